@@ -1,0 +1,62 @@
+"""A progress bar on stderr for long work; silent where nobody looks."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+Advance = Callable[[str, int, int | None], None]
+
+_WORTH_SHOWING_AFTER_S = 0.5
+
+
+@contextmanager
+def stages(*, quiet: bool) -> Iterator[Advance]:
+    """Show how far each stage of a run is, once it has run long enough to be worth it.
+
+    Parameters
+    ----------
+    quiet : bool
+        Show nothing.
+
+    Yields
+    ------
+    callable
+        Takes the name of the stage, what is done and the whole, if known.
+    """
+    if quiet or not sys.stderr.isatty():
+        yield lambda _name, _done, _total: None
+        return
+    start = time.monotonic()
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    tasks = {}
+    running = False
+
+    def advance(name: str, done: int, total: int | None) -> None:
+        nonlocal running
+        if not running and time.monotonic() - start < _WORTH_SHOWING_AFTER_S:
+            return
+        if not running:
+            bar.start()
+            running = True
+        if name not in tasks:
+            tasks[name] = bar.add_task(name, total=total)
+        bar.update(tasks[name], completed=done, total=total)
+
+    try:
+        yield advance
+    finally:
+        if running:
+            bar.stop()

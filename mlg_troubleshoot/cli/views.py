@@ -1,0 +1,248 @@
+"""What a terminal shows: one gear, a batch, problems, the model."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected, Verdict
+from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.workflows import CheckResult
+
+STYLES = {
+    Verdict.INVALID: "bold magenta",
+    Verdict.OUTSIDE_MARGIN: "bold red",
+    Verdict.INCOMPLETE: "bold yellow",
+    Verdict.WITHIN_MARGIN: "bold green",
+    Verdict.INCONCLUSIVE: "bold yellow",
+}
+# A shape beside each verdict: it must be readable without colour.
+MARKS = {
+    Verdict.INVALID: "X",
+    Verdict.OUTSIDE_MARGIN: "!",
+    Verdict.INCOMPLETE: "?",
+    Verdict.WITHIN_MARGIN: "=",
+    Verdict.INCONCLUSIVE: "~",
+}
+_LINES_OF_A_BATCH = 60
+_LINES_OF_PROBLEMS = 40
+
+
+def _console(*, to_stderr: bool = False) -> Console:
+    console = Console(stderr=to_stderr, highlight=False)
+    if not console.is_terminal:
+        return Console(stderr=to_stderr, highlight=False, width=110)
+    return console
+
+
+def show_notes(notes: Sequence[str]) -> None:
+    """Show notes on the input, on stderr.
+
+    Parameters
+    ----------
+    notes : sequence of str
+        The notes.
+    """
+    console = _console(to_stderr=True)
+    for note in notes:
+        console.print(Text(f"Note: {note}"))
+
+
+def show_problems(problems: Sequence[Problem]) -> None:
+    """Show what is wrong with the input, on stderr: place, value, expected, remedy.
+
+    Parameters
+    ----------
+    problems : sequence of Problem
+        The problems.
+    """
+    if not problems:
+        return
+    console = _console(to_stderr=True)
+    noun = "problem" if len(problems) == 1 else "problems"
+    console.print(Text(f"{len(problems)} {noun} in the input:", style="bold"))
+    for problem in problems[:_LINES_OF_PROBLEMS]:
+        found = "" if problem.value is None else f" found {problem.value!r};"
+        console.print(Text(f"  {problem.place()}:{found} expected {problem.expected}."))
+        console.print(Text(f"    What to do: {problem.remedy}"))
+    if len(problems) > _LINES_OF_PROBLEMS:
+        rest = len(problems) - _LINES_OF_PROBLEMS
+        console.print(Text(f"  … and {rest} more; --json lists all of them, --annotate marks them in your workbook."))
+
+
+def show_one(judgement: Judgement, gear: Gear) -> None:
+    """Show one gear: verdict, next action, ranked joints, warnings.
+
+    Parameters
+    ----------
+    judgement : Assessment or Rejected
+        The judgement.
+    gear : Gear
+        The gear.
+    """
+    console = _console()
+    if isinstance(judgement, Rejected):
+        row = judgement.row
+        title = f"{row.tail_no or 'tail ?'}  {row.side or 'side ?'}  {row.record_id or 'record ?'}"
+        console.print(Panel(Text(judgement.next_action.text), title=Text(f"{title} · INVALID – do not use")))
+        for warning in judgement.warnings:
+            console.print(Text(f"* {warning}"))
+        return
+    a, i = judgement, judgement.inspection
+    body = Text()
+    if a.measured_statement is not None:
+        body.append(a.measured_statement + "\n", style="bold")
+    body.append(a.headline + "\n")
+    if a.geometry_spread_in is not None and a.probability_within_margin is not None:
+        low, high = a.geometry_spread_in
+        body.append(
+            f"Probability that the worst case is within the margin {100 * a.probability_within_margin:.1f} %; "
+            f"the other reconstructed linkages give {low:.4f} to {high:.4f} in.\n"
+        )
+    body.append("NEXT: ", style="bold")
+    body.append(a.next_action.text, style="bold")
+    console.print(
+        Panel(
+            body,
+            title=Text(f"{i.tail_no}  {i.side}  {i.record_id}"),
+            subtitle=Text(f"[{MARKS[a.verdict]}] {a.verdict.words}", style=STYLES[a.verdict]),
+        )
+    )
+    console.print(_joint_table(a))
+    alike = sorted({tuple(sorted((f.joint, *f.alike))) for f in a.joints if f.alike})
+    if alike:
+        pairs = ", ".join("#" + " = #".join(str(n) for n in group) for group in alike)
+        console.print(Text(f"Both ends of one link act alike ({pairs}): the plunger cannot tell which end is worn."))
+    if a.repair_sets:
+        console.print(_repair_table(a))
+    for warning in a.warnings:
+        console.print(Text(f"* {warning}"))
+    console.print(
+        Text(
+            f"Model: {gear.name}, geometry {gear.provenance}. The worst case is a bound, not a prediction. "
+            "Troubleshooting aid, not maintenance data; within margin is not an approval for return to service.",
+            style="dim",
+        )
+    )
+
+
+def _joint_table(a: Assessment) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for heading, side in (
+        ("rank", "right"),
+        ("joint", "left"),
+        ("clearance in", "right"),
+        ("limit in", "right"),
+        ("contributes in", "right"),
+        ("S first", "right"),
+        ("S total", "right"),
+        ("amplif.", "right"),
+        ("rank range", "right"),
+    ):
+        table.add_column(heading, justify="right" if side == "right" else "left", no_wrap=heading != "joint")
+    for f in a.ranked:
+        table.add_row(*_joint_cells(f), style="bold" if f.over_limit else "")
+    return table
+
+
+def _joint_cells(f: JointFinding) -> tuple[str, ...]:
+    clearance = "not measured" if f.clearance_in is None else f"{f.clearance_in:.4f}"
+    low, high = f.rank_range
+    return (
+        str(f.rank),
+        f"#{f.joint} {f.name}" + (" OVER LIMIT" if f.over_limit else ""),
+        clearance,
+        f"{f.limit_in:.4f}",
+        "-" if f.contribution_in is None else f"{f.contribution_in:.4f}",
+        f"{f.first_order:.3f}",
+        f"{f.total_order:.3f}",
+        f"{f.plunger_amplification:.2f}",
+        str(low) if low == high else f"{low}-{high}",
+    )
+
+
+def _repair_table(a: Assessment) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="bold", title="Repairs that would bring it within", title_justify="left")
+    for heading in ("restore", "access min", "worst case in", "probability within"):
+        table.add_column(heading, justify="left" if heading == "restore" else "right")
+    for s in a.repair_sets or ():
+        table.add_row(
+            ", ".join(f"#{n}" for n in s.joints),
+            f"{s.access_minutes:.0f}",
+            f"{s.predicted_displacement_in:.4f}",
+            f"{100 * s.probability_within_margin:.1f} %",
+        )
+    return table
+
+
+def _urgency(judgement: Judgement) -> tuple[int, float]:
+    order = list(Verdict).index(judgement.verdict)
+    if isinstance(judgement, Rejected):
+        return (len(Verdict), 0.0)
+    remaining = judgement.remaining_in
+    return (order, float("-inf") if remaining is None else remaining)
+
+
+def show_batch(result: CheckResult) -> None:
+    """Show a batch: how many of each verdict, worst gears first, one line a gear.
+
+    Parameters
+    ----------
+    result : CheckResult
+        The check.
+    """
+    console = _console()
+    counts = result.counts
+    summary = Text(f"{len(result.judgements)} inspections: ")
+    summary.append(
+        " · ".join(f"{counts[v]} {v.value.replace('_', ' ').lower()}" for v in Verdict if counts[v])
+    )
+    console.print(summary)
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for heading in ("", "verdict", "tail", "side", "record", "worst in", "margin", "chance", "next"):
+        numeric = heading in {"worst in", "margin", "chance"}
+        table.add_column(heading, justify="right" if numeric else "left", no_wrap=heading != "next", overflow="ellipsis")
+    ordered = sorted(result.judgements, key=_urgency)
+    for judgement in ordered[:_LINES_OF_A_BATCH]:
+        table.add_row(*_batch_cells(judgement))
+    console.print(table)
+    if len(ordered) > _LINES_OF_A_BATCH:
+        console.print(Text(f"… and {len(ordered) - _LINES_OF_A_BATCH} more gears; --csv or --json lists all of them."))
+    worst = Counter(f.joint for j in result.judgements if isinstance(j, Assessment) for f in j.joints if f.over_limit)
+    if worst:
+        listed = ", ".join(f"#{joint} on {count}" for joint, count in worst.most_common())
+        console.print(Text(f"Joints over their limit: {listed} inspections."))
+    console.print(
+        Text(
+            f"Model: {result.gear.name}, geometry {result.gear.provenance}. 'worst' is a bound; 'chance' is of exceeding "
+            "the margin with random directions. Troubleshooting aid, not maintenance data.",
+            style="dim",
+        )
+    )
+
+
+def _batch_cells(judgement: Judgement) -> tuple[Text | str, ...]:
+    verdict = Text(judgement.verdict.value, style=STYLES[judgement.verdict])
+    mark = MARKS[judgement.verdict]
+    if isinstance(judgement, Rejected):
+        row = judgement.row
+        return (mark, verdict, row.tail_no or "?", str(row.side or "?"), row.record_id or "?", "-", "-", "-", judgement.next_action.text)
+    i = judgement.inspection
+    worst, chance = judgement.predicted_displacement_in, judgement.probability_exceed_random_directions
+    return (
+        mark,
+        verdict,
+        i.tail_no,
+        str(i.side),
+        i.record_id,
+        "open" if worst is None else f"{worst:.4f}",
+        f"{judgement.margin_in:.4f}",
+        "-" if chance is None else f"{100 * chance:.0f} %",
+        judgement.next_action.text,
+    )

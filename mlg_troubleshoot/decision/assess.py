@@ -1,0 +1,285 @@
+"""From inspections to judgements: prediction, verdict, ranking and next action."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.decision import measured as measured_plunger
+from mlg_troubleshoot.decision.assessment import (
+    Assessment,
+    JointFinding,
+    Judgement,
+    Rejected,
+    UncertaintyBudget,
+    Verdict,
+)
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
+from mlg_troubleshoot.decision.next_action import choose, correct
+from mlg_troubleshoot.decision.prediction import BatchPrediction, Extension, predict_batch
+from mlg_troubleshoot.decision.ranking import rank_joints
+from mlg_troubleshoot.decision.repair import repair_sets
+from mlg_troubleshoot.decision.rule import verdict
+from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.studies.table import IndexTable
+
+Array = NDArray[np.float64]
+
+_CHUNK = 1024
+
+
+@dataclass(frozen=True, slots=True)
+class AssessOptions:
+    """What to compute beside the verdicts.
+
+    Parameters
+    ----------
+    repairs : bool
+        Search the repair sets of each gear that is not within its margin.
+    allowances : bool
+        Find how much further each joint may wear.
+    extension : Extension or None
+        An extension of the model to predict with.
+    """
+
+    repairs: bool = False
+    allowances: bool = False
+    extension: Extension | None = None
+
+
+def assess(
+    rows: Sequence[Inspection | InvalidRow],
+    gear: Gear,
+    table: IndexTable,
+    options: AssessOptions | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> tuple[Judgement, ...]:
+    """Judge each row, in order.
+
+    Parameters
+    ----------
+    rows : sequence of Inspection or InvalidRow
+        The rows.
+    gear : Gear
+        The gear.
+    table : IndexTable
+        Its precomputed indices.
+    options : AssessOptions, optional
+        What else to compute.
+    progress : callable, optional
+        Called with the number of rows just done.
+
+    Returns
+    -------
+    tuple of Assessment or Rejected
+        One for each row, in the same order.
+    """
+    options = options or AssessOptions()
+    judged: list[Judgement] = []
+    for start in range(0, len(rows), _CHUNK):
+        part = rows[start : start + _CHUNK]
+        valid = [row for row in part if isinstance(row, Inspection)]
+        assessed = iter(_assess_valid(valid, gear, table, options) if valid else ())
+        for row in part:
+            if isinstance(row, Inspection):
+                judged.append(next(assessed))
+            else:
+                judged.append(Rejected(row, correct(row), row.warnings))
+        if progress is not None:
+            progress(len(part))
+    return tuple(judged)
+
+
+def _assess_valid(
+    inspections: Sequence[Inspection], gear: Gear, table: IndexTable, options: AssessOptions
+) -> list[Assessment]:
+    batch = predict_batch(gear, inspections, options.extension)
+    p_lower = batch.lower.probability_within(batch.margin_in, batch.margin_u_in)
+    p_upper = batch.upper.probability_within(batch.margin_in, batch.margin_u_in)
+    u = batch.lower.standard_uncertainty(batch.margin_u_in)
+    critical = np.array([joint.critical for joint in gear.joints])
+    missing = np.any(~np.isfinite(batch.clearance_in) & critical, axis=1)
+    return [
+        _assess_one(
+            gear, table, options, inspection, batch, i, float(p_lower[i]), float(p_upper[i]), float(u[i]), bool(missing[i])
+        )
+        for i, inspection in enumerate(inspections)
+    ]
+
+
+def _assess_one(
+    gear: Gear,
+    table: IndexTable,
+    options: AssessOptions,
+    inspection: Inspection,
+    batch: BatchPrediction,
+    i: int,
+    p_lower: float,
+    p_upper: float,
+    u: float,
+    critical_missing: bool,
+) -> Assessment:
+    lower, margin = batch.lower, float(batch.margin_in[i])
+    displacement = float(lower.displacement_in[i])
+    closes = bool(np.isfinite(displacement))
+    found = verdict(p_lower, p_upper, critical_missing=critical_missing)
+    allowances = None
+    if options.allowances and closes:
+        allowances = allowance(gear, inspection, margin, options.extension)
+    findings = rank_joints(gear, table, inspection.clearance_in, allowances)
+    sets = None
+    if options.repairs:
+        sets = repair_sets(gear, inspection, margin, options.extension) if found is not Verdict.WITHIN_MARGIN else ()
+    over, under = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
+    upper = float(batch.upper.displacement_in[i])
+    chance = float(batch.chance_random[i])
+    model_source = (
+        "provisional: the larger of 0.003 in and 10 % of the prediction, because one published failure gives none"
+        if options.extension is None
+        else f"residual scatter of the diagnosis ({options.extension.describe()})"
+    )
+    return Assessment(
+        inspection=inspection,
+        verdict=found,
+        predicted_displacement_in=displacement if closes else None,
+        over_travel_in=over if closes else None,
+        under_travel_in=under if closes else None,
+        predicted_upper_in=upper if np.isfinite(upper) else None,
+        margin_in=margin,
+        remaining_in=margin - displacement if closes else None,
+        standard_uncertainty_in=u if closes else None,
+        probability_within_margin=p_lower,
+        probability_exceed_random_directions=chance if closes else None,
+        geometry_spread_in=(float(lower.spread_low_in[i]), float(lower.spread_high_in[i]))
+        if closes and np.isfinite(lower.spread_low_in[i])
+        else None,
+        budget=UncertaintyBudget(
+            float(lower.u_clearances_in[i]),
+            float(lower.u_geometry_in[i]),
+            float(lower.u_model_in[i]),
+            float(batch.margin_u_in[i]),
+            model_source,
+        )
+        if closes
+        else None,
+        over_directions_rad=tuple(lower.worst.over_directions[i].tolist()) if closes else (),
+        under_directions_rad=tuple(lower.worst.under_directions[i].tolist()) if closes else (),
+        joints=findings,
+        next_action=choose(gear, found, findings, inspection.outcome, sets),
+        headline=_headline(found, displacement, chance, margin, p_lower, inspection, findings),
+        measured_statement=measured_plunger.statement(inspection, margin),
+        repair_sets=sets,
+        warnings=_warnings(gear, inspection, findings, closes, over, under, u),
+    )
+
+
+def _headline(
+    found: Verdict,
+    displacement: float,
+    chance: float,
+    margin: float,
+    p_within: float,
+    inspection: Inspection,
+    findings: Sequence[JointFinding],
+) -> str:
+    if not np.isfinite(displacement):
+        return "With these clearances the linkage does not close in its worst position: outside any margin."
+    numbers = f"worst case {displacement:.4f} in, chance with random directions {100 * chance:.0f} %"
+    if found is Verdict.OUTSIDE_MARGIN:
+        return f"Clearances could push the plunger outside its margin of {margin:.4f} in ({numbers})."
+    if found is Verdict.WITHIN_MARGIN:
+        return (
+            f"Even the worst case stays within the margin of {margin:.4f} in ({numbers}). "
+            "Continue fault isolation; not a release."
+        )
+    if found is Verdict.INCOMPLETE:
+        open_joints = ", ".join(f"#{f.joint}" for f in findings if f.clearance_in is None)
+        return f"Cannot clear: not measured {open_joints} ({numbers} from the measured joints alone)."
+    return (
+        f"Too close to the margin of {margin:.4f} in to say ({numbers}; "
+        f"probability that the bound is within the margin {100 * p_within:.0f} %)."
+    )
+
+
+def _warnings(
+    gear: Gear,
+    inspection: Inspection,
+    findings: Sequence[JointFinding],
+    closes: bool,
+    over: float,
+    under: float,
+    u: float,
+) -> tuple[str, ...]:
+    warnings = list(inspection.warnings)
+    for finding in findings:
+        if finding.over_limit and finding.clearance_in is not None:
+            warnings.append(
+                f"Joint #{finding.joint} {finding.name}: {finding.clearance_in:.4f} in radial is above its limit of "
+                f"{finding.limit_in:.4f} in ({gear.joint(finding.joint).limit.kind}): reject to the manual."
+            )
+    down_lock = inspection.plunger_down_lock_in
+    low, high = gear.down_lock_range
+    if down_lock is not None and not low <= down_lock <= high:
+        warnings.append(
+            f"Plunger at Down Lock {down_lock:.4f} in is outside {low:.2f} to {high:.2f} in: check the rigging first."
+        )
+    if not closes:
+        warnings.append("With these clearances the linkage does not close in every direction: check the entries.")
+    else:
+        differs = measured_plunger.disagreement(inspection, over, under, u)
+        if differs is not None:
+            warnings.append(differs)
+    if inspection.gauge_u_is_default:
+        warnings.append(
+            f"Gauge uncertainty not stated: {inspection.gauge_u_in:.5f} in radial taken as the default."
+        )
+    if inspection.outcome is Outcome.FAILED and inspection.measured_displacement_in is None:
+        warnings.append("The gear failed and no plunger displacement was measured: measure it at mid-position.")
+    return tuple(warnings)
+
+
+def allowance(
+    gear: Gear, inspection: Inspection, margin_in: float, extension: Extension | None = None
+) -> dict[int, float]:
+    """Find how much further each measured joint may wear, alone, until the worst case reaches the margin.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    inspection : Inspection
+        What was measured; unmeasured joints count as 0.
+    margin_in : float
+        Allowed displacement. [in]
+    extension : Extension, optional
+        An extension of the model.
+
+    Returns
+    -------
+    dict of int to float
+        Further radial wear by joint, at most the gear file's hard limit; empty if the worst case is beyond
+        the margin already. [in]
+    """
+    places = [(j, joint.number) for j, joint in enumerate(gear.joints) if joint.number in inspection.clearance_in]
+    start = np.array([[inspection.clearance_in.get(number, 0.0) for number in gear.joint_numbers]])
+
+    def worst(clearance: Array) -> Array:
+        same = [inspection] * len(clearance)
+        adjustment = Adjustment(clearance) if extension is None else extension.adjust(same, clearance)
+        return adjusted_worst_case(gear.model, adjustment).magnitude_in
+
+    if not worst(start)[0] <= margin_in:
+        return {}
+    low, high = np.zeros(len(places)), np.full(len(places), gear.hard_limit.value)
+    for _ in range(18):
+        middle = 0.5 * (low + high)
+        worn = np.tile(start, (len(places), 1))
+        for row, (j, _number) in enumerate(places):
+            worn[row, j] += middle[row]
+        fits = worst(worn) <= margin_in
+        low, high = np.where(fits, middle, low), np.where(fits, high, middle)
+    return {number: float(low[row]) for row, (_j, number) in enumerate(places)}

@@ -1,0 +1,176 @@
+"""One inspection of one gear, as the decision and the diagnosis need it: radial clearances in inches."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import date
+from enum import StrEnum
+
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+
+DEFAULT_GAUGE_U_IN = 0.0005
+
+
+class Side(StrEnum):
+    """Which main landing gear. There is no default."""
+
+    LH = "LH"
+    RH = "RH"
+
+
+class Outcome(StrEnum):
+    """What the gear did."""
+
+    RETRACTED = "RETRACTED"
+    FAILED = "FAILED"
+
+
+class Approach(StrEnum):
+    """How the position was approached before the plunger was read."""
+
+    EXTENDING = "EXTENDING"
+    RETRACTING = "RETRACTING"
+
+
+@dataclass(frozen=True, slots=True)
+class EnteredClearance:
+    """A clearance reading exactly as it was entered, for the report.
+
+    Parameters
+    ----------
+    text : str
+        The entered text or number.
+    unit : LengthUnit
+        The unit it was read in.
+    """
+
+    text: str
+    unit: LengthUnit
+
+
+@dataclass(frozen=True, slots=True)
+class RowSource:
+    """Where an inspection came from.
+
+    Parameters
+    ----------
+    file : str or None
+        File as the user named it; None for the prompts and the command line.
+    sheet : str or None
+        Worksheet, None for CSV.
+    row : int or None
+        Row in the file, counted from 1 with the header included.
+    """
+
+    file: str | None = None
+    sheet: str | None = None
+    row: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Inspection:
+    """One valid inspection of one gear.
+
+    Parameters
+    ----------
+    record_id, tail_no : str
+        Identity, always text.
+    side : Side
+        Which gear.
+    convention : ClearanceConvention
+        How the clearances were entered; `clearance_in` is already radial.
+    clearance_in : mapping of int to float
+        Radial clearance by joint number; a joint that is not a key was not measured. [in]
+    entered : mapping of int to EnteredClearance
+        The readings as entered.
+    gauge_u_in : float
+        Standard uncertainty of one radial clearance. [in]
+    gauge_u_is_default : bool
+        True if the record does not state the uncertainty.
+    readings_in : tuple of float
+        Measured plunger displacements at mid-position, over-travel positive. [in]
+    plunger_gauge_u_in : float or None
+        Declared repeatability of one plunger reading. [in]
+    plunger_down_lock_in : float or None
+        Measured plunger position at Down Lock. [in]
+    margin_in : float or None
+        This gear's margin as found at rigging. [in]
+    margin_u_in : float
+        Standard uncertainty of that margin. [in]
+    outcome : Outcome or None
+        What the gear did.
+    inspection_date : datetime.date or None
+        Day of the inspection.
+    gear_landings, temperature_c, hydraulic_pressure_psi : float or None
+        Landings since overhaul; temperature [°C]; pressure [psi].
+    approach : Approach or None
+        Approach direction before the plunger reading.
+    gauge_id, technician_id : str or None
+        Who measured with what.
+    axial_float_in : mapping of int to float
+        End float of a joint along its pin. [in]
+    carried : mapping of str to str
+        Columns that only travel to the report: work order, manual reference, remarks, unknown columns.
+    warnings : tuple of str
+        What the reader noticed about this row, in plain words.
+    source : RowSource
+        Where it came from.
+    """
+
+    record_id: str
+    tail_no: str
+    side: Side
+    convention: ClearanceConvention
+    clearance_in: Mapping[int, float]
+    entered: Mapping[int, EnteredClearance] = field(default_factory=dict)
+    gauge_u_in: float = DEFAULT_GAUGE_U_IN
+    gauge_u_is_default: bool = True
+    readings_in: tuple[float, ...] = ()
+    plunger_gauge_u_in: float | None = None
+    plunger_down_lock_in: float | None = None
+    margin_in: float | None = None
+    margin_u_in: float = 0.0
+    outcome: Outcome | None = None
+    inspection_date: date | None = None
+    gear_landings: float | None = None
+    temperature_c: float | None = None
+    hydraulic_pressure_psi: float | None = None
+    approach: Approach | None = None
+    gauge_id: str | None = None
+    technician_id: str | None = None
+    axial_float_in: Mapping[int, float] = field(default_factory=dict)
+    carried: Mapping[str, str] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    source: RowSource = RowSource()
+
+    @property
+    def measured_displacement_in(self) -> float | None:
+        """Mean of the plunger readings, over-travel positive; None if there is none. [in]"""
+        return sum(self.readings_in) / len(self.readings_in) if self.readings_in else None
+
+
+@dataclass(frozen=True, slots=True)
+class InvalidRow:
+    """A data row that cannot be judged; its problems stand in the list of problems.
+
+    Parameters
+    ----------
+    record_id, tail_no : str or None
+        Identity as far as it could be read.
+    side : Side or None
+        Which gear, if it could be read.
+    correct : tuple of str
+        The columns to correct, in the order of the table.
+    warnings : tuple of str
+        What else the reader noticed about this row, suggestions included.
+    source : RowSource
+        Where it came from.
+    """
+
+    record_id: str | None
+    tail_no: str | None
+    side: Side | None
+    correct: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+    source: RowSource = RowSource()

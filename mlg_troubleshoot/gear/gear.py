@@ -1,0 +1,177 @@
+"""One gear type: its linkage, joints, margin and limits, and the ensemble of linkages that fit as well."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from mlg_troubleshoot.gear.cycle import RetractionCycle
+from mlg_troubleshoot.gear.joints import JointSpec
+from mlg_troubleshoot.gear.model import Calibration, LinkageModel
+from mlg_troubleshoot.gear.sources import Sourced
+from mlg_troubleshoot.geometry.mechanism import Mechanism
+
+
+@dataclass(frozen=True, slots=True)
+class Linkage:
+    """One set of numbers for the gear's linkage.
+
+    Parameters
+    ----------
+    name : str
+        ``A`` for the reference of the shipped gear, ``B`` … for its ensemble.
+    mechanism : Mechanism
+        Coordinates and steps.
+    stroke : tuple of float
+        Input at Down Lock and at mid-position. [in]
+    """
+
+    name: str
+    mechanism: Mechanism
+    stroke: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """A part of the gear that must be opened to reach its joints.
+
+    Parameters
+    ----------
+    name, description : str
+        Its name and what opening it means.
+    access : Sourced
+        Time to open and close it, once for all joints in it. [min]
+    """
+
+    name: str
+    description: str
+    access: Sourced
+
+
+@dataclass(frozen=True)
+class Gear:
+    """A gear type as its gear file describes it.
+
+    Parameters
+    ----------
+    id, name, provenance : str
+        Identity, and where the geometry comes from in one sentence; it stands in every output.
+    reference : Linkage
+        The linkage that predicts.
+    ensemble : tuple of Linkage
+        All linkages that reproduce the published numbers, the reference first.
+    joints : tuple of JointSpec
+        Joints with clearance, in the order of the mechanism.
+    areas : tuple of Area
+        Areas to open.
+    calibration : Calibration
+        Down Lock displacement and travel. [in]
+    margin : Sourced
+        Allowed displacement of the plunger from mid-position. [in]
+    bearing_span : Sourced
+        Length over which end float tilts a link. [in]
+    hard_limit, confirm_above : Sourced
+        Radial clearance beyond which a reading is refused, and beyond which it is asked again. [in]
+    down_lock_range : tuple of float
+        Allowed plunger displacement at Down Lock. [in]
+    cycle : RetractionCycle or None
+        What the plunger's position means in the retraction sequence, as far as the source states it.
+    numbers : tuple of Sourced
+        Every number behind a prediction, with its source.
+    geometry_sha256, ensemble_sha256 : str
+        Hash of the reference geometry with its calibration, and of the ensemble.
+    path : Path
+        The gear file.
+    indices_file : Path
+        The precomputed sensitivity table that goes with it.
+    """
+
+    id: str
+    name: str
+    provenance: str
+    reference: Linkage
+    ensemble: tuple[Linkage, ...]
+    joints: tuple[JointSpec, ...]
+    areas: tuple[Area, ...]
+    calibration: Calibration
+    margin: Sourced
+    bearing_span: Sourced
+    hard_limit: Sourced
+    confirm_above: Sourced
+    down_lock_range: tuple[float, float]
+    cycle: RetractionCycle | None
+    numbers: tuple[Sourced, ...]
+    geometry_sha256: str
+    ensemble_sha256: str
+    path: Path
+    indices_file: Path
+
+    @cached_property
+    def model(self) -> LinkageModel:
+        """The calibrated reference linkage."""
+        return self.model_of(self.reference)
+
+    @cached_property
+    def ensemble_models(self) -> tuple[LinkageModel, ...]:
+        """The calibrated linkages of the ensemble, the reference first."""
+        return (self.model, *(self.model_of(linkage) for linkage in self.ensemble[1:]))
+
+    def model_of(self, linkage: Linkage) -> LinkageModel:
+        """Calibrate one linkage of this gear.
+
+        Parameters
+        ----------
+        linkage : Linkage
+            The linkage.
+
+        Returns
+        -------
+        LinkageModel
+            The linkage with this gear's calibration.
+        """
+        return LinkageModel(linkage.mechanism, linkage.stroke, self.calibration)
+
+    @property
+    def joint_numbers(self) -> tuple[int, ...]:
+        """Numbers of the joints, in the order of the mechanism."""
+        return tuple(joint.number for joint in self.joints)
+
+    @property
+    def limits_in(self) -> np.ndarray:
+        """Largest allowed radial clearance of each joint, shape (n_joints,). [in]"""
+        return np.array([joint.limit.value for joint in self.joints])
+
+    @cached_property
+    def alike(self) -> dict[int, tuple[int, ...]]:
+        """Joints that act alike with each joint: the other end of the same link, by structure."""
+        groups: dict[int, tuple[int, ...]] = {number: () for number in self.joint_numbers}
+        for step in self.reference.mechanism.steps:
+            for number in step.virtual_links:
+                groups[number] = tuple(other for other in step.virtual_links if other != number)
+        return groups
+
+    def joint(self, number: int) -> JointSpec:
+        """Return the joint of that number.
+
+        Parameters
+        ----------
+        number : int
+            Number of the joint.
+
+        Returns
+        -------
+        JointSpec
+            The joint.
+
+        Raises
+        ------
+        KeyError
+            If the gear has no such joint.
+        """
+        for joint in self.joints:
+            if joint.number == number:
+                return joint
+        raise KeyError(f"{self.name} has no joint {number}")

@@ -1,0 +1,354 @@
+"""Gear files: a gear type as TOML, with a source for every number."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from copy import deepcopy
+from functools import lru_cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mlg_troubleshoot.errors import GearFileError, UsageError
+from mlg_troubleshoot.gear.cycle import RetractionCycle, Stage, ValveState
+from mlg_troubleshoot.gear.gear import Area, Gear, Linkage
+from mlg_troubleshoot.gear.joints import JointSpec
+from mlg_troubleshoot.gear.model import Calibration
+from mlg_troubleshoot.gear.sources import Source, Sourced, SourceKind
+from mlg_troubleshoot.gear.toml_table import TomlTable
+from mlg_troubleshoot.geometry.mechanism import (
+    Crank,
+    Dyad,
+    Lever,
+    Mechanism,
+    Output,
+    Plane,
+    Point,
+    Slider,
+    Slot,
+    Step,
+)
+
+DEFAULT_GEAR = "hawker-800xp"
+_GEOMETRY_KEYS = ("input", "planes", "points", "steps", "output", "calibration")
+
+
+def shipped_gears() -> tuple[str, ...]:
+    """Return the names of the gears that ship with the program.
+
+    Returns
+    -------
+    tuple of str
+        Names for :func:`load_gear`.
+    """
+    folder = Path(str(files("mlg_troubleshoot.gear"))) / "data"
+    names = {p.stem for p in folder.glob("*.toml")}
+    return tuple(sorted(n for n in names if not n.endswith(("-ensemble", "-targets"))))
+
+
+@lru_cache(maxsize=8)
+def load_gear(name_or_path: str | Path = DEFAULT_GEAR) -> Gear:
+    """Load a gear by its shipped name or from a gear file.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        ``hawker-800xp``, or the path of a TOML file.
+
+    Returns
+    -------
+    Gear
+        The gear, checked and assembled.
+
+    Raises
+    ------
+    UsageError
+        If there is no such gear.
+    GearFileError
+        If the file is not valid; the message names the place.
+    MechanismError
+        If the linkage cannot be assembled.
+    """
+    text = str(name_or_path)
+    path = Path(str(files("mlg_troubleshoot.gear"))) / "data" / f"{text}.toml"
+    if text not in shipped_gears():
+        path = Path(text)
+        if not path.is_file():
+            raise UsageError(
+                f"there is no gear {text!r}",
+                f"Give one of {', '.join(shipped_gears())}, or the path of a gear file.",
+            )
+    raw = _parse(path)
+    table = TomlTable(raw, path)
+    if table.whole("schema") != 1:
+        raise table.fail("schema", "1")
+    sources = _sources(table.table("sources"))
+    numbers = _Numbers(sources)
+    reference = _linkage(raw, path, "A", numbers)
+    ensemble_name = table.text("ensemble", "")
+    members: dict[str, dict[str, Any]] = {}
+    if ensemble_name:
+        members = _members(raw, path.with_name(ensemble_name))
+    calibration, down_lock_range = _calibration(raw, path, numbers)
+    entry = table.table("entry")
+    table.skip(*_GEOMETRY_KEYS)
+    gear = Gear(
+        id=table.text("id"),
+        name=table.text("name"),
+        provenance=table.text("provenance"),
+        reference=reference,
+        ensemble=(reference, *(_linkage(m, path, n, None) for n, m in members.items())),
+        joints=tuple(_joint(t, numbers) for t in table.tables("joints")),
+        areas=tuple(_area(t, numbers) for t in table.tables("areas")),
+        calibration=calibration,
+        margin=numbers.read(table.table("margin"), "value", "in"),
+        bearing_span=numbers.read(table.table("bearing_span"), "value", "in"),
+        hard_limit=numbers.read(entry, "hard_limit", "in"),
+        confirm_above=numbers.read(entry, "confirm_above", "in"),
+        down_lock_range=down_lock_range,
+        cycle=_cycle(table.table("cycle")) if table.has("cycle") else None,
+        numbers=tuple(numbers.found),
+        geometry_sha256=_sha256({k: raw.get(k) for k in _GEOMETRY_KEYS}),
+        ensemble_sha256=_sha256({n: {k: m.get(k) for k in _GEOMETRY_KEYS} for n, m in members.items()}),
+        path=path,
+        indices_file=path.with_name(table.text("indices", f"{path.stem}-indices.json")),
+    )
+    table.finish()
+    _check_joints(gear, path)
+    return gear
+
+
+def _parse(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise GearFileError(f"{path}: cannot be read as TOML: {error}", "Correct the file and run again.") from error
+
+
+def _sha256(value: Any) -> str:
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
+
+
+class _Numbers:
+    """Reads numbers with their sources and remembers them all."""
+
+    def __init__(self, sources: dict[str, Source]) -> None:
+        self.sources = sources
+        self.found: list[Sourced] = []
+
+    def source(self, table: TomlTable, key: str = "source") -> Source:
+        name = table.text(key)
+        if name not in self.sources:
+            raise table.fail(key, f"one of the sources {', '.join(self.sources)}")
+        return self.sources[name]
+
+    def add(self, value: float, unit: str, source: Source) -> Sourced:
+        number = Sourced(value, unit, source.kind, source.text)
+        self.found.append(number)
+        return number
+
+    def read(self, table: TomlTable, key: str, unit: str, source_key: str = "source") -> Sourced:
+        return self.add(table.number(key), unit, self.source(table, source_key))
+
+
+def _sources(table: TomlTable) -> dict[str, Source]:
+    sources = {}
+    for name in table.keys():
+        entry = table.table(name)
+        kind = entry.text("kind")
+        if kind not in set(SourceKind):
+            raise entry.fail("kind", "one of " + ", ".join(SourceKind))
+        sources[name] = Source(name, SourceKind(kind), entry.text("text"))
+        entry.finish()
+    return sources
+
+
+def _linkage(raw: dict[str, Any], path: Path, name: str, numbers: _Numbers | None) -> Linkage:
+    """Read the mechanism; numbers of the reference are remembered with their sources."""
+    table = TomlTable(raw, path)
+
+    def sourced(entry: TomlTable, *values: tuple[float, str]) -> None:
+        if numbers is not None:
+            source = numbers.source(entry)
+            for value, unit in values:
+                numbers.add(value, unit, source)
+        elif entry.has("source"):
+            entry.text("source")
+
+    drive = table.table("input")
+    stroke, reference = drive.pair("range"), drive.number("reference")
+    drive.text("name")
+    sourced(drive, (stroke[1], "in"))
+    drive.finish()
+    planes = []
+    for entry in table.tables("planes"):
+        if entry.has("parent"):
+            direction, dihedral = entry.number("hinge_direction_deg"), entry.number("dihedral_deg")
+            planes.append(
+                Plane(
+                    entry.text("name"),
+                    entry.text("parent"),
+                    entry.text("hinge_point"),
+                    float(np.radians(direction)),
+                    float(np.radians(dihedral)),
+                )
+            )
+            sourced(entry, (direction, "deg"), (dihedral, "deg"))
+        else:
+            planes.append(Plane(entry.text("name")))
+        entry.finish()
+    points = []
+    for entry in table.tables("points"):
+        x, y = entry.pair("at")
+        link = entry.whole("virtual_link") if entry.has("virtual_link") else None
+        points.append(Point(entry.text("name"), entry.text("plane"), x, y, entry.flag("fixed"), link))
+        sourced(entry, (x, "in"), (y, "in"))
+        entry.finish()
+    steps = []
+    for entry in table.tables("steps"):
+        steps.append(_step(entry))
+        sourced(entry)
+        entry.finish()
+    read = table.table("output")
+    kind = read.text("kind")
+    if kind not in ("position", "angle"):
+        raise read.fail("kind", "position or angle")
+    output = Output("position" if kind == "position" else "angle", read.text("joint"), read.text("pivot", ""))
+    read.finish()
+    mechanism = Mechanism(tuple(planes), tuple(points), tuple(steps), output, reference)
+    return Linkage(name, mechanism, stroke)
+
+
+def _step(t: TomlTable) -> Step:
+    joint, links = t.text("joint"), t.wholes("virtual_links")
+    match t.text("type"):
+        case "crank":
+            return Crank(joint, t.text("pivot"), links)
+        case "dyad":
+            return Dyad(joint, t.text("upstream"), t.text("downstream"), _sign(t), links, t.flag("driven"))
+        case "lever":
+            return Lever(joint, t.text("pivot"), t.text("follows"), links)
+        case "slot":
+            return Slot(joint, t.text("pivot"), t.text("pin"), links)
+        case "slider":
+            return Slider(joint, t.text("upstream"), float(np.radians(t.number("axis_deg"))), _sign(t), links)
+        case _:
+            raise t.fail("type", "crank, dyad, lever, slot or slider")
+
+
+def _sign(table: TomlTable) -> float:
+    sign = table.number("sign")
+    if sign not in (1.0, -1.0):
+        raise table.fail("sign", "+1 or -1")
+    return sign
+
+
+def _members(raw: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:
+    """Each member of the ensemble as a full description: the reference with its own numbers in place."""
+    table = TomlTable(_parse(path), path)
+    table.text("source")
+    members = table.table("members")
+    full = {}
+    for name in members.keys():
+        member = members.table(name)
+        new = deepcopy({k: raw.get(k) for k in _GEOMETRY_KEYS})
+        new["input"].update(range=list(member.pair("range")), reference=member.number("reference"))
+        if member.has("planes"):
+            planes = member.table("planes")
+            for plane in planes.keys():
+                change = planes.table(plane)
+                _entry(new["planes"], "name", plane, planes).update({k: change.number(k) for k in change.keys()})
+        points = member.table("points")
+        for point in points.keys():
+            _entry(new["points"], "name", point, points)["at"] = list(points.pair(point))
+        steps = member.table("steps")
+        for joint in steps.keys():
+            change = steps.table(joint)
+            _entry(new["steps"], "joint", joint, steps).update({k: change.number(k) for k in change.keys()})
+        member.finish()
+        full[name] = new
+    table.finish()
+    return full
+
+
+def _entry(entries: list[dict[str, Any]], key: str, value: str, table: TomlTable) -> dict[str, Any]:
+    for entry in entries:
+        if entry.get(key) == value:
+            return entry
+    raise table.fail(value, f"a {key} of the gear file")
+
+
+def _calibration(
+    raw: dict[str, Any], path: Path, numbers: _Numbers
+) -> tuple[Calibration, tuple[float, float]]:
+    table = TomlTable(raw, path)
+    if not table.has("calibration"):
+        return Calibration(), (-np.inf, np.inf)
+    entry = table.table("calibration")
+    found = Calibration(
+        numbers.read(entry, "down_lock", "in").value, numbers.read(entry, "travel", "in").value
+    )
+    allowed = entry.pair("down_lock_range")
+    entry.finish()
+    return found, allowed
+
+
+def _joint(t: TomlTable, numbers: _Numbers) -> JointSpec:
+    joint = JointSpec(
+        number=t.whole("number"),
+        point=t.text("point", str(t.whole("number"))),
+        name=t.text("name"),
+        location=t.text("location"),
+        limit=numbers.read(t, "limit", "in", "limit_source"),
+        new_part=numbers.read(t, "new_part", "in", "new_part_source"),
+        access=numbers.read(t, "access_min", "min", "access_source"),
+        area=t.text("area"),
+        critical=t.flag("critical"),
+    )
+    t.finish()
+    return joint
+
+
+def _area(t: TomlTable, numbers: _Numbers) -> Area:
+    area = Area(t.text("name"), t.text("description"), numbers.read(t, "access_min", "min"))
+    t.finish()
+    return area
+
+
+def _cycle(t: TomlTable) -> RetractionCycle:
+    cycle = RetractionCycle(
+        stages=tuple(Stage(s.text("name"), s.text("meaning"), s.text("plunger")) for s in t.tables("stages")),
+        release=t.texts("release"),
+        retraction_order=t.texts("retraction_order"),
+        extension_order=t.texts("extension_order"),
+        valve=tuple(
+            ValveState(v.text("plunger"), v.text("flow"), v.text("stage"), v.text("result"))
+            for v in t.tables("valve")
+        ),
+        beyond=t.text("beyond"),
+        short=t.text("short"),
+        within=t.text("within"),
+        source=t.text("source"),
+    )
+    t.finish()
+    return cycle
+
+
+def _check_joints(gear: Gear, path: Path) -> None:
+    links = gear.reference.mechanism.virtual_links
+    if tuple(sorted(gear.joint_numbers)) != links or gear.joint_numbers != links:
+        raise GearFileError(
+            f"{path.name}: joints {list(gear.joint_numbers)} and virtual links {list(links)} differ",
+            "Describe each virtual link of the steps as one joint, in ascending order.",
+        )
+    areas = {area.name for area in gear.areas}
+    for joint in gear.joints:
+        if joint.area not in areas:
+            raise GearFileError(
+                f"{path.name}: joint {joint.number} lies in area {joint.area!r}, which is not described",
+                f"Use one of {', '.join(sorted(areas))}, or add the area.",
+            )

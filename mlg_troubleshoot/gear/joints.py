@@ -1,0 +1,67 @@
+"""The joints of a gear whose clearances are its inputs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from mlg_troubleshoot.gear.sources import Sourced
+
+
+class Joint(IntEnum):
+    """The ten joints of the Hawker 800XP down-lock linkage, in the order of the mechanism (Fig. 7).
+
+    The paper's text names joints 2 to 5 (section 4.3); the other names follow from the order of the
+    mechanism in section 3.2 and the reconstructed topology.
+    """
+
+    ACTUATOR_ROD_END = 1
+    LOCKING_PIN = 2
+    SHORT_LINK_INNER = 3
+    LOCKING_LEVER_PIVOT = 4
+    SHORT_LINK_OUTER = 5
+    EXTENSION_LEVER_END = 6
+    BELLCRANK_INPUT = 7
+    BELLCRANK_PIVOT = 8
+    BELLCRANK_OUTPUT = 9
+    PLUNGER_PIN = 10
+
+
+@dataclass(frozen=True, slots=True)
+class JointSpec:
+    """A joint as the gear file describes it.
+
+    Parameters
+    ----------
+    number : int
+        Its number, which is also the number of its virtual link.
+    point : str
+        The mechanism's point.
+    name, location : str
+        What it is called and where a technician finds it.
+    limit : Sourced
+        Largest radial clearance that the manual allows. [in]
+    new_part : Sourced
+        Radial clearance after the joint is restored. [in]
+    access : Sourced
+        Time to reach and measure this joint once its area is open. [min]
+    area : str
+        Area that must be opened for it; opening counts once for all joints of the area.
+    critical : bool
+        True for a joint without whose measurement nothing can be cleared (joints 1 to 5 of the paper).
+    """
+
+    number: int
+    point: str
+    name: str
+    location: str
+    limit: Sourced
+    new_part: Sourced
+    access: Sourced
+    area: str
+    critical: bool
+
+    @property
+    def label(self) -> str:
+        """Number and name: ``#3 short link inner bearing``."""
+        return f"#{self.number} {self.name}"

@@ -1,0 +1,195 @@
+"""The calibrated linkage: clearances in, plunger displacement out (sections 3.2 and 4.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.errors import MechanismError
+from mlg_troubleshoot.geometry.kernel import Kernel
+from mlg_troubleshoot.geometry.mechanism import Mechanism
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """Numbers that tie the linkage to the technical order (section 4.2).
+
+    Parameters
+    ----------
+    down_lock_in : float
+        Plunger displacement at Down Lock. [in]
+    travel_in : float or None
+        Travel from the least displacement to mid-position; None leaves the rate at 1. [in]
+    """
+
+    down_lock_in: float = 0.0
+    travel_in: float | None = None
+
+
+class LinkageModel:
+    """One calibrated linkage, ready to be solved for batches of clearances.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The linkage, given at mid-position.
+    stroke : tuple of float
+        Input at Down Lock and at mid-position, the release stroke. [in]
+    calibration : Calibration
+        What the plunger does without clearance.
+
+    Attributes
+    ----------
+    kernel : Kernel
+        The solver.
+    rate : float
+        Calibration rate k of P(s) = P(0) + k (p(s) − p(0)); its sign makes over-travel positive. [1]
+    stroke : tuple of float
+        The release stroke. [in]
+
+    Raises
+    ------
+    MechanismError
+        If the linkage does not close over the whole stroke without clearance.
+    """
+
+    def __init__(self, mechanism: Mechanism, stroke: tuple[float, float], calibration: Calibration) -> None:
+        self.kernel = Kernel(mechanism)
+        self.mechanism = mechanism
+        self.stroke = stroke
+        self.calibration = calibration
+        self.joint_numbers = mechanism.virtual_links
+        self._down_lock, self._mid = (
+            float(self.kernel.output(s, self.kernel.no_clearance())) for s in (stroke[0], stroke[1])
+        )
+        curve = self.kernel.output(np.linspace(*stroke, 201), self.kernel.no_clearance())
+        if not np.all(np.isfinite(curve)):
+            closed = 100.0 * float(np.mean(np.isfinite(curve)))
+            raise MechanismError(f"Without clearance the linkage closes over only {closed:.0f} % of its stroke.")
+        self.rate = 1.0
+        if calibration.travel_in is not None:
+            self.rate = self._calibrated_rate(calibration.travel_in)
+
+    def _calibrated_rate(self, travel_in: float) -> float:
+        """Rate k that makes the travel from the least displacement to mid-position as prescribed."""
+        direction = np.sign(self._mid - self._down_lock)
+        if direction == 0:
+            raise MechanismError("The plunger is at the same place at Down Lock and at mid-position.")
+        low, high = self.stroke
+        for _ in range(4):
+            strokes = np.linspace(low, high, 101)
+            along = direction * self.kernel.output(strokes, self.kernel.no_clearance())
+            least = int(np.argmin(along))
+            low, high = strokes[max(least - 1, 0)], strokes[min(least + 1, 100)]
+        return float(direction * travel_in / (direction * self._mid - along[least]))
+
+    def numbers(self, changed: Mapping[str, Any] | None) -> Sequence[Any] | None:
+        """Return the linkage's numbers with some of them changed, for the kernel.
+
+        Parameters
+        ----------
+        changed : mapping of str to array_like or None
+            New values by parameter name; arrays broadcast with the virtual links.
+
+        Returns
+        -------
+        sequence or None
+            All numbers in the kernel's order; None if nothing is changed.
+
+        Raises
+        ------
+        KeyError
+            If the linkage has no number of that name.
+        """
+        if not changed:
+            return None
+        values: list[Any] = self.kernel.parameters.tolist()
+        for name, value in changed.items():
+            values[self.kernel.parameter_index(name)] = value
+        return values
+
+    def displacement(
+        self, links: Sequence[Any], changed: Mapping[str, Any] | None = None, stroke: Any = None
+    ) -> Array:
+        """Displacement of the plunger by clearances, measured from the same linkage without them.
+
+        Parameters
+        ----------
+        links : sequence of array_like, length 2 × number of joints
+            Components of each virtual link. [in]
+        changed : mapping of str to array_like, optional
+            Numbers of the linkage that differ from the nominal ones.
+        stroke : array_like, optional
+            Actuator extension, else mid-position. [in]
+
+        Returns
+        -------
+        ndarray
+            Displacement, over-travel positive; NaN where the linkage does not close. [in]
+        """
+        at = self.stroke[1] if stroke is None else stroke
+        zero = self._mid if stroke is None else self.kernel.output(at, self.kernel.no_clearance())
+        return np.asarray(self.rate * (self.kernel.output(at, links, self.numbers(changed)) - zero))
+
+    def plunger(self, stroke: Any, links: Sequence[Any] | None = None) -> Array:
+        """Plunger position over the release stroke (Fig. 12): P(s) = P(0) + k (p(s) − p(0)).
+
+        Parameters
+        ----------
+        stroke : array_like
+            Actuator extension from Down Lock. [in]
+        links : sequence of array_like, optional
+            Components of each virtual link, else no clearance. [in]
+
+        Returns
+        -------
+        ndarray
+            Position; NaN where the linkage does not close. [in]
+        """
+        links = self.kernel.no_clearance() if links is None else links
+        moved = self.kernel.output(stroke, links) - self._down_lock
+        return np.asarray(self.calibration.down_lock_in + self.rate * moved)
+
+    def plunger_amplification(self, step_in: float = 1e-5) -> Array:
+        """Plunger amplification index A_iP of each joint at mid-position (Eq. 8) in the limit of small clearance.
+
+        Parameters
+        ----------
+        step_in : float
+            Step of the central differences. [in]
+
+        Returns
+        -------
+        ndarray, shape (n_joints,)
+            Largest plunger displacement per unit of clearance over all directions. [1]
+        """
+        n = 2 * len(self.joint_numbers)
+        steps = np.vstack([np.eye(n), -np.eye(n)]) * step_in
+        moved = self.displacement([steps[:, i] for i in range(n)])
+        gradient = (moved[:n] - moved[n:]) / (2 * step_in)
+        return np.hypot(gradient[0::2], gradient[1::2])
+
+
+def links_from(clearance_in: Array, directions: Array) -> list[Array]:
+    """Components of virtual links from their lengths and directions.
+
+    Parameters
+    ----------
+    clearance_in : ndarray, shape (..., n_joints)
+        Lengths. [in]
+    directions : ndarray, shape (..., n_joints)
+        Directions in the plane of each joint. [rad]
+
+    Returns
+    -------
+    list of ndarray
+        x and y of each joint in turn, each of the broadcast shape. [in]
+    """
+    x, y = clearance_in * np.cos(directions), clearance_in * np.sin(directions)
+    return [part[..., j] for j in range(x.shape[-1]) for part in (x, y)]

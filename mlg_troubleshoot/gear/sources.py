@@ -1,0 +1,57 @@
+"""Where a number comes from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class SourceKind(StrEnum):
+    """How much a number is worth."""
+
+    TECHNICAL_ORDER = "technical order"
+    STATED = "stated in the paper"
+    RECONSTRUCTED = "reconstructed"
+    MEASURED = "measured"
+    ASSUMED = "assumed"
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A source that numbers of a gear file refer to by name.
+
+    Parameters
+    ----------
+    name : str
+        Name within the gear file.
+    kind : SourceKind
+        What kind of source.
+    text : str
+        The source in words: document, section, how it was obtained.
+    """
+
+    name: str
+    kind: SourceKind
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Sourced:
+    """A number with its unit and its source.
+
+    Parameters
+    ----------
+    value : float
+        The number.
+    unit : str
+        Its unit.
+    kind : SourceKind
+        What kind of source.
+    source : str
+        The source in words.
+    """
+
+    value: float
+    unit: str
+    kind: SourceKind
+    source: str

@@ -1,0 +1,226 @@
+"""Runs a mechanism's program on arrays: numpy always, numba where it is installed.
+
+Both run the same formulas of :mod:`~mlg_troubleshoot.geometry.program`. A position that does not close is
+NaN; nobody drops it.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.geometry.mechanism import Mechanism
+from mlg_troubleshoot.geometry.program import Program, write_program
+
+Array = NDArray[Any]
+_NUMPY = {"sqrt": np.sqrt, "cos": np.cos, "sin": np.sin, "arctan2": np.arctan2}
+CHUNK = 4096
+
+
+def numba_is_installed() -> bool:
+    """Tell whether the compiled kernel can be used (extra ``fast``).
+
+    Returns
+    -------
+    bool
+        True if numba can be imported.
+    """
+    return importlib.util.find_spec("numba") is not None
+
+
+class Kernel:
+    """A mechanism that can be solved for many virtual links at once.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    parameters : ndarray, shape (n_parameters,)
+        Its numbers, in the order of `parameter_names`. [in, rad or 1]
+    parameter_names : tuple of str
+        Their names: ``length.3-5``, ``point.E.x`` …
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+        program = write_program(mechanism)
+        self._program = program
+        self.parameter_names = tuple(program.parameters)
+        self.parameters = np.array(list(program.parameters.values()))
+        self.parameters.flags.writeable = False
+        self._output = _function(program, (program.output,))
+
+    def parameter_index(self, name: str) -> int:
+        """Return the place of a parameter.
+
+        Parameters
+        ----------
+        name : str
+            Name of the parameter.
+
+        Returns
+        -------
+        int
+            Its index in `parameters`.
+
+        Raises
+        ------
+        KeyError
+            If the mechanism has no such number.
+        """
+        try:
+            return self.parameter_names.index(name)
+        except ValueError:
+            raise KeyError(f"{name!r} is not a number of this mechanism") from None
+
+    def output(
+        self, position: Array | float, links: Sequence[Array | float], parameters: Sequence[Any] | None = None
+    ) -> Array:
+        """Solve the mechanism and read its output.
+
+        Parameters
+        ----------
+        position : array_like
+            Input of the mechanism. [in or rad]
+        links : sequence of array_like, length 2 × number of virtual links
+            Components x, y of each virtual link in turn; all must broadcast with each other. [in]
+        parameters : sequence of array_like, optional
+            Numbers of the mechanism in place of its own, each a number or an array that broadcasts.
+
+        Returns
+        -------
+        ndarray
+            Output; NaN where the mechanism does not close. [in or rad]
+        """
+        with np.errstate(invalid="ignore", divide="ignore"):
+            numbers = self.parameters.tolist() if parameters is None else parameters
+            return np.asarray(self._output(position, links, numbers)[0])
+
+    def positions(
+        self, position: Array | float, links: Sequence[Array | float], parameters: Sequence[Any] | None = None
+    ) -> dict[str, tuple[Array, Array]]:
+        """Coordinates of every point, each in its own plane.
+
+        Parameters
+        ----------
+        position, links, parameters
+            As for :meth:`output`.
+
+        Returns
+        -------
+        dict of str to tuple of ndarray
+            x and y of each point; a joint with a virtual link is given at its downstream link. [in]
+        """
+        names = self._program.joints
+        wanted = tuple(dict.fromkeys(n for pair in names.values() for n in pair))
+        function = _function(self._program, wanted)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            numbers = self.parameters.tolist() if parameters is None else parameters
+            values = dict(zip(wanted, function(position, links, numbers), strict=True))
+        return {joint: (np.asarray(values[x]), np.asarray(values[y])) for joint, (x, y) in names.items()}
+
+    def no_clearance(self) -> list[float]:
+        """Return virtual links of zero length.
+
+        Returns
+        -------
+        list of float
+            Zeros, for `links` of :meth:`output`. [in]
+        """
+        return [0.0] * (2 * len(self.mechanism.virtual_links))
+
+    def batch(
+        self,
+        position: float,
+        clearance_in: Array,
+        directions: Array,
+        *,
+        compiled: bool = False,
+        out: Array | None = None,
+    ) -> Array:
+        """Output for a large batch of clearances in fixed directions, as fast as this machine allows.
+
+        Parameters
+        ----------
+        position : float
+            Input of the mechanism. [in or rad]
+        clearance_in : ndarray, shape (n_virtual_links, n)
+            Lengths of the virtual links, one row a joint. [in]
+        directions : ndarray, shape (n_virtual_links,)
+            Their directions. [rad]
+        compiled : bool
+            Use numba (it must be installed); else numpy.
+        out : ndarray, shape (n,), optional
+            Where to write the result.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Output; NaN where the mechanism does not close. [in or rad]
+        """
+        clearance = np.ascontiguousarray(clearance_in, float)
+        result = np.empty(clearance.shape[1]) if out is None else out
+        unit = np.column_stack([np.cos(directions), np.sin(directions)])
+        if compiled:
+            _compiled_loop(self._program.source((self._program.output,), release=False), self._layout())(
+                float(position), clearance, unit, self.parameters, result
+            )
+            return result
+        numbers = self.parameters.tolist()
+        with np.errstate(invalid="ignore", divide="ignore"):
+            for start in range(0, clearance.shape[1], CHUNK):
+                part = clearance[:, start : start + CHUNK]
+                links = [part[j] * unit[j, axis] for j in range(len(unit)) for axis in (0, 1)]
+                result[start : start + CHUNK] = self._output(position, links, numbers)[0]
+        return result
+
+    def _layout(self) -> tuple[int, tuple[int, ...], str]:
+        return len(self.parameters), self._program.virtual_links, self._program.output
+
+
+def _function(program: Program, results: tuple[str, ...]) -> Callable[..., tuple[Any, ...]]:
+    return _build(program.source(results), program.inputs, results)
+
+
+@lru_cache(maxsize=64)
+def _build(body: str, inputs: tuple[str, ...], results: tuple[str, ...]) -> Callable[..., tuple[Any, ...]]:
+    n_links = sum(name.startswith("v") for name in inputs)
+    unpack = ""
+    if n_links:
+        unpack += f"    ({', '.join(inputs[:n_links])},) = links\n"
+    unpack += f"    ({', '.join(inputs[n_links:])},) = numbers\n"
+    text = f"def solve(s, links, numbers):\n{unpack}{body}\n    return ({', '.join(results)},)\n"
+    namespace: dict[str, Any] = dict(_NUMPY)
+    exec(compile(text, "<mechanism>", "exec"), namespace)
+    function: Callable[..., tuple[Any, ...]] = namespace["solve"]
+    return function
+
+
+@lru_cache(maxsize=16)
+def _compiled_loop(body: str, layout: tuple[int, tuple[int, ...], str]) -> Callable[..., None]:
+    import numba
+
+    n_parameters, links, result = layout
+    lines = ["def loop(s, clearance, unit, numbers, out):"]
+    lines += [f"    p{i} = numbers[{i}]" for i in range(n_parameters)]
+    lines += [f"    u{axis}{n} = unit[{j}, {i}]" for j, n in enumerate(links) for i, axis in enumerate("xy")]
+    lines.append("    for i in range(out.shape[0]):")
+    for j, n in enumerate(links):
+        lines += [f"        c{n} = clearance[{j}, i]"]
+        lines += [f"        v{axis}{n} = c{n} * u{axis}{n}" for axis in "xy"]
+    lines += ["    " + line for line in body.splitlines()]
+    lines.append(f"        out[i] = {result}")
+    namespace: dict[str, Any] = dict(_NUMPY)
+    exec(compile("\n".join(lines), "<mechanism>", "exec"), namespace)
+    compiled: Callable[..., None] = numba.njit(error_model="numpy", nogil=True)(namespace["loop"])
+    return compiled

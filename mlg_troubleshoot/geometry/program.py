@@ -1,0 +1,284 @@
+"""From a mechanism to one straight-line program: every step becomes a few scalar formulas.
+
+The same formulas run on numpy arrays (:mod:`~mlg_troubleshoot.geometry.kernel`), on complex numbers for
+derivatives, and compiled in a loop. In a plane, Eq. 6 needs no matrix: with ω normal to AB the bracket
+``I + [ω] sin θ + [ω]² (1 − cos θ)`` maps AB to ``cos θ · AB + sin θ · ω × AB``, and Eq. 3 gives cos θ.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlg_troubleshoot.errors import MechanismError
+from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot, Step
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """Formulas that locate every joint of a mechanism, in order, and its numbers by name.
+
+    Parameters
+    ----------
+    parameters : dict of str to float
+        Every number of the mechanism by name: ``point.E.x``, ``length.3-5``, ``sign.5`` … [in, rad or 1]
+    lines : tuple of tuple of str
+        Assignments (name, expression); each name is assigned once.
+    joints : dict of str to tuple of str
+        Names of the two coordinates of each point, in its plane.
+    output : str
+        Name of the output.
+    virtual_links : tuple of int
+        Virtual links, each the two inputs ``vx{n}`` and ``vy{n}``. [in]
+    """
+
+    parameters: dict[str, float]
+    lines: tuple[tuple[str, str], ...]
+    joints: dict[str, tuple[str, str]]
+    output: str
+    virtual_links: tuple[int, ...]
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names that the formulas take, beside ``s``: virtual links, then parameters."""
+        links = [f"v{axis}{n}" for n in self.virtual_links for axis in "xy"]
+        return (*links, *(f"p{i}" for i in range(len(self.parameters))))
+
+    def source(self, results: tuple[str, ...], indent: str = "    ", *, release: bool = True) -> str:
+        """Write the formulas that the given results need, as Python source.
+
+        Parameters
+        ----------
+        results : tuple of str
+            Names to keep.
+        indent : str
+            Indentation of each line.
+        release : bool
+            Delete each intermediate after its last use, so that arrays are reused while in the cache.
+
+        Returns
+        -------
+        str
+            The source, without a function header or a return.
+        """
+        needed = set(results)
+        kept: list[tuple[str, str, set[str]]] = []
+        for name, expression in reversed(self.lines):
+            if name in needed:
+                used = set(_NAME.findall(expression))
+                needed |= used
+                kept.append((name, expression, used))
+        kept.reverse()
+        assigned = {name for name, _ in self.lines}
+        last = {used: i for i, (_, _, names) in enumerate(kept) for used in names}
+        text = []
+        for i, (name, expression, names) in enumerate(kept):
+            text.append(f"{indent}{name} = {expression}")
+            dead = sorted(n for n in names if last[n] == i and n in assigned and n not in results)
+            if release and dead:
+                text.append(f"{indent}del {', '.join(dead)}")
+        return "\n".join(text)
+
+
+_NAME = re.compile(r"\b[a-z]\w*\b")
+
+
+class _Writer:
+    """Collects parameters and formulas while a mechanism is written out."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+        self.parameters: dict[str, float] = {}
+        self.lines: list[tuple[str, str]] = []
+        self.joints: dict[str, tuple[str, str]] = {}
+
+    def parameter(self, name: str, value: float) -> str:
+        if name not in self.parameters:
+            self.parameters[name] = float(value)
+        return f"p{list(self.parameters).index(name)}"
+
+    def let(self, expression: str) -> str:
+        name = f"t{len(self.lines)}"
+        self.lines.append((name, expression))
+        return name
+
+    def shifted(self, place: tuple[str, str], links: tuple[int, ...]) -> tuple[str, str]:
+        if not links:
+            return place
+        x, y = place
+        return (
+            self.let(" + ".join([x, *(f"vx{n}" for n in links)])),
+            self.let(" + ".join([y, *(f"vy{n}" for n in links)])),
+        )
+
+    def seen_from(self, name: str, plane: str) -> tuple[tuple[str, str], str | None]:
+        """Coordinates of a located point in another plane, and its distance from that plane."""
+        point = self.mechanism.point(name)
+        x, y = self.joints[name]
+        if point.plane == plane:
+            return (x, y), None
+        origin, axes = self.mechanism.frame(plane)
+        from_origin, from_axes = self.mechanism.frame(point.plane)
+        constant = axes @ (from_origin - origin)
+        slopes = axes @ from_axes[:2].T
+        seen = []
+        for i, axis in enumerate("uvh"):
+            c0, cx, cy = (
+                self.parameter(f"transfer.{point.plane}.{plane}.{axis}{part}", value)
+                for part, value in zip("0xy", (constant[i], slopes[i, 0], slopes[i, 1]), strict=True)
+            )
+            seen.append(self.let(f"{c0} + {cx} * {x} + {cy} * {y}"))
+        return (seen[0], seen[1]), seen[2]
+
+    def same_plane(self, step: Step, *names: str) -> None:
+        plane = self.mechanism.point(step.joint).plane
+        for name in names:
+            if self.mechanism.point(name).plane != plane:
+                raise MechanismError(f"Step {step.joint!r}: {name!r} is not in the plane {plane!r}.")
+
+    def length(self, a: str, b: str) -> tuple[str, float]:
+        value = float(
+            np.linalg.norm(self.mechanism.reference_in_space(a) - self.mechanism.reference_in_space(b))
+        )
+        if value == 0.0:
+            raise MechanismError(f"The link {a}-{b} has no length.")
+        return self.parameter(f"length.{a}-{b}", value), value
+
+
+def write_program(mechanism: Mechanism) -> Program:
+    """Write a mechanism out as straight-line formulas.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+
+    Returns
+    -------
+    Program
+        Its formulas and numbers.
+
+    Raises
+    ------
+    MechanismError
+        If a step mixes planes that it cannot mix, or a link has no length.
+    """
+    w = _Writer(mechanism)
+    for point in mechanism.points:
+        if point.fixed:
+            place = (
+                w.parameter(f"point.{point.name}.x", point.x),
+                w.parameter(f"point.{point.name}.y", point.y),
+            )
+            links = () if point.virtual_link is None else (point.virtual_link,)
+            w.joints[point.name] = w.shifted(place, links)
+    for step in mechanism.steps:
+        match step:
+            case Crank():
+                _crank(w, step)
+            case Dyad():
+                _dyad(w, step)
+            case Lever():
+                _lever(w, step)
+            case Slot():
+                _slot(w, step)
+            case Slider():
+                _slider(w, step)
+    return Program(w.parameters, tuple(w.lines), w.joints, _output(w), mechanism.virtual_links)
+
+
+def _travel(w: _Writer) -> str:
+    return w.let(f"s - {w.parameter('input.reference', w.mechanism.reference_input)}")
+
+
+def _crank(w: _Writer, step: Crank) -> None:
+    w.same_plane(step, step.pivot)
+    joint, pivot = w.mechanism.point(step.joint), w.mechanism.point(step.pivot)
+    length, _ = w.length(step.pivot, step.joint)
+    start = w.parameter(f"crank.{step.joint}.angle", np.arctan2(joint.y - pivot.y, joint.x - pivot.x))
+    angle = w.let(f"{start} + {_travel(w)}")
+    x, y = w.joints[step.pivot]
+    place = (w.let(f"{x} + {length} * cos({angle})"), w.let(f"{y} + {length} * sin({angle})"))
+    w.joints[step.joint] = w.shifted(place, step.virtual_links)
+
+
+def _dyad(w: _Writer, step: Dyad) -> None:
+    w.same_plane(step, step.downstream)
+    first, _ = w.length(step.upstream, step.joint)
+    second, _ = w.length(step.joint, step.downstream)
+    sign = w.parameter(f"sign.{step.joint}", step.sign)
+    seen, height = w.seen_from(step.upstream, w.mechanism.point(step.joint).plane)
+    ax, ay = w.shifted(seen, step.virtual_links)
+    bx, by = w.joints[step.downstream]
+    reach = w.let(f"{first} + {_travel(w)}") if step.driven else first
+    square = w.let(f"{reach} * {reach}" + (f" - {height} * {height}" if height else ""))
+    dx, dy = w.let(f"{bx} - {ax}"), w.let(f"{by} - {ay}")
+    inverse = w.let(f"1.0 / ({dx} * {dx} + {dy} * {dy})")
+    along = w.let(f"0.5 + 0.5 * ({square} - {second} * {second}) * {inverse}")
+    across = w.let(f"{sign} * sqrt({square} * {inverse} - {along} * {along})")
+    w.joints[step.joint] = (
+        w.let(f"{ax} + {along} * {dx} - {across} * {dy}"),
+        w.let(f"{ay} + {along} * {dy} + {across} * {dx}"),
+    )
+
+
+def _lever(w: _Writer, step: Lever) -> None:
+    w.same_plane(step, step.pivot, step.follows)
+    joint, pivot, led = (w.mechanism.point(n) for n in (step.joint, step.pivot, step.follows))
+    ratio = complex(joint.x - pivot.x, joint.y - pivot.y) / complex(led.x - pivot.x, led.y - pivot.y)
+    along = w.parameter(f"lever.{step.joint}.along", ratio.real)
+    across = w.parameter(f"lever.{step.joint}.across", ratio.imag)
+    (px, py), (fx, fy) = w.joints[step.pivot], w.joints[step.follows]
+    dx, dy = w.let(f"{fx} - {px}"), w.let(f"{fy} - {py}")
+    place = (
+        w.let(f"{px} + {along} * {dx} - {across} * {dy}"),
+        w.let(f"{py} + {along} * {dy} + {across} * {dx}"),
+    )
+    w.joints[step.joint] = w.shifted(place, step.virtual_links)
+
+
+def _slot(w: _Writer, step: Slot) -> None:
+    w.same_plane(step, step.pivot, step.pin)
+    joint, pivot, pin = (w.mechanism.point(n) for n in (step.joint, step.pivot, step.pin))
+    to_pin = complex(pin.x - pivot.x, pin.y - pivot.y)
+    arm = complex(joint.x - pivot.x, joint.y - pivot.y) / (to_pin / abs(to_pin))
+    along = w.parameter(f"arm.{step.joint}.along", arm.real)
+    across = w.parameter(f"arm.{step.joint}.across", arm.imag)
+    px, py = w.joints[step.pivot]
+    qx, qy = w.shifted(w.joints[step.pin], step.virtual_links)
+    dx, dy = w.let(f"{qx} - {px}"), w.let(f"{qy} - {py}")
+    inverse = w.let(f"1.0 / sqrt({dx} * {dx} + {dy} * {dy})")
+    w.joints[step.joint] = (
+        w.let(f"{px} + ({along} * {dx} - {across} * {dy}) * {inverse}"),
+        w.let(f"{py} + ({along} * {dy} + {across} * {dx}) * {inverse}"),
+    )
+
+
+def _slider(w: _Writer, step: Slider) -> None:
+    joint = w.mechanism.point(step.joint)
+    length, _ = w.length(step.upstream, step.joint)
+    sign = w.parameter(f"sign.{step.joint}", step.sign)
+    axis = w.parameter(f"slider.{step.joint}.axis", step.axis)
+    ox = w.parameter(f"slider.{step.joint}.x", joint.x)
+    oy = w.parameter(f"slider.{step.joint}.y", joint.y)
+    seen, height = w.seen_from(step.upstream, joint.plane)
+    ux, uy = w.shifted(seen, step.virtual_links)
+    c, s = w.let(f"cos({axis})"), w.let(f"sin({axis})")
+    dx, dy = w.let(f"{ux} - {ox}"), w.let(f"{uy} - {oy}")
+    across = w.let(f"{c} * {dy} - {s} * {dx}")
+    square = w.let(f"{length} * {length}" + (f" - {height} * {height}" if height else ""))
+    position = w.let(f"{c} * {dx} + {s} * {dy} + {sign} * sqrt({square} - {across} * {across})")
+    w.joints[step.joint] = (w.let(f"{ox} + {c} * {position}"), w.let(f"{oy} + {s} * {position}"))
+    w.lines.append((f"position_{step.joint}", position))
+
+
+def _output(w: _Writer) -> str:
+    output = w.mechanism.output
+    if output.kind == "position":
+        if not isinstance(w.mechanism.step(output.joint), Slider):
+            raise MechanismError(f"The output is the position of {output.joint!r}, which is not a slider.")
+        return f"position_{output.joint}"
+    (jx, jy), (px, py) = w.joints[output.joint], w.joints[output.pivot]
+    return w.let(f"arctan2({jy} - {py}, {jx} - {px})")
