@@ -107,7 +107,9 @@ def check(
     ] = None,
     measured: Annotated[
         str | None,
-        typer.Option("--measured", metavar="VALUE", help="Measured plunger displacement at mid-position, e.g. 0.041in."),
+        typer.Option(
+            "--measured", metavar="VALUE", help="Measured plunger displacement at mid-position, e.g. 0.041in."
+        ),
     ] = None,
     gear: GearOption = "hawker-800xp",
     unit: UnitOption = None,
@@ -129,7 +131,8 @@ def check(
     page: Annotated[Page, typer.Option("--page", help="Paper of the report.")] = Page.A4,
     repairs: Annotated[bool, typer.Option("--repairs", help="Repair sets for each gear of a batch.")] = False,
     extension: Annotated[
-        Path | None, typer.Option("--extension", metavar="TOML", help="Predict with an extension of the model.")
+        Path | None,
+        typer.Option("--extension", metavar="TOML", help="Predict with an extension of the model."),
     ] = None,
     annotate: Annotated[
         Path | None,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import sys
-
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -14,7 +13,6 @@ from typing import BinaryIO
 import typer
 
 from mlg_troubleshoot import workflows
-
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, Outcome, Side
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.gear.gear import Gear
@@ -79,7 +77,14 @@ def run(arguments: CheckArguments) -> None:
 
 
 def _result(arguments: CheckArguments, options: workflows.CheckOptions) -> workflows.CheckResult:
-    single = (arguments.values, arguments.tail, arguments.side, arguments.record_id, arguments.outcome, arguments.measured)
+    single = (
+        arguments.values,
+        arguments.tail,
+        arguments.side,
+        arguments.record_id,
+        arguments.outcome,
+        arguments.measured,
+    )
     if arguments.files:
         if any(single):
             raise UsageError(
@@ -103,7 +108,9 @@ def _column_map(pairs: tuple[str, ...]) -> dict[str, str]:
     for pair in pairs:
         header, sign, column = pair.rpartition("=")
         if not sign or not header.strip() or not column.strip():
-            raise UsageError(f"--map {pair!r} is not HEADER=COLUMN", "Write for example --map 'Spiel 3=clearance_3_mm'.")
+            raise UsageError(
+                f"--map {pair!r} is not HEADER=COLUMN", "Write for example --map 'Spiel 3=clearance_3_mm'."
+            )
         mapped[header.strip()] = column.strip()
     return mapped
 
@@ -138,7 +145,8 @@ def _from_flags(arguments: CheckArguments, gear: Gear) -> Inspection:
     ]
     if missing or arguments.tail is None or arguments.side is None or arguments.convention is None:
         raise UsageError(
-            f"--set needs {', '.join(missing)}", "Say which gear, and what a clearance reading is: there is no default."
+            f"--set needs {', '.join(missing)}",
+            "Say which gear, and what a clearance reading is: there is no default.",
         )
     clearances: dict[int, float] = {}
     entered: dict[int, EnteredClearance] = {}
@@ -157,7 +165,9 @@ def _from_flags(arguments: CheckArguments, gear: Gear) -> Inspection:
         gauge_u_in=0.0005 / arguments.convention.per_radial,
         readings_in=_readings(arguments),
         outcome=_outcome(arguments.outcome),
-        warnings=tuple(_confirm(gear, number, value) for number, value in clearances.items() if value > gear.confirm_above.value),
+        warnings=tuple(
+            _confirm(gear, number, value) for number, value in clearances.items() if value > gear.confirm_above.value
+        ),
     )
 
 
@@ -177,7 +187,8 @@ def _one_value(
     number = int(name.strip().lstrip("#"))
     if number not in gear.joint_numbers:
         raise UsageError(
-            f"--set {text!r}: {gear.name} has no joint {number}", f"Its joints are {_numbers(gear.joint_numbers)}."
+            f"--set {text!r}: {gear.name} has no joint {number}",
+            f"Its joints are {_numbers(gear.joint_numbers)}.",
         )
     length = parse_length(written)
     radial = length.inches(arguments.unit) / convention.per_radial
@@ -253,9 +264,7 @@ def _show(arguments: CheckArguments, result: workflows.CheckResult) -> None:
         views.show_batch(result)
 
 
-def _write_reports(
-    arguments: CheckArguments, options: workflows.CheckOptions, result: workflows.CheckResult
-) -> None:
+def _write_reports(arguments: CheckArguments, options: workflows.CheckOptions, result: workflows.CheckResult) -> None:
     from mlg_troubleshoot.cli.progress import stages
 
     if arguments.report is None:
@@ -281,5 +290,3 @@ def _write_reports(
                 typer.echo(f"Report: {path}", err=True)
         else:
             typer.echo(f"Reports: {len(files)} files in {arguments.report}, first {files[0].name}", err=True)
-
-

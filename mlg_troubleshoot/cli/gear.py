@@ -124,7 +124,14 @@ def verify(name: str, *, as_json: bool) -> None:
             mark = "holds" if n.holds else ("DOES NOT HOLD" if n.should_hold else "known not to hold")
             style = "bold red" if n in failed else ""
             table.add_row(
-                n.quantity, n.section, n.printed, f"{n.computed:.4g} {n.unit}".strip(), n.tolerance, n.status, mark, style=style
+                n.quantity,
+                n.section,
+                n.printed,
+                f"{n.computed:.4g} {n.unit}".strip(),
+                n.tolerance,
+                n.status,
+                mark,
+                style=style,
             )
         console.print(table)
         verdict = "all that should hold hold" if not failed else f"{len(failed)} that should hold do not"

@@ -168,7 +168,13 @@ def _joint_cells(f: JointFinding) -> tuple[str, ...]:
 
 
 def _repair_table(a: Assessment) -> Table:
-    table = Table(box=None, pad_edge=False, header_style="bold", title="Repairs that would bring it within", title_justify="left")
+    table = Table(
+        box=None,
+        pad_edge=False,
+        header_style="bold",
+        title="Repairs that would bring it within",
+        title_justify="left",
+    )
     for heading in ("restore", "access min", "worst case in", "probability within"):
         table.add_column(heading, justify="left" if heading == "restore" else "right")
     for s in a.repair_sets or ():
@@ -200,14 +206,14 @@ def show_batch(result: CheckResult) -> None:
     console = _console()
     counts = result.counts
     summary = Text(f"{len(result.judgements)} inspections: ")
-    summary.append(
-        " · ".join(f"{counts[v]} {v.value.replace('_', ' ').lower()}" for v in Verdict if counts[v])
-    )
+    summary.append(" · ".join(f"{counts[v]} {v.value.replace('_', ' ').lower()}" for v in Verdict if counts[v]))
     console.print(summary)
     table = Table(box=None, pad_edge=False, header_style="bold")
     for heading in ("", "verdict", "tail", "side", "record", "worst in", "margin", "chance", "next"):
         numeric = heading in {"worst in", "margin", "chance"}
-        table.add_column(heading, justify="right" if numeric else "left", no_wrap=heading != "next", overflow="ellipsis")
+        table.add_column(
+            heading, justify="right" if numeric else "left", no_wrap=heading != "next", overflow="ellipsis"
+        )
     ordered = sorted(result.judgements, key=_urgency)
     for judgement in ordered[:_LINES_OF_A_BATCH]:
         table.add_row(*_batch_cells(judgement))
@@ -232,7 +238,17 @@ def _batch_cells(judgement: Judgement) -> tuple[Text | str, ...]:
     mark = MARKS[judgement.verdict]
     if isinstance(judgement, Rejected):
         row = judgement.row
-        return (mark, verdict, row.tail_no or "?", str(row.side or "?"), row.record_id or "?", "-", "-", "-", judgement.next_action.text)
+        return (
+            mark,
+            verdict,
+            row.tail_no or "?",
+            str(row.side or "?"),
+            row.record_id or "?",
+            "-",
+            "-",
+            "-",
+            judgement.next_action.text,
+        )
     i = judgement.inspection
     worst, chance = judgement.predicted_displacement_in, judgement.probability_exceed_random_directions
     return (

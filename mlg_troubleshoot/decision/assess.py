@@ -18,7 +18,7 @@ from mlg_troubleshoot.decision.assessment import (
     Verdict,
 )
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
-from mlg_troubleshoot.decision.next_action import choose, correct
+from mlg_troubleshoot.decision.next_action import FAILED_BUT_WITHIN, choose, correct
 from mlg_troubleshoot.decision.prediction import BatchPrediction, Extension, predict_batch
 from mlg_troubleshoot.decision.ranking import rank_joints
 from mlg_troubleshoot.decision.repair import repair_sets
@@ -105,7 +105,16 @@ def _assess_valid(
     missing = np.any(~np.isfinite(batch.clearance_in) & critical, axis=1)
     return [
         _assess_one(
-            gear, table, options, inspection, batch, i, float(p_lower[i]), float(p_upper[i]), float(u[i]), bool(missing[i])
+            gear,
+            table,
+            options,
+            inspection,
+            batch,
+            i,
+            float(p_lower[i]),
+            float(p_upper[i]),
+            float(u[i]),
+            bool(missing[i]),
         )
         for i, inspection in enumerate(inspections)
     ]
@@ -126,6 +135,8 @@ def _assess_one(
     lower, margin = batch.lower, float(batch.margin_in[i])
     displacement = float(lower.displacement_in[i])
     closes = bool(np.isfinite(displacement))
+    # A linkage of the ensemble may not close where the reference does: the uncertainty is then unknown.
+    known = closes and bool(np.isfinite(u))
     found = verdict(p_lower, p_upper, critical_missing=critical_missing)
     allowances = None
     if options.allowances and closes:
@@ -151,12 +162,10 @@ def _assess_one(
         predicted_upper_in=upper if np.isfinite(upper) else None,
         margin_in=margin,
         remaining_in=margin - displacement if closes else None,
-        standard_uncertainty_in=u if closes else None,
+        standard_uncertainty_in=u if known else None,
         probability_within_margin=p_lower,
         probability_exceed_random_directions=chance if closes else None,
-        geometry_spread_in=(float(lower.spread_low_in[i]), float(lower.spread_high_in[i]))
-        if closes and np.isfinite(lower.spread_low_in[i])
-        else None,
+        geometry_spread_in=(float(lower.spread_low_in[i]), float(lower.spread_high_in[i])) if known else None,
         budget=UncertaintyBudget(
             float(lower.u_clearances_in[i]),
             float(lower.u_geometry_in[i]),
@@ -164,13 +173,13 @@ def _assess_one(
             float(batch.margin_u_in[i]),
             model_source,
         )
-        if closes
+        if known
         else None,
         over_directions_rad=tuple(lower.worst.over_directions[i].tolist()) if closes else (),
         under_directions_rad=tuple(lower.worst.under_directions[i].tolist()) if closes else (),
         joints=findings,
         next_action=choose(gear, found, findings, inspection.outcome, sets),
-        headline=_headline(found, displacement, chance, margin, p_lower, inspection, findings),
+        headline=_headline(found, displacement, chance, margin, p_lower, findings, inspection.outcome),
         measured_statement=measured_plunger.statement(inspection, margin),
         repair_sets=sets,
         warnings=_warnings(gear, inspection, findings, closes, over, under, u),
@@ -183,8 +192,8 @@ def _headline(
     chance: float,
     margin: float,
     p_within: float,
-    inspection: Inspection,
     findings: Sequence[JointFinding],
+    outcome: Outcome | None,
 ) -> str:
     if not np.isfinite(displacement):
         return "With these clearances the linkage does not close in its worst position: outside any margin."
@@ -192,10 +201,8 @@ def _headline(
     if found is Verdict.OUTSIDE_MARGIN:
         return f"Clearances could push the plunger outside its margin of {margin:.4f} in ({numbers})."
     if found is Verdict.WITHIN_MARGIN:
-        return (
-            f"Even the worst case stays within the margin of {margin:.4f} in ({numbers}). "
-            "Continue fault isolation; not a release."
-        )
+        then = FAILED_BUT_WITHIN if outcome is Outcome.FAILED else "Continue fault isolation; not a release."
+        return f"Even the worst case stays within the margin of {margin:.4f} in ({numbers}). {then}"
     if found is Verdict.INCOMPLETE:
         open_joints = ", ".join(f"#{f.joint}" for f in findings if f.clearance_in is None)
         return f"Cannot clear: not measured {open_joints} ({numbers} from the measured joints alone)."
@@ -215,12 +222,12 @@ def _warnings(
     u: float,
 ) -> tuple[str, ...]:
     warnings = list(inspection.warnings)
-    for finding in findings:
-        if finding.over_limit and finding.clearance_in is not None:
-            warnings.append(
-                f"Joint #{finding.joint} {finding.name}: {finding.clearance_in:.4f} in radial is above its limit of "
-                f"{finding.limit_in:.4f} in ({gear.joint(finding.joint).limit.kind}): reject to the manual."
-            )
+    warnings += [
+        f"Joint #{finding.joint} {finding.name}: {finding.clearance_in:.4f} in radial is above its limit of "
+        f"{finding.limit_in:.4f} in ({gear.joint(finding.joint).limit.kind}): reject to the manual."
+        for finding in findings
+        if finding.over_limit and finding.clearance_in is not None
+    ]
     down_lock = inspection.plunger_down_lock_in
     low, high = gear.down_lock_range
     if down_lock is not None and not low <= down_lock <= high:
@@ -229,14 +236,14 @@ def _warnings(
         )
     if not closes:
         warnings.append("With these clearances the linkage does not close in every direction: check the entries.")
+    elif not np.isfinite(u):
+        warnings.append("With these clearances some linkages of the ensemble do not close: the uncertainty is unknown.")
     else:
         differs = measured_plunger.disagreement(inspection, over, under, u)
         if differs is not None:
             warnings.append(differs)
     if inspection.gauge_u_is_default:
-        warnings.append(
-            f"Gauge uncertainty not stated: {inspection.gauge_u_in:.5f} in radial taken as the default."
-        )
+        warnings.append(f"Gauge uncertainty not stated: {inspection.gauge_u_in:.5f} in radial taken as the default.")
     if inspection.outcome is Outcome.FAILED and inspection.measured_displacement_in is None:
         warnings.append("The gear failed and no plunger displacement was measured: measure it at mid-position.")
     return tuple(warnings)

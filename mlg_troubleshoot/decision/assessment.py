@@ -173,7 +173,7 @@ class Assessment:
     remaining_in : float or None
         Margin less prediction. [in]
     standard_uncertainty_in : float or None
-        Of the prediction against the margin. [in]
+        Of the prediction against the margin; None where a linkage of the ensemble does not close. [in]
     probability_within_margin : float or None
         Probability that the worst-case bound is within the margin, unmeasured joints taken as 0. [1]
     probability_exceed_random_directions : float or None

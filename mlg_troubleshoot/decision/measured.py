@@ -21,7 +21,7 @@ def reading_uncertainty(inspection: Inspection) -> tuple[float, str]:
     u_in : float
         Standard uncertainty of the mean. [in]
     source : str
-        ``declared``, ``default``, or ``repeat readings``.
+        ``declared`` or ``default``.
     """
     n = len(inspection.readings_in)
     if inspection.plunger_gauge_u_in is not None:
@@ -59,9 +59,7 @@ def statement(inspection: Inspection, margin_in: float) -> str | None:
     )
 
 
-def disagreement(
-    inspection: Inspection, over_in: float, under_in: float, standard_uncertainty_in: float
-) -> str | None:
+def disagreement(inspection: Inspection, over_in: float, under_in: float, standard_uncertainty_in: float) -> str | None:
     """Flag a measured displacement that differs from the prediction by more than two standard uncertainties.
 
     Parameters

@@ -9,6 +9,8 @@ from mlg_troubleshoot.decision.inspection import InvalidRow, Outcome
 from mlg_troubleshoot.decision.repair import access_minutes
 from mlg_troubleshoot.gear.gear import Gear
 
+FAILED_BUT_WITHIN = "Joint clearances do not explain this failure: check hydraulics, reversing valve, doors."
+
 
 def correct(row: InvalidRow) -> NextAction:
     """Return the next action for a row that cannot be judged.
@@ -94,25 +96,23 @@ def choose(
         )
     if verdict is Verdict.OUTSIDE_MARGIN:
         first = tuple(f.joint for f in ranked if f.clearance_in)[:3] or tuple(f.joint for f in ranked)[:3]
-        return NextAction(
-            Action.MEASURE, first, f"Clearances could contribute. Inspect in this order: {_list(first)}."
-        )
+        return NextAction(Action.MEASURE, first, f"Clearances could contribute. Inspect in this order: {_list(first)}.")
     if verdict is Verdict.INCOMPLETE:
         joint = next_to_measure(gear, findings)
         if joint is None:
             raise ValueError("an inspection with every joint measured cannot be incomplete")
         return NextAction(Action.MEASURE, (joint,), f"Cannot clear. Measure #{joint} {gear.joint(joint).name} next.")
     if verdict is Verdict.WITHIN_MARGIN:
-        text = "Joint clearances do not explain this failure: check hydraulics, reversing valve, doors."
-        if not failed:
-            text = "Continue fault isolation; within margin is not a release to service."
+        text = FAILED_BUT_WITHIN if failed else "Continue fault isolation; within margin is not a release to service."
         return NextAction(Action.CONTINUE, (), text)
     again = max(
         (f for f in findings if f.clearance_in is not None),
         key=lambda f: f.plunger_amplification**2 / gear.joint(f.joint).access.value,
     )
     return NextAction(
-        Action.MEASURE, (again.joint,), f"Too close. Measure #{again.joint} {again.name} again, more precisely."
+        Action.MEASURE,
+        (again.joint,),
+        f"Too close. Measure #{again.joint} {again.name} again, more precisely.",
     )
 
 
@@ -126,7 +126,7 @@ def _restore(
             Action.RESTORE,
             joints,
             f"Rectify, in this order: {_list(joints)} (about {sets[0].access_minutes:.0f} min access). The worst case "
-            f"is then {sets[0].predicted_displacement_in:.4f} in.",
+            f"is then {sets[0].predicted_displacement_in:.4f} in{_unless_all_measured(ranked)}.",
         )
     worn = tuple(f.joint for f in ranked if f.clearance_in)
     joints = over or worn
@@ -134,6 +134,11 @@ def _restore(
     return NextAction(
         Action.RESTORE, joints, f"Rectify, in this order: {_list(joints)} (about {minutes:.0f} min access)."
     )
+
+
+def _unless_all_measured(findings: Sequence[JointFinding]) -> str:
+    missing = [f.joint for f in findings if f.clearance_in is None]
+    return f", with {_list(sorted(missing))} not measured and counted as 0" if missing else ""
 
 
 def _list(joints: Sequence[int]) -> str:

@@ -207,9 +207,7 @@ class BatchPrediction:
     chance_random: Array
 
 
-def predict_batch(
-    gear: Gear, inspections: Sequence[Inspection], extension: Extension | None = None
-) -> BatchPrediction:
+def predict_batch(gear: Gear, inspections: Sequence[Inspection], extension: Extension | None = None) -> BatchPrediction:
     """Predict a batch with unmeasured joints at 0 and at their limit.
 
     Parameters
@@ -238,7 +236,7 @@ def predict_batch(
     if len(open_rows):
         some = predict(
             gear,
-            [inspections[i] for i in open_rows],
+            [inspections[int(i)] for i in open_rows],
             np.where(measured, found, gear.limits_in)[open_rows],
             measured[open_rows],
             gauge_u[open_rows],

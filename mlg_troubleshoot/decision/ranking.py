@@ -60,10 +60,8 @@ def rank_joints(
         One for each joint, in the order of the joints' numbers.
     """
     assumed = np.array([clearance_in.get(j.number, 0.5 * j.limit.value) for j in gear.joints])
-    over = [clearance_in.get(j.number, 0.0) > j.limit.value for j in gear.joints]
-    orders = [
-        _order(gear, over, contribution, table) for contribution in ensemble_amplification(gear) * assumed
-    ]
+    over = [j.is_over_limit(clearance_in.get(j.number, 0.0)) for j in gear.joints]
+    orders = [_order(gear, over, contribution, table) for contribution in ensemble_amplification(gear) * assumed]
     findings = []
     for j, joint in enumerate(gear.joints):
         ranks = [order.index(j) + 1 for order in orders]

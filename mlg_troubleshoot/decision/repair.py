@@ -62,11 +62,12 @@ def repair_sets(
     Returns
     -------
     tuple of RepairSet
-        Sufficient sets, least access time first, then fewest joints; empty if no set is sufficient.
+        Sufficient sets, least access time first, then fewest joints; empty if no set is sufficient, or if
+        nothing need be restored.
     """
     found = clearances([inspection], gear, np.full(len(gear.joints), np.nan))[0]
     measured = np.flatnonzero(np.isfinite(found))
-    mandatory = np.array([found[j] > gear.joints[j].limit.value for j in measured], bool)
+    mandatory = np.array([gear.joints[j].is_over_limit(float(found[j])) for j in measured], bool)
     new = np.array([joint.new_part.value for joint in gear.joints])
     codes = np.arange(2 ** len(measured))
     restored = ((codes[:, None] >> np.arange(len(measured))) & 1).astype(bool)
@@ -84,10 +85,12 @@ def repair_sets(
     )
     p = prediction.probability_within(np.full(n, margin_in), np.full(n, inspection.margin_u_in))
     numbers = np.array(gear.joint_numbers)[measured]
+    if np.any(p[~restored.any(axis=1)] >= CONFORMANCE):
+        return ()
     enough = [
         RepairSet(joints, float(prediction.displacement_in[row]), float(p[row]), access_minutes(gear, joints))
         for row in np.flatnonzero(p >= CONFORMANCE)
-        if (joints := tuple(int(number) for number in numbers[restored[row]]))
+        for joints in [tuple(int(number) for number in numbers[restored[row]])]
     ]
     enough.sort(key=lambda s: (len(s.joints), s.joints))
     least: list[RepairSet] = []

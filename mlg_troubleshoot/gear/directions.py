@@ -56,9 +56,7 @@ class WorstCase:
         return np.where(over, self.over_directions, self.under_directions)
 
 
-def worst_case(
-    model: LinkageModel, clearance_in: Array, changed: Mapping[str, Array] | None = None
-) -> WorstCase:
+def worst_case(model: LinkageModel, clearance_in: Array, changed: Mapping[str, Array] | None = None) -> WorstCase:
     """Find the worst directions for each gear's own clearances, joint by joint from the most remote one.
 
     Along one joint's circle the displacement is a smooth periodic function: it is sampled at eight angles,
@@ -110,7 +108,7 @@ def _sequential(
 def _argmax_on_circle(sampled: Array) -> Array:
     """Angle of the maximum of the trigonometric polynomials through samples at eight equal angles. [rad]"""
     coefficients = np.fft.rfft(np.nan_to_num(sampled), axis=-1)[:, _HARMONICS]
-    angle = _ANGLES[np.argmax(sampled, axis=-1)]
+    angle: Array = _ANGLES[np.argmax(sampled, axis=-1)]
     for _ in range(4):
         terms = coefficients * np.exp(1j * _HARMONICS * angle[:, None])
         slope = -(_HARMONICS * terms).imag.sum(axis=-1)

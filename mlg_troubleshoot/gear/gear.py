@@ -51,6 +51,47 @@ class Area:
     access: Sourced
 
 
+@dataclass(frozen=True, slots=True)
+class TiltedLink:
+    """A link whose projected length shrinks when end float lets it tilt.
+
+    Parameters
+    ----------
+    length : str
+        The model's number.
+    floats : tuple of int
+        Joints whose end floats tilt it: both ends of a link, or the pivot of a lever.
+    """
+
+    length: str
+    floats: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Discrepancies:
+    """Where inside the linkage physical causes outside the plain model act.
+
+    Parameters
+    ----------
+    elastic : tuple of str
+        Lengths that hydraulic load stretches.
+    wear_shift : str or None
+        The number that wear of a part outside the joints shifts.
+    contact : tuple of tuple of int
+        Pairs of neighbouring joints.
+    tilt : tuple of TiltedLink
+        Links that end float tilts.
+    bearing_span_in : float
+        Length over which end float tilts a link, nominal. [in]
+    """
+
+    elastic: tuple[str, ...] = ()
+    wear_shift: str | None = None
+    contact: tuple[tuple[int, int], ...] = ()
+    tilt: tuple[TiltedLink, ...] = ()
+    bearing_span_in: float = 1.5
+
+
 @dataclass(frozen=True)
 class Gear:
     """A gear type as its gear file describes it.
@@ -77,6 +118,8 @@ class Gear:
         Radial clearance beyond which a reading is refused, and beyond which it is asked again. [in]
     down_lock_range : tuple of float
         Allowed plunger displacement at Down Lock. [in]
+    discrepancies : Discrepancies
+        Where a diagnosis may change the model.
     cycle : RetractionCycle or None
         What the plunger's position means in the retraction sequence, as far as the source states it.
     numbers : tuple of Sourced
@@ -102,6 +145,7 @@ class Gear:
     hard_limit: Sourced
     confirm_above: Sourced
     down_lock_range: tuple[float, float]
+    discrepancies: Discrepancies
     cycle: RetractionCycle | None
     numbers: tuple[Sourced, ...]
     geometry_sha256: str
@@ -147,7 +191,7 @@ class Gear:
     @cached_property
     def alike(self) -> dict[int, tuple[int, ...]]:
         """Joints that act alike with each joint: the other end of the same link, by structure."""
-        groups: dict[int, tuple[int, ...]] = {number: () for number in self.joint_numbers}
+        groups: dict[int, tuple[int, ...]] = dict.fromkeys(self.joint_numbers, ())
         for step in self.reference.mechanism.steps:
             for number in step.virtual_links:
                 groups[number] = tuple(other for other in step.virtual_links if other != number)

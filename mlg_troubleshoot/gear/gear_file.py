@@ -15,7 +15,7 @@ import numpy as np
 
 from mlg_troubleshoot.errors import GearFileError, UsageError
 from mlg_troubleshoot.gear.cycle import RetractionCycle, Stage, ValveState
-from mlg_troubleshoot.gear.gear import Area, Gear, Linkage
+from mlg_troubleshoot.gear.gear import Area, Discrepancies, Gear, Linkage, TiltedLink
 from mlg_troubleshoot.gear.joints import JointSpec
 from mlg_troubleshoot.gear.model import Calibration
 from mlg_troubleshoot.gear.sources import Source, Sourced, SourceKind
@@ -32,6 +32,7 @@ from mlg_troubleshoot.geometry.mechanism import (
     Slot,
     Step,
 )
+from mlg_troubleshoot.geometry.program import write_program
 
 DEFAULT_GEAR = "hawker-800xp"
 _GEOMETRY_KEYS = ("input", "planes", "points", "steps", "output", "calibration")
@@ -91,8 +92,10 @@ def load_gear(name_or_path: str | Path = DEFAULT_GEAR) -> Gear:
     reference = _linkage(raw, path, "A", numbers)
     ensemble_name = table.text("ensemble", "")
     members: dict[str, dict[str, Any]] = {}
+    ensemble_path = path
     if ensemble_name:
-        members = _members(raw, path.with_name(ensemble_name))
+        ensemble_path = path.with_name(ensemble_name)
+        members = _members(raw, ensemble_path)
     calibration, down_lock_range = _calibration(raw, path, numbers)
     entry = table.table("entry")
     table.skip(*_GEOMETRY_KEYS)
@@ -101,15 +104,16 @@ def load_gear(name_or_path: str | Path = DEFAULT_GEAR) -> Gear:
         name=table.text("name"),
         provenance=table.text("provenance"),
         reference=reference,
-        ensemble=(reference, *(_linkage(m, path, n, None) for n, m in members.items())),
+        ensemble=(reference, *(_linkage(m, ensemble_path, n, None) for n, m in members.items())),
         joints=tuple(_joint(t, numbers) for t in table.tables("joints")),
         areas=tuple(_area(t, numbers) for t in table.tables("areas")),
         calibration=calibration,
-        margin=numbers.read(table.table("margin"), "value", "in"),
-        bearing_span=numbers.read(table.table("bearing_span"), "value", "in"),
+        margin=numbers.only(table.table("margin"), "in"),
+        bearing_span=numbers.only(table.table("bearing_span"), "in"),
         hard_limit=numbers.read(entry, "hard_limit", "in"),
         confirm_above=numbers.read(entry, "confirm_above", "in"),
         down_lock_range=down_lock_range,
+        discrepancies=_discrepancies(table, reference.mechanism, numbers),
         cycle=_cycle(table.table("cycle")) if table.has("cycle") else None,
         numbers=tuple(numbers.found),
         geometry_sha256=_sha256({k: raw.get(k) for k in _GEOMETRY_KEYS}),
@@ -117,6 +121,7 @@ def load_gear(name_or_path: str | Path = DEFAULT_GEAR) -> Gear:
         path=path,
         indices_file=path.with_name(table.text("indices", f"{path.stem}-indices.json")),
     )
+    entry.finish()
     table.finish()
     _check_joints(gear, path)
     return gear
@@ -151,13 +156,22 @@ class _Numbers:
         self.found.append(number)
         return number
 
-    def read(self, table: TomlTable, key: str, unit: str, source_key: str = "source") -> Sourced:
-        return self.add(table.number(key), unit, self.source(table, source_key))
+    def read(
+        self, table: TomlTable, key: str, unit: str, source_key: str = "source", *, or_zero: bool = False
+    ) -> Sourced:
+        """Read a number that cannot be negative."""
+        return self.add(table.positive(key, or_zero=or_zero), unit, self.source(table, source_key))
+
+    def only(self, table: TomlTable, unit: str) -> Sourced:
+        """Read a table that holds one value and its source, and nothing else."""
+        number = self.read(table, "value", unit)
+        table.finish()
+        return number
 
 
 def _sources(table: TomlTable) -> dict[str, Source]:
     sources = {}
-    for name in table.keys():
+    for name in table.names:
         entry = table.table(name)
         kind = entry.text("kind")
         if kind not in set(SourceKind):
@@ -182,7 +196,7 @@ def _linkage(raw: dict[str, Any], path: Path, name: str, numbers: _Numbers | Non
     drive = table.table("input")
     stroke, reference = drive.pair("range"), drive.number("reference")
     drive.text("name")
-    sourced(drive, (stroke[1], "in"))
+    sourced(drive, (stroke[0], "in"), (stroke[1], "in"), (reference, "in"))
     drive.finish()
     planes = []
     for entry in table.tables("planes"):
@@ -210,8 +224,9 @@ def _linkage(raw: dict[str, Any], path: Path, name: str, numbers: _Numbers | Non
         entry.finish()
     steps = []
     for entry in table.tables("steps"):
-        steps.append(_step(entry))
-        sourced(entry)
+        step = _step(entry)
+        steps.append(step)
+        sourced(entry, *([(entry.number("axis_deg"), "deg")] if isinstance(step, Slider) else []))
         entry.finish()
     read = table.table("output")
     kind = read.text("kind")
@@ -253,22 +268,22 @@ def _members(raw: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:
     table.text("source")
     members = table.table("members")
     full = {}
-    for name in members.keys():
+    for name in members.names:
         member = members.table(name)
-        new = deepcopy({k: raw.get(k) for k in _GEOMETRY_KEYS})
+        new: dict[str, Any] = deepcopy({k: raw.get(k) for k in _GEOMETRY_KEYS})
         new["input"].update(range=list(member.pair("range")), reference=member.number("reference"))
         if member.has("planes"):
             planes = member.table("planes")
-            for plane in planes.keys():
+            for plane in planes.names:
                 change = planes.table(plane)
-                _entry(new["planes"], "name", plane, planes).update({k: change.number(k) for k in change.keys()})
+                _entry(new["planes"], "name", plane, planes).update({k: change.number(k) for k in change.names})
         points = member.table("points")
-        for point in points.keys():
+        for point in points.names:
             _entry(new["points"], "name", point, points)["at"] = list(points.pair(point))
         steps = member.table("steps")
-        for joint in steps.keys():
+        for joint in steps.names:
             change = steps.table(joint)
-            _entry(new["steps"], "joint", joint, steps).update({k: change.number(k) for k in change.keys()})
+            _entry(new["steps"], "joint", joint, steps).update({k: change.number(k) for k in change.names})
         member.finish()
         full[name] = new
     table.finish()
@@ -282,17 +297,16 @@ def _entry(entries: list[dict[str, Any]], key: str, value: str, table: TomlTable
     raise table.fail(value, f"a {key} of the gear file")
 
 
-def _calibration(
-    raw: dict[str, Any], path: Path, numbers: _Numbers
-) -> tuple[Calibration, tuple[float, float]]:
+def _calibration(raw: dict[str, Any], path: Path, numbers: _Numbers) -> tuple[Calibration, tuple[float, float]]:
     table = TomlTable(raw, path)
     if not table.has("calibration"):
         return Calibration(), (-np.inf, np.inf)
     entry = table.table("calibration")
-    found = Calibration(
-        numbers.read(entry, "down_lock", "in").value, numbers.read(entry, "travel", "in").value
-    )
+    down_lock = numbers.add(entry.number("down_lock"), "in", numbers.source(entry))
+    found = Calibration(down_lock.value, numbers.read(entry, "travel", "in").value)
     allowed = entry.pair("down_lock_range")
+    for end in allowed:
+        numbers.add(end, "in", numbers.source(entry))
     entry.finish()
     return found, allowed
 
@@ -304,7 +318,7 @@ def _joint(t: TomlTable, numbers: _Numbers) -> JointSpec:
         name=t.text("name"),
         location=t.text("location"),
         limit=numbers.read(t, "limit", "in", "limit_source"),
-        new_part=numbers.read(t, "new_part", "in", "new_part_source"),
+        new_part=numbers.read(t, "new_part", "in", "new_part_source", or_zero=True),
         access=numbers.read(t, "access_min", "min", "access_source"),
         area=t.text("area"),
         critical=t.flag("critical"),
@@ -314,9 +328,31 @@ def _joint(t: TomlTable, numbers: _Numbers) -> JointSpec:
 
 
 def _area(t: TomlTable, numbers: _Numbers) -> Area:
-    area = Area(t.text("name"), t.text("description"), numbers.read(t, "access_min", "min"))
+    area = Area(t.text("name"), t.text("description"), numbers.read(t, "access_min", "min", or_zero=True))
     t.finish()
     return area
+
+
+def _discrepancies(table: TomlTable, mechanism: Mechanism, numbers: _Numbers) -> Discrepancies:
+    span = table.table("bearing_span").number("value")
+    if not table.has("diagnosis"):
+        return Discrepancies(bearing_span_in=span)
+    entry = table.table("diagnosis")
+    numbers.source(entry)
+    known = write_program(mechanism).parameters
+    found = Discrepancies(
+        elastic=entry.texts("elastic") if entry.has("elastic") else (),
+        wear_shift=entry.text("wear_shift") if entry.has("wear_shift") else None,
+        contact=entry.pairs("contact"),
+        tilt=tuple(TiltedLink(t.text("length"), t.wholes("floats")) for t in entry.tables("tilt")),
+        bearing_span_in=span,
+    )
+    used = (*found.elastic, *(t.length for t in found.tilt), *((found.wear_shift,) if found.wear_shift else ()))
+    for name in used:
+        if name not in known:
+            raise entry.fail("elastic, tilt or wear_shift", f"a number of the linkage instead of {name!r}")
+    entry.finish()
+    return found
 
 
 def _cycle(t: TomlTable) -> RetractionCycle:
@@ -326,8 +362,7 @@ def _cycle(t: TomlTable) -> RetractionCycle:
         retraction_order=t.texts("retraction_order"),
         extension_order=t.texts("extension_order"),
         valve=tuple(
-            ValveState(v.text("plunger"), v.text("flow"), v.text("stage"), v.text("result"))
-            for v in t.tables("valve")
+            ValveState(v.text("plunger"), v.text("flow"), v.text("stage"), v.text("result")) for v in t.tables("valve")
         ),
         beyond=t.text("beyond"),
         short=t.text("short"),
@@ -346,7 +381,13 @@ def _check_joints(gear: Gear, path: Path) -> None:
             "Describe each virtual link of the steps as one joint, in ascending order.",
         )
     areas = {area.name for area in gear.areas}
+    points = {point.name for point in gear.reference.mechanism.points}
     for joint in gear.joints:
+        if joint.point not in points:
+            raise GearFileError(
+                f"{path.name}: joint {joint.number} is at point {joint.point!r}, which has no coordinates",
+                "Name one of the points of the linkage.",
+            )
         if joint.area not in areas:
             raise GearFileError(
                 f"{path.name}: joint {joint.number} lies in area {joint.area!r}, which is not described",

@@ -7,6 +7,9 @@ from enum import IntEnum
 
 from mlg_troubleshoot.gear.sources import Sourced
 
+# 0.1905 mm is 0.0075000000000000006 in to a computer: no gauge reads a difference of 1e-9 in.
+_ROUNDING_IN = 1e-9
+
 
 class Joint(IntEnum):
     """The ten joints of the Hawker 800XP down-lock linkage, in the order of the mechanism (Fig. 7).
@@ -60,6 +63,21 @@ class JointSpec:
     access: Sourced
     area: str
     critical: bool
+
+    def is_over_limit(self, clearance_in: float) -> bool:
+        """Tell whether a clearance is above the limit, beyond the rounding of a conversion from another unit.
+
+        Parameters
+        ----------
+        clearance_in : float
+            Radial clearance. [in]
+
+        Returns
+        -------
+        bool
+            True if it is above the limit; a clearance at the limit, in whatever unit it was read, is not.
+        """
+        return clearance_in > self.limit.value + _ROUNDING_IN
 
     @property
     def label(self) -> str:

@@ -114,9 +114,7 @@ class LinkageModel:
             values[self.kernel.parameter_index(name)] = value
         return values
 
-    def displacement(
-        self, links: Sequence[Any], changed: Mapping[str, Any] | None = None, stroke: Any = None
-    ) -> Array:
+    def displacement(self, links: Sequence[Any], changed: Mapping[str, Any] | None = None, stroke: Any = None) -> Array:
         """Displacement of the plunger by clearances, measured from the same linkage without them.
 
         Parameters

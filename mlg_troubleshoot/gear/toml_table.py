@@ -47,7 +47,8 @@ class TomlTable:
         place = f"{self._place}.{key}" if self._place else key
         found = repr(self._values[key]) if key in self._values else "nothing"
         return GearFileError(
-            f"{self._file.name}: {place}: expected {expected}, found {found}", "Correct the file and run again."
+            f"{self._file.name}: {place}: expected {expected}, found {found}",
+            "Correct the file and run again.",
         )
 
     def _get(self, key: str) -> Any:
@@ -72,9 +73,16 @@ class TomlTable:
         value = self._get(key)
         if value is None and default is not None:
             return default
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or abs(value) > 1e12 or value != value:
+        if not _is_number(value):
             raise self.fail(key, "a number")
         return float(value)
+
+    def positive(self, key: str, *, or_zero: bool = False) -> float:
+        """Return a finite number above 0, or 0 where that is allowed."""
+        value = self.number(key)
+        if value < 0.0 or (value == 0.0 and not or_zero):
+            raise self.fail(key, "a number of 0 or more" if or_zero else "a number above 0")
+        return value
 
     def whole(self, key: str) -> int:
         """Return a whole number."""
@@ -95,11 +103,7 @@ class TomlTable:
     def pair(self, key: str) -> tuple[float, float]:
         """Return two numbers."""
         value = self._get(key)
-        if (
-            not isinstance(value, list)
-            or len(value) != 2
-            or any(isinstance(v, bool) or not isinstance(v, (int, float)) for v in value)
-        ):
+        if not isinstance(value, list) or len(value) != 2 or not all(_is_number(v) for v in value):
             raise self.fail(key, "two numbers")
         return float(value[0]), float(value[1])
 
@@ -111,6 +115,17 @@ class TomlTable:
         if not isinstance(value, list) or any(isinstance(v, bool) or not isinstance(v, int) for v in value):
             raise self.fail(key, "a list of whole numbers")
         return tuple(value)
+
+    def pairs(self, key: str) -> tuple[tuple[int, int], ...]:
+        """Return a list of pairs of whole numbers, empty if the key is absent."""
+        value = self._get(key)
+        if value is None:
+            return ()
+        if not isinstance(value, list) or not all(
+            isinstance(pair, list) and len(pair) == 2 and all(isinstance(v, int) for v in pair) for pair in value
+        ):
+            raise self.fail(key, "a list of pairs of whole numbers")
+        return tuple((pair[0], pair[1]) for pair in value)
 
     def texts(self, key: str) -> tuple[str, ...]:
         """Return a list of texts."""
@@ -135,14 +150,16 @@ class TomlTable:
             raise self.fail(key, "an array of tables")
         for i, entry in enumerate(value):
             label = entry.get("name", entry.get("joint", entry.get("number", i + 1)))
-            yield TomlTable(entry, self._file, f"{key}[{label}]")
+            place = f"{self._place}.{key}" if self._place else key
+            yield TomlTable(entry, self._file, f"{place}[{label}]")
 
     def skip(self, *keys: str) -> None:
         """Count keys as read that another reader takes care of."""
         self._read.update(keys)
 
-    def keys(self) -> tuple[str, ...]:
-        """Return the keys of the table."""
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The keys of the table."""
         return tuple(self._values)
 
     def finish(self) -> None:
@@ -158,3 +175,7 @@ class TomlTable:
                 near = difflib.get_close_matches(key, self._read, n=1)
                 hint = f"one of the known keys; did you mean {near[0]!r}?" if near else "a known key"
                 raise self.fail(key, hint)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= 1e12

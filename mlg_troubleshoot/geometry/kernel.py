@@ -59,6 +59,7 @@ class Kernel:
         self.parameters = np.array(list(program.parameters.values()))
         self.parameters.flags.writeable = False
         self._output = _function(program, (program.output,))
+        self._loop: Callable[..., None] | None = None
 
     def parameter_index(self, name: str) -> int:
         """Return the place of a parameter.
@@ -105,6 +106,21 @@ class Kernel:
         with np.errstate(invalid="ignore", divide="ignore"):
             numbers = self.parameters.tolist() if parameters is None else parameters
             return np.asarray(self._output(position, links, numbers)[0])
+
+    def run(self, position: Any, links: Sequence[Any], numbers: Sequence[Any]) -> Any:
+        """Run the formulas on numbers of another kind, for example intervals.
+
+        Parameters
+        ----------
+        position, links, numbers
+            As for :meth:`output`, of any kind that has arithmetic and the methods ``sqrt``, ``cos``, ``sin``.
+
+        Returns
+        -------
+        object
+            Output, of that kind. [in or rad]
+        """
+        return self._output(position, links, numbers)[0]
 
     def positions(
         self, position: Array | float, links: Sequence[Array | float], parameters: Sequence[Any] | None = None
@@ -172,9 +188,10 @@ class Kernel:
         result = np.empty(clearance.shape[1]) if out is None else out
         unit = np.column_stack([np.cos(directions), np.sin(directions)])
         if compiled:
-            _compiled_loop(self._program.source((self._program.output,), release=False), self._layout())(
-                float(position), clearance, unit, self.parameters, result
-            )
+            if self._loop is None:
+                body = self._program.source((self._program.output,), release=False)
+                self._loop = _compiled_loop(body, self._layout())
+            self._loop(float(position), clearance, unit, self.parameters, result)
             return result
         numbers = self.parameters.tolist()
         with np.errstate(invalid="ignore", divide="ignore"):

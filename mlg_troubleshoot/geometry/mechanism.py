@@ -78,6 +78,8 @@ class Crank:
     ----------
     joint, pivot : str
         The joint located and the fixed pivot it turns about.
+    virtual_links : tuple of int
+        Virtual links that displace the crank.
     """
 
     joint: str
@@ -119,6 +121,8 @@ class Lever:
     ----------
     joint, pivot, follows : str
         The joint located, the fixed pivot, and the joint of the same lever that is already located.
+    virtual_links : tuple of int
+        Virtual links that displace the joint.
     """
 
     joint: str
@@ -206,13 +210,17 @@ class Mechanism:
         What is read.
     reference_input : float
         Input at which the points are given. [in or rad]
+
+    Attributes
+    ----------
     virtual_links : tuple of int
         Numbers of all virtual links, in order.
 
     Raises
     ------
     MechanismError
-        If a step uses a point that is not known yet, or a virtual link is used never or twice.
+        If a plane, point, step or the output refers to what is not there, a point is located never or twice,
+        or a virtual link is used twice.
     """
 
     planes: tuple[Plane, ...]
@@ -223,18 +231,8 @@ class Mechanism:
     virtual_links: tuple[int, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        planes: set[str] = set()
-        for plane in self.planes:
-            if plane.parent is not None and plane.parent not in planes:
-                raise MechanismError(f"Plane {plane.name!r} is hinged to {plane.parent!r}, not defined before it.")
-            planes.add(plane.name)
         names = [point.name for point in self.points]
-        for name in names:
-            if names.count(name) > 1:
-                raise MechanismError(f"Point {name!r} is defined {names.count(name)} times.")
-        for point in self.points:
-            if point.plane not in planes:
-                raise MechanismError(f"Point {point.name!r} lies in plane {point.plane!r}, which is not defined.")
+        self._check_planes_and_points(names)
         known = {point.name for point in self.points if point.fixed}
         used = [point.virtual_link for point in self.points if point.virtual_link is not None]
         for step in self.steps:
@@ -245,13 +243,41 @@ class Mechanism:
                     )
             if step.joint not in names:
                 raise MechanismError(f"Step {step.joint!r} locates a point that has no coordinates.")
+            if step.joint in known:
+                raise MechanismError(f"Step {step.joint!r} locates a point that is fixed or located before it.")
             known.add(step.joint)
             used += step.virtual_links
         if len(set(used)) != len(used):
             raise MechanismError(f"A virtual link is used twice: {sorted(used)}.")
-        if self.output.joint not in known or (self.output.pivot and self.output.pivot not in known):
-            raise MechanismError(f"The output reads {self.output.joint!r}, which no step locates.")
+        self._check_all_known(names, known)
         object.__setattr__(self, "virtual_links", tuple(sorted(used)))
+
+    def _check_planes_and_points(self, names: list[str]) -> None:
+        planes: set[str] = set()
+        for plane in self.planes:
+            if plane.parent is not None:
+                if plane.parent not in planes:
+                    raise MechanismError(f"Plane {plane.name!r} is hinged to {plane.parent!r}, not defined before it.")
+                if plane.hinge_point not in names:
+                    raise MechanismError(
+                        f"Plane {plane.name!r} is hinged at {plane.hinge_point!r}, which has no coordinates."
+                    )
+            planes.add(plane.name)
+        for name in names:
+            if names.count(name) > 1:
+                raise MechanismError(f"Point {name!r} is defined {names.count(name)} times.")
+        for point in self.points:
+            if point.plane not in planes:
+                raise MechanismError(f"Point {point.name!r} lies in plane {point.plane!r}, which is not defined.")
+
+    def _check_all_known(self, names: list[str], known: set[str]) -> None:
+        for name in names:
+            if name not in known:
+                raise MechanismError(f"Point {name!r} is neither fixed nor located by a step.")
+        if self.output.joint not in known:
+            raise MechanismError(f"The output reads {self.output.joint!r}, which no step locates.")
+        if self.output.kind == "angle" and self.output.pivot not in known:
+            raise MechanismError(f"The output is an angle about {self.output.pivot!r}, which no step locates.")
 
     def point(self, name: str) -> Point:
         """Return the point of that name.

@@ -138,13 +138,28 @@ class _Writer:
             if self.mechanism.point(name).plane != plane:
                 raise MechanismError(f"Step {step.joint!r}: {name!r} is not in the plane {plane!r}.")
 
-    def length(self, a: str, b: str) -> tuple[str, float]:
-        value = float(
-            np.linalg.norm(self.mechanism.reference_in_space(a) - self.mechanism.reference_in_space(b))
-        )
+    def distance(self, a: str, b: str) -> float:
+        value = float(np.linalg.norm(self.mechanism.reference_in_space(a) - self.mechanism.reference_in_space(b)))
         if value == 0.0:
             raise MechanismError(f"The link {a}-{b} has no length.")
+        return value
+
+    def length(self, a: str, b: str) -> tuple[str, float]:
+        value = self.distance(a, b)
         return self.parameter(f"length.{a}-{b}", value), value
+
+    def in_plane(self, plane: str, start: str, end: str) -> tuple[float, float]:
+        """Vector from one reference position to another, seen in a plane."""
+        _, axes = self.mechanism.frame(plane)
+        across = self.mechanism.reference_in_space(end) - self.mechanism.reference_in_space(start)
+        return float(across @ axes[0]), float(across @ axes[1])
+
+    def same_side(self, step: Dyad | Slider, offset: float) -> None:
+        """Refuse a branch sign that would put the joint elsewhere than its coordinates do."""
+        if offset * step.sign < 0.0:
+            raise MechanismError(
+                f"Step {step.joint!r} has the sign {step.sign:+.0f}, but its coordinates lie on the other side."
+            )
 
 
 def write_program(mechanism: Mechanism) -> Program:
@@ -163,7 +178,8 @@ def write_program(mechanism: Mechanism) -> Program:
     Raises
     ------
     MechanismError
-        If a step mixes planes that it cannot mix, or a link has no length.
+        If a step mixes planes that it cannot mix, a link has no length, or a branch sign contradicts the
+        coordinates.
     """
     w = _Writer(mechanism)
     for point in mechanism.points:
@@ -186,7 +202,8 @@ def write_program(mechanism: Mechanism) -> Program:
                 _slot(w, step)
             case Slider():
                 _slider(w, step)
-    return Program(w.parameters, tuple(w.lines), w.joints, _output(w), mechanism.virtual_links)
+    output = _output(w)
+    return Program(w.parameters, tuple(w.lines), w.joints, output, mechanism.virtual_links)
 
 
 def _travel(w: _Writer) -> str:
@@ -208,16 +225,29 @@ def _dyad(w: _Writer, step: Dyad) -> None:
     w.same_plane(step, step.downstream)
     first, _ = w.length(step.upstream, step.joint)
     second, _ = w.length(step.joint, step.downstream)
+    plane = w.mechanism.point(step.joint).plane
+    base, arm = w.in_plane(plane, step.upstream, step.downstream), w.in_plane(plane, step.upstream, step.joint)
+    w.same_side(step, base[0] * arm[1] - base[1] * arm[0])
     sign = w.parameter(f"sign.{step.joint}", step.sign)
-    seen, height = w.seen_from(step.upstream, w.mechanism.point(step.joint).plane)
+    seen, height = w.seen_from(step.upstream, plane)
     ax, ay = w.shifted(seen, step.virtual_links)
     bx, by = w.joints[step.downstream]
     reach = w.let(f"{first} + {_travel(w)}") if step.driven else first
-    square = w.let(f"{reach} * {reach}" + (f" - {height} * {height}" if height else ""))
     dx, dy = w.let(f"{bx} - {ax}"), w.let(f"{by} - {ay}")
-    inverse = w.let(f"1.0 / ({dx} * {dx} + {dy} * {dy})")
-    along = w.let(f"0.5 + 0.5 * ({square} - {second} * {second}) * {inverse}")
-    across = w.let(f"{sign} * sqrt({square} * {inverse} - {along} * {along})")
+    apart = w.let(f"{dx} * {dx} + {dy} * {dy}")
+    inverse = w.let(f"1.0 / {apart}")
+    if height is None:
+        # Eq. 3 in factors (Heron): nothing cancels where the two links lie almost in line.
+        more, less = w.let(f"{reach} + {second}"), w.let(f"{reach} - {second}")
+        along = w.let(f"0.5 + 0.5 * ({more} * {less}) * {inverse}")
+        factors = w.let(f"({more} * {more} - {apart}) * ({apart} - {less} * {less})")
+        across = w.let(f"0.5 * {sign} * sqrt({factors}) * {inverse}")
+    else:
+        square = w.let(f"{reach} * {reach} - {height} * {height}")
+        along = w.let(f"0.5 + 0.5 * ({square} - {second} * {second}) * {inverse}")
+        excess = w.let(f"{apart} - {square} - {second} * {second}")
+        factors = w.let(f"4.0 * {second} * {second} * {square} - {excess} * {excess}")
+        across = w.let(f"0.5 * {sign} * sqrt({factors}) * {inverse}")
     w.joints[step.joint] = (
         w.let(f"{ax} + {along} * {dx} - {across} * {dy}"),
         w.let(f"{ay} + {along} * {dy} + {across} * {dx}"),
@@ -227,6 +257,7 @@ def _dyad(w: _Writer, step: Dyad) -> None:
 def _lever(w: _Writer, step: Lever) -> None:
     w.same_plane(step, step.pivot, step.follows)
     joint, pivot, led = (w.mechanism.point(n) for n in (step.joint, step.pivot, step.follows))
+    w.distance(step.pivot, step.follows)
     ratio = complex(joint.x - pivot.x, joint.y - pivot.y) / complex(led.x - pivot.x, led.y - pivot.y)
     along = w.parameter(f"lever.{step.joint}.along", ratio.real)
     across = w.parameter(f"lever.{step.joint}.across", ratio.imag)
@@ -242,6 +273,7 @@ def _lever(w: _Writer, step: Lever) -> None:
 def _slot(w: _Writer, step: Slot) -> None:
     w.same_plane(step, step.pivot, step.pin)
     joint, pivot, pin = (w.mechanism.point(n) for n in (step.joint, step.pivot, step.pin))
+    w.distance(step.pivot, step.pin)
     to_pin = complex(pin.x - pivot.x, pin.y - pivot.y)
     arm = complex(joint.x - pivot.x, joint.y - pivot.y) / (to_pin / abs(to_pin))
     along = w.parameter(f"arm.{step.joint}.along", arm.real)
@@ -259,6 +291,8 @@ def _slot(w: _Writer, step: Slot) -> None:
 def _slider(w: _Writer, step: Slider) -> None:
     joint = w.mechanism.point(step.joint)
     length, _ = w.length(step.upstream, step.joint)
+    arm = w.in_plane(joint.plane, step.upstream, step.joint)
+    w.same_side(step, np.cos(step.axis) * arm[0] + np.sin(step.axis) * arm[1])
     sign = w.parameter(f"sign.{step.joint}", step.sign)
     axis = w.parameter(f"slider.{step.joint}.axis", step.axis)
     ox = w.parameter(f"slider.{step.joint}.x", joint.x)

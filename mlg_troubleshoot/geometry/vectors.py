@@ -23,7 +23,8 @@ def angle_from_sides(ab: ArrayLike, ca: ArrayLike, bc: ArrayLike) -> Vector:
     """
     ab, ca, bc = np.asarray(ab, float), np.asarray(ca, float), np.asarray(bc, float)
     with np.errstate(invalid="ignore"):
-        return np.arccos((ab**2 + ca**2 - bc**2) / (2 * ab * ca))
+        angle: Vector = np.arccos((ab**2 + ca**2 - bc**2) / (2 * ab * ca))
+    return angle
 
 
 def skew(normal: ArrayLike) -> Vector:

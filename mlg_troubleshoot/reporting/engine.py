@@ -22,7 +22,7 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
     """
     import plutoprint
 
-    class Refuse(plutoprint.ResourceFetcher):  # type: ignore[misc]
+    class Refuse(plutoprint.ResourceFetcher):
         """Fetches nothing: ``data:`` URLs never get here, and nothing else is allowed."""
 
         def fetch_url(self, url: str) -> Any:

@@ -36,9 +36,7 @@ def check_as_json(
     return {
         "schema_version": SCHEMA_VERSION,
         "gear": {"id": gear.id, "geometry_sha256": gear.geometry_sha256, "provenance": gear.provenance},
-        "inspections": [
-            _assessment(j) if isinstance(j, Assessment) else _rejected(j, gear) for j in judgements
-        ],
+        "inspections": [_assessment(j) if isinstance(j, Assessment) else _rejected(j, gear) for j in judgements],
         "problems": [problem.as_dict() for problem in problems],
         "warnings": list(warnings),
     }

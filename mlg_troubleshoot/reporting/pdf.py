@@ -14,11 +14,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Literal, Self
+from typing import Any, Self
 
 TIME_LIMIT_S = 30.0
-
-Page = Literal["A4", "Letter"]
 
 
 class PdfError(Exception):
@@ -79,15 +77,15 @@ class PdfEngine:
             )
         return self._process
 
-    def convert(self, html: str, page: Page, created: datetime) -> bytes:
+    def convert(self, html: str, page: str, created: datetime) -> bytes:
         """Make one PDF.
 
         Parameters
         ----------
         html : str
             The document, everything it needs inside.
-        page : {'A4', 'Letter'}
-            Paper.
+        page : str
+            ``A4`` or ``Letter``.
         created : datetime.datetime
             Creation date that is written into the PDF.
 
@@ -118,7 +116,7 @@ class PdfEngine:
             process.stdin.write(json.dumps(job).encode("ascii") + b"\n" + body)
             process.stdin.flush()
             line = process.stdout.readline()
-            answer = json.loads(line) if line else {"error": "it ended without an answer", "length": 0}
+            answer: dict[str, Any] = json.loads(line) if line else {"error": "it ended without an answer", "length": 0}
             made = process.stdout.read(answer["length"])
         except (BrokenPipeError, ConnectionResetError, OSError) as error:
             answer, made = {"error": str(error), "length": 0}, b""
@@ -150,7 +148,7 @@ class Section:
     title: str
 
 
-_HEADING = re.compile(r'<h2 id="(?P<id>[a-z0-9-]+)"[^>]*><a href="#(?P=id)">(?P<text>.*?)</a></h2>', re.DOTALL)
+_HEADING = re.compile(r'<h2\b[^>]*\bid="(?P<id>[a-z0-9-]+)"[^>]*><a href="#(?P=id)">(?P<text>.*?)</a></h2>', re.DOTALL)
 _TITLE = re.compile(r"<title>(.*?)</title>", re.DOTALL)
 
 

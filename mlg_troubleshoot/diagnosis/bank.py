@@ -1,0 +1,109 @@
+"""A bank of shapes that are no listed cause: does the remainder still move with a variable, and with which?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.diagnosis.causes.base import Scene, levels
+
+Array = NDArray[np.float64]
+
+_PERIODS_DAYS = (120.0, 150.0, 185.0, 225.0, 275.0, 365.25)
+
+
+@dataclass(frozen=True)
+class Bank:
+    """Shapes and the variables that each moves with.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (n, k)
+        Shapes, each of unit root mean square. [1]
+    variables : tuple of tuple of str
+        Names of the columns of the table behind each shape.
+    """
+
+    columns: Array
+    variables: tuple[tuple[str, ...], ...]
+
+
+def build_bank(scene: Scene, catalogue: Array) -> Bank:
+    """Build the shapes that the table allows and that no candidate of the catalogue already has.
+
+    Parameters
+    ----------
+    scene : Scene
+        Model and rows.
+    catalogue : ndarray, shape (n, n_candidates)
+        Effects of the candidates. [in / unit]
+
+    Returns
+    -------
+    Bank
+        Low-order polynomials of each quantity, seasons, factors and pairwise products.
+    """
+    smooth = _quantities(scene)
+    classes = {
+        (name, value): (texts == value).astype(float)
+        for name, texts in scene.table.factors.items()
+        if name != "tail_no"
+        for value in levels(texts)
+    }
+    shapes: list[tuple[Array, tuple[str, ...]]] = []
+    main = {name: z for name, z in smooth.items() if not name.startswith(("clearance_", "axial_float_"))}
+    for name, z in smooth.items():
+        shapes += [(z, (name,)), (z**2, (name,)), (z**3, (name,)), (np.maximum(z, 0.0), (name,))]
+    if "day" in scene.table.quantities:
+        day = np.nan_to_num(scene.table.quantities["day"])
+        for period in _PERIODS_DAYS:
+            phase = 2.0 * np.pi * day / period
+            shapes += [(np.cos(phase - turn), ("day",)) for turn in (0.0, np.pi / 4, np.pi / 2, 3 * np.pi / 4)]
+    names = list(main)
+    for i, a in enumerate(names):
+        shapes += [(main[a] * main[b], (a, b)) for b in names[i + 1 :]]
+    joint = [name for name in smooth if name.startswith("clearance_")]
+    for i, a in enumerate(joint):
+        shapes += [(smooth[a] * smooth[b], (a, b)) for b in joint[i + 1 :]]
+    keys = list(classes)
+    for i, key in enumerate(keys):
+        shapes += [(classes[key] * main[b], (key[0], b)) for b in names]
+        shapes += [
+            (classes[key] * classes[other], (key[0], other[0])) for other in keys[i + 1 :] if other[0] != key[0]
+        ]
+    return _distinct(shapes, catalogue)
+
+
+def _quantities(scene: Scene) -> dict[str, Array]:
+    table = scene.table
+    raw: dict[str, Array] = {"predicted": scene.over_in, **table.quantities}
+    for j, joint in enumerate(scene.joints):
+        raw[f"clearance_{joint}"] = scene.clearance_in[:, j]
+    if table.axial_float_in is not None:
+        for j, joint in enumerate(scene.joints):
+            if np.isfinite(table.axial_float_in[:, j]).any():
+                raw[f"axial_float_{joint}"] = table.axial_float_in[:, j]
+    smooth = {}
+    for name, values in raw.items():
+        known = np.isfinite(values)
+        if known.sum() < 3 or np.std(values[known]) <= 1e-12 * max(1.0, float(np.max(np.abs(values[known])))):
+            continue
+        z = (values - np.mean(values[known])) / np.std(values[known])
+        smooth[name] = np.clip(np.where(known, z, 0.0), -4.0, 4.0)
+    return smooth
+
+
+def _distinct(shapes: list[tuple[Array, tuple[str, ...]]], catalogue: Array) -> Bank:
+    """Drop shapes that are constant, or that a candidate of the catalogue has already."""
+    kept = [(s / np.sqrt(np.mean(s**2)), v) for s, v in shapes if np.std(s) > 1e-9]
+    n = len(catalogue)
+    columns = np.column_stack([s for s, _ in kept]) if kept else np.empty((n, 0))
+    size = np.std(catalogue, axis=0)
+    varying = catalogue[:, size > 0]
+    centred = (varying - varying.mean(axis=0)) / size[size > 0]
+    own = (columns - columns.mean(axis=0)) / np.std(columns, axis=0)
+    alike = np.max(np.abs(own.T @ centred) / n, axis=1) if centred.shape[1] else np.zeros(len(kept))
+    use = alike < 0.97
+    return Bank(columns[:, use], tuple(v for (_, v), u in zip(kept, use, strict=True) if u))

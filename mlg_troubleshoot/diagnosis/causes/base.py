@@ -1,0 +1,217 @@
+"""What a cause is: a small change inside the geometric model, with one parameter."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.gear.adjustment import Adjustment
+from mlg_troubleshoot.gear.gear import Discrepancies
+from mlg_troubleshoot.gear.model import LinkageModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The model and the rows that a cause acts on.
+
+    Parameters
+    ----------
+    model : LinkageModel
+        The linkage.
+    table : DiagnosisTable
+        The rows.
+    clearance_in : ndarray, shape (n, n_joints)
+        Clearances with missing ones filled. [in]
+    joints : tuple of int
+        Numbers of the joints.
+    where : Discrepancies
+        Where inside the linkage causes act.
+    over_in : ndarray, shape (n,)
+        Plain prediction, over-travel. [in]
+    contribution_in : ndarray, shape (n, n_joints)
+        What each joint's clearance adds to it, directions held. [in]
+    """
+
+    model: LinkageModel
+    table: DiagnosisTable
+    clearance_in: Array
+    joints: tuple[int, ...]
+    where: Discrepancies
+    over_in: Array
+    contribution_in: Array
+
+    def place(self, joint: int) -> int:
+        """Return the column of a joint."""
+        return self.joints.index(joint)
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One cause with its target and everything fixed but its parameter.
+
+    Parameters
+    ----------
+    cause : Cause
+        The cause.
+    target : str or None
+        Which joint, tail, gauge …
+    setting : mapping
+        What else is fixed, for example the day from which it acts.
+    """
+
+    cause: Cause
+    target: str | None = None
+    setting: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def key(self) -> tuple[str, str | None]:
+        """Cause and target: candidates that share it are variants of one name."""
+        return self.cause.name, self.cause.family(self.target)
+
+
+class Cause(ABC):
+    """A physical cause of misfit, as a change inside the geometric model.
+
+    A user adds a cause by deriving from this class in a file of his own. The change must be proportional to
+    the parameter to first order; the engine fits the parameter.
+    """
+
+    name: ClassVar[str]
+    """Name in the contract."""
+    needs: ClassVar[tuple[str, ...]] = ()
+    """Columns without which the cause cannot be tested."""
+    parameter: ClassVar[str]
+    """Name of the parameter, its unit as the last word."""
+    trial: ClassVar[float]
+    """A small typical value of the parameter, at which the effect is computed."""
+    sign: ClassVar[int] = 0
+    """+1 or −1 where physics allows one sign of the parameter only, else 0."""
+    sentence: ClassVar[str]
+    """What it is, for a technician."""
+    inspect: ClassVar[str]
+    """What to inspect if it is named."""
+    separates: ClassVar[str]
+    """The one reading that would separate it from its rivals."""
+
+    def candidates(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield the cause with each target and setting that the table allows.
+
+        Parameters
+        ----------
+        scene : Scene
+            Model and rows.
+
+        Yields
+        ------
+        Candidate
+            One for each target and setting.
+        """
+        yield Candidate(self)
+
+    @abstractmethod
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Change the model.
+
+        Parameters
+        ----------
+        scene : Scene
+            Model and rows.
+        candidate : Candidate
+            Target and setting.
+        value : float
+            The parameter. [unit of `parameter`]
+
+        Returns
+        -------
+        Adjustment
+            What differs from the plain model, row by row.
+        """
+
+    def family(self, target: str | None) -> str | None:
+        """Return the target under which variants of one name are gathered."""
+        return target
+
+    def words(self, target: str | None) -> str:
+        """Return the sentence with its target."""
+        return self.sentence.format(target=target or "")
+
+    def shown(self, value: float) -> dict[str, float]:
+        """Return the parameters as a person reads them.
+
+        Parameters
+        ----------
+        value : float
+            The fitted parameter. [unit of `parameter`]
+
+        Returns
+        -------
+        dict of str to float
+            Parameters by name, the unit as the last word.
+        """
+        return {self.parameter: value}
+
+
+def filled(values: Array, neutral: float) -> Array:
+    """Replace missing cells by a neutral value, so that a cause does nothing there.
+
+    Parameters
+    ----------
+    values : ndarray
+        Cells, NaN where missing.
+    neutral : float
+        Value at which the cause does nothing.
+
+    Returns
+    -------
+    ndarray
+        The cells.
+    """
+    return np.where(np.isfinite(values), values, neutral)
+
+
+def offset(scene: Scene, where: Array, value: float) -> Adjustment:
+    """Return a displacement that comes on top in some rows.
+
+    Parameters
+    ----------
+    scene : Scene
+        Model and rows.
+    where : ndarray, shape (n,)
+        1 in the rows that it acts on, 0 elsewhere, or a share. [1]
+    value : float
+        The displacement. [in]
+
+    Returns
+    -------
+    Adjustment
+        The offset.
+    """
+    return Adjustment(scene.clearance_in, offset_in=np.asarray(where, float) * value)
+
+
+def levels(texts: NDArray[np.str_], least: int = 3) -> Sequence[str]:
+    """Return the values of a factor that occur often enough to be judged, but not everywhere.
+
+    Parameters
+    ----------
+    texts : ndarray of str, shape (n,)
+        The factor.
+    least : int
+        Fewest rows with and without the value.
+
+    Returns
+    -------
+    sequence of str
+        The values, in order.
+    """
+    found, counts = np.unique(texts, return_counts=True)
+    n = len(texts)
+    return [str(v) for v, c in zip(found, counts, strict=True) if v and least <= c <= n - least]

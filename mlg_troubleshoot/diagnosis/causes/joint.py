@@ -1,0 +1,84 @@
+"""Causes in one joint or in two neighbours: how much of a clearance acts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import ClassVar
+
+import numpy as np
+
+from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
+from mlg_troubleshoot.gear.adjustment import Adjustment
+
+
+class _JointShare(Cause):
+    """A joint contributes more or less than its measured clearance in the worst direction."""
+
+    parameter: ClassVar[str] = "contribution_change"
+
+    def candidates(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield one candidate for each joint that was measured with some wear."""
+        for j, joint in enumerate(scene.joints):
+            if np.ptp(scene.clearance_in[:, j]) > 0.0:
+                yield Candidate(self, f"joint {joint}", {"joint": joint})
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Scale one joint's clearance."""
+        clearance = scene.clearance_in.copy()
+        clearance[:, scene.place(candidate.setting["joint"])] *= max(1.0 + value, 0.0)
+        return Adjustment(clearance)
+
+    def shown(self, value: float) -> dict[str, float]:
+        """Return the share of the measured clearance that acts."""
+        return {"contribution_factor": 1.0 + value}
+
+
+class DirectionNotWorstCase(_JointShare):
+    """A joint's clearance is not taken up in the worst direction."""
+
+    name: ClassVar[str] = "direction_not_worst_case"
+    trial: ClassVar[float] = -0.1
+    sign: ClassVar[int] = -1
+    sentence: ClassVar[str] = "The clearance of {target} is not taken up in the worst direction: it contributes less"
+    inspect: ClassVar[str] = "Which way the pin of that joint rests under load"
+    separates: ClassVar[str] = "the pin's resting side in that joint under pressure, by feeler or dial"
+
+
+class OvalWear(_JointShare):
+    """A worn bore is larger in the load direction than where it was measured."""
+
+    name: ClassVar[str] = "oval_wear"
+    trial: ClassVar[float] = 0.1
+    sign: ClassVar[int] = 1
+    sentence: ClassVar[str] = "The bore of {target} is oval: its clearance in the load direction is larger than measured"
+    inspect: ClassVar[str] = "Bore of that joint in two directions"
+    separates: ClassVar[str] = "the bore of that joint measured across and along the load"
+
+
+class JointContact(Cause):
+    """Two adjacent joints cannot take up both clearances."""
+
+    name: ClassVar[str] = "joint_contact"
+    parameter: ClassVar[str] = "share_not_taken_up"
+    trial: ClassVar[float] = 0.2
+    sign: ClassVar[int] = 1
+    sentence: ClassVar[str] = "The neighbouring {target} cannot both take up their clearances"
+    inspect: ClassVar[str] = "Contact marks between the two joints"
+    separates: ClassVar[str] = "one plunger reading with each of the two joints shimmed in turn"
+
+    def candidates(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield one candidate for each pair of neighbours that the gear names."""
+        for first, second in scene.where.contact:
+            a, b = scene.place(first), scene.place(second)
+            if np.any(np.minimum(scene.clearance_in[:, a], scene.clearance_in[:, b]) > 0.0):
+                yield Candidate(self, f"joints {first},{second}", {"pair": (first, second)})
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Take from the joint that contributes less a share of its clearance, down to none."""
+        a, b = (scene.place(joint) for joint in candidate.setting["pair"])
+        first_is_less = scene.contribution_in[:, a] <= scene.contribution_in[:, b]
+        clearance = scene.clearance_in.copy()
+        keep = max(1.0 - value, 0.0)
+        clearance[:, a] *= np.where(first_is_less, keep, 1.0)
+        clearance[:, b] *= np.where(first_is_less, 1.0, keep)
+        return Adjustment(clearance)

@@ -1,0 +1,133 @@
+"""Causes in the linkage itself: lengths, pivots, levers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import ClassVar
+
+import numpy as np
+
+from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, filled
+from mlg_troubleshoot.gear.adjustment import Adjustment
+
+REFERENCE_TEMPERATURE_C = 20.0
+REFERENCE_PRESSURE_PSI = 3000.0
+
+
+class OutOfPlaneTilt(Cause):
+    """Axial float over the bearing span tilts links; their projected lengths shrink with the cosine."""
+
+    name: ClassVar[str] = "out_of_plane_tilt"
+    needs: ClassVar[tuple[str, ...]] = ("axial_float",)
+    parameter: ClassVar[str] = "inverse_span_squared_per_in2"
+    trial: ClassVar[float] = 1.0 / 1.5**2
+    sign: ClassVar[int] = 1
+    sentence: ClassVar[str] = "End float lets links tilt out of their plane, which shortens them"
+    inspect: ClassVar[str] = "End float and thrust washers of the short link, the locking lever and the link assembly"
+    separates: ClassVar[str] = "end float of joints 3, 4 and 5, and one plunger reading with the float taken up by shims"
+
+    def candidates(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield one candidate where the gear says which floats tilt which link."""
+        if scene.where.tilt:
+            yield Candidate(self)
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Shrink each link by the cosine of its tilt: root sum of squares of its floats over the span."""
+        floats = scene.table.axial_float_in
+        if floats is None:
+            return Adjustment(scene.clearance_in)
+        scaled = {}
+        for link in scene.where.tilt:
+            places = [scene.place(joint) for joint in link.floats]
+            square = value * np.sum(filled(floats[:, places], 0.0) ** 2, axis=1)
+            scaled[link.length] = np.sqrt(np.maximum(1.0 - square, 0.0))
+        return Adjustment(scene.clearance_in, scaled=scaled)
+
+    def shown(self, value: float) -> dict[str, float]:
+        """Return the bearing span that the tilt implies."""
+        return {"bearing_span_in": float(1.0 / np.sqrt(value)) if value > 0 else float("inf")}
+
+
+class ElasticCompliance(Cause):
+    """A link stretches with hydraulic load, in proportion to the pressure above 3000 psi."""
+
+    name: ClassVar[str] = "elastic_compliance"
+    needs: ClassVar[tuple[str, ...]] = ("hydraulic_pressure_psi",)
+    parameter: ClassVar[str] = "stretch_in_per_psi"
+    trial: ClassVar[float] = 1e-6
+    sentence: ClassVar[str] = "Actuator and short link stretch with hydraulic pressure"
+    inspect: ClassVar[str] = "Hydraulic pressure at the reading; actuator rod and short link for cracks and bending"
+    separates: ClassVar[str] = "two plunger readings of one gear, at full pressure and at hand-pump pressure"
+
+    def candidates(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield one candidate for each length that stretches; the sign of a stretch is not known."""
+        for length in scene.where.elastic:
+            yield Candidate(self, None, {"length": length})
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Lengthen one link in proportion to the pressure above the reference."""
+        pressure = filled(scene.table.quantities["hydraulic_pressure_psi"], REFERENCE_PRESSURE_PSI)
+        changed = {candidate.setting["length"]: value * (pressure - REFERENCE_PRESSURE_PSI)}
+        return Adjustment(scene.clearance_in, changed=changed)
+
+
+class ThermalGrowth(Cause):
+    """The airframe's pivots spread with temperature more than the links grow."""
+
+    name: ClassVar[str] = "thermal_growth"
+    needs: ClassVar[tuple[str, ...]] = ("temperature_c",)
+    parameter: ClassVar[str] = "expansion_difference_per_c"
+    trial: ClassVar[float] = 1e-5
+    sentence: ClassVar[str] = "Aluminium airframe pivots and steel links grow differently with temperature"
+    inspect: ClassVar[str] = "Temperature of the structure at the reading; rig and measure at about 20 °C"
+    separates: ClassVar[str] = "two plunger readings of one gear, cold and warm"
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Spread every fixed point and the plunger's axis from the origin."""
+        temperature = filled(scene.table.quantities["temperature_c"], REFERENCE_TEMPERATURE_C)
+        growth = 1.0 + value * (temperature - REFERENCE_TEMPERATURE_C)
+        fixed = [
+            name
+            for name in scene.model.kernel.parameter_names
+            if name.startswith("point.")
+            or (name.startswith("slider.") and not name.endswith(".axis"))
+            or (name.startswith("transfer.") and name.endswith("0"))
+        ]
+        return Adjustment(scene.clearance_in, scaled=dict.fromkeys(fixed, growth))
+
+
+class UnlistedWear(Cause):
+    """A part outside the joints, such as the lock roller or its cam, wears with landings and shifts the lever."""
+
+    name: ClassVar[str] = "unlisted_wear"
+    needs: ClassVar[tuple[str, ...]] = ("gear_landings",)
+    parameter: ClassVar[str] = "lever_shift_per_1000_landings"
+    trial: ClassVar[float] = 1e-3
+    sentence: ClassVar[str] = "A part outside the listed joints wears with landings and shifts the lever"
+    inspect: ClassVar[str] = "Lock roller and cam of the locking lever"
+    separates: ClassVar[str] = "one plunger reading after a new lock roller, clearances unchanged"
+
+    def candidates(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield one candidate where the gear says which number such wear shifts."""
+        if scene.where.wear_shift:
+            yield Candidate(self)
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Shift the lever in proportion to the landings."""
+        landings = filled(scene.table.quantities["gear_landings"], 0.0)
+        return Adjustment(scene.clearance_in, changed={str(scene.where.wear_shift): value * landings / 1000.0})
+
+
+class CalibrationRate(Cause):
+    """The calibration rate is wrong: all predictions are scaled."""
+
+    name: ClassVar[str] = "calibration_rate"
+    parameter: ClassVar[str] = "rate_change"
+    trial: ClassVar[float] = 0.01
+    sentence: ClassVar[str] = "The calibration rate of the model is off: every prediction is scaled"
+    inspect: ClassVar[str] = "Plunger travel from Down Lock to mid-position (technical order: 0.45 in)"
+    separates: ClassVar[str] = "the plunger's travel over the release, measured on two gears without wear"
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Scale the calibration rate."""
+        return Adjustment(scene.clearance_in, rate_factor=np.full(len(scene.table), 1.0 + value))

@@ -1,0 +1,202 @@
+"""Causes in rigging, gauges, people and habits: an offset of some rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from datetime import date, timedelta
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.diagnosis.causes.base import Array, Candidate, Cause, Scene, levels, offset
+from mlg_troubleshoot.gear.adjustment import Adjustment
+
+_LEAST_ROWS = 3
+
+
+def _date(scene: Scene, day: float) -> str | None:
+    first = scene.table.first_day
+    return None if first is None else (date.fromisoformat(first) + timedelta(days=float(day))).isoformat()
+
+
+def _from_day_on(scene: Scene, setting: Mapping[str, Any]) -> NDArray[np.bool_]:
+    """Rows from the setting's day on; all rows if it has none. The day is found by its date in any table."""
+    if setting["day"] is None:
+        return np.ones(len(scene.table), bool)
+    days = scene.table.quantities.get("day")
+    if days is None:
+        return np.zeros(len(scene.table), bool)
+    start = setting["day"]
+    if setting["since"] is not None and scene.table.first_day is not None:
+        start = (date.fromisoformat(setting["since"]) - date.fromisoformat(scene.table.first_day)).days
+    return np.asarray(days >= start)
+
+
+def _change_days(days: Array, least: int, most: int) -> list[float]:
+    """Days between which a change may lie, so that enough rows stand on both sides."""
+    known = np.sort(days[np.isfinite(days)])
+    places = [i for i in range(least, len(known) - least + 1) if i < len(known) and known[i] > known[i - 1]]
+    if len(places) > most:
+        places = [places[k] for k in np.linspace(0, len(places) - 1, most).round().astype(int)]
+    return [float(known[i]) for i in places]
+
+
+class _Level(Cause):
+    """An offset of all rows that share one value of a factor."""
+
+    parameter: ClassVar[str] = "offset_in"
+    trial: ClassVar[float] = 0.001
+    factor: ClassVar[str]
+    label: ClassVar[str]
+
+    def candidates(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield one candidate for each value that occurs often enough, but not everywhere."""
+        for value in levels(scene.table.factors[self.factor]):
+            yield Candidate(self, f"{self.label} {value}", {"value": value})
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Shift the rows of that value."""
+        texts = scene.table.factors.get(self.factor, np.full(len(scene.table), ""))
+        return offset(scene, texts == candidate.setting["value"], value)
+
+
+class GaugeBias(_Level):
+    """One gauge reads off."""
+
+    name: ClassVar[str] = "gauge_bias"
+    needs: ClassVar[tuple[str, ...]] = ("gauge_id",)
+    factor: ClassVar[str] = "gauge_id"
+    label: ClassVar[str] = "gauge"
+    sentence: ClassVar[str] = "Readings with {target} are shifted"
+    inspect: ClassVar[str] = "Calibration of that gauge"
+    separates: ClassVar[str] = "one gear measured with this gauge and with another by the same technician on one day"
+
+
+class TechnicianBias(_Level):
+    """One technician reads off."""
+
+    name: ClassVar[str] = "technician_bias"
+    needs: ClassVar[tuple[str, ...]] = ("technician_id",)
+    factor: ClassVar[str] = "technician_id"
+    label: ClassVar[str] = "technician"
+    sentence: ClassVar[str] = "Readings by {target} are shifted"
+    inspect: ClassVar[str] = "How that technician seats and zeroes the gauge"
+    separates: ClassVar[str] = "one gear measured by this technician and by another with the same gauge on one day"
+
+
+class SideDifference(Cause):
+    """Left and right gear differ."""
+
+    name: ClassVar[str] = "side_difference"
+    needs: ClassVar[tuple[str, ...]] = ("side",)
+    parameter: ClassVar[str] = "rh_minus_lh_in"
+    trial: ClassVar[float] = 0.001
+    sentence: ClassVar[str] = "Right-hand and left-hand gears differ"
+    inspect: ClassVar[str] = "Rigging of one right-hand gear against its left-hand neighbour"
+    separates: ClassVar[str] = "both gears of one aircraft, same technician, same gauge, same day"
+
+    def candidates(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield the difference, and each side alone, where both sides occur."""
+        if len(levels(scene.table.factors["side"])) == 2:
+            yield Candidate(self, None, {"shares": {"RH": 1.0}})
+            yield Candidate(self, None, {"shares": {"LH": -1.0}})
+            yield Candidate(self, None, {"shares": {"RH": 0.5, "LH": -0.5}})
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Shift the sides against each other."""
+        shares, sides = candidate.setting["shares"], scene.table.factors["side"]
+        where = sum(((sides == side) * share for side, share in shares.items()), np.zeros(len(sides)))
+        return offset(scene, where, value)
+
+
+class ApproachHysteresis(Cause):
+    """Lost motion: the reading depends on the direction of approach."""
+
+    name: ClassVar[str] = "approach_hysteresis"
+    needs: ClassVar[tuple[str, ...]] = ("approach",)
+    parameter: ClassVar[str] = "extending_minus_retracting_in"
+    trial: ClassVar[float] = 0.001
+    sentence: ClassVar[str] = "Lost motion: the reading depends on the direction of approach"
+    inspect: ClassVar[str] = "Approach mid-position always in the same direction; look for friction in the link assembly"
+    separates: ClassVar[str] = "one gear read twice, approached extending and retracting"
+
+    def candidates(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield the difference, and each direction alone, where both directions occur."""
+        if len(levels(scene.table.factors["approach"])) == 2:
+            yield Candidate(self, None, {"shares": {"EXTENDING": 0.5, "RETRACTING": -0.5}})
+            yield Candidate(self, None, {"shares": {"EXTENDING": 1.0}})
+            yield Candidate(self, None, {"shares": {"RETRACTING": -1.0}})
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Shift the two directions of approach against each other."""
+        shares, ways = candidate.setting["shares"], scene.table.factors["approach"]
+        where = sum(((ways == way) * share for way, share in shares.items()), np.zeros(len(ways)))
+        return offset(scene, where, value)
+
+
+class DateStep(Cause):
+    """A fleet-wide change of practice from a date on."""
+
+    name: ClassVar[str] = "date_step"
+    needs: ClassVar[tuple[str, ...]] = ("day",)
+    parameter: ClassVar[str] = "offset_in"
+    trial: ClassVar[float] = 0.001
+    sentence: ClassVar[str] = "All readings are shifted from a date on"
+    inspect: ClassVar[str] = "What changed that day: procedure, tooling, rigging instruction"
+    separates: ClassVar[str] = "one gear measured by the old and by the new practice on one day"
+
+    def candidates(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield one candidate for each day on which the change may have come."""
+        days = scene.table.quantities["day"]
+        for day in _change_days(days, max(_LEAST_ROWS, len(days) // 25), 60):
+            yield Candidate(self, None, {"day": day, "since": _date(scene, day)})
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Shift the rows from that day on."""
+        return offset(scene, _from_day_on(scene, candidate.setting), value)
+
+
+class RiggingOffset(Cause):
+    """The plunger rod of one aircraft, or of one of its gears, was re-rigged."""
+
+    name: ClassVar[str] = "rigging_offset"
+    needs: ClassVar[tuple[str, ...]] = ("tail_no",)
+    parameter: ClassVar[str] = "offset_in"
+    trial: ClassVar[float] = 0.001
+    sentence: ClassVar[str] = "The plunger rod of {target} was re-rigged"
+    inspect: ClassVar[str] = "Plunger rod length and rigging record of that gear"
+    separates: ClassVar[str] = "rigging check of that gear: plunger at Down Lock and at mid-position"
+
+    def candidates(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield each aircraft and each single gear, over all its rows and from each possible day on."""
+        table = scene.table
+        days = table.quantities.get("day", np.full(len(table), np.nan))
+        tails = table.factors["tail_no"]
+        groups = [(f"tail {v}", {"tail": v}, tails == v) for v in levels(tails)]
+        if "side" in table.factors:
+            gears = table.gears
+            groups += [
+                (f"tail {v}", {"tail": str(tails[gears == v][0]), "side": str(table.factors["side"][gears == v][0])}, gears == v)
+                for v in levels(gears)
+                if np.unique(gears[tails == tails[gears == v][0]]).size > 1
+            ]
+        for label, setting, rows in groups:
+            yield Candidate(self, label, {**setting, "day": None, "since": None})
+            for day in _change_days(days[rows], 2, 12):
+                yield Candidate(self, label, {**setting, "day": day, "since": _date(scene, day)})
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Shift the rows of that aircraft or gear from that day on."""
+        table, setting = scene.table, candidate.setting
+        where = table.factors["tail_no"] == setting["tail"]
+        if "side" in setting:
+            where = where & (table.factors["side"] == setting["side"])
+        return offset(scene, where & _from_day_on(scene, setting), value)
+
+    def family(self, target: str | None) -> str | None:
+        """Gather an aircraft and its single gears under one name."""
+        if target is None:
+            return None
+        words = target.split(" ")
+        return " ".join(words[:-1]) if words[-1] in {"LH", "RH"} else target

@@ -1,0 +1,222 @@
+"""What rows do when nothing is wrong: scatter of readings, scatter between tails, small bias and slope.
+
+Rows of one aircraft are not exchangeable, noise may grow with the displacement and have heavy tails, and
+rounding and scatter of the clearances bias the mean and the slope a little. All of that is part of the
+covariance; what stands out against it is an effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+
+Array = NDArray[np.float64]
+
+# Pins scatter by some 6° about the worst direction, so a healthy fleet reads less than the bound by this share. [1]
+EXPECTED_SLOPE = -0.006
+# Bias that the null model allows beyond that, one standard deviation: of the mean [in], and of the slope [1].
+BIAS_IN = 0.0002
+SLOPE = 0.006
+# Ratios of the scatter between tails to the scatter of a row that are tried.
+TAIL_RATIOS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.4, 2.0)
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Covariance of the rows: diagonal scatter, common scatter of each tail, bias and slope.
+
+    Parameters
+    ----------
+    relative : ndarray, shape (n,)
+        Standard deviation of each row in units of the common one. [1]
+    tails : ndarray of int, shape (n,)
+        Number of the tail of each row.
+    loadings : ndarray, shape (n, 2)
+        Bias and slope, each at one standard deviation in units of the common one. [1]
+    """
+
+    relative: Array
+    tails: NDArray[np.int64]
+    loadings: Array
+
+    def factors(self, tail_ratio: float) -> Array:
+        """Low-rank part of the covariance, shape (n, k). [1]"""
+        if tail_ratio == 0.0:
+            return self.loadings
+        indicator = (self.tails[:, None] == np.arange(self.tails.max() + 1)).astype(float)
+        return np.hstack([tail_ratio * indicator, self.loadings])
+
+    def precision_times(self, columns: Array, tail_ratio: float) -> tuple[Array, float]:
+        """Multiply columns by the inverse covariance (Woodbury).
+
+        Parameters
+        ----------
+        columns : ndarray, shape (n, k)
+            Columns.
+        tail_ratio : float
+            Scatter between tails over scatter of a row. [1]
+
+        Returns
+        -------
+        product : ndarray, shape (n, k)
+            V⁻¹ times the columns, V in units of the common variance.
+        log_determinant : float
+            Logarithm of the determinant of V. [1]
+        """
+        weight = 1.0 / self.relative**2
+        low = self.factors(tail_ratio)
+        scaled = low * weight[:, None]
+        inner = np.eye(low.shape[1]) + low.T @ scaled
+        product = columns * weight[:, None]
+        product = product - scaled @ np.linalg.solve(inner, low.T @ product)
+        return product, float(np.linalg.slogdet(inner)[1] + 2.0 * np.sum(np.log(self.relative)))
+
+    def draw(self, residuals: Array, tail_ratio: float, scale: float, n: int, rng: np.random.Generator) -> Array:
+        """Draw data sets in which nothing is wrong.
+
+        Parameters
+        ----------
+        residuals : ndarray, shape (m,)
+            Standardised residuals to draw from, so that heavy tails stay. [1]
+        tail_ratio : float
+            Scatter between tails over scatter of a row. [1]
+        scale : float
+            Common standard deviation. [in]
+        n : int
+            Number of data sets.
+        rng : numpy.random.Generator
+            Source of randomness.
+
+        Returns
+        -------
+        ndarray, shape (n_rows, n)
+            The data sets. [in]
+        """
+        rows = len(self.relative)
+        drawn = rng.choice(residuals, size=(rows, n)) * rng.choice([-1.0, 1.0], size=(rows, n))
+        low = self.factors(tail_ratio)
+        common = low @ rng.standard_normal((low.shape[1], n))
+        return np.asarray(scale * (self.relative[:, None] * drawn + common))
+
+
+def estimate_repeatability(table: DiagnosisTable) -> tuple[float, str]:
+    """Estimate how well one reading repeats.
+
+    Parameters
+    ----------
+    table : DiagnosisTable
+        The rows.
+
+    Returns
+    -------
+    repeatability_in : float
+        Standard deviation of one reading; NaN if nothing tells. [in]
+    source : str
+        ``repeat readings``, ``declared`` or ``unknown``.
+    """
+    readings = table.readings_in
+    counts = np.isfinite(readings).sum(axis=1)
+    degrees = int(np.sum(counts[counts > 1] - 1))
+    if degrees >= 5:
+        repeated = readings[counts > 1]
+        centred = repeated - np.nanmean(repeated, axis=1, keepdims=True)
+        return float(np.sqrt(np.nansum(centred**2) / degrees)), "repeat readings"
+    if table.plunger_gauge_u_in is not None:
+        return float(np.nanmedian(table.plunger_gauge_u_in)), "declared"
+    return float("nan"), "unknown"
+
+
+def robust_scale(values: Array) -> float:
+    """Standard deviation from the median absolute deviation.
+
+    Parameters
+    ----------
+    values : ndarray
+        Values.
+
+    Returns
+    -------
+    float
+        Consistent with the standard deviation for normal values.
+    """
+    return float(1.4826 * np.median(np.abs(values - np.median(values))))
+
+
+def tail_numbers(tails: Sequence[str] | NDArray[np.str_]) -> NDArray[np.int64]:
+    """Number the tails in order of their names.
+
+    Parameters
+    ----------
+    tails : sequence of str
+        Tail of each row.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        Numbers from 0.
+    """
+    return np.unique(np.asarray(tails), return_inverse=True)[1].astype(np.int64)
+
+
+def build_noise(
+    misfit: Array, predicted: Array, tails: NDArray[np.str_], extra_in: Array, explained: Array | None = None
+) -> tuple[NoiseModel, float]:
+    """Estimate the noise model from the misfit.
+
+    Parameters
+    ----------
+    misfit : ndarray, shape (n,)
+        Measured less predicted. [in]
+    predicted : ndarray, shape (n,)
+        Prediction. [in]
+    tails : ndarray of str, shape (n,)
+        Tail of each row.
+    extra_in : ndarray, shape (n,)
+        Further standard deviation of a row, by filled clearances. [in]
+    explained : ndarray, shape (n,), optional
+        What a tentative cause explains; removed before the scatter is estimated. [in]
+
+    Returns
+    -------
+    noise : NoiseModel
+        The model.
+    scale : float
+        Common standard deviation of a row, first guess. [in]
+    """
+    rest = misfit if explained is None else misfit - explained
+    numbers = tail_numbers(tails)
+    centred = rest.copy()
+    for tail in range(numbers.max() + 1):
+        rows = numbers == tail
+        if rows.sum() > 2:
+            centred[rows] -= np.median(rest[rows])
+    scale = max(robust_scale(centred), 1e-6)
+    relative = _growth(centred, predicted)
+    scale = max(robust_scale(centred / relative), 1e-6)
+    relative = np.sqrt(relative**2 + (extra_in / scale) ** 2)
+    # Rows far out in the tails of the distribution count less, but never as nothing.
+    standard = np.abs(centred) / (scale * relative)
+    relative = relative * np.maximum(1.0, standard / 3.0)
+    loadings = np.column_stack([np.full(len(misfit), BIAS_IN), SLOPE * predicted]) / scale
+    return NoiseModel(relative, numbers, loadings), scale
+
+
+def _growth(centred: Array, predicted: Array) -> Array:
+    """Relative standard deviation of each row where noise grows with displacement, median 1."""
+    size = np.abs(centred)
+    size = np.minimum(size, 4.0 * np.median(size) + 1e-12)
+    at = np.abs(predicted)
+    if np.ptp(at) == 0.0:
+        return np.ones(len(at))
+    slope, level = np.polyfit(at, size, 1)
+    fitted = np.maximum(level + slope * at, 0.3 * np.median(size) + 1e-12)
+    # A slope within its own error is no growth.
+    error = np.std(size - level - slope * at) / (np.std(at) * np.sqrt(len(at)))
+    if slope < 2.5 * error:
+        return np.ones(len(at))
+    return np.asarray(fitted / np.median(fitted))

@@ -1,0 +1,200 @@
+"""The plain prediction for each row, and what each candidate cause would do to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.diagnosis.causes.base import Candidate, Scene
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
+from mlg_troubleshoot.gear.directions import WorstCase
+from mlg_troubleshoot.gear.gear import Discrepancies
+from mlg_troubleshoot.gear.model import LinkageModel, links_from
+
+Array = NDArray[np.float64]
+
+
+def likely_clearances(table: DiagnosisTable) -> tuple[Array, Array]:
+    """Most likely clearances behind the readings, and those of joints that were not read.
+
+    A gear's joint wears along its own history: its clearance is expected near the gear's own level, growing
+    with landings as the fleet's does. A reading is drawn towards that expectation as far as its uncertainty
+    deserves it, judged by how much the readings really scatter about it (regression calibration). Otherwise
+    the scatter of the readings alone looks like a cause, because a reading that is too large by chance
+    predicts too much. A joint that nobody measured counts as 0, as in the check.
+
+    Parameters
+    ----------
+    table : DiagnosisTable
+        The rows.
+
+    Returns
+    -------
+    likely : ndarray, shape (n, n_joints)
+        Clearances without gaps. [in]
+    u_in : ndarray, shape (n, n_joints)
+        Standard uncertainty of the filled ones, 0 for the measured ones. [in]
+    """
+    readings = table.clearance_in
+    likely, spread = np.zeros_like(readings), np.zeros_like(readings)
+    gears = np.unique(table.gears, return_inverse=True)[1]
+    for j in range(readings.shape[1]):
+        known = np.isfinite(readings[:, j])
+        if not known.any():
+            continue
+        expected, own = _expected(readings[:, j], known, gears, table.quantities.get("gear_landings"))
+        noise = table.gauge_u_in**2 + _resolution(readings[known, j]) ** 2 / 12.0
+        # Wear scatters in proportion to its level: a gear with little of it is known better by its history.
+        level = np.maximum(expected, 1e-4) ** 2
+        share = float(np.mean(own[known] - noise[known]) / np.mean(level[known]))
+        true = np.maximum(share, 0.01) * level
+        trust = true / (true + noise)
+        read = np.where(known, readings[:, j], expected)
+        likely[:, j] = expected + trust * (read - expected)
+        spread[:, j] = np.where(known, 0.0, np.sqrt(true))
+    return np.maximum(likely, 0.0), spread
+
+
+def _expected(
+    values: Array, known: NDArray[np.bool_], gears: NDArray[np.intp], landings: Array | None
+) -> tuple[Array, Array]:
+    """Expected clearance of each row from its gear's rows, and its squared distance from it, unbiased. [in, in²]"""
+    overall = float(np.mean(values[known]))
+    count = np.bincount(gears[known], minlength=gears.max() + 1).astype(float)
+    growth = _relative_landings(landings, gears)
+    rate = 0.0
+    for _ in range(4):
+        shape = 1.0 + rate * growth
+        level = np.bincount(gears[known], (values / shape)[known], minlength=len(count)) / np.maximum(count, 1.0)
+        centred = values - level[gears] * shape
+        along = level[gears] * growth
+        square = float(np.sum(along[known] ** 2))
+        if square <= 0.0:
+            break
+        rate = float(np.clip(rate + np.sum((centred * along)[known]) / square, -0.5, 2.0))
+    shape = 1.0 + rate * growth
+    within = float(np.sum((values - level[gears] * shape)[known] ** 2) / max(known.sum() - np.sum(count > 0), 1.0))
+    between = max(float(np.var(level[count > 0])) - within / max(float(np.mean(count[count > 0])), 1.0), 0.0)
+    # A gear's level is drawn to the fleet's where it rests on few readings.
+    weight = between / np.maximum(between + within / np.maximum(count, 1.0), 1e-30)
+    drawn = np.where(count > 0, overall + weight * (level - overall), overall)
+    expected = drawn[gears] * shape
+    degrees = max(1.0 - float(np.sum(weight[count > 0])) / known.sum(), 0.2)
+    return expected, (values - expected) ** 2 / degrees
+
+
+def _relative_landings(landings: Array | None, gears: NDArray[np.intp]) -> Array:
+    """Landings of each row against its gear's mean, as a fraction of that mean; 0 where unknown. [1]"""
+    if landings is None:
+        return np.zeros(len(gears))
+    known = np.isfinite(landings)
+    count = np.maximum(np.bincount(gears[known], minlength=gears.max() + 1), 1)
+    mean = np.bincount(gears[known], landings[known], minlength=gears.max() + 1) / count
+    own = np.maximum(mean[gears], 1.0)
+    return np.where(known, np.nan_to_num(landings) / own - 1.0, 0.0)
+
+
+def _resolution(values: Array) -> float:
+    """Step of the readings: the least difference between them, 0 if they lie on no grid. [in]"""
+    unique = np.unique(np.round(values, 7))
+    if len(unique) < 3:
+        return 0.0
+    step = float(np.min(np.diff(unique)))
+    on_grid = np.abs(unique / step - np.round(unique / step)) < 0.02
+    return step if step >= 1e-4 and bool(np.mean(on_grid) > 0.9) else 0.0
+
+
+def build_scene(
+    model: LinkageModel, table: DiagnosisTable, where: Discrepancies
+) -> tuple[Scene, WorstCase, Array]:
+    """Predict every row with the plain model.
+
+    Parameters
+    ----------
+    model : LinkageModel
+        The linkage.
+    table : DiagnosisTable
+        The rows.
+    where : Discrepancies
+        Where inside the linkage causes act.
+
+    Returns
+    -------
+    scene : Scene
+        Model, rows and plain prediction.
+    worst : WorstCase
+        Worst directions of each row.
+    u_filled_in : ndarray, shape (n,)
+        Standard uncertainty of the prediction by filled clearances. [in]
+    """
+    clearance, u_clearance = likely_clearances(table)
+    worst = adjusted_worst_case(model, Adjustment(clearance))
+    contribution = np.empty_like(clearance)
+    slopes = np.zeros_like(clearance)
+    for j in range(clearance.shape[1]):
+        without = clearance.copy()
+        without[:, j] = 0.0
+        contribution[:, j] = worst.over_in - model.displacement(links_from(without, worst.over_directions))
+        if np.any(u_clearance[:, j] > 0):
+            moved = clearance.copy()
+            moved[:, j] += 1e-5
+            slopes[:, j] = (
+                model.displacement(links_from(moved, worst.over_directions)) - worst.over_in
+            ) / 1e-5
+    scene = Scene(model, table, clearance, model.joint_numbers, where, worst.over_in, contribution)
+    return scene, worst, np.sqrt(np.sum((slopes * u_clearance) ** 2, axis=1))
+
+
+def effect(scene: Scene, worst: WorstCase, adjustment: Adjustment) -> Array:
+    """What an adjustment adds to the plain prediction, the worst directions held: exact to first order.
+
+    Parameters
+    ----------
+    scene : Scene
+        Model and rows.
+    worst : WorstCase
+        Worst directions of the plain model.
+    adjustment : Adjustment
+        The change.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Change of the over-travel prediction. [in]
+    """
+    moved = scene.over_in
+    if adjustment.changed or adjustment.scaled or adjustment.clearance_in is not scene.clearance_in:
+        links = links_from(adjustment.clearance_in, worst.over_directions)
+        moved = scene.model.displacement(links, adjustment.numbers(scene.model))
+    if adjustment.rate_factor is not None:
+        moved = moved * adjustment.rate_factor
+    if adjustment.offset_in is not None:
+        moved = moved + adjustment.offset_in
+    return np.asarray(moved - scene.over_in)
+
+
+def effect_columns(scene: Scene, worst: WorstCase, candidates: Sequence[Candidate]) -> Array:
+    """Effect of each candidate per unit of its parameter.
+
+    Parameters
+    ----------
+    scene : Scene
+        Model and rows.
+    worst : WorstCase
+        Worst directions of the plain model.
+    candidates : sequence of Candidate
+        The candidates.
+
+    Returns
+    -------
+    ndarray, shape (n, n_candidates)
+        Change of the prediction per unit of the parameter. [in / unit]
+    """
+    columns = np.empty((len(scene.table), len(candidates)))
+    for k, candidate in enumerate(candidates):
+        trial = candidate.cause.trial
+        columns[:, k] = effect(scene, worst, candidate.cause.adjust(scene, candidate, trial)) / trial
+    return columns

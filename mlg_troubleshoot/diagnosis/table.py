@@ -1,0 +1,189 @@
+"""Measured rows as columns by name: all that the diagnosis sees."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.gear.gear import Gear
+
+Array = NDArray[np.float64]
+Texts = NDArray[np.str_]
+
+FACTORS = ("tail_no", "side", "gauge_id", "technician_id", "approach")
+QUANTITIES = ("temperature_c", "hydraulic_pressure_psi", "gear_landings", "day")
+
+
+@dataclass(frozen=True)
+class DiagnosisTable:
+    """Rows of measured output beside the inputs of the model, as columns.
+
+    A column that the source does not have is absent; a missing cell is NaN or an empty text.
+
+    Parameters
+    ----------
+    clearance_in : ndarray, shape (n, n_joints)
+        Radial clearances, NaN where not measured. [in]
+    readings_in : ndarray, shape (n, n_readings)
+        Repeat readings of the output, NaN where missing. [in or rad]
+    record_id : sequence of str
+        Identity of each row.
+    row : ndarray of int, shape (n,)
+        Row in the source, counted from 1.
+    margin_in : ndarray, shape (n,)
+        Margin of each row. [in or rad]
+    gauge_u_in : ndarray, shape (n,)
+        Standard uncertainty of one radial clearance. [in]
+    quantities : mapping of str to ndarray of shape (n,)
+        Numbers by name: ``temperature_c`` [°C], ``hydraulic_pressure_psi`` [psi], ``gear_landings``,
+        ``day`` (days since the earliest date), or a user's own.
+    factors : mapping of str to ndarray of str of shape (n,)
+        Texts by name: ``tail_no``, ``side``, ``gauge_id``, ``technician_id``, ``approach``, or a user's own.
+    axial_float_in : ndarray, shape (n, n_joints), or None
+        End floats, NaN where not measured. [in]
+    first_day : str or None
+        Date of day 0, ISO 8601.
+    plunger_gauge_u_in : ndarray, shape (n,), or None
+        Declared repeatability of one reading. [in]
+    """
+
+    clearance_in: Array
+    readings_in: Array
+    record_id: tuple[str, ...]
+    row: NDArray[np.int64]
+    margin_in: Array
+    gauge_u_in: Array
+    quantities: Mapping[str, Array] = field(default_factory=dict)
+    factors: Mapping[str, Texts] = field(default_factory=dict)
+    axial_float_in: Array | None = None
+    first_day: str | None = None
+    plunger_gauge_u_in: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.clearance_in)
+
+    @property
+    def measured_in(self) -> Array:
+        """Mean of the readings of each row, shape (n,); NaN where there is none. [in]"""
+        count = np.isfinite(self.readings_in).sum(axis=1)
+        total = np.nansum(self.readings_in, axis=1)
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the covariates that the table has."""
+        floats = ("axial_float",) if self.axial_float_in is not None else ()
+        return (*self.quantities, *self.factors, *floats)
+
+    @property
+    def gears(self) -> Texts:
+        """The single gear of each row, tail and side, shape (n,)."""
+        tail = self.factors.get("tail_no")
+        if tail is None:
+            return np.array([str(i) for i in range(len(self))])
+        side = self.factors.get("side")
+        if side is None:
+            return tail
+        return np.array([f"{t} {s}" for t, s in zip(tail, side, strict=True)])
+
+    @property
+    def tails(self) -> Texts:
+        """The aircraft of each row, shape (n,); each row its own where no tail is given."""
+        tail = self.factors.get("tail_no")
+        return np.array([str(i) for i in range(len(self))]) if tail is None else tail
+
+    def take(self, rows: Any) -> DiagnosisTable:
+        """Return some of the rows.
+
+        Parameters
+        ----------
+        rows : index array
+            Rows to take, by place or as a mask.
+
+        Returns
+        -------
+        DiagnosisTable
+            The rows.
+        """
+        places = np.arange(len(self))[rows]
+        return replace(
+            self,
+            clearance_in=self.clearance_in[places],
+            readings_in=self.readings_in[places],
+            record_id=tuple(self.record_id[int(i)] for i in places),
+            row=self.row[places],
+            margin_in=self.margin_in[places],
+            gauge_u_in=self.gauge_u_in[places],
+            quantities={name: values[places] for name, values in self.quantities.items()},
+            factors={name: values[places] for name, values in self.factors.items()},
+            axial_float_in=None if self.axial_float_in is None else self.axial_float_in[places],
+            plunger_gauge_u_in=None if self.plunger_gauge_u_in is None else self.plunger_gauge_u_in[places],
+        )
+
+
+def table_from_inspections(inspections: Sequence[Inspection], gear: Gear) -> DiagnosisTable:
+    """Put inspections into columns.
+
+    Parameters
+    ----------
+    inspections : sequence of Inspection
+        The inspections, with or without measured displacements.
+    gear : Gear
+        The gear.
+
+    Returns
+    -------
+    DiagnosisTable
+        The columns; a covariate that no inspection has is absent.
+    """
+    n, numbers = len(inspections), gear.joint_numbers
+    clearance = np.full((n, len(numbers)), np.nan)
+    floats = np.full((n, len(numbers)), np.nan)
+    width = max((len(i.readings_in) for i in inspections), default=0)
+    readings = np.full((n, max(width, 1)), np.nan)
+    for row, inspection in enumerate(inspections):
+        for j, number in enumerate(numbers):
+            clearance[row, j] = inspection.clearance_in.get(number, np.nan)
+            floats[row, j] = inspection.axial_float_in.get(number, np.nan)
+        readings[row, : len(inspection.readings_in)] = inspection.readings_in
+    days = [None if i.inspection_date is None else i.inspection_date.toordinal() for i in inspections]
+    known = [day for day in days if day is not None]
+    first = min(known) if known else None
+    quantities = {
+        "temperature_c": [i.temperature_c for i in inspections],
+        "hydraulic_pressure_psi": [i.hydraulic_pressure_psi for i in inspections],
+        "gear_landings": [i.gear_landings for i in inspections],
+        "day": [None if day is None or first is None else day - first for day in days],
+    }
+    factors = {
+        "tail_no": [i.tail_no for i in inspections],
+        "side": [str(i.side) for i in inspections],
+        "gauge_id": [i.gauge_id or "" for i in inspections],
+        "technician_id": [i.technician_id or "" for i in inspections],
+        "approach": ["" if i.approach is None else str(i.approach) for i in inspections],
+    }
+    declared = [np.nan if i.plunger_gauge_u_in is None else i.plunger_gauge_u_in for i in inspections]
+    from datetime import date
+
+    return DiagnosisTable(
+        clearance_in=clearance,
+        readings_in=readings,
+        record_id=tuple(i.record_id for i in inspections),
+        row=np.array([i.source.row or k + 1 for k, i in enumerate(inspections)], np.int64),
+        margin_in=np.array([gear.margin.value if i.margin_in is None else i.margin_in for i in inspections]),
+        gauge_u_in=np.array([i.gauge_u_in for i in inspections]),
+        quantities={
+            name: np.array([np.nan if v is None else v for v in values], float)
+            for name, values in quantities.items()
+            if any(v is not None for v in values)
+        },
+        factors={name: np.array(values) for name, values in factors.items() if any(values)},
+        axial_float_in=floats if np.isfinite(floats).any() else None,
+        first_day=None if first is None else date.fromordinal(first).isoformat(),
+        plunger_gauge_u_in=np.array(declared) if np.isfinite(declared).any() else None,
+    )

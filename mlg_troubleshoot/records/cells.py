@@ -1,0 +1,224 @@
+"""What a cell can hold, and what a spreadsheet program calls it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from datetime import date, datetime
+from enum import StrEnum
+
+MAX_ROWS = 100_000
+MAX_COLUMNS = 200
+
+NO_VALUE_TEXT = "(formula without a result)"
+
+
+class OddKind(StrEnum):
+    """Kinds of cell that are neither blank nor text nor a plain number."""
+
+    ERROR = "error"
+    DATE = "date"
+    BOOLEAN = "boolean"
+    NO_VALUE = "formula without a result"
+    PADDED = "number shown with leading zeros"
+
+
+@dataclass(frozen=True, slots=True)
+class OddCell:
+    """A cell that is neither blank nor text nor a plain number.
+
+    Parameters
+    ----------
+    kind : OddKind
+        What it is.
+    text : str
+        What a spreadsheet program shows.
+    day : datetime.date, optional
+        The day, if it is a date that the calendar knows.
+    number : float, optional
+        The stored number, if there is one.
+    """
+
+    kind: OddKind
+    text: str
+    day: date | None = None
+    number: float | None = None
+
+
+Cell = str | float | OddCell | None
+
+
+def column_letters(index: int) -> str:
+    """Return the letters of a column.
+
+    Parameters
+    ----------
+    index : int
+        Column, counted from 0.
+
+    Returns
+    -------
+    str
+        ``A`` for 0, ``AA`` for 26.
+    """
+    letters = ""
+    index += 1
+    while index:
+        index, rest = divmod(index - 1, 26)
+        letters = chr(65 + rest) + letters
+    return letters
+
+
+LETTERS: tuple[str, ...] = tuple(column_letters(i) for i in range(MAX_COLUMNS))
+COLUMN_INDEX: dict[str, int] = {name: i for i, name in enumerate(LETTERS)}
+
+
+def column_index(letters: str) -> int:
+    """Return the index of a column from its letters.
+
+    Parameters
+    ----------
+    letters : str
+        One or more letters, upper or lower case.
+
+    Returns
+    -------
+    int
+        Column, counted from 0.
+    """
+    index = 0
+    for letter in letters.upper():
+        index = index * 26 + ord(letter) - 64
+    return index - 1
+
+
+def show_number(value: float) -> str:
+    """Return a number as a spreadsheet program shows it when the column is wide enough.
+
+    Parameters
+    ----------
+    value : float
+        The stored number.
+
+    Returns
+    -------
+    str
+        At most 15 significant digits, an integer without a point.
+    """
+    return f"{value:.15g}"
+
+
+def show(cell: Cell) -> str:
+    """Return a cell as text, as found.
+
+    Parameters
+    ----------
+    cell : str, float, OddCell or None
+        The cell.
+
+    Returns
+    -------
+    str
+        Its text; empty for a blank cell.
+    """
+    if cell is None:
+        return ""
+    if isinstance(cell, str):
+        return cell
+    if isinstance(cell, float):
+        return show_number(cell)
+    return cell.text
+
+
+_ELAPSED = re.compile(r"\[[hms]+\]", re.IGNORECASE)
+_NOT_CODE = re.compile(r'"[^"]*"|\\.|_.|\*.|\[[^\]]*\]', re.DOTALL)
+_BUILTIN_DATES = frozenset((*range(14, 23), *range(27, 37), *range(45, 48), *range(50, 59)))
+
+
+def is_date_format(format_id: int, code: str | None) -> bool:
+    """Tell whether a number format shows a number as a date or a time.
+
+    Parameters
+    ----------
+    format_id : int
+        Number of the format; below 164 it is built in.
+    code : str or None
+        The format's code, if the file states it.
+
+    Returns
+    -------
+    bool
+        True for a date or a time.
+    """
+    if code is None:
+        return format_id in _BUILTIN_DATES
+    if _ELAPSED.search(code):
+        return True
+    bare = _NOT_CODE.sub("", code).lower()
+    if "general" in bare:
+        return False
+    # In a plain number format E is the exponent; y, m, d, h and s stand only in dates and times.
+    return any(letter in bare for letter in "ymdhs")
+
+
+def padding_width(code: str | None) -> int:
+    """Return how many digits a format such as ``000`` fills up with zeros.
+
+    Parameters
+    ----------
+    code : str or None
+        The format's code.
+
+    Returns
+    -------
+    int
+        Number of digits; 0 if the format does not pad.
+    """
+    return len(code) if code is not None and len(code) > 1 and set(code) == {"0"} else 0
+
+
+def date_cell(serial: float, *, epoch_1904: bool) -> OddCell:
+    """Return the cell of a number that is shown as a date.
+
+    Parameters
+    ----------
+    serial : float
+        Days since the start of the file's calendar.
+    epoch_1904 : bool
+        True if the file counts from 1904-01-01, as old Macintosh workbooks do.
+
+    Returns
+    -------
+    OddCell
+        A date, without a day if the number lies outside the calendar.
+    """
+    # 25569 is 1970-01-01 in the 1900 system, 24107 in the 1904 system.
+    days = serial - (24107 if epoch_1904 else 25569)
+    whole = int(days // 1) if abs(days) < 4e6 else None
+    if whole is None or serial < 0 or (serial < 61 and not epoch_1904):
+        # Before March 1900 the 1900 system counts a day that never was; no inspection is that old.
+        return OddCell(OddKind.DATE, f"{show_number(serial)} shown as a date or time", None, serial)
+    try:
+        day = date.fromordinal(date(1970, 1, 1).toordinal() + whole)
+    except (ValueError, OverflowError):
+        return OddCell(OddKind.DATE, f"{show_number(serial)} shown as a date or time", None, serial)
+    return OddCell(OddKind.DATE, day.isoformat(), day, serial)
+
+
+def iso_date_cell(text: str) -> OddCell:
+    """Return the cell of a date that the file stores as ISO 8601 text.
+
+    Parameters
+    ----------
+    text : str
+        For example ``2026-03-04T00:00:00``.
+
+    Returns
+    -------
+    OddCell
+        A date, without a day if the text is not one.
+    """
+    try:
+        return OddCell(OddKind.DATE, text[:10], datetime.fromisoformat(text).date())
+    except ValueError:
+        return OddCell(OddKind.DATE, text)

@@ -1,0 +1,104 @@
+"""The columns of an inspection table, by their canonical names."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from mlg_troubleshoot.units import LengthUnit
+
+
+class Kind(StrEnum):
+    """What a column holds; the value is the canonical name without number and unit."""
+
+    RECORD_ID = "record_id"
+    TAIL_NO = "tail_no"
+    SIDE = "side"
+    CONVENTION = "clearance_convention"
+    UNIT = "unit"
+    JOINT = "joint"
+    CLEARANCE = "clearance"
+    AXIAL_FLOAT = "axial_float"
+    GAUGE_U = "gauge_u"
+    PLUNGER_GAUGE_U = "plunger_gauge_u"
+    PLUNGER_DOWN_LOCK = "plunger_down_lock"
+    PLUNGER_DISPLACEMENT = "plunger_displacement"
+    MARGIN = "margin"
+    MARGIN_U = "margin_u"
+    DATE = "inspection_date"
+    LANDINGS = "gear_landings"
+    TEMPERATURE = "temperature_c"
+    PRESSURE = "hydraulic_pressure_psi"
+    APPROACH = "approach"
+    GAUGE_ID = "gauge_id"
+    TECHNICIAN_ID = "technician_id"
+    OUTCOME = "outcome"
+    WORK_ORDER = "work_order"
+    MANUAL_REF = "manual_ref"
+    MANUAL_REV = "manual_rev"
+    REMARKS = "remarks"
+
+
+LENGTHS = frozenset(
+    {
+        Kind.CLEARANCE,
+        Kind.AXIAL_FLOAT,
+        Kind.GAUGE_U,
+        Kind.PLUNGER_GAUGE_U,
+        Kind.PLUNGER_DOWN_LOCK,
+        Kind.PLUNGER_DISPLACEMENT,
+        Kind.MARGIN,
+        Kind.MARGIN_U,
+    }
+)
+PER_JOINT = frozenset({Kind.CLEARANCE, Kind.AXIAL_FLOAT})
+REQUIRED = (Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE)
+# A mistake in one of these changes a verdict, so the whole row is not judged.
+VERDICT_BEARING = frozenset(
+    {*REQUIRED, Kind.CONVENTION, Kind.UNIT, Kind.JOINT, Kind.CLEARANCE, Kind.MARGIN, Kind.MARGIN_U}
+)
+CARRIED = (Kind.WORK_ORDER, Kind.MANUAL_REF, Kind.MANUAL_REV, Kind.REMARKS)
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A column that the program understands.
+
+    Parameters
+    ----------
+    kind : Kind
+        What it holds.
+    number : int or None
+        Joint number, or which repeat of a plunger reading.
+    unit : LengthUnit or None
+        Unit of a length, if the header states it.
+    """
+
+    kind: Kind
+    number: int | None = None
+    unit: LengthUnit | None = None
+
+    @property
+    def name(self) -> str:
+        """Canonical name, for example ``clearance_3_mm``."""
+        parts = [self.kind.value]
+        if self.number is not None and not (self.kind is Kind.PLUNGER_DISPLACEMENT and self.number == 1):
+            parts.append(str(self.number))
+        if self.unit is not None:
+            parts.append(self.unit.value)
+        return "_".join(parts)
+
+    @property
+    def label(self) -> str:
+        """The label of its line in the template's form, for example ``Clearance #3`` or ``Tail no``."""
+        words = self.kind.value.replace("_", " ")
+        if self.kind is Kind.PLUNGER_DISPLACEMENT and self.number not in (None, 1):
+            words += f" {self.number}"
+        elif self.kind in PER_JOINT and self.number is not None:
+            words += f" #{self.number}"
+        return words[:1].upper() + words[1:]
+
+    @property
+    def quantity(self) -> tuple[Kind, int | None]:
+        """What it is a reading of, whatever the unit: two columns of one quantity are duplicates."""
+        return (self.kind, self.number)

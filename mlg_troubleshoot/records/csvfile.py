@@ -1,0 +1,237 @@
+"""CSV as spreadsheet programs write it: encodings, separators, and rows that do not fit."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import io
+import re
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+
+from mlg_troubleshoot.records.cells import MAX_COLUMNS, MAX_ROWS, Cell
+from mlg_troubleshoot.records.model import FileRefusedError
+from mlg_troubleshoot.records.source import MergedRange, NumberedRow, SheetFacts
+
+_DELIMITERS = (",", ";", "\t", "|")
+_SEP_LINE = re.compile(r'\s*"?sep=(.)"?\s*(?:\r\n|\r|\n)', re.IGNORECASE)
+_CONTROL = re.compile(r"[\x01-\x08\x0b\x0e-\x1f]")
+_MAX_FIELD_LINES = 50
+
+
+def decode(data: bytes) -> tuple[str, list[str]]:
+    """Decode a text file: UTF-8, UTF-16 or Windows-1252.
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+
+    Returns
+    -------
+    text : str
+        Its text, without a byte order mark.
+    notes : list of str
+        The encoding, if it is not plain UTF-8.
+
+    Raises
+    ------
+    FileRefusedError
+        If it is not text.
+    """
+    if data.startswith(codecs.BOM_UTF8):
+        data = data[3:]
+    elif data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return _strictly(data, "utf-16"), ["read as UTF-16 text"]
+    elif len(data) >= 4:
+        head = data[:4096]
+        even, odd = head[0::2].count(0), head[1::2].count(0)
+        if odd > len(head) * 0.3 and even < len(head) * 0.05:
+            return _strictly(data, "utf-16-le"), ["read as UTF-16 text (little-endian, without a byte order mark)"]
+        if even > len(head) * 0.3 and odd < len(head) * 0.05:
+            return _strictly(data, "utf-16-be"), ["read as UTF-16 text (big-endian, without a byte order mark)"]
+    try:
+        return data.decode("utf-8"), []
+    except UnicodeDecodeError:
+        pass
+    return _strictly(data, "cp1252"), ["read as Windows-1252 text, because it is not UTF-8"]
+
+
+def _strictly(data: bytes, encoding: str) -> str:
+    try:
+        return data.decode(encoding)
+    except UnicodeDecodeError:
+        raise not_text() from None
+
+
+def not_text() -> FileRefusedError:
+    """Return the refusal of a file that is no text at all."""
+    return FileRefusedError(
+        "not_a_table",
+        "the file is neither text nor a spreadsheet",
+        "a CSV file in UTF-8, UTF-16 or Windows-1252, or an .xlsx workbook",
+        "Save the table as .xlsx or as CSV (UTF-8) and read that.",
+    )
+
+
+class CsvSheet:
+    """The one table of a CSV file.
+
+    Parameters
+    ----------
+    text : str
+        The decoded file.
+    delimiter : str
+        What separates the fields.
+    """
+
+    name: str | None = None
+    hidden = False
+
+    def __init__(self, text: str, delimiter: str) -> None:
+        self._text = text
+        self._delimiter = delimiter
+        self.facts = SheetFacts()
+
+    def merged(self) -> Sequence[MergedRange]:
+        """Return nothing: CSV has no merged cells."""
+        return ()
+
+    def rows(self) -> Iterator[NumberedRow]:
+        """Read the rows that are not blank, with their numbers counted from 1.
+
+        Yields
+        ------
+        tuple
+            Number and fields of the next row.
+
+        Raises
+        ------
+        FileRefusedError
+            If the table is far too large.
+        """
+        for number, fields in enumerate(self._records(), 1):
+            cells: list[Cell] = [field if field and not field.isspace() else None for field in fields]
+            if not any(cells):
+                continue
+            if number > MAX_ROWS or (len(cells) > MAX_COLUMNS and any(cells[MAX_COLUMNS:])):
+                raise FileRefusedError(
+                    "file_too_large",
+                    f"row {number} has {len(cells)} fields",
+                    f"at most {MAX_ROWS} rows and {MAX_COLUMNS} columns",
+                    "Read the inspection table alone, or split the file.",
+                    row=number,
+                )
+            yield number, cells
+
+    def _records(self) -> Iterator[list[str]]:
+        """Split the lines into fields; a quoted field may go on over several lines."""
+        lines = deque(io.StringIO(self._text, newline=""))
+        delimiter = self._delimiter
+        usual = 0
+        number = 0
+        while lines:
+            line = lines.popleft().rstrip("\r\n")
+            number += 1
+            if '"' not in line:
+                fields = line.split(delimiter) if line else []
+            else:
+                fields = self._quoted(line, lines, usual, number)
+            if "\0" in line:
+                self.facts.faulty[number] = _zero_character(number)
+            usual = len(fields) or usual
+            yield fields
+
+    def _quoted(self, line: str, lines: deque[str], usual: int, number: int) -> list[str]:
+        fields = self._parse(line)
+        if fields is not None:
+            return fields
+        record = line
+        for more in range(min(_MAX_FIELD_LINES, len(lines))):
+            record += "\n" + lines[more].rstrip("\r\n")
+            fields = self._parse(record)
+            if fields is not None and usual in (0, len(fields)):
+                for _ in range(more + 1):
+                    lines.popleft()
+                return fields
+        # The quotation mark is a stray one: the row is named as faulty and the next line is a row again.
+        self.facts.faulty[number] = _unclosed_quote(number)
+        return line.split(self._delimiter)
+
+    def _parse(self, record: str) -> list[str] | None:
+        try:
+            parsed = list(csv.reader(io.StringIO(record, newline=""), delimiter=self._delimiter, strict=True))
+        except csv.Error:
+            return None
+        return parsed[0] if len(parsed) == 1 else None
+
+
+def _unclosed_quote(row: int) -> FileRefusedError:
+    return FileRefusedError(
+        "csv_quote",
+        "a quotation mark that is not closed, or stands in the middle of a field",
+        "quotation marks in pairs around a whole field",
+        "Correct the quotation marks of this row; write inches as 0.013 in.",
+        row=row,
+    )
+
+
+def _zero_character(row: int) -> FileRefusedError:
+    return FileRefusedError(
+        "csv_nul",
+        "a zero character: the file is damaged there",
+        "plain text",
+        "Enter this row again, or save the table again as CSV (UTF-8).",
+        row=row,
+    )
+
+
+class CsvFile:
+    """A CSV file.
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+    header_score : callable
+        Tells how many columns of a row are understood as a header; the separator that makes most sense of the
+        first rows is taken.
+
+    Raises
+    ------
+    FileRefusedError
+        If it is not text.
+    """
+
+    kind = "csv"
+
+    def __init__(self, data: bytes, header_score: Callable[[Sequence[Cell]], int]) -> None:
+        text, notes = decode(data)
+        self.notes: list[str] = notes
+        head = text[:65536]
+        strange = len(_CONTROL.findall(head)) + head.count("\0")
+        if strange > 20 and strange > len(head) * 0.02:
+            raise not_text()
+        match = _SEP_LINE.match(text)
+        if match is not None:
+            self.delimiter: str | None = match[1]
+            text = text[match.end() :]
+            self.notes.append(f"the first line names the separator {match[1]!r} and is not counted as a row")
+        else:
+            self.delimiter = _find_delimiter(head, header_score)
+        self.sheets = (CsvSheet(text, self.delimiter or ","),)
+
+
+def _find_delimiter(head: str, header_score: Callable[[Sequence[Cell]], int]) -> str:
+    """Take the separator under which one of the first rows makes most sense as a header."""
+    lines = head.splitlines()[:20]
+    best, best_score = ",", 0
+    for delimiter in _DELIMITERS:
+        score = 0
+        for line in lines:
+            if delimiter in line:
+                fields = next(csv.reader([line], delimiter=delimiter), [])
+                score = max(score, header_score([f or None for f in fields[:MAX_COLUMNS]]))
+        if score > best_score:
+            best, best_score = delimiter, score
+    return best

@@ -1,0 +1,102 @@
+"""Record ids that stand twice: the same inspection again, or two that contradict each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
+from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.records.cells import column_letters
+from mlg_troubleshoot.records.columns import Kind
+from mlg_troubleshoot.records.model import SheetLayout
+
+
+def settle_duplicates(rows: list[Inspection | InvalidRow], layouts: Sequence[SheetLayout]) -> list[Problem]:
+    """Warn of rows that are the same inspection again, and refuse rows that share an id and differ.
+
+    Parameters
+    ----------
+    rows : list of Inspection or InvalidRow
+        The rows; changed in place.
+    layouts : sequence of SheetLayout
+        Where the tables are, for the cells of the ids.
+
+    Returns
+    -------
+    list of Problem
+        One entry for each row that was refused.
+    """
+    first: dict[str, int] = {}
+    groups: dict[str, list[int]] = {}
+    for place, row in enumerate(rows):
+        if row.record_id is None:
+            continue
+        earlier = first.setdefault(row.record_id, place)
+        if earlier != place:
+            groups.setdefault(row.record_id, [earlier]).append(place)
+    problems: list[Problem] = []
+    for record_id, places in groups.items():
+        found = [rows[place] for place in places]
+        bare = [_content(row) for row in found]
+        if all(b is not None and b == bare[0] for b in bare):
+            for place in places[1:]:
+                row = rows[place]
+                note = f"the same inspection as {_where(found[0].source)}"
+                rows[place] = replace(row, warnings=(*row.warnings, note))
+            continue
+        for place, row in zip(places, found, strict=True):
+            others = [_where(other.source) for other in found if other is not row]
+            problems.append(_problem(record_id, row.source, others, layouts))
+            rows[place] = _refused(row, layouts)
+    return problems
+
+
+def _content(row: Inspection | InvalidRow) -> Inspection | None:
+    if isinstance(row, InvalidRow):
+        return None
+    return replace(row, source=RowSource(), warnings=(), entered={})
+
+
+def _where(source: RowSource) -> str:
+    sheet = f" of sheet {source.sheet!r}" if source.sheet is not None else ""
+    return f"row {source.row}{sheet} of {source.file or 'the input'}"
+
+
+def _column(source: RowSource, layouts: Sequence[SheetLayout]) -> tuple[str, str | None]:
+    """Return the header and the cell of a row's record id."""
+    for layout in layouts:
+        if (layout.file, layout.sheet) == (source.file, source.sheet):
+            for column in layout.columns:
+                if column.read_as == Kind.RECORD_ID.value:
+                    return column.header, f"{column_letters(column.index)}{source.row}"
+    return Kind.RECORD_ID.value, None
+
+
+def _problem(record_id: str, source: RowSource, others: list[str], layouts: Sequence[SheetLayout]) -> Problem:
+    header, cell = _column(source, layouts)
+    shown = ", ".join(others[:3]) + (f" and {len(others) - 3} more" if len(others) > 3 else "")
+    return Problem(
+        "record_id_duplicate",
+        source.file,
+        source.sheet,
+        source.row,
+        header,
+        cell,
+        record_id,
+        f"a record id that no other inspection has; {shown} has it too",
+        "Keep the right row, or give each inspection its own record id.",
+    )
+
+
+def _refused(row: Inspection | InvalidRow, layouts: Sequence[SheetLayout]) -> InvalidRow:
+    header, _ = _column(row.source, layouts)
+    correct = row.correct if isinstance(row, InvalidRow) else ()
+    return InvalidRow(
+        row.record_id,
+        row.tail_no,
+        row.side,
+        (header, *(c for c in correct if c != header)),
+        row.warnings,
+        row.source,
+    )

@@ -1,0 +1,177 @@
+"""Vertical forms: one sheet is one inspection, the label to the left and the value to the right."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.records.cells import Cell, column_letters
+from mlg_troubleshoot.records.columns import REQUIRED, Kind
+from mlg_troubleshoot.records.headers import Standing, recognise
+from mlg_troubleshoot.records.layout import ColumnReader
+from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout
+from mlg_troubleshoot.records.rows import RowReader
+from mlg_troubleshoot.records.source import NumberedRow
+from mlg_troubleshoot.records.tables import Collected
+
+FORM_TITLE = "MLG inspection form"
+# What an untouched copy of the form may hold: it says how to read, not what was found.
+_DECLARATIONS = frozenset({Kind.UNIT, Kind.CONVENTION})
+
+
+class Form:
+    """A sheet that is laid out as a form.
+
+    Parameters
+    ----------
+    labels : sequence of tuple
+        Row, label and value of each line.
+    label_column, value_column : int
+        Where they stand, counted from 0.
+    """
+
+    def __init__(self, lines: Sequence[tuple[int, str, Cell]], label_column: int, value_column: int) -> None:
+        self.lines = tuple(lines)
+        self.label_column = label_column
+        self.value_column = value_column
+
+    def is_untouched(self, options: ReadOptions) -> bool:
+        """Tell whether nothing has been filled in yet.
+
+        Parameters
+        ----------
+        options : ReadOptions
+            The gear's joints.
+
+        Returns
+        -------
+        bool
+            True if no line but the unit and the convention holds a value.
+        """
+        for _, label, value in self.lines:
+            if value is None:
+                continue
+            found = recognise(label, options.joint_numbers, options.joint_names).field
+            if found is None or found.kind not in _DECLARATIONS:
+                return False
+        return True
+
+
+def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
+    """Look for a form in the rows of a sheet.
+
+    Parameters
+    ----------
+    rows : sequence of tuple
+        Its first rows.
+    options : ReadOptions
+        The gear's joints and the mapped headers.
+
+    Returns
+    -------
+    Form or None
+        The form; None if the sheet is none.
+    """
+    known: Counter[int] = Counter()
+    kinds: dict[int, set[Kind]] = {}
+    for _, cells in rows:
+        for index, cell in enumerate(cells[:4]):
+            if isinstance(cell, str):
+                found = recognise(cell, options.joint_numbers, options.joint_names)
+                if found.field is not None:
+                    known[index] += 1
+                    kinds.setdefault(index, set()).add(found.field.kind)
+                    break
+    if not known:
+        return None
+    column, count = known.most_common(1)[0]
+    if count < 3 or not kinds[column] & {*REQUIRED} or Kind.CLEARANCE not in kinds[column]:
+        return None
+    ours = any(cell == FORM_TITLE for _, cells in rows[:2] for cell in cells[:1])
+    value_column = column + 1
+    if not ours:
+        labelled = [cells for _, cells in rows if column < len(cells) and isinstance(cells[column], str)]
+        filled = Counter(i for cells in labelled for i in range(column + 1, len(cells)) if cells[i] is not None)
+        # Merged labels push the values further to the right.
+        if filled and column + 1 not in filled:
+            value_column = min(filled)
+    lines = []
+    for number, cells in rows:
+        label = cells[column] if column < len(cells) else None
+        if isinstance(label, str) and _is_line(label, options):
+            lines.append((number, label, cells[value_column] if value_column < len(cells) else None))
+    return Form(lines, column, value_column)
+
+
+def _is_line(label: str, options: ReadOptions) -> bool:
+    """Leave out titles, hints and signature lines, but not a label that may be a reading."""
+    found = recognise(label, options.joint_numbers, options.joint_names)
+    return found.standing is not Standing.UNKNOWN or label in options.column_map or label.rstrip().endswith(":")
+
+
+def read_form(form: Form, options: ReadOptions, *, file: str | None, sheet: str | None) -> Collected:
+    """Read one form as one inspection.
+
+    Parameters
+    ----------
+    form : Form
+        The form.
+    options : ReadOptions
+        What the caller declared.
+    file, sheet : str or None
+        Where it is.
+
+    Returns
+    -------
+    Collected
+        Its row, problems and notes.
+    """
+    out = Collected()
+    letters, values = column_letters(form.label_column), column_letters(form.value_column)
+    labels = [label for _, label, _ in form.lines]
+    label_places = [(row, f"{letters}{row}") for row, _, _ in form.lines]
+    value_places = [(row, f"{values}{row}") for row, _, _ in form.lines]
+    columns = ColumnReader(options, file, sheet).place(labels, form.lines[0][0], places=label_places)
+    out.problems += columns.problems
+    out.notes += columns.notes
+    row_problems: list[Problem] = []
+    reader = RowReader(
+        columns.placed,
+        options,
+        file=file,
+        sheet=sheet,
+        decimal_comma=options.decimal_comma,
+        report=row_problems.append,
+        header_row=form.lines[0][0],
+    )
+    start = next(
+        (
+            row
+            for (row, _, _), p in zip(form.lines, columns.placed, strict=True)
+            if p.field is not None and p.field.kind is Kind.RECORD_ID
+        ),
+        form.lines[0][0],
+    )
+    out.rows.append(reader.read(start, [value for _, _, value in form.lines], value_places))
+    out.problems += row_problems
+    out.layouts.append(
+        SheetLayout(
+            file,
+            sheet,
+            "form",
+            form.lines[0][0],
+            form.lines[-1][0],
+            form.value_column + 1,
+            tuple(
+                ColumnReading(
+                    form.value_column,
+                    p.header,
+                    p.field.name if p.field is not None and not p.refused else None,
+                    row,
+                )
+                for (row, _, _), p in zip(form.lines, columns.placed, strict=True)
+            ),
+        )
+    )
+    return out

@@ -1,0 +1,445 @@
+"""Headers as people write them: understood, unknown, or doubtful and then never guessed."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import unicodedata
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import lru_cache
+
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.joints import Joint
+from mlg_troubleshoot.records.columns import LENGTHS, PER_JOINT, VERDICT_BEARING, Field, Kind
+from mlg_troubleshoot.units import LengthUnit
+
+
+class Standing(StrEnum):
+    """How sure the reading of a header is."""
+
+    CANONICAL = "canonical"
+    UNDERSTOOD = "understood"
+    DOUBTFUL = "doubtful"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class Recognition:
+    """What a header was read as.
+
+    Parameters
+    ----------
+    standing : Standing
+        How sure that is.
+    field : Field or None
+        The column, if it is understood.
+    reason : str
+        Why it is doubtful.
+    nearest : str or None
+        The canonical column that it may mean.
+    code : str
+        Kind of problem, if it is doubtful.
+    """
+
+    standing: Standing
+    field: Field | None = None
+    reason: str = ""
+    nearest: str | None = None
+    code: str = "header_doubtful"
+
+
+UNKNOWN = Recognition(Standing.UNKNOWN)
+
+_UNIT_WORDS: dict[str, LengthUnit] = {
+    word: unit
+    for unit, words in (
+        (LengthUnit.INCH, ("in", "inch", "inches", '"', "''")),
+        (LengthUnit.THOU, ("thou", "thous", "mil", "mils")),
+        (LengthUnit.MILLIMETRE, ("mm", "millimetre", "millimetres", "millimeter", "millimeters")),
+    )
+    for word in words
+}
+_FOREIGN_UNITS = frozenset(
+    ("cm", "um", "μm", "µm", "micron", "microns", "m", "ft", "foot", "feet", "dm", "nm", "cms", "metre", "meter")
+)
+_CONVENTION_WORDS = frozenset(("radial", "diametral", "diametrical", "diameter", "diam", "dia", "play"))
+_CLEARANCE_WORDS = frozenset(("clearance", "clearances", "clr"))
+_JOINT_WORDS = frozenset(("joint", "jt", "j", "no", "nr", "number", "#"))
+_FLOAT_WORDS = frozenset(("axial", "float", "end", "endfloat"))
+_FILLERS = frozenset(("of", "at", "the", "for", "in"))
+# A joint's column with one of these words holds something other than a measurement.
+_OTHER_MATTER = frozenset(
+    (
+        *("remark", "remarks", "comment", "comments", "note", "notes", "photo", "photos", "picture", "date", "by"),
+        *("initials", "sign", "signature", "stamp", "part", "serial", "sn", "pn", "status", "ok", "condition"),
+        *("technician", "inspector", "gauge", "name", "description", "location", "access"),
+    )
+)
+
+_ALIASES: dict[str, Kind] = {
+    alias: kind
+    for kind, aliases in (
+        (Kind.RECORD_ID, "record|record no|record nr|record number|inspection id|inspection no|inspection number"),
+        (
+            Kind.TAIL_NO,
+            "tail|tail number|tail nr|tail #|a c reg|a c registration|a c tail no|aircraft tail|aircraft tail no|"
+            "aircraft registration|registration",
+        ),
+        (Kind.SIDE, "gear side|lh rh|side lh rh|gear side lh rh"),
+        (Kind.CONVENTION, "convention|clearance type convention|convention of the clearances"),
+        (Kind.UNIT, "units|length unit|clearance unit|unit of the clearances|unit of the lengths"),
+        (Kind.JOINT, "joint no|joint nr|joint number|jt|jt no|joint #"),
+        (Kind.DATE, "date|date of inspection"),
+        (Kind.LANDINGS, "landings|landings since overhaul|gear landings since overhaul"),
+        (Kind.APPROACH, "approach direction"),
+        (Kind.GAUGE_ID, "gauge|gauge no|gauge number|gauge set"),
+        (Kind.TECHNICIAN_ID, "technician|technician no|technician number|measured by"),
+        (Kind.WORK_ORDER, "wo|work order no|work order number|w o"),
+        (Kind.MANUAL_REF, "manual reference"),
+        (Kind.MANUAL_REV, "manual revision"),
+        (Kind.REMARKS, "remark|comment|comments|notes"),
+        (Kind.GAUGE_U, "gauge uncertainty|standard uncertainty of one reading"),
+        (Kind.PLUNGER_GAUGE_U, "plunger gauge uncertainty|repeatability of the plunger reading"),
+        (Kind.PLUNGER_DOWN_LOCK, "plunger at down lock|plunger position at down lock"),
+        (Kind.PLUNGER_DISPLACEMENT, "plunger displacement at mid position|measured plunger displacement"),
+        (Kind.MARGIN, "plunger margin|margin found at rigging|margin as found at rigging"),
+        (Kind.MARGIN_U, "margin uncertainty|standard uncertainty of the margin"),
+    )
+    for alias in aliases.split("|")
+} | {kind.value.replace("_", " "): kind for kind in Kind if kind not in (Kind.TEMPERATURE, Kind.PRESSURE)}
+_WITH_OTHER_UNIT: dict[str, Kind] = {
+    "temperature c": Kind.TEMPERATURE,
+    "temp c": Kind.TEMPERATURE,
+    "hydraulic pressure psi": Kind.PRESSURE,
+    "pressure psi": Kind.PRESSURE,
+}
+
+_CANONICAL = re.compile(r"(?P<kind>[a-z]+(?:_[a-z]+)*?)(?:_(?P<number>[1-9]\d?))?(?:_(?P<unit>in|thou|mm))?", re.ASCII)
+_KINDS: dict[str, Kind] = {kind.value: kind for kind in Kind}
+_BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
+_TOKEN = re.compile(r"""[a-zµμ]+\d*|\d+(?:[.,]\d+)?|["″]|''|\#""")
+_GLUED = re.compile(r"(j|jt|joint|clearance|clr|no|nr)0?(\d{1,2})", re.ASCII)
+_DASHES = re.compile(r"[\u2010-\u2015\u2212]")
+
+
+def tidy(header: str) -> str:
+    """Return a header in one spelling: lower case, plain dashes and blanks, no colon or asterisk at the end.
+
+    Parameters
+    ----------
+    header : str
+        The header as found.
+
+    Returns
+    -------
+    str
+        The header for comparison.
+    """
+    text = unicodedata.normalize("NFKC", header.replace("″", '"').replace("”", '"').replace("“", '"'))
+    text = _DASHES.sub("-", text).replace("\u200b", "").replace("\ufeff", "")
+    return re.sub(r"\s+", " ", text).strip().rstrip(":*").strip().casefold()
+
+
+def parse_canonical(name: str, joint_numbers: tuple[int, ...]) -> Field | None:
+    """Read a canonical column name.
+
+    Parameters
+    ----------
+    name : str
+        For example ``clearance_3_in``; the unit may be missing.
+    joint_numbers : tuple of int
+        The gear's joints.
+
+    Returns
+    -------
+    Field or None
+        The column; None if the name is not canonical.
+    """
+    match = _CANONICAL.fullmatch(name)
+    if match is None or match["kind"] not in _KINDS:
+        return None
+    kind = _KINDS[match["kind"]]
+    number = int(match["number"]) if match["number"] else None
+    unit = LengthUnit(match["unit"]) if match["unit"] else None
+    if (unit is not None and kind not in LENGTHS) or (number is not None and not _may_be_numbered(kind)):
+        return None
+    if kind in PER_JOINT and number is not None and number not in joint_numbers:
+        return None
+    if kind is Kind.PLUNGER_DISPLACEMENT and number is None:
+        number = 1
+    return Field(kind, number, unit)
+
+
+def _may_be_numbered(kind: Kind) -> bool:
+    return kind in PER_JOINT or kind is Kind.PLUNGER_DISPLACEMENT
+
+
+@lru_cache(maxsize=4096)
+def _recognise(  # noqa: PLR0911 - each return is one way to be sure
+    header: str, joint_numbers: tuple[int, ...], names: tuple[tuple[int, str], ...]
+) -> Recognition:
+    text = tidy(header)
+    if not text or len(text) > 120:
+        return UNKNOWN
+    snake = re.sub(r"[\s\-]+", "_", text)
+    field = parse_canonical(snake, joint_numbers)
+    if field is not None:
+        return Recognition(Standing.CANONICAL if snake == header.strip() else Standing.UNDERSTOOD, field)
+    bracketed = [part.strip() for part in _BRACKETS.findall(text)]
+    bare = _BRACKETS.sub(" ", text)
+    bare = bare.replace("_", " ").replace("°", " ")
+    words = _TOKEN.findall(bare)
+    units, foreign, odd = _units_in(bracketed)
+    words, trailing = _trailing_unit(words)
+    if trailing is not None:
+        units.add(trailing)
+    plain = " ".join(words)
+    other = " ".join([plain, *(b.replace("°", "") for b in bracketed)]).strip()
+    if other in _WITH_OTHER_UNIT:
+        return Recognition(Standing.UNDERSTOOD, Field(_WITH_OTHER_UNIT[other]))
+    numbered = _numbered(words, joint_numbers, names)
+    if numbered is None:
+        by_alias = _by_alias(plain, units, foreign, odd)
+        if by_alias.standing is Standing.UNKNOWN:
+            return _resembles_clearance(words, bool(units), joint_numbers, names)
+        return by_alias
+    if numbered.standing is not Standing.UNDERSTOOD or numbered.field is None:
+        return numbered
+    return _with_unit(numbered.field, units, foreign, odd)
+
+
+def _units_in(bracketed: list[str]) -> tuple[set[LengthUnit], list[str], list[str]]:
+    units: set[LengthUnit] = set()
+    foreign: list[str] = []
+    odd: list[str] = []
+    for part in bracketed:
+        for word in re.split(r"[\s,;/]+", part.rstrip(".")):
+            if word in _UNIT_WORDS:
+                units.add(_UNIT_WORDS[word])
+            elif word in _FOREIGN_UNITS:
+                foreign.append(word)
+            elif word:
+                odd.append(word)
+    return units, foreign, odd
+
+
+def _trailing_unit(words: list[str]) -> tuple[list[str], LengthUnit | None]:
+    if len(words) > 1 and words[-1] in _UNIT_WORDS:
+        rest = words[:-1]
+        if len(rest) > 1 and rest[-1] == "in":  # "Joint 3 in mm"
+            rest = rest[:-1]
+        return rest, _UNIT_WORDS[words[-1]]
+    for i in range(len(words) - 2):  # "Clearance in mm, joint 3"
+        if words[i] == "in" and words[i + 1] in _UNIT_WORDS:
+            return words[:i] + words[i + 2 :], _UNIT_WORDS[words[i + 1]]
+    return words, None
+
+
+def _by_alias(plain: str, units: set[LengthUnit], foreign: list[str], odd: list[str]) -> Recognition:
+    kind = _ALIASES.get(f"{plain} {' '.join(odd)}") if odd else None
+    if kind is not None:
+        odd = []
+    kind = kind or _ALIASES.get(plain)
+    if kind is None:
+        return UNKNOWN
+    if kind not in LENGTHS:
+        if units or foreign or odd:
+            return UNKNOWN
+        return Recognition(Standing.UNDERSTOOD, Field(kind))
+    field = Field(kind, 1 if kind is Kind.PLUNGER_DISPLACEMENT else None)
+    return _with_unit(field, units, foreign, odd)
+
+
+def _resembles_clearance(
+    words: list[str], has_unit: bool, joint_numbers: tuple[int, ...], names: tuple[tuple[int, str], ...]
+) -> Recognition:
+    """Doubt a header that may be a joint's clearance, although it does not say so plainly."""
+    said = set(words) - _FILLERS
+    if said & _OTHER_MATTER or not said:
+        return UNKNOWN
+    if len(words) == 1:
+        number = re.fullmatch(r"(?:c|cl)?0?(\d{1,2})", words[0], re.ASCII)
+        if number is not None and int(number[1]) in joint_numbers:
+            return _doubt("a number alone does not say what was measured", f"clearance_{int(number[1])}")
+    rest = said - _CLEARANCE_WORDS - _JOINT_WORDS
+    vocabulary = {word for _, name in names for word in _name_words(name)}
+    speaks_of_joint = len(rest) < len(said)
+    named = len(rest) > 1 and rest <= vocabulary
+    if (speaks_of_joint and has_unit and rest) or (named and (speaks_of_joint or has_unit)):
+        fitting = [number for number, name in names if rest and rest <= _name_words(name)]
+        nearest = f"clearance_{fitting[0]}" if len(fitting) == 1 else None
+        return _doubt("it may be a joint's clearance, but does not give the joint's number", nearest)
+    return UNKNOWN
+
+
+def _with_unit(field: Field, units: set[LengthUnit], foreign: list[str], odd: list[str]) -> Recognition:
+    if foreign:
+        return _doubt(f"the unit {foreign[0]!r} is none of in, thou, mm", field.name)
+    if len(units) > 1:
+        return _doubt("it names two units", field.name)
+    if odd:
+        return _doubt(f"{' '.join(odd)!r} beside it leaves open what was measured", field.name)
+    return Recognition(Standing.UNDERSTOOD, Field(field.kind, field.number, next(iter(units), None)))
+
+
+def _doubt(reason: str, nearest: str | None, code: str = "header_doubtful") -> Recognition:
+    return Recognition(Standing.DOUBTFUL, None, reason, nearest, code)
+
+
+def _split_number(words: list[str]) -> tuple[list[str], int | None, list[str]]:
+    """Split the words around the joint's number; a number glued to a joint word is taken apart."""
+    for i, word in enumerate(words):
+        glued = _GLUED.fullmatch(word)
+        if glued is not None:
+            return [*words[:i], glued[1]], int(glued[2]), words[i + 1 :]
+        if word.isascii() and word.isdigit() and len(word) <= 2:
+            return words[:i], int(word), words[i + 1 :]
+    return words, None, []
+
+
+def _numbered(  # noqa: PLR0911 - each return is one reason to doubt
+    words: list[str], joint_numbers: tuple[int, ...], names: tuple[tuple[int, str], ...]
+) -> Recognition | None:
+    """Read the words of a joint's column; None if they do not speak of a joint by number."""
+    before, number, after = _split_number(words)
+    said = set(before)
+    if number is None:
+        return None
+    is_joint = bool(said & _JOINT_WORDS)
+    is_clearance = bool(said & _CLEARANCE_WORDS)
+    is_float = "float" in said or "axial" in said or "endfloat" in said
+    everything = said | set(after)
+    if not (is_joint or is_clearance or is_float):
+        if said == {"plunger", "displacement"} and not after:
+            return Recognition(Standing.UNDERSTOOD, Field(Kind.PLUNGER_DISPLACEMENT, number))
+        return None
+    if everything & _OTHER_MATTER and not (is_clearance or is_float):
+        return UNKNOWN
+    kind = Kind.AXIAL_FLOAT if is_float else Kind.CLEARANCE
+    nearest = f"{kind.value}_{number}"
+    if number not in joint_numbers:
+        close = difflib.get_close_matches(nearest, [f"{kind.value}_{n}" for n in joint_numbers], 2, 0.0)
+        known = f"{min(joint_numbers)} to {max(joint_numbers)}"
+        return _doubt(f"this gear has no joint {number}: its joints are {known}", " or ".join(close), "joint_unknown")
+    if everything & _CONVENTION_WORDS:
+        return _doubt("a convention in the header is not read; it has its own column", nearest)
+    allowed = _CLEARANCE_WORDS | _JOINT_WORDS | _FILLERS | (_FLOAT_WORDS if is_float else frozenset())
+    extra = said - allowed
+    if extra:
+        return _doubt(f"{' '.join(sorted(extra))!r} may make it something else than the clearance", nearest)
+    if after and not is_float and set(after) <= _CLEARANCE_WORDS:
+        after = []
+    return _check_name(kind, number, after, names)
+
+
+def _check_name(kind: Kind, number: int, after: list[str], names: tuple[tuple[int, str], ...]) -> Recognition:
+    """Accept a joint's name behind its number only if it is this joint's, not another's."""
+    nearest = f"{kind.value}_{number}"
+    said = set(after) - _FILLERS
+    if said:
+        vocabulary = {word for _, name in names for word in _name_words(name)}
+        strange = said - vocabulary
+        if strange:
+            return _doubt(f"{' '.join(after)!r} may make it something else than the clearance", nearest)
+        own = next((_name_words(name) for n, name in names if n == number), frozenset())
+        if not said <= own:
+            others = [n for n, name in names if n != number and said <= _name_words(name)]
+            if others or own:
+                hint = f"; that is joint {others[0]}" if len(others) == 1 else ""
+                return _doubt(f"{' '.join(after)!r} is not the name of joint {number}{hint}", nearest)
+    return Recognition(Standing.UNDERSTOOD, Field(kind, number))
+
+
+def _name_words(name: str) -> frozenset[str]:
+    return frozenset(_TOKEN.findall(name.casefold()))
+
+
+_REFERENCE_NAMES: tuple[tuple[int, str], ...] = tuple(
+    (int(joint), joint.name.replace("_", " ").lower() + " bearing joint") for joint in Joint
+)
+
+
+def recognise(header: str, joint_numbers: tuple[int, ...], joint_names: Mapping[int, str]) -> Recognition:
+    """Read one header.
+
+    Parameters
+    ----------
+    header : str
+        The header as found.
+    joint_numbers : tuple of int
+        The gear's joints.
+    joint_names : mapping of int to str
+        Their names; empty takes the reference gear's.
+
+    Returns
+    -------
+    Recognition
+        The column, or why it is doubtful, or unknown.
+    """
+    names = dict(_REFERENCE_NAMES)
+    for number, name in joint_names.items():
+        names[number] = f"{name} {names.get(number, '')}" if number in joint_numbers else name
+    return _recognise(header, joint_numbers, tuple(sorted(names.items())))
+
+
+def near_miss(header: str, joint_numbers: tuple[int, ...]) -> Recognition:
+    """Look for the canonical column that an unknown header is a slip of the pen away from.
+
+    Parameters
+    ----------
+    header : str
+        A header that was not recognised.
+    joint_numbers : tuple of int
+        The gear's joints.
+
+    Returns
+    -------
+    Recognition
+        Doubtful if the column it resembles bears on a verdict, else unknown with the nearest name.
+    """
+    snake = re.sub(r"[\s\-]+", "_", tidy(header))
+    bare = re.sub(r"_(in|thou|mm)$", "", snake)
+    candidates = [k.value for k in Kind if k not in PER_JOINT and k not in (Kind.UNIT, Kind.SIDE, Kind.JOINT)]
+    candidates += [f"{k.value}_{n}" for k in (Kind.CLEARANCE, Kind.AXIAL_FLOAT) for n in joint_numbers]
+    close = difflib.get_close_matches(bare, candidates, 1, 0.87)
+    if not close:
+        return UNKNOWN
+    field = parse_canonical(close[0], joint_numbers)
+    if field is not None and field.kind in VERDICT_BEARING:
+        unit = snake[len(bare) :]
+        return _doubt(f"it looks like a slip of the pen for {close[0]}{unit}", close[0] + unit)
+    return Recognition(Standing.UNKNOWN, nearest=close[0])
+
+
+def parse_target(name: str, joint_numbers: tuple[int, ...]) -> Field | None:
+    """Read the target of a column mapping.
+
+    Parameters
+    ----------
+    name : str
+        A canonical column, or ``carry``.
+    joint_numbers : tuple of int
+        The gear's joints.
+
+    Returns
+    -------
+    Field or None
+        The column; None for ``carry``.
+
+    Raises
+    ------
+    UsageError
+        If the name is not a column.
+    """
+    text = re.sub(r"[\s\-]+", "_", tidy(name))
+    if text == "carry":
+        return None
+    field = parse_canonical(text, joint_numbers)
+    if field is None:
+        raise UsageError(
+            f"--map: {name!r} is not a column of the inspection table",
+            "Give a column such as clearance_3_mm, tail_no or margin_in, or carry to leave the column unread.",
+        )
+    return field

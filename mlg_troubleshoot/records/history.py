@@ -1,0 +1,122 @@
+"""Rows compared with the other inspections of the same gear: slips that would explain a jump."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from statistics import median
+
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Side
+from mlg_troubleshoot.units import MM_PER_IN
+
+# Rows of a gear before and after that a row is compared with: enough for a median, few enough to follow the wear.
+_NEIGHBOURS = 3
+_FEWEST = 2
+_FIT_IN = 0.0008
+_CLEARLY_OFF = 3.0
+_SCALES: tuple[tuple[float, str], ...] = (
+    (MM_PER_IN, "millimetres read as inches (factor 25.4)"),
+    (1.0 / MM_PER_IN, "inches read as millimetres (factor 25.4)"),
+    (10.0, "a slipped decimal point (factor 10)"),
+    (0.1, "a slipped decimal point (factor 10)"),
+    (2.0, "a diametral clearance or total play read as radial (factor 2)"),
+    (0.5, "a radial clearance read as diametral or total play (factor 2)"),
+)
+
+Gear = tuple[str, Side]
+Clearances = Mapping[int, float]
+
+
+def history_warnings(rows: Sequence[Inspection | InvalidRow]) -> dict[int, tuple[str, ...]]:
+    """Suggest slips for rows that do not fit the gear's other inspections.
+
+    Parameters
+    ----------
+    rows : sequence of Inspection or InvalidRow
+        All rows.
+
+    Returns
+    -------
+    dict of int to tuple of str
+        Warnings by place in `rows`; nothing is changed by them.
+    """
+    gears: dict[Gear, list[int]] = {}
+    for place, row in enumerate(rows):
+        if isinstance(row, Inspection) and row.clearance_in:
+            gears.setdefault((row.tail_no, row.side), []).append(place)
+    usual: dict[Gear, Clearances] = {}
+    found: dict[int, tuple[str, ...]] = {}
+    for gear, places in gears.items():
+        if len(places) <= _FEWEST:
+            continue
+        clearances = [row.clearance_in for row in (rows[p] for p in places) if isinstance(row, Inspection)]
+        for at, place in enumerate(places):
+            near = [*clearances[max(0, at - _NEIGHBOURS) : at], *clearances[at + 1 : at + 1 + _NEIGHBOURS]]
+            if _fits(clearances[at], near):
+                continue
+            expected = _medians(near)
+            other = (gear[0], Side.RH if gear[1] is Side.LH else Side.LH)
+            if other not in usual:
+                others = [rows[p] for p in gears.get(other, ())][: 2 * _NEIGHBOURS + 1]
+                usual[other] = _medians([r.clearance_in for r in others if isinstance(r, Inspection)])
+            slip = _slip(clearances[at], expected, usual[other], other[1])
+            if slip:
+                found[place] = (slip,)
+    return found
+
+
+def _fits(own: Clearances, near: Sequence[Clearances]) -> bool:
+    """Tell quickly that a row is like one of its neighbours."""
+    return any(
+        all(abs(value - them.get(joint, value)) <= _tolerance(value) for joint, value in own.items()) for them in near
+    )
+
+
+def _tolerance(value_in: float) -> float:
+    return max(_FIT_IN, 0.15 * value_in)
+
+
+def _medians(near: Sequence[Clearances]) -> Clearances:
+    values: dict[int, list[float]] = {}
+    for them in near:
+        for joint, value in them.items():
+            values.setdefault(joint, []).append(value)
+    return {joint: median(found) for joint, found in values.items() if len(found) >= _FEWEST}
+
+
+def _slip(own: Clearances, usual: Clearances, other: Clearances, other_side: Side) -> str:
+    common = [joint for joint in own if joint in usual]
+    off = [joint for joint in common if abs(own[joint] - usual[joint]) > _CLEARLY_OFF * _tolerance(usual[joint])]
+    if not off:
+        return ""
+    for first, second in zip(sorted(common), sorted(common)[1:], strict=False):
+        if off == [first, second] and _near(own[first], usual[second]) and _near(own[second], usual[first]):
+            return (
+                f"joints {first} and {second} do not fit this gear's other inspections, but would if they were "
+                "swapped: were the two readings exchanged?"
+            )
+    if len(common) >= 3 and all(joint in other and _near(own[joint], other[joint]) for joint in common):
+        return f"the clearances fit the {other_side} gear of this aircraft, not this one: is the side right?"
+    return _scale(own, usual, common, off)
+
+
+def _near(value_in: float, expected_in: float) -> bool:
+    return abs(value_in - expected_in) <= _tolerance(expected_in)
+
+
+def _scale(own: Clearances, usual: Clearances, common: list[int], off: list[int]) -> str:
+    measurable = [joint for joint in common if usual[joint] > _FIT_IN]
+    for factor, meaning in _SCALES:
+        all_off = len(measurable) >= 3 and all(
+            abs(own[joint] / factor - usual[joint]) <= 0.15 * usual[joint] for joint in measurable
+        )
+        if all_off:
+            return f"all clearances of this row are {_times(factor)} this gear's other inspections: {meaning}?"
+        if len(off) == 1 and off[0] in measurable and factor not in (2.0, 0.5):
+            joint = off[0]
+            if abs(own[joint] / factor - usual[joint]) <= 0.15 * usual[joint]:
+                return f"joint {joint} is {_times(factor)} this gear's other inspections: {meaning}?"
+    return ""
+
+
+def _times(factor: float) -> str:
+    return f"{factor:g} times" if factor >= 1 else f"one part in {1 / factor:g} of"

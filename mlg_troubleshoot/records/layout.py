@@ -1,0 +1,423 @@
+"""Where a sheet's header is and what its columns hold."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.records.cells import Cell, column_letters, show
+from mlg_troubleshoot.records.columns import PER_JOINT, REQUIRED, Field, Kind
+from mlg_troubleshoot.records.headers import Recognition, Standing, near_miss, parse_target, recognise, tidy
+from mlg_troubleshoot.records.model import ReadOptions
+from mlg_troubleshoot.records.rows import PlacedField
+from mlg_troubleshoot.records.source import MergedRange, NumberedRow
+from mlg_troubleshoot.units import LengthUnit
+
+HEADER_SEARCH_ROWS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """A header as found.
+
+    Parameters
+    ----------
+    row : int
+        Its row (the lower one of two), counted from 1.
+    texts : tuple of str
+        Header of each column.
+    width : int
+        Number of fields in the header row, trailing blanks included.
+    rows_used : tuple of int
+        The rows that belong to it: one, or two where the header has two rows or a row of units below.
+    units : tuple of LengthUnit or None
+        Unit of each column from a row of units; empty if there is none.
+    """
+
+    row: int
+    texts: tuple[str, ...]
+    width: int
+    rows_used: tuple[int, ...]
+    units: tuple[LengthUnit | None, ...] = ()
+
+
+@dataclass(slots=True)
+class Columns:
+    """The columns of a table, with what was wrong with its header.
+
+    Parameters
+    ----------
+    placed : list of PlacedField
+        The columns.
+    problems : list of Problem
+        What is wrong with the header, each once.
+    notes : list of str
+        How headers that are not canonical were read.
+    is_long : bool
+        True if one row is one joint's reading.
+    """
+
+    placed: list[PlacedField]
+    problems: list[Problem] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    is_long: bool = False
+
+
+def _mapped(text: str, index: int, options: ReadOptions) -> bool:
+    return any(tidy(key) == tidy(text) or key == column_letters(index) for key in options.column_map)
+
+
+def header_score(cells: Sequence[Cell], options: ReadOptions) -> int:
+    """Tell how much a row looks like a header.
+
+    Parameters
+    ----------
+    cells : sequence of Cell
+        The row.
+    options : ReadOptions
+        Joints and mapped headers.
+
+    Returns
+    -------
+    int
+        Number of different columns understood; 0 if the row is no header of inspections.
+    """
+    known: set[tuple[Kind, int | None]] = set()
+    doubtful = 0
+    for index, cell in enumerate(cells):
+        if isinstance(cell, str):
+            if _mapped(cell, index, options):
+                doubtful += 1
+                continue
+            found = recognise(cell, options.joint_numbers, options.joint_names)
+            if found.field is not None:
+                known.add(found.field.quantity)
+            elif found.standing is Standing.DOUBTFUL:
+                doubtful += 1
+    kinds = {kind for kind, _ in known}
+    core = len(kinds & {*REQUIRED}) + (1 if Kind.CLEARANCE in kinds else 0) + (1 if doubtful else 0)
+    if core < 2 or len(known) + doubtful < 3:
+        return 0
+    return 2 * len(known) + doubtful
+
+
+def find_header(
+    rows: Sequence[NumberedRow], options: ReadOptions, merged: Callable[[], Sequence[MergedRange]]
+) -> Header | None:
+    """Search the first rows of a sheet for the header.
+
+    Parameters
+    ----------
+    rows : sequence of tuple
+        The first rows that are not blank.
+    options : ReadOptions
+        Joints and mapped headers.
+    merged : callable
+        Returns the merged ranges, asked for only where they may matter.
+
+    Returns
+    -------
+    Header or None
+        The header; None if no row of the first 20 is one.
+    """
+    near = [(number, cells) for number, cells in rows if number <= HEADER_SEARCH_ROWS]
+    best: tuple[int, int] | None = None
+    for place, (_, cells) in enumerate(near):
+        score = header_score(cells, options)
+        if score and (best is None or score > best[0]):
+            best = (score, place)
+    two_rows = _two_row_header(near, options, merged, best[0] if best else 0)
+    if two_rows is not None:
+        return two_rows
+    if best is None:
+        return None
+    number, cells = near[best[1]]
+    header = Header(number, tuple(_text(c) for c in cells), len(cells), (number,))
+    if best[1] + 1 < len(near):
+        below, units = near[best[1] + 1]
+        found = _unit_row(header, units) if below == number + 1 else None
+        if found is not None:
+            return replace(header, units=found, row=below, rows_used=(number, below))
+    return header
+
+
+def _text(cell: Cell) -> str:
+    return " ".join(show(cell).split())
+
+
+def _two_row_header(
+    near: Sequence[NumberedRow],
+    options: ReadOptions,
+    merged: Callable[[], Sequence[MergedRange]],
+    single: int,
+) -> Header | None:
+    """Join a header of two rows, where merged cells say which columns the upper one covers."""
+    ranges: Sequence[MergedRange] | None = None
+    best: tuple[int, Header] | None = None
+    for (upper, above), (lower, below) in pairwise(near):
+        if lower != upper + 1 or not _may_be_upper(above, below):
+            continue
+        if ranges is None:
+            ranges = merged()
+        texts = _joined(upper, above, below, ranges)
+        if texts is None:
+            continue
+        score = header_score(texts, options)
+        if score > single and (best is None or score > best[0]):
+            header = Header(lower, tuple(texts), len(texts), (upper, lower))
+            best = (score, header)
+    return best[1] if best is not None else None
+
+
+def _may_be_upper(above: Sequence[Cell], below: Sequence[Cell]) -> bool:
+    texts = [c for c in above if c is not None]
+    return bool(texts) and all(isinstance(c, str) for c in texts) and sum(c is not None for c in below) >= 2
+
+
+def _joined(
+    upper: int, above: Sequence[Cell], below: Sequence[Cell], ranges: Sequence[MergedRange]
+) -> list[str] | None:
+    width = max(len(above), len(below))
+    covering: list[str] = [_text(above[i]) if i < len(above) else "" for i in range(width)]
+    across = False
+    for first_row, first, last_row, last in ranges:
+        if first_row == upper and last_row == upper and last > first:
+            across = True
+            for index in range(first + 1, min(last + 1, width)):
+                covering[index] = covering[first] if first < width else ""
+    if not across:
+        return None
+    lower_texts = [_text(below[i]) if i < len(below) else "" for i in range(width)]
+    return [f"{top} {bottom}".strip() for top, bottom in zip(covering, lower_texts, strict=True)]
+
+
+def _unit_row(header: Header, cells: Sequence[Cell]) -> tuple[LengthUnit | None, ...] | None:
+    """Read a row of units below the header; None if it is something else."""
+    words = [_text(c).strip("()[]").lower() for c in cells]
+    if not any(words) or any(
+        w not in ("", "in", "inch", "mm", "thou", "mil", '"', "-", "psi", "°c", "c") for w in words
+    ):
+        return None
+    units: list[LengthUnit | None] = []
+    for word in words[: len(header.texts)]:
+        try:
+            units.append(LengthUnit(_UNIT_ROW_WORDS.get(word, word)))
+        except ValueError:
+            units.append(None)
+    return tuple(units) if any(units) else None
+
+
+_UNIT_ROW_WORDS = {"inch": "in", '"': "in", "mil": "thou"}
+
+
+class ColumnReader:
+    """Reads the headers of one table or form.
+
+    Parameters
+    ----------
+    options : ReadOptions
+        What the caller declared.
+    file, sheet : str or None
+        Where the table is.
+    """
+
+    def __init__(self, options: ReadOptions, file: str | None, sheet: str | None) -> None:
+        self._options = options
+        self._file = file
+        self._sheet = sheet
+
+    def _recognise(self, text: str, index: int) -> tuple[Recognition, bool]:
+        """Read one header; True if the caller mapped it."""
+        options = self._options
+        for key, target in options.column_map.items():
+            if tidy(key) == tidy(text) or key == column_letters(index):
+                found = parse_target(target, options.joint_numbers)
+                return Recognition(Standing.UNDERSTOOD if found else Standing.UNKNOWN, found), True
+        found_by_name = recognise(text, options.joint_numbers, options.joint_names)
+        if found_by_name.standing is Standing.UNKNOWN and text:
+            found_by_name = near_miss(text, options.joint_numbers)
+        return found_by_name, False
+
+    def place(
+        self,
+        headers: Sequence[str],
+        row: int,
+        *,
+        units: Sequence[LengthUnit | None] = (),
+        places: Sequence[tuple[int, str]] | None = None,
+        required: bool = True,
+    ) -> Columns:
+        """Read all headers of a table.
+
+        Parameters
+        ----------
+        headers : sequence of str
+            The headers.
+        row : int
+            Their row, counted from 1.
+        units : sequence of LengthUnit or None, optional
+            Units from a row of units.
+        places : sequence of tuple, optional
+            Row and cell of each label, where they do not stand in one row.
+        required : bool, optional
+            False to leave missing columns unreported.
+
+        Returns
+        -------
+        Columns
+            The columns.
+        """
+        columns = Columns([])
+        for index, text in enumerate(headers):
+            header_row, cell = places[index] if places is not None else (row, f"{column_letters(index)}{row}")
+            found, mapped = self._recognise(text, index)
+            known = found.field
+            if known is not None and index < len(units) and units[index] is not None:
+                known = self._with_unit(known, units[index])
+            placed = PlacedField(index, text, known, found.standing is Standing.DOUBTFUL, cell, header_row)
+            columns.placed.append(placed)
+            if placed.refused:
+                columns.problems.append(self._doubtful(placed, found))
+            elif text:
+                self._note(columns, placed, found, mapped, in_form=places is not None)
+        self._joint_columns(columns)
+        self._duplicates(columns)
+        if required:
+            self._missing(columns, row)
+        self._unused_map(columns, row)
+        return columns
+
+    @staticmethod
+    def _with_unit(known: Field, unit: LengthUnit | None) -> Field:
+        return known if known.unit is not None else replace(known, unit=unit)
+
+    def _note(self, columns: Columns, placed: PlacedField, found: Recognition, mapped: bool, *, in_form: bool) -> None:
+        where = f"cell {placed.header_cell}" if in_form else f"column {column_letters(placed.index)}"
+        if placed.field is None:
+            hint = ""
+            if found.nearest and not mapped:
+                hint = f'; if it means {found.nearest}, pass --map "{placed.header}={found.nearest}"'
+            columns.notes.append(f'{where} "{placed.header}" is not used, only carried to the report{hint}')
+        elif mapped or (placed.header != placed.field.label if in_form else placed.header != placed.field.name):
+            columns.notes.append(f'{where} "{placed.header}" read as {placed.field.name}')
+
+    def _problem(self, code: str, placed: PlacedField, expected: str, remedy: str) -> Problem:
+        return Problem(
+            code,
+            self._file,
+            self._sheet,
+            placed.header_row,
+            placed.header,
+            placed.header_cell,
+            placed.header,
+            expected,
+            remedy,
+        )
+
+    def _doubtful(self, placed: PlacedField, found: Recognition) -> Problem:
+        target = found.nearest or "clearance_3_in"
+        if found.code == "joint_unknown":
+            low, high = min(self._options.joint_numbers), max(self._options.joint_numbers)
+            return self._problem(
+                found.code,
+                placed,
+                f"a joint from {low} to {high}",
+                f"{found.reason[:1].upper()}{found.reason[1:]}. The nearest names are {target}. Correct the header, or "
+                f'pass --map "{placed.header}=COLUMN".',
+            )
+        return self._problem(
+            found.code,
+            placed,
+            "a header that can be understood, such as clearance_3_mm",
+            f'The header is doubtful: {found.reason}. If {target} is meant, pass --map "{placed.header}={target}" '
+            f'(a length with its unit); to leave the column unread, pass --map "{placed.header}=carry".',
+        )
+
+    def _joint_columns(self, columns: Columns) -> None:
+        """Tell a long table from a wide one; a clearance without its joint is doubtful in a wide one."""
+        fields = [p.field for p in columns.placed if p.field is not None and not p.refused]
+        numbered = any(f.kind in PER_JOINT and f.number is not None for f in fields)
+        loose = [p for p in columns.placed if p.field and p.field.kind in PER_JOINT and p.field.number is None]
+        joint = next((p for p in columns.placed if p.field and p.field.kind is Kind.JOINT), None)
+        if joint is not None and loose and not numbered:
+            columns.is_long = True
+            return
+        for p in [*loose, *([joint] if joint is not None and numbered else [])]:
+            self._refuse(
+                columns,
+                p,
+                "joint_missing",
+                "a joint's number in the header, such as clearance_3_in, or a column joint beside it",
+                "The header does not say which joint. "
+                f'Correct it, or pass --map "{p.header}=COLUMN" with a column such as clearance_3_in.',
+            )
+
+    def _refuse(self, columns: Columns, placed: PlacedField, code: str, expected: str, remedy: str) -> None:
+        columns.placed[placed.index] = replace(placed, refused=True)
+        columns.problems.append(self._problem(code, placed, expected, remedy))
+
+    def _duplicates(self, columns: Columns) -> None:
+        seen: dict[tuple[Kind, int | None], PlacedField] = {}
+        for placed in list(columns.placed):
+            if placed.field is None or placed.refused:
+                continue
+            first = seen.setdefault(placed.field.quantity, placed)
+            if first is placed:
+                continue
+            columns.placed[first.index] = replace(columns.placed[first.index], refused=True)
+            self._refuse(
+                columns,
+                placed,
+                "header_duplicate",
+                f"one column for {placed.field.name}; {first.header_cell} {first.header!r} is one already",
+                f"Remove one of the two, or pass --map {column_letters(placed.index)}=carry to use the other.",
+            )
+
+    def _missing(self, columns: Columns, row: int) -> None:
+        fields = {p.field.kind for p in columns.placed if p.field is not None}
+        unknown = [p.header for p in columns.placed if p.field is None and p.header]
+        missing: list[tuple[str, str]] = [
+            (kind.value, f"a column {kind.value}") for kind in REQUIRED if kind not in fields
+        ]
+        clearance_refused = any(p.refused for p in columns.placed)
+        if Kind.CLEARANCE not in fields and not clearance_refused:
+            missing.append(("clearance_1_in", "at least one clearance column, such as clearance_3_in"))
+        for name, expected in missing:
+            close = difflib.get_close_matches(name, [tidy(h).replace(" ", "_") for h in unknown], 1, 0.6)
+            hint = next((h for h in unknown if close and tidy(h).replace(" ", "_") == close[0]), None)
+            like = f' If "{hint}" is meant, pass --map "{hint}={name}".' if hint else ""
+            columns.problems.append(
+                Problem(
+                    "column_missing",
+                    self._file,
+                    self._sheet,
+                    row,
+                    name,
+                    None,
+                    None,
+                    expected,
+                    f"Add the column, or name the one that is meant with --map.{like}",
+                )
+            )
+
+    def _unused_map(self, columns: Columns, row: int) -> None:
+        for key in self._options.column_map:
+            used = any(tidy(key) == tidy(p.header) or key == column_letters(p.index) for p in columns.placed)
+            if not used:
+                headers = ", ".join(p.header for p in columns.placed if p.header)
+                columns.problems.append(
+                    Problem(
+                        "map_header_unknown",
+                        self._file,
+                        self._sheet,
+                        row,
+                        key,
+                        None,
+                        key,
+                        f"one of the headers of the table: {headers[:200]}",
+                        "Correct the header named in --map.",
+                    )
+                )

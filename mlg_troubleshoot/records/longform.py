@@ -1,0 +1,248 @@
+"""The long layout: one row is one joint's reading, rows with one record id are one inspection."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
+from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.records.cells import Cell, OddCell, column_letters, show
+from mlg_troubleshoot.records.columns import PER_JOINT, Field, Kind
+from mlg_troubleshoot.records.headers import tidy
+from mlg_troubleshoot.records.model import ReadOptions
+from mlg_troubleshoot.records.rows import PlacedField, RowReader
+from mlg_troubleshoot.records.values import plain_text
+
+_JOINT_TEXT = re.compile(r"(?:joint|jt|j)?\W*(?:no|nr|number|#)?\W*0?(\d{1,3})", re.ASCII)
+
+
+@dataclass(slots=True)
+class _Group:
+    """The rows of one record."""
+
+    row: int
+    cells: list[Cell]
+    places: list[tuple[int, str]]
+    bad: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+
+class LongReader:
+    """Gathers the rows of a long table and reads each record as one row of a wide one.
+
+    Parameters
+    ----------
+    placed : sequence of PlacedField
+        The columns.
+    options : ReadOptions
+        What the caller declared.
+    file, sheet : str or None
+        Where the table is.
+    decimal_comma : bool
+        True if the table writes ``0,013`` for 0.013.
+    report : callable
+        Takes each problem.
+    header_row : int
+        Row of the header.
+    """
+
+    def __init__(
+        self,
+        placed: Sequence[PlacedField],
+        options: ReadOptions,
+        file: str | None,
+        sheet: str | None,
+        decimal_comma: bool,
+        report: Callable[[Problem], None],
+        header_row: int,
+    ) -> None:
+        self._options = options
+        self._file = file
+        self._sheet = sheet
+        self._report = report
+        self._placed = list(placed)
+        self._record = self._find(Kind.RECORD_ID)
+        self._joint = self._find(Kind.JOINT)
+        self._per_joint = [p for p in placed if p.field is not None and p.field.kind in PER_JOINT]
+        wide: list[PlacedField] = [
+            replace(p, field=None, refused=True) if p is self._joint or p in self._per_joint else p for p in placed
+        ]
+        # The joint's own columns stay in place but empty; each joint's reading gets a column behind them.
+        self._slots: dict[tuple[int, int], int] = {}
+        for p in self._per_joint:
+            for joint in options.joint_numbers:
+                self._slots[p.index, joint] = len(wide)
+                kind = p.field.kind if p.field is not None else Kind.CLEARANCE
+                unit = p.field.unit if p.field is not None else None
+                wide.append(replace(p, index=len(wide), field=Field(kind, joint, unit), header_cell=p.header_cell))
+        self._width = len(wide)
+        self._names = self._joint_names(options.joint_names)
+        self._groups: dict[str, _Group] = {}
+        self._loose: list[_Group] = []
+        self._reader = RowReader(
+            wide,
+            options,
+            file=file,
+            sheet=sheet,
+            decimal_comma=decimal_comma,
+            report=report,
+            header_row=header_row,
+        )
+
+    def _find(self, kind: Kind) -> PlacedField | None:
+        return next((p for p in self._placed if p.field is not None and p.field.kind is kind and not p.refused), None)
+
+    @staticmethod
+    def _joint_names(names: Mapping[int, str]) -> dict[str, int]:
+        return {tidy(name): number for number, name in names.items()}
+
+    def add(self, row: int, cells: Sequence[Cell]) -> None:
+        """Take one row.
+
+        Parameters
+        ----------
+        row : int
+            Row in the file, counted from 1.
+        cells : sequence of Cell
+            Its cells.
+        """
+        width = len(self._placed)
+        filled = [*cells[:width], *[None] * (width - len(cells))]
+        record = filled[self._record.index] if self._record is not None else None
+        key = show(record).strip()
+        group = self._groups.get(key) if key else None
+        if group is None:
+            group = _Group(
+                row,
+                [*filled, *[None] * (self._width - width)],
+                [(row, f"{column_letters(i)}{row}") for i in range(self._width)],
+            )
+            for p in self._own():
+                group.cells[p.index] = None
+            if key:
+                self._groups[key] = group
+            else:
+                self._loose.append(group)
+        else:
+            self._same_elsewhere(group, row, filled)
+        self._take_reading(group, row, filled)
+
+    def _own(self) -> list[PlacedField]:
+        return [*self._per_joint, *([self._joint] if self._joint is not None else [])]
+
+    def _same_elsewhere(self, group: _Group, row: int, filled: Sequence[Cell]) -> None:
+        """Check that what belongs to the whole inspection is the same in each of its rows."""
+        own = {p.index for p in self._own()}
+        for p in self._placed:
+            if p.index in own:
+                continue
+            here, there = filled[p.index], group.cells[p.index]
+            if here is None or here == there:
+                continue
+            if there is None:
+                group.cells[p.index] = here
+                group.places[p.index] = (row, f"{column_letters(p.index)}{row}")
+            elif p.field is not None:
+                self._fault(
+                    group,
+                    p,
+                    row,
+                    here,
+                    "record_contradicts",
+                    f"{show(there)}, as in cell {group.places[p.index][1]}",
+                    "All rows of one record must agree. Correct one of them, or the record id.",
+                )
+
+    def _take_reading(self, group: _Group, row: int, filled: Sequence[Cell]) -> None:
+        if self._joint is None:
+            return
+        cell = filled[self._joint.index]
+        readings = [(p, filled[p.index]) for p in self._per_joint if filled[p.index] is not None]
+        if cell is None and not readings:
+            return
+        joint = self._joint_number(cell)
+        if joint is None:
+            low, high = min(self._options.joint_numbers), max(self._options.joint_numbers)
+            self._fault(
+                group,
+                self._joint,
+                row,
+                cell,
+                "joint_unknown" if cell is not None else "joint_missing",
+                f"a joint number from {low} to {high}",
+                "Enter the joint's number.",
+            )
+            return
+        for p, reading in readings:
+            slot = self._slots[p.index, joint]
+            place = (row, f"{column_letters(p.index)}{row}")
+            first = group.cells[slot]
+            if first is None:
+                group.cells[slot] = reading
+                group.places[slot] = place
+            elif first == reading:
+                group.warnings.append(f"joint {joint} is given twice with the same reading (row {row})")
+            else:
+                self._fault(
+                    group,
+                    p,
+                    row,
+                    reading,
+                    "joint_twice",
+                    f"one reading of joint {joint}; cell {group.places[slot][1]} says {show(first)}",
+                    "Keep the right one, or correct the joint number.",
+                )
+
+    def _joint_number(self, cell: Cell) -> int | None:
+        if cell is None or isinstance(cell, OddCell):
+            return None
+        if isinstance(cell, float):
+            number = int(cell) if cell.is_integer() and abs(cell) < 1e6 else None
+        else:
+            text = tidy(plain_text(cell))
+            match = _JOINT_TEXT.fullmatch(text)
+            number = int(match[1]) if match is not None else self._names.get(text)
+        return number if number in self._options.joint_numbers else None
+
+    def _fault(
+        self, group: _Group, p: PlacedField, row: int, cell: Cell, code: str, expected: str, remedy: str
+    ) -> None:
+        if p.header not in group.bad:
+            group.bad.append(p.header)
+        self._report(
+            Problem(
+                code,
+                self._file,
+                self._sheet,
+                row,
+                p.header,
+                f"{column_letters(p.index)}{row}",
+                None if cell is None else show(cell),
+                expected,
+                remedy,
+            )
+        )
+
+    def finish(self) -> list[Inspection | InvalidRow]:
+        """Read the records that were gathered.
+
+        Returns
+        -------
+        list of Inspection or InvalidRow
+            One entry for each record, at the row where it begins.
+        """
+        done: list[Inspection | InvalidRow] = []
+        for group in [*self._groups.values(), *self._loose]:
+            read = self._reader.read(group.row, group.cells, group.places)
+            warnings = (*read.warnings, *group.warnings)
+            if group.bad:
+                correct = (*group.bad, *(read.correct if isinstance(read, InvalidRow) else ()))
+                source = RowSource(self._file, self._sheet, group.row)
+                done.append(
+                    InvalidRow(read.record_id, read.tail_no, read.side, tuple(dict.fromkeys(correct)), warnings, source)
+                )
+            else:
+                done.append(replace(read, warnings=warnings))
+        return done

@@ -1,0 +1,412 @@
+"""From files to inspections: every data row exactly once, every bad cell named."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, islice
+from pathlib import Path
+from typing import BinaryIO
+
+from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.records.csvfile import CsvFile
+from mlg_troubleshoot.records.duplicates import settle_duplicates
+from mlg_troubleshoot.records.forms import Form, find_form, read_form
+from mlg_troubleshoot.records.history import history_warnings
+from mlg_troubleshoot.records.layout import HEADER_SEARCH_ROWS, Header, find_header, header_score
+from mlg_troubleshoot.records.model import FileRead, FileRefusedError, Progress, ReadOptions, ReadResult
+from mlg_troubleshoot.records.sniff import sniff
+from mlg_troubleshoot.records.source import NumberedRow, Sheet, Workbook
+from mlg_troubleshoot.records.tables import Collected, read_table
+
+MAX_FILE_BYTES = 200_000_000
+STDIN_NAME = "-"
+_PEEKED_ROWS = 120
+_INSTRUCTIONS = "instructions"
+_SUFFIXES = frozenset((".csv", ".tsv", ".txt", ".xlsx", ".xlsm", ".xls", ".ods"))
+
+Source = str | Path | BinaryIO
+
+
+@dataclass(slots=True)
+class _Candidate:
+    """A sheet that may hold inspections."""
+
+    sheet: Sheet
+    rows: Iterator[NumberedRow]
+    header: Header | None
+    form: Form | None
+    has_rows: bool
+
+
+class _Ticker:
+    """Adds up the rows of all files for the progress display."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self._progress = progress
+        self._done = 0
+
+    def __call__(self, rows: int) -> None:
+        self._done += rows
+        if self._progress is not None:
+            self._progress(self._done, None)
+
+
+def read_inspections(
+    source: Source, options: ReadOptions, *, name: str | None = None, progress: Progress | None = None
+) -> ReadResult:
+    """Read the inspections of one file.
+
+    Parameters
+    ----------
+    source : str, Path or binary file
+        A CSV file, a workbook, or an open binary stream of either.
+    options : ReadOptions
+        What the caller declares about it.
+    name : str, optional
+        What the messages call it; the path as given if left out.
+    progress : callable, optional
+        Called with the number of rows read so far and the total, if it is known.
+
+    Returns
+    -------
+    ReadResult
+        Every data row once, every error once. A file that cannot be read at all is a problem, too.
+
+    Raises
+    ------
+    UsageError
+        If a mapped column does not exist.
+    """
+    return _finish([_read_file(source, options, name, _Ticker(progress))])
+
+
+def read_many(sources: Iterable[Source], options: ReadOptions, *, progress: Progress | None = None) -> ReadResult:
+    """Read the inspections of several files, folders and patterns as one batch.
+
+    Parameters
+    ----------
+    sources : iterable of str, Path or binary file
+        Files; a folder stands for the tables in it, a pattern such as ``fleet/*.xlsx`` for what it matches.
+    options : ReadOptions
+        What the caller declares about them.
+    progress : callable, optional
+        Called with the number of rows read so far and the total, if it is known.
+
+    Returns
+    -------
+    ReadResult
+        The rows of all files in their order. A file that cannot be read is a problem and the others still work.
+
+    Raises
+    ------
+    UsageError
+        If a mapped column does not exist.
+    """
+    ticker = _Ticker(progress)
+    return _finish([_read_file(item, options, None, ticker) for source in sources for item in expand(source)])
+
+
+def expand(source: Source) -> list[Source]:
+    """Return the files that a path stands for.
+
+    Parameters
+    ----------
+    source : str, Path or binary file
+        A file, a folder or a pattern.
+
+    Returns
+    -------
+    list
+        The files, in the order of their names; the path itself if there is nothing to expand.
+    """
+    if not isinstance(source, str | Path) or str(source) == STDIN_NAME:
+        return [source]
+    path = Path(source)
+    try:
+        if path.is_dir():
+            found = [p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES and not _is_scratch(p)]
+            return [*sorted(found)] or [source]
+        if any(c in str(source) for c in "*?[") and not path.exists():
+            base = Path(path.anchor) if path.is_absolute() else Path()
+            pattern = str(path.relative_to(path.anchor)) if path.is_absolute() else str(path)
+            return [*sorted(p for p in base.glob(pattern) if p.is_file() and not _is_scratch(p))] or [source]
+    except (OSError, ValueError, NotImplementedError):
+        return [source]
+    return [source]
+
+
+def _is_scratch(path: Path) -> bool:
+    """Tell the lock files that spreadsheet programs lay beside an open workbook."""
+    return path.name.startswith(("~$", ".~lock", "."))
+
+
+@dataclass(slots=True)
+class _FileResult:
+    """What one file gave."""
+
+    file: FileRead
+    found: Collected
+
+
+def _read_file(source: Source, options: ReadOptions, name: str | None, ticker: _Ticker) -> _FileResult:
+    label = name or (str(source) if isinstance(source, str | Path) else STDIN_NAME)
+    digest: str | None = None
+    kind = "unreadable"
+    found = Collected()
+    try:
+        data = _load(source)
+        digest = hashlib.sha256(data).hexdigest()
+        book = _open(data, label, options)
+        del data
+        kind = book.kind
+        if kind != Path(label).suffix.lower().removeprefix(".") and Path(label).suffix.lower() in _SUFFIXES - {
+            ".tsv",
+            ".txt",
+        }:
+            found.notes.append(f"the file is of kind {kind}, whatever its name")
+        found.notes += book.notes
+        _read_book(book, options, label, ticker, found)
+    except FileRefusedError as refusal:
+        # A reader that stops halfway has not seen the whole table: none of its rows are used.
+        found.rows.clear()
+        found.layouts.clear()
+        found.problems[:] = [refusal.problem(label)]
+    found.notes[:] = [f"{label}: {note}" for note in found.notes]
+    return _FileResult(FileRead(label, kind, digest, len(found.rows)), found)
+
+
+def _load(source: Source) -> bytes:
+    try:
+        if isinstance(source, str | Path):
+            with Path(source).open("rb") as file:
+                data = file.read(MAX_FILE_BYTES + 1)
+        else:
+            data = source.read(MAX_FILE_BYTES + 1)
+    except FileNotFoundError:
+        raise FileRefusedError(
+            "file_not_found", "there is no such file", "an existing file", "Check the path and the spelling."
+        ) from None
+    except IsADirectoryError:
+        raise FileRefusedError(
+            "file_not_found", "it is a folder without tables", "a CSV file or a workbook", "Name the file."
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise FileRefusedError(
+            "file_unreadable",
+            f"it cannot be opened ({reason})",
+            "a readable file",
+            "Check the path and the permissions.",
+        ) from None
+    if len(data) > MAX_FILE_BYTES:
+        raise FileRefusedError(
+            "file_too_large",
+            f"the file is larger than {MAX_FILE_BYTES // 1_000_000} MB",
+            "a table of inspections",
+            "Read the inspection table alone, or split the file.",
+        )
+    return data
+
+
+def _open(data: bytes, label: str, options: ReadOptions) -> Workbook:
+    kind = sniff(data, label)
+    if kind == "text":
+        return CsvFile(data, lambda cells: header_score(cells, options))
+    if kind == "ole":
+        from mlg_troubleshoot.records.xls import XlsFile
+
+        return XlsFile(data)
+    if b"opendocument.spreadsheet" in data[:200]:
+        from mlg_troubleshoot.records.ods import OdsFile
+
+        return OdsFile(data)
+    from mlg_troubleshoot.records.xlsx import XlsxFile
+
+    return XlsxFile(data)
+
+
+def _candidate(sheet: Sheet, options: ReadOptions) -> _Candidate:
+    rows = sheet.rows()
+    peeked = list(islice(rows, _PEEKED_ROWS))
+    header: Header | None = None
+    form: Form | None = None
+    if not _is_instructions(peeked):
+        form = find_form(peeked, options)
+        header = None if form is not None else find_header(peeked, options, sheet.merged)
+    has_rows = header is not None and any(number > header.row for number, _ in peeked)
+    return _Candidate(sheet, chain(peeked, rows), header, form, has_rows)
+
+
+def _is_instructions(rows: Sequence[NumberedRow]) -> bool:
+    first = next((cell for _, cells in rows[:1] for cell in cells if cell is not None), None)
+    return isinstance(first, str) and first.strip().lower().startswith(_INSTRUCTIONS)
+
+
+def _read_book(book: Workbook, options: ReadOptions, label: str, ticker: _Ticker, found: Collected) -> None:
+    chosen = _choose(book, options, found)
+    for candidate in chosen:
+        sheet = candidate.sheet
+        if candidate.form is not None:
+            part = read_form(candidate.form, options, file=label, sheet=sheet.name)
+            ticker(1)
+        elif candidate.header is not None:
+            part = read_table(
+                sheet,
+                candidate.header,
+                candidate.rows,
+                options,
+                file=label,
+                delimiter=book.delimiter,
+                tick=ticker,
+            )
+        else:
+            raise _no_header(candidate)
+        several = len(chosen) > 1
+        found.rows += part.rows
+        found.problems += part.problems
+        found.notes += [f"sheet {sheet.name!r}: {note}" if several else note for note in part.notes]
+        found.layouts += part.layouts
+    if not found.rows and not found.problems:
+        raise FileRefusedError(
+            "no_rows",
+            "there is no inspection in it",
+            "at least one row below the header, or a filled-in form",
+            "Enter the inspections and save the file.",
+        )
+
+
+def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Candidate]:
+    """Choose the sheets to read: the named one, the only table, or all filled-in forms."""
+    if len(book.sheets) == 1 and book.sheets[0].name is None:
+        return [_candidate(book.sheets[0], options)]
+    if options.sheet is not None and options.sheet != "*":
+        return [_named(book, options.sheet, options, found)]
+    visible = [sheet for sheet in book.sheets if not sheet.hidden]
+    candidates = [_candidate(sheet, options) for sheet in visible]
+    tables = [c for c in candidates if c.header is not None]
+    filled = [c for c in tables if c.has_rows]
+    forms = [c for c in candidates if c.form is not None and not c.form.is_untouched(options)]
+    if options.sheet == "*":
+        return [c for c in candidates if c in filled or c in forms] or tables
+    if len(filled) > 1:
+        names = ", ".join(repr(c.sheet.name) for c in filled)
+        raise FileRefusedError(
+            "sheet_several",
+            f"several sheets hold inspections: {names}",
+            "one table, or the sheet to read",
+            f'Name the sheet, for example --sheet "{filled[0].sheet.name}", or --sheet "*" for all of them.',
+        )
+    chosen = [c for c in candidates if c in filled or c in forms]
+    _note_hidden(book, found)
+    if chosen:
+        if len(visible) > 1:
+            names = ", ".join(repr(c.sheet.name) for c in chosen)
+            found.notes.append(f"read from sheet {names}" if len(chosen) == 1 else f"read from sheets {names}")
+        return chosen
+    if tables:
+        return tables[:1]
+    if any(c.form is not None for c in candidates):
+        return []
+    raise _nothing_found(book, candidates, options)
+
+
+def _named(book: Workbook, wanted: str, options: ReadOptions, found: Collected) -> _Candidate:
+    by_name = [s for s in book.sheets if s.name == wanted]
+    by_name = by_name or [s for s in book.sheets if (s.name or "").strip().casefold() == wanted.strip().casefold()]
+    if not by_name:
+        names = ", ".join(repr(s.name) for s in book.sheets)
+        raise FileRefusedError(
+            "sheet_unknown",
+            f"there is no sheet {wanted!r}",
+            f"one of its sheets: {names}",
+            "Correct the name given with --sheet.",
+        )
+    sheet = by_name[0]
+    if sheet.hidden:
+        found.notes.append(f"sheet {sheet.name!r} is hidden; it was read because it was named")
+    candidate = _candidate(sheet, options)
+    if candidate.header is None and candidate.form is None:
+        raise _no_header(candidate)
+    return candidate
+
+
+def _note_hidden(book: Workbook, found: Collected) -> None:
+    hidden = [repr(sheet.name) for sheet in book.sheets if sheet.hidden]
+    if hidden:
+        found.notes.append(f"hidden sheets were not read: {', '.join(hidden)}")
+
+
+def _nothing_found(book: Workbook, candidates: Sequence[_Candidate], options: ReadOptions) -> FileRefusedError:
+    for sheet in book.sheets:
+        if sheet.hidden:
+            candidate = _candidate(sheet, options)
+            if candidate.header is not None or candidate.form is not None:
+                return FileRefusedError(
+                    "sheet_hidden",
+                    f"the inspections stand on the hidden sheet {sheet.name!r}",
+                    "inspections on a sheet that can be seen",
+                    f'Unhide the sheet, or name it: --sheet "{sheet.name}".',
+                    sheet=sheet.name,
+                )
+    if len(candidates) == 1:
+        return _no_header(candidates[0])
+    names = ", ".join(repr(c.sheet.name) for c in candidates)
+    return FileRefusedError(
+        "header_missing",
+        f"no sheet holds a table of inspections (sheets: {names})",
+        f"a header with record_id, tail_no, side and clearances in the first {HEADER_SEARCH_ROWS} rows of a sheet",
+        "Use the workbook that 'mlg template' writes, or name the columns with --map.",
+    )
+
+
+def _no_header(candidate: _Candidate) -> FileRefusedError:
+    first = next(iter(islice(candidate.rows, 1)), None)
+    shown = "it holds nothing"
+    if first is not None:
+        texts = [str(cell) for cell in first[1] if isinstance(cell, str)][:8]
+        shown = f"row {first[0]} reads: {', '.join(texts)[:120]}" if texts else f"row {first[0]} holds no text"
+    return FileRefusedError(
+        "header_missing",
+        f"no header of inspections was found ({shown})",
+        f"a header with record_id, tail_no, side and clearances in the first {HEADER_SEARCH_ROWS} rows",
+        "Use the workbook that 'mlg template' writes, or name the columns with --map.",
+        sheet=candidate.sheet.name,
+    )
+
+
+def _finish(results: Sequence[_FileResult]) -> ReadResult:
+    """Join the files, compare the rows with each other, and put the problems in order."""
+    rows = [row for result in results for row in result.found.rows]
+    layouts = tuple(layout for result in results for layout in result.found.layouts)
+    problems = [p for result in results for p in result.found.problems]
+    problems += settle_duplicates(rows, layouts)
+    for place, warnings in history_warnings(rows).items():
+        rows[place] = replace(rows[place], warnings=(*rows[place].warnings, *warnings))
+    order = _places(results)
+    problems.sort(key=order)
+    return ReadResult(
+        tuple(rows),
+        tuple(problems),
+        tuple(note for result in results for note in result.found.notes),
+        layouts,
+        tuple(result.file for result in results),
+    )
+
+
+def _places(results: Sequence[_FileResult]) -> Callable[[Problem], tuple[int, int, int]]:
+    files = {result.file.name: i for i, result in enumerate(reversed(results))}
+    sheets: dict[tuple[str | None, str | None], int] = {}
+    for result in results:
+        for layout in result.found.layouts:
+            sheets.setdefault((layout.file, layout.sheet), len(sheets))
+
+    def key(problem: Problem) -> tuple[int, int, int]:
+        return (
+            len(results) - files.get(problem.file or "", 0),
+            sheets.get((problem.file, problem.sheet), -1),
+            problem.row or 0,
+        )
+
+    return key

@@ -1,0 +1,84 @@
+"""What kind of file it is, told from its first bytes, not from its name."""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+
+from mlg_troubleshoot.records.model import FileRefusedError
+
+ZIP_MAGIC = b"PK"
+OLE_MAGIC = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
+_WORKBOOK_NAMES = frozenset((".xlsx", ".xlsm", ".xls", ".ods", ".xlsb", ".xltx", ".xltm"))
+_OTHERS: tuple[tuple[bytes, str], ...] = (
+    (b"%PDF", "a PDF document"),
+    (b"\x89PNG", "a picture (PNG)"),
+    (b"\xff\xd8\xff", "a picture (JPEG)"),
+    (b"GIF8", "a picture (GIF)"),
+    (b"\x1f\x8b", "a compressed file (gzip)"),
+    (b"7z\xbc\xaf", "a compressed file (7z)"),
+    (b"Rar!", "a compressed file (RAR)"),
+    (b"{\\rtf", "a text document (RTF)"),
+    (b"SQLite format 3", "a database"),
+    (b"\x7fELF", "a program"),
+    (b"MZ", "a program"),
+)
+
+
+def sniff(data: bytes, name: str) -> str:
+    """Tell what kind of file it is.
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+    name : str
+        Its name, for a text that stands under a workbook's name.
+
+    Returns
+    -------
+    str
+        ``zip``, ``ole`` or ``text``.
+
+    Raises
+    ------
+    FileRefusedError
+        If it is empty or something else.
+    """
+    if not data.strip(b" \t\r\n\0\xef\xbb\xbf"):
+        raise FileRefusedError(
+            "file_empty",
+            "the file is empty" if not data else "the file holds nothing but blanks",
+            "a table of inspections",
+            "Check that the file was saved and copied completely.",
+        )
+    if data.startswith((b"PK\x03\x04", b"PK\x05\x06", b"PK\x07\x08")):
+        return "zip"
+    if data.startswith(OLE_MAGIC):
+        return "ole"
+    head = data[:2048].lstrip(b"\xef\xbb\xbf \t\r\n")
+    for magic, what in _OTHERS:
+        if head.startswith(magic):
+            raise _refused(what)
+    low = head.lower()
+    if low.startswith((b"<!doctype html", b"<html", b"<table", b"<head", b"<body")):
+        raise _refused("a web page (HTML), whatever its name")
+    if low.startswith(b"<?xml") or low.startswith(b"<workbook"):
+        raise _refused("an XML file, whatever its name")
+    suffix = PurePath(name).suffix.lower()
+    if suffix in _WORKBOOK_NAMES:
+        raise FileRefusedError(
+            "file_kind",
+            f"a text file under a workbook's name ({suffix})",
+            "a workbook",
+            "If it is a CSV file, rename it to .csv. Otherwise open it in a spreadsheet program and save it as .xlsx.",
+        )
+    return "text"
+
+
+def _refused(what: str) -> FileRefusedError:
+    return FileRefusedError(
+        "file_kind",
+        what,
+        "an .xlsx workbook or a CSV file",
+        "Save the table as .xlsx or as CSV (UTF-8) and read that.",
+    )

@@ -1,0 +1,282 @@
+"""The empty inspection workbook, which reads back when it is filled in."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mlg_troubleshoot.records.cells import column_letters
+from mlg_troubleshoot.records.columns import LENGTHS, Field, Kind
+from mlg_troubleshoot.records.export import write_bytes
+from mlg_troubleshoot.records.forms import FORM_TITLE
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+
+if TYPE_CHECKING:
+    from openpyxl import Workbook
+    from openpyxl.comments import Comment
+    from openpyxl.worksheet.worksheet import Worksheet
+
+JointLine = tuple[int, str, str]
+
+_ROWS = 500
+_HEADER_FILL = "FFD9E2EC"
+_REQUIRED_FILL = "FFFFE9A8"
+_TEXT_KINDS = frozenset(
+    {
+        Kind.RECORD_ID,
+        Kind.TAIL_NO,
+        Kind.GAUGE_ID,
+        Kind.TECHNICIAN_ID,
+        Kind.WORK_ORDER,
+        Kind.MANUAL_REF,
+        Kind.MANUAL_REV,
+        Kind.REMARKS,
+    }
+)
+_MUST = frozenset({Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE, Kind.CONVENTION})
+_CHOICES: dict[Kind, tuple[str, ...]] = {
+    Kind.SIDE: ("LH", "RH"),
+    Kind.CONVENTION: tuple(ClearanceConvention),
+    Kind.UNIT: tuple(LengthUnit),
+    Kind.APPROACH: ("EXTENDING", "RETRACTING"),
+    Kind.OUTCOME: ("RETRACTED", "FAILED"),
+}
+_MEANING: dict[Kind, str] = {
+    Kind.RECORD_ID: "Required. Your own unique name of this inspection.",
+    Kind.TAIL_NO: "Required. Tail number, kept as text.",
+    Kind.SIDE: "Required. LH or RH; there is no default.",
+    Kind.CONVENTION: "Required. " + " ".join(f"{c.value}: {c.meaning}." for c in ClearanceConvention),
+    Kind.UNIT: "Unit of every length on this sheet: in, thou or mm.",
+    Kind.DATE: "Optional. Year-month-day, for example 2026-03-04.",
+    Kind.LANDINGS: "Optional. Landings since overhaul, 0 or more.",
+    Kind.CLEARANCE: "Clearance. Leave blank if it was not measured; 0 means measured and found to be zero.",
+    Kind.GAUGE_U: "Optional. Standard uncertainty of one reading, as read. Blank: 0.0005 in is assumed.",
+    Kind.PLUNGER_DISPLACEMENT: "Optional. Measured change of the plunger position at mid-position, over-travel "
+    "positive, under-travel negative. Repeat readings have their own columns.",
+    Kind.PLUNGER_DOWN_LOCK: "Optional. Measured plunger position at Down Lock; 0.01 to 0.05 in is allowed.",
+    Kind.PLUNGER_GAUGE_U: "Optional. Repeatability of one plunger reading.",
+    Kind.MARGIN: "Optional. This gear's margin as found at rigging. Blank: 0.03 in.",
+    Kind.MARGIN_U: "Optional. Standard uncertainty of that margin. Blank: 0.",
+    Kind.TEMPERATURE: "Optional. Temperature in degrees Celsius, -60 to 60.",
+    Kind.PRESSURE: "Optional. Hydraulic pressure in psi, 0 to 4000.",
+    Kind.APPROACH: "Optional. How the position was approached before the reading: EXTENDING or RETRACTING.",
+    Kind.GAUGE_ID: "Optional. The gauge set that was used.",
+    Kind.TECHNICIAN_ID: "Optional. Who measured.",
+    Kind.AXIAL_FLOAT: "Optional. End float of the joint along its pin.",
+    Kind.OUTCOME: "Optional. What the gear did: RETRACTED or FAILED.",
+    Kind.WORK_ORDER: "Optional. Goes to the report unchanged.",
+    Kind.MANUAL_REF: "Optional. Manual reference; goes to the report unchanged.",
+    Kind.MANUAL_REV: "Optional. Manual revision; goes to the report unchanged.",
+    Kind.REMARKS: "Optional. Goes to the report unchanged.",
+}
+_INSTRUCTIONS = (
+    "Instructions (this sheet is not read)",
+    "",
+    "Use either of the two sheets, or both:",
+    "  Inspections: one row is one inspection of one gear.",
+    "  Form: one sheet is one inspection. Copy the sheet for each further inspection (right click on its tab).",
+    "",
+    "Yellow columns and lines must be filled in. Everything else may stay blank.",
+    "Blank means not measured. 0 means measured and found to be zero. Never enter 0 for a joint that was not measured.",
+    "",
+    "Clearance convention: say how the clearances were taken. A wrong convention is a factor of 2.",
+    *(f"  {c.value}: {c.meaning}" for c in ClearanceConvention),
+    "",
+    "Lengths: in the sheet Inspections the unit is the last word of the column's name (_in, _thou, _mm). "
+    "To enter millimetres, change _in to _mm in the header of that column.",
+    "In the sheet Form choose the unit in the line Unit.",
+    "Use a decimal point or your program's own decimal mark, and no fractions.",
+    "Dates: year-month-day. Columns of your own may be added; they are carried to the report unchanged.",
+    "",
+    "Each column is explained in the comment of its header.",
+    "Troubleshooting aid, not maintenance data: the limits of the maintenance manual apply.",
+    "",
+    "The joints:",
+)
+
+
+def write_template(path: str | Path, joints: Sequence[JointLine], *, unit: LengthUnit = LengthUnit.INCH) -> None:
+    """Write the empty inspection workbook.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to write; it appears whole or not at all.
+    joints : sequence of tuple
+        Number, name and location of each joint.
+    unit : LengthUnit, optional
+        Unit of the columns of the sheet Inspections.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    from openpyxl import Workbook
+
+    book = Workbook()
+    book.properties.title = "Main landing gear: joint clearance inspections"
+    _instructions(book, joints)
+    _table(book, joints, unit)
+    _form(book, joints)
+    book.active = 1
+    buffer = io.BytesIO()
+    book.save(buffer)
+    write_bytes(path, buffer.getvalue())
+
+
+def _fields(joints: Sequence[JointLine], unit: LengthUnit | None) -> list[Field]:
+    def length(kind: Kind, number: int | None = None) -> Field:
+        return Field(kind, number, unit)
+
+    numbers = [number for number, _, _ in joints]
+    return [
+        *(Field(kind) for kind in (Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE, Kind.CONVENTION)),
+        *(length(Kind.CLEARANCE, n) for n in numbers),
+        *(Field(kind) for kind in (Kind.DATE, Kind.OUTCOME, Kind.LANDINGS)),
+        length(Kind.GAUGE_U),
+        *(length(Kind.PLUNGER_DISPLACEMENT, n) for n in (1, 2, 3)),
+        length(Kind.PLUNGER_DOWN_LOCK),
+        length(Kind.PLUNGER_GAUGE_U),
+        length(Kind.MARGIN),
+        length(Kind.MARGIN_U),
+        *(
+            Field(kind)
+            for kind in (
+                Kind.TEMPERATURE,
+                Kind.PRESSURE,
+                Kind.APPROACH,
+                Kind.GAUGE_ID,
+                Kind.TECHNICIAN_ID,
+                Kind.WORK_ORDER,
+                Kind.MANUAL_REF,
+                Kind.MANUAL_REV,
+                Kind.REMARKS,
+            )
+        ),
+        *(length(Kind.AXIAL_FLOAT, n) for n in numbers),
+    ]
+
+
+def _explain(field: Field, joints: Sequence[JointLine]) -> str:
+    text = _MEANING[field.kind]
+    if field.kind in (Kind.CLEARANCE, Kind.AXIAL_FLOAT):
+        name, place = next(((name, place) for number, name, place in joints if number == field.number), ("", ""))
+        text = f"Joint {field.number}: {name}. {place}. {text}"
+    return text
+
+
+def _instructions(book: Workbook, joints: Sequence[JointLine]) -> None:
+    from openpyxl.styles import Alignment, Font
+
+    sheet = book.worksheets[0]
+    sheet.title = "Instructions"
+    sheet.column_dimensions["A"].width = 110
+    # One cell a line: labels beside values would look like a form.
+    lines = [*_INSTRUCTIONS, *(f"  #{number} {name}: {place}" for number, name, place in joints)]
+    for row, line in enumerate(lines, 1):
+        cell = sheet.cell(row, 1, line)
+        cell.data_type = "s"
+        cell.alignment = Alignment(wrap_text=True, vertical="top")
+    sheet["A1"].font = Font(bold=True, size=14)
+    _page(sheet, landscape=False)
+
+
+def _page(sheet: Worksheet, *, landscape: bool) -> None:
+    from openpyxl.worksheet.properties import PageSetupProperties
+
+    sheet.page_setup.orientation = "landscape" if landscape else "portrait"
+    sheet.page_setup.paperSize = 9
+    sheet.page_setup.fitToWidth = 1
+    sheet.page_setup.fitToHeight = 0
+    sheet.sheet_properties.pageSetUpPr = PageSetupProperties(fitToPage=True)
+
+
+def _comment(text: str) -> Comment:
+    from openpyxl.comments import Comment
+
+    return Comment(text, "mlg", width=320, height=120)
+
+
+def _table(book: Workbook, joints: Sequence[JointLine], unit: LengthUnit) -> None:
+    from openpyxl.styles import Alignment, Border, Font, PatternFill, Side
+
+    sheet = book.create_sheet("Inspections")
+    line = Side(style="thin", color="FF9AA5B1")
+    for index, field in enumerate(_fields(joints, unit)):
+        letters = column_letters(index)
+        cell = sheet.cell(1, index + 1, field.name)
+        cell.font = Font(bold=True)
+        cell.fill = PatternFill("solid", fgColor=_REQUIRED_FILL if field.kind in _MUST else _HEADER_FILL)
+        cell.alignment = Alignment(wrap_text=True, vertical="center", horizontal="center")
+        cell.border = Border(bottom=line, right=line)
+        cell.comment = _comment(_explain(field, joints))
+        sheet.column_dimensions[letters].width = 30 if field.kind is Kind.REMARKS else 14
+        number_format = _number_format(field.kind)
+        for row in range(2, _ROWS + 2):
+            if number_format is not None:
+                sheet.cell(row, index + 1).number_format = number_format
+        _validate(sheet, field.kind, f"{letters}2:{letters}{_ROWS + 1}")
+    sheet.row_dimensions[1].height = 45
+    sheet.freeze_panes = "D2"
+    sheet.print_title_rows = "1:1"
+    _page(sheet, landscape=True)
+
+
+def _number_format(kind: Kind) -> str | None:
+    if kind in _TEXT_KINDS:
+        return "@"
+    return "yyyy-mm-dd" if kind is Kind.DATE else None
+
+
+def _validate(sheet: Worksheet, kind: Kind, cells: str) -> None:
+    from openpyxl.worksheet.datavalidation import DataValidation
+
+    if kind in _CHOICES:
+        rule = DataValidation("list", formula1='"' + ",".join(_CHOICES[kind]) + '"', allow_blank=True)
+        rule.errorTitle, rule.error = "Not in the list", "Choose one of: " + ", ".join(_CHOICES[kind])
+    elif kind in LENGTHS and kind is not Kind.PLUNGER_DISPLACEMENT and kind is not Kind.PLUNGER_DOWN_LOCK:
+        rule = DataValidation("decimal", operator="greaterThanOrEqual", formula1="0", allow_blank=True)
+        rule.errorTitle, rule.error = "Not a length", "Enter a number, 0 or more, or leave the cell blank."
+        rule.errorStyle = "warning"
+    elif kind is Kind.LANDINGS:
+        rule = DataValidation("decimal", operator="greaterThanOrEqual", formula1="0", allow_blank=True)
+    else:
+        return
+    rule.showErrorMessage = True
+    sheet.add_data_validation(rule)
+    rule.add(cells)
+
+
+def _form(book: Workbook, joints: Sequence[JointLine]) -> None:
+    from openpyxl.styles import Alignment, Border, Font, PatternFill, Side
+
+    sheet = book.create_sheet("Form")
+    sheet["A1"] = FORM_TITLE
+    sheet["A1"].font = Font(bold=True, size=14)
+    sheet["A2"] = "One sheet is one inspection. Yellow lines must be filled in; blank means not measured."
+    for letters, width in (("A", 34), ("B", 22), ("C", 62)):
+        sheet.column_dimensions[letters].width = width
+    fields = _fields(joints, None)
+    fields.insert(4, Field(Kind.UNIT))
+    line = Side(style="thin", color="FF9AA5B1")
+    row = 4
+    for field in fields:
+        label, value, hint = sheet.cell(row, 1, field.label), sheet.cell(row, 2), sheet.cell(row, 3)
+        must = field.kind in _MUST or field.kind is Kind.UNIT
+        value.fill = PatternFill("solid", fgColor=_REQUIRED_FILL if must else "FFFFFFFF")
+        value.border = Border(left=line, right=line, top=line, bottom=line)
+        value.number_format = _number_format(field.kind) or "General"
+        value.alignment = Alignment(horizontal="left")
+        label.font = Font(bold=must)
+        hint.value = _explain(field, joints)
+        hint.data_type = "s"
+        hint.alignment = Alignment(wrap_text=True, vertical="top")
+        hint.font = Font(size=8, color="FF52606D")
+        _validate(sheet, field.kind, f"B{row}")
+        row += 1
+    sheet.freeze_panes = "B4"
+    sheet.print_title_rows = "1:2"
+    _page(sheet, landscape=False)

@@ -1,0 +1,396 @@
+"""Cell values read as lengths, numbers, names and dates; what cannot be read is a fault with its remedy."""
+
+from __future__ import annotations
+
+import math
+import re
+from datetime import date
+from enum import StrEnum
+from typing import TypeVar
+
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.records.cells import OddCell, OddKind, show_number
+from mlg_troubleshoot.units import LengthUnit, parse_length
+
+
+class CellFaultError(Exception):
+    """A cell that does not hold what its column needs; caught by the row reader and made a `Problem`.
+
+    Parameters
+    ----------
+    code : str
+        Stable name of the kind of fault.
+    expected : str
+        What was expected instead.
+    remedy : str
+        What to do.
+    """
+
+    def __init__(self, code: str, expected: str, remedy: str) -> None:
+        super().__init__(code)
+        self.code = code
+        self.expected = expected
+        self.remedy = remedy
+
+
+_MINUS = "-\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"
+_SIGNED = re.compile(rf"^\s*([{_MINUS}+])\s*(?=[\d.,])")
+_COMMA_NUMBER = re.compile(r"\s*[+\-]?\d*,\d+(?![\d,.])[^,.]*")
+_UNCLEAR_GROUP = re.compile(r"[+\-]?[1-9]\d{0,2}[,.]\d{3}")
+_PLAIN = re.compile(r"[+\-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+\-]?\d+)?", re.ASCII)
+_NOT_FINITE = re.compile(r"[+\-]?\s*(nan|inf|infinity|1\.#\w+)", re.IGNORECASE)
+_INVISIBLE = {ord(c): None for c in "\u200b\u200c\u200d\u2060\ufeff"}
+
+_E = TypeVar("_E", bound=StrEnum)
+
+
+def odd_cell_fault(cell: OddCell, expected: str) -> CellFaultError:
+    """Return the fault of a cell that holds an error, a date, a truth value or nothing that was computed.
+
+    Parameters
+    ----------
+    cell : OddCell
+        The cell.
+    expected : str
+        What the column holds.
+
+    Returns
+    -------
+    CellFaultError
+        The fault, to be raised.
+    """
+    if cell.kind is OddKind.ERROR:
+        return CellFaultError(
+            "cell_error",
+            expected,
+            f"The cell shows the error {cell.text}, which is not the same as not measured. Enter the value, or empty "
+            "the cell if it was not measured.",
+        )
+    if cell.kind is OddKind.NO_VALUE:
+        return CellFaultError(
+            "formula_without_value",
+            expected,
+            "The formula has never been calculated. Open the file in a spreadsheet program, save it, read it again.",
+        )
+    if cell.kind is OddKind.DATE:
+        return CellFaultError(
+            "cell_is_date",
+            expected,
+            "The cell is formatted as a date or time; a fraction such as 1/8 is turned into one. Format the cell as "
+            "a number (or text) and enter the value again.",
+        )
+    return CellFaultError("cell_is_boolean", expected, "The cell holds TRUE or FALSE. Enter the value.")
+
+
+def plain_text(text: str) -> str:
+    """Return a text without blanks around it and without invisible characters."""
+    return text.translate(_INVISIBLE).strip()
+
+
+def read_length(
+    cell: str | float | OddCell, unit: LengthUnit | None, *, signed: bool, decimal_comma: bool, expected: str
+) -> tuple[float, LengthUnit, str]:
+    """Read a length.
+
+    Parameters
+    ----------
+    cell : str, float or OddCell
+        The cell, not blank.
+    unit : LengthUnit or None
+        Unit that the column states.
+    signed : bool
+        True if a length below zero makes sense.
+    decimal_comma : bool
+        True if ``0,013`` means 0.013.
+    expected : str
+        What the column holds, for the message.
+
+    Returns
+    -------
+    value_in : float
+        The length. [in]
+    unit : LengthUnit
+        The unit it was read in.
+    text : str
+        The text as entered.
+
+    Raises
+    ------
+    CellFaultError
+        If the cell is not a length or its unit is not known; a missing unit has the code ``unit_missing``.
+    """
+    if isinstance(cell, float):
+        text = show_number(cell)
+        value, written = cell, None
+    elif isinstance(cell, str):
+        text = plain_text(cell)
+        value, written = _written_length(text, decimal_comma, expected)
+    elif cell.kind is OddKind.PADDED and cell.number is not None:
+        text, value, written = cell.text, cell.number, None
+    else:
+        raise odd_cell_fault(cell, expected)
+    if not math.isfinite(value):
+        raise _not_finite(expected)
+    if value < 0 and not signed:
+        raise CellFaultError(
+            "length_negative",
+            expected,
+            "It cannot be less than zero. Enter the value as measured, or empty the cell if it was not measured.",
+        )
+    if written is not None and unit is not None and written is not unit:
+        same = show_number(unit.from_inches(written.to_inches(value)))
+        raise CellFaultError(
+            "unit_contradiction",
+            f"{expected}: the column is in {unit.value}",
+            f"The cell says {written.value}, the column says {unit.value}. If the cell is right, enter {same} "
+            f"({unit.value}); if the column is right, enter the number without a unit.",
+        )
+    found = written or unit
+    if found is None:
+        raise CellFaultError(
+            "unit_missing",
+            f"{expected} with its unit",
+            "Neither the header nor the cell says the unit. Put it in the header (_in, _thou or _mm) or pass --unit.",
+        )
+    return found.to_inches(value), found, text
+
+
+def _not_finite(expected: str) -> CellFaultError:
+    return CellFaultError("not_finite", expected, "Enter a number, or empty the cell if it was not measured.")
+
+
+def _written_length(text: str, decimal_comma: bool, expected: str) -> tuple[float, LengthUnit | None]:
+    if _NOT_FINITE.fullmatch(text):
+        raise _not_finite(expected)
+    sign = _SIGNED.match(text)
+    body = text[sign.end() :] if sign is not None else text
+    if decimal_comma and _COMMA_NUMBER.fullmatch(body):
+        body = body.replace(",", ".")
+    try:
+        written = parse_length(body)
+    except UsageError as error:
+        raise _length_fault(text, body, error, expected) from None
+    negative = sign is not None and sign[1] != "+"
+    return (-written.value if negative else written.value), written.unit
+
+
+def _length_fault(text: str, body: str, error: UsageError, expected: str) -> CellFaultError:
+    if _COMMA_NUMBER.fullmatch(body):
+        return CellFaultError(
+            "decimal_comma",
+            f"{expected}, with a decimal point",
+            f"If the comma is the decimal mark, enter {text.replace(',', '.')} or pass --decimal-comma.",
+        )
+    if re.fullmatch(r"\d+\s*/\s*\d+.*", body):
+        return CellFaultError(
+            "fraction", expected, "Fractions are not read. Enter a decimal number, for example 0.125."
+        )
+    return CellFaultError(
+        "not_a_length",
+        expected,
+        f"{error.remedy} Leave the cell empty if it was not measured.",
+    )
+
+
+def read_number(
+    cell: str | float | OddCell, low: float, high: float, *, decimal_comma: bool, expected: str, suffix: str = ""
+) -> float:
+    """Read a plain number within a range.
+
+    Parameters
+    ----------
+    cell : str, float or OddCell
+        The cell, not blank.
+    low, high : float
+        Range, ends included.
+    decimal_comma : bool
+        True if ``0,5`` means 0.5.
+    expected : str
+        What the column holds, for the message.
+    suffix : str, optional
+        A unit that may stand behind the number, for example ``psi``.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Raises
+    ------
+    CellFaultError
+        If the cell is not a number in that range.
+    """
+    if isinstance(cell, OddCell):
+        if cell.kind is not OddKind.PADDED or cell.number is None:
+            raise odd_cell_fault(cell, expected)
+        value = cell.number
+    elif isinstance(cell, float):
+        value = cell
+    else:
+        value = _written_number(plain_text(cell), decimal_comma, expected, suffix)
+    if not math.isfinite(value):
+        raise _not_finite(expected)
+    if not low <= value <= high:
+        raise CellFaultError(
+            "out_of_range", expected, "Check the number and the unit; empty the cell if it is not known."
+        )
+    return value
+
+
+def _written_number(text: str, decimal_comma: bool, expected: str, suffix: str) -> float:
+    if suffix and text.lower().endswith(suffix.lower()):
+        text = text[: -len(suffix)].rstrip().rstrip("°").rstrip()
+    sign = _SIGNED.match(text)
+    if sign is not None:
+        text = ("" if sign[1] == "+" else "-") + text[sign.end() :]
+    if "," in text or decimal_comma:
+        if _UNCLEAR_GROUP.fullmatch(text):
+            raise CellFaultError(
+                "ambiguous_number",
+                expected,
+                f"{text!r} may be a thousand or a fraction. Enter it without a separator for thousands.",
+            )
+        if decimal_comma and _COMMA_NUMBER.fullmatch(text):
+            text = text.replace(",", ".")
+        elif _COMMA_NUMBER.fullmatch(text):
+            raise CellFaultError(
+                "decimal_comma",
+                f"{expected}, with a decimal point",
+                f"If the comma is the decimal mark, enter {text.replace(',', '.')} or pass --decimal-comma.",
+            )
+    if _NOT_FINITE.fullmatch(text):
+        raise _not_finite(expected)
+    if not _PLAIN.fullmatch(text):
+        raise CellFaultError("not_a_number", expected, "Enter a plain number, or empty the cell if it is not known.")
+    return float(text)
+
+
+def read_text(cell: str | float | OddCell, expected: str, *, required: bool = False) -> str:
+    """Read an identifier or another text; numbers keep the digits they show.
+
+    Parameters
+    ----------
+    cell : str, float or OddCell
+        The cell, not blank.
+    expected : str
+        What the column holds, for the message.
+    required : bool, optional
+        True for an identity, in which a line break or another control character is refused.
+
+    Returns
+    -------
+    str
+        The text.
+
+    Raises
+    ------
+    CellFaultError
+        If the cell holds an error, a date, a truth value, or a number whose digits are lost.
+    """
+    if isinstance(cell, str):
+        text = plain_text(cell)
+        if required and any(ord(c) < 32 or 127 <= ord(c) < 160 for c in text):
+            raise CellFaultError(
+                "text_control_character", expected, "It holds a line break or an invisible character. Enter it again."
+            )
+        return text
+    if isinstance(cell, float):
+        if not math.isfinite(cell) or abs(cell) >= 1e15:
+            raise CellFaultError(
+                "number_lost_digits",
+                expected,
+                "A spreadsheet keeps 15 digits of a number. Format the cell as text and enter it again.",
+            )
+        return show_number(cell)
+    if cell.kind is OddKind.PADDED:
+        return cell.text
+    raise odd_cell_fault(cell, expected)
+
+
+def read_choice(cell: str | float | OddCell, choices: type[_E], code: str, hints: dict[str, str]) -> _E:
+    """Read one of a few words, in upper or lower case.
+
+    Parameters
+    ----------
+    cell : str, float or OddCell
+        The cell, not blank.
+    choices : type of StrEnum
+        The words.
+    code : str
+        Kind of the fault if it is none of them.
+    hints : dict of str to str
+        What other spellings may mean, to be suggested.
+
+    Returns
+    -------
+    StrEnum
+        The word.
+
+    Raises
+    ------
+    CellFaultError
+        If it is none of them.
+    """
+    words = [str(choice) for choice in choices]
+    expected = " or ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
+    text = plain_text(cell) if isinstance(cell, str) else ""
+    name = re.sub(r"[\s\-]+", "_", text).upper()
+    if name in words:
+        return choices(name)
+    if isinstance(cell, OddCell):
+        raise odd_cell_fault(cell, expected)
+    hint = hints.get(text.casefold())
+    remedy = f"Enter {hint} if that is meant." if hint else f"Enter {expected}."
+    raise CellFaultError(code, expected, remedy)
+
+
+def read_date(cell: str | float | OddCell) -> date:
+    """Read a day: ISO 8601 text, or a cell that is formatted as a date.
+
+    Parameters
+    ----------
+    cell : str, float or OddCell
+        The cell, not blank.
+
+    Returns
+    -------
+    datetime.date
+        The day.
+
+    Raises
+    ------
+    CellFaultError
+        If the day would have to be guessed.
+    """
+    expected = "a date as 2026-03-04 (year-month-day)"
+    if isinstance(cell, float):
+        raise CellFaultError(
+            "date_serial",
+            expected,
+            "The cell holds a bare number. Format it as a date, or enter year-month-day as text.",
+        )
+    if isinstance(cell, OddCell):
+        if cell.kind is not OddKind.DATE:
+            raise odd_cell_fault(cell, expected)
+        day = cell.day
+    else:
+        day = _iso_day(plain_text(cell), expected)
+    if day is None or not 1950 <= day.year <= 2100:
+        raise CellFaultError("date_out_of_range", expected, "Check the year.")
+    return day
+
+
+def _iso_day(text: str, expected: str) -> date:
+    match = re.fullmatch(r"(\d{4}-\d{2}-\d{2})(?:[T ]\d{2}:\d{2}(?::\d{2}(?:\.\d+)?)?(?:Z|[+\-]\d{2}:?\d{2})?)?", text)
+    if match is not None:
+        try:
+            return date.fromisoformat(match[1])
+        except ValueError:
+            raise CellFaultError("date_invalid", expected, "There is no such day in the calendar.") from None
+    if re.fullmatch(r"\d{1,4}[./\-]\d{1,2}[./\-]\d{1,4}", text):
+        raise CellFaultError(
+            "date_ambiguous",
+            expected,
+            "Day and month cannot be told apart. Enter year-month-day, for example 2026-03-04.",
+        )
+    raise CellFaultError("date_invalid", expected, "Enter year-month-day, for example 2026-03-04.")

@@ -1,0 +1,470 @@
+"""The linkage drawn in its planes: joints numbered in place, told apart by shape, clearances exaggerated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.decision.assessment import Assessment, JointFinding
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot
+from mlg_troubleshoot.reporting.figures import INK, PALE, PAPER, RULE, SOFT, Canvas, text_width
+from mlg_troubleshoot.reporting.formats import inches, number
+
+JointState = Literal["over", "fine", "missing"]
+
+
+@dataclass(frozen=True, slots=True)
+class Schematic:
+    """The linkage drawn in its planes, all at one scale.
+
+    Parameters
+    ----------
+    panels : tuple of tuple of (str, Markup, float)
+        Name of each plane, its drawing and the drawing's width [canvas units].
+    exaggeration : int or None
+        How many times larger than life the virtual links are drawn; None if there are none.
+    """
+
+    panels: tuple[tuple[str, Markup, float], ...]
+    exaggeration: int | None
+
+
+_MARKER = 9.5
+_LONGEST_ARROW = 42.0
+# One scale for most reports, so that their drawings compare.
+_LARGEST_EXAGGERATION = 100
+_SHORTEST_ARROW = 2.5
+# Room for labels, supports and the slot above and below the linkage.
+_ABOVE, _BELOW = 44.0, 40.0
+
+_TURNS = np.arange(24) * np.pi / 12 + 1e-6
+_COSINES, _SINES = np.cos(_TURNS), np.sin(_TURNS)
+_RINGS = np.array([0.0, 5.0, 10.0, 16.0, 24.0, 34.0, 46.0])
+
+Array = NDArray[np.float64]
+Place = tuple[float, float]
+Box = tuple[float, float, float, float]
+Segment = tuple[Place, Place]
+_At = Callable[[str], Place]
+
+
+def schematic(gear: Gear, assessment: Assessment, width: float = 690.0) -> Schematic:
+    """Draw the linkage at mid-position, its joints numbered in place and their clearances exaggerated.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear; its reference linkage is drawn.
+    assessment : Assessment
+        The decision, whose governing worst directions are drawn.
+    width : float
+        Width of all panels together. [canvas units]
+
+    Returns
+    -------
+    Schematic
+        The drawings and the scale of the virtual links.
+    """
+    mechanism = gear.reference.mechanism
+    drawings = [d for d in (_PlaneDrawing(gear, plane.name) for plane in mechanism.planes) if d.points]
+    gap, side = 6.0, 74.0
+    free = width - gap * (len(drawings) - 1) - 2 * side * len(drawings)
+    scale = free / sum(d.extent()[2] - d.extent()[0] for d in drawings)
+    findings = {finding.joint: finding for finding in assessment.joints}
+    largest = max([0.0, *(f.clearance_in or 0.0 for f in findings.values())])
+    over = (assessment.over_travel_in or 0.0) >= -(assessment.under_travel_in or 0.0)
+    directions = assessment.over_directions_rad if over else assessment.under_directions_rad
+    exaggeration = None
+    if largest > 0.0 and directions:
+        exaggeration = min(_LARGEST_EXAGGERATION, _one_digit(_LONGEST_ARROW / (largest * scale)))
+    height = max(d.extent()[3] - d.extent()[1] for d in drawings) * scale + _ABOVE + _BELOW
+    panels = []
+    for drawing in drawings:
+        angle = dict(zip(gear.joint_numbers, directions, strict=True)) if exaggeration else {}
+        panels.append(drawing.draw(scale, side, height, findings, angle, exaggeration or 0))
+    return Schematic(tuple(panels), exaggeration)
+
+
+def _one_digit(value: float) -> int:
+    """Round down to one significant digit, at least 1."""
+    if value < 1.0:
+        return 1
+    power = 10 ** math.floor(math.log10(value))
+    return int(value // power * power)
+
+
+class _PlaneDrawing:
+    """One plane of the mechanism: its points, the links between them, and how they are drawn."""
+
+    def __init__(self, gear: Gear, plane: str) -> None:
+        self.gear = gear
+        self.mechanism: Mechanism = gear.reference.mechanism
+        self.plane = plane
+        self.steps = [s for s in self.mechanism.steps if self.mechanism.point(s.joint).plane == plane]
+        names = {s.joint for s in self.steps}
+        for step in self.steps:
+            match step:
+                case Dyad():
+                    names |= {step.upstream, step.downstream}
+                case Lever():
+                    names |= {step.pivot, step.follows}
+                case Slot():
+                    names |= {step.pivot, step.pin}
+                case Slider():
+                    names.add(step.upstream)
+                case Crank():
+                    names.add(step.pivot)
+        # Points of another plane are drawn where they stand above this one.
+        origin, axes = self.mechanism.frame(plane)
+        self.points: dict[str, Place] = {}
+        for name in sorted(names):
+            offset = self.mechanism.reference_in_space(name) - origin
+            self.points[name] = (float(offset @ axes[0]), float(offset @ axes[1]))
+        self.cut = {s.upstream: s.joint for s in self.steps if isinstance(s, Dyad) and s.driven}
+        self._shorten()
+
+    def _shorten(self) -> None:
+        """Draw only the near end of the actuator: its anchor lies far from everything else."""
+        others = [p for name, p in self.points.items() if name not in self.cut]
+        if not others:
+            return
+        span = max(max(v) - min(v) for v in zip(*others, strict=True))
+        for anchor, joint in self.cut.items():
+            (x0, y0), (x1, y1) = self.points[joint], self.points[anchor]
+            length = math.hypot(x1 - x0, y1 - y0)
+            part = min(1.0, 0.34 * span / length)
+            self.points[anchor] = (x0 + part * (x1 - x0), y0 + part * (y1 - y0))
+
+    def extent(self) -> tuple[float, float, float, float]:
+        xs, ys = zip(*self.points.values(), strict=True)
+        return min(xs), min(ys), max(xs), max(ys)
+
+    def draw(
+        self,
+        scale: float,
+        side: float,
+        height: float,
+        findings: dict[int, JointFinding],
+        angles: dict[int, float],
+        exaggeration: int,
+    ) -> tuple[str, Markup, float]:
+        x0, y0, x1, y1 = self.extent()
+        width = (x1 - x0) * scale + 2 * side
+        name = self.plane.replace("_", " ") + " plane"
+        shown = ", ".join(
+            f"joint {j.number} {_state(findings[j.number])}" for j in self.gear.joints if j.point in self.points
+        )
+        canvas = Canvas(width, height, f"Linkage schematic, {name}", shown)
+        lift = (height - _ABOVE - _BELOW - (y1 - y0) * scale) / 2
+
+        def at(point: str) -> Place:
+            x, y = self.points[point]
+            return side + (x - x0) * scale, _ABOVE + lift + (y1 - y) * scale
+
+        canvas.text(2, 11, name, size=10.5, bold=True, colour=SOFT)
+        segments = self._links(canvas, at)
+        for point in self.points:
+            if self.mechanism.point(point).fixed and point not in self.cut:
+                _ground(canvas, *at(point))
+        here = [j for j in self.gear.joints if self._home(j.point)]
+        numbered = {j.point for j in self.gear.joints if j.point in self.points}
+        for point in self.points:
+            if point not in numbered and point not in self.cut:
+                canvas.marker("circle", *at(point), 3.0)
+        for joint in self.gear.joints:
+            if joint.point in self.points and not self._home(joint.point):
+                _joint_marker(canvas, *at(joint.point), joint.number, findings[joint.number], faded=True)
+        boxes = self._obstacles(at)
+        for joint in here:
+            clearance = findings[joint.number].clearance_in or 0.0
+            length = clearance * scale * exaggeration
+            x, y = at(joint.point)
+            if joint.number in angles and length > _SHORTEST_ARROW:
+                c, s = math.cos(angles[joint.number]), -math.sin(angles[joint.number])
+                start = (x + _MARKER * c, y + _MARKER * s)
+                end = (start[0] + length * c, start[1] + length * s)
+                _arrow(canvas, start, end)
+                segments.append((start, end))
+                boxes.append(
+                    (min(start[0], end[0]), min(start[1], end[1]), max(start[0], end[0]), max(start[1], end[1]))
+                )
+            _joint_marker(canvas, x, y, joint.number, findings[joint.number])
+        for joint in sorted(here, key=lambda j: not findings[j.number].over_limit):
+            finding = findings[joint.number]
+            names = [joint.name] if finding.over_limit else _two_lines(joint.name)
+            lines = [_Line(part, 8.5, False) for part in names]
+            if finding.over_limit:
+                lines.append(_Line(f"{number(finding.clearance_in, 4)} OVER LIMIT", 10.5, True))
+            elif finding.clearance_in is not None:
+                lines.append(_Line(number(finding.clearance_in, 4), 9.5, True))
+            _callout(canvas, at(joint.point), lines, boxes, segments, finding.over_limit)
+        return name, canvas.svg("figure panel"), width
+
+    def _obstacles(self, at: _At) -> list[Box]:
+        """Boxes of what labels must not cover: markers, supports, the slot, actuator and plunger with their names."""
+        boxes: list[Box] = [(0.0, 0.0, 130.0, 14.0)]
+        pins = {s.pin for s in self.steps if isinstance(s, Slot)}
+        for point in self.points:
+            x, y = at(point)
+            fixed = self.mechanism.point(point).fixed and point not in self.cut
+            reach = 24.0 if point in pins or fixed else _MARKER
+            boxes.append((x - 13.0 if fixed else x - 11.0, y - 11.0, x + 13.0 if fixed else x + 11.0, y + reach))
+        for step in self.steps:
+            x, y = at(step.joint)
+            if isinstance(step, Slider):
+                ux, uy = math.cos(step.axis), -math.sin(step.axis)
+                ends = (x + 20 * ux, x + 60 * ux), (y + 20 * uy, y + 60 * uy)
+                boxes.append((min(ends[0]) - 60, min(ends[1]) - 6, max(ends[0]) + 10, max(ends[1]) + 6))
+            if isinstance(step, Dyad) and step.driven:
+                fx, fy = at(step.upstream)
+                boxes.append((min(x, fx) - 62, (y + fy) / 2 - 12, max(x, fx) + 8, max(y, fy)))
+        return boxes
+
+    def _home(self, point: str) -> bool:
+        return point in self.points and self.mechanism.point(point).plane == self.plane
+
+    def _links(self, canvas: Canvas, at: _At) -> list[Segment]:
+        """Draw the rigid parts below, the links above; return the segments for the placing of labels."""
+        segments = self._rigid_parts(canvas, at)
+        for step in self.steps:
+            place = at(step.joint)
+            match step:
+                case Dyad(upstream=upstream, downstream=downstream):
+                    (_actuator if step.driven else _bar)(canvas, at(upstream), place)
+                    if not self._rigid(step.joint, downstream):
+                        _bar(canvas, place, at(downstream))
+                    segments += [(at(upstream), place), (place, at(downstream))]
+                case Crank(pivot=pivot):
+                    _bar(canvas, at(pivot), place)
+                    segments.append((at(pivot), place))
+                case Slider(upstream=upstream, axis=axis):
+                    segments += [_plunger(canvas, place, axis), (at(upstream), place)]
+                    _bar(canvas, at(upstream), place)
+                case Lever() | Slot():
+                    pass
+        return segments
+
+    def _rigid_parts(self, canvas: Canvas, at: _At) -> list[Segment]:
+        """Draw levers as plates, and the slot in its lever."""
+        segments: list[Segment] = []
+        for step in self.steps:
+            if isinstance(step, (Lever, Slot)):
+                first = step.follows if isinstance(step, Lever) else step.pin
+                a, b, c = at(first), at(step.pivot), at(step.joint)
+                canvas.polyline([a, b, c], fill=PALE, colour=RULE, width=7.0, closed=True)
+                canvas.polyline([a, b, c], fill=PALE, colour=PALE, width=4.0, closed=True)
+                segments += [(a, b), (b, c), (a, c)]
+        for step in self.steps:
+            if isinstance(step, Slot):
+                _slot(canvas, at(step.pivot), at(step.pin))
+        return segments
+
+    def _rigid(self, joint: str, pivot: str) -> bool:
+        """Tell whether two points are already drawn as an edge of a rigid part."""
+        return any(isinstance(s, Lever) and s.pivot == pivot and joint in (s.follows, s.joint) for s in self.steps)
+
+
+def _state(finding: JointFinding) -> str:
+    if finding.clearance_in is None:
+        return "not measured"
+    return f"{inches(finding.clearance_in)}{' over its limit' if finding.over_limit else ''}"
+
+
+def _bar(canvas: Canvas, a: Place, b: Place) -> None:
+    canvas.line(*a, *b, colour=INK, width=7, cap="round")
+    canvas.line(*a, *b, colour=PAPER, width=4, cap="round")
+
+
+def _unit(a: Place, b: Place) -> Place:
+    length = math.hypot(b[0] - a[0], b[1] - a[1]) or 1.0
+    return (b[0] - a[0]) / length, (b[1] - a[1]) / length
+
+
+def _actuator(canvas: Canvas, far: Place, joint: Place) -> None:
+    """A cylinder towards its anchor, broken off, and its rod."""
+    ux, uy = _unit(joint, far)
+    length = math.hypot(far[0] - joint[0], far[1] - joint[1])
+    neck = (joint[0] + 0.42 * length * ux, joint[1] + 0.42 * length * uy)
+    canvas.line(*joint, *neck, width=5)
+    canvas.line(*neck, *far, width=15)
+    canvas.line(*neck, *far, colour=PALE, width=12)
+    for k in (-1, 1):
+        x, y = far[0] + 3 * k * ux, far[1] + 3 * k * uy
+        canvas.line(x - 10 * uy - 3 * ux, y + 10 * ux - 3 * uy, x + 10 * uy + 3 * ux, y - 10 * ux + 3 * uy)
+    outside = -1.0 if neck[0] < canvas.width / 2 else 1.0
+    canvas.text(
+        neck[0] + 12 * outside,
+        neck[1] + 16,
+        "actuator",
+        size=9,
+        bold=True,
+        colour=SOFT,
+        anchor="end" if outside < 0 else "start",
+    )
+
+
+def _slot(canvas: Canvas, pivot: Place, pin: Place) -> None:
+    """A radial slot around the pin."""
+    ux, uy = _unit(pivot, pin)
+    a, b = (pin[0] - 13 * ux, pin[1] - 13 * uy), (pin[0] + 9 * ux, pin[1] + 9 * uy)
+    canvas.line(*a, *b, width=25, cap="round", colour=INK)
+    canvas.line(*a, *b, width=22, cap="round", colour=PAPER)
+
+
+def _plunger(canvas: Canvas, joint: Place, axis: float) -> Segment:
+    """The plunger beyond its pin, entering the valve."""
+    ux, uy = math.cos(axis), -math.sin(axis)
+    tip = (joint[0] + 30 * ux, joint[1] + 30 * uy)
+    end = (joint[0] + 52 * ux, joint[1] + 52 * uy)
+    canvas.line(*joint, *tip, width=6)
+    canvas.line(*tip, *end, width=24)
+    canvas.line(*tip, *end, width=21, colour=PALE)
+    x = (tip[0] + end[0]) / 2
+    canvas.text(x - 18, (tip[1] + end[1]) / 2 - 7, "plunger", size=9, bold=True, colour=SOFT, anchor="end")
+    return joint, end
+
+
+def _ground(canvas: Canvas, x: float, y: float) -> None:
+    canvas.polyline([(x, y), (x + 12, y + 19), (x - 12, y + 19)], fill=PAPER, width=1.4, closed=True)
+    for k in range(-2, 3):
+        canvas.line(x + 5 * k + 1, y + 19, x + 5 * k - 3, y + 24)
+
+
+def _joint_marker(canvas: Canvas, x: float, y: float, joint: int, finding: JointFinding, faded: bool = False) -> None:
+    _mark(canvas, x, y, str(joint), joint_state(finding), faded)
+
+
+def joint_state(finding: JointFinding) -> JointState:
+    """Return whether a joint is over its limit, within it, or not measured."""
+    if finding.clearance_in is None:
+        return "missing"
+    return "over" if finding.over_limit else "fine"
+
+
+def _mark(canvas: Canvas, x: float, y: float, text: str, state: str, faded: bool) -> None:
+    size = _MARKER
+    if state == "over":
+        canvas.rectangle(x - size, y - size, 2 * size, 2 * size, fill=SOFT if faded else INK, edge=PAPER)
+        canvas.text(x, y + 4, text, bold=True, colour=PAPER, anchor="middle")
+        return
+    missing = state == "missing"
+    canvas.add(
+        "circle",
+        cx=float(x),
+        cy=float(y),
+        r=size,
+        fill=PAPER,
+        stroke=SOFT if missing or faded else INK,
+        stroke_width=1.3 if missing or faded else 2.2,
+        stroke_dasharray="3 2.2" if missing else None,
+    )
+    canvas.text(x, y + 4, text, bold=not missing, colour=SOFT if missing or faded else INK, anchor="middle")
+
+
+def joint_mark(text: str, state: JointState) -> Markup:
+    """Draw the mark of a joint as the schematic has it, for tables and the legend.
+
+    Parameters
+    ----------
+    text : str
+        Number of the joint.
+    state : {'over', 'fine', 'missing'}
+        Over its limit, within it, or not measured.
+
+    Returns
+    -------
+    Markup
+        The mark.
+    """
+    words = {"over": "over its limit", "fine": "within its limit", "missing": "not measured"}[state]
+    canvas = Canvas(22, 22, f"joint {text}, {words}" if text else words)
+    _mark(canvas, 11, 11, text, state, faded=False)
+    return canvas.svg("mark")
+
+
+def _arrow(canvas: Canvas, start: Place, end: Place) -> None:
+    ux, uy = _unit(start, end)
+    head = min(8.0, math.hypot(end[0] - start[0], end[1] - start[1]))
+    base = (end[0] - head * ux, end[1] - head * uy)
+    canvas.line(*start, *end, colour=PAPER, width=5.5)
+    canvas.line(*start, *base, width=2.4)
+    corners = [end, (base[0] - 4.2 * uy, base[1] + 4.2 * ux), (base[0] + 4.2 * uy, base[1] - 4.2 * ux)]
+    canvas.polyline(corners, fill=INK, width=0.5, closed=True)
+
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    """A line of a label."""
+
+    text: str
+    size: float
+    bold: bool
+
+
+def _callout(
+    canvas: Canvas, joint: Place, lines: list[_Line], boxes: list[Box], segments: list[Segment], framed: bool
+) -> None:
+    """Write a label where it covers least, and remember its box."""
+    width = max(text_width(line.text, line.size) * (1.12 if line.bold else 1.0) for line in lines) + 6
+    height = sum(line.size + 2.0 for line in lines) + 3
+    # From the marker's edge outwards until the label's box clears it, in every direction and at several distances.
+    with np.errstate(divide="ignore"):
+        clears = np.minimum(width / 2 / np.abs(_COSINES), height / 2 / np.abs(_SINES))
+    reach = _MARKER + 2 + _RINGS[:, None] + clears
+    x, y = (joint[0] + _COSINES * reach).ravel(), (joint[1] + _SINES * reach).ravel()
+    tried = np.column_stack([x - width / 2, y - height / 2, x + width / 2, y + height / 2])
+    cost = np.repeat(1.1 * _RINGS, len(_COSINES)) + _overlap(tried, np.array(boxes)) + _covered(tried, segments)
+    outside = (tried[:, 0] < 0) | (tried[:, 2] > canvas.width) | (tried[:, 1] < 14) | (tried[:, 3] > canvas.height)
+    box: Box = tuple(tried[int(np.argmin(np.round(cost + 2000.0 * outside, 6)))].tolist())
+    boxes.append(box)
+    edge = (min(max(joint[0], box[0]), box[2]), min(max(joint[1], box[1]), box[3]))
+    away = math.hypot(edge[0] - joint[0], edge[1] - joint[1])
+    if away > _MARKER + 14:
+        ux, uy = _unit(joint, edge)
+        canvas.line(joint[0] + (_MARKER + 1) * ux, joint[1] + (_MARKER + 1) * uy, *edge, colour=SOFT, width=0.8)
+    if framed:
+        canvas.rectangle(box[0], box[1], width, height, fill=PAPER, edge=INK, edge_width=1.4)
+    base, middle = box[1] + 0.5, (box[0] + box[2]) / 2
+    for line in lines:
+        base += line.size + 2.0
+        colour = INK if line.bold else SOFT
+        canvas.text(middle, base - 1.5, line.text, size=line.size, bold=line.bold, anchor="middle", colour=colour)
+
+
+def _two_lines(name: str) -> list[str]:
+    """Split a name of several words near its middle, so that its label is compact."""
+    words = name.split()
+    if len(name) <= 14 or len(words) < 2:
+        return [name]
+    cut = min(range(1, len(words)), key=lambda k: abs(len(" ".join(words[:k])) - len(name) / 2))
+    return [" ".join(words[:cut]), " ".join(words[cut:])]
+
+
+def _overlap(tried: Array, boxes: Array) -> Array:
+    """Area that each tried box shares with all others. [canvas units squared]"""
+    low = np.maximum(tried[:, None, :2], boxes[None, :, :2])
+    high = np.minimum(tried[:, None, 2:], boxes[None, :, 2:])
+    return np.asarray(np.prod(np.clip(high - low, 0.0, None), axis=2).sum(axis=1))
+
+
+def _covered(tried: Array, segments: list[Segment]) -> Array:
+    """Cost of laying each tried box, a little widened, over lines: by the length it covers."""
+    if not segments:
+        return np.zeros(len(tried))
+    ends = np.array(segments)
+    start, run = ends[:, 0], ends[:, 1] - ends[:, 0]
+    run = np.where(np.abs(run) < 1e-9, 1e-9, run)
+    # The part of each line between the box's sides, as in Liang and Barsky's clipping.
+    first = (tried[:, None, :2] - 3.0 - start) / run
+    last = (tried[:, None, 2:] + 3.0 - start) / run
+    enter = np.maximum(np.minimum(first, last).max(axis=2), 0.0)
+    leave = np.minimum(np.maximum(first, last).min(axis=2), 1.0)
+    length = np.clip(leave - enter, 0.0, None) * np.hypot(run[:, 0], run[:, 1])
+    return np.asarray(6.0 * length.sum(axis=1))

@@ -1,0 +1,335 @@
+"""Amplification index method: how a small clearance grows from joint to joint (section 3.3, Eqs. 7 to 10).
+
+Every step of the mechanism is one of the three cases of Eq. 10. A clearance enters at the step whose link it
+displaces (*current clearance*, ``csc θ``), is handed on by the next links (*previous clearance*,
+``cos φ csc θ``) and by levers and slots (*rigid body*, ``sin φ · L2/L1``).
+
+The stage of a clearance runs from its joint to the first joint of a higher number that moves: A_i,i+1 of
+Eq. 9. The two ends of one link act alike (Fig. 10), so both have the stage of the upstream end.
+Differs from the paper: a fixed pivot that has a clearance is no case of Eq. 10; its stage is the exact
+derivative. In a slider the guide stands for an infinitely long second link, so that its csc θ is the secant
+of the angle between link and axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot, Step
+
+Array = NDArray[np.float64]
+STROKES = 2001
+_STEP_IN = 1e-5
+
+
+@dataclass(frozen=True, slots=True)
+class Amplification:
+    """Stage-wise and plunger amplification indices of one linkage.
+
+    Parameters
+    ----------
+    joints : tuple of int
+        Numbers of the joints.
+    stroke : ndarray, shape (n_strokes,)
+        Actuator extension from Down Lock to mid-position. [in]
+    stage : ndarray, shape (n_joints, n_strokes)
+        Stage-wise index A_i,i+1 over the release. [1]
+    handed_on : ndarray, shape (n_joints, n_strokes)
+        Product of the indices of all later stages, as the chain from the stage's end to the output. [1]
+    onward_of_maxima : ndarray, shape (n_joints,)
+        The same product, each factor at its own maximum over the release. [1]
+    beta : float
+        β of Eq. 9: what follows the last joint, here the calibration rate k. [1]
+    exact : ndarray, shape (n_joints,)
+        Plunger amplification index at mid-position from the exact gradient. [1]
+    """
+
+    joints: tuple[int, ...]
+    stroke: Array
+    stage: Array
+    handed_on: Array
+    onward_of_maxima: Array
+    beta: float
+    exact: Array
+
+    @property
+    def local_stage(self) -> Array:
+        """Stage-wise index at mid-position, shape (n_joints,). [1]"""
+        return np.asarray(self.stage[:, -1])
+
+    @property
+    def max_stage(self) -> Array:
+        """Largest stage-wise index over the release, shape (n_joints,). [1]"""
+        return np.asarray(self.stage.max(axis=1))
+
+    @property
+    def local_plunger(self) -> Array:
+        """A_iP by the product of Eq. 9 at mid-position, shape (n_joints,). [1]"""
+        return np.asarray(self.beta * self.stage[:, -1] * self.handed_on[:, -1])
+
+    @property
+    def max_plunger(self) -> Array:
+        """A_iP by Eq. 9 with every index at its maximum over the release, shape (n_joints,). [1]"""
+        return np.asarray(self.beta * self.max_stage * self.onward_of_maxima)
+
+    def shares(self, plunger: Array, limits_in: Array) -> Array:
+        """Share of each joint in the variance of the linearised displacement: Fig. 13b's index.
+
+        Parameters
+        ----------
+        plunger : ndarray, shape (n_joints,)
+            Plunger amplification indices: local, of maxima, or exact. [1]
+        limits_in : ndarray, shape (n_joints,)
+            Largest clearance of each joint, each uniformly distributed from 0. [in]
+
+        Returns
+        -------
+        ndarray, shape (n_joints,)
+            Shares, 1 in total. [1]
+        """
+        squares = (plunger * limits_in) ** 2
+        return np.asarray(squares / squares.sum())
+
+
+def amplification(gear: Gear, model: LinkageModel | None = None, n_strokes: int = STROKES) -> Amplification:
+    """Compute the amplification indices of a linkage over its release stroke.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear, for its joints.
+    model : LinkageModel, optional
+        Another linkage of the same gear, else the reference.
+    n_strokes : int
+        Positions over the release stroke.
+
+    Returns
+    -------
+    Amplification
+        Indices by Eq. 10 over the release, their products by Eq. 9, and the exact gradient.
+    """
+    linkage = gear.model if model is None else model
+    chain = _Chain(linkage, {joint.number: joint.point for joint in gear.joints}, n_strokes)
+    numbers = gear.joint_numbers
+    stage, onward, of_maxima = [], [], []
+    for number in numbers:
+        own, later = chain.stage_and_later(number)
+        stage.append(own)
+        onward.append(np.prod(later, axis=0) if later else np.ones(n_strokes))
+        of_maxima.append(float(np.prod([factor.max() for factor in later])))
+    return Amplification(
+        numbers,
+        chain.stroke,
+        _frozen(np.array(stage)),
+        _frozen(np.array(onward)),
+        _frozen(np.array(of_maxima)),
+        abs(linkage.rate) * chain.output_factor(),
+        _frozen(linkage.plunger_amplification()),
+    )
+
+
+def max_amplification_index(gear: Gear, model: LinkageModel | None = None) -> Array:
+    """Largest stage-wise amplification index of each joint over the release (section 4.3).
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    model : LinkageModel, optional
+        Another linkage of the same gear, else the reference.
+
+    Returns
+    -------
+    ndarray, shape (n_joints,)
+        Indices: 0.84 and 1.488 for joints 1 and 2 of the shipped gear. [1]
+    """
+    return amplification(gear, model).max_stage
+
+
+def csc(first: Array, second: Array) -> Array:
+    """Cosecant of the angle between two links.
+
+    Parameters
+    ----------
+    first, second : ndarray, shape (..., 2) or (..., 3)
+        Vectors along the links. [in]
+
+    Returns
+    -------
+    ndarray, shape (...)
+        csc θ ≥ 1. [1]
+    """
+    lengths = np.linalg.norm(first, axis=-1) * np.linalg.norm(second, axis=-1)
+    cosine = np.sum(first * second, axis=-1) / lengths
+    return np.asarray(1.0 / np.sqrt(1.0 - cosine**2))
+
+
+class _Chain:
+    """Positions of all joints in space over the release, and the cases of Eq. 10 between them."""
+
+    def __init__(self, model: LinkageModel, points: dict[int, str], n_strokes: int) -> None:
+        self.model = model
+        self.mechanism: Mechanism = model.mechanism
+        self.points = points
+        self.numbers = {point: number for number, point in points.items()}
+        self.stroke = _frozen(np.linspace(*model.stroke, n_strokes))
+        flat = model.kernel.positions(self.stroke, model.kernel.no_clearance())
+        self.place: dict[str, Array] = {}
+        for point in self.mechanism.points:
+            if point.name in flat:
+                origin, axes = self.mechanism.frame(point.plane)
+                x, y = (np.broadcast_to(part, (n_strokes,))[:, None] for part in flat[point.name])
+                self.place[point.name] = origin + x * axes[0] + y * axes[1]
+
+    def stage_and_later(self, number: int) -> tuple[Array, list[Array]]:
+        """Index of the stage of a joint, and the index of every later stage, each over the release."""
+        first = min(self._ends_of_link(number))
+        entry = self._entry(first)
+        path = self._path(entry)
+        end = next((i for i, step in enumerate(path) if self.numbers.get(step.joint, 0) > first), len(path) - 1)
+        if self.mechanism.point(self.points[first]).fixed:
+            own = self._derivative(first, path[end].joint)
+        else:
+            own = self._current(entry) * _product(self._previous(step) for step in path[1 : end + 1])
+        return own, [self._previous(step) for step in path[end + 1 :]]
+
+    def output_factor(self) -> float:
+        output = self.mechanism.output
+        if output.kind == "position":
+            return 1.0
+        arm = self.place[output.joint][-1] - self.place[output.pivot][-1]
+        return float(1.0 / np.linalg.norm(arm))
+
+    def _ends_of_link(self, number: int) -> tuple[int, ...]:
+        for step in self.mechanism.steps:
+            if number in step.virtual_links:
+                return step.virtual_links
+        return (number,)
+
+    def _entry(self, number: int) -> Step:
+        for step in self.mechanism.steps:
+            pivot = step.downstream if isinstance(step, Dyad) else getattr(step, "pivot", "")
+            point = self.mechanism.point(pivot) if pivot else None
+            if number in step.virtual_links or (point is not None and point.virtual_link == number):
+                return step
+        raise KeyError(f"no step has the virtual link {number}")
+
+    def _path(self, entry: Step) -> list[Step]:
+        """Return the steps from one step to the output, each driven by the one before."""
+        path = [entry]
+        joint = self.mechanism.output.joint
+        back: list[Step] = []
+        while joint != entry.joint:
+            step = self.mechanism.step(joint)
+            if step is None:
+                return path
+            back.append(step)
+            joint = _driver(step)
+        return path + back[::-1]
+
+    def _tangent(self, step: Step) -> Array:
+        """Unit vector along which a step's joint moves when only the mechanism's input changes."""
+        if isinstance(step, Slider):
+            _, axes = self._axes(step)
+            return np.broadcast_to(
+                np.cos(step.axis) * axes[0] + np.sin(step.axis) * axes[1], self.place[step.joint].shape
+            )
+        pivot = step.downstream if isinstance(step, Dyad) else step.pivot
+        _, axes = self._axes(step)
+        return _unit(np.cross(axes[2], self.place[step.joint] - self.place[pivot]))
+
+    def _axes(self, step: Step) -> tuple[Array, Array]:
+        return self.mechanism.frame(self.mechanism.point(step.joint).plane)
+
+    def _link(self, step: Dyad | Slider) -> Array:
+        return self.place[step.joint] - self.place[step.upstream]
+
+    def _current(self, step: Step) -> Array:
+        """Current clearance: csc θ; on a slot's pin, which is a rigid body, L2/L1 (Eq. 10 with sin φ = 1)."""
+        match step:
+            case Dyad() | Slider():
+                _, axes = self._axes(step)
+                in_plane = self._link(step) @ axes[:2].T
+                tangent = self._tangent(step) @ axes[:2].T
+                # The joint moves across its second link: the sine of θ is the cosine between link and path.
+                return csc(in_plane, np.stack([-tangent[:, 1], tangent[:, 0]], axis=-1))
+            case Slot():
+                return self._arms(step, step.pin)
+            case Crank() | Lever():
+                return np.ones(len(self.stroke))
+
+    def _previous(self, step: Step) -> Array:
+        """Previous clearance, cos φ csc θ, or rigid body, sin φ · L2/L1 (Eq. 10)."""
+        match step:
+            case Dyad() | Slider():
+                link = _unit(self._link(step))
+                handed = self.mechanism.step(step.upstream)
+                if handed is None:
+                    return np.ones(len(self.stroke))
+                cosine = np.sum(link * self._tangent(handed), axis=-1)
+                return np.asarray(np.abs(cosine / np.sum(link * self._tangent(step), axis=-1)))
+            case Slot():
+                handed = self.mechanism.step(step.pin)
+                arm = _unit(self.place[step.pin] - self.place[step.pivot])
+                if handed is None:
+                    return self._arms(step, step.pin)
+                sine = np.linalg.norm(np.cross(arm, self._tangent(handed)), axis=-1)
+                return np.asarray(sine * self._arms(step, step.pin))
+            case Lever():
+                return self._arms(step, step.follows)
+            case Crank():
+                return np.ones(len(self.stroke))
+
+    def _arms(self, step: Lever | Slot, other: str) -> Array:
+        pivot = self.place[step.pivot]
+        long = np.linalg.norm(self.place[step.joint] - pivot, axis=-1)
+        return np.asarray(long / np.linalg.norm(self.place[other] - pivot, axis=-1))
+
+    def _derivative(self, number: int, joint: str) -> Array:
+        """Largest movement of a joint per unit of one clearance over all directions."""
+        at = 2 * self.model.joint_numbers.index(number)
+        moved = []
+        for axis in (0, 1):
+            ends = []
+            for sign in (1.0, -1.0):
+                links = self.model.kernel.no_clearance()
+                links[at + axis] = sign * _STEP_IN
+                x, y = self.model.kernel.positions(self.stroke, links)[joint]
+                ends.append(np.stack([x, y], axis=-1))
+            moved.append((ends[0] - ends[1]) / (2 * _STEP_IN))
+        return np.linalg.svd(np.stack(moved, axis=-1), compute_uv=False)[..., 0]
+
+
+def _driver(step: Step) -> str:
+    match step:
+        case Dyad() | Slider():
+            return step.upstream
+        case Slot():
+            return step.pin
+        case Lever():
+            return step.follows
+        case Crank():
+            return step.pivot
+
+
+def _product(factors: Iterable[Array]) -> Array:
+    result = np.ones(1)
+    for factor in factors:
+        result = result * factor
+    return result
+
+
+def _unit(vectors: Array) -> Array:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+
+
+def _frozen(array: Array) -> Array:
+    array = np.ascontiguousarray(array)
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,241 @@
+"""A bound of the plunger displacement over all directions and the whole stroke, proved by interval arithmetic.
+
+Each virtual link may be any vector in a disc, each position any of the stroke. Where the displacement is
+greatest, a virtual link whose gradient is not zero has its full length and points along that gradient. An
+enclosure of the gradients over a box of links therefore narrows the box; the gradients over the narrower box
+are narrower still, and so on until it is a point. The stroke shrinks to its end where the displacement grows
+along it. A box that cannot hold the greatest displacement is dropped, one that does not shrink is split.
+The result holds for every combination of directions and every clearance up to the given ones: nothing is
+sampled.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.gear.model import LinkageModel, links_from
+from mlg_troubleshoot.geometry.intervals import Box, Range, cosine_range
+
+Array = NDArray[np.float64]
+_STROKES = 16
+_BATCH = 64
+_MOST_BOXES = 20_000
+
+
+@dataclass(frozen=True, slots=True)
+class CertifiedBound:
+    """The largest displacement in one sense, enclosed.
+
+    Parameters
+    ----------
+    sense : float
+        +1 for over-travel, −1 for under-travel. [1]
+    found_in : float
+        Largest displacement found, in this sense: it is reached. [in]
+    bound_in : float
+        No directions and no position give more; infinite if that could not be shown. [in]
+    directions : ndarray, shape (n_joints,)
+        Directions that reach `found_in`. [rad]
+    stroke_in : float
+        Actuator extension where they do. [in]
+    boxes : int
+        Ranges of directions and stroke examined.
+    """
+
+    sense: float
+    found_in: float
+    bound_in: float
+    directions: Array
+    stroke_in: float
+    boxes: int
+
+    @property
+    def gap_in(self) -> float:
+        """Bound less what was found. [in]"""
+        return self.bound_in - self.found_in
+
+
+def certified_bound(
+    model: LinkageModel, clearance_in: Array, sense: float = 1.0, gap_in: float = 1e-6, mid_only: bool = False
+) -> CertifiedBound:
+    """Enclose the largest displacement over all directions and the whole release stroke.
+
+    Parameters
+    ----------
+    model : LinkageModel
+        The calibrated linkage.
+    clearance_in : ndarray, shape (n_joints,)
+        Largest clearance of each joint. [in]
+    sense : float
+        +1 for over-travel, −1 for under-travel. [1]
+    gap_in : float
+        Wanted difference of bound and best found. [in]
+    mid_only : bool
+        Only at mid-position, else over the whole stroke.
+
+    Returns
+    -------
+    CertifiedBound
+        The enclosure; its bound is infinite if the linkage may fail to close somewhere.
+    """
+    search = _Search(model, np.asarray(clearance_in, float), sense, mid_only)
+    waiting = search.start()
+    settled, examined = -np.inf, 0
+    while waiting.low.size and examined < _MOST_BOXES:
+        count = min(_BATCH, waiting.low.shape[1])
+        boxes = Box(waiting.low[:, -count:], waiting.high[:, -count:])
+        waiting = Box(waiting.low[:, :-count], waiting.high[:, :-count])
+        examined += count
+        boxes, bounds, smear = search.contract(boxes)
+        within = bounds <= search.best + gap_in
+        settled = max(settled, float(np.max(bounds[within], initial=-np.inf)))
+        if not np.all(within):
+            kept = Box(boxes.low[:, ~within], boxes.high[:, ~within])
+            halves = _halves(kept, smear[:, ~within])
+            # The most promising box comes last and is taken next.
+            waiting = Box(
+                np.concatenate([waiting.low, halves.low], axis=1), np.concatenate([waiting.high, halves.high], axis=1)
+            )
+    bound = np.inf if waiting.low.size else max(settled, search.best)
+    return CertifiedBound(sense, search.best, bound, search.directions, search.stroke, examined)
+
+
+def _halves(boxes: Box, smear: Array) -> Box:
+    """Halve each box in the variable that widens its bound the most."""
+    known = np.where(np.isfinite(smear), smear, -1.0)
+    blind = ~np.any(known > 0.0, axis=0)
+    widest = np.where(blind, np.argmax(boxes.high - boxes.low, axis=0), np.argmax(known, axis=0))
+    row, column = widest, np.arange(boxes.low.shape[1])
+    middle = boxes.middle[row, column]
+    high, low = boxes.high.copy(), boxes.low.copy()
+    high[row, column] = middle
+    low[row, column] = middle
+    return Box(np.concatenate([boxes.low, low], axis=1), np.concatenate([high, boxes.high], axis=1))
+
+
+class _Search:
+    """Contracts boxes of the links that have a clearance, and of the stroke; remembers the best it reached."""
+
+    def __init__(self, model: LinkageModel, clearance: Array, sense: float, mid_only: bool) -> None:
+        self.model = model
+        self.clearance = clearance
+        self.sense = sense
+        self.joints = np.flatnonzero(clearance > 0.0)
+        self.over_stroke = not mid_only
+        self.stroke = model.stroke[1]
+        # The sequential rule is a good start: what it reaches drops most boxes at once.
+        worst = worst_case(model, clearance[None])
+        over = sense > 0.0
+        self.directions = (worst.over_directions if over else worst.under_directions)[0]
+        self.best = float(sense * (worst.over_in if over else worst.under_in)[0])
+        if not np.isfinite(self.best):
+            self.best = -np.inf
+
+    def start(self) -> Box:
+        """All directions, and the stroke in some parts."""
+        reach = np.repeat(self.clearance[self.joints], 2)[:, None]
+        if not self.over_stroke:
+            return Box(-reach, reach)
+        edges = np.linspace(min(self.model.stroke), max(self.model.stroke), _STROKES + 1)
+        all_ = np.tile(reach, _STROKES)
+        return Box(np.vstack([-all_, edges[:-1]]), np.vstack([all_, edges[1:]]))
+
+    def contract(self, boxes: Box) -> tuple[Box, Array, Array]:
+        """Narrow boxes until they no longer shrink.
+
+        Returns the boxes that may hold the greatest displacement, a bound of each, and how much each
+        variable widens it.
+        """
+        bounds = np.full(boxes.low.shape[1], np.inf)
+        while True:
+            moved = self._displacement(boxes)
+            low, high = moved.slope
+            bounds = np.fmin(bounds, moved.value[1])
+            width = boxes.high - boxes.low
+            smear = np.maximum(np.abs(low), np.abs(high)) * width
+            narrower = self._narrowed(boxes, low, high)
+            possible = np.all(narrower.low <= narrower.high, axis=0)
+            boxes = Box(narrower.low[:, possible], narrower.high[:, possible])
+            bounds, smear = bounds[possible], smear[:, possible]
+            self._try(boxes)
+            promising = ~(bounds <= self.best)
+            boxes = Box(boxes.low[:, promising], boxes.high[:, promising])
+            bounds, smear = bounds[promising], smear[:, promising]
+            shrunk = np.sum(boxes.high - boxes.low, axis=0)
+            before = np.sum(width[:, possible][:, promising], axis=0)
+            if not shrunk.size or np.all((shrunk > 0.7 * before) | (bounds <= self.best + 1e-12)):
+                return boxes, np.where(np.isnan(bounds), np.inf, bounds), smear
+
+    def _narrowed(self, boxes: Box, low: Array, high: Array) -> Box:
+        """Intersect boxes with what the gradients allow at a greatest displacement."""
+        bottom, top = boxes.low.copy(), boxes.high.copy()
+        for k, j in enumerate(self.joints):
+            rows = slice(2 * k, 2 * k + 2)
+            arc_low, arc_high = _arc(low[rows], high[rows], self.clearance[j])
+            bottom[rows] = np.fmax(bottom[rows], arc_low)
+            top[rows] = np.fmin(top[rows], arc_high)
+        if self.over_stroke:
+            bottom[-1] = np.where(low[-1] > 0.0, top[-1], bottom[-1])
+            top[-1] = np.where(high[-1] < 0.0, boxes.low[-1], top[-1])
+            ends = self.model.stroke
+            # A part of the stroke that is not its end hands its own end to the next part.
+            first, last = min(ends), max(ends)
+            inner = ((low[-1] > 0.0) & (boxes.high[-1] < last)) | ((high[-1] < 0.0) & (boxes.low[-1] > first))
+            bottom[0] = np.where(inner, np.inf, bottom[0])
+        return Box(bottom, top)
+
+    def _displacement(self, boxes: Box) -> Range:
+        kernel = self.model.kernel
+        numbers = kernel.parameters.tolist()
+        variables = boxes.variables()
+        stroke = variables.pop() if self.over_stroke else self.model.stroke[1]
+        links: list[Range | float] = list(kernel.no_clearance())
+        for k, j in enumerate(self.joints):
+            links[2 * j : 2 * j + 2] = variables[2 * k : 2 * k + 2]
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            moved = kernel.run(stroke, links, numbers)
+            still = kernel.run(stroke, kernel.no_clearance(), numbers)
+            result: Range = self.sense * self.model.rate * (moved - still)
+        return result
+
+    def _try(self, boxes: Box) -> None:
+        """Solve the linkage with full-length links towards the middle of each box and keep the best."""
+        if not boxes.low.shape[1]:
+            return
+        middle = boxes.middle
+        directions = np.zeros((middle.shape[1], len(self.clearance)))
+        for k, j in enumerate(self.joints):
+            directions[:, j] = np.arctan2(middle[2 * k + 1], middle[2 * k])
+        stroke = middle[-1] if self.over_stroke else np.full(len(directions), self.model.stroke[1])
+        links = links_from(np.broadcast_to(self.clearance, directions.shape), directions)
+        reached = self.sense * self.model.displacement(links, None, stroke)
+        if np.any(np.isfinite(reached)):
+            top = int(np.nanargmax(reached))
+            if reached[top] > self.best:
+                self.best = float(reached[top])
+                self.directions = directions[top].copy()
+                self.stroke = float(stroke[top])
+
+
+def _arc(low: Array, high: Array, length: float) -> tuple[Array, Array]:
+    """Smallest box around the vectors of a length that point along a gradient, −∞ to ∞ if it may be zero."""
+    (left, bottom), (right, top) = low, high
+    usable = (left > 0.0) | (right < 0.0) | (bottom > 0.0) | (top < 0.0)
+    centre = np.arctan2(bottom + top, left + right)
+    half = np.zeros_like(centre)
+    for x in (left, right):
+        for y in (bottom, top):
+            off = np.arctan2(y, x) - centre
+            half = np.maximum(half, np.abs(np.remainder(off + np.pi, 2 * np.pi) - np.pi))
+    usable &= np.isfinite(half)
+    centre, half = np.where(usable, centre, 0.0), np.where(usable, half, np.pi) * (1.0 + 1e-12) + 1e-14
+    across = cosine_range(centre - half, centre + half)
+    up = cosine_range(centre - half - np.pi / 2, centre + half - np.pi / 2)
+    return (
+        np.where(usable, np.nextafter(np.stack([across[0], up[0]]) * length, -np.inf), -np.inf),
+        np.where(usable, np.nextafter(np.stack([across[1], up[1]]) * length, np.inf), np.inf),
+    )

@@ -1,0 +1,306 @@
+"""Polynomial chaos by least squares: the fast route for a smooth response, with a check that it is smooth.
+
+The response is fitted by orthonormal Legendre polynomials of the unit cube; Eqs. 1 and 2 are then sums of
+squared coefficients. Points that took no part in the fit, and corners of the range, say whether to trust it:
+a clipped or otherwise kinked response is handed to :mod:`~mlg_troubleshoot.studies.saltelli`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations_with_replacement
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.studies.indices import Indices, failed_note, interval, without_numbers
+from mlg_troubleshoot.studies.response import Response
+
+Array = NDArray[np.float64]
+
+_HELD_OUT = 48
+_CORNERS = 16
+_MOST_TERMS = 500
+_PER_TERM = 1.3
+# A fit that follows the inside of the range but misses a corner by more than this share of the standard
+# deviation has met a kink.
+_CORNER_MISS = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class ChaosFit:
+    """A polynomial of the unit cube with orthonormal terms.
+
+    Parameters
+    ----------
+    exponents : ndarray of int, shape (n_terms, n)
+        Degrees of each term in each variable, the constant first.
+    coefficients : ndarray, shape (n_terms,)
+        Coefficients. [unit of the response]
+    residual : float
+        Mean square of the held-out residuals over the variance. [1]
+    corner_miss : float
+        Largest residual at corners of the range over the standard deviation. [1]
+    trained_on : int
+        Points of the fit.
+    """
+
+    exponents: NDArray[np.int64]
+    coefficients: Array
+    residual: float
+    corner_miss: float
+    trained_on: int
+
+    @property
+    def variance(self) -> float:
+        """Variance of the polynomial."""
+        return float(np.sum(self.coefficients[1:] ** 2))
+
+    def share(self, group: tuple[int, ...]) -> float:
+        """Closed index of a group: what it explains alone, interactions within it included.
+
+        Parameters
+        ----------
+        group : tuple of int
+            Places of the variables.
+
+        Returns
+        -------
+        float
+            Share of the variance. [1]
+        """
+        outside = np.delete(self.exponents, list(group), axis=1).sum(axis=1)
+        squares = self.coefficients[1:] ** 2
+        return float(squares[outside[1:] == 0].sum() / self.variance)
+
+    def total_share(self, group: tuple[int, ...]) -> float:
+        """Total index of a group: everything that it takes part in.
+
+        Parameters
+        ----------
+        group : tuple of int
+            Places of the variables.
+
+        Returns
+        -------
+        float
+            Share of the variance. [1]
+        """
+        within = self.exponents[1:, list(group)].sum(axis=1) > 0
+        return float((self.coefficients[1:] ** 2)[within].sum() / self.variance)
+
+    def index_error(self, accuracy_of: Array) -> Array:
+        """Error of indices from what the polynomial leaves out.
+
+        Parameters
+        ----------
+        accuracy_of : ndarray, shape (n,)
+            The indices. [1]
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Bound of the omitted share, and twice the effect of its aliasing on the coefficients. [1]
+        """
+        level = np.clip(accuracy_of, self.residual, 1.0)
+        return np.asarray(self.residual + 4.0 * np.sqrt(level * self.residual / self.trained_on))
+
+
+def chaos_indices(
+    response: Response, n: int, rng: Generator, seed: int, accuracy: float = 1e-3, most: int = 2048
+) -> tuple[Indices, ChaosFit | None]:
+    """Compute indices by polynomial chaos, with as few evaluations as the accuracy needs.
+
+    Parameters
+    ----------
+    response : callable
+        Unit cube, shape (n_points, n), to values, shape (n_points,).
+    n : int
+        Number of variables.
+    rng : Generator
+        Source of the points.
+    seed : int
+        Its seed, for the result.
+    accuracy : float
+        Wanted error of every index. [1]
+    most : int
+        Evaluations to stop at.
+
+    Returns
+    -------
+    indices : Indices
+        The indices, with the note "not smooth" and NaN if the polynomial cannot be trusted.
+    fit : ChaosFit or None
+        The polynomial, if it can be trusted.
+    """
+    corners = np.concatenate([np.zeros((1, n)), np.ones((1, n)), rng.integers(0, 2, (_CORNERS - 2, n))])
+    held = _latin(rng, _HELD_OUT, n)
+    checks = np.concatenate([held, corners])
+    points = _latin(rng, _first_size(n), n)
+    values = response(np.concatenate([checks, points]))
+    check_values, values = values[: len(checks)], values[len(checks) :]
+    best: ChaosFit | None = None
+    while True:
+        used = len(check_values) + len(values)
+        failed = int(np.count_nonzero(~np.isfinite(check_values)) + np.count_nonzero(~np.isfinite(values)))
+        design = f"polynomial chaos, {len(values)} points for the fit and {len(checks)} for its check"
+        if failed:
+            return without_numbers(design, seed, n, used, failed, failed_note(failed, used), (np.nan, np.nan)), None
+        before = np.inf if best is None else best.residual
+        best = _best_fit(points, values, checks, check_values, before, best)
+        if best is not None:
+            found = _indices(best, n, design, seed, used, float(best.coefficients[0]))
+            if found.half_width <= accuracy and best.corner_miss <= _CORNER_MISS:
+                return found, best
+        gains = best is None or best.residual < 0.5 * before
+        if not gains or used + len(values) > most:
+            residual = "undefined" if best is None else f"{best.residual:.2g} of the variance"
+            note = f"not smooth: a polynomial leaves {residual} unexplained"
+            return without_numbers(design, seed, n, used, 0, note, (float(values.mean()), np.nan)), None
+        more = _latin(rng, len(values), n)
+        points, values = np.concatenate([points, more]), np.concatenate([values, response(more)])
+
+
+def _first_size(n: int) -> int:
+    """Points of the first fit: enough for the second degree, or for a good one where variables are few."""
+    return max(128, int(np.ceil(2.0 * len(total_degree(n, 2)))))
+
+
+def _latin(rng: Generator, count: int, n: int) -> Array:
+    places = rng.permuted(np.tile(np.arange(count), (n, 1)), axis=1).T
+    return np.asarray((places + rng.random((count, n))) / count)
+
+
+def _best_fit(
+    points: Array, values: Array, checks: Array, check_values: Array, before: float, best: ChaosFit | None
+) -> ChaosFit | None:
+    """Try degrees upward as long as the held-out residual falls."""
+    n = points.shape[1]
+    spread = float(np.concatenate([values, check_values[:_HELD_OUT]]).var())
+    if spread <= 1e-24 * float(np.mean(values)) ** 2 or spread == 0.0:
+        return None
+    last = before
+    found = best
+    for degree in range(2, 21):
+        exponents = total_degree(n, degree)
+        if len(exponents) * _PER_TERM > len(points) or len(exponents) > _MOST_TERMS:
+            break
+        matrix = legendre_terms(points, exponents)
+        gram, right = matrix.T @ matrix, matrix.T @ values
+        try:
+            coefficients = np.linalg.solve(gram, right)
+        except np.linalg.LinAlgError:
+            break
+        misses = check_values - legendre_terms(checks, exponents) @ coefficients
+        residual = float(np.mean(misses[:_HELD_OUT] ** 2)) / spread
+        if residual < last:
+            corner = float(np.abs(misses[_HELD_OUT:]).max()) / np.sqrt(spread)
+            found = ChaosFit(exponents, coefficients, residual, corner, len(points))
+            last = residual
+            if residual < 1e-10:
+                break
+        elif residual > 4.0 * last and degree > 4:
+            break
+    return found
+
+
+def _indices(fit: ChaosFit, n: int, design: str, seed: int, used: int, mean: float) -> Indices:
+    squares = fit.coefficients[1:] ** 2
+    present = fit.exponents[1:] > 0
+    order = present.sum(axis=1)
+    variance = fit.variance
+    first = squares[order == 1] @ present[order == 1] / variance
+    total = squares @ present / variance
+    pairs = present[order == 2].astype(float)
+    second = pairs.T @ (squares[order == 2][:, None] * pairs) / variance
+    np.fill_diagonal(second, 0.0)
+    return Indices(
+        design,
+        seed,
+        first,
+        interval(first, fit.index_error(first)),
+        total,
+        interval(total, fit.index_error(total)),
+        mean,
+        variance,
+        used,
+        0,
+        "",
+        second,
+    )
+
+
+@lru_cache(maxsize=64)
+def total_degree(n: int, degree: int) -> NDArray[np.int64]:
+    """Exponents of all polynomials up to a total degree, the constant first.
+
+    Parameters
+    ----------
+    n : int
+        Number of variables.
+    degree : int
+        Largest total degree.
+
+    Returns
+    -------
+    ndarray of int, shape (n_terms, n)
+        Exponents. [1]
+    """
+    rows = []
+    for total in range(degree + 1):
+        for chosen in combinations_with_replacement(range(n), total):
+            row = [0] * n
+            for place in chosen:
+                row[place] += 1
+            rows.append(row)
+    exponents = np.array(rows, dtype=np.int64)
+    exponents.flags.writeable = False
+    return exponents
+
+
+def legendre_terms(unit: Array, exponents: NDArray[np.int64]) -> Array:
+    """Orthonormal Legendre polynomials of the unit cube.
+
+    Parameters
+    ----------
+    unit : ndarray, shape (n_points, n)
+        Points of the unit cube. [1]
+    exponents : ndarray of int, shape (n_terms, n)
+        Degrees of each term.
+
+    Returns
+    -------
+    ndarray, shape (n_points, n_terms)
+        Values of the terms. [1]
+    """
+    x = 2.0 * unit - 1.0
+    degree = int(exponents.max(initial=0))
+    count, n = unit.shape
+    values = np.empty((degree + 1, n, count))
+    values[0] = 1.0
+    if degree:
+        values[1] = x.T
+    for k in range(1, degree):
+        values[k + 1] = ((2 * k + 1) * x.T * values[k] - k * values[k - 1]) / (k + 1)
+    values *= np.sqrt(2.0 * np.arange(degree + 1) + 1.0)[:, None, None]
+    flat = values.reshape((degree + 1) * n, count)
+    places = _factors(exponents.tobytes(), exponents.shape)
+    matrix = flat[places[0]]
+    for factor in places[1:]:
+        matrix *= flat[factor]
+    return np.ascontiguousarray(matrix.T)
+
+
+@lru_cache(maxsize=64)
+def _factors(raw: bytes, shape: tuple[int, int]) -> list[NDArray[np.int64]]:
+    """Rows of the table of one-variable polynomials that each term multiplies; absent ones are constant."""
+    exponents = np.frombuffer(raw, dtype=np.int64).reshape(shape)
+    n = shape[1]
+    most = max(1, int((exponents > 0).sum(axis=1).max(initial=0)))
+    places = np.zeros((most, shape[0]), dtype=np.int64)
+    for term, row in enumerate(exponents):
+        for slot, variable in enumerate(np.flatnonzero(row)):
+            places[slot, term] = row[variable] * n + variable
+    return list(places)

@@ -1,0 +1,181 @@
+"""The paper's designs: modified Latin hypercube samples and central composite points (section 2.2, Fig. 5).
+
+A modified Latin hypercube has n1 replicates of n2 levels. Sorted by the level of one joint, the n1 samples of
+a level share that joint's clearance while the others vary (Fig. 5a); exchanging one joint's clearance among
+them lets that joint vary while the others are fixed (Fig. 5b).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.errors import UsageError
+
+Array = NDArray[np.float64]
+
+# Resolution V fractions of the two-level factorial: the columns whose product each further column is. No
+# word of their defining relations is shorter than five letters.
+_FRACTIONS: dict[int, tuple[int, tuple[tuple[int, ...], ...]]] = {
+    8: (6, ((0, 1, 2, 3), (0, 1, 4, 5))),
+    9: (7, ((0, 2, 3, 5, 6), (1, 2, 4, 5, 6))),
+    10: (7, ((0, 1, 2, 6), (1, 2, 3, 4), (0, 2, 3, 5))),
+}
+_FULL = 7
+
+
+@dataclass(frozen=True, slots=True)
+class Replicated:
+    """Levels and points of a replicated design.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n1, n_rows, n)
+        Points of the unit cube, replicate by replicate. [1]
+    places : ndarray of int, shape (n1, n_rows, n)
+        Group of each row for each variable: rows of one group share the variable's value (Fig. 5a). [1]
+    """
+
+    points: Array
+    places: NDArray[np.int64]
+
+
+def central_composite(n: int, count: int | None = None) -> Array:
+    """Corners and axial points of the range.
+
+    The paper has 138 points in ten joints and does not say how they are made up. 128 corners are the
+    resolution V fraction 2^(10−3) of the two-level factorial; the ten points that remain are taken as one
+    axial point a joint, all others in mid-range: the first joint at its limit, the second at zero, and so
+    on. (With all ten at their limits a joint in mid-range would go with high values of the others, which
+    adds 0.004 to every first-order index.)
+
+    Parameters
+    ----------
+    n : int
+        Number of variables, 2 to 10.
+    count : int, optional
+        Points wanted: the corners and 0, n or 2 n axial points; one centre point may be added. Else the
+        corners and n axial points.
+
+    Returns
+    -------
+    ndarray, shape (count, n)
+        Points of the unit cube. [1]
+
+    Raises
+    ------
+    UsageError
+        If there is no such design.
+    """
+    if not 2 <= n <= max(_FRACTIONS):
+        raise UsageError(f"a central composite design in {n} variables", f"It has 2 to {max(_FRACTIONS)}.")
+    corners = _corners(n)
+    alternate = np.full((n, n), 0.5)
+    np.fill_diagonal(alternate, np.arange(1, n + 1) % 2)
+    upper, lower = np.full((n, n), 0.5), np.full((n, n), 0.5)
+    np.fill_diagonal(upper, 1.0)
+    np.fill_diagonal(lower, 0.0)
+    centre = np.full((1, n), 0.5)
+    designs = [
+        np.concatenate(parts)
+        for parts in (
+            (corners,),
+            (corners, centre),
+            (corners, alternate),
+            (corners, alternate, centre),
+            (corners, upper, lower),
+            (corners, upper, lower, centre),
+        )
+    ]
+    wanted = len(corners) + n if count is None else count
+    for design in designs:
+        if len(design) == wanted:
+            return design
+    raise UsageError(
+        f"a central composite design of {wanted} points in {n} variables",
+        f"Use one of {', '.join(str(len(design)) for design in designs)} points.",
+    )
+
+
+def _corners(n: int) -> Array:
+    base, words = (n, ()) if n <= _FULL else _FRACTIONS[n]
+    signs = np.array(list(product((-1, 1), repeat=base)))
+    columns = [signs, *(np.prod(signs[:, list(word)], axis=1)[:, None] for word in words)]
+    return np.asarray((np.concatenate(columns, axis=1) + 1) / 2.0)
+
+
+def replicated_levels(n: int, n1: int, n2: int, rng: Generator) -> NDArray[np.int64]:
+    """Levels of a modified Latin hypercube: every level once in every replicate.
+
+    Parameters
+    ----------
+    n : int
+        Number of variables.
+    n1, n2 : int
+        Replicates, and levels in each.
+    rng : Generator
+        Source of the permutations.
+
+    Returns
+    -------
+    ndarray of int, shape (n1, n2, n)
+        Levels from 0. [1]
+    """
+    levels = np.tile(np.arange(n2, dtype=np.int64), (n1, n, 1))
+    return np.ascontiguousarray(rng.permuted(levels, axis=2).transpose(0, 2, 1))
+
+
+def middle_of_level(levels: NDArray[np.int64], n2: int) -> Array:
+    """Point of the unit interval in the middle of a level.
+
+    Parameters
+    ----------
+    levels : ndarray of int
+        Levels from 0. [1]
+    n2 : int
+        Number of levels.
+
+    Returns
+    -------
+    ndarray
+        Points. [1]
+    """
+    return np.asarray((levels + 0.5) / n2)
+
+
+def first_order_design(n: int, n1: int, n2: int, ccd: Array | None, rng: Generator) -> Replicated:
+    """Samples for the first-order index (Fig. 5a): Latin hypercube levels, composite points, or both.
+
+    Every replicate holds all composite points. Points that share a joint's clearance are put in its groups
+    in an order of their own in every replicate, so that the others vary within a group.
+
+    Parameters
+    ----------
+    n : int
+        Number of variables.
+    n1, n2 : int
+        Replicates, and Latin hypercube levels in each (0 for composite points only).
+    ccd : ndarray, shape (n_ccd, n), or None
+        Composite points added to every replicate. [1]
+    rng : Generator
+        Source of the order.
+
+    Returns
+    -------
+    Replicated
+        Points and groups.
+    """
+    levels = replicated_levels(n, n1, n2, rng)
+    points, places = middle_of_level(levels, max(n2, 1)), levels
+    if ccd is not None:
+        tie = rng.random((n1, len(ccd), n))
+        order = np.lexsort((tie, np.broadcast_to(ccd, tie.shape)), axis=1)
+        groups = np.empty_like(order)
+        np.put_along_axis(groups, order, np.arange(len(ccd))[None, :, None], axis=1)
+        points = np.concatenate([points, np.broadcast_to(ccd, (n1, *ccd.shape))], axis=1)
+        places = np.concatenate([places, groups + n2], axis=1)
+    return Replicated(points, places)

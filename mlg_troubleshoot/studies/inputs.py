@@ -1,0 +1,160 @@
+"""Distributions of the clearances: from the unit cube to inches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.model import LinkageModel, links_from
+from mlg_troubleshoot.studies.response import Response
+
+Array = NDArray[np.float64]
+
+
+def _half_normal(u: Array) -> Array:
+    """Quantiles of a half-normal distribution cut at its 2.5 σ, scaled to 1."""
+    from scipy.special import erf, erfinv
+
+    cut = 2.5 / np.sqrt(2.0)
+    return np.asarray(erfinv(u * erf(cut)) / cut)
+
+
+_QUANTILES: dict[str, Callable[[Array], Array]] = {
+    "uniform": lambda u: u,
+    "falling": lambda u: 1.0 - np.sqrt(1.0 - u),
+    "rising": np.sqrt,
+    "half-normal": _half_normal,
+}
+DISTRIBUTIONS = tuple(_QUANTILES)
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """Independent clearances on [0, limit], all of one kind of distribution.
+
+    Parameters
+    ----------
+    limits_in : ndarray, shape (n_joints,)
+        Upper ends. [in]
+    distribution : str
+        uniform (the paper's), falling or rising (triangular, most likely at 0 or at the limit), half-normal.
+
+    Raises
+    ------
+    UsageError
+        If the distribution is unknown or a limit is not a positive number.
+    """
+
+    limits_in: Array
+    distribution: str = "uniform"
+
+    def __post_init__(self) -> None:
+        if self.distribution not in DISTRIBUTIONS:
+            raise UsageError(
+                f"distribution {self.distribution!r} is not known", f"Give one of {', '.join(DISTRIBUTIONS)}."
+            )
+        limits = np.array(self.limits_in, float)
+        if limits.ndim != 1 or not np.all(np.isfinite(limits) & (limits > 0.0)):
+            raise UsageError(f"limits {limits.tolist()} in", "Every limit is a positive length.")
+        limits.flags.writeable = False
+        object.__setattr__(self, "limits_in", limits)
+
+    def at(self, unit: Array) -> Array:
+        """Clearances at points of the unit cube.
+
+        Parameters
+        ----------
+        unit : ndarray, shape (n, n_joints)
+            Probabilities. [1]
+
+        Returns
+        -------
+        ndarray, shape (n, n_joints)
+            Clearances. [in]
+        """
+        return np.asarray(_QUANTILES[self.distribution](unit) * self.limits_in)
+
+    def on_unit_cube(self, response: Response) -> Response:
+        """Return the response as a function of the unit cube.
+
+        Parameters
+        ----------
+        response : callable
+            Clearances, shape (n, n_joints), to values, shape (n,).
+
+        Returns
+        -------
+        callable
+            Probabilities, shape (n, n_joints), to values, shape (n,).
+        """
+
+        def on_cube(unit: Array) -> Array:
+            return response(self.at(unit))
+
+        return on_cube
+
+
+def with_random_directions(model: LinkageModel, inputs: Inputs) -> Response:
+    """Displacement when every clearance takes a uniformly random direction (as Zhu and Ting do).
+
+    Parameters
+    ----------
+    model : LinkageModel
+        The calibrated linkage.
+    inputs : Inputs
+        Distributions of the clearances.
+
+    Returns
+    -------
+    callable
+        Unit cube, shape (n, 2 × n_joints): probabilities of the clearances, then directions in turns;
+        to the signed displacement, shape (n,). [in]
+    """
+    n = len(inputs.limits_in)
+
+    def on_cube(unit: Array) -> Array:
+        return model.displacement(links_from(inputs.at(unit[:, :n]), 2.0 * np.pi * unit[:, n:]))
+
+    return on_cube
+
+
+def joint_groups(n_joints: int) -> tuple[tuple[int, ...], ...]:
+    """Group each joint's clearance with its direction, for :func:`with_random_directions`.
+
+    Parameters
+    ----------
+    n_joints : int
+        Number of joints.
+
+    Returns
+    -------
+    tuple of tuple of int
+        Places of the variables of each joint.
+    """
+    return tuple((j, n_joints + j) for j in range(n_joints))
+
+
+def beyond_margin(response: Response, margin_in: float) -> Response:
+    """Turn a displacement into 1 where it exceeds the margin or the linkage does not close, else 0.
+
+    Parameters
+    ----------
+    response : callable
+        Any variables to displacements. [in]
+    margin_in : float
+        Allowed displacement. [in]
+
+    Returns
+    -------
+    callable
+        The same variables to 0 or 1.
+    """
+
+    def exceeds(variables: Array) -> Array:
+        return np.asarray(~(np.abs(response(variables)) <= margin_in), dtype=float)
+
+    return exceeds

@@ -1,0 +1,213 @@
+"""Indices of any response by sampling: Saltelli's and Jansen's estimators on scrambled Sobol points.
+
+The intervals come from independent scrambles of the points, because neighbouring Sobol points are not
+independent and a bootstrap over them is many times too wide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.studies.indices import Indices, failed_note, interval, without_numbers
+from mlg_troubleshoot.studies.response import Response
+
+Array = NDArray[np.float64]
+SCRAMBLES = 8
+_ROWS = 1 << 14
+_FIRST_POWER = 8
+
+
+def saltelli_indices(
+    response: Response,
+    n: int,
+    rng: Generator,
+    seed: int,
+    accuracy: float = 1e-3,
+    most: int = 1 << 24,
+    groups: tuple[tuple[int, ...], ...] | None = None,
+    progress: Callable[[int, float], None] | None = None,
+    note: str = "",
+) -> Indices:
+    """Compute indices with more and more points until every interval is as narrow as wanted.
+
+    Parameters
+    ----------
+    response : callable
+        Unit cube, shape (n_points, n), to values, shape (n_points,).
+    n : int
+        Number of variables.
+    rng : Generator
+        Source of the scrambles.
+    seed : int
+        Its seed, for the result.
+    accuracy : float
+        Wanted half width of every 95 % interval. [1]
+    most : int
+        Evaluations to stop at.
+    groups : tuple of tuple of int, optional
+        Variables that count as one, else each alone; indices are then closed and total ones of groups.
+    progress : callable, optional
+        Called with the evaluations done and the largest half width so far.
+    note : str
+        Put in front of the result's own note.
+
+    Returns
+    -------
+    Indices
+        One entry a group. If `most` was reached first, the note says so.
+    """
+    sets = tuple((i,) for i in range(n)) if groups is None else groups
+    children = rng.spawn(SCRAMBLES)
+    power, used = _FIRST_POWER, 0
+    streams = [_Stream(child, n) for child in children]
+    sums = [_Sums(len(sets)) for _ in children]
+    while True:
+        for stream, total in zip(streams, sums, strict=True):
+            for a, b in stream.up_to(power):
+                used += total.add(response, a, b, sets)
+        failed = sum(total.failed for total in sums)
+        design = f"Saltelli and Jansen on {SCRAMBLES} scrambles of 2^{power} Sobol points"
+        if failed:
+            return without_numbers(design, seed, len(sets), used, failed, failed_note(failed, used), (np.nan, np.nan))
+        found = _pooled(sums, design, seed, used, note)
+        if progress is not None:
+            progress(used, found.half_width)
+        if found.half_width <= accuracy or not np.isfinite(found.half_width):
+            return found
+        if 2 * used > most:
+            short = f"stopped at {used} evaluations with intervals of ± {found.half_width:.2g}"
+            return _pooled(sums, design, seed, used, f"{note}; {short}" if note else short)
+        power += 1
+
+
+class _Stream:
+    """Scrambled Sobol points in both halves of the variables, continued on demand."""
+
+    def __init__(self, rng: Generator, n: int) -> None:
+        from scipy import __version__
+        from scipy.stats import qmc
+
+        # The argument was called seed before scipy 1.15.
+        recent = tuple(int(part) for part in __version__.split(".")[:2]) >= (1, 15)
+        chosen: dict[str, Any] = {"rng" if recent else "seed": rng}
+        self._engine = qmc.Sobol(2 * n, scramble=True, **chosen)
+        self._n = n
+        self._drawn = 0
+
+    def up_to(self, power: int) -> Iterator[tuple[Array, Array]]:
+        while self._drawn < 1 << power:
+            count = min(_ROWS, (1 << power) - self._drawn)
+            both = self._engine.random(count)
+            self._drawn += count
+            yield both[:, : self._n], both[:, self._n :]
+
+
+class _Sums:
+    """Running sums of one scramble."""
+
+    def __init__(self, n: int) -> None:
+        self.count = 0
+        self.failed = 0
+        self.shift: float | None = None
+        self.total = 0.0
+        self.squares = 0.0
+        self.partial = np.zeros(n)
+        self.total_partial = np.zeros(n)
+
+    def add(self, response: Response, a: Array, b: Array, groups: tuple[tuple[int, ...], ...]) -> int:
+        count = len(a)
+        ya, yb = response(a), response(b)
+        self.failed += int(np.count_nonzero(~np.isfinite(ya)) + np.count_nonzero(~np.isfinite(yb)))
+        if self.shift is None:
+            # Moments about a value near the mean lose no digits.
+            self.shift = float(np.mean(np.concatenate([ya, yb])))
+        ya, yb = ya - self.shift, yb - self.shift
+        self.total += float(ya.sum() + yb.sum())
+        self.squares += float((ya**2).sum() + (yb**2).sum())
+        for i, group in enumerate(groups):
+            mixed = a.copy()
+            mixed[:, list(group)] = b[:, list(group)]
+            ym = response(mixed)
+            self.failed += int(np.count_nonzero(~np.isfinite(ym)))
+            ym = ym - self.shift
+            self.partial[i] += float((yb * (ym - ya)).sum())
+            self.total_partial[i] += float(((ya - ym) ** 2).sum()) / 2.0
+        self.count += count
+        return count * (2 + len(groups))
+
+    def moments(self) -> tuple[float, float]:
+        mean = self.total / (2 * self.count)
+        return mean + (self.shift or 0.0), self.squares / (2 * self.count) - mean**2
+
+
+def _pooled(sums: list[_Sums], design: str, seed: int, used: int, note: str) -> Indices:
+    moments = np.array([each.moments() for each in sums])
+    variance = moments[:, 1]
+    if np.any(variance <= 0.0):
+        return without_numbers(
+            design, seed, len(sums[0].partial), used, 0, "the response does not vary", (moments[0, 0], 0.0)
+        )
+    first = np.array([each.partial / each.count / v for each, v in zip(sums, variance, strict=True)])
+    total = np.array([each.total_partial / each.count / v for each, v in zip(sums, variance, strict=True)])
+    return Indices(
+        design,
+        seed,
+        first.mean(axis=0),
+        interval(first.mean(axis=0), _half(first)),
+        total.mean(axis=0),
+        interval(total.mean(axis=0), _half(total)),
+        float(moments[:, 0].mean()),
+        float(variance.mean()),
+        used,
+        0,
+        note,
+    )
+
+
+def _half(samples: Array) -> Array:
+    """Half width of the 95 % interval of a mean of independent values (Student)."""
+    from scipy.special import stdtrit
+
+    count = len(samples)
+    spread = samples.std(axis=0, ddof=1) / np.sqrt(count)
+    return np.asarray(float(stdtrit(count - 1, 0.975)) * spread)
+
+
+def fast_indices(
+    response: Response,
+    n: int,
+    rng: Generator,
+    seed: int,
+    accuracy: float = 1e-3,
+    most: int = 1 << 24,
+    progress: Callable[[int, float], None] | None = None,
+) -> Indices:
+    """Compute indices by polynomial chaos, or by sampling where the response is not smooth.
+
+    Parameters
+    ----------
+    response, n, rng, seed, accuracy, most, progress
+        As for :func:`saltelli_indices`.
+
+    Returns
+    -------
+    Indices
+        The indices; the note says if the fast route was refused, and the evaluations include its own.
+    """
+    from mlg_troubleshoot.studies.chaos import chaos_indices
+
+    found, fit = chaos_indices(response, n, rng, seed, accuracy, most=min(2048, most))
+    if fit is not None or found.failed:
+        return found
+    sampled = saltelli_indices(response, n, rng, seed, accuracy, most, None, progress, found.note)
+    return Indices(
+        **{
+            **{name: getattr(sampled, name) for name in Indices.__slots__},
+            "evaluations": sampled.evaluations + found.evaluations,
+        }
+    )

@@ -1,0 +1,290 @@
+"""Every number that the paper prints, beside what the model gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.errors import GearFileError
+from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.studies.amplification import Amplification, amplification
+from mlg_troubleshoot.studies.response import HeldDirections, worst_directions
+from mlg_troubleshoot.studies.targets import Target, load_targets, targets_file
+from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
+
+Array = NDArray[np.float64]
+_CURVE = 401
+_CORNERS = (np.array([0.0, 1.0]), np.array([0.5, 0.5]))
+
+
+@dataclass(frozen=True, slots=True)
+class VerifiedNumber:
+    """One printed number beside the computed one.
+
+    Parameters
+    ----------
+    quantity : str
+        What it is, in words.
+    section : str
+        Section of the paper.
+    printed : str
+        As the paper prints it.
+    computed : float
+        What the model gives. [unit]
+    unit : str
+        Its unit; empty for a pure number.
+    tolerance : str
+        What is accepted.
+    status : str
+        fitted, calibrated, reproduced or not reproduced, as it turned out.
+    holds : bool
+        True if the computed number is accepted.
+    should_hold : bool
+        False if it is known not to hold.
+    """
+
+    quantity: str
+    section: str
+    printed: str
+    computed: float
+    unit: str
+    tolerance: str
+    status: str
+    holds: bool
+    should_hold: bool
+
+
+def verify(gear: Gear, targets: Path | None = None) -> tuple[VerifiedNumber, ...]:
+    """Compare every printed number with what the gear's reference linkage gives.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    targets : Path, optional
+        Targets file, else the one beside the gear file.
+
+    Returns
+    -------
+    tuple of VerifiedNumber
+        One entry a target, in the order of the file.
+
+    Raises
+    ------
+    GearFileError
+        If the targets file is missing, not valid or asks for an unknown measure.
+    """
+    path = targets_file(gear) if targets is None else targets
+    facts = Facts(gear, gear.model)
+    rows = []
+    for target in load_targets(path):
+        computed = facts.measure(target)
+        holds = target.holds(computed)
+        kind = "reproduced" if target.kind == "not reproduced" else target.kind
+        rows.append(
+            VerifiedNumber(
+                target.quantity,
+                target.section,
+                target.printed,
+                computed,
+                target.unit,
+                target.tolerance,
+                kind if holds else "not reproduced",
+                holds,
+                target.expected,
+            )
+        )
+    return tuple(rows)
+
+
+class Facts:
+    """What a linkage gives for the measures of a targets file; each is computed once.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear, for joints, limits and calibration.
+    model : LinkageModel
+        The linkage.
+    """
+
+    def __init__(self, gear: Gear, model: LinkageModel) -> None:
+        self.gear = gear
+        self.model = model
+        self.limits = np.asarray(gear.limits_in, float)
+
+    def measure(self, target: Target) -> float:
+        """Compute the number that a target speaks of.
+
+        Parameters
+        ----------
+        target : Target
+            The target.
+
+        Returns
+        -------
+        float
+            The number. [the target's unit]
+
+        Raises
+        ------
+        GearFileError
+            If the measure or a joint is unknown.
+        """
+        if target.measure not in _MEASURES:
+            raise GearFileError(
+                f"target {target.quantity!r}: measure {target.measure!r} is not known",
+                f"Use one of {', '.join(_MEASURES)}.",
+            )
+        unknown = (set(target.joints) | set(target.clearance_in)) - set(self.gear.joint_numbers)
+        if unknown:
+            raise GearFileError(
+                f"target {target.quantity!r}: {self.gear.name} has no joint {min(unknown)}",
+                f"Use joints {self.gear.joint_numbers[0]} to {self.gear.joint_numbers[-1]}.",
+            )
+        return float(_MEASURES[target.measure](self, target))
+
+    @cached_property
+    def response(self) -> HeldDirections:
+        """Worst directions at the limits, held."""
+        return worst_directions(self.model, self.limits)
+
+    @cached_property
+    def indices(self) -> TensorIndices:
+        """Indices over the whole range of clearances."""
+        return tensor_indices(self.response, self.limits)
+
+    @cached_property
+    def corner_indices(self) -> TensorIndices:
+        """Indices with every clearance at an end of its range: the limit of a central composite design."""
+        return tensor_indices(self.response, self.limits, nodes=_CORNERS)
+
+    @cached_property
+    def growth(self) -> Amplification:
+        """Amplification indices over the release."""
+        return amplification(self.gear, self.model)
+
+    @cached_property
+    def curve(self) -> tuple[Array, Array]:
+        """Stroke and plunger position over the release, Fig. 12. [in]"""
+        stroke = np.linspace(*self.model.stroke, _CURVE)
+        return stroke, self.model.plunger(stroke)
+
+    def of(self, values: Array, joints: tuple[int, ...]) -> Array:
+        """Pick the values of some joints.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n_joints,)
+            A value a joint.
+        joints : tuple of int
+            Numbers of the joints, empty for all.
+
+        Returns
+        -------
+        ndarray
+            Their values.
+        """
+        numbers = self.gear.joint_numbers
+        return np.asarray(values[[numbers.index(j) for j in joints or numbers]])
+
+    def others(self, joints: tuple[int, ...]) -> tuple[int, ...]:
+        """Return the joints that are not among the given ones.
+
+        Parameters
+        ----------
+        joints : tuple of int
+            Numbers of joints.
+
+        Returns
+        -------
+        tuple of int
+            The other joints of the gear.
+        """
+        return tuple(j for j in self.gear.joint_numbers if j not in joints)
+
+
+_REDUCE: dict[str, Callable[[Array], float]] = {"min": np.min, "max": np.max, "sum": np.sum}
+
+
+def _worst_displacement(facts: Facts, target: Target) -> float:
+    clearance = np.array([[target.clearance_in.get(j, 0.0) for j in facts.gear.joint_numbers]])
+    return float(worst_case(facts.model, clearance).magnitude_in[0])
+
+
+def _max_index(facts: Facts, target: Target) -> float:
+    return _REDUCE[target.over](facts.of(facts.growth.max_stage, target.joints))
+
+
+def _first_order(facts: Facts, target: Target) -> float:
+    return _REDUCE[target.over](facts.of(facts.indices.first_order, target.joints))
+
+
+def _down_lock(facts: Facts, _: Target) -> float:
+    return float(facts.model.plunger(facts.model.stroke[0]))
+
+
+def _travel(facts: Facts, _: Target) -> float:
+    stroke, position = facts.curve
+    least = int(np.argmin(position))
+    near = np.linspace(stroke[max(least - 1, 0)], stroke[min(least + 1, len(stroke) - 1)], _CURVE)
+    return float(position[-1] - facts.model.plunger(near).min())
+
+
+def _least_curvature(facts: Facts, _: Target) -> float:
+    stroke, position = facts.curve
+    return float(np.min(np.diff(position, 2)) / (stroke[1] - stroke[0]) ** 2)
+
+
+def _end_rate(facts: Facts, _: Target) -> float:
+    stroke, position = facts.curve
+    least = int(np.argmin(position))
+    mean = (position[-1] - position[least]) / (stroke[-1] - stroke[least])
+    return float((position[-1] - position[-2]) / (stroke[1] - stroke[0]) / mean)
+
+
+def _sharpening(facts: Facts, target: Target) -> float:
+    whole, corners = facts.indices.first_order, facts.corner_indices.first_order
+    return float(facts.of(corners / corners.sum() - whole / whole.sum(), target.joints).sum())
+
+
+def _amplification_excess(facts: Facts, target: Target) -> float:
+    growth = facts.growth
+    product = growth.local_plunger if target.reading == "local" else growth.max_plunger
+    excess = growth.shares(product, facts.limits) - facts.indices.first_order
+    return float(facts.of(excess, target.joints).min())
+
+
+def _interaction(facts: Facts) -> Array:
+    return facts.indices.total_order - facts.indices.first_order
+
+
+def _interaction_order(facts: Facts, target: Target) -> float:
+    near, far = target.joints, facts.others(target.joints)
+    return float(facts.of(_interaction(facts), near).min() - facts.of(_interaction(facts), far).max())
+
+
+def _interaction_size(facts: Facts, target: Target) -> float:
+    return float(facts.of(_interaction(facts), target.joints).max())
+
+
+_MEASURES: dict[str, Callable[[Facts, Target], float]] = {
+    "worst_displacement": _worst_displacement,
+    "max_amplification_index": _max_index,
+    "first_order": _first_order,
+    "down_lock": _down_lock,
+    "travel": _travel,
+    "least_curvature": _least_curvature,
+    "end_rate": _end_rate,
+    "sharpening": _sharpening,
+    "amplification_excess": _amplification_excess,
+    "interaction_order": _interaction_order,
+    "interaction_size": _interaction_size,
+}

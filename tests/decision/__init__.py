@@ -1,0 +1,1 @@
+"""The decision: verdict, uncertainty, ranking, next action, repair sets."""

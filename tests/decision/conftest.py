@@ -1,0 +1,51 @@
+"""Inspections made by hand, and their judgement."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pytest
+
+from mlg_troubleshoot.decision.assess import AssessOptions, assess
+from mlg_troubleshoot.decision.assessment import Assessment
+from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.studies.table import IndexTable
+from mlg_troubleshoot.units import ClearanceConvention
+
+Judge = Callable[..., Assessment]
+
+
+def inspected(clearance_in: Mapping[int, float], **more: Any) -> Inspection:
+    """An inspection with these radial clearances."""
+    values: dict[str, Any] = {
+        "record_id": "R1",
+        "tail_no": "258401",
+        "side": Side.LH,
+        "convention": ClearanceConvention.RADIAL,
+        "clearance_in": clearance_in,
+        "gauge_u_is_default": False,
+    }
+    return Inspection(**{**values, **more})
+
+
+def every_joint(clearance_in: float, **others: float) -> dict[int, float]:
+    """All ten joints at one clearance, some at another: ``every_joint(0.001, j3=0.013)``."""
+    return dict.fromkeys(range(1, 11), clearance_in) | {int(name[1:]): value for name, value in others.items()}
+
+
+@pytest.fixture(scope="session")
+def judge(gear: Gear, table: IndexTable) -> Judge:
+    """Judge one inspection of the shipped gear; the same inspection is judged once, for judgements cannot change."""
+    judged: dict[Any, Assessment] = {}
+
+    def judge_one(clearance_in: Mapping[int, float], options: AssessOptions | None = None, **more: Any) -> Assessment:
+        key = (frozenset(clearance_in.items()), options, frozenset(more.items()))
+        if key not in judged:
+            (found,) = assess([inspected(clearance_in, **more)], gear, table, options)
+            assert isinstance(found, Assessment)
+            judged[key] = found
+        return judged[key]
+
+    return judge_one

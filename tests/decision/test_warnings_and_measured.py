@@ -1,0 +1,165 @@
+"""What is laid over every verdict: limits, a failure that clearances do not explain, a measured plunger."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from decision.conftest import Judge, every_joint, inspected
+from mlg_troubleshoot.decision.assessment import Action, Verdict
+from mlg_troubleshoot.decision.inspection import Outcome
+from mlg_troubleshoot.decision.measured import disagreement, reading_uncertainty
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.reporting.json_form import check_as_json
+
+NOT_EXPLAINED = "Joint clearances do not explain this failure: check hydraulics, reversing valve, doors."
+
+
+def said(warnings: tuple[str, ...], words: str) -> bool:
+    return any(words in warning for warning in warnings)
+
+
+@pytest.mark.parametrize("base", [0.0, 0.002, 0.006])
+def test_a_joint_above_its_limit_is_rejected_to_the_manual_whatever_the_verdict(judge: Judge, base: float) -> None:
+    found = judge(every_joint(base, j7=0.008))
+    assert said(found.warnings, "#7 bellcrank input joint: 0.0080 in radial is above its limit of 0.0075 in")
+    assert said(found.warnings, "reject to the manual")
+    assert 7 in found.next_action.joints
+    assert found.next_action.action is Action.RESTORE
+
+
+def test_the_limit_is_said_to_be_assumed(judge: Judge) -> None:
+    assert said(judge(every_joint(0.0, j7=0.008)).warnings, "(assumed)")
+
+
+def test_a_joint_above_its_limit_does_not_change_the_verdict(judge: Judge) -> None:
+    assert judge(every_joint(0.0, j7=0.008)).verdict is Verdict.WITHIN_MARGIN
+
+
+def test_a_joint_at_its_limit_is_not_above_it_even_if_read_in_millimetres(judge: Judge) -> None:
+    found = judge(every_joint(0.0, j7=0.1905 / 25.4))
+    assert not any(joint.over_limit for joint in found.joints)
+
+
+def test_a_failure_within_the_margin_is_not_explained_by_clearances(judge: Judge) -> None:
+    found = judge(every_joint(0.001), outcome=Outcome.FAILED)
+    assert found.verdict is Verdict.WITHIN_MARGIN
+    assert found.next_action.text == NOT_EXPLAINED
+    assert NOT_EXPLAINED in found.headline
+
+
+def test_a_failure_within_the_margin_is_not_explained_even_with_a_joint_above_its_limit(judge: Judge) -> None:
+    assert NOT_EXPLAINED in judge(every_joint(0.001, j7=0.008), outcome=Outcome.FAILED).headline
+
+
+def test_a_failure_outside_the_margin_is_not_said_to_be_unexplained(judge: Judge) -> None:
+    assert NOT_EXPLAINED not in judge({3: 0.013, 5: 0.007}, outcome=Outcome.FAILED).headline
+
+
+def test_within_is_said_not_to_be_a_release(judge: Judge) -> None:
+    assert "not a release" in judge(every_joint(0.001)).headline
+
+
+def test_outside_is_said_as_could_and_never_as_will_with_both_numbers(judge: Judge) -> None:
+    headline = judge({3: 0.013, 5: 0.007}).headline
+    assert headline.startswith("Clearances could push the plunger outside its margin")
+    assert "worst case 0.0472 in, chance with random directions 25 %" in headline
+    assert "will" not in headline.split()
+
+
+def test_incomplete_names_the_joints_that_are_not_measured(judge: Judge) -> None:
+    headline = judge(dict.fromkeys((1, 2, 4, 5, 6, 7, 8, 9), 0.001)).headline
+    assert headline.startswith("Cannot clear: not measured #3, #10 ")
+
+
+def test_a_measured_displacement_beyond_the_margin_is_said_first_whatever_the_prediction(
+    gear: Gear, judge: Judge
+) -> None:
+    found = judge(every_joint(0.001), readings_in=(-0.040, -0.042))
+    form = check_as_json(gear, [found], [], [])["inspections"][0]
+    assert found.verdict is Verdict.WITHIN_MARGIN
+    assert form["warnings"][0].startswith("MEASURED: the plunger stands 0.0410 in short of mid-position, outside")
+
+
+def test_a_measured_displacement_within_the_margin_is_said_quietly(judge: Judge) -> None:
+    statement = judge(every_joint(0.001), readings_in=(0.012,)).measured_statement
+    assert statement == "Measured: the plunger stands 0.0120 in beyond mid-position, within its margin of 0.0300 in."
+
+
+def test_without_a_reading_nothing_is_said_about_a_measurement(judge: Judge) -> None:
+    assert judge(every_joint(0.001)).measured_statement is None
+
+
+def test_the_measured_displacement_is_the_mean_of_the_readings(judge: Judge) -> None:
+    assert judge({}, readings_in=(0.01, 0.02, 0.06)).inspection.measured_displacement_in == pytest.approx(0.03)
+
+
+@pytest.mark.parametrize(("apart", "flagged"), [(1.99, False), (2.01, True), (-1.99, False), (-2.01, True)])
+def test_measured_and_predicted_differ_from_two_combined_standard_uncertainties_on(apart: float, flagged: bool) -> None:
+    u = math.hypot(0.004, 0.003)
+    reading = inspected({}, readings_in=(0.02 + apart * u,), plunger_gauge_u_in=0.003)
+    assert (disagreement(reading, 0.02, -0.02, 0.004) is not None) == flagged
+
+
+def test_a_reading_inside_the_bounds_is_said_to_be_possible() -> None:
+    text = disagreement(inspected({}, readings_in=(0.0,)), 0.05, -0.05, 0.004)
+    assert text is not None
+    assert "the clearances need not be taken up in the worst direction" in text
+
+
+def test_a_reading_beyond_the_bounds_is_said_to_be_impossible_with_its_possible_causes() -> None:
+    text = disagreement(inspected({}, readings_in=(0.09,)), 0.05, -0.05, 0.004)
+    assert text is not None
+    assert "beyond what the entered clearances can do in any direction" in text
+    for cause in ("wrong unit or convention", "an unmeasured joint", "rigging", "plunger gauge"):
+        assert cause in text
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [(25.4, "millimetres entered as inches"), (10.0, "decimal point"), (2.0, "total play entered as radial")],
+)
+def test_a_slip_that_would_explain_the_difference_is_suggested(factor: float, words: str) -> None:
+    text = disagreement(inspected({}, readings_in=(0.02 * factor,)), 0.02, -0.02, 0.001)
+    assert text is not None
+    assert words in text
+
+
+def test_a_suggested_slip_is_never_applied(judge: Judge) -> None:
+    plain, read = judge(every_joint(0.001)), judge(every_joint(0.001), readings_in=(0.1321,))
+    assert said(read.warnings, "decimal point")
+    assert (read.predicted_displacement_in, read.verdict) == (plain.predicted_displacement_in, plain.verdict)
+
+
+@pytest.mark.parametrize(
+    ("declared", "readings", "expected"),
+    [(None, 1, (0.0005, "default")), (None, 4, (0.00025, "default")), (0.002, 4, (0.001, "declared"))],
+)
+def test_the_mean_of_repeat_readings_is_better_than_one(
+    declared: float | None, readings: int, expected: tuple[float, str]
+) -> None:
+    found = reading_uncertainty(inspected({}, readings_in=(0.01,) * readings, plunger_gauge_u_in=declared))
+    assert found == (pytest.approx(expected[0]), expected[1])
+
+
+def test_a_default_gauge_uncertainty_is_shown_as_a_default(judge: Judge) -> None:
+    assert said(judge(every_joint(0.001), gauge_u_is_default=True).warnings, "taken as the default")
+    assert not said(judge(every_joint(0.001)).warnings, "default")
+
+
+@pytest.mark.parametrize(("down_lock", "warned"), [(0.009, True), (0.01, False), (0.05, False), (0.051, True)])
+def test_a_down_lock_position_outside_the_technical_order_is_a_matter_of_rigging(
+    judge: Judge, down_lock: float, warned: bool
+) -> None:
+    assert said(judge(every_joint(0.001), plunger_down_lock_in=down_lock).warnings, "check the rigging") == warned
+
+
+def test_a_failed_gear_without_a_plunger_reading_is_asked_for_one(judge: Judge) -> None:
+    words = "no plunger displacement was measured"
+    assert said(judge(every_joint(0.001), outcome=Outcome.FAILED).warnings, words)
+    assert not said(judge(every_joint(0.001), outcome=Outcome.FAILED, readings_in=(0.01,)).warnings, words)
+
+
+def test_what_the_reader_noticed_stays_with_the_judgement(judge: Judge) -> None:
+    assert judge(every_joint(0.001), warnings=("joint 3 above 0.015 in",)).warnings[0] == "joint 3 above 0.015 in"

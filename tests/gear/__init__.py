@@ -1,0 +1,1 @@
+"""The gear: its file, its linkages, clearances as virtual links, worst directions."""

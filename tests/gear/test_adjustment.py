@@ -1,0 +1,82 @@
+"""Changes inside the model, row by row: numbers changed or scaled, calibration rate, offset."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
+from mlg_troubleshoot.gear.directions import chance_beyond, worst_case
+from mlg_troubleshoot.gear.gear import Gear
+
+CLEARANCE = np.tile(np.linspace(0.001, 0.005, 10), (3, 1))
+LINK = "length.3-5"
+
+
+def test_an_empty_adjustment_changes_nothing(gear: Gear) -> None:
+    plain, adjusted = worst_case(gear.model, CLEARANCE), adjusted_worst_case(gear.model, Adjustment(CLEARANCE))
+    assert np.array_equal(plain.over_in, adjusted.over_in)
+
+
+def test_an_offset_is_added_to_both_senses_with_its_sign(gear: Gear) -> None:
+    plain = worst_case(gear.model, CLEARANCE)
+    adjusted = adjusted_worst_case(gear.model, Adjustment(CLEARANCE, offset_in=np.array([0.0, 0.004, -0.004])))
+    assert adjusted.over_in - plain.over_in == pytest.approx([0.0, 0.004, -0.004])
+    assert adjusted.under_in - plain.under_in == pytest.approx([0.0, 0.004, -0.004])
+
+
+def test_a_rate_factor_multiplies_both_senses_and_not_the_offset(gear: Gear) -> None:
+    plain = worst_case(gear.model, CLEARANCE)
+    adjusted = adjusted_worst_case(
+        gear.model, Adjustment(CLEARANCE, rate_factor=np.full(3, 1.1), offset_in=np.full(3, 0.002))
+    )
+    assert adjusted.over_in == pytest.approx(1.1 * plain.over_in + 0.002)
+    assert adjusted.under_in == pytest.approx(1.1 * plain.under_in + 0.002)
+
+
+def test_a_changed_number_is_added_to_its_nominal_value(gear: Gear) -> None:
+    nominal = gear.model.kernel.parameters[gear.model.kernel.parameter_index(LINK)]
+    numbers = Adjustment(CLEARANCE, changed={LINK: np.array([0.0, 0.01, -0.01])}).numbers(gear.model)
+    assert numbers[LINK] == pytest.approx(nominal + np.array([0.0, 0.01, -0.01]))
+
+
+def test_a_scaled_number_is_multiplied_and_then_changed(gear: Gear) -> None:
+    nominal = gear.model.kernel.parameters[gear.model.kernel.parameter_index(LINK)]
+    both = Adjustment(CLEARANCE, changed={LINK: np.full(3, 0.01)}, scaled={LINK: np.full(3, 0.999)})
+    assert both.numbers(gear.model)[LINK] == pytest.approx(np.full(3, 0.999 * nominal + 0.01))
+
+
+def test_each_linkage_of_the_ensemble_changes_its_own_nominal_number(gear: Gear) -> None:
+    adjustment = Adjustment(CLEARANCE, changed={LINK: np.full(3, 0.01)})
+    found = {float(adjustment.numbers(model)[LINK][0]) for model in gear.ensemble_models}
+    assert len(found) == 10
+
+
+def test_a_longer_link_shifts_both_senses_by_what_the_link_alone_does(gear: Gear) -> None:
+    zero = np.zeros((1, 10))
+    longer = adjusted_worst_case(gear.model, Adjustment(zero, changed={LINK: np.array([0.002])}))
+    assert longer.over_in == pytest.approx(longer.under_in)
+    assert abs(longer.over_in[0]) == pytest.approx(0.002 * gear.model.plunger_amplification()[2], rel=0.02)
+
+
+def test_rows_are_adjusted_independently(gear: Gear) -> None:
+    adjusted = adjusted_worst_case(gear.model, Adjustment(CLEARANCE, changed={LINK: np.array([0.0, 0.002, 0.0])}))
+    plain = worst_case(gear.model, CLEARANCE)
+    assert (adjusted.over_in != plain.over_in).tolist() == [False, True, False]
+
+
+def test_the_clearances_that_act_may_differ_from_the_measured_ones(gear: Gear) -> None:
+    adjusted = adjusted_worst_case(gear.model, Adjustment(0.5 * CLEARANCE))
+    assert adjusted.over_in == pytest.approx(worst_case(gear.model, 0.5 * CLEARANCE).over_in)
+
+
+def test_the_chance_with_random_directions_counts_rate_and_offset(gear: Gear) -> None:
+    clearance, margin = CLEARANCE[:1], np.array([0.03])
+    moved = chance_beyond(gear.model, clearance, margin, 512, offset_in=np.array([0.025]))
+    grown = chance_beyond(gear.model, clearance, margin, 512, rate_factor=np.array([3.0]))
+    assert min(moved[0], grown[0]) > chance_beyond(gear.model, clearance, margin, 512)[0]
+
+
+def test_an_offset_alone_decides_when_there_is_no_clearance(gear: Gear) -> None:
+    zero, margin = np.zeros((2, 10)), np.full(2, 0.03)
+    assert chance_beyond(gear.model, zero, margin, 64, offset_in=np.array([0.029, 0.031])).tolist() == [0.0, 1.0]

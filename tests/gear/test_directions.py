@@ -1,0 +1,192 @@
+"""Directions of the virtual links: worst directions joint by joint, and uniformly random ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.stats import qmc
+
+from mlg_troubleshoot.gear.directions import chance_beyond, random_directions, worst_case
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.model import LinkageModel, links_from
+
+FAILURE = np.array([[0, 0, 0.013, 0, 0.007, 0, 0, 0, 0, 0]])
+MARGIN_IN = 0.03
+clearances = arrays(float, 10, elements=st.floats(0, 0.0075))
+
+
+def best_over_all_directions(model: LinkageModel, clearance: np.ndarray, sense: float) -> float:
+    """The global optimum: coordinate ascent over 72 angles a joint, then finer, from many random starts."""
+    rng = np.random.default_rng(10)
+    starts = rng.uniform(0, 2 * np.pi, (12, 10))
+    for width in (np.pi, np.pi, 0.1, 0.02, 0.004, 0.001):
+        offsets = np.linspace(-width, width, 73)
+        for _ in range(2):
+            for j in range(10):
+                tried = np.repeat(starts[:, None, :], len(offsets), axis=1)
+                tried[:, :, j] += offsets
+                moved = sense * model.displacement(links_from(clearance, tried))
+                starts = tried[np.arange(len(starts)), np.argmax(moved, axis=1)]
+    return float(np.max(sense * model.displacement(links_from(clearance, starts))))
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+@pytest.mark.parametrize(
+    "clearance", [np.full(10, 0.0075), FAILURE[0], np.linspace(0.001, 0.012, 10)], ids=["all", "failure", "mixed"]
+)
+def test_the_sequential_rule_is_within_four_in_ten_thousand_of_the_global_optimum(
+    gear: Gear, clearance: np.ndarray, sense: float
+) -> None:
+    worst = worst_case(gear.model, clearance)
+    found = (sense * (worst.over_in if sense > 0 else worst.under_in))[0]
+    assert found == pytest.approx(best_over_all_directions(gear.model, clearance, sense), rel=4e-4)
+
+
+@given(clearance=clearances)
+def test_over_travel_is_never_negative_and_under_travel_never_positive(gear: Gear, clearance: np.ndarray) -> None:
+    worst = worst_case(gear.model, clearance)
+    assert worst.under_in[0] <= 0.0 <= worst.over_in[0]
+
+
+@given(clearance=clearances, direction=arrays(float, 10, elements=st.floats(-np.pi, np.pi)))
+def test_no_other_directions_go_beyond_the_worst_ones_by_more_than_that(
+    gear: Gear, clearance: np.ndarray, direction: np.ndarray
+) -> None:
+    worst = worst_case(gear.model, clearance)
+    moved = float(gear.model.displacement(links_from(clearance, direction)))
+    assert worst.under_in[0] * 1.0004 - 1e-9 <= moved <= worst.over_in[0] * 1.0004 + 1e-9
+
+
+def test_the_reported_directions_give_the_reported_displacements(gear: Gear) -> None:
+    clearance = np.random.default_rng(11).uniform(0, 0.0075, (20, 10))
+    worst = worst_case(gear.model, clearance)
+    over = gear.model.displacement(links_from(clearance, worst.over_directions))
+    under = gear.model.displacement(links_from(clearance, worst.under_directions))
+    assert over == pytest.approx(worst.over_in, abs=1e-14)
+    assert under == pytest.approx(worst.under_in, abs=1e-14)
+
+
+def test_the_magnitude_is_the_larger_sense_and_its_directions_govern(gear: Gear) -> None:
+    worst = worst_case(gear.model, np.full((1, 10), 0.0075))
+    assert worst.magnitude_in[0] == worst.over_in[0] > -worst.under_in[0]
+    assert np.array_equal(worst.governing_directions, worst.over_directions)
+
+
+def test_under_travel_governs_where_it_is_larger(gear: Gear) -> None:
+    # Both senses of a linkage whose output is read the other way round.
+    worst = worst_case(gear.model, FAILURE)
+    turned = type(worst)(-worst.under_in, -worst.over_in, worst.under_directions, worst.over_directions)
+    assert turned.magnitude_in[0] == worst.over_in[0]
+    assert np.array_equal(turned.governing_directions, worst.over_directions)
+
+
+def test_directions_are_chosen_from_the_most_remote_joint_to_the_nearest(gear: Gear) -> None:
+    """Each joint's direction is the best one while all joints nearer to the input have no clearance yet."""
+    clearance = np.full(10, 0.0075)
+    chosen = worst_case(gear.model, clearance).over_directions[0]
+    turns = np.linspace(0, 2 * np.pi, 721)
+    for j in range(10):
+        partly = np.where(np.arange(10) >= j, clearance, 0.0)
+        tried = np.tile(chosen, (len(turns), 1))
+        tried[:, j] = turns
+        best = gear.model.displacement(links_from(partly, tried)).max()
+        assert float(gear.model.displacement(links_from(partly, chosen))) >= best - 1e-9
+
+
+def test_each_gear_of_a_batch_gets_the_directions_of_its_own_clearances(gear: Gear) -> None:
+    clearance = np.random.default_rng(12).uniform(0, 0.0075, (600, 10))
+    batch = worst_case(gear.model, clearance)
+    for i in (0, 511, 512, 599):
+        alone = worst_case(gear.model, clearance[i])
+        assert (alone.over_in[0], alone.under_in[0]) == pytest.approx((batch.over_in[i], batch.under_in[i]), abs=1e-14)
+
+
+def test_a_joint_without_clearance_still_has_the_direction_in_which_it_would_act(gear: Gear) -> None:
+    worst = worst_case(gear.model, np.zeros(10))
+    tiny = gear.model.displacement(links_from(np.eye(10) * 1e-5, worst.over_directions))
+    assert tiny / 1e-5 == pytest.approx(gear.model.plunger_amplification(), rel=1e-3)
+
+
+def test_without_clearance_the_plunger_does_not_move(gear: Gear) -> None:
+    worst = worst_case(gear.model, np.zeros(10))
+    assert (worst.over_in[0], worst.under_in[0]) == pytest.approx((0.0, 0.0), abs=1e-15)
+
+
+def test_a_gear_that_does_not_close_is_nan_and_the_others_of_the_batch_are_not(gear: Gear) -> None:
+    worst = worst_case(gear.model, np.array([[0.005] * 10, [0.05] * 10]))
+    assert np.isnan(worst.magnitude_in).tolist() == [False, True]
+
+
+def test_the_failure_case_exceeds_its_margin_in_a_quarter_of_random_directions(gear: Gear) -> None:
+    assert chance_beyond(gear.model, FAILURE, np.array([MARGIN_IN]), 4096)[0] == pytest.approx(0.25, abs=0.01)
+
+
+def test_with_two_worn_joints_the_chance_is_what_their_two_angles_give(gear: Gear) -> None:
+    # Both ends of one link act along one line: the sum of two vectors, integrated over both angles.
+    turns = 2 * np.pi * (np.arange(400) + 0.5) / 400
+    directions = np.zeros((400, 400, 10))
+    directions[:, :, 2], directions[:, :, 4] = np.meshgrid(turns, turns)
+    moved = gear.model.displacement(links_from(FAILURE[0], directions))
+    chance = chance_beyond(gear.model, FAILURE, np.array([MARGIN_IN]), 4096)[0]
+    assert chance == pytest.approx(np.mean(np.abs(moved) > MARGIN_IN), abs=0.003)
+
+
+@pytest.fixture(scope="module")
+def worn_gears() -> np.ndarray:
+    """Gears with clearances spread evenly over 0 to 0.0075 in."""
+    return 0.0075 * qmc.Sobol(10, seed=13).random(1024)
+
+
+def test_gears_worn_up_to_the_limit_exceed_in_five_percent_of_random_directions(
+    gear: Gear, worn_gears: np.ndarray
+) -> None:
+    chance = chance_beyond(gear.model, worn_gears, np.full(len(worn_gears), MARGIN_IN), 512)
+    assert chance.mean() == pytest.approx(0.05, abs=0.005)
+
+
+def test_gears_worn_up_to_the_limit_exceed_with_worst_directions_in_97_percent(
+    gear: Gear, worn_gears: np.ndarray
+) -> None:
+    beyond = worst_case(gear.model, worn_gears).magnitude_in > MARGIN_IN
+    assert beyond.mean() == pytest.approx(0.97, abs=0.015)
+
+
+def test_the_chance_is_zero_without_clearance(gear: Gear) -> None:
+    assert chance_beyond(gear.model, np.zeros((2, 10)), np.full(2, MARGIN_IN), 64).tolist() == [0.0, 0.0]
+
+
+def test_a_position_that_does_not_close_counts_as_beyond_the_margin(gear: Gear) -> None:
+    clearance = np.zeros((1, 10))
+    clearance[0, 0] = 100.0
+    assert chance_beyond(gear.model, clearance, np.array([1e9]), 64)[0] == 1.0
+
+
+def test_the_same_directions_are_used_at_every_call() -> None:
+    assert np.array_equal(random_directions(10, 100), random_directions(10, 100))
+
+
+def test_random_directions_lie_on_the_circle() -> None:
+    turns = random_directions(10, 1000)
+    assert turns.min() >= 0.0
+    assert turns.max() < 2 * np.pi
+
+
+def test_random_directions_are_spread_more_evenly_than_plain_monte_carlo() -> None:
+    lattice = qmc.discrepancy(random_directions(10, 1024) / (2 * np.pi), method="WD")
+    rng = np.random.default_rng(14)
+    plain = [qmc.discrepancy(rng.random((1024, 10)), method="WD") for _ in range(5)]
+    assert lattice < 0.5 * min(plain)
+
+
+def test_every_pair_of_random_directions_is_spread_evenly() -> None:
+    turns = random_directions(10, 4096) / (2 * np.pi)
+    worst = 0.0
+    for i in range(10):
+        for j in range(i):
+            counts, _, _ = np.histogram2d(turns[:, i], turns[:, j], bins=8, range=[[0, 1], [0, 1]])
+            worst = max(worst, np.abs(counts / 64 - 1).max())
+    # A plain sample is off by four standard deviations of 1/8 in the worst of 2,880 cells.
+    assert worst < 0.35

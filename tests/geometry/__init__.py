@@ -1,0 +1,1 @@
+"""The geometric engine: vectors, mechanisms as data, and their solution in batch."""

@@ -1,0 +1,1 @@
+"""Effects hidden in simulated inspections, and the requirement that they are found."""

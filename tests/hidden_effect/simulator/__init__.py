@@ -1,0 +1,41 @@
+"""An independent simulator of inspected landing gears: draws a fleet, hides effects in it, keeps the label.
+
+It shares nothing with the program that it tests but the coordinates of the joints.
+"""
+
+from .causes import CATALOGUE, OFF_CATALOGUE
+from .generate import (
+    KINDS,
+    NULLS,
+    Effect,
+    EffectSpec,
+    Fleet,
+    FleetSpec,
+    Label,
+    draw_fleet,
+    draw_spec,
+    follow_up,
+    simulate_fleet,
+    write_csv,
+)
+from .records import COLUMNS, FAULT_KINDS, Fault
+
+__all__ = [
+    "CATALOGUE",
+    "COLUMNS",
+    "FAULT_KINDS",
+    "KINDS",
+    "NULLS",
+    "OFF_CATALOGUE",
+    "Effect",
+    "EffectSpec",
+    "Fault",
+    "Fleet",
+    "FleetSpec",
+    "Label",
+    "draw_fleet",
+    "draw_spec",
+    "follow_up",
+    "simulate_fleet",
+    "write_csv",
+]

@@ -1,0 +1,65 @@
+"""A terminal that answers from a list, and short ways to drive the questions with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from datetime import datetime
+
+from mlg_troubleshoot.cli.prompts import Line, Preset, SessionStore, ask_inspection
+from mlg_troubleshoot.cli.prompts.flow import Effect, Flow, State, Turn
+from mlg_troubleshoot.cli.prompts.lines import without_tones
+from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+
+NOON = datetime(2026, 3, 4, 12, 0, 0)
+NOTHING = Preset()
+RADIAL_INCHES = Preset("N123AB", Side.LH, LengthUnit.INCH, ClearanceConvention.RADIAL)
+PLAY_INCHES = Preset("N123AB", Side.LH, LengthUnit.INCH, ClearanceConvention.TOTAL_PLAY)
+PLAY_MM = Preset("N123AB", Side.LH, LengthUnit.MILLIMETRE, ClearanceConvention.TOTAL_PLAY)
+
+
+class ScriptedTerminal:
+    """Types the given lines one after the other, then ends the input."""
+
+    width = 80
+
+    def __init__(self, typed: Iterable[str], end: type[BaseException] = EOFError) -> None:
+        self._typed = list(typed)
+        self._end = end
+        self.screen = ""
+        self.keystrokes = 0
+
+    def say(self, lines: Iterable[Line]) -> None:
+        self.screen += without_tones(lines) + "\n"
+
+    def ask(self, prompt: str) -> str:
+        self.screen += prompt
+        if not self._typed:
+            raise self._end
+        text = self._typed.pop(0)
+        self.keystrokes += len(text) + 1
+        self.screen += text + "\n"
+        return text
+
+
+def inspect(gear: Gear, store: SessionStore, typed: Iterable[str], preset: Preset = NOTHING, **more) -> Inspection:
+    return ask_inspection(gear, ScriptedTerminal(typed), store, preset, now=lambda: NOON, **more)
+
+
+def play(flow: Flow, typed: Iterable[str], preset: Preset = RADIAL_INCHES) -> Turn:
+    """Answer the questions of a flow from its beginning; the last turn is returned."""
+    turn = flow.begin(preset)
+    for text in typed:
+        assert turn.effect is not Effect.COMPUTE, f"nothing is asked any more, {text!r} is left"
+        turn = flow.answer(turn.state, text)
+    return turn
+
+
+def said(turn: Turn) -> str:
+    return without_tones(turn.lines)
+
+
+def shown(flow: Flow, state: State, width: int = 80) -> str:
+    page = flow.page(state, width)
+    return without_tones(page.lines) + "\n" + page.prompt

@@ -1,0 +1,141 @@
+"""Workbooks that LibreOffice wrote: samples every day, and fresh conversions in the slow part."""
+
+from __future__ import annotations
+
+import io
+import shutil
+import subprocess
+import zipfile
+
+import openpyxl
+import pytest
+
+from mlg_troubleshoot.records import ReadOptions, read_inspections, write_template
+
+JOINTS = [(n, f"name {n}", f"place {n}") for n in range(1, 11)]
+
+
+def fill(path):
+    """Write the template with one row of the table and one form filled in."""
+    write_template(path, JOINTS)
+    book = openpyxl.load_workbook(path)
+    sheet = book["Inspections"]
+    values = {"record_id": "R1", "tail_no": "007", "side": "LH", "clearance_convention": "TOTAL_PLAY"}
+    values |= {"clearance_3_in": 0.026, "clearance_5_in": 0.014, "work_order": "1E5"}
+    for cell in sheet[1]:
+        if cell.value in values:
+            sheet.cell(2, cell.column).value = values[cell.value]
+        if cell.value == "clearance_7_in":
+            sheet.cell(2, cell.column).value = "=0.002*2"
+    form = {"Record id": "F1", "Tail no": "N2", "Side": "RH", "Clearance convention": "RADIAL", "Unit": "mm"}
+    form["Clearance #3"] = 0.3302
+    for row in book["Form"].iter_rows(max_col=2):
+        if row[0].value in form:
+            row[1].value = form[row[0].value]
+    book.save(path)
+
+
+def check(path):
+    """Compare what was read with what was filled in."""
+    result = read_inspections(path, ReadOptions())
+    assert not result.problems
+    table, form = result.inspections
+    assert (table.record_id, table.tail_no, table.carried) == ("R1", "007", {"work_order": "1E5"})
+    assert dict(table.clearance_in) == {3: 0.013, 5: 0.007, 7: 0.002}
+    assert (form.record_id, form.source.sheet) == ("F1", "Form")
+    assert dict(form.clearance_in) == {3: pytest.approx(0.013)}
+    assert any("formula" in note for note in result.notes)
+
+
+@pytest.mark.parametrize("suffix", ["xlsx", "ods", "xls"])
+def test_the_template_saved_by_libreoffice_reads_back(samples, suffix):
+    check(samples / f"template_filled.{suffix}")
+
+
+def test_a_password_protected_open_document_is_named_as_such(samples, read):
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(samples / "sample.ods") as old, zipfile.ZipFile(buffer, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            if name == "META-INF/manifest.xml":
+                content = content.replace(b"</manifest:manifest>", b"<manifest:encryption-data/></manifest:manifest>")
+            new.writestr(name, b"\x93\x1f" * 40 if name == "content.xml" else content)
+    assert [p.code for p in read(buffer.getvalue(), "t.ods").problems] == ["password_protected"]
+
+
+def test_a_password_protected_old_workbook_is_named_as_such(samples, read):
+    data = bytearray((samples / "sample.xls").read_bytes())
+    start = data.find(b"\x09\x08\x10\x00\x00\x06\x05\x00")
+    data[start + 20 : start + 22] = b"\x2f\x00"
+    assert [p.code for p in read(bytes(data), "t.xls").problems] == ["password_protected"]
+
+
+@pytest.mark.parametrize("keep", [600, 3000, 6000])
+def test_a_truncated_old_workbook_is_named_as_damaged(samples, read, keep):
+    result = read((samples / "sample.xls").read_bytes()[:keep], "t.xls")
+    assert [p.code for p in result.problems] == ["file_damaged"]
+
+
+def test_an_old_office_file_that_is_no_workbook_is_refused(samples, read):
+    data = (samples / "sample.xls").read_bytes()
+    renamed = data.replace("Workbook".encode("utf-16-le"), "WordDoc1".encode("utf-16-le"))
+    assert [p.code for p in read(renamed, "t.doc").problems] == ["file_kind"]
+
+
+def convert(path, kind, folder):
+    """Convert a file with LibreOffice and return the new file."""
+    office = shutil.which("soffice")
+    if office is None:
+        pytest.skip("LibreOffice is not installed")
+    profile = f"-env:UserInstallation=file://{folder}/profile"
+    subprocess.run(
+        [office, profile, "--headless", "--convert-to", kind, "--outdir", str(folder), str(path)],
+        check=True,
+        capture_output=True,
+        timeout=120,
+    )
+    return folder / f"{path.stem}.{kind.partition(':')[0]}"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["xlsx", "ods", "xls"])
+def test_the_template_passes_through_libreoffice_unharmed(tmp_path, kind):
+    source = tmp_path / "filled.xlsx"
+    fill(source)
+    out = tmp_path / "out"
+    out.mkdir()
+    check(convert(source, kind, out))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("charset", "separator", "note"), [("76", "44", None), ("1", "59", "Windows-1252"), ("65535", "9", "UTF-16")]
+)
+def test_csv_written_by_libreoffice_is_read(tmp_path, xlsx, charset, separator, note):
+    source = tmp_path / "t.xlsx"
+    rows = [
+        ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "remarks"),
+        ("R1", "007", "LH", "RADIAL", 0.013, 'geprüft, "gut"\nzwei Zeilen'),
+    ]
+    source.write_bytes(xlsx(rows))
+    path = convert(source, f"csv:Text - txt - csv (StarCalc):{separator},34,{charset},1", tmp_path)
+    result = read_inspections(path, ReadOptions())
+    assert not result.problems
+    assert result.rows[0].tail_no == "007"
+    assert result.rows[0].carried["remarks"] == 'geprüft, "gut"\nzwei Zeilen'
+    assert any(note in n for n in result.notes) if note else not result.notes
+
+
+@pytest.mark.slow
+def test_libreoffice_opens_an_annotated_workbook_and_calculates_it(tmp_path, samples):
+    from mlg_troubleshoot.records import annotate_workbook
+
+    out = tmp_path / "annotated.xlsx"
+    result = read_inspections(samples / "sample.xlsx", ReadOptions())
+    annotate_workbook(samples / "sample.xlsx", out, result, {r.source: {"verdict": "=1+1"} for r in result.rows})
+    folder = tmp_path / "again"
+    folder.mkdir()
+    sheet = openpyxl.load_workbook(convert(out, "xlsx", folder))["Inspections"]
+    assert sheet["I2"].value == "=1+1"
+    assert sheet["I2"].data_type == "s"
+    assert "expected" in sheet["E4"].comment.text

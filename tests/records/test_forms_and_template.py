@@ -1,0 +1,195 @@
+"""The template workbook and vertical forms: filled in, they read back."""
+
+from __future__ import annotations
+
+import io
+
+import openpyxl
+import pytest
+
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
+from mlg_troubleshoot.errors import OutputError
+from mlg_troubleshoot.records import ReadOptions, read_inspections, write_template
+from mlg_troubleshoot.units import LengthUnit
+
+JOINTS = [(n, f"name {n}", f"place {n}") for n in range(1, 11)]
+FILLED = {
+    "Record id": "F1",
+    "Tail no": "007",
+    "Side": "RH",
+    "Clearance convention": "TOTAL_PLAY",
+    "Unit": "mm",
+    "Clearance #3": 0.6604,
+    "Clearance #5": "0.3556",
+    "Plunger displacement 2": -0.254,
+    "Margin": 0.762,
+    "Remarks": "=not a formula",
+}
+
+
+@pytest.fixture
+def template(tmp_path):
+    """Write the template and return its path."""
+    path = tmp_path / "template.xlsx"
+    write_template(path, JOINTS)
+    return path
+
+
+def fill_form(sheet, values):
+    """Fill in the lines of a form by their labels."""
+    for row in sheet.iter_rows(min_row=1, max_col=2):
+        if row[0].value in values:
+            row[1].value = values[row[0].value]
+            if isinstance(row[1].value, str):
+                row[1].data_type = "s"
+
+
+def fill_table(sheet, row, values):
+    """Fill in a row of the table by its headers."""
+    for cell in sheet[1]:
+        if cell.value in values:
+            sheet.cell(row, cell.column).value = values[cell.value]
+
+
+def test_the_untouched_template_says_that_there_is_nothing_in_it(template):
+    result = read_inspections(template, ReadOptions())
+    assert [p.code for p in result.problems] == ["no_rows"]
+    assert result.rows == ()
+
+
+def test_every_header_of_the_template_is_canonical(template):
+    book = openpyxl.load_workbook(template)
+    fill_table(
+        book["Inspections"], 2, {"record_id": "R1", "tail_no": "1", "side": "LH", "clearance_convention": "RADIAL"}
+    )
+    book.save(template)
+    result = read_inspections(template, ReadOptions())
+    assert not result.problems
+    assert not [note for note in result.notes if "read as" in note or "not used" in note]
+    (layout,) = result.layouts
+    assert all(column.read_as == column.header for column in layout.columns)
+    assert {f"clearance_{n}_in" for n in range(1, 11)} <= {column.header for column in layout.columns}
+
+
+@pytest.mark.parametrize("unit", list(LengthUnit))
+def test_a_filled_in_table_reads_back_in_its_unit(tmp_path, unit):
+    path = tmp_path / "t.xlsx"
+    write_template(path, JOINTS, unit=unit)
+    book = openpyxl.load_workbook(path)
+    values = {"record_id": "R1", "tail_no": "007", "side": "LH", "clearance_convention": "RADIAL"}
+    values[f"clearance_3_{unit.value}"] = unit.from_inches(0.013)
+    fill_table(book["Inspections"], 2, values)
+    book.save(path)
+    result = read_inspections(path, ReadOptions())
+    assert not result.problems
+    assert result.rows[0].clearance_in == {3: pytest.approx(0.013)}
+
+
+def test_a_filled_in_form_reads_back(template):
+    book = openpyxl.load_workbook(template)
+    fill_form(book["Form"], FILLED)
+    book.save(template)
+    result = read_inspections(template, ReadOptions())
+    assert not result.problems
+    (row,) = result.rows
+    assert isinstance(row, Inspection)
+    assert (row.record_id, row.tail_no) == ("F1", "007")
+    assert row.clearance_in == {3: pytest.approx(0.013), 5: pytest.approx(0.007)}
+    assert row.readings_in == (pytest.approx(-0.01),)
+    assert row.margin_in == pytest.approx(0.03)
+    assert row.carried == {"remarks": "=not a formula"}
+    assert row.source.sheet == "Form"
+
+
+def test_many_copies_of_the_form_are_many_inspections_and_an_untouched_one_is_none(template):
+    book = openpyxl.load_workbook(template)
+    for number in range(3):
+        copy = book.copy_worksheet(book["Form"])
+        copy.title = f"Form {number + 2}"
+        fill_form(copy, {**FILLED, "Record id": f"F{number}"})
+    fill_table(
+        book["Inspections"],
+        2,
+        {"record_id": "R1", "tail_no": "1", "side": "LH", "clearance_convention": "RADIAL", "clearance_3_in": 0.001},
+    )
+    book.save(template)
+    result = read_inspections(template, ReadOptions())
+    assert not result.problems
+    assert [row.record_id for row in result.rows] == ["R1", "F0", "F1", "F2"]
+
+
+def test_a_bad_value_of_a_form_is_named_at_its_cell(template):
+    book = openpyxl.load_workbook(template)
+    fill_form(book["Form"], {**FILLED, "Clearance #3": -1, "Side": None})
+    book.save(template)
+    result = read_inspections(template, ReadOptions())
+    assert [(p.sheet, p.column, p.cell, p.value) for p in result.problems] == [
+        ("Form", "Side", "B6", None),
+        ("Form", "Clearance #3", "B11", "-1"),
+    ]
+    assert isinstance(result.rows[0], InvalidRow)
+
+
+def test_a_form_with_only_unit_and_convention_chosen_is_untouched(template):
+    book = openpyxl.load_workbook(template)
+    fill_form(book["Form"], {"Unit": "mm", "Clearance convention": "RADIAL"})
+    book.save(template)
+    assert [p.code for p in read_inspections(template, ReadOptions()).problems] == ["no_rows"]
+
+
+def test_a_form_that_is_partly_filled_in_is_an_inspection_with_problems(template):
+    book = openpyxl.load_workbook(template)
+    fill_form(book["Form"], {"Clearance #3": 0.013})
+    book.save(template)
+    result = read_inspections(template, ReadOptions())
+    assert len(result.rows) == 1
+    assert {p.code for p in result.problems} == {
+        "record_id_missing",
+        "tail_no_missing",
+        "side_missing",
+        "convention_missing",
+        "unit_missing",
+    }
+
+
+def test_a_form_of_another_maker_is_read_and_its_labels_shown(read):
+    book = openpyxl.Workbook()
+    sheet = book.worksheets[0]
+    lines = [("Inspection sheet", None), ("Record No.:", "R1"), ("Tail number:", "N1"), ("Side:", "LH")]
+    lines += [("Convention:", "DIAMETRAL"), ("Joint 3 (in):", 0.026), ("Joint 5 (in):", 0.014), ("Signature", None)]
+    for row, (label, value) in enumerate(lines, 1):
+        sheet.cell(row, 2, label)
+        sheet.merge_cells(start_row=row, end_row=row, start_column=2, end_column=3)
+        sheet.cell(row, 4, value)
+    buffer = io.BytesIO()
+    book.save(buffer)
+    result = read(buffer.getvalue(), "f.xlsx")
+    assert not result.problems
+    assert result.rows[0].clearance_in == {3: 0.013, 5: 0.007}
+    assert any('cell B6 "Joint 3 (in):" read as clearance_3_in' in note for note in result.notes)
+
+
+def test_the_template_has_lists_of_choices_and_explains_each_column(template):
+    sheet = openpyxl.load_workbook(template)["Inspections"]
+    choices = {rule.formula1 for rule in sheet.data_validations.dataValidation if rule.type == "list"}
+    assert {'"LH,RH"', '"RADIAL,DIAMETRAL,TOTAL_PLAY"', '"EXTENDING,RETRACTING"', '"RETRACTED,FAILED"'} <= choices
+    assert all(cell.comment is not None for cell in sheet[1])
+    assert "place 3" in next(c.comment.text for c in sheet[1] if c.value == "clearance_3_in")
+    assert sheet.freeze_panes == "D2"
+
+
+def test_identities_of_the_template_are_text_cells(template):
+    sheet = openpyxl.load_workbook(template)["Inspections"]
+    formats = {sheet.cell(1, c.column).value: c.number_format for c in sheet[2]}
+    assert all(formats[name] == "@" for name in ("record_id", "tail_no", "gauge_id", "work_order"))
+
+
+def test_the_template_holds_no_formula(template):
+    book = openpyxl.load_workbook(template)
+    assert not [c for sheet in book for row in sheet.iter_rows() for c in row if c.data_type == "f"]
+
+
+def test_a_template_that_cannot_be_written_is_an_output_error(tmp_path):
+    with pytest.raises(OutputError, match="missing"):
+        write_template(tmp_path / "missing" / "t.xlsx", JOINTS)
+    assert not list(tmp_path.iterdir())

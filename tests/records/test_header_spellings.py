@@ -1,0 +1,139 @@
+"""Headers as people write them: understood and said, or doubtful and asked for, never guessed."""
+
+from __future__ import annotations
+
+import pytest
+
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
+from mlg_troubleshoot.errors import UsageError
+
+HEADER = ("record_id", "tail_no", "side", "clearance_convention")
+GOOD = ("R1", "N1", "LH", "RADIAL")
+
+UNDERSTOOD = {
+    "Joint 3 (in)": ("in", 0.013),
+    "J3 [mm]": ("mm", 0.3302),
+    "Clearance #3 – short link inner (in)": ("in", 0.013),
+    "Clearance #3: short link inner bearing [in]": ("in", 0.013),
+    "CLEARANCE 3 IN": ("in", 0.013),
+    "Joint No. 3 (thou)": ("thou", 13),
+    "Joint 3 in mm": ("mm", 0.3302),
+    'J3 (")': ("in", 0.013),
+    "#3 (in)": ("in", 0.013),
+    "J3\u00a0(in) *": ("in", 0.013),
+}
+
+
+@pytest.mark.parametrize("header", UNDERSTOOD)
+def test_a_close_variant_is_understood_and_the_mapping_shown(read, xlsx, header):
+    unit, value = UNDERSTOOD[header]
+    result = read(xlsx([(*HEADER, header), (*GOOD, value)]), "t.xlsx")
+    assert result.rows[0].clearance_in[3] == pytest.approx(0.013)
+    assert any(note.endswith(f"read as clearance_3_{unit}") and "column E" in note for note in result.notes)
+
+
+@pytest.mark.parametrize("header", ["Joint 3", "J3", "#3", "Clearance #3 – short link inner", "clearance_3"])
+def test_a_variant_without_a_unit_needs_the_unit_declared(read, table, header):
+    text = table((*HEADER, header), [(*GOOD, 0.013)])
+    assert [p.code for p in read(text).problems] == ["unit_missing"]
+    assert read(text, unit="in").rows[0].clearance_in == {3: 0.013}
+
+
+DOUBTFUL = [
+    "Clearance #3 – short link outer (in)",
+    "J3 (cm)",
+    "Joint 3 limit (in)",
+    "Joint 3 old (in)",
+    "J3 radial (in)",
+    "Play J3 (in)",
+    "Joint 3/5 (in)",
+    "Joint three (in)",
+    "3 (in)",
+    "3",
+    "clearance_3_in_old",
+    "Short link inner (in)",
+]
+
+
+@pytest.mark.parametrize("header", DOUBTFUL)
+def test_a_doubtful_header_is_refused_with_a_hint_to_map_it(read, table, header):
+    result = read(table((*HEADER, "clearance_1_in", header), [(*GOOD, 0.001, 0.013)]))
+    (problem,) = result.problems
+    assert (problem.code, problem.row, problem.cell, problem.value) == ("header_doubtful", 1, "F1", header)
+    assert "--map" in problem.remedy
+    assert isinstance(result.rows[0], InvalidRow)
+    assert result.rows[0].correct == (header,)
+
+
+def test_a_row_with_nothing_under_a_doubtful_header_is_still_read(read, table):
+    result = read(
+        table((*HEADER, "clearance_1_in", "Play J3"), [(*GOOD, 0.001, None), ("R2", *GOOD[1:], 0.001, 0.013)])
+    )
+    assert [type(row) for row in result.rows] == [Inspection, InvalidRow]
+
+
+@pytest.mark.parametrize("key", ["Play J3", "  play  j3 ", "F"])
+def test_a_mapped_header_is_read_as_the_caller_says(read, table, key):
+    text = table((*HEADER, "clearance_1_in", "Play J3"), [(*GOOD, 0.001, 0.33)])
+    result = read(text, column_map={key: "clearance_3_mm"})
+    assert not result.problems
+    assert result.rows[0].clearance_in[3] == pytest.approx(0.33 / 25.4)
+    assert any('"Play J3" read as clearance_3_mm' in note for note in result.notes)
+
+
+def test_a_column_mapped_to_carry_is_not_read(read, table):
+    text = table((*HEADER, "clearance_1_in", "Play J3"), [(*GOOD, 0.001, 0.33)])
+    result = read(text, column_map={"Play J3": "carry"})
+    assert result.rows[0].clearance_in == {1: 0.001}
+    assert result.rows[0].carried == {"Play J3": "0.33"}
+
+
+def test_mapping_to_a_column_that_does_not_exist_is_a_usage_error(read, table):
+    with pytest.raises(UsageError, match="clearance_42_in"):
+        read(table((*HEADER, "clearance_1_in", "x"), [(*GOOD, 0.001, 1)]), column_map={"x": "clearance_42_in"})
+
+
+def test_mapping_a_header_that_is_not_there_is_a_problem(read, table):
+    result = read(table((*HEADER, "clearance_1_in"), [(*GOOD, 0.001)]), column_map={"Spiel 3": "clearance_3_mm"})
+    assert [(p.code, p.value) for p in result.problems] == [("map_header_unknown", "Spiel 3")]
+
+
+def test_identity_headers_as_people_write_them_are_understood(read, table):
+    text = table(("Record ID", "Tail No.", "Side (LH/RH)", "Clearance convention", "clearance_3_in"), [(*GOOD, 0.013)])
+    result = read(text)
+    assert not result.problems
+    assert sum("read as" in note for note in result.notes) == 4
+
+
+def test_an_unknown_column_is_kept_and_named(read, table):
+    result = read(table((*HEADER, "clearance_3_in", "Stroke (mm)"), [(*GOOD, 0.013, 17)]))
+    assert result.rows[0].carried == {"Stroke (mm)": "17"}
+    assert any('column F "Stroke (mm)" is not used' in note for note in result.notes)
+
+
+def test_a_column_of_remarks_about_a_joint_is_kept(read, table):
+    result = read(table((*HEADER, "clearance_3_in", "Joint 3 remarks"), [(*GOOD, 0.013, "worn")]))
+    assert result.rows[0].carried == {"Joint 3 remarks": "worn"}
+
+
+def test_a_misspelt_optional_column_is_kept_and_its_likely_name_given(read, table):
+    result = read(table((*HEADER, "clearance_3_in", "temprature_c"), [(*GOOD, 0.013, 20)]))
+    assert not result.problems
+    assert any("temperature_c" in note and "--map" in note for note in result.notes)
+
+
+def test_two_columns_of_remarks_are_both_kept(read, table):
+    result = read(table((*HEADER, "clearance_3_in", "Remarks", "Comments"), [(*GOOD, 0.013, "a", "b")]))
+    assert not result.problems
+    assert result.rows[0].carried == {"remarks": "a", "Comments": "b"}
+
+
+def test_the_names_of_another_gear_are_known_when_given(read, table):
+    text = table((*HEADER, "Clearance #3 – drag strut knuckle (in)"), [(*GOOD, 0.013)])
+    assert read(text).problems
+    assert not read(text, joint_names={3: "drag strut knuckle"}).problems
+
+
+def test_a_header_cell_in_a_csv_file_is_named_by_its_letter(read, table):
+    (problem,) = read(table((*HEADER, "clearance_1_in", "J12 (in)"), [(*GOOD, 0.001, 0.001)])).problems
+    assert (problem.sheet, problem.row, problem.cell, problem.column) == (None, 1, "F1", "J12 (in)")

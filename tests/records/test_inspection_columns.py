@@ -1,0 +1,327 @@
+"""Each column of the inspection table: what is read, what is an error, and what an error does to its row."""
+
+from __future__ import annotations
+
+import datetime
+
+import pytest
+
+from mlg_troubleshoot.decision.inspection import Approach, Inspection, InvalidRow, Outcome, Side
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+
+HEADER = ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in")
+GOOD = ("R1", "N100AB", "LH", "RADIAL", 0.013, 0.007)
+
+
+def only(result):
+    """Return the only problem of a result."""
+    assert len(result.problems) == 1, result.problems
+    return result.problems[0]
+
+
+def inspection(result):
+    """Return the only row of a result, which must be valid and without a problem."""
+    assert not result.problems, result.problems
+    (row,) = result.rows
+    assert isinstance(row, Inspection)
+    return row
+
+
+def with_column(table, name, value):
+    """Return the good row with one more column."""
+    return table((*HEADER, name), [(*GOOD, value)])
+
+
+def test_a_canonical_table_is_read_without_a_note(read, table):
+    result = read(table())
+    row = inspection(result)
+    assert (row.record_id, row.tail_no, row.side) == ("R1", "N100AB", Side.LH)
+    assert row.convention is ClearanceConvention.RADIAL
+    assert row.clearance_in == {3: 0.013, 5: 0.007}
+    assert result.notes == ()
+
+
+@pytest.mark.parametrize("convention", ["DIAMETRAL", "TOTAL_PLAY", "total play", "Total-Play"])
+def test_a_reading_across_the_joint_is_halved(read, table, convention):
+    row = inspection(read(table(rows=[("R1", "N1", "LH", convention, 0.026, 0.014)])))
+    assert row.clearance_in == {3: 0.013, 5: 0.007}
+
+
+def test_millimetres_and_thou_columns_give_the_inches(read, table):
+    header = (*HEADER[:4], "clearance_3_mm", "clearance_5_thou")
+    row = inspection(read(table(header, [(*GOOD[:4], 0.3302, 7)])))
+    assert row.clearance_in == {3: pytest.approx(0.013), 5: pytest.approx(0.007)}
+
+
+def test_the_reading_is_kept_as_entered_with_its_unit(read, table):
+    header = (*HEADER[:4], "clearance_3_mm", "clearance_5_in")
+    row = inspection(read(table(header, [(*GOOD[:4], "0.330", ".0070")])))
+    assert (row.entered[3].text, row.entered[3].unit) == ("0.330", LengthUnit.MILLIMETRE)
+    assert (row.entered[5].text, row.entered[5].unit) == (".0070", LengthUnit.INCH)
+
+
+@pytest.mark.parametrize("column", [0, 1, 2])
+def test_a_missing_identity_makes_the_row_invalid(read, table, column):
+    cells = list(GOOD)
+    cells[column] = None
+    result = read(table(rows=[cells]))
+    assert (only(result).cell, only(result).value) == (f"{'ABC'[column]}2", None)
+    assert result.rows[0].correct == (HEADER[column],)
+
+
+@pytest.mark.parametrize(("text", "hint"), [("left", "LH"), ("R", "RH"), ("port", "LH"), ("both", "LH or RH")])
+def test_a_side_that_is_not_lh_or_rh_is_an_error_with_a_suggestion(read, table, text, hint):
+    problem = only(read(table(rows=[("R1", "N1", text, *GOOD[3:])])))
+    assert problem.code == "side_unknown"
+    assert hint in problem.remedy
+
+
+def test_a_side_in_lower_case_is_read(read, table):
+    assert inspection(read(table(rows=[("R1", "N1", " rh ", *GOOD[3:])]))).side is Side.RH
+
+
+def test_a_missing_convention_is_an_error_of_each_row(read, table):
+    header = [h for h in HEADER if h != "clearance_convention"]
+    result = read(table(header, [("R1", "N1", "LH", 0.013, 0.007), ("R2", "N1", "LH", 0.013, 0.007)]))
+    assert [(p.code, p.row, p.column) for p in result.problems] == [
+        ("convention_missing", 2, "clearance_convention"),
+        ("convention_missing", 3, "clearance_convention"),
+    ]
+    assert all(isinstance(row, InvalidRow) and row.correct == ("clearance_convention",) for row in result.rows)
+
+
+def test_a_blank_convention_is_an_error_at_its_cell(read, table):
+    result = read(table(rows=[("R1", "N1", "LH", None, 0.013, 0.007)]))
+    assert (only(result).code, only(result).cell) == ("convention_missing", "D2")
+
+
+def test_the_declared_convention_serves_rows_without_one(read, table):
+    result = read(table(rows=[("R1", "N1", "LH", None, 0.026, 0.014)]), convention="TOTAL_PLAY")
+    assert inspection(result).clearance_in == {3: 0.013, 5: 0.007}
+
+
+def test_a_convention_in_the_row_goes_before_the_declared_one(read, table):
+    assert inspection(read(table(), convention="TOTAL_PLAY")).convention is ClearanceConvention.RADIAL
+
+
+def test_an_unknown_convention_is_an_error(read, table):
+    assert only(read(table(rows=[("R1", "N1", "LH", "CLEAR", 0.013, 0.007)]))).code == "convention_unknown"
+
+
+@pytest.mark.parametrize(("convention", "largest"), [("RADIAL", 0.05), ("DIAMETRAL", 0.1)])
+def test_the_hard_range_is_in_the_radial_clearance(read, table, convention, largest):
+    rows = [("R1", "N1", "LH", convention, largest, 0), ("R2", "N1", "LH", convention, largest + 0.0001, 0)]
+    result = read(table(rows=rows))
+    assert (only(result).code, only(result).cell) == ("clearance_out_of_range", "E3")
+
+
+def test_the_hard_range_includes_its_end_in_millimetres(read, table):
+    header = (*HEADER[:4], "clearance_3_mm", "clearance_5_mm")
+    assert not read(table(header, [(*GOOD[:4], 1.27, 0.1)])).problems
+
+
+def test_a_clearance_to_confirm_is_read_with_a_warning(read, table):
+    row = inspection(read(table(rows=[(*GOOD[:4], 0.0151, 0.015)])))
+    assert len(row.warnings) == 1
+    assert row.warnings[0].startswith("joint 3: 0.0151 in")
+
+
+@pytest.mark.parametrize(
+    ("value", "words"), [(0.33, "factor 25.4"), (13, "factor 1000"), (0.13, "factor 10"), (0.022, "factor 2)")]
+)
+def test_the_slip_that_explains_a_value_is_suggested_and_not_applied(read, table, value, words):
+    result = read(table(rows=[(*GOOD[:4], value, 0.007)]))
+    said = [p.remedy for p in result.problems] + [w for row in result.rows for w in row.warnings]
+    assert any(words in text for text in said), said
+    assert not any(dict(r.clearance_in).get(3) == 0.013 for r in result.inspections)
+
+
+def test_every_bad_cell_of_a_row_is_reported_once_in_the_order_of_the_table(read, table):
+    result = read(table((*HEADER, "outcome"), [("R1", None, "x", "RADIAL", "a", -1, "maybe")]))
+    assert [p.cell for p in result.problems] == ["B2", "C2", "E2", "F2", "G2"]
+    assert result.rows[0].correct == ("tail_no", "side", "clearance_3_in", "clearance_5_in")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("margin_in", -0.03), ("margin_in", 0), ("margin_in", "x"), ("margin_u_in", -1)]
+)
+def test_a_bad_margin_makes_the_row_invalid(read, table, name, value):
+    result = read(with_column(table, name, value))
+    assert only(result).column == name
+    assert isinstance(result.rows[0], InvalidRow)
+
+
+def test_margin_and_its_uncertainty_are_read_in_their_units(read, table):
+    text = table((*HEADER, "margin_mm", "margin_u_thou"), [(*GOOD, 0.762, 2)])
+    row = inspection(read(text))
+    assert row.margin_in == pytest.approx(0.03)
+    assert row.margin_u_in == pytest.approx(0.002)
+
+
+BAD_OPTIONAL = [
+    ("inspection_date", "2026-02-30"),
+    ("gear_landings", -1),
+    ("gear_landings", "many"),
+    ("gear_landings", "1,250x"),
+    ("temperature_c", 61),
+    ("temperature_c", -60.5),
+    ("hydraulic_pressure_psi", 4001),
+    ("hydraulic_pressure_psi", "nan"),
+    ("approach", "SIDEWAYS"),
+    ("gauge_u_in", -0.0005),
+    ("gauge_u_in", 0.5),
+    ("plunger_gauge_u_in", "x"),
+    ("axial_float_3_in", -0.01),
+    ("plunger_down_lock_in", 3),
+    ("plunger_displacement_in", 1.2),
+    ("plunger_displacement_in", "?"),
+    ("outcome", "MAYBE"),
+]
+
+
+@pytest.mark.parametrize(("name", "value"), BAD_OPTIONAL)
+def test_a_bad_optional_cell_is_reported_and_reads_as_absent(read, table, name, value):
+    result = read(
+        with_column(table, name, value) if "," not in str(value) else table((*HEADER, name), [(*GOOD, f'"{value}"')])
+    )
+    problem = only(result)
+    assert (problem.column, problem.cell, problem.row) == (name, "G2", 2)
+    plain = inspection(read(table()))
+    row = result.rows[0]
+    assert isinstance(row, Inspection)
+    assert row.clearance_in == plain.clearance_in
+    assert (row.gauge_u_in, row.margin_in, row.readings_in, dict(row.axial_float_in)) == (0.0005, None, (), {})
+    assert (row.outcome, row.approach, row.inspection_date, row.gear_landings) == (None, None, None, None)
+
+
+def test_the_optional_columns_are_read(read, table):
+    extra = {
+        "inspection_date": "2026-03-04T10:15",
+        "gear_landings": 1234,
+        "temperature_c": "-12.5 °C",
+        "hydraulic_pressure_psi": "3000 psi",
+        "approach": "extending",
+        "gauge_id": "007",
+        "technician_id": "T-1",
+        "outcome": "Failed",
+        "plunger_down_lock_in": 0.03,
+        "plunger_gauge_u_in": 0.001,
+        "axial_float_3_in": 0.004,
+        "work_order": "WO-7",
+        "tool box": "red",
+    }
+    result = read(table((*HEADER, *extra), [(*GOOD, *extra.values())]))
+    row = inspection(result)
+    assert row.inspection_date == datetime.date(2026, 3, 4)
+    assert (row.gear_landings, row.temperature_c, row.hydraulic_pressure_psi) == (1234, -12.5, 3000)
+    assert (row.approach, row.outcome) == (Approach.EXTENDING, Outcome.FAILED)
+    assert (row.gauge_id, row.technician_id) == ("007", "T-1")
+    assert (row.plunger_down_lock_in, row.plunger_gauge_u_in) == (0.03, 0.001)
+    assert dict(row.axial_float_in) == {3: 0.004}
+    assert row.carried == {"work_order": "WO-7", "tool box": "red"}
+    assert any('"tool box" is not used' in note for note in result.notes)
+
+
+def test_plunger_readings_keep_their_sign_and_their_order(read, table):
+    header = (*HEADER, "plunger_displacement_2_in", "plunger_displacement_in", "plunger_displacement_3_mm")
+    row = inspection(read(table(header, [(*GOOD, -0.02, "-0.01", 0.254)])))
+    assert row.readings_in == (-0.01, -0.02, pytest.approx(0.01))
+
+
+def test_a_plunger_outside_its_down_lock_range_is_a_finding_and_not_an_error(read, table):
+    row = inspection(read(with_column(table, "plunger_down_lock_in", 0.06)))
+    assert row.plunger_down_lock_in == 0.06
+    assert any("Down Lock" in warning for warning in row.warnings)
+
+
+@pytest.mark.parametrize(("convention", "expected"), [("RADIAL", 0.001), ("TOTAL_PLAY", 0.0005)])
+def test_the_gauge_uncertainty_is_in_the_convention_of_the_reading(read, table, convention, expected):
+    text = table((*HEADER, "gauge_u_in"), [("R1", "N1", "LH", convention, 0.013, 0.007, 0.001)])
+    row = inspection(read(text))
+    assert row.gauge_u_in == expected
+    assert not row.gauge_u_is_default
+
+
+def test_without_a_gauge_uncertainty_the_default_is_marked_as_such(read, table):
+    row = inspection(read(table()))
+    assert (row.gauge_u_in, row.gauge_u_is_default) == (0.0005, True)
+
+
+def test_a_row_without_any_clearance_is_read_with_a_warning(read, table):
+    row = inspection(read(table(rows=[(*GOOD[:4], None, None)])))
+    assert row.clearance_in == {}
+    assert any("no joint was measured" in warning for warning in row.warnings)
+
+
+@pytest.mark.parametrize(
+    "text", ["n/a", "-", "x", "0.01-0.02", "~0.013", "0.013 cm", "0.0.13", "<0.001", "0.013 in in"]
+)
+def test_a_text_that_is_no_length_is_an_error_that_says_how_to_leave_a_joint_out(read, xlsx, text):
+    def change(book):
+        book.worksheets[0]["E2"] = text
+
+    problem = only(read(xlsx(change=change), "t.xlsx"))
+    assert (problem.cell, problem.value) == ("E2", text)
+    assert "empty" in problem.remedy
+
+
+def test_a_number_with_a_comma_that_may_be_a_thousand_is_refused(read, table):
+    result = read(table((*HEADER, "gear_landings"), [(*GOOD, "1,250")], sep=";"))
+    assert only(result).code == "ambiguous_number"
+
+
+def test_a_missing_required_column_is_reported_once_with_the_header_that_may_be_meant(read, table):
+    result = read(table(("record_id", "tial_no", "side", *HEADER[3:]), [GOOD, ("R2", *GOOD[1:])]))
+    missing = [p for p in result.problems if p.code == "column_missing"]
+    doubtful = [p for p in result.problems if p.code == "header_doubtful"]
+    assert len(missing) + len(doubtful) >= 1
+    assert any("tial_no" in p.remedy for p in result.problems)
+    assert len(result.invalid) == 2
+
+
+def test_a_row_unit_that_contradicts_the_header_is_an_error(read, table):
+    assert only(read(with_column(table, "unit", "mm"))).code == "unit_contradiction"
+
+
+def test_a_unit_column_serves_headers_without_a_unit(read, table):
+    header = (*(h.removesuffix("_in") for h in HEADER), "unit")
+    rows = [(*GOOD, "in"), ("R2", *GOOD[1:4], 0.3302, 0.1778, "mm")]
+    result = read(table(header, rows))
+    assert not result.problems
+    assert [r.clearance_in[3] for r in result.inspections] == [0.013, pytest.approx(0.013)]
+
+
+def test_a_repeated_header_row_is_skipped_and_said(read, table):
+    result = read(table(rows=[GOOD, HEADER, ("R2", *GOOD[1:])]))
+    assert len(result.inspections) == 2
+    assert any("repeated header" in note for note in result.notes)
+
+
+def test_rows_and_problems_come_in_the_order_of_the_file(read, table):
+    rows = [(f"R{i}", "N1", "LH", "RADIAL", -1 if i % 3 == 0 else 0.001, 0.002) for i in range(1, 30)]
+    result = read(table(rows=rows))
+    assert [row.source.row for row in result.rows] == list(range(2, 31))
+    assert [p.row for p in result.problems] == [i + 1 for i in range(3, 30, 3)]
+
+
+def test_a_line_break_in_an_identity_is_refused(read, table):
+    result = read(table(rows=[('"R1\nx"', *GOOD[1:])]))
+    assert only(result).code == "text_control_character"
+
+
+def test_a_number_whose_digits_are_lost_is_no_identity(read, xlsx):
+    def change(book):
+        book.worksheets[0]["A2"] = 20260304123456789
+
+    assert only(read(xlsx(change=change), "t.xlsx")).code == "number_lost_digits"
+
+
+def test_progress_is_told_as_the_rows_are_read(table):
+    import io
+
+    from mlg_troubleshoot.records import ReadOptions, read_inspections
+
+    text = table(rows=[(f"R{i}", *GOOD[1:]) for i in range(1200)])
+    told: list[int] = []
+    read_inspections(io.BytesIO(text.encode()), ReadOptions(), progress=lambda done, _: told.append(done))
+    assert told == [500, 1000, 1200]

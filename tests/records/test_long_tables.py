@@ -1,0 +1,91 @@
+"""The long layout: one row is one joint's reading."""
+
+from __future__ import annotations
+
+import pytest
+
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
+
+HEADER = ("record_id", "tail_no", "side", "clearance_convention", "joint", "clearance_in")
+ROWS = [
+    ("R1", "N1", "LH", "RADIAL", 3, 0.013),
+    ("R2", "N2", "RH", "RADIAL", 3, 0.001),
+    ("R1", "N1", "LH", "RADIAL", 5, 0.007),
+]
+
+
+def test_rows_of_one_record_are_one_inspection(read, table):
+    result = read(table(HEADER, ROWS))
+    assert not result.problems
+    assert [(r.record_id, dict(r.clearance_in), r.source.row) for r in result.rows] == [
+        ("R1", {3: 0.013, 5: 0.007}, 2),
+        ("R2", {3: 0.001}, 3),
+    ]
+    assert any("long layout" in note for note in result.notes)
+
+
+@pytest.mark.parametrize("joint", ["3", "#3", "J3", "Joint 3", "joint no. 3", "3 "])
+def test_a_joint_is_named_as_people_write_it(read, table, joint):
+    assert dict(read(table(HEADER, [("R1", "N1", "LH", "RADIAL", joint, 0.013)])).rows[0].clearance_in) == {3: 0.013}
+
+
+def test_long_and_wide_tables_give_the_same_inspection(read, table):
+    long = read(table(HEADER, [ROWS[0], ROWS[2]])).rows[0]
+    wide = read(table((*HEADER[:4], "clearance_3_in", "clearance_5_in"), [(*ROWS[0][:4], 0.013, 0.007)])).rows[0]
+    assert (long.clearance_in, long.entered, long.convention) == (wide.clearance_in, wide.entered, wide.convention)
+
+
+@pytest.mark.parametrize("joint", [11, "short", None, 0, 3.5])
+def test_an_unknown_joint_makes_its_record_invalid(read, table, joint):
+    result = read(table(HEADER, [*ROWS, ("R1", "N1", "LH", "RADIAL", joint, 0.002)]))
+    (problem,) = result.problems
+    assert problem.cell == "E5"
+    assert [type(row) for row in result.rows] == [InvalidRow, Inspection]
+
+
+def test_a_bad_clearance_is_named_at_its_own_row(read, table):
+    result = read(table(HEADER, [*ROWS, ("R1", "N1", "LH", "RADIAL", 7, -0.1)]))
+    (problem,) = result.problems
+    assert (problem.row, problem.cell, problem.column) == (5, "F5", "clearance_in")
+
+
+def test_a_joint_given_twice_with_different_readings_is_an_error(read, table):
+    result = read(table(HEADER, [*ROWS, ("R1", "N1", "LH", "RADIAL", 5, 0.001)]))
+    assert [(p.code, p.cell) for p in result.problems] == [("joint_twice", "F5")]
+
+
+def test_a_joint_given_twice_with_the_same_reading_is_a_warning(read, table):
+    result = read(table(HEADER, [*ROWS, ROWS[2]]))
+    assert not result.problems
+    assert any("twice" in warning for warning in result.rows[0].warnings)
+
+
+def test_rows_of_a_record_that_contradict_each_other_are_an_error(read, table):
+    result = read(table(HEADER, [*ROWS, ("R1", "N9", "LH", "RADIAL", 7, 0.001)]))
+    assert [(p.code, p.cell, p.value) for p in result.problems] == [("record_contradicts", "B5", "N9")]
+    assert isinstance(result.rows[0], InvalidRow)
+
+
+def test_what_a_record_says_only_once_holds_for_all_its_rows(read, table):
+    rows = [("R1", "N1", "LH", "RADIAL", 3, 0.013), ("R1", None, None, None, 5, 0.007)]
+    result = read(table(HEADER, rows))
+    assert not result.problems
+    assert dict(result.rows[0].clearance_in) == {3: 0.013, 5: 0.007}
+
+
+def test_a_row_without_a_record_id_is_reported_on_its_own(read, table):
+    result = read(table(HEADER, [*ROWS, (None, "N1", "LH", "RADIAL", 7, 0.001)]))
+    assert [(p.code, p.cell) for p in result.problems] == [("record_id_missing", "A5")]
+    assert len(result.rows) == 3
+
+
+def test_a_long_header_without_a_unit_is_reported_once(read, table):
+    result = read(table((*HEADER[:5], "Clearance"), ROWS))
+    assert [(p.code, p.cell) for p in result.problems] == [("unit_missing", "F1")]
+    assert dict(read(table((*HEADER[:5], "Clearance"), ROWS), unit="in").rows[0].clearance_in) == {3: 0.013, 5: 0.007}
+
+
+def test_axial_floats_are_read_in_a_long_table_too(read, table):
+    header = (*HEADER, "axial_float_mm")
+    rows = [(*ROWS[0], 0.1), (*ROWS[2], None)]
+    assert dict(read(table(header, rows)).rows[0].axial_float_in) == {3: pytest.approx(0.1 / 25.4)}

@@ -1,0 +1,175 @@
+"""Rows in are rows judged plus rows reported, and the reported cells are exactly the bad ones."""
+
+from __future__ import annotations
+
+import csv
+import datetime
+import io
+import random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
+from mlg_troubleshoot.records import ReadOptions, read_inspections
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+
+HEADER = (
+    "record_id",
+    "tail_no",
+    "side",
+    "clearance_convention",
+    *(f"clearance_{n}_in" for n in range(1, 11)),
+    "inspection_date",
+    "gear_landings",
+    "margin_in",
+    "outcome",
+    "remarks",
+)
+# Bad values by column; True if the row can still be judged.
+BAD = {
+    "tail_no": (None,),
+    "side": ("left", None, "XX", 5),
+    "clearance_convention": ("CLEAR", None, 3),
+    "clearance": (
+        -0.001,
+        0.33,
+        9,
+        "0,013",
+        "n/a",
+        "1/8",
+        "0.3 mm",
+        "\u22120.002",
+        "nan",
+        datetime.date(2026, 8, 1),
+        True,
+    ),
+    "inspection_date": ("03/04/2026", 46085, "soon"),
+    "gear_landings": (-5, "many"),
+    "margin_in": (-0.03, "x", 0.7),
+    "outcome": ("MAYBE", 1),
+}
+HARMLESS = {"inspection_date", "gear_landings", "outcome"}
+
+
+def make(rows, share, seed):
+    """Return a table, the places of its bad cells and the rows that they spoil."""
+    rng = random.Random(seed)
+    table, bad, spoilt = [HEADER], set(), set()
+    for n in range(rows):
+        row = [f"R{n:05d}", f"N{n % 90:03d}", rng.choice(("LH", "RH")), rng.choice(("RADIAL", "TOTAL_PLAY"))]
+        row += [rng.choice((None, 0, round(rng.uniform(0, 0.012), 4))) for _ in range(10)]
+        row += [
+            datetime.date(2026, 1, 1) + datetime.timedelta(days=n % 300),
+            n,
+            0.03,
+            rng.choice(("FAILED", None)),
+            "=x",
+        ]
+        row[5] = 0.004
+        for index, name in enumerate(HEADER):
+            kind = "clearance" if name.startswith("clearance_") and name != "clearance_convention" else name
+            if kind in BAD and rng.random() < share:
+                row[index] = rng.choice(BAD[kind])
+                bad.add((n + 2, name))
+                if kind not in HARMLESS:
+                    spoilt.add(n + 2)
+        table.append(row)
+    return table, bad, spoilt
+
+
+def no_formulas(book):
+    """Keep texts that begin with = as texts."""
+    for row in book.worksheets[0].iter_rows():
+        for cell in row:
+            if cell.data_type == "f":
+                cell.data_type = "s"
+
+
+@pytest.mark.parametrize(("rows", "share", "seed"), [(400, 0.03, 1), (40, 0.4, 2)])
+def test_exactly_the_bad_cells_of_a_workbook_are_named(read, xlsx, rows, share, seed):
+    table, bad, spoilt = make(rows, share, seed)
+    result = read(xlsx(table, no_formulas), "t.xlsx")
+    assert sorted((p.row, p.column) for p in result.problems) == sorted(bad)
+    assert {row.source.row for row in result.invalid} == spoilt
+    assert [row.source.row for row in result.rows] == list(range(2, rows + 2))
+
+
+def test_every_problem_names_its_place_and_its_remedy(read, xlsx):
+    table, _, _ = make(200, 0.1, 3)
+    for problem in read(xlsx(table, no_formulas), "t.xlsx").problems:
+        assert problem.file == "t.xlsx"
+        assert problem.sheet == "Inspections"
+        assert problem.cell is not None
+        assert problem.cell.endswith(str(problem.row))
+        assert problem.expected
+        assert problem.remedy.endswith((".", "?"))
+
+
+def test_csv_and_workbook_give_the_same_inspections(read, xlsx):
+    table, _, _ = make(120, 0.0, 4)
+    lines = [",".join("" if c is None else str(c) for c in row) for row in table]
+    from_csv = read("\n".join(lines), "t.csv")
+    from_xlsx = read(xlsx(table, no_formulas), "t.xlsx")
+    assert not from_csv.problems
+    assert not from_xlsx.problems
+    for a, b in zip(from_csv.inspections, from_xlsx.inspections, strict=True):
+        assert (a.record_id, a.tail_no, a.side, a.convention) == (b.record_id, b.tail_no, b.side, b.convention)
+        assert (a.clearance_in, a.margin_in, a.outcome, a.inspection_date) == (
+            b.clearance_in,
+            b.margin_in,
+            b.outcome,
+            b.inspection_date,
+        )
+
+
+ANY_CELL = st.one_of(
+    st.none(),
+    st.floats(allow_nan=True, allow_infinity=True),
+    st.floats(0, 0.06),
+    st.integers(-5, 50),
+    st.sampled_from(
+        ("LH", "RH", "RADIAL", "0,013", "1/8", ".013", "13 thou", "0.33 mm", '"', "''", "=1", "\0", "–0.1", "NA")
+    ),
+    st.text(max_size=12),
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(rows=st.lists(st.lists(ANY_CELL, min_size=1, max_size=8), max_size=6), sep=st.sampled_from((",", ";", "\t")))
+def test_no_table_of_any_cells_loses_a_row_or_ends_in_an_exception(rows, sep):
+    header = ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "margin_in", "remarks")
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, delimiter=sep, lineterminator="\n")
+    writer.writerow(header)
+    for row in rows:
+        writer.writerow(["" if c is None else str(c).replace("\n", " ").replace("\r", " ") for c in row])
+    result = read_inspections(io.BytesIO(buffer.getvalue().encode("utf-8", "replace")), ReadOptions())
+    filled = sum(1 for row in rows if any(c is not None and str(c).strip() for c in row))
+    if result.layouts:
+        assert len(result.rows) == filled
+    assert all(isinstance(row, Inspection | InvalidRow) for row in result.rows)
+    reported = {p.row for p in result.problems}
+    assert all(row.source.row in reported for row in result.invalid)
+
+
+@settings(max_examples=80, deadline=None)
+@given(cells=st.lists(ANY_CELL, min_size=1, max_size=9))
+def test_no_header_of_any_cells_ends_in_an_exception(cells):
+    text = ",".join(["record_id", "tail_no", "side", *('"' + str(c).replace('"', "") + '"' for c in cells)])
+    result = read_inspections(io.BytesIO((text + "\nR1,N1,LH,0.1\n").encode("utf-8", "replace")), ReadOptions())
+    assert result.rows or result.problems
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    value=st.floats(0, 0.0499, allow_subnormal=False),
+    unit=st.sampled_from(("in", "thou", "mm")),
+    convention=st.sampled_from(("RADIAL", "DIAMETRAL", "TOTAL_PLAY")),
+)
+def test_one_clearance_in_any_unit_and_convention_is_the_same(value, unit, convention):
+    entered = LengthUnit(unit).from_inches(value * ClearanceConvention(convention).per_radial)
+    text = f"record_id,tail_no,side,clearance_convention,clearance_3_{unit}\nR1,N1,LH,{convention},{entered!r}\n"
+    result = read_inspections(io.BytesIO(text.encode()), ReadOptions())
+    assert result.inspections[0].clearance_in[3] == pytest.approx(value, rel=1e-12, abs=1e-18)

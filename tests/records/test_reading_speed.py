@@ -1,0 +1,109 @@
+"""Large tables in time and memory: 50,000 rows of 40 columns, measured in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import random
+import subprocess
+import sys
+import zipfile
+
+import pytest
+
+MEASURE = """
+import json, sys, time
+start = time.process_time()
+from mlg_troubleshoot.records import ReadOptions, read_inspections
+result = read_inspections(sys.argv[1], ReadOptions())
+judged = time.process_time() - start
+peak = int(open("/proc/self/status").read().split("VmHWM:")[1].split()[0]) / 1024
+counts = len(result.inspections), len(result.problems)
+del result
+raw = calamine = None
+if sys.argv[1].endswith("xlsx"):
+    from mlg_troubleshoot.records.xlsx import XlsxFile
+    start = time.process_time()
+    rows = sum(1 for _ in XlsxFile(open(sys.argv[1], "rb").read()).sheets[0].rows())
+    raw = time.process_time() - start
+    import python_calamine
+    start = time.process_time()
+    python_calamine.CalamineWorkbook.from_path(sys.argv[1]).get_sheet_by_index(0).to_python()
+    calamine = time.process_time() - start
+print(json.dumps([judged, peak, raw, calamine, *counts]))
+"""
+NUMBERED = [f"clearance_{n}_in" for n in range(1, 11)] + [f"axial_float_{n}_in" for n in range(1, 11)]
+HEADER = [
+    *("record_id", "tail_no", "side", "clearance_convention", "inspection_date", "gear_landings", "temperature_c"),
+    *("hydraulic_pressure_psi", "approach", "gauge_id", "technician_id", "gauge_u_in", "plunger_gauge_u_in"),
+    *NUMBERED,
+    *("plunger_down_lock_in", "plunger_displacement_in", "plunger_displacement_2_in", "margin_in", "margin_u_in"),
+    *("outcome", "work_order"),
+]
+
+
+def row(number, rng):
+    """Return one inspection."""
+    return [
+        *(f"R{number:06d}", f"N{number % 300:03d}", rng.choice(("LH", "RH")), "RADIAL", "2026-03-04", number, 20.5, 3000),
+        *("EXTENDING", f"G-{number % 7}", f"T{number % 20}", 0.0005, 0.001),
+        *(round(rng.uniform(0, 0.008), 4) for _ in range(20)),
+        *(0.03, round(rng.uniform(-0.05, 0.05), 4), 0.01, 0.03, 0.002, "RETRACTED", f"WO{number}"),
+    ]
+
+
+def write_workbook(path, package, rows):
+    """Write a large workbook by hand, which is quicker than by a library."""
+    from mlg_troubleshoot.records.cells import LETTERS
+
+    rng = random.Random(1)
+    lines = []
+    for number, cells in enumerate([HEADER, *(row(n, rng) for n in range(rows))], 1):
+        xml = "".join(
+            f'<c r="{LETTERS[i]}{number}" t="inlineStr"><is><t>{c}</t></is></c>'
+            if isinstance(c, str)
+            else f'<c r="{LETTERS[i]}{number}"><v>{c}</v></c>'
+            for i, c in enumerate(cells)
+        )
+        lines.append(f'<row r="{number}">{xml}</row>')
+    path.write_bytes(package("".join(lines)))
+    assert zipfile.is_zipfile(path)
+
+
+def measure(path):
+    """Read a file in a fresh process and return the figures."""
+    done = subprocess.run([sys.executable, "-c", MEASURE, str(path)], check=True, capture_output=True, timeout=300)
+    return json.loads(done.stdout)
+
+
+@pytest.mark.slow
+def test_fifty_thousand_rows_of_forty_columns_are_read_in_time_and_memory(tmp_path, package):
+    path = tmp_path / "big.xlsx"
+    write_workbook(path, package, 50_000)
+    judged, peak, raw, calamine, rows, problems = measure(path)
+    print(f"read and checked {judged:.1f} s, {peak:.0f} MB; reading alone {raw:.1f} s, calamine {calamine:.1f} s")
+    assert (rows, problems) == (50_000, 0)
+    assert judged < 40
+    assert peak < 400
+    assert raw < 3 * calamine
+
+
+@pytest.mark.slow
+def test_ten_thousand_rows_of_csv_are_read_in_time(tmp_path):
+    rng = random.Random(2)
+    path = tmp_path / "big.csv"
+    lines = [",".join(map(str, cells)) for cells in [HEADER, *(row(n, rng) for n in range(10_000))]]
+    path.write_text("\n".join(lines))
+    judged, peak, _, _, rows, problems = measure(path)
+    print(f"read and checked {judged:.1f} s, {peak:.0f} MB")
+    assert (rows, problems) == (10_000, 0)
+    assert judged < 6
+
+
+def test_reading_a_table_loads_no_spreadsheet_library():
+    code = (
+        "import io, sys; from mlg_troubleshoot.records import ReadOptions, read_inspections;"
+        "read_inspections(io.BytesIO(b'record_id,tail_no,side,clearance_3_in\\nR1,N1,LH,0.1\\n'), ReadOptions());"
+        "print([m for m in ('pandas', 'openpyxl', 'python_calamine') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,707 @@
+"""The traps of real spreadsheets, each made as the world makes it; the number is the trap's."""
+
+from __future__ import annotations
+
+import datetime
+import io
+import struct
+import time
+import zipfile
+
+import openpyxl
+import pytest
+
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
+from mlg_troubleshoot.records.cells import LETTERS
+
+HEADER = ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in")
+GOOD = ("R1", "N100AB", "LH", "RADIAL", 0.013, 0.007)
+
+
+def with_cell(**cells):
+    """Return a change of a workbook that sets cells of its first sheet."""
+
+    def change(book):
+        for place, value in cells.items():
+            book.worksheets[0][place] = value
+
+    return change
+
+
+def only(result):
+    """Return the only problem of a result."""
+    assert len(result.problems) == 1, result.problems
+    return result.problems[0]
+
+
+def clearances(result):
+    """Return the clearances of the first row, which must be valid."""
+    assert not result.problems, result.problems
+    row = result.rows[0]
+    assert isinstance(row, Inspection)
+    return dict(row.clearance_in)
+
+
+# 1 and 2: formulas
+
+
+def test_01_a_formula_that_was_never_calculated_is_an_error(read, xlsx):
+    problem = only(read(xlsx(change=with_cell(E2="=0.026/2")), "t.xlsx"))
+    assert (problem.code, problem.sheet, problem.cell) == ("formula_without_value", "Inspections", "E2")
+    assert "save" in problem.remedy
+
+
+def test_01_a_formula_in_another_producer_s_spelling_without_a_value_is_an_error(read, package):
+    data = (
+        '<row r="1">'
+        + "".join(f'<c r="{c}1" t="inlineStr"><is><t>{h}</t></is></c>' for c, h in zip("ABCDEF", HEADER, strict=True))
+        + "</row>"
+        '<row r="2"><c r="A2" t="inlineStr"><is><t>R1</t></is></c><c r="B2" t="inlineStr"><is><t>N1</t></is></c>'
+        '<c r="C2" t="inlineStr"><is><t>LH</t></is></c><c r="D2" t="inlineStr"><is><t>RADIAL</t></is></c>'
+        '<c r="E2"><f t="shared" ref="E2:E9" si="0">A9</f></c><c r="F2"><v>0.007</v></c></row>'
+    )
+    assert only(read(package(data), "t.xlsx")).code == "formula_without_value"
+
+
+def test_02_a_formula_with_its_last_value_is_read_and_said(read, package):
+    cells = '<c r="E2"><f>0.026/2</f><v>0.013</v></c><c r="F2"><f>1/2</f><v>0.007</v></c>'
+    data = _rows_with(cells)
+    result = read(package(data), "t.xlsx")
+    assert clearances(result) == {3: 0.013, 5: 0.007}
+    assert any("formula" in note and "E (1)" in note for note in result.notes)
+
+
+def _rows_with(cells, ids="R1 N100AB LH RADIAL"):
+    header = "".join(
+        f'<c r="{c}1" t="inlineStr"><is><t>{h}</t></is></c>' for c, h in zip("ABCDEF", HEADER, strict=True)
+    )
+    texts = "".join(
+        f'<c r="{c}2" t="inlineStr"><is><t>{v}</t></is></c>' for c, v in zip("ABCD", ids.split(), strict=True)
+    )
+    return f'<row r="1">{header}</row><row r="2">{texts}{cells}</row>'
+
+
+# 3: error values
+
+
+@pytest.mark.parametrize("error", ["#N/A", "#DIV/0!", "#REF!", "#VALUE!"])
+def test_03_an_error_value_is_an_error_and_not_an_unmeasured_joint(read, package, error):
+    result = read(package(_rows_with(f'<c r="E2" t="e"><v>{error}</v></c><c r="F2"><v>0.007</v></c>')), "t.xlsx")
+    problem = only(result)
+    assert (problem.code, problem.cell, problem.value) == ("cell_error", "E2", error)
+    assert isinstance(result.rows[0], InvalidRow)
+
+
+# 4 to 8: numbers as people write them
+
+
+def test_04_a_decimal_comma_in_a_text_cell_is_an_error_that_suggests_the_point(read, xlsx):
+    problem = only(read(xlsx(change=with_cell(E2="0,013")), "t.xlsx"))
+    assert (problem.cell, problem.value) == ("E2", "0,013")
+    assert "0.013" in problem.remedy
+
+
+def test_04_a_declared_decimal_comma_is_read(read, xlsx):
+    result = read(xlsx(change=with_cell(E2="0,013")), "t.xlsx", decimal_comma=True)
+    assert clearances(result)[3] == 0.013
+
+
+@pytest.mark.parametrize(
+    "text", ['.013"', "0.013 in", "0.013\u00a0in", "\u202f0.013\u202finch ", "+0.013", "13e-3", "\ufeff0.013"]
+)
+def test_05_06_inches_as_people_write_them_are_read(read, xlsx, text):
+    assert clearances(read(xlsx(change=with_cell(E2=text)), "t.xlsx"))[3] == pytest.approx(0.013, abs=1e-15)
+
+
+@pytest.mark.parametrize(("text", "inches"), [("13 thou", 0.013), ("0.33 mm", 0.33 / 25.4), ("13 mil", 0.013)])
+def test_07_a_unit_in_the_cell_is_converted_under_a_header_without_one(read, xlsx, text, inches):
+    rows = [[h.removesuffix("_in") for h in HEADER], [*GOOD[:4], text, '.007"']]
+    assert clearances(read(xlsx(rows), "t.xlsx")) == {3: pytest.approx(inches), 5: 0.007}
+
+
+def test_07_a_unit_in_the_cell_goes_before_the_declared_unit(read, xlsx):
+    rows = [[h.removesuffix("_in") for h in HEADER], [*GOOD[:4], "0.33 mm", 0.007]]
+    assert clearances(read(xlsx(rows), "t.xlsx", unit="in"))[3] == pytest.approx(0.33 / 25.4)
+
+
+def test_08_a_fraction_is_refused(read, xlsx):
+    problem = only(read(xlsx(change=with_cell(E2="1/8")), "t.xlsx"))
+    assert (problem.code, problem.value) == ("fraction", "1/8")
+
+
+def test_08_a_fraction_that_became_a_date_is_refused(read, xlsx):
+    problem = only(read(xlsx(change=with_cell(E2=datetime.date(2026, 8, 1))), "t.xlsx"))
+    assert (problem.code, problem.value) == ("cell_is_date", "2026-08-01")
+
+
+# 9 to 11: units
+
+
+def test_09_millimetres_under_an_inch_header_are_an_error_that_names_the_factor(read, xlsx):
+    problem = only(read(xlsx(change=with_cell(E2=0.33)), "t.xlsx"))
+    assert problem.code == "clearance_out_of_range"
+    assert "25.4" in problem.remedy
+    assert "millimetres" in problem.remedy
+
+
+def test_10_a_header_without_a_unit_is_refused(read, table):
+    header = [h.removesuffix("_in") for h in HEADER]
+    result = read(table(header))
+    assert [p.code for p in result.problems] == ["unit_missing", "unit_missing"]
+    assert [p.cell for p in result.problems] == ["E1", "F1"]
+    assert isinstance(result.rows[0], InvalidRow)
+    assert result.rows[0].correct == ("clearance_3", "clearance_5")
+
+
+def test_10_a_header_without_a_unit_is_reported_once_however_many_rows_it_has(read, table):
+    header = [h.removesuffix("_in") for h in HEADER]
+    result = read(table(header, [(f"R{i}", *GOOD[1:]) for i in range(50)]))
+    assert len(result.problems) == 2
+    assert len(result.invalid) == 50
+
+
+def test_10_the_declared_unit_serves_a_header_without_one(read, table):
+    header = [h.removesuffix("_in") for h in HEADER]
+    assert clearances(read(table(header), unit="in")) == {3: 0.013, 5: 0.007}
+
+
+@pytest.mark.parametrize("text", ["0.33 mm", "13 thou"])
+def test_11_a_unit_that_contradicts_the_header_is_an_error(read, xlsx, text):
+    problem = only(read(xlsx(change=with_cell(E2=text)), "t.xlsx"))
+    assert (problem.code, problem.value) == ("unit_contradiction", text)
+    assert "0.013" in problem.remedy or "0.01299" in problem.remedy
+
+
+# 12 to 15: headers
+
+
+def two_rows(book):
+    sheet = book.worksheets[0]
+    sheet.merge_cells("E1:F1")
+
+
+def test_12_a_merged_header_of_two_rows_is_read_as_one(read, xlsx):
+    rows = [
+        ["record_id", "tail_no", "side", "clearance_convention", "Clearance (in)", None],
+        [None, None, None, None, "J3", "J5"],
+        GOOD,
+    ]
+    result = read(xlsx(rows, two_rows), "t.xlsx")
+    assert clearances(result) == {3: 0.013, 5: 0.007}
+    assert result.rows[0].source.row == 3
+
+
+def test_12_an_unknown_header_of_two_rows_is_an_error_and_its_second_row_no_inspection(read, xlsx):
+    rows = [["Identity", None, None, None, "Wear", None], ["a", "b", "c", "d", "e", "f"], GOOD]
+    result = read(xlsx(rows, two_rows), "t.xlsx")
+    assert only(result).code == "header_missing"
+    assert not result.rows
+
+
+def test_12_a_row_of_units_below_the_header_is_read(read, xlsx):
+    rows = [
+        ["record_id", "tail_no", "side", "clearance_convention", "Joint 3", "Joint 5"],
+        [None] * 4 + ["mm", "mm"],
+        (*GOOD[:4], 0.33, 0.1778),
+    ]
+    assert clearances(read(xlsx(rows), "t.xlsx")) == {3: pytest.approx(0.33 / 25.4), 5: pytest.approx(0.007)}
+
+
+def test_13_a_header_that_stands_twice_is_an_error(read, table):
+    header = (*HEADER, "clearance_3_in")
+    result = read(table(header, [(*GOOD, 0.001)]))
+    problem = only(result)
+    assert (problem.code, problem.cell, problem.row) == ("header_duplicate", "G1", 1)
+    assert isinstance(result.rows[0], InvalidRow)
+
+
+def test_13_one_joint_in_two_units_is_a_duplicate_too(read, table):
+    result = read(table((*HEADER, "clearance_3_mm"), [(*GOOD, 0.33)]))
+    assert only(result).code == "header_duplicate"
+
+
+def test_14_a_header_further_down_is_found_and_said(read, xlsx):
+    rows = [["Main landing gear"], [], ["Printed", "2026-03-04"], HEADER, GOOD]
+    result = read(xlsx(rows), "t.xlsx")
+    assert result.rows[0].source.row == 5
+    assert any("header stands in row 4" in note for note in result.notes)
+
+
+def test_14_a_header_below_row_20_is_not_searched_for(read, xlsx):
+    rows = [["title"], *([["text"]] * 20), HEADER, GOOD]
+    assert only(read(xlsx(rows), "t.xlsx")).code == "header_missing"
+
+
+def test_15_a_joint_that_the_gear_does_not_have_is_an_error_with_the_nearest_name(read, table):
+    result = read(table((*HEADER[:5], "clearance_11_in")))
+    problem = only(result)
+    assert (problem.code, problem.cell, problem.value) == ("joint_unknown", "F1", "clearance_11_in")
+    assert "clearance_1" in problem.remedy
+    assert isinstance(result.rows[0], InvalidRow)
+
+
+def test_15_a_clearance_without_its_joint_is_an_error(read, table):
+    assert only(read(table((*HEADER[:5], "clearance_in")))).code == "joint_missing"
+
+
+def test_15_a_table_without_any_clearance_is_an_error(read, table):
+    result = read(table(HEADER[:4], [GOOD[:4]]))
+    assert [p.code for p in result.problems] == ["column_missing"]
+
+
+@pytest.mark.parametrize("header", ["clerance_3_in", "clearence_3_in"])
+def test_15_a_slip_of_the_pen_in_a_header_is_refused_with_the_nearest_name(read, table, header):
+    result = read(table((*HEADER[:4], header, "clearance_5_in")))
+    problem = only(result)
+    assert problem.code == "header_doubtful"
+    assert "clearance_3_in" in problem.remedy
+    assert "--map" in problem.remedy
+
+
+# 16 to 20: blanks, zeros, impossible numbers
+
+
+def test_16_blank_rows_inside_are_skipped_and_the_row_numbers_kept(read, xlsx):
+    result = read(xlsx([HEADER, GOOD, [], ["  ", None, ""], ("R2", *GOOD[1:4], -1, 0.007)]), "t.xlsx")
+    assert [row.source.row for row in result.rows] == [2, 5]
+    assert only(result).cell == "E5"
+
+
+def test_17_a_blank_joint_is_not_measured_and_not_zero(read, table):
+    assert clearances(read(table(rows=[(*GOOD[:5], None)]))) == {3: 0.013}
+
+
+def test_18_zero_is_a_measured_zero(read, table):
+    assert clearances(read(table(rows=[(*GOOD[:5], 0)]))) == {3: 0.013, 5: 0.0}
+
+
+def test_18_a_row_of_zeros_is_read_with_a_warning(read, table):
+    result = read(table(rows=[(*GOOD[:4], 0, "0.000")]))
+    assert clearances(result) == {3: 0.0, 5: 0.0}
+    assert any("every clearance is 0" in warning for warning in result.rows[0].warnings)
+
+
+@pytest.mark.parametrize("text", ["-0.002", "\u22120.002", "\u20130.002", " - 0.002"])
+def test_19_a_negative_clearance_is_an_error_however_its_minus_is_written(read, xlsx, text):
+    problem = only(read(xlsx(change=with_cell(E2=text)), "t.xlsx"))
+    assert (problem.code, problem.value) == ("clearance_negative", text)
+
+
+def test_19_a_negative_number_is_an_error(read, xlsx):
+    assert only(read(xlsx(change=with_cell(E2=-0.002)), "t.xlsx")).code == "clearance_negative"
+
+
+@pytest.mark.parametrize("text", ["NaN", "nan", "inf", "-inf", "Infinity", "1e309", "1.#QNAN"])
+def test_20_what_is_no_finite_number_is_an_error(read, table, text):
+    result = read(table(rows=[(*GOOD[:4], text, 0.007)]))
+    assert (only(result).code, only(result).cell) == ("not_finite", "E2")
+
+
+@pytest.mark.parametrize("number", ["NaN", "1e309", "INF"])
+def test_20_a_number_cell_that_is_not_finite_is_an_error(read, package, number):
+    result = read(package(_rows_with(f'<c r="E2"><v>{number}</v></c><c r="F2"><v>0.007</v></c>')), "t.xlsx")
+    assert only(result).code == "not_finite"
+
+
+# 21 to 25: identities, texts and dates
+
+
+def test_21_the_same_record_twice_is_read_with_a_warning(read, table):
+    result = read(table(rows=[GOOD, GOOD]))
+    assert not result.problems
+    assert len(result.inspections) == 2
+    assert "the same inspection as row 2" in result.rows[1].warnings[0]
+
+
+def test_21_two_different_records_under_one_id_are_errors(read, table):
+    result = read(table(rows=[GOOD, (*GOOD[:5], 0.001), ("R2", *GOOD[1:])]))
+    assert [(p.code, p.cell, p.value) for p in result.problems] == [
+        ("record_id_duplicate", "A2", "R1"),
+        ("record_id_duplicate", "A3", "R1"),
+    ]
+    assert [type(row) for row in result.rows] == [InvalidRow, InvalidRow, Inspection]
+
+
+def test_22_a_tail_number_keeps_its_zeros_in_csv(read, table):
+    assert read(table(rows=[("R1", "007", *GOOD[2:])])).rows[0].tail_no == "007"
+
+
+def test_22_a_tail_number_shown_with_zeros_keeps_them(read, xlsx):
+    def change(book):
+        book.worksheets[0]["B2"] = 7
+        book.worksheets[0]["B2"].number_format = "000"
+
+    assert read(xlsx(change=change), "t.xlsx").rows[0].tail_no == "007"
+
+
+def test_22_a_tail_number_stored_as_a_number_becomes_text(read, xlsx):
+    assert read(xlsx(change=with_cell(B2=7)), "t.xlsx").rows[0].tail_no == "7"
+
+
+@pytest.mark.parametrize("tail", ["NA", "None", "NULL", "nan", "TRUE"])
+def test_23_a_tail_number_that_looks_like_nothing_is_text(read, table, tail):
+    assert read(table(rows=[("R1", tail, *GOOD[2:])])).rows[0].tail_no == tail
+
+
+def test_24_a_work_order_that_looks_like_a_number_is_text(read, table, xlsx):
+    header = (*HEADER, "work_order")
+    assert read(table(header, [(*GOOD, "1E5")])).rows[0].carried["work_order"] == "1E5"
+    assert read(xlsx([header, (*GOOD, "1E5")]), "t.xlsx").rows[0].carried["work_order"] == "1E5"
+
+
+@pytest.mark.parametrize("text", ["03/04/2026", "3.4.2026", "03-04-26"])
+def test_25_a_date_that_is_not_iso_is_refused_as_ambiguous(read, table, text):
+    result = read(table((*HEADER, "inspection_date"), [(*GOOD, text)]))
+    assert (only(result).code, only(result).value) == ("date_ambiguous", text)
+    assert isinstance(result.rows[0], Inspection)
+    assert result.rows[0].inspection_date is None
+
+
+def test_25_an_iso_date_is_read(read, table):
+    result = read(table((*HEADER, "inspection_date"), [(*GOOD, "2026-03-04")]))
+    assert result.rows[0].inspection_date == datetime.date(2026, 3, 4)
+
+
+# 26: dates as numbers
+
+
+def test_26_a_bare_number_as_a_date_is_an_error(read, xlsx):
+    result = read(xlsx([(*HEADER, "inspection_date"), (*GOOD, 46085)]), "t.xlsx")
+    assert (only(result).code, only(result).value) == ("date_serial", "46085")
+    assert isinstance(result.rows[0], Inspection)
+
+
+@pytest.mark.parametrize("number_format", ["yyyy-mm-dd", "d. mmm yyyy", "[$-409]mmmm d, yyyy;@", "dd/mm/yy hh:mm"])
+def test_26_a_number_formatted_as_a_date_is_a_date(read, xlsx, number_format):
+    def change(book):
+        book.worksheets[0]["G2"] = 46085
+        book.worksheets[0]["G2"].number_format = number_format
+
+    result = read(xlsx([(*HEADER, "inspection_date"), GOOD], change), "t.xlsx")
+    assert result.rows[0].inspection_date == datetime.date(2026, 3, 4)
+
+
+def test_26_a_date_of_the_1904_system_is_the_same_day(read, xlsx):
+    def change(book):
+        book.epoch = datetime.datetime(1904, 1, 1)
+        book.worksheets[0]["G2"] = datetime.date(2026, 3, 4)
+
+    data = xlsx([(*HEADER, "inspection_date"), GOOD], change)
+    assert b"date1904" in zipfile.ZipFile(io.BytesIO(data)).read("xl/workbook.xml")
+    assert read(data, "t.xlsx").rows[0].inspection_date == datetime.date(2026, 3, 4)
+
+
+def test_26_a_day_before_march_1900_is_refused(read, xlsx):
+    def change(book):
+        book.worksheets[0]["G2"] = 12
+        book.worksheets[0]["G2"].number_format = "yyyy-mm-dd"
+
+    assert only(read(xlsx([(*HEADER, "inspection_date"), GOOD], change), "t.xlsx")).code == "date_out_of_range"
+
+
+# 27 to 30: what is shown and what is hidden
+
+
+def test_27_the_stored_value_counts_not_the_shown_one(read, xlsx):
+    def change(book):
+        book.worksheets[0]["E2"].number_format = "0.00"
+
+    assert clearances(read(xlsx(change=change), "t.xlsx"))[3] == 0.013
+
+
+def _second_sheet(book, rows=(HEADER, ("X1", *GOOD[1:])), title="Other"):
+    sheet = book.create_sheet(title)
+    for row in rows:
+        sheet.append(list(row))
+
+
+def test_28_a_hidden_first_sheet_is_not_read(read, xlsx):
+    def change(book):
+        _second_sheet(book)
+        book.worksheets[0].sheet_state = "hidden"
+        book.active = 1
+
+    result = read(xlsx(change=change), "t.xlsx")
+    assert [row.record_id for row in result.rows] == ["X1"]
+    assert any("hidden" in note and "Inspections" in note for note in result.notes)
+
+
+@pytest.mark.parametrize("state", ["hidden", "veryHidden"])
+def test_28_inspections_on_a_hidden_sheet_alone_are_an_error(read, xlsx, state):
+    def change(book):
+        _second_sheet(book, [["Cover"]])
+        book.worksheets[0].sheet_state = state
+        book.active = 1
+
+    problem = only(read(xlsx(change=change), "t.xlsx"))
+    assert (problem.code, problem.sheet) == ("sheet_hidden", "Inspections")
+
+
+def test_28_a_hidden_sheet_is_read_when_it_is_named(read, xlsx):
+    def change(book):
+        _second_sheet(book, [["Cover"]])
+        book.worksheets[0].sheet_state = "hidden"
+        book.active = 1
+
+    assert len(read(xlsx(change=change), "t.xlsx", sheet="Inspections").inspections) == 1
+
+
+def test_29_several_sheets_with_inspections_are_an_error_that_lists_them(read, xlsx):
+    result = read(xlsx(change=_second_sheet), "t.xlsx")
+    assert only(result).code == "sheet_several"
+    assert "'Inspections', 'Other'" in only(result).value
+    assert "--sheet" in only(result).remedy
+    assert not result.rows
+
+
+def test_29_the_named_sheet_is_read(read, xlsx):
+    assert [r.record_id for r in read(xlsx(change=_second_sheet), "t.xlsx", sheet="Other").rows] == ["X1"]
+
+
+def test_29_a_star_reads_every_sheet(read, xlsx):
+    assert [r.record_id for r in read(xlsx(change=_second_sheet), "t.xlsx", sheet="*").rows] == ["R1", "X1"]
+
+
+def test_29_a_sheet_that_does_not_exist_is_an_error_that_lists_the_others(read, xlsx):
+    problem = only(read(xlsx(), "t.xlsx", sheet="March"))
+    assert problem.code == "sheet_unknown"
+    assert "'Inspections'" in problem.expected
+
+
+def test_30_hidden_rows_are_read_and_counted(read, xlsx):
+    def change(book):
+        book.worksheets[0].row_dimensions[3].hidden = True
+
+    result = read(xlsx([HEADER, GOOD, ("R2", *GOOD[1:])], change), "t.xlsx")
+    assert len(result.inspections) == 2
+    assert any("1 hidden or filtered row was read" in note for note in result.notes)
+
+
+# 31 to 35: text files
+
+
+def test_31_a_byte_order_mark_is_no_part_of_the_header(read, table):
+    assert clearances(read(b"\xef\xbb\xbf" + table().encode())) == {3: 0.013, 5: 0.007}
+
+
+def test_32_windows_1252_is_detected_and_said(read, table):
+    header = (*HEADER, "remarks")
+    result = read(table(header, [(*GOOD, "Bolzen geprüft")]).encode("cp1252"))
+    assert result.rows[0].carried["remarks"] == "Bolzen geprüft"
+    assert any("Windows-1252" in note for note in result.notes)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_32_utf_16_is_detected_and_said(read, table, encoding):
+    result = read(table((*HEADER, "remarks"), [(*GOOD, "ü")]).encode(encoding))
+    assert result.rows[0].carried["remarks"] == "ü"
+    assert any("UTF-16" in note for note in result.notes)
+
+
+def test_33_semicolons_with_decimal_commas_are_read(read, table):
+    assert clearances(read(table(rows=[(*GOOD[:4], "0,013", "0,010")], sep=";"))) == {3: 0.013, 5: 0.010}
+
+
+def test_33_tabs_are_read(read, table):
+    assert clearances(read(table(sep="\t"))) == {3: 0.013, 5: 0.007}
+
+
+def test_34_decimal_commas_in_a_comma_file_are_a_field_count_error(read, table):
+    result = read(table(rows=[(*GOOD[:4], "0,013", "0,010"), ("R2", *GOOD[1:])]))
+    problem = only(result)
+    assert (problem.code, problem.row) == ("row_field_count", 2)
+    assert "8 fields" in problem.value
+    assert "comma" in problem.remedy
+    assert [type(row) for row in result.rows] == [InvalidRow, Inspection]
+
+
+@pytest.mark.parametrize("line", ["R2,N1,LH,RADIAL,0.013", "R2,N1,LH,RADIAL,0.013,0.007,9"])
+def test_35_a_ragged_row_is_an_error_with_its_row_and_the_others_are_read(read, table, line):
+    result = read(table() + line + "\n" + "R3,N1,LH,RADIAL,0.013,0.007\n")
+    assert (only(result).code, only(result).row) == ("row_field_count", 3)
+    assert len(result.inspections) == 2
+
+
+def test_35_empty_fields_at_the_end_are_no_error(read, table):
+    assert not read(table().replace("0.007\n", "0.007,,\n")).problems
+
+
+def test_35_a_zero_character_is_an_error_with_its_row(read, table):
+    result = read(table(rows=[GOOD, ("R\0002", *GOOD[1:]), ("R3", *GOOD[1:])]))
+    assert (only(result).code, only(result).row) == ("csv_nul", 3)
+    assert [type(row) for row in result.rows] == [Inspection, InvalidRow, Inspection]
+
+
+@pytest.mark.parametrize("line", ["sep=;\n", '"sep=;"\r\n', "SEP=;\r\n"])
+def test_35_a_sep_line_is_accepted(read, table, line):
+    result = read(line + table(sep=";"))
+    assert clearances(result) == {3: 0.013, 5: 0.007}
+    assert result.rows[0].source.row == 2
+
+
+def test_35_a_quotation_mark_that_is_not_closed_loses_no_row(read, table):
+    text = table() + '"R2,N1,LH,RADIAL,0.013,0.007\nR3,N1,LH,RADIAL,0.013,0.007\nR4,N1,LH,RADIAL,0.013,0.007\n'
+    result = read(text)
+    assert (only(result).code, only(result).row) == ("csv_quote", 3)
+    assert [row.record_id for row in result.inspections] == ["R1", "R3", "R4"]
+
+
+def test_35_a_quoted_field_of_two_lines_is_one_field(read, table):
+    text = table((*HEADER, "remarks"), [(*GOOD, '"a\nb, c"'), ("R2", *GOOD[1:], "x")])
+    result = read(text)
+    assert result.rows[0].carried["remarks"] == "a\nb, c"
+    assert [row.source.row for row in result.rows] == [2, 3]
+
+
+# 36 to 40: what is refused before it is parsed
+
+
+def test_36_a_cell_far_outside_is_refused(read, xlsx):
+    problem = only(read(xlsx(change=with_cell(XFD1048576=1)), "t.xlsx"))
+    assert (problem.code, problem.cell, problem.sheet) == ("cell_outside_limits", "XFD1048576", "Inspections")
+
+
+def test_36_the_last_allowed_column_is_read(read, xlsx):
+    result = read(xlsx(change=with_cell(**{f"{LETTERS[-1]}1": "note", f"{LETTERS[-1]}2": "x"})), "t.xlsx")
+    assert result.rows[0].carried == {"note": "x"}
+
+
+def test_36_an_empty_formatted_cell_far_outside_is_no_error(read, package):
+    data = _rows_with('<c r="E2"><v>0.013</v></c><c r="F2"><v>0.007</v></c><c r="XFD2" s="0"/>')
+    result = read(package(data + '<row r="1048576" hidden="1"><c r="A1048576" s="0"/></row>'), "t.xlsx")
+    assert clearances(result) == {3: 0.013, 5: 0.007}
+
+
+def test_37_a_zip_bomb_is_refused_at_once(read, package):
+    bomb = package(sheet_xml=b"<worksheet>" + b" " * 150_000_000)
+    assert len(bomb) < 1_000_000
+    start = time.perf_counter()
+    problem = only(read(bomb, "t.xlsx"))
+    assert problem.code == "file_too_large"
+    assert time.perf_counter() - start < 2.0
+
+
+def test_37_a_workbook_that_lies_about_its_size_is_refused(read, package):
+    bomb = package(sheet_xml=b"<worksheet>" + b" " * 220_000_000)
+    sizes = struct.pack("<I", 220_000_011)
+    assert bomb.count(sizes) == 2
+    lying = bomb.replace(sizes, struct.pack("<I", 5000))
+    assert only(read(lying, "t.xlsx")).code in ("file_too_large", "file_damaged")
+
+
+@pytest.mark.parametrize(
+    "declaration",
+    ['<!DOCTYPE x [<!ENTITY a "0.013">]>', '<!DOCTYPE worksheet SYSTEM "http://example.com/x.dtd">'],
+)
+def test_38_a_document_type_is_refused(read, package, declaration):
+    result = read(package(prolog=f'<?xml version="1.0"?>{declaration}'), "t.xlsx")
+    assert only(result).code == "xml_declaration"
+    assert not result.rows
+
+
+def test_38_entities_in_the_shared_strings_are_refused(read, package):
+    bomb = '<!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]><sst><si><t>&b;</t></si></sst>'
+    assert only(read(package(parts={"xl/sharedStrings.xml": bomb}), "t.xlsx")).code == "xml_declaration"
+
+
+def test_38_a_document_type_in_utf_16_is_refused(read, package):
+    xml = '<?xml version="1.0" encoding="UTF-16"?><!DOCTYPE x [<!ENTITY a "1">]><worksheet/>'.encode("utf-16")
+    assert only(read(package(sheet_xml=xml), "t.xlsx")).code == "xml_declaration"
+
+
+@pytest.mark.parametrize("reference", ["A1:XFD1048576", "A1", "A1:B1", "nonsense"])
+def test_39_a_lying_dimension_is_ignored(read, package, reference):
+    assert clearances(read(package(before=f'<dimension ref="{reference}"/>'), "t.xlsx")) == {3: 0.013, 5: 0.007}
+
+
+def test_40_a_password_protected_workbook_is_named_as_such(read, xlsx):
+    msoffcrypto = pytest.importorskip("msoffcrypto.format.ooxml")
+    locked = io.BytesIO()
+    msoffcrypto.OOXMLFile(io.BytesIO(xlsx())).encrypt("secret", locked)
+    problem = only(read(locked.getvalue(), "t.xlsx"))
+    assert problem.code == "password_protected"
+    assert "copy without" in problem.remedy
+
+
+# 41 to 44: kinds of file
+
+
+def test_41_macros_are_ignored_and_said(read, package):
+    result = read(package(parts={"xl/vbaProject.bin": b"\xd0\xcf\x11\xe0"}), "t.xlsm")
+    assert clearances(result) == {3: 0.013, 5: 0.007}
+    assert any("macros" in note and "ignored" in note for note in result.notes)
+
+
+@pytest.mark.parametrize("name", ["sample.xls", "sample.ods", "sample.xlsx"])
+def test_42_files_written_by_libreoffice_are_read(read, samples, name):
+    result = read((samples / name).read_bytes(), name)
+    assert [(r.record_id, r.tail_no) for r in result.inspections] == [("R1", "007"), ("R4", "N3")]
+    assert dict(result.rows[0].clearance_in) == {3: 0.013, 5: 0.0065}
+    assert result.rows[0].inspection_date == datetime.date(2026, 3, 4)
+    assert [(p.cell, p.code) for p in result.problems] == [
+        ("H2", "cell_error"),
+        ("E3", "cell_error"),
+        ("F3", "cell_error"),
+        ("E4", "decimal_comma"),
+        ("F4", "cell_is_boolean"),
+        ("G4", "date_serial"),
+    ]
+    assert any("hidden sheets were not read: 'Old'" in note for note in result.notes)
+    assert any("1 hidden or filtered row" in note for note in result.notes)
+
+
+@pytest.mark.parametrize(
+    ("data", "code", "words"),
+    [
+        (b"record_id,tail_no\nR1,N1\n", "file_kind", "text file"),
+        (b"<html><table><tr><td>record_id</td></tr></table></html>", "file_kind", "web page"),
+        (b"\xef\xbb\xbf\r\n<!DOCTYPE html><html></html>", "file_kind", "web page"),
+        (b"", "file_empty", "empty"),
+        (b"\r\n  ", "file_empty", "nothing but blanks"),
+        (b"%PDF-1.7 ...", "file_kind", "PDF"),
+        (b"\x89PNG\r\n\x1a\n", "file_kind", "picture"),
+        (b"PK\x03\x04" + b"\0" * 40, "file_damaged", "cut off"),
+    ],
+)
+def test_43_another_kind_of_file_under_a_workbook_s_name_is_named_in_plain_words(read, data, code, words):
+    problem = only(read(data, "t.xlsx"))
+    assert problem.code == code
+    assert words in problem.value
+
+
+@pytest.mark.parametrize("keep", [0.05, 0.5, 0.9, 0.999])
+def test_43_a_truncated_workbook_is_named_as_cut_off(read, xlsx, keep):
+    data = xlsx()
+    problem = only(read(data[: int(len(data) * keep)], "t.xlsx"))
+    assert problem.code == "file_damaged"
+    assert "cut off" in problem.value
+
+
+def test_43_a_pdf_named_csv_is_named_as_a_pdf(read):
+    assert "PDF" in only(read(b"%PDF-1.4\n%\xe2\xe3", "t.csv")).value
+
+
+def test_43_bytes_that_are_no_text_are_refused(read):
+    assert only(read(bytes(range(256)) * 8, "t.csv")).code == "not_a_table"
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", " =cmd|' /C calc'!A0", "＝1+1"])
+def test_44_an_exported_text_is_no_formula(tmp_path, text):
+    from mlg_troubleshoot.records import write_csv
+
+    write_csv(tmp_path / "out.csv", ["remarks", "n"], [[text, -0.5]])
+    lines = (tmp_path / "out.csv").read_text().splitlines()
+    assert lines[1].lstrip('"').startswith("'")
+    assert lines[1].endswith(",-0.5")
+
+
+def test_44_a_text_in_an_annotated_workbook_is_no_formula(tmp_path, read, xlsx):
+    from mlg_troubleshoot.records import ReadOptions, annotate_workbook, read_inspections
+
+    source, out = tmp_path / "in.xlsx", tmp_path / "out.xlsx"
+    source.write_bytes(xlsx())
+    result = read_inspections(source, ReadOptions())
+    annotate_workbook(source, out, result, {result.rows[0].source: {"=verdict": "=1+1"}})
+    sheet = openpyxl.load_workbook(out)["Inspections"]
+    assert (sheet["G1"].value, sheet["G1"].data_type) == ("=verdict", "s")
+    assert (sheet["G2"].value, sheet["G2"].data_type) == ("=1+1", "s")
