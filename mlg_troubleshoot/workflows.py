@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -12,16 +11,18 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from mlg_troubleshoot.decision.assess import AssessOptions, assess
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Verdict
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, Side
+from mlg_troubleshoot.decision.next_action import next_to_measure
 from mlg_troubleshoot.decision.prediction import Extension
-from mlg_troubleshoot.errors import OutputError, Problem
+from mlg_troubleshoot.decision.ranking import rank_joints
+from mlg_troubleshoot.errors import OutputError, Problem, TroubleshootError, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
 from mlg_troubleshoot.studies.table import load_index_table
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.records import ReadOptions
+    from mlg_troubleshoot.records import ReadOptions, ReadResult
     from mlg_troubleshoot.reporting import ReportProvenance, WrittenReport
     from mlg_troubleshoot.studies.verification import VerifiedNumber
 
@@ -79,6 +80,8 @@ class CheckResult:
         Notes on the input as a whole.
     inputs_sha256 : mapping of str to str
         Hash of each input file by name.
+    read : ReadResult or None
+        What was read, for annotating the user's workbook; None for an inspection entered by hand.
     """
 
     gear: Gear
@@ -86,6 +89,7 @@ class CheckResult:
     problems: tuple[Problem, ...]
     notes: tuple[str, ...]
     inputs_sha256: Mapping[str, str]
+    read: ReadResult | None = None
 
     @property
     def counts(self) -> dict[Verdict, int]:
@@ -163,19 +167,16 @@ def check_files(
 
     Raises
     ------
-    InputFileError
-        If no file could be read at all.
+    UsageError
+        If a mapped column does not exist.
     """
     from mlg_troubleshoot.records import read_many
 
     gear = load_gear(options.gear)
     read = read_many(sources, read_options(gear, options), progress=on_read)
-    hashes = {
-        str(source): hashlib.sha256(source.read_bytes()).hexdigest()
-        for source in sources
-        if isinstance(source, Path) and source.is_file()
-    }
-    return _judge(gear, read.rows, read.problems, read.notes, hashes, options, on_judged)
+    hashes = {file.name: file.sha256 for file in read.files}
+    result = _judge(gear, read.rows, read.problems, read.notes, hashes, options, on_judged)
+    return replace(result, read=read)
 
 
 def check_inspection(inspection: Inspection, options: CheckOptions) -> CheckResult:
@@ -194,6 +195,24 @@ def check_inspection(inspection: Inspection, options: CheckOptions) -> CheckResu
         One judgement.
     """
     return _judge(load_gear(options.gear), (inspection,), (), (), {}, options, None)
+
+
+def next_joint(gear: Gear, measured: Mapping[int, float]) -> int | None:
+    """Choose the joint whose reading is worth most next.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    measured : mapping of int to float
+        Radial clearances measured so far. [in]
+
+    Returns
+    -------
+    int or None
+        Number of the joint; None if all are measured.
+    """
+    return next_to_measure(gear, rank_joints(gear, load_index_table(gear), measured))
 
 
 def _judge(
@@ -301,6 +320,7 @@ def write_reports(
         formats=formats,
         page=page,
         provenance=provenance(result, options),
+        notes=result.notes,
         progress=on_written,
     )
 
@@ -346,3 +366,166 @@ def verify_gear(gear: str = DEFAULT_GEAR) -> tuple[VerifiedNumber, ...]:
     from mlg_troubleshoot.studies.verification import verify
 
     return verify(load_gear(gear))
+
+
+_VERDICT_COLUMNS = (
+    "verdict",
+    "predicted_displacement_in",
+    "over_travel_in",
+    "under_travel_in",
+    "margin_used_in",
+    "remaining_in",
+    "probability_within_margin",
+    "probability_exceed_random_directions",
+    "joints_over_limit",
+    "next_action",
+)
+
+
+def _verdict_values(judgement: Judgement) -> tuple[str | float | None, ...]:
+    if not isinstance(judgement, Assessment):
+        return (str(judgement.verdict), *[None] * 8, judgement.next_action.text)
+    return (
+        str(judgement.verdict),
+        judgement.predicted_displacement_in,
+        judgement.over_travel_in,
+        judgement.under_travel_in,
+        judgement.margin_in,
+        judgement.remaining_in,
+        judgement.probability_within_margin,
+        judgement.probability_exceed_random_directions,
+        ", ".join(f"#{f.joint}" for f in judgement.joints if f.over_limit),
+        judgement.next_action.text,
+    )
+
+
+def write_verdicts(result: CheckResult, file: Path) -> None:
+    """Write the verdicts as CSV, one line a row of the input, in its order.
+
+    Parameters
+    ----------
+    result : CheckResult
+        The check.
+    file : Path
+        File to write.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    from mlg_troubleshoot.records import write_csv
+
+    rows = []
+    for judgement in result.judgements:
+        row = judgement.inspection if isinstance(judgement, Assessment) else judgement.row
+        identity = (row.record_id, row.tail_no, None if row.side is None else str(row.side))
+        place = (row.source.file, row.source.sheet, row.source.row)
+        rows.append((*identity, *_verdict_values(judgement), *place))
+    write_csv(file, ("record_id", "tail_no", "side", *_VERDICT_COLUMNS, "file", "sheet", "row"), rows)
+
+
+def annotate(result: CheckResult, source: Path, out: Path) -> None:
+    """Write a copy of the user's workbook with bad cells marked and verdict columns added.
+
+    Parameters
+    ----------
+    result : CheckResult
+        The check of that workbook.
+    source : Path
+        The workbook.
+    out : Path
+        The copy.
+
+    Raises
+    ------
+    UsageError
+        If the source is not an xlsx workbook, or the copy would replace it.
+    OutputError
+        If the copy cannot be written.
+    """
+    from mlg_troubleshoot.records import annotate_workbook
+
+    if result.read is None:
+        raise UsageError("there is no workbook to annotate", "Give the workbook as FILE.")
+    verdicts = {
+        (j.inspection if isinstance(j, Assessment) else j.row).source: dict(
+            zip(_VERDICT_COLUMNS, _verdict_values(j), strict=True)
+        )
+        for j in result.judgements
+    }
+    annotate_workbook(source, out, result.read, verdicts)
+
+
+@dataclass(frozen=True, slots=True)
+class Ability:
+    """One thing that an installation can do, or cannot.
+
+    Parameters
+    ----------
+    ability, detail : str
+        What, and how it was found.
+    works : bool
+        True if it can.
+    needed : bool
+        False for what only makes things faster or nicer.
+    remedy : str
+        What to do if it cannot.
+    """
+
+    ability: str
+    detail: str
+    works: bool
+    needed: bool = True
+    remedy: str = ""
+
+
+def examine_installation(gear: str = DEFAULT_GEAR) -> tuple[Ability, ...]:
+    """Try what an installation must be able to do: shipped tables, prediction, report, PDF with fonts.
+
+    Parameters
+    ----------
+    gear : str
+        Shipped gear or gear file.
+
+    Returns
+    -------
+    tuple of Ability
+        One for each thing tried.
+    """
+    import sys
+    import tempfile
+
+    from mlg_troubleshoot.geometry.kernel import numba_is_installed
+
+    python = f"{sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
+    found = [Ability("Python", python, sys.version_info >= (3, 11), remedy="Install Python 3.11 or later.")]
+    try:
+        loaded = load_gear(gear)
+        found.append(Ability("gear", f"{loaded.name}, geometry {loaded.geometry_sha256[:12]}", True))
+        table = load_index_table(loaded)
+        found.append(Ability("precomputed indices", f"match the geometry ({table.design})", True))
+        result = check_inspection(_trial_inspection(loaded), CheckOptions(gear=gear, repairs=False, allowances=False))
+        found.append(Ability("prediction", f"{result.counts[Verdict.OUTSIDE_MARGIN]} trial judged", True))
+        with tempfile.TemporaryDirectory() as folder:
+            written = write_reports(result, CheckOptions(gear=gear), Path(folder))[0]
+            found.append(Ability("HTML report", "written", written.html is not None))
+            why = "written, fonts embedded" if written.pdf is not None else "; ".join(written.notes)
+            found.append(Ability("PDF report", why, written.pdf is not None, remedy="Print the HTML report instead."))
+    except TroubleshootError as error:
+        found.append(Ability("gear, tables and reports", error.message, False, remedy=error.remedy))
+    speed = "numba installed" if numba_is_installed() else "numba not installed: large studies run on numpy alone"
+    found.append(
+        Ability("fast kernel", speed, numba_is_installed(), needed=False, remedy="pip install 'mlg-troubleshoot[fast]'")
+    )
+    return tuple(found)
+
+
+def _trial_inspection(gear: Gear) -> Inspection:
+    return Inspection(
+        record_id="trial",
+        tail_no="trial",
+        side=Side.LH,
+        convention=ClearanceConvention.RADIAL,
+        clearance_in={joint.number: 2.0 * joint.limit.value for joint in gear.joints},
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import sys
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -69,6 +70,12 @@ def run(arguments: CheckArguments) -> None:
     )
     result = _result(arguments, options)
     _show(arguments, result)
+    if arguments.csv is not None:
+        workflows.write_verdicts(result, arguments.csv)
+    if arguments.annotate is not None:
+        if len(arguments.files) != 1 or arguments.files[0] == "-":
+            raise UsageError("--annotate needs exactly one workbook", "Give one .xlsx FILE.")
+        workflows.annotate(result, Path(arguments.files[0]), arguments.annotate)
     if arguments.report is not None:
         _write_reports(arguments, options, result)
     if result.problems and not arguments.as_json and not result.judgements:
@@ -230,6 +237,10 @@ def _readings(arguments: CheckArguments) -> tuple[float, ...]:
 def _from_prompts(arguments: CheckArguments, gear: Gear) -> Inspection:
     from mlg_troubleshoot.cli.prompts import Preset, RichTerminal, SessionStore, ask_inspection
 
+    store = SessionStore()
+    saved = store.latest() if arguments.resume else None
+    if arguments.resume and saved is None:
+        raise UsageError("there is no unfinished entry to resume", "Start a new one: mlg check")
     preset = Preset(
         tail_no=arguments.tail,
         side=None if arguments.side is None else _side(arguments.side),
@@ -237,7 +248,17 @@ def _from_prompts(arguments: CheckArguments, gear: Gear) -> Inspection:
         convention=arguments.convention,
         record_id=arguments.record_id,
     )
-    return ask_inspection(gear, RichTerminal(), SessionStore(), preset)
+    return ask_inspection(gear, RichTerminal(), store, preset, saved=saved, advice=_advice(gear))
+
+
+def _advice(gear: Gear) -> Callable[[Mapping[int, float], Sequence[int]], str | None]:
+    """Say after each critical joint which one is worth most next."""
+
+    def advise(measured: Mapping[int, float], _left: Sequence[int]) -> str | None:
+        joint = workflows.next_joint(gear, measured)
+        return None if joint is None else f"Worth most next: {gear.joint(joint).label}."
+
+    return advise
 
 
 def _show(arguments: CheckArguments, result: workflows.CheckResult) -> None:

@@ -152,6 +152,8 @@ class RowReader:
         self._lengths = [
             (index, field) for index, field in good if field.kind in LENGTHS and field.kind is not Kind.CLEARANCE
         ]
+        # The readings of a fleet repeat: what was understood once is not taken apart again.
+        self._known_lengths: dict[tuple[int, LengthUnit | None, Cell], float] = {}
         self._numbers = [(index, field.kind) for index, field in good if field.kind in _NUMBER_RANGE]
         self._date = self._only(good, Kind.DATE)
         self._approach = self._only(good, Kind.APPROACH)
@@ -545,19 +547,25 @@ class RowReader:
         lengths: dict[Kind, float] = {}
         readings: list[tuple[int, float]] = []
         floats: dict[int, float] = {}
+        known = self._known_lengths
         for index, field in self._lengths:
             cell = self._cells[index]
             if cell is None:
                 continue
             kind = field.kind
-            try:
-                value_in = self._one_length(cell, field, row_unit)
-            except CellFaultError as fault:
-                if kind in VERDICT_BEARING:
-                    self._fault(index, fault)
-                else:
-                    self._faults.append((index, fault))
-                continue
+            value_in = known.get((index, row_unit, cell))
+            if value_in is None:
+                try:
+                    value_in = self._one_length(cell, field, row_unit)
+                except CellFaultError as fault:
+                    if kind in VERDICT_BEARING:
+                        self._fault(index, fault)
+                    else:
+                        self._faults.append((index, fault))
+                    continue
+                if len(known) > _CACHE_LIMIT:
+                    known.clear()
+                known[index, row_unit, cell] = value_in
             if kind is Kind.PLUNGER_DISPLACEMENT:
                 readings.append((field.number or 1, value_in))
             elif kind is Kind.AXIAL_FLOAT:

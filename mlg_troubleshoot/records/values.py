@@ -6,7 +6,7 @@ import math
 import re
 from datetime import date
 from enum import StrEnum
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.records.cells import OddCell, OddKind, show_number
@@ -42,6 +42,7 @@ _NOT_FINITE = re.compile(r"[+\-]?\s*(nan|inf|infinity|1\.#\w+)", re.IGNORECASE)
 _INVISIBLE = {ord(c): None for c in "\u200b\u200c\u200d\u2060\ufeff"}
 
 _E = TypeVar("_E", bound=StrEnum)
+_CHOICES: dict[type[StrEnum], dict[str, StrEnum]] = {}
 
 
 def odd_cell_fault(cell: OddCell, expected: str) -> CellFaultError:
@@ -331,7 +332,13 @@ def read_choice(cell: str | float | OddCell, choices: type[_E], code: str, hints
     CellFaultError
         If it is none of them.
     """
-    words = [str(choice) for choice in choices]
+    known = _CHOICES.get(choices)
+    if known is None:
+        known = _CHOICES[choices] = {str(choice): choice for choice in choices}
+    found = known.get(cell) if isinstance(cell, str) else None
+    if found is not None:
+        return cast("_E", found)
+    words = list(known)
     expected = " or ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
     text = plain_text(cell) if isinstance(cell, str) else ""
     name = re.sub(r"[\s\-]+", "_", text).upper()

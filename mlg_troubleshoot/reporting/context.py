@@ -9,7 +9,7 @@ from typing import TypedDict
 
 from markupsafe import Markup
 
-from mlg_troubleshoot.decision.assessment import Action, Assessment, JointFinding, Rejected, Verdict
+from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Rejected, Verdict
 from mlg_troubleshoot.decision.inspection import Inspection, RowSource, Side
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
@@ -36,12 +36,6 @@ DISCLAIMER = (
     "In-plane joint clearance only: not hydraulics, friction, doors, switches or structure.",
 )
 SIGNATORIES = ("Measured by", "Independently measured by", "Rectified by", "Inspected by")
-_ACTION_LABEL = {
-    Action.MEASURE: "Measure next",
-    Action.RESTORE: "Rectify next",
-    Action.CONTINUE: "Continue",
-    Action.CORRECT: "Correct the entry",
-}
 _STATE_WORDS = {"over": "OVER LIMIT", "fine": "within limit", "missing": "not measured"}
 _WARNINGS_ON_FRONT = 3
 
@@ -73,13 +67,6 @@ class VerdictContext(TypedDict):
     tone: str
     sign: Markup
     headline: str
-
-
-class ActionContext(TypedDict):
-    """The one next action."""
-
-    label: str
-    text: str
 
 
 class KeyFigure(TypedDict):
@@ -200,7 +187,7 @@ class InspectionContext(DocumentContext):
 
     identity: IdentityContext
     verdict: VerdictContext
-    action: ActionContext
+    action: str
     front_warnings: list[str]
     more_warnings: str
     warnings: list[str]
@@ -226,7 +213,7 @@ class RejectedContext(DocumentContext):
 
     identity: IdentityContext
     verdict: VerdictContext
-    action: ActionContext
+    action: str
     correct: list[str]
     problems: list[ProblemRow]
     warnings: list[str]
@@ -266,7 +253,7 @@ def inspection_context(assessment: Assessment, gear: Gear, provenance: ReportPro
         "assumptions": assumptions(gear, assessment),
         "identity": identity,
         "verdict": _verdict(a.verdict, a.headline),
-        "action": {"label": _ACTION_LABEL[a.next_action.action], "text": a.next_action.text},
+        "action": a.next_action.text,
         "front_warnings": front,
         "more_warnings": f"{several(rest, 'more warning')} under “Warnings”." if rest else "",
         "warnings": warnings if rest else [],
@@ -319,10 +306,7 @@ def rejected_context(
         **_document(f"{identity['tail']} {identity['side']} – {Verdict.INVALID.words}", identity, gear, provenance),
         "identity": identity,
         "verdict": _verdict(Verdict.INVALID, "This entry cannot be judged. Do not use it until it is corrected."),
-        "action": {
-            "label": _ACTION_LABEL[rejected.next_action.action],
-            "text": rejected.next_action.text,
-        },
+        "action": rejected.next_action.text,
         "correct": list(row.correct),
         "problems": [problem_row(p) for p in problems if (p.file, p.sheet, p.row) == _place(row.source)],
         "warnings": list(dict.fromkeys((*rejected.warnings, *row.warnings))),
@@ -410,15 +394,20 @@ def _verdict(verdict: Verdict, headline: str) -> VerdictContext:
 
 
 def _key_figures(a: Assessment) -> list[KeyFigure]:
-    upper = ""
+    closes = a.predicted_displacement_in is not None
+    bound = "Each clearance in its worst direction: a bound, not a forecast."
     if a.predicted_upper_in is not None and any(f.clearance_in is None for f in a.joints):
-        upper = f"{inches(a.predicted_upper_in)} with unmeasured joints at their limit"
+        bound += f" {inches(a.predicted_upper_in)} with unmeasured joints at their limit."
+    if a.standard_uncertainty_in is None:
+        uncertainty = "Standard uncertainty not known."
+    else:
+        uncertainty = f"Standard uncertainty {inches(a.standard_uncertainty_in)}; the box below is twice that."
     return [
         {
             "label": "Worst case",
-            "value": inches(a.predicted_displacement_in),
-            "also": millimetres(a.predicted_displacement_in, decimals=2),
-            "meaning": f"Each clearance in its worst direction: a bound, not a forecast. {upper}",
+            "value": inches(a.predicted_displacement_in) if closes else "beyond",
+            "also": millimetres(a.predicted_displacement_in, decimals=2) if closes else "does not close",
+            "meaning": bound,
         },
         {
             "label": "Margin",
@@ -436,8 +425,7 @@ def _key_figures(a: Assessment) -> list[KeyFigure]:
             "label": "Worst case within margin",
             "value": percent(a.probability_within_margin),
             "also": "probability",
-            "meaning": f"Standard uncertainty {inches(a.standard_uncertainty_in)}; the box below is twice that. "
-            "95 % or more is within, 5 % or less outside.",
+            "meaning": f"{uncertainty} 95 % or more is within, 5 % or less outside.",
         },
     ]
 

@@ -11,6 +11,8 @@ from functools import cache
 from mlg_troubleshoot.reporting.resources import FONT_FILES, templates_folder
 
 _PLAIN_SPACE = {"\t", "\n", "\r"}
+_LONGEST_WORD = 64
+_LONG_WORD = re.compile(rf"\S{{{_LONGEST_WORD + 1},}}")
 _SOUNDS = re.compile(r"^(?:HANGUL SYLLABLE|HIRAGANA LETTER|KATAKANA LETTER) (?:SMALL )?(.+)$")
 
 
@@ -30,6 +32,24 @@ def visible(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(c if _is_shown(c) else f"‹U+{ord(c):04X}›" for c in text)
+
+
+def breakable(text: str) -> str:
+    """Let a word that is wider than a page be broken: the PDF engine would shrink the whole page to fit it.
+
+    Parameters
+    ----------
+    text : str
+        Any text.
+
+    Returns
+    -------
+    str
+        The text, with zero-width spaces inside words of more than 64 characters.
+    """
+    if len(text) <= _LONGEST_WORD:
+        return text
+    return _LONG_WORD.sub(lambda word: "\u200b".join(re.findall(".{1,32}", word[0])), text)
 
 
 def _is_shown(character: str) -> bool:

@@ -11,7 +11,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from mlg_troubleshoot.reporting.glyphs import font_faces, visible
+from mlg_troubleshoot.reporting.glyphs import breakable, font_faces, visible
 from mlg_troubleshoot.reporting.resources import templates_folder
 
 
@@ -52,12 +52,17 @@ def environment() -> Environment:
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
-        # Texts of users pass through here before they are escaped; markup of this package is left as it is.
-        finalize=lambda value: visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value,
+        # Texts pass through here before they are escaped.
+        finalize=_readable,
         auto_reload=False,
     )
     made.filters["css_string"] = css_string
     return made
+
+
+def _readable(value: Any) -> Any:
+    """Make a text fit to be shown; markup of this package is left as it is."""
+    return value if isinstance(value, Markup) or not isinstance(value, str) else breakable(visible(value))
 
 
 def css_string(text: str) -> Markup:

@@ -41,6 +41,8 @@ _LONGEST_ARROW = 42.0
 # One scale for most reports, so that their drawings compare.
 _LARGEST_EXAGGERATION = 100
 _SHORTEST_ARROW = 2.5
+# With more joints over their limit, frames would cover the linkage.
+_MOST_FRAMES = 2
 # Room for labels, supports and the slot above and below the linkage.
 _ABOVE, _BELOW = 44.0, 40.0
 
@@ -196,15 +198,15 @@ class _PlaneDrawing:
                     (min(start[0], end[0]), min(start[1], end[1]), max(start[0], end[0]), max(start[1], end[1]))
                 )
             _joint_marker(canvas, x, y, joint.number, findings[joint.number])
+        framed = sum(findings[j.number].over_limit for j in here) <= _MOST_FRAMES
         for joint in sorted(here, key=lambda j: not findings[j.number].over_limit):
             finding = findings[joint.number]
-            names = [joint.name] if finding.over_limit else _two_lines(joint.name)
-            lines = [_Line(part, 8.5, False) for part in names]
-            if finding.over_limit:
-                lines.append(_Line(f"{number(finding.clearance_in, 4)} OVER LIMIT", 10.5, True))
-            elif finding.clearance_in is not None:
-                lines.append(_Line(number(finding.clearance_in, 4), 9.5, True))
-            _callout(canvas, at(joint.point), lines, boxes, segments, finding.over_limit)
+            strong = finding.over_limit and framed
+            lines = [_Line(part, 8.5, False) for part in ([joint.name] if strong else _two_lines(joint.name))]
+            if finding.clearance_in is not None:
+                mark = " OVER LIMIT" if strong else " OVER" if finding.over_limit else ""
+                lines.append(_Line(number(finding.clearance_in, 4) + mark, 10.5 if strong else 9.5, True))
+            _callout(canvas, at(joint.point), lines, boxes, segments, strong)
         return name, canvas.svg("figure panel"), width
 
     def _obstacles(self, at: _At) -> list[Box]:

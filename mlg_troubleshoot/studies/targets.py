@@ -159,7 +159,7 @@ def _target(entry: TomlTable) -> Target:
     clearance: dict[int, float] = {}
     if entry.has("clearance_in"):
         lengths = entry.table("clearance_in")
-        for key in lengths.names():
+        for key in lengths.names:
             if not key.isdigit():
                 raise lengths.fail(key, "the number of a joint")
             clearance[int(key)] = lengths.number(key)

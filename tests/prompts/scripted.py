@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from datetime import datetime
 
-from mlg_troubleshoot.cli.prompts import Line, Preset, SessionStore, ask_inspection
+from mlg_troubleshoot.cli.prompts import EntryInterruptedError, Line, Preset, SessionStore, ask_inspection
 from mlg_troubleshoot.cli.prompts.flow import Effect, Flow, State, Turn
 from mlg_troubleshoot.cli.prompts.lines import without_tones
 from mlg_troubleshoot.decision.inspection import Inspection, Side
@@ -44,7 +44,11 @@ class ScriptedTerminal:
 
 
 def inspect(gear: Gear, store: SessionStore, typed: Iterable[str], preset: Preset = NOTHING, **more) -> Inspection:
-    return ask_inspection(gear, ScriptedTerminal(typed), store, preset, now=lambda: NOON, **more)
+    terminal = ScriptedTerminal(typed)
+    try:
+        return ask_inspection(gear, terminal, store, preset, now=lambda: NOON, **more)
+    except EntryInterruptedError:
+        raise AssertionError(f"more was asked:\n{terminal.screen}") from None
 
 
 def play(flow: Flow, typed: Iterable[str], preset: Preset = RADIAL_INCHES) -> Turn:

@@ -173,7 +173,13 @@ def test_a_declined_offer_is_not_made_again(gear: Gear, store: SessionStore) -> 
 def test_an_inspection_of_another_gear_is_not_offered(gear: Gear, store: SessionStore, heading: list[str]) -> None:
     interrupted(gear, store, [*HEADING, ".004"])
     terminal, _ = interrupted(gear, store, heading)
-    assert "is unfinished" not in terminal.screen
+    assert "unfinished" not in terminal.screen
+
+
+def test_an_inspection_of_another_gear_type_is_not_offered(gear: Gear, store: SessionStore) -> None:
+    interrupted(replace(gear, id="other"), store, [*HEADING, ".004"])
+    terminal, _ = interrupted(gear, store, ["N123AB", "l"])
+    assert "unfinished" not in terminal.screen
 
 
 def test_a_computed_inspection_is_not_unfinished(gear: Gear, store: SessionStore) -> None:

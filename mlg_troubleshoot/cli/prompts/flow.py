@@ -315,8 +315,6 @@ class Flow:
         }
         return shown[state.ask]
 
-    # The heading.
-
     def _tail(self, state: State, typed: str) -> Turn:
         answers = state.answers
         if not typed and answers.tail_no is None:
@@ -408,8 +406,6 @@ class Flow:
             return replace(self._go_on(state.answers), effect=Effect.PUT_AWAY, session=saved)
         return _again(state, _not_taken(typed, "Type y to go on with it or n to begin a new one."))
 
-    # The joints.
-
     def _joint(self, state: State, typed: str) -> Turn:
         number, answers = _known(state.joint), state.answers
         jump = re.fullmatch(r"#\s*(\d{1,4})", typed)
@@ -477,8 +473,6 @@ class Flow:
             return _again(state, f"There is no joint #{number}. The joints are {self._joint_names()}.")
         return Turn(State(Ask.JOINT, state.answers, joint=number, from_review=state.from_review))
 
-    # The end.
-
     def _more(self, state: State, typed: str) -> Turn:
         if typed.lower() in ("", "s"):
             return Turn(State(Ask.REVIEW, state.answers))
@@ -501,8 +495,6 @@ class Flow:
         if number is not None:
             return self._jump(replace(state, from_review=True), int(number[1]))
         return _again(state, _not_taken(typed, f"Type a joint number ({self._joint_names()}), or Enter alone."))
-
-    # Where to go.
 
     def _offer_or_go_on(self, answers: Answers, from_review: bool = False) -> Turn:
         """Offer an unfinished inspection as soon as tail and side are known."""
@@ -569,8 +561,6 @@ class Flow:
             return _again(state, "This is the first question.")
         ask, joint = course[at - 1]
         return Turn(State(ask, state.answers, joint=joint))
-
-    # Small things.
 
     def _reading(self, answers: Answers, written: WrittenLength) -> Reading:
         unit, convention = _known(answers.unit), _known(answers.convention)
