@@ -29,7 +29,9 @@ class Boundary:
         if error is None or isinstance(error, (typer.Exit, typer.Abort, SystemExit)):
             return
         if isinstance(error, KeyboardInterrupt):
-            typer.echo("\nInterrupted.", err=True)
+            # A prompt that was interrupted has said already how to go on.
+            if type(error) is KeyboardInterrupt:
+                typer.echo("\nInterrupted.", err=True)
             raise typer.Exit(INTERRUPTED) from None
         if isinstance(error, BrokenPipeError):
             # The reader of a pipe went away: nothing is wrong with the run, and nobody is left to tell.

@@ -256,7 +256,7 @@ def _advice(gear: Gear) -> Callable[[Mapping[int, float], Sequence[int]], str | 
 
     def advise(measured: Mapping[int, float], _left: Sequence[int]) -> str | None:
         joint = workflows.next_joint(gear, measured)
-        return None if joint is None else f"Worth most next: {gear.joint(joint).label}."
+        return None if joint is None else f"Worth most next: {gear.joint(joint).label} (type #{joint})."
 
     return advise
 

@@ -118,20 +118,15 @@ def verify(name: str, *, as_json: bool) -> None:
         console = Console(highlight=False)
         console.print(Text(f"{gear.name}: geometry {gear.provenance}", style="bold"))
         table = Table(box=None, pad_edge=False, header_style="bold")
-        for heading in ("quantity", "section", "printed", "model", "accepted", "status", ""):
-            table.add_column(heading, justify="right" if heading in {"printed", "model"} else "left")
+        table.add_column("what the paper prints (section)")
+        for heading in ("printed", "model"):
+            table.add_column(heading, justify="right", max_width=14)
+        table.add_column("status", no_wrap=True)
         for n in numbers:
-            mark = "holds" if n.holds else ("DOES NOT HOLD" if n.should_hold else "known not to hold")
+            mark = "" if n.holds else (": DOES NOT HOLD" if n.should_hold else ", known")
             style = "bold red" if n in failed else ""
             table.add_row(
-                n.quantity,
-                n.section,
-                n.printed,
-                f"{n.computed:.4g} {n.unit}".strip(),
-                n.tolerance,
-                n.status,
-                mark,
-                style=style,
+                f"{n.quantity} ({n.section})", n.printed, f"{n.computed:.4g} {n.unit}".strip(), n.status + mark, style=style
             )
         console.print(table)
         verdict = "all that should hold hold" if not failed else f"{len(failed)} that should hold do not"

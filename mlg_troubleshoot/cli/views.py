@@ -187,12 +187,18 @@ def _repair_table(a: Assessment) -> Table:
     return table
 
 
+_WORST_FIRST = (
+    Verdict.OUTSIDE_MARGIN,
+    Verdict.INCONCLUSIVE,
+    Verdict.INCOMPLETE,
+    Verdict.INVALID,
+    Verdict.WITHIN_MARGIN,
+)
+
+
 def _urgency(judgement: Judgement) -> tuple[int, float]:
-    order = list(Verdict).index(judgement.verdict)
-    if isinstance(judgement, Rejected):
-        return (len(Verdict), 0.0)
-    remaining = judgement.remaining_in
-    return (order, float("-inf") if remaining is None else remaining)
+    remaining = judgement.remaining_in if isinstance(judgement, Assessment) else None
+    return (_WORST_FIRST.index(judgement.verdict), float("-inf") if remaining is None else remaining)
 
 
 def show_batch(result: CheckResult) -> None:

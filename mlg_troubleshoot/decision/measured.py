@@ -6,6 +6,7 @@ import math
 
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.prediction import DEFAULT_PLUNGER_U_IN
+from mlg_troubleshoot.units import MM_PER_IN
 
 
 def reading_uncertainty(inspection: Inspection) -> tuple[float, str]:
@@ -104,7 +105,7 @@ def _slip(measured: float, predicted: float, u: float) -> str:
     if predicted <= 0.0 or measured <= 0.0:
         return ""
     for factor, words in (
-        (25.4, "millimetres entered as inches, or the reverse"),
+        (MM_PER_IN, "millimetres entered as inches, or the reverse"),
         (10.0, "a decimal point in the wrong place"),
         (2.0, "diametral or total play entered as radial, or the reverse"),
     ):

@@ -1,0 +1,23 @@
+"""Measured against predicted: what the model gets wrong, the cause by name, the extension and its gain."""
+
+from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate, Cause, Scene, load_causes
+from mlg_troubleshoot.diagnosis.diagnose import Diagnosis, NamedCause, diagnose
+from mlg_troubleshoot.diagnosis.extension import ModelExtension, Term, load_extension, save_extension
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
+
+__all__ = [
+    "CATALOGUE",
+    "Candidate",
+    "Cause",
+    "Diagnosis",
+    "DiagnosisTable",
+    "ModelExtension",
+    "NamedCause",
+    "Scene",
+    "Term",
+    "diagnose",
+    "load_causes",
+    "load_extension",
+    "save_extension",
+    "table_from_inspections",
+]

@@ -96,7 +96,7 @@ class Kernel:
         links : sequence of array_like, length 2 × number of virtual links
             Components x, y of each virtual link in turn; all must broadcast with each other. [in]
         parameters : sequence of array_like, optional
-            Numbers of the mechanism in place of its own, each a number or an array that broadcasts.
+            Numbers of the mechanism in place of its own, each a number or an array that broadcasts. [in, rad or 1]
 
         Returns
         -------
@@ -177,7 +177,7 @@ class Kernel:
         compiled : bool
             Use numba (it must be installed); else numpy.
         out : ndarray, shape (n,), optional
-            Where to write the result.
+            Where to write the result. [in or rad]
 
         Returns
         -------

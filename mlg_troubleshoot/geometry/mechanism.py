@@ -98,7 +98,7 @@ class Dyad:
     upstream, downstream : str
         The joints at the other ends; the downstream one is a fixed pivot or located before.
     sign : float
-        +1 if the joint lies to the left of the line from upstream to downstream, else −1.
+        +1 if the joint lies to the left of the line from upstream to downstream, else −1. [1]
     virtual_links : tuple of int
         Virtual links at the two ends of the upstream link: both displace it in parallel (A**, Fig. 8b).
     driven : bool
@@ -160,7 +160,7 @@ class Slider:
     axis : float
         Direction of the axis in the joint's plane; the axis passes through the joint's reference position. [rad]
     sign : float
-        +1 if the joint lies ahead, along the axis, of the foot of the upstream joint, else −1.
+        +1 if the joint lies ahead, along the axis, of the foot of the upstream joint, else −1. [1]
     virtual_links : tuple of int
         Virtual links at the two ends of the link.
     """

@@ -6,7 +6,7 @@ import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
-from zipfile import BadZipFile
+from zipfile import BadZipFile, ZipFile
 
 from mlg_troubleshoot.decision.inspection import RowSource
 from mlg_troubleshoot.errors import OutputError, Problem, UsageError
@@ -30,7 +30,7 @@ VerdictColumns = Mapping[RowSource, Mapping[str, str | float | None]]
 
 def annotate_workbook(
     source: str | Path, out: str | Path, result: ReadResult, verdicts: VerdictColumns, *, name: str | None = None
-) -> None:
+) -> tuple[str, ...]:
     """Write a copy of a workbook with bad cells marked and verdict columns behind the table.
 
     Parameters
@@ -45,6 +45,11 @@ def annotate_workbook(
         New columns by header, for each row.
     name : str, optional
         What `result` calls the file; the path as given if left out.
+
+    Returns
+    -------
+    tuple of str
+        What the copy could not take over, such as pictures and drawn shapes, in plain words; empty if nothing.
 
     Raises
     ------
@@ -79,7 +84,45 @@ def annotate_workbook(
                 _behind_table(sheet, layout, free, own)
     buffer = io.BytesIO()
     book.save(buffer)
-    write_bytes(out, restore_results(data, buffer.getvalue()))
+    written = restore_results(data, buffer.getvalue())
+    write_bytes(out, written)
+    return _not_taken_over(data, written)
+
+
+# Parts that the library may drop in silence: their folder, and what a user calls them.
+_DROPPABLE = (
+    ("xl/media/", "pictures"),
+    ("xl/charts/chart", "charts"),
+    ("xl/pivottables/", "pivot tables"),
+    ("xl/ctrlprops/", "form controls"),
+    ("xl/slicers/", "slicers"),
+    ("xl/threadedcomments/", "threaded comments"),
+    ("xl/diagrams/data", "diagrams"),
+)
+_SHAPES = (b"<xdr:sp ", b"<xdr:sp>", b"<xdr:cxnSp", b"<xdr:grpSp")
+
+
+def _not_taken_over(before: bytes, after: bytes) -> tuple[str, ...]:
+    """Compare what the two packages hold beside their cells."""
+    with ZipFile(io.BytesIO(before)) as old, ZipFile(io.BytesIO(after)) as new:
+        lost = [
+            f"the annotated copy lacks {count} of the {what} of the workbook"
+            for folder, what in _DROPPABLE
+            if (count := _count(old, folder) - _count(new, folder)) > 0
+        ]
+        shapes = _shapes(old) - _shapes(new)
+    if shapes > 0:
+        lost.append(f"the annotated copy lacks {shapes} of the drawn shapes of the workbook")
+    return tuple(lost)
+
+
+def _count(archive: ZipFile, folder: str) -> int:
+    return sum(1 for name in archive.namelist() if name.lower().startswith(folder) and "_rels" not in name)
+
+
+def _shapes(archive: ZipFile) -> int:
+    drawings = [name for name in archive.namelist() if name.lower().startswith("xl/drawings/drawing")]
+    return sum(archive.read(name).count(mark) for name in drawings for mark in _SHAPES)
 
 
 def _load(source: str | Path, out: str | Path) -> bytes:

@@ -130,6 +130,28 @@ def show(cell: Cell) -> str:
     return cell.text
 
 
+def quote(cell: Cell, limit: int = 300) -> str:
+    """Return a cell as text for a message: not endless, and without characters that steer a terminal.
+
+    Parameters
+    ----------
+    cell : str, float, OddCell or None
+        The cell.
+    limit : int, optional
+        Number of characters after which it is cut.
+
+    Returns
+    -------
+    str
+        Its text.
+    """
+    text = show(cell)
+    if len(text) > limit:
+        text = text[:limit] + "…"
+    return _STEERING.sub(lambda match: f"\\x{ord(match[0]):02x}", text)
+
+
+_STEERING = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]")
 _ELAPSED = re.compile(r"\[[hms]+\]", re.IGNORECASE)
 _NOT_CODE = re.compile(r'"[^"]*"|\\.|_.|\*.|\[[^\]]*\]', re.DOTALL)
 _BUILTIN_DATES = frozenset((*range(14, 23), *range(27, 37), *range(45, 48), *range(50, 59)))

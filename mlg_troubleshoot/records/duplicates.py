@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
@@ -12,7 +12,11 @@ from mlg_troubleshoot.records.columns import Kind
 from mlg_troubleshoot.records.model import SheetLayout
 
 
-def settle_duplicates(rows: list[Inspection | InvalidRow], layouts: Sequence[SheetLayout]) -> list[Problem]:
+def settle_duplicates(
+    rows: list[Inspection | InvalidRow],
+    layouts: Sequence[SheetLayout],
+    invalid_content: Mapping[RowSource, int],
+) -> list[Problem]:
     """Warn of rows that are the same inspection again, and refuse rows that share an id and differ.
 
     Parameters
@@ -21,6 +25,8 @@ def settle_duplicates(rows: list[Inspection | InvalidRow], layouts: Sequence[She
         The rows; changed in place.
     layouts : sequence of SheetLayout
         Where the tables are, for the cells of the ids.
+    invalid_content : mapping of RowSource to int
+        A hash of the cells of the rows that cannot be judged anyway.
 
     Returns
     -------
@@ -38,7 +44,7 @@ def settle_duplicates(rows: list[Inspection | InvalidRow], layouts: Sequence[She
     problems: list[Problem] = []
     for record_id, places in groups.items():
         found = [rows[place] for place in places]
-        bare = [_content(row) for row in found]
+        bare = [_content(row, invalid_content) for row in found]
         if all(b is not None and b == bare[0] for b in bare):
             for place in places[1:]:
                 row = rows[place]
@@ -52,9 +58,9 @@ def settle_duplicates(rows: list[Inspection | InvalidRow], layouts: Sequence[She
     return problems
 
 
-def _content(row: Inspection | InvalidRow) -> Inspection | None:
+def _content(row: Inspection | InvalidRow, invalid_content: Mapping[RowSource, int]) -> Inspection | int | None:
     if isinstance(row, InvalidRow):
-        return None
+        return invalid_content.get(row.source)
     return replace(row, source=RowSource(), warnings=(), entered={})
 
 

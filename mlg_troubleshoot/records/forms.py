@@ -25,7 +25,7 @@ class Form:
 
     Parameters
     ----------
-    labels : sequence of tuple
+    lines : sequence of tuple
         Row, label and value of each line.
     label_column, value_column : int
         Where they stand, counted from 0.
@@ -154,6 +154,7 @@ def read_form(form: Form, options: ReadOptions, *, file: str | None, sheet: str 
         form.lines[0][0],
     )
     out.rows.append(reader.read(start, [value for _, _, value in form.lines], value_places))
+    out.invalid_content[out.rows[0].source] = hash(tuple(value for _, _, value in form.lines))
     out.problems += row_problems
     out.layouts.append(
         SheetLayout(

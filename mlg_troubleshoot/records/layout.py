@@ -99,7 +99,9 @@ def header_score(cells: Sequence[Cell], options: ReadOptions) -> int:
                 doubtful += 1
     kinds = {kind for kind, _ in known}
     core = len(kinds & {*REQUIRED}) + (1 if Kind.CLEARANCE in kinds else 0) + (1 if doubtful else 0)
-    if core < 2 or len(known) + doubtful < 3:
+    # A table of clearances alone is a table, too: what it lacks is then named column by column.
+    clearances = sum(1 for kind, number in known if kind is Kind.CLEARANCE and number is not None)
+    if clearances < 2 and (core < 2 or len(known) + doubtful < 3):
         return 0
     return 2 * len(known) + doubtful
 
@@ -248,7 +250,6 @@ class ColumnReader:
         *,
         units: Sequence[LengthUnit | None] = (),
         places: Sequence[tuple[int, str]] | None = None,
-        required: bool = True,
     ) -> Columns:
         """Read all headers of a table.
 
@@ -262,8 +263,6 @@ class ColumnReader:
             Units from a row of units.
         places : sequence of tuple, optional
             Row and cell of each label, where they do not stand in one row.
-        required : bool, optional
-            False to leave missing columns unreported.
 
         Returns
         -------
@@ -271,22 +270,24 @@ class ColumnReader:
             The columns.
         """
         columns = Columns([])
+        readings: list[tuple[Recognition, bool]] = []
         for index, text in enumerate(headers):
             header_row, cell = places[index] if places is not None else (row, f"{column_letters(index)}{row}")
             found, mapped = self._recognise(text, index)
             known = found.field
             if known is not None and index < len(units) and units[index] is not None:
                 known = self._with_unit(known, units[index])
+            readings.append((found, mapped))
             placed = PlacedField(index, text, known, found.standing is Standing.DOUBTFUL, cell, header_row)
             columns.placed.append(placed)
             if placed.refused:
                 columns.problems.append(self._doubtful(placed, found))
-            elif text:
-                self._note(columns, placed, found, mapped, in_form=places is not None)
         self._joint_columns(columns)
         self._duplicates(columns)
-        if required:
-            self._missing(columns, row)
+        for placed, (found, mapped) in zip(columns.placed, readings, strict=True):
+            if placed.header and not placed.refused:
+                self._note(columns, placed, found, mapped, in_form=places is not None)
+        self._missing(columns, row)
         self._unused_map(columns, row)
         return columns
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
 from mlg_troubleshoot.errors import Problem
-from mlg_troubleshoot.records.cells import Cell, OddCell, column_letters, show
+from mlg_troubleshoot.records.cells import Cell, OddCell, column_letters, quote, show
 from mlg_troubleshoot.records.columns import PER_JOINT, Field, Kind
 from mlg_troubleshoot.records.headers import tidy
 from mlg_troubleshoot.records.model import ReadOptions
@@ -219,7 +219,7 @@ class LongReader:
                 row,
                 p.header,
                 f"{column_letters(p.index)}{row}",
-                None if cell is None else show(cell),
+                None if cell is None else quote(cell),
                 expected,
                 remedy,
             )

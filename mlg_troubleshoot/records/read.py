@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, islice
@@ -61,7 +62,7 @@ def read_inspections(
     Parameters
     ----------
     source : str, Path or binary file
-        A CSV file, a workbook, or an open binary stream of either.
+        A CSV file, a workbook, or an open binary stream of either; ``-`` is standard input.
     options : ReadOptions
         What the caller declares about it.
     name : str, optional
@@ -179,7 +180,9 @@ def _read_file(source: Source, options: ReadOptions, name: str | None, ticker: _
 
 def _load(source: Source) -> bytes:
     try:
-        if isinstance(source, str | Path):
+        if isinstance(source, str | Path) and str(source) == STDIN_NAME:
+            data = sys.stdin.buffer.read(MAX_FILE_BYTES + 1)
+        elif isinstance(source, str | Path):
             with Path(source).open("rb") as file:
                 data = file.read(MAX_FILE_BYTES + 1)
         else:
@@ -268,6 +271,7 @@ def _read_book(book: Workbook, options: ReadOptions, label: str, ticker: _Ticker
         found.problems += part.problems
         found.notes += [f"sheet {sheet.name!r}: {note}" if several else note for note in part.notes]
         found.layouts += part.layouts
+        found.invalid_content |= part.invalid_content
     if not found.rows and not found.problems:
         raise FileRefusedError(
             "no_rows",
@@ -381,7 +385,8 @@ def _finish(results: Sequence[_FileResult]) -> ReadResult:
     rows = [row for result in results for row in result.found.rows]
     layouts = tuple(layout for result in results for layout in result.found.layouts)
     problems = [p for result in results for p in result.found.problems]
-    problems += settle_duplicates(rows, layouts)
+    contents = {source: content for result in results for source, content in result.found.invalid_content.items()}
+    problems += settle_duplicates(rows, layouts, contents)
     for place, warnings in history_warnings(rows).items():
         rows[place] = replace(rows[place], warnings=(*rows[place].warnings, *warnings))
     order = _places(results)

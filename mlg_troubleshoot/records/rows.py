@@ -18,7 +18,7 @@ from mlg_troubleshoot.decision.inspection import (
     Side,
 )
 from mlg_troubleshoot.errors import Problem
-from mlg_troubleshoot.records.cells import Cell, OddCell, OddKind, column_letters, show
+from mlg_troubleshoot.records.cells import Cell, OddCell, OddKind, column_letters, quote, show
 from mlg_troubleshoot.records.columns import CARRIED, LENGTHS, VERDICT_BEARING, Field, Kind
 from mlg_troubleshoot.records.model import FileRefusedError, ReadOptions
 from mlg_troubleshoot.records.slips import scale_slip
@@ -299,7 +299,7 @@ class RowReader:
         InvalidRow
             The row, with its problem reported.
         """
-        found = ",".join(show(c) for c in cells)
+        found = quote(",".join(show(c) for c in cells), 80)
         comma = len(cells) > expected and any(isinstance(c, str) and c.strip() == "0" for c in cells)
         self._report(
             Problem(
@@ -309,7 +309,7 @@ class RowReader:
                 row,
                 None,
                 None,
-                f"{len(cells)} fields: {found[:80]}",
+                f"{len(cells)} fields: {found}",
                 f"{expected} fields, as in the header",
                 "A decimal comma in a comma-separated file splits a number in two: write 0.013, or separate the "
                 "columns by semicolons."
@@ -339,7 +339,7 @@ class RowReader:
         InvalidRow
             The row, with its problem reported.
         """
-        found = ",".join(show(c) for c in cells).replace("\0", "\\0")
+        found = quote(",".join(show(c) for c in cells), 80)
         self._report(
             Problem(
                 reason.code,
@@ -348,7 +348,7 @@ class RowReader:
                 row,
                 None,
                 None,
-                f"{reason.found}: {found[:80]}",
+                f"{reason.found}: {found}",
                 reason.expected,
                 reason.remedy,
             )
@@ -663,7 +663,7 @@ class RowReader:
                 row,
                 placed.header,
                 cell,
-                None if raw is None else show(raw),
+                None if raw is None else quote(raw),
                 fault.expected,
                 fault.remedy,
             )

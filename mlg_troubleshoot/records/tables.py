@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
 from mlg_troubleshoot.errors import Problem
-from mlg_troubleshoot.records.cells import column_letters
+from mlg_troubleshoot.records.cells import Cell, column_letters
 from mlg_troubleshoot.records.columns import CARRIED
 from mlg_troubleshoot.records.layout import ColumnReader, Columns, Header
 from mlg_troubleshoot.records.longform import LongReader
@@ -32,12 +32,15 @@ class Collected:
         The notes.
     layouts : list of SheetLayout
         Where the tables are.
+    invalid_content : dict of RowSource to int
+        A hash of the cells of each row that cannot be judged, to tell a repeated row from another one.
     """
 
     rows: list[Inspection | InvalidRow] = field(default_factory=list)
     problems: list[Problem] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     layouts: list[SheetLayout] = field(default_factory=list)
+    invalid_content: dict[RowSource, int] = field(default_factory=dict)
 
 
 def read_table(
@@ -103,15 +106,14 @@ def read_table(
     last = header.row
     repeated = 0
     pending = 0
-    texts = tuple(text or None for text in header.texts)
-    first_text = next((i for i, t in enumerate(texts) if t), 0)
     width = header.width
+    is_header = _header_test(header)
     faulty = sheet.facts.faulty
     collect = out.rows.append
     for number, cells in rows:
         if number <= header.row:
             continue
-        if len(cells) > first_text and cells[first_text] == texts[first_text] and tuple(cells) == texts[: len(cells)]:
+        if is_header(cells):
             repeated += 1
             continue
         last = number
@@ -126,7 +128,10 @@ def read_table(
         elif long is not None:
             long.add(number, cells)
         else:
-            collect(reader.read(number, cells))
+            read = reader.read(number, cells)
+            collect(read)
+            if read.__class__ is InvalidRow:
+                out.invalid_content[read.source] = hash(tuple(cells))
     tick(pending)
     if long is not None:
         out.rows = _in_order([*out.rows, *long.finish()])
@@ -152,6 +157,17 @@ def read_table(
         )
     )
     return out
+
+
+def _header_test(header: Header) -> Callable[[Sequence[Cell]], bool]:
+    """Return a test that tells the header printed again on a later page."""
+    texts = tuple(text or None for text in header.texts)
+    first = next((i for i, text in enumerate(texts) if text), 0)
+
+    def is_header(cells: Sequence[Cell]) -> bool:
+        return len(cells) > first and cells[first] == texts[first] and tuple(cells) == texts[: len(cells)]
+
+    return is_header
 
 
 def _in_order(rows: list[Inspection | InvalidRow]) -> list[Inspection | InvalidRow]:

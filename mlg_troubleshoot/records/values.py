@@ -142,7 +142,7 @@ def read_length(
         same = show_number(unit.from_inches(written.to_inches(value)))
         raise CellFaultError(
             "unit_contradiction",
-            f"{expected}: the column is in {unit.value}",
+            f"{expected}, in the unit of the column ({unit.value})",
             f"The cell says {written.value}, the column says {unit.value}. If the cell is right, enter {same} "
             f"({unit.value}); if the column is right, enter the number without a unit.",
         )

@@ -191,6 +191,7 @@ class InspectionContext(DocumentContext):
     front_warnings: list[str]
     more_warnings: str
     warnings: list[str]
+    carried_in_full: list[Fact]
     measured: MeasuredContext | None
     key_figures: list[KeyFigure]
     gauge: Markup | None
@@ -244,7 +245,8 @@ def inspection_context(assessment: Assessment, gear: Gear, provenance: ReportPro
         identity["inspected"] = inspection.inspection_date.isoformat()
     if inspection.outcome:
         identity["outcome"] = inspection.outcome.value
-    identity["carried"] = [{"label": k.replace("_", " "), "value": v} for k, v in inspection.carried.items() if v]
+    carried: list[Fact] = [{"label": k.replace("_", " "), "value": v} for k, v in inspection.carried.items() if v]
+    identity["carried"] = [{"label": _short(f["label"], 60), "value": _short(f["value"], 120)} for f in carried[:10]]
     warnings = list(dict.fromkeys((*a.warnings, *inspection.warnings)))
     front = warnings if len(warnings) <= _WARNINGS_ON_FRONT else warnings[: _WARNINGS_ON_FRONT - 1]
     rest = len(warnings) - len(front)
@@ -257,6 +259,7 @@ def inspection_context(assessment: Assessment, gear: Gear, provenance: ReportPro
         "front_warnings": front,
         "more_warnings": f"{several(rest, 'more warning')} under “Warnings”." if rest else "",
         "warnings": warnings if rest else [],
+        "carried_in_full": carried if carried != identity["carried"] else [],
         "measured": _measured(a),
         "key_figures": _key_figures(a),
         "gauge": drawn.margin_gauge(a),

@@ -34,9 +34,11 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
         try:
             book = plutoprint.Book(getattr(plutoprint, f"PAGE_SIZE_{job['page'].upper()}"))
             book.custom_resource_fetcher = Refuse()
-            book.set_metadata(plutoprint.PDF_METADATA_CREATION_DATE, job["created"])
             # Links within the document become named destinations only where the document has an address.
             book.load_html(html, base_url="https://report.invalid/")
+            # Loading forgets what was set before; a date that is not given is today's, and the bytes differ.
+            book.set_metadata(plutoprint.PDF_METADATA_CREATION_DATE, job["created"])
+            book.set_metadata(plutoprint.PDF_METADATA_MODIFICATION_DATE, job["created"])
             stream = io.BytesIO()
             book.write_to_pdf_stream(stream)
         except (plutoprint.Error, OSError, ValueError) as error:

@@ -166,7 +166,7 @@ def sections_of(html: str) -> tuple[Section, ...]:
         Sections in the order of the document.
     """
     return tuple(
-        Section(found["id"], html_text.unescape(re.sub(r"<[^>]*>|\s+", " ", found["text"])).strip())
+        Section(found["id"], " ".join(html_text.unescape(re.sub(r"<[^>]*>", " ", found["text"])).split()))
         for found in _HEADING.finditer(html)
     )
 

@@ -23,6 +23,7 @@ from mlg_troubleshoot.geometry.intervals import Box, Range, cosine_range
 Array = NDArray[np.float64]
 _STROKES = 16
 _BATCH = 64
+W = 1.0
 _MOST_BOXES = 20_000
 
 
@@ -124,7 +125,14 @@ class _Search:
         self.model = model
         self.clearance = clearance
         self.sense = sense
-        self.joints = np.flatnonzero(clearance > 0.0)
+        numbers = model.joint_numbers
+        groups: dict[tuple[int, ...], list[int]] = {}
+        for j in np.flatnonzero(clearance > 0.0):
+            step = next((s.virtual_links for s in model.mechanism.steps if numbers[j] in s.virtual_links), (numbers[j],))
+            groups.setdefault(step, []).append(int(j))
+        # Links at both ends of one rigid link displace it by their sum: one disc of the summed length.
+        self.groups = tuple(tuple(group) for group in groups.values())
+        self.reach = np.array([clearance[list(group)].sum() for group in self.groups])
         self.over_stroke = not mid_only
         self.stroke = model.stroke[1]
         # The sequential rule is a good start: what it reaches drops most boxes at once.
@@ -137,7 +145,7 @@ class _Search:
 
     def start(self) -> Box:
         """All directions, and the stroke in some parts."""
-        reach = np.repeat(self.clearance[self.joints], 2)[:, None]
+        reach = np.repeat(self.reach, 2)[:, None]
         if not self.over_stroke:
             return Box(-reach, reach)
         edges = np.linspace(min(self.model.stroke), max(self.model.stroke), _STROKES + 1)
@@ -157,6 +165,8 @@ class _Search:
             bounds = np.fmin(bounds, moved.value[1])
             width = boxes.high - boxes.low
             smear = np.maximum(np.abs(low), np.abs(high)) * width
+            if self.over_stroke:
+                smear[-1] *= W
             narrower = self._narrowed(boxes, low, high)
             possible = np.all(narrower.low <= narrower.high, axis=0)
             boxes = Box(narrower.low[:, possible], narrower.high[:, possible])
@@ -173,9 +183,9 @@ class _Search:
     def _narrowed(self, boxes: Box, low: Array, high: Array) -> Box:
         """Intersect boxes with what the gradients allow at a greatest displacement."""
         bottom, top = boxes.low.copy(), boxes.high.copy()
-        for k, j in enumerate(self.joints):
+        for k, length in enumerate(self.reach):
             rows = slice(2 * k, 2 * k + 2)
-            arc_low, arc_high = _arc(low[rows], high[rows], self.clearance[j])
+            arc_low, arc_high = _arc(low[rows], high[rows], float(length))
             bottom[rows] = np.fmax(bottom[rows], arc_low)
             top[rows] = np.fmin(top[rows], arc_high)
         if self.over_stroke:
@@ -194,7 +204,8 @@ class _Search:
         variables = boxes.variables()
         stroke = variables.pop() if self.over_stroke else self.model.stroke[1]
         links: list[Range | float] = list(kernel.no_clearance())
-        for k, j in enumerate(self.joints):
+        for k, group in enumerate(self.groups):
+            j = group[0]
             links[2 * j : 2 * j + 2] = variables[2 * k : 2 * k + 2]
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             moved = kernel.run(stroke, links, numbers)
@@ -208,8 +219,8 @@ class _Search:
             return
         middle = boxes.middle
         directions = np.zeros((middle.shape[1], len(self.clearance)))
-        for k, j in enumerate(self.joints):
-            directions[:, j] = np.arctan2(middle[2 * k + 1], middle[2 * k])
+        for k, group in enumerate(self.groups):
+            directions[:, list(group)] = np.arctan2(middle[2 * k + 1], middle[2 * k])[:, None]
         stroke = middle[-1] if self.over_stroke else np.full(len(directions), self.model.stroke[1])
         links = links_from(np.broadcast_to(self.clearance, directions.shape), directions)
         reached = self.sense * self.model.displacement(links, None, stroke)

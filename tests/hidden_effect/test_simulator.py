@@ -129,9 +129,7 @@ def test_no_other_directions_push_the_plunger_further() -> None:
     for row, size in enumerate(sizes):
         one = linkage.Build.nominal(geometry, 1)
 
-        def short(
-            angles: np.ndarray, size: np.ndarray = size, one: linkage.Build = one
-        ) -> tuple[float, np.ndarray]:
+        def short(angles: np.ndarray, size: np.ndarray = size, one: linkage.Build = one) -> tuple[float, np.ndarray]:
             vectors = linkage.clearance_vectors(size[None, :], angles[None, :])
             unknown = linkage.close(one, vectors)
             slope = linkage.plunger_gradient(one, vectors, unknown)[0]
@@ -139,8 +137,7 @@ def test_no_other_directions_push_the_plunger_further() -> None:
             return -100.0 * float(linkage.reading(one, unknown)[0]), -100.0 * along
 
         best = max(
-            -minimize(short, rng.uniform(-np.pi, np.pi, 10), jac=True, method="BFGS").fun / 100.0
-            for _ in range(3)
+            -minimize(short, rng.uniform(-np.pi, np.pi, 10), jac=True, method="BFGS").fun / 100.0 for _ in range(3)
         )
         assert found[row] == pytest.approx(best, abs=1e-7)
 
@@ -384,11 +381,7 @@ def test_two_swapped_joints_exchange_their_clearances() -> None:
 
 def test_about_one_cell_in_a_hundred_is_blank() -> None:
     table = simulate_fleet(FleetSpec(rows=500), 2).table
-    cells = [
-        value
-        for name in (*CLEARANCES, "temperature_c", "gauge_id", "axial_float_4_in")
-        for value in table[name]
-    ]
+    cells = [value for name in (*CLEARANCES, "temperature_c", "gauge_id", "axial_float_4_in") for value in table[name]]
     assert 0.005 < sum(value is None for value in cells) / len(cells) < 0.016
 
 

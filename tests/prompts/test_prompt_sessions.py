@@ -19,6 +19,7 @@ from mlg_troubleshoot.cli.prompts import (
     ask_inspection,
 )
 from mlg_troubleshoot.cli.prompts.flow import Flow
+from mlg_troubleshoot.cli.prompts.store import state_folder
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.gear.gear import Gear
@@ -360,10 +361,10 @@ def test_a_stop_does_not_promise_a_resume_that_cannot_be(gear: Gear, tmp_path: P
 
 
 def test_sessions_live_in_the_state_folder_of_the_desktop_standard() -> None:
-    assert SessionStore.default({"XDG_STATE_HOME": "/var/s"}).folder == Path("/var/s/mlg-troubleshoot")
+    assert state_folder({"XDG_STATE_HOME": "/var/s"}) == Path("/var/s/mlg-troubleshoot")
 
 
 @pytest.mark.parametrize("variable", [{}, {"XDG_STATE_HOME": ""}, {"XDG_STATE_HOME": "relative"}])
 def test_else_they_live_below_the_home_folder(variable: dict[str, str]) -> None:
-    folder = SessionStore.default({"HOME": "/home/anna", **variable}).folder
+    folder = state_folder({"HOME": "/home/anna", **variable})
     assert folder == Path("/home/anna/.local/state/mlg-troubleshoot")

@@ -27,7 +27,7 @@ _RUNNER = """
 import sys
 from mlg_troubleshoot.cli.prompts import Preset, RichTerminal, SessionStore, ask_inspection
 from mlg_troubleshoot.gear.gear_file import load_gear
-store = SessionStore.default()
+store = SessionStore()
 saved = store.latest() if "--resume" in sys.argv else None
 try:
     found = ask_inspection(load_gear(), RichTerminal(), store, Preset(), saved=saved)

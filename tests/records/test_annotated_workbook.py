@@ -189,3 +189,17 @@ def test_csv_export_keeps_numbers_exact_and_blanks_blank(tmp_path):
 def test_csv_export_cannot_be_written_is_an_output_error(tmp_path):
     with pytest.raises(OutputError, match="cannot be written"):
         write_csv(tmp_path / "none" / "o.csv", ["a"], [])
+
+
+def test_what_the_copy_cannot_take_over_is_said(book, tmp_path):
+    import zipfile
+
+    assert annotate_workbook(book, tmp_path / "a.xlsx", read_inspections(book, ReadOptions()), {}) == ()
+    with zipfile.ZipFile(book, "a") as archive:
+        archive.writestr("xl/media/image1.png", b"picture")
+        archive.writestr("xl/drawings/drawing1.xml", b"<xdr:wsDr><xdr:sp macro=''/></xdr:wsDr>")
+    notes = annotate_workbook(book, tmp_path / "b.xlsx", read_inspections(book, ReadOptions()), {})
+    assert [note.split("lacks ")[1] for note in notes] == [
+        "1 of the pictures of the workbook",
+        "1 of the drawn shapes of the workbook",
+    ]

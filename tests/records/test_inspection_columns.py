@@ -293,7 +293,7 @@ def test_a_unit_column_serves_headers_without_a_unit(read, table):
 
 def test_a_repeated_header_row_is_skipped_and_said(read, table):
     result = read(table(rows=[GOOD, HEADER, ("R2", *GOOD[1:])]))
-    assert len(result.inspections) == 2
+    assert len(result.rows) == 2
     assert any("repeated header" in note for note in result.notes)
 
 
@@ -325,3 +325,37 @@ def test_progress_is_told_as_the_rows_are_read(table):
     told: list[int] = []
     read_inspections(io.BytesIO(text.encode()), ReadOptions(), progress=lambda done, _: told.append(done))
     assert told == [500, 1000, 1200]
+
+
+def test_a_row_repeated_in_a_table_that_lacks_its_convention_is_no_contradiction(read, table):
+    header = [h for h in HEADER if h != "clearance_convention"]
+    row = ("R1", "N1", "LH", 0.013, 0.007)
+    assert {p.code for p in read(table(header, [row, row])).problems} == {"convention_missing"}
+
+
+def test_a_table_of_clearances_alone_is_told_which_columns_it_lacks(read):
+    result = read("J1 (in);J2 (in)\n0,013;0,010\n", convention="RADIAL")
+    assert [(p.code, p.column) for p in result.problems] == [
+        ("column_missing", "record_id"),
+        ("column_missing", "tail_no"),
+        ("column_missing", "side"),
+    ]
+    assert result.rows[0].correct == ("record_id", "tail_no", "side")
+
+
+def test_standard_input_is_read(table):
+    import subprocess
+    import sys
+
+    code = (
+        "from mlg_troubleshoot.records import ReadOptions, read_many;"
+        "print([r.record_id for r in read_many(['-'], ReadOptions()).rows])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], input=table(), check=True, capture_output=True, text=True)
+    assert done.stdout.strip() == "['R1']"
+
+
+def test_a_value_in_a_message_is_cut_and_cannot_steer_a_terminal(read, table):
+    problem = only(read(table(rows=[(*GOOD[:4], "\x1b[31m" + "9" * 5000, 0.007)])))
+    assert problem.value.startswith("\\x1b[31m999")
+    assert len(problem.value) < 400

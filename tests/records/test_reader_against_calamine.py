@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import io
 import random
+import zipfile
 
 import python_calamine
 
@@ -70,7 +71,8 @@ def test_a_row_in_an_unusual_spelling_reads_like_a_usual_one(package):
         '<row r="1"><c r="A1"><v>1</v></c><c r="C1"><v>2.5</v></c></row><row r="2"><c r="B2"><v>3</v></c></row>'
     )
     odd = package(
-        "<!-- <row r='9'><c r='A9'><v>9</v></c></row> --><row spans='1:3' r='1' ><c  r='A1'\n><v >1</v></c>"
+        '<!-- <row r="8"><c r="A8"><v>8</v></c></row><row r="9"><c r="A9"><v>9</v></c></row> -->'
+        "<row spans='1:3' r='1' ><c  r='A1'\n><v >1</v></c>"
         "<c r='C1' cm='1'><v>2.5</v><extLst/></c></row>\n<row><c/><c><v>3</v></c></row>"
     )
     assert ours(plain) == ours(odd) == {1: [1.0, None, 2.5], 2: [None, 3.0]}
@@ -83,6 +85,20 @@ def test_a_sheet_with_prefixed_elements_is_read(package):
         "<x:rPh sb='0' eb='1'><x:t>no</x:t></x:rPh></x:is></x:c></x:row></x:sheetData></x:worksheet>"
     )
     assert ours(package(sheet_xml=xml)) == {1: [None, "ab"]}
+
+
+def test_a_shared_text_in_pieces_is_joined_without_its_pronunciation(package, xlsx):
+    data = xlsx([["漢字"]])
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    parts["xl/sharedStrings.xml"] = (
+        "<sst><si><r><t>漢</t></r><r><rPr/><t>字</t></r><rPh sb='0' eb='1'><t>かんじ</t></rPh></si></sst>".encode()
+    )
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, content in parts.items():
+            archive.writestr(name, content)
+    assert ours(buffer.getvalue()) == {1: ["漢字"]}
 
 
 def test_a_sheet_in_utf_16_is_read(package):

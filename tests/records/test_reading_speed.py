@@ -44,7 +44,16 @@ HEADER = [
 def row(number, rng):
     """Return one inspection."""
     return [
-        *(f"R{number:06d}", f"N{number % 300:03d}", rng.choice(("LH", "RH")), "RADIAL", "2026-03-04", number, 20.5, 3000),
+        *(
+            f"R{number:06d}",
+            f"N{number % 300:03d}",
+            rng.choice(("LH", "RH")),
+            "RADIAL",
+            "2026-03-04",
+            number,
+            20.5,
+            3000,
+        ),
         *("EXTENDING", f"G-{number % 7}", f"T{number % 20}", 0.0005, 0.001),
         *(round(rng.uniform(0, 0.008), 4) for _ in range(20)),
         *(0.03, round(rng.uniform(-0.05, 0.05), 4), 0.01, 0.03, 0.002, "RETRACTED", f"WO{number}"),

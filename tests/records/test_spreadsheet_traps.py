@@ -381,13 +381,24 @@ def test_26_a_number_formatted_as_a_date_is_a_date(read, xlsx, number_format):
     assert result.rows[0].inspection_date == datetime.date(2026, 3, 4)
 
 
-def test_26_a_date_of_the_1904_system_is_the_same_day(read, xlsx):
+@pytest.mark.parametrize(("flag", "serial"), [("0", 46085), ("1", 44623), ("true", 44623)])
+def test_26_a_date_of_either_system_is_the_same_day(read, package, flag, serial):
+    styles = '<styleSheet><cellXfs><xf numFmtId="0"/><xf numFmtId="14"/></cellXfs></styleSheet>'
+    data = _rows_with('<c r="E2"><v>0.013</v></c>' + f'<c r="G2" s="1"><v>{serial}</v></c>')
+    data = data.replace("</row>", '<c r="G1" t="inlineStr"><is><t>inspection_date</t></is></c></row>', 1)
+    result = read(package(data, styles=styles, book_pr=f'<workbookPr date1904="{flag}"/>'), "t.xlsx")
+    assert result.rows[0].inspection_date == datetime.date(2026, 3, 4)
+
+
+def test_26_a_workbook_saved_in_the_1904_system_is_read(read, xlsx):
+    from openpyxl.utils.datetime import CALENDAR_MAC_1904
+
     def change(book):
-        book.epoch = datetime.datetime(1904, 1, 1)
+        book.epoch = CALENDAR_MAC_1904
         book.worksheets[0]["G2"] = datetime.date(2026, 3, 4)
 
     data = xlsx([(*HEADER, "inspection_date"), GOOD], change)
-    assert b"date1904" in zipfile.ZipFile(io.BytesIO(data)).read("xl/workbook.xml")
+    assert b'date1904="1"' in zipfile.ZipFile(io.BytesIO(data)).read("xl/workbook.xml")
     assert read(data, "t.xlsx").rows[0].inspection_date == datetime.date(2026, 3, 4)
 
 
@@ -396,7 +407,8 @@ def test_26_a_day_before_march_1900_is_refused(read, xlsx):
         book.worksheets[0]["G2"] = 12
         book.worksheets[0]["G2"].number_format = "yyyy-mm-dd"
 
-    assert only(read(xlsx([(*HEADER, "inspection_date"), GOOD], change), "t.xlsx")).code == "date_out_of_range"
+    problem = only(read(xlsx([(*HEADER, "inspection_date"), GOOD], change), "t.xlsx"))
+    assert (problem.code, problem.value) == ("date_out_of_range", "12 shown as a date or time")
 
 
 # 27 to 30: what is shown and what is hidden
@@ -481,7 +493,9 @@ def test_30_hidden_rows_are_read_and_counted(read, xlsx):
 
 
 def test_31_a_byte_order_mark_is_no_part_of_the_header(read, table):
-    assert clearances(read(b"\xef\xbb\xbf" + table().encode())) == {3: 0.013, 5: 0.007}
+    result = read(b"\xef\xbb\xbf" + table().encode())
+    assert clearances(result) == {3: 0.013, 5: 0.007}
+    assert result.notes == ()
 
 
 def test_32_windows_1252_is_detected_and_said(read, table):
@@ -546,6 +560,13 @@ def test_35_a_quotation_mark_that_is_not_closed_loses_no_row(read, table):
     assert [row.record_id for row in result.inspections] == ["R1", "R3", "R4"]
 
 
+def test_35_two_stray_quotation_marks_do_not_swallow_the_rows_between_them(read, table):
+    text = table() + '"R2,N1,LH,RADIAL,0.013,0.007\nR3,N1,LH,RADIAL,0.013,0.007\nR4,N1,LH,RADIAL,0.013,"\n'
+    result = read(text)
+    assert [row.source.row for row in result.rows] == [2, 3, 4, 5]
+    assert [row.record_id for row in result.inspections] == ["R1", "R3"]
+
+
 def test_35_a_quoted_field_of_two_lines_is_one_field(read, table):
     text = table((*HEADER, "remarks"), [(*GOOD, '"a\nb, c"'), ("R2", *GOOD[1:], "x")])
     result = read(text)
@@ -589,6 +610,16 @@ def test_37_a_workbook_that_lies_about_its_size_is_refused(read, package):
     assert only(read(lying, "t.xlsx")).code in ("file_too_large", "file_damaged")
 
 
+def test_37_a_workbook_that_declares_too_large_a_size_is_refused_before_it_is_unpacked(read, package):
+    data = package(parts={"xl/media/big.bin": b"x" * 3_000_000}, compression=zipfile.ZIP_STORED)
+    size = struct.pack("<I", 3_000_000)
+    # The last one stands in the list of parts: the unpacked size, which here is 83 times the packed one.
+    at = data.rfind(size)
+    lying = data[:at] + struct.pack("<I", 250_000_000) + data[at + 4 :]
+    problem = only(read(lying, "t.xlsx"))
+    assert (problem.code, "250 MB" in problem.value) == ("file_too_large", True)
+
+
 @pytest.mark.parametrize(
     "declaration",
     ['<!DOCTYPE x [<!ENTITY a "0.013">]>', '<!DOCTYPE worksheet SYSTEM "http://example.com/x.dtd">'],
@@ -621,6 +652,14 @@ def test_40_a_password_protected_workbook_is_named_as_such(read, xlsx):
     problem = only(read(locked.getvalue(), "t.xlsx"))
     assert problem.code == "password_protected"
     assert "copy without" in problem.remedy
+
+
+def test_40_a_workbook_in_an_encrypted_archive_is_named_as_such(read, package):
+    data = bytearray(package())
+    at = -1
+    while (at := data.find(b"PK\x01\x02", at + 1)) >= 0:
+        data[at + 8] |= 1
+    assert only(read(bytes(data), "t.xlsx")).code == "password_protected"
 
 
 # 41 to 44: kinds of file

@@ -8,7 +8,7 @@ import secrets
 import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 from types import MappingProxyType
@@ -72,37 +72,37 @@ def new_session(gear_id: str, started: datetime, answers: Answers) -> Session:
     return Session(f"{started:%Y%m%d-%H%M%S}-{secrets.token_hex(2)}", gear_id, started, answers)
 
 
+def state_folder(environment: Mapping[str, str] | None = None) -> Path:
+    """Return where a user's sessions are: ``$XDG_STATE_HOME/mlg-troubleshoot``, else below ``~/.local/state``.
+
+    Parameters
+    ----------
+    environment : mapping of str to str, optional
+        Environment variables, else those of the process.
+
+    Returns
+    -------
+    Path
+        The folder, which need not exist.
+    """
+    known = os.environ if environment is None else environment
+    base = Path(known.get("XDG_STATE_HOME", ""))
+    if not base.is_absolute():
+        base = Path(known.get("HOME") or Path("~").expanduser()) / ".local" / "state"
+    return base / "mlg-troubleshoot"
+
+
 @dataclass(frozen=True, slots=True)
 class SessionStore:
     """The folder of sessions, one JSON file each, readable by their owner only.
 
     Parameters
     ----------
-    folder : Path
-        The folder; it is made when the first answer is saved.
+    folder : Path, optional
+        The folder, else the user's; it is made when the first answer is saved.
     """
 
-    folder: Path
-
-    @classmethod
-    def default(cls, environment: Mapping[str, str] | None = None) -> SessionStore:
-        """Return the user's store: ``$XDG_STATE_HOME/mlg-troubleshoot`` or ``~/.local/state/mlg-troubleshoot``.
-
-        Parameters
-        ----------
-        environment : mapping of str to str, optional
-            Environment variables, else those of the process.
-
-        Returns
-        -------
-        SessionStore
-            The store.
-        """
-        known = os.environ if environment is None else environment
-        base = Path(known.get("XDG_STATE_HOME", ""))
-        if not base.is_absolute():
-            base = Path(known.get("HOME") or Path("~").expanduser()) / ".local" / "state"
-        return cls(base / "mlg-troubleshoot")
+    folder: Path = field(default_factory=state_folder)
 
     def save(self, session: Session) -> None:
         """Write a session so that a reader sees the old file or the new one, never a part.

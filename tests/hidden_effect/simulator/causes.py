@@ -502,18 +502,14 @@ OFF_CATALOGUE: dict[str, Cause] = {
                 "middle_psi": float(d.pressure.mean()),
                 "width_psi": float(d.pressure.std()),
             },
-            lambda d, p: (
-                (d.temperature - p["middle_c"]) / 12.0 * (d.pressure - p["middle_psi"]) / p["width_psi"]
-            ),
+            lambda d, p: (d.temperature - p["middle_c"]) / 12.0 * (d.pressure - p["middle_psi"]) / p["width_psi"],
         ),
         _off(
             "lost_motion_under_load",
             ("approach", "hydraulic_pressure_psi"),
             lambda _, d: {"middle_psi": float(d.pressure.mean()), "width_psi": float(d.pressure.std())},
             lambda d, p: (
-                np.where(d.approach == "RETRACTING", 1.0, -1.0)
-                * (d.pressure - p["middle_psi"])
-                / p["width_psi"]
+                np.where(d.approach == "RETRACTING", 1.0, -1.0) * (d.pressure - p["middle_psi"]) / p["width_psi"]
             ),
         ),
         _off(

@@ -225,9 +225,7 @@ def _identities(rng: np.random.Generator, rows: int, arrangement: str) -> dict[s
     return fleet
 
 
-def _assign(
-    rng: np.random.Generator, names: list[str], homes: NDArray[np.intp], home: int, arrangement: str
-) -> str:
+def _assign(rng: np.random.Generator, names: list[str], homes: NDArray[np.intp], home: int, arrangement: str) -> str:
     local = [name for name, at in zip(names, homes, strict=True) if at == home]
     away = 0.0 if arrangement == "confounded" else 0.18
     if arrangement == "iid" or rng.random() < away:

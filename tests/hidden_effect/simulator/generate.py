@@ -471,9 +471,7 @@ def simulate_fleet(spec: FleetSpec, seed: int) -> Fleet:
     for wanted in spec.effects:
         aimed = _alias_target(spec, design, wanted) if spec.alias is not None else wanted
         taken = {(name, draft.target) for name, draft in drafts}
-        drafts.append(
-            (wanted.cause, _draw_effect(rng, effects, aimed, noise_rms, alias=spec.alias, taken=taken))
-        )
+        drafts.append((wanted.cause, _draw_effect(rng, effects, aimed, noise_rms, alias=spec.alias, taken=taken)))
     total, on_reading, on_record = effects.shift(drafts)
 
     clearance = records.recorded_clearances(design, errors, on_record)
@@ -481,9 +479,9 @@ def simulate_fleet(spec: FleetSpec, seed: int) -> Fleet:
     table = records.write_table(design, noise, clearance, readings, errors, blank=blank)
     for column in spec.drop_columns:
         table.pop(column, None)
-    gain = linkage.plunger_gradient(
-        linkage.Build.nominal(geometry, 1), np.zeros((1, 10, 2)), geometry.start[None, :]
-    )[0]
+    gain = linkage.plunger_gradient(linkage.Build.nominal(geometry, 1), np.zeros((1, 10, 2)), geometry.start[None, :])[
+        0
+    ]
     weights = np.hypot(gain[:, 0], gain[:, 1])
     faults = records.add_faults(_stream(seed, "faults"), table, spec.faults, weights, noise_rms)
 
@@ -754,9 +752,7 @@ def follow_up(fleet: Fleet, readings: Sequence[dict[str, Any]], seed: int) -> Fl
                 fits &= getattr(old, _OVERRIDES[column]) == chosen[column]
         index.append(int(rng.choice(np.flatnonzero(fits))))
     design = old.take(np.array(index, dtype=np.intp))
-    design.clearance[:] = np.minimum(
-        design.clearance * rng.lognormal(0.0, 0.15, design.clearance.shape), 0.0145
-    )
+    design.clearance[:] = np.minimum(design.clearance * rng.lognormal(0.0, 0.15, design.clearance.shape), 0.0145)
     for row, chosen in enumerate(readings):
         for column, value in chosen.items():
             if column in records.CLEARANCES:

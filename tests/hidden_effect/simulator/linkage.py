@@ -221,9 +221,7 @@ class _Equations:
         pin = unknown[:, 2:4] + self.clearance[:, 1] - self.at["Q"][:, :2]
         eight = self.geometry.eight + self.clearance[:, 7]
         first = np.stack([vectors[:, 0, :2], pin, vectors[:, 4, :2], unknown[:, 10:12] - eight], axis=1)
-        last = np.stack(
-            [vectors[:, 1, :2], vectors[:, 3, :2], vectors[:, 5, :2], unknown[:, 12:14] - eight], axis=1
-        )
+        last = np.stack([vectors[:, 1, :2], vectors[:, 3, :2], vectors[:, 5, :2], unknown[:, 12:14] - eight], axis=1)
         return _turn(first, self.angles), last
 
     def residual(self, unknown: Array, vectors: Array) -> Array:

@@ -1,0 +1,132 @@
+"""What an extension gains on rows that it was not fitted to: in displacement and in decisions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, NoiseModel
+from mlg_troubleshoot.diagnosis.screen import fit
+
+Array = NDArray[np.float64]
+
+_FOLDS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """Held-out misfit and decisions before and after.
+
+    Parameters
+    ----------
+    rms_before_in, rms_after_in : float
+        Root mean square misfit of rows that were not used for the fit. [in]
+    share_interval : tuple of float
+        95 % interval of the share of the mean square misfit that is removed, over tails. [1]
+    false_within_before, false_within_after : int
+        Rows predicted within whose measured displacement is outside.
+    false_outside_before, false_outside_after : int
+        Rows predicted outside whose measured displacement is within.
+    verdicts_changed : tuple of str
+        Records whose predicted side of the margin changes.
+    held_out_by : str
+        What was held out together: ``tail`` or ``row``.
+    """
+
+    rms_before_in: float
+    rms_after_in: float
+    share_interval: tuple[float, float]
+    false_within_before: int
+    false_within_after: int
+    false_outside_before: int
+    false_outside_after: int
+    verdicts_changed: tuple[str, ...]
+    held_out_by: str
+
+
+def measure_gain(
+    noise: NoiseModel,
+    columns: Array,
+    misfit: Array,
+    predicted: Array,
+    margin_in: Array,
+    record_id: Sequence[str],
+    groups: NDArray[np.str_],
+    by_row: bool,
+    rng: np.random.Generator,
+) -> Gain:
+    """Cross-validate an extension; rows of one tail are never on both sides.
+
+    An extension that concerns one tail cannot be learned from the others: for it single rows are held out.
+
+    Parameters
+    ----------
+    noise : NoiseModel
+        Noise of the rows.
+    columns : ndarray, shape (n, k)
+        Effects of the named causes per unit of their parameters.
+    misfit, predicted : ndarray, shape (n,)
+        Measured less predicted, and predicted. [in]
+    margin_in : ndarray, shape (n,)
+        Margin of each row. [in]
+    record_id : sequence of str
+        Identity of each row.
+    groups : ndarray of str, shape (n,)
+        Tail of each row.
+    by_row : bool
+        Hold out single rows.
+    rng : numpy.random.Generator
+        Source of randomness for the folds and the interval.
+
+    Returns
+    -------
+    Gain
+        Before and after.
+    """
+    n = len(misfit)
+    keys = np.arange(n).astype(str) if by_row else groups
+    names = np.unique(keys)
+    fold_of = dict(zip(rng.permutation(names).tolist(), np.arange(len(names)) % _FOLDS, strict=True))
+    fold = np.array([fold_of[str(key)] for key in keys])
+    correction = np.zeros(n)
+    for k in range(min(_FOLDS, len(names))):
+        train, test = fold != k, fold == k
+        if not test.any() or not train.any():
+            continue
+        part = replace(noise, relative=noise.relative[train], tails=noise.tails[train], loadings=noise.loadings[train])
+        used = np.any(columns[train] != 0.0, axis=0)
+        values = np.zeros(columns.shape[1])
+        if used.any():
+            expected = misfit[train] - EXPECTED_SLOPE * predicted[train]
+            values[used] = fit(part, columns[train][:, used], expected).values
+        correction[test] = columns[test] @ values
+    before, after = misfit, misfit - correction
+    measured = predicted + misfit
+    outside = np.abs(measured) > margin_in
+    said_before = np.abs(predicted) <= margin_in
+    said_after = np.abs(predicted + correction) <= margin_in
+    return Gain(
+        rms_before_in=float(np.sqrt(np.mean(before**2))),
+        rms_after_in=float(np.sqrt(np.mean(after**2))),
+        share_interval=_interval(before, after, groups, rng),
+        false_within_before=int(np.sum(said_before & outside)),
+        false_within_after=int(np.sum(said_after & outside)),
+        false_outside_before=int(np.sum(~said_before & ~outside)),
+        false_outside_after=int(np.sum(~said_after & ~outside)),
+        verdicts_changed=tuple(record_id[int(i)] for i in np.flatnonzero(said_before != said_after)),
+        held_out_by="row" if by_row else "tail",
+    )
+
+
+def _interval(before: Array, after: Array, groups: NDArray[np.str_], rng: np.random.Generator) -> tuple[float, float]:
+    """Bootstrap over tails of the share of mean square misfit removed."""
+    number = np.unique(groups, return_inverse=True)[1]
+    square_before = np.bincount(number, before**2)
+    square_after = np.bincount(number, after**2)
+    drawn = rng.integers(0, len(square_before), size=(999, len(square_before)))
+    share = 1.0 - square_after[drawn].sum(axis=1) / np.maximum(square_before[drawn].sum(axis=1), 1e-30)
+    low, high = np.quantile(share, [0.025, 0.975])
+    return float(low), float(high)

@@ -1,0 +1,157 @@
+"""The summary of a batch, and many reports at once."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
+from mlg_troubleshoot.errors import OutputError, Problem
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.reporting import ReportProvenance, write_batch_report, write_reports
+
+from .conftest import FAILURE, SOUND, WORN, Judge, readable
+from .test_pdf import opened
+
+PROBLEM = Problem("side", "fleet.csv", None, 7, "side", "C7", "LEFT", "LH or RH", "Write LH or RH.")
+
+
+@pytest.fixture(scope="module")
+def batch(judge: Judge, rejected: Rejected) -> list[Judgement]:
+    return [
+        judge(SOUND, record_id="sound", tail_no="N1"),
+        judge(FAILURE, record_id="published", tail_no="N2"),
+        rejected,
+        judge(WORN, record_id="worn", tail_no="N3"),
+        judge({1: 0.001}, record_id="little", tail_no="N4", readings_in=(0.05,)),
+    ]
+
+
+@pytest.fixture(scope="module")
+def summary(
+    batch: list[Judgement], gear: Gear, provenance: ReportProvenance, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[str, bytes]:
+    folder = tmp_path_factory.mktemp("batch")
+    written = write_batch_report(batch, [PROBLEM], gear, folder, provenance=provenance, notes=("2 columns unread.",))
+    assert written.html is not None
+    assert written.pdf is not None
+    return written.html.read_text(encoding="utf-8"), written.pdf.read_bytes()
+
+
+def records(html: str) -> list[str]:
+    return re.findall(
+        r'<th scope="row"><bdi>.*?</bdi></th><td class="strong">..?</td><td>(?:<a[^>]*>)?<bdi>(.*?)</bdi>', html
+    )
+
+
+def test_each_verdict_is_counted_once(batch: Sequence[Judgement], summary: tuple[str, bytes]) -> None:
+    counts = [int(n) for n in re.findall(r'class="count-number">(\d+)<', summary[0])]
+    assert sum(counts) == len(batch)
+
+
+def test_each_verdict_is_counted_under_its_name(summary: tuple[str, bytes]) -> None:
+    assert re.search(r"2</span><span>OUTSIDE MARGIN", summary[0])
+
+
+def test_every_gear_has_one_line(summary: tuple[str, bytes]) -> None:
+    assert sorted(records(summary[0])) == ["R-9", "little", "published", "sound", "worn"]
+
+
+def test_the_worst_gear_stands_first(summary: tuple[str, bytes]) -> None:
+    order = records(summary[0])
+    assert order.index("worn") < order.index("published") < order.index("sound") < order.index("R-9")
+
+
+def test_a_gear_measured_beyond_its_margin_stands_before_all_others(summary: tuple[str, bytes]) -> None:
+    assert records(summary[0])[0] == "little"
+
+
+def test_problems_of_the_input_are_listed(summary: tuple[str, bytes]) -> None:
+    assert "LEFT" in readable(summary[0])
+    assert "cell C7" in readable(summary[0])
+
+
+def test_notes_on_the_input_stand_on_the_summary(summary: tuple[str, bytes]) -> None:
+    assert "2 columns unread." in readable(summary[0])
+
+
+def test_the_summary_is_printed_in_landscape(summary: tuple[str, bytes]) -> None:
+    box = opened(summary[1]).pages[0].mediabox
+    assert box.width > box.height
+
+
+def test_a_long_table_repeats_its_header_on_each_page(
+    judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path
+) -> None:
+    one = judge(SOUND)
+    many = [
+        dataclasses.replace(one, inspection=dataclasses.replace(one.inspection, record_id=f"r{i}")) for i in range(120)
+    ]
+    written = write_batch_report(many, [], gear, tmp_path, provenance=provenance, formats=("pdf",))
+    assert written.pdf is not None
+    pages = [page.extract_text() for page in opened(written.pdf.read_bytes()).pages]
+    with_rows = [text for text in pages if re.search(r"\br\d+\b", text)]
+    assert len(with_rows) > 2
+    assert all("Verdict" in text for text in with_rows)
+
+
+def test_a_batch_gets_its_summary_first_then_a_report_a_row(
+    batch: list[Judgement], gear: Gear, provenance: ReportProvenance, tmp_path: Path
+) -> None:
+    written = write_reports(batch, [PROBLEM], gear, tmp_path, provenance=provenance, formats=("html",))
+    assert len(written) == len(batch) + 1
+    names = [report.html.name for report in written if report.html]
+    assert names[0].startswith("mlg-batch")
+    assert "published" in names[2]
+
+
+def test_the_summary_links_the_reports(
+    batch: list[Judgement], gear: Gear, provenance: ReportProvenance, tmp_path: Path
+) -> None:
+    first = write_reports(batch, [], gear, tmp_path, provenance=provenance, formats=("html",))[0]
+    assert first.html is not None
+    links = re.findall(r'href="([^"#]+)"', first.html.read_text(encoding="utf-8"))
+    assert len(links) == len(batch)
+    assert all((tmp_path / link).is_file() for link in links)
+
+
+def test_one_inspection_gets_no_summary(judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path) -> None:
+    assert len(write_reports([judge(SOUND)], [], gear, tmp_path, provenance=provenance, formats=("html",))) == 1
+
+
+def test_progress_counts_every_report(
+    batch: list[Judgement], gear: Gear, provenance: ReportProvenance, tmp_path: Path
+) -> None:
+    seen: list[tuple[int, int]] = []
+    write_reports(
+        batch,
+        [],
+        gear,
+        tmp_path,
+        provenance=provenance,
+        formats=("html",),
+        progress=lambda done, total: seen.append((done, total)),
+    )
+    assert seen == [(n, len(batch)) for n in range(1, len(batch) + 1)]
+
+
+def test_reports_written_in_parallel_equal_reports_written_alone(
+    batch: list[Judgement], gear: Gear, provenance: ReportProvenance, tmp_path: Path
+) -> None:
+    def written(folder: str, workers: int) -> dict[str, bytes]:
+        write_reports(batch, [], gear, tmp_path / folder, provenance=provenance, workers=workers)
+        return {path.name: path.read_bytes() for path in (tmp_path / folder).iterdir()}
+
+    assert written("a", 1) == written("b", 3)
+
+
+def test_a_folder_that_cannot_be_written_is_named(
+    batch: list[Assessment], gear: Gear, provenance: ReportProvenance, tmp_path: Path
+) -> None:
+    (tmp_path / "taken").write_text("a file", encoding="utf-8")
+    with pytest.raises(OutputError, match="taken"):
+        write_reports(batch, [], gear, tmp_path / "taken", provenance=provenance, formats=("html",))

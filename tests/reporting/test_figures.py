@@ -1,0 +1,145 @@
+"""The figure primitives that every report draws with."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mlg_troubleshoot.decision.assessment import Verdict
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.reporting.figures import (
+    Axis,
+    Band,
+    Bar,
+    Canvas,
+    Plot,
+    Series,
+    bar_chart,
+    line_plot,
+    nice_ticks,
+    scatter_plot,
+)
+from mlg_troubleshoot.reporting.inspection_figures import margin_gauge, verdict_sign
+from mlg_troubleshoot.reporting.schematic import schematic
+
+from .conftest import FAILURE, SOUND, WORN, Judge
+
+LINE = Series("one & <two>", (0.0, 1.0, 2.0), (1.0, float("nan"), 3.0), marker="circle")
+
+
+def rectangles(svg: str) -> list[dict[str, str]]:
+    return [element.attrib for element in ET.fromstring(svg).iter() if element.tag.endswith("rect")]
+
+
+@pytest.mark.parametrize(
+    "svg",
+    [
+        bar_chart([Bar("a<b", 1.0, "1")], "Bars & more"),
+        line_plot([LINE], Axis("x", 0, 2), Axis("y", 0, 3), "Lines", band=Band("margin", 1, 2)),
+        scatter_plot([LINE], Axis("x", 0, 2), Axis("y", 0, 3), "Points", diagonal=True),
+        *(verdict_sign(verdict) for verdict in Verdict),
+    ],
+)
+def test_a_figure_is_well_formed(svg: str) -> None:
+    assert ET.fromstring(svg).get("role") == "img"
+
+
+def test_text_in_a_figure_is_escaped() -> None:
+    canvas = Canvas(10, 10, "<script>", "\"'")
+    canvas.text(0, 0, "</svg><script>")
+    assert "<script>" not in canvas.svg()
+
+
+def test_bars_are_as_long_as_their_values() -> None:
+    widths = [float(r["width"]) for r in rectangles(bar_chart([Bar("a", 1.0, "1"), Bar("b", 3.0, "3")], "t"))]
+    assert widths[1] == pytest.approx(3 * widths[0], rel=0.01)
+
+
+def test_a_missing_bar_draws_none() -> None:
+    assert rectangles(bar_chart([Bar("a", 1.0, "1"), Bar("b", None, "not measured")], "t"))[1:] == []
+
+
+def test_a_gap_in_a_series_breaks_its_line() -> None:
+    gap = Series("gap", (0.0, 1.0, 2.0, 3.0, 4.0), (1.0, 1.0, float("nan"), 1.0, 1.0))
+    assert line_plot([gap], Axis("x", 0, 4), Axis("y", 0, 2), "t").count("<polyline") == 2
+
+
+def test_a_plot_puts_the_ends_of_its_axes_on_its_frame() -> None:
+    plot = Plot(Canvas(100, 80, "t"), Axis("x", 2.0, 4.0), Axis("y", -1.0, 1.0), 10, 10, 5, 15)
+    assert plot.at(2.0, -1.0) == (10.0, 65.0)
+    assert plot.at(4.0, 1.0) == (90.0, 5.0)
+
+
+def test_an_axis_around_values_holds_them_all() -> None:
+    axis = Axis.around("x", [3.0, float("nan"), -2.0])
+    assert axis.low < -2.0
+    assert axis.high > 3.0
+
+
+@given(st.floats(-1e6, 1e6), st.floats(1e-6, 1e6))
+def test_ticks_lie_within_their_axis(low: float, span: float) -> None:
+    high = low + span
+    room = 1e-6 * max(abs(low), abs(high), span)
+    assert all(low - room <= tick <= high + room for tick in nice_ticks(low, high))
+
+
+def test_the_gauge_shows_the_worst_case_of_both_senses(judge: Judge) -> None:
+    assert ">−0.0429 / +0.0472</text>" in str(margin_gauge(judge(FAILURE)))
+
+
+def test_the_margin_of_the_gauge_is_drawn_to_the_scale_of_the_worst_case(judge: Judge) -> None:
+    judged = judge(FAILURE)
+    lines = re.findall(
+        r'<line x1="([\d.]+)" y1="([\d.]+)" x2="([\d.]+)" y2="([\d.]+)"[^>]*stroke-width="4"', str(margin_gauge(judged))
+    )
+    margin = rectangles(str(margin_gauge(judged)))[0]
+    assert judged.over_travel_in is not None
+    assert judged.under_travel_in is not None
+    drawn = float(lines[0][2]) - float(lines[0][0])
+    expected = (judged.over_travel_in - judged.under_travel_in) / (2 * judged.margin_in)
+    assert drawn / float(margin["width"]) == pytest.approx(expected, rel=0.01)
+
+
+def test_there_is_no_gauge_where_the_linkage_does_not_close(judge: Judge) -> None:
+    assert margin_gauge(judge(dict.fromkeys(range(1, 11), 0.0465))) is None
+
+
+def arrow_lengths(gear: Gear, judge: Judge, clearance: dict[int, float]) -> list[float]:
+    """Lengths of the white lines below the arrows."""
+    found = "".join(str(svg) for _, svg, _ in schematic(gear, judge(clearance)).panels)
+    ends = re.findall(
+        r'<line x1="([\d.]+)" y1="([\d.]+)" x2="([\d.]+)" y2="([\d.]+)" stroke="#ffffff" stroke-width="5.5"', found
+    )
+    return [((float(c) - float(a)) ** 2 + (float(d) - float(b)) ** 2) ** 0.5 for a, b, c, d in ends]
+
+
+def test_virtual_links_are_drawn_to_one_scale(gear: Gear, judge: Judge) -> None:
+    three, five = arrow_lengths(gear, judge, FAILURE)
+    assert three / five == pytest.approx(0.013 / 0.007, rel=0.02)
+
+
+def test_virtual_links_are_exaggerated_as_stated(gear: Gear, judge: Judge) -> None:
+    drawn = schematic(gear, judge(FAILURE))
+    # Joints 4 and 5 are 4.422 in apart in the reference; their markers tell the scale of the drawing.
+    marks = {
+        number: float(x) for x, number in re.findall(r'<text x="([\d.]+)"[^>]*>(4|5)</text>', str(drawn.panels[0][1]))
+    }
+    scale = (marks["5"] - marks["4"]) / 4.422
+    assert drawn.exaggeration is not None
+    assert arrow_lengths(gear, judge, FAILURE)[0] == pytest.approx(0.013 * scale * drawn.exaggeration, rel=0.02)
+
+
+def test_small_clearances_are_not_blown_up(gear: Gear, judge: Judge) -> None:
+    assert schematic(gear, judge(SOUND)).exaggeration == schematic(gear, judge(WORN)).exaggeration
+
+
+def test_no_label_of_the_schematic_lies_outside_it(gear: Gear, judge: Judge) -> None:
+    for _, svg, width in schematic(gear, judge(WORN)).panels:
+        height = float(ET.fromstring(str(svg)).attrib["height"])
+        for x, y in re.findall(r'<text x="([-\d.]+)" y="([-\d.]+)"', str(svg)):
+            assert 0 <= float(x) <= width
+            assert 0 <= float(y) <= height

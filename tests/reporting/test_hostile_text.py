@@ -1,0 +1,136 @@
+"""Text from a user stays text, whatever it looks like."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from html.parser import HTMLParser
+
+import pytest
+
+from mlg_troubleshoot.decision.assessment import Rejected
+from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.reporting.glyphs import breakable, visible
+from mlg_troubleshoot.reporting.html import css_string
+
+from .conftest import FAILURE, Judge, Made, readable
+from .test_pdf import opened, text_of
+
+SCRIPT = "<script>alert(1)</script>"
+TEMPLATE = "{{ 7*7 }} {% raw %}"
+CDATA = "]]> --> </style></title>"
+
+
+class Elements(HTMLParser):
+    """Names of all elements, and all event handlers."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.names: set[str] = set()
+        self.handlers: list[str] = []
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.names.add(tag)
+        self.handlers += [name for name, _ in attrs if name.startswith("on")]
+
+
+@pytest.fixture(scope="module")
+def hostile(judge: Judge, make: Callable[..., Made]) -> Made:
+    carried = {
+        "remarks": "<img src=x onerror=alert(1)>\"'&amp; " + CDATA,
+        "<b>column</b>": TEMPLATE,
+        "order": "abc\u202egpj.exe\u202c \x00\x07",
+    }
+    return make(
+        judge(
+            FAILURE,
+            record_id=SCRIPT,
+            tail_no=TEMPLATE + CDATA,
+            technician_id=SCRIPT,
+            gauge_id='"><svg onload=alert(1)>',
+            carried=carried,
+            warnings=("<iframe src=//x></iframe>",),
+        )
+    )
+
+
+@pytest.mark.parametrize("element", ["script", "img", "iframe", "object", "embed", "form", "link", "base"])
+def test_no_element_comes_from_a_field(element: str, hostile: Made) -> None:
+    assert element not in Elements(hostile.html).names
+
+
+def test_no_event_handler_comes_from_a_field(hostile: Made) -> None:
+    assert Elements(hostile.html).handlers == []
+
+
+@pytest.mark.parametrize("words", [SCRIPT, TEMPLATE, CDATA, "<b>column</b>", "<iframe src=//x></iframe>"])
+def test_hostile_text_is_shown_as_it_was_entered(words: str, hostile: Made) -> None:
+    assert words in readable(hostile.html)
+
+
+def test_hostile_text_is_text_on_paper_too(hostile: Made) -> None:
+    assert SCRIPT in text_of(hostile.pdf)
+
+
+def test_the_footer_of_each_page_survives_hostile_text(hostile: Made) -> None:
+    pages = opened(hostile.pdf).pages
+    assert all(re.search(rf"page {n} of {len(pages)}", p.extract_text()) for n, p in enumerate(pages, 1))
+
+
+def test_the_stylesheet_is_not_left_by_a_field(hostile: Made) -> None:
+    assert hostile.html.count("</style>") == 1
+
+
+def test_a_direction_override_is_shown_as_its_code(hostile: Made) -> None:
+    assert "\u202e" not in hostile.html
+    assert "abc‹U+202E›gpj.exe" in hostile.text
+
+
+def test_a_control_character_is_shown_as_its_code() -> None:
+    assert visible("a\x00b\x07") == "a‹U+0000›b‹U+0007›"
+
+
+@pytest.mark.parametrize(
+    "text", ["plain", "Zoë Müller", "김민수", "עברית", "line\nbreak", "می\u200cخواهم", "1\u00a0234"]
+)
+def test_ordinary_writing_is_left_alone(text: str) -> None:
+    assert visible(text) == text
+
+
+def test_a_css_string_cannot_be_left() -> None:
+    written = css_string('";}\n</style>\\')
+    assert not set('";}</\\\n') & set(re.sub(r"\\[0-9a-f]+ ", "", written[1:-1]))
+
+
+def test_long_remarks_do_not_push_the_verdict_off_the_first_page(judge: Judge, make: Callable[..., Made]) -> None:
+    made = make(judge(FAILURE, carried={"remarks": "many words " * 400}), formats=("html", "pdf"))
+    assert "OVER LIMIT" in opened(made.pdf).pages[0].extract_text()
+
+
+def test_long_remarks_stand_in_full(judge: Judge, make: Callable[..., Made]) -> None:
+    made = make(judge(FAILURE, carried={"remarks": "many words " * 400 + "LAST"}), formats=("html",))
+    assert "LAST" in made.text
+
+
+def test_a_word_without_end_does_not_shrink_the_page(judge: Judge, make: Callable[..., Made]) -> None:
+    made = make(judge(FAILURE, carried={"x" * 300: "y" * 900}), formats=("pdf",))
+    sizes: list[float] = []
+
+    def note(_text: str, cm: list[float], tm: list[float], _font: object, size: float) -> None:
+        sizes.append(size * abs(cm[0]) * abs(tm[0]))
+
+    opened(made.pdf).pages[0].extract_text(visitor_text=note)
+    assert max(sizes) > 12.0
+
+
+def test_only_words_that_are_too_long_are_broken() -> None:
+    assert breakable("short " + "x" * 64) == "short " + "x" * 64
+    assert breakable("x" * 65) == "x" * 32 + "\u200b" + "x" * 32 + "\u200bx"
+
+
+def test_hostile_problems_stay_text(rejected: Rejected, make: Callable[..., Made]) -> None:
+    problem = Problem("x", "fleet.csv", None, 7, SCRIPT, "C7", SCRIPT, TEMPLATE, CDATA)
+    made = make(rejected, formats=("html",), problems=(problem,))
+    assert "script" not in Elements(made.html).names
+    assert SCRIPT in made.text

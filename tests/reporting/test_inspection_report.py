@@ -1,0 +1,235 @@
+"""What the report of one gear must say (the decision rule's list, read from the HTML)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import pytest
+
+from mlg_troubleshoot.decision.assessment import Rejected, Verdict
+from mlg_troubleshoot.decision.inspection import Side
+from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.sources import SourceKind
+from mlg_troubleshoot.reporting.inspection_figures import VERDICT_SHAPE
+
+from .conftest import FAILURE, SOUND, WORN, Judge, Made
+
+Make = Callable[..., Made]
+
+
+def test_identity_stands_before_the_verdict(failure: Made) -> None:
+    assert -1 < failure.text.find("N123AB") < failure.text.find("OUTSIDE MARGIN", failure.text.find("R-2024-0117"))
+
+
+def test_the_side_stands_alone_in_large_letters(failure: Made) -> None:
+    assert '<p class="side" aria-hidden="true">LH</p>' in failure.html
+
+
+def test_the_side_is_also_said_in_words(judge: Judge, make: Make) -> None:
+    assert "right-hand main landing gear" in make(judge(FAILURE, side=Side.RH), formats=("html",)).text
+
+
+def test_the_verdict_is_written_in_words(failure: Made) -> None:
+    assert re.search(r'<h2 class="verdict-words"[^>]*>OUTSIDE MARGIN</h2>', failure.html)
+
+
+def test_every_verdict_has_its_own_shape() -> None:
+    assert len(set(VERDICT_SHAPE.values())) == len(Verdict)
+
+
+def test_the_failure_case_shows_the_published_displacement(failure: Made) -> None:
+    assert "0.0472 in" in failure.text.replace("\u00a0", " ")
+
+
+def test_the_chance_with_random_directions_stands_beside_the_worst_case(failure: Made) -> None:
+    found = re.search(r"Chance, random directions (\d+) % of leaving the margin", failure.text.replace("\u00a0", " "))
+    assert found is not None
+    assert 20 <= int(found[1]) <= 30
+
+
+def test_the_worst_case_is_called_a_bound(failure: Made) -> None:
+    assert "a bound, not a forecast" in failure.text
+
+
+def test_there_is_one_next_action(failure: Made) -> None:
+    assert failure.html.count('class="action-text"') == 1
+
+
+def test_the_next_action_is_the_decision_s(judge: Judge, failure: Made) -> None:
+    assert judge(FAILURE).next_action.text in failure.text
+
+
+def test_a_reading_stands_as_entered_beside_the_radial_value(worn: Made) -> None:
+    assert re.search(r"short link inner bearing 0\.0252 in 0\.0126 0\.320 0\.0075 OVER LIMIT", worn.text)
+
+
+def test_the_convention_of_the_readings_is_named(worn: Made) -> None:
+    assert "Entered total play" in worn.text
+
+
+def test_unmeasured_joints_are_listed(failure: Made) -> None:
+    assert "8 joints not measured: #1, #2, #4, #6, #7, #8, #9 and #10" in failure.text.replace("\u00a0", " ")
+
+
+def test_joints_stand_in_the_order_to_inspect_them(judge: Judge, worn: Made) -> None:
+    table = worn.html[worn.html.index('<table class="ranked">') :]
+    names = [f.name for f in judge(WORN).ranked]
+    places = [table.index(name) for name in names]
+    assert places == sorted(places)
+
+
+def test_a_joint_over_its_limit_is_told_apart_by_text_in_the_schematic(failure: Made) -> None:
+    assert ">0.0130 OVER LIMIT</text>" in failure.html
+
+
+def test_a_joint_over_its_limit_is_told_apart_by_shape_in_the_schematic(failure: Made) -> None:
+    drawing = failure.html[failure.html.index('<svg class="figure panel"') :]
+    number = drawing.index('font-weight="bold" fill="#ffffff" text-anchor="middle">3</text>')
+    assert drawing[:number].rsplit("<", 2)[1].startswith("rect")
+
+
+def test_an_unmeasured_joint_has_a_dashed_mark(failure: Made) -> None:
+    drawing = failure.html[failure.html.index('<svg class="figure panel"') :]
+    number = drawing.index('text-anchor="middle">1</text>')
+    assert "stroke-dasharray" in drawing[:number].rsplit("<", 2)[1]
+
+
+def test_the_exaggeration_of_the_virtual_links_is_stated(failure: Made) -> None:
+    assert re.search(r"drawn \d+ times its size, in the worst direction for over-travel", failure.text)
+
+
+def test_every_joint_is_numbered_in_the_schematic(gear: Gear, failure: Made) -> None:
+    drawings = "".join(re.findall(r'<svg class="figure panel".*?</svg>', failure.html, re.DOTALL))
+    assert all(f">{joint.number}</text>" in drawings for joint in gear.joints)
+
+
+def test_the_gauge_marks_the_margin_on_both_sides(failure: Made) -> None:
+    assert ">−0.0300</text>" in failure.html
+    assert ">+0.0300</text>" in failure.html
+
+
+def test_the_plunger_curve_shows_both_senses(failure: Made) -> None:
+    assert "worst case, over-travel" in failure.text
+    assert "worst case, under-travel" in failure.text
+
+
+def test_both_ends_of_one_link_are_named_as_alike(failure: Made) -> None:
+    assert "acts like #5" in failure.text
+
+
+def test_repair_sets_stand_with_their_access_time(judge: Judge, worn: Made) -> None:
+    sets = judge(WORN).repair_sets
+    assert sets
+    assert f"{sets[0].access_minutes:.0f}" in worn.text[worn.text.index("Access, min") :]
+
+
+def test_no_repair_table_where_none_was_asked_for(judge: Judge, make: Make) -> None:
+    import dataclasses
+
+    assert "Repair sets" not in make(dataclasses.replace(judge(FAILURE), repair_sets=None), formats=("html",)).text
+
+
+def test_a_measurement_beyond_the_margin_is_said_first(worn: Made) -> None:
+    assert worn.html.index("MEASURED: the plunger stands") < worn.html.index("OUTSIDE MARGIN</h2>")
+
+
+def test_a_measurement_within_the_margin_comes_after_the_verdict(judge: Judge, make: Make) -> None:
+    html = make(judge(FAILURE, readings_in=(0.01,)), formats=("html",)).html
+    assert html.index("OUTSIDE MARGIN</h2>") < html.index("Measured: the plunger stands")
+
+
+def test_measured_stands_against_predicted(worn: Made) -> None:
+    assert "Measured less predicted, same sense −0.0331 in" in worn.text.replace("\u00a0", " ")
+
+
+def test_what_the_source_does_not_state_is_shown_as_not_stated(failure: Made) -> None:
+    assert "Which valve port is affected: not stated" in failure.text
+
+
+def test_the_symptom_of_a_sound_gear_is_the_one_within(gear: Gear, judge: Judge, make: Make) -> None:
+    assert gear.cycle is not None
+    text = make(judge(SOUND), formats=("html",)).text
+    assert gear.cycle.within in text
+    assert gear.cycle.beyond not in text
+
+
+@pytest.mark.parametrize("role", ["Measured by", "Independently measured by", "Rectified by", "Inspected by"])
+def test_there_is_a_line_to_sign_for(role: str, failure: Made) -> None:
+    assert f'<th scope="row">{role}</th>' in failure.html
+
+
+def test_there_is_a_handover_line(failure: Made) -> None:
+    assert "Handover, open for the next shift" in failure.text
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "Troubleshooting aid, not maintenance data.",
+        "Does not replace the maintenance manual's limits.",
+        "Within margin is not an approval for return to service.",
+        "not hydraulics, friction, doors, switches or structure",
+        "reconstructed from published figures, not drawing data",
+        "not a validation set",
+        "its position cannot tell them apart",
+    ],
+)
+def test_the_report_says_what_it_is_not(words: str, failure: Made) -> None:
+    assert words in failure.text
+
+
+def test_reconstructed_and_assumed_numbers_are_counted(gear: Gear, failure: Made) -> None:
+    assumed = sum(n.kind is SourceKind.ASSUMED for n in gear.numbers)
+    assert f"Of {len(gear.numbers)} numbers behind a verdict:" in failure.text
+    assert f"{assumed} assumed" in failure.text
+
+
+def test_the_limit_is_marked_as_assumed(failure: Made) -> None:
+    assert "Joint limit 0.0075 in radial: assumed" in failure.text.replace("\u00a0", " ")
+
+
+def test_hashes_of_input_and_geometry_stand_in_full(gear: Gear, failure: Made) -> None:
+    assert "9f2c" + "ab" * 30 in failure.text
+    assert gear.geometry_sha256 in failure.text
+
+
+def test_warnings_of_the_decision_stand_on_the_report(judge: Judge, failure: Made) -> None:
+    warnings = judge(FAILURE).warnings
+    assert warnings
+    assert all(warning in failure.text for warning in warnings)
+
+
+def test_many_warnings_are_cut_short_in_front_and_stand_in_full_behind(judge: Judge, make: Make) -> None:
+    many = tuple(f"Remark {i} about this row." for i in range(9))
+    text = make(judge(FAILURE, warnings=many), formats=("html",)).text
+    assert "more warnings under “Warnings”" in text.replace("\u00a0", " ")
+    assert all(warning in text for warning in many)
+
+
+def test_an_extension_is_named(judge: Judge, make: Make, provenance: object) -> None:
+    import dataclasses
+
+    extended = dataclasses.replace(provenance, extension="rigging_offset of tail N123, sha256 77")  # type: ignore[type-var]
+    text = make(judge(FAILURE), formats=("html",), provenance=extended).text
+    assert "rigging_offset of tail N123" in text
+    assert "Drawn without the extension" in text
+
+
+def test_a_linkage_that_does_not_close_still_gets_its_report(judge: Judge, make: Make) -> None:
+    text = make(judge(dict.fromkeys(range(1, 11), 0.0465)), formats=("html",)).text
+    assert "the linkage does not close: there is no displacement to show" in text
+
+
+def test_an_invalid_row_says_what_to_correct(rejected: Rejected, make: Make) -> None:
+    problem = Problem("side", "fleet.csv", None, 7, "side", "C7", "LEFT", "LH or RH", "Write LH or RH.")
+    other = Problem("side", "fleet.csv", None, 8, "side", "C8", "UP", "LH or RH", "Write LH or RH.")
+    text = make(rejected, formats=("html",), problems=(problem, other)).text
+    assert "INVALID – do not use" in text
+    assert "LEFT" in text
+    assert "C8" not in text
+
+
+def test_an_invalid_row_without_a_side_shows_a_question_mark(rejected: Rejected, make: Make) -> None:
+    assert '<p class="side" aria-hidden="true">?</p>' in make(rejected, formats=("html",)).html

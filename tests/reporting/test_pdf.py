@@ -1,0 +1,236 @@
+"""The PDF: fonts inside, text to search, bookmarks, the same bytes every time, and no way out of the sandbox."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import io
+import re
+import sys
+import threading
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+
+import pypdf
+import pytest
+
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.reporting import ReportProvenance, pdf, write_inspection_report
+from mlg_troubleshoot.reporting.glyphs import font_faces
+from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError, add_outline, check_fonts, sections_of
+
+from .conftest import FAILURE, Judge, Made
+
+NOW = datetime(2024, 5, 17, 9, 30, tzinfo=UTC)
+
+
+def page_of(body: str) -> str:
+    return f"<html><head><style>{font_faces()} body {{ font-family: 'Report Sans' }}</style></head>{body}</html>"
+
+
+def opened(made: bytes) -> pypdf.PdfReader:
+    return pypdf.PdfReader(io.BytesIO(made), strict=True)
+
+
+def text_of(made: bytes) -> str:
+    return re.sub(r"\s+", " ", " ".join(page.extract_text() for page in opened(made).pages))
+
+
+def test_every_font_is_embedded(failure: Made) -> None:
+    for page in opened(failure.pdf).pages:
+        for reference in page["/Resources"]["/Font"].values():
+            font = reference.get_object()
+            font = font["/DescendantFonts"][0].get_object() if "/DescendantFonts" in font else font
+            assert "/FontFile2" in font["/FontDescriptor"]
+
+
+def test_the_fonts_are_the_bundled_ones(failure: Made) -> None:
+    names = {
+        reference.get_object()["/BaseFont"].split("+")[1]
+        for page in opened(failure.pdf).pages
+        for reference in page["/Resources"]["/Font"].values()
+    }
+    assert names == {"DejaVuSans", "DejaVuSans-Bold"}
+
+
+@pytest.mark.parametrize("words", ["N123AB", "OUTSIDE MARGIN", "short link inner bearing", "0.0130 OVER LIMIT"])
+def test_text_can_be_searched(words: str, failure: Made) -> None:
+    assert words in text_of(failure.pdf)
+
+
+def test_the_report_has_two_or_three_pages(failure: Made) -> None:
+    assert len(opened(failure.pdf).pages) in (2, 3)
+
+
+def test_the_first_page_answers_everything_a_technician_needs(failure: Made) -> None:
+    first = re.sub(r"\s+", " ", opened(failure.pdf).pages[0].extract_text())
+    for words in ("LH", "OUTSIDE MARGIN", "Next", "0.0472", "Worst case (bound)", "OVER LIMIT", "not measured"):
+        assert words in first
+
+
+def test_each_page_says_which_of_how_many_it_is(failure: Made) -> None:
+    pages = opened(failure.pdf).pages
+    for number, page in enumerate(pages, 1):
+        assert f"page {number} of {len(pages)}" in page.extract_text()
+
+
+@pytest.mark.parametrize("words", ["N123AB LH", "R-2024-0117", "mlg 9.8.7", "geometry ", "input 9f2cabab"])
+def test_each_page_names_the_record_and_the_program(words: str, failure: Made) -> None:
+    assert all(words in page.extract_text() for page in opened(failure.pdf).pages)
+
+
+def test_each_page_says_that_it_is_not_maintenance_data(failure: Made) -> None:
+    assert all("not maintenance data" in page.extract_text() for page in opened(failure.pdf).pages)
+
+
+def test_there_is_a_bookmark_for_each_section(failure: Made) -> None:
+    titles = [entry["/Title"] for entry in opened(failure.pdf).outline]
+    sections = re.findall(r'<h2[^>]*id="[^"]*">(.*?)</h2>', failure.html)
+    assert titles == sections
+
+
+def test_the_first_bookmark_is_the_verdict_on_the_first_page(failure: Made) -> None:
+    reader = opened(failure.pdf)
+    first = reader.outline[0]
+    assert first["/Title"] == "OUTSIDE MARGIN"
+    assert reader.get_destination_page_number(first) == 0
+
+
+def test_the_last_bookmark_leads_to_the_last_page(failure: Made) -> None:
+    reader = opened(failure.pdf)
+    assert reader.get_destination_page_number(reader.outline[-1]) == len(reader.pages) - 1
+
+
+def test_the_title_names_tail_side_verdict_and_record(failure: Made) -> None:
+    metadata = opened(failure.pdf).metadata
+    assert metadata is not None
+    assert metadata.title == "N123AB LH – OUTSIDE MARGIN – R-2024-0117"
+
+
+def test_the_language_is_declared(failure: Made) -> None:
+    assert opened(failure.pdf).root_object["/Lang"] == "en"
+
+
+def test_the_creation_date_is_the_one_that_was_given(failure: Made) -> None:
+    metadata = opened(failure.pdf).metadata
+    assert metadata is not None
+    assert metadata.creation_date == NOW
+
+
+def test_the_same_input_gives_the_same_bytes(judge: Judge, make: Callable[..., Made], failure: Made) -> None:
+    # The engine's own clock has a step of one second.
+    time.sleep(1.1)
+    assert hashlib.sha256(make(judge(FAILURE)).pdf).digest() == hashlib.sha256(failure.pdf).digest()
+
+
+def test_another_moment_gives_other_bytes(
+    judge: Judge, make: Callable[..., Made], failure: Made, provenance: ReportProvenance
+) -> None:
+    later = dataclasses.replace(provenance, created=datetime(2024, 5, 18, tzinfo=UTC))
+    assert make(judge(FAILURE), provenance=later).pdf != failure.pdf
+
+
+@pytest.mark.parametrize(("page", "width", "height"), [("A4", 595, 842), ("Letter", 612, 792)])
+def test_the_paper_is_the_one_asked_for(
+    page: str, width: int, height: int, judge: Judge, make: Callable[..., Made]
+) -> None:
+    box = opened(make(judge(FAILURE), page=page, formats=("pdf",)).pdf).pages[0].mediabox
+    assert (round(box.width), round(box.height)) == (width, height)
+
+
+def test_letter_takes_as_many_pages_as_a4(judge: Judge, make: Callable[..., Made], failure: Made) -> None:
+    letter = make(judge(FAILURE), page="Letter", formats=("pdf",)).pdf
+    assert len(opened(letter).pages) == len(opened(failure.pdf).pages)
+
+
+def test_a_pdf_without_a_font_is_refused() -> None:
+    with PdfEngine() as engine, pytest.raises(PdfError, match="no font is embedded"):
+        engine.convert("<p></p>", "A4", NOW)
+
+
+def test_a_font_that_is_only_named_is_refused(failure: Made) -> None:
+    with pytest.raises(PdfError, match="is not embedded"):
+        check_fonts(failure.pdf.replace(b"/FontFile2", b"/Fontfile2"))
+
+
+def test_nothing_is_fetched_from_the_network() -> None:
+    asked: list[str] = []
+
+    class Listen(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            asked.append(self.path)
+            self.send_error(404)
+
+    with HTTPServer(("127.0.0.1", 0), Listen) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        there = f"http://127.0.0.1:{server.server_port}"
+        body = f'<p>text</p><img src="{there}/a.png"><link rel="stylesheet" href="{there}/b.css">'
+        with PdfEngine() as engine:
+            engine.convert(page_of(f"{body}<p style='background:url({there}/c.png)'>more</p>"), "A4", NOW)
+        server.shutdown()
+    assert asked == []
+
+
+def test_no_file_of_this_computer_is_read(tmp_path: Path) -> None:
+    square = '<svg xmlns="http://www.w3.org/2000/svg" width="10" height="10"><text>SECRET</text></svg>'
+    (tmp_path / "secret.svg").write_text(square, encoding="utf-8")
+    with PdfEngine() as engine:
+        made = engine.convert(page_of(f'<p>text</p><img src="file://{tmp_path}/secret.svg">'), "A4", NOW)
+    assert "SECRET" not in text_of(made)
+
+
+def test_a_document_that_takes_too_long_is_stopped() -> None:
+    with PdfEngine(time_limit_s=0.05) as engine, pytest.raises(PdfError, match=r"longer than 0\.05 s"):
+        engine.convert(page_of("<p>word</p>" * 200_000), "A4", NOW)
+
+
+def test_the_engine_works_again_after_it_was_stopped() -> None:
+    with PdfEngine(time_limit_s=0.05) as engine:
+        with pytest.raises(PdfError):
+            engine.convert(page_of("<p>word</p>" * 200_000), "A4", NOW)
+        engine.time_limit_s = 30.0
+        assert "again" in text_of(engine.convert(page_of("<p>again</p>"), "A4", NOW))
+
+
+def test_an_engine_that_dies_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", "/bin/false")
+    with PdfEngine() as engine, pytest.raises(PdfError):
+        engine.convert(page_of("<p>word</p>"), "A4", NOW)
+
+
+@pytest.mark.parametrize("formats", [("html", "pdf"), ("pdf",)])
+def test_without_an_engine_the_html_still_comes(
+    formats: tuple[str, ...],
+    judge: Judge,
+    gear: Gear,
+    provenance: ReportProvenance,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(pdf, "engine_is_installed", lambda: False)
+    written = write_inspection_report(judge(FAILURE), gear, tmp_path, provenance=provenance, formats=formats)
+    assert written.pdf is None
+    assert written.html is not None
+    assert written.html.is_file()
+
+
+def test_without_an_engine_a_note_says_how_to_print(
+    judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pdf, "engine_is_installed", lambda: False)
+    (note,) = write_inspection_report(judge(FAILURE), gear, tmp_path, provenance=provenance).notes
+    assert "plutoprint is not installed" in note
+    assert "in a web browser and print it" in note
+
+
+def test_a_pdf_of_an_unknown_kind_is_refused() -> None:
+    with pytest.raises(PdfError, match="not known"):
+        add_outline(b"%PDF-1.4\nnothing\n%%EOF\n", (), "title", NOW)
+
+
+def test_a_heading_with_markup_becomes_a_plain_bookmark() -> None:
+    html = '<h2 class="x" id="a-b"><a href="#a-b">One &amp; <b>two</b></a></h2>'
+    assert [section.title for section in sections_of(html)] == ["One & two"]

@@ -1,0 +1,234 @@
+"""The project keeps its own rules: format, lint, types, layers, docstrings, constants, top level."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import inspect
+import io
+import pkgutil
+import re
+import subprocess
+import sys
+import tokenize
+from collections.abc import Iterator
+from dataclasses import is_dataclass
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+from numpydoc.docscrape import NumpyDocString, Parameter
+
+import mlg_troubleshoot
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "mlg_troubleshoot"
+TOP_LEVEL = {"pyproject.toml", "mlg_troubleshoot", "inspection_data", "templates", "tests", "README.md"}
+
+
+def run(*arguments: str) -> None:
+    """Run a tool on the project and show what it says if it is not content."""
+    done = subprocess.run([sys.executable, *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_code_is_formatted() -> None:
+    run("-m", "ruff", "format", "--check", ".")
+
+
+def test_the_linter_finds_nothing() -> None:
+    run("-m", "ruff", "check", ".")
+
+
+def test_the_types_are_right() -> None:
+    run("-m", "mypy")
+
+
+def test_imports_run_downward_only() -> None:
+    run("-c", "from importlinter.cli import lint_imports_command; lint_imports_command()")
+
+
+def sources() -> list[Path]:
+    return sorted(PACKAGE.rglob("*.py"))
+
+
+def test_25_4_stands_only_in_units() -> None:
+    found = set()
+    for path in sources():
+        tokens = tokenize.generate_tokens(io.StringIO(path.read_text(encoding="utf-8")).readline)
+        if any(token.type == tokenize.NUMBER and float_of(token.string) in {25.4, 1 / 25.4} for token in tokens):
+            found.add(path.relative_to(PACKAGE).as_posix())
+    assert found == {"units.py"}
+
+
+def float_of(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def test_nothing_catches_every_exception() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}:{node.lineno}"
+        for path in sources()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ExceptHandler)
+        and (
+            node.type is None
+            or {"Exception", "BaseException"} & {n.id for n in ast.walk(node.type) if isinstance(n, ast.Name)}
+        )
+    ]
+    assert found == []
+
+
+def test_nothing_else_stands_at_the_top_level() -> None:
+    visible = {entry.name for entry in ROOT.iterdir() if not entry.name.startswith(".")}
+    assert visible - TOP_LEVEL == set()
+
+
+def test_the_geometry_knows_no_aircraft() -> None:
+    words = re.compile(r"hawker|landing|plunger|sidestay|bellcrank|valve|retract|down.?lock|\bgears?\b", re.IGNORECASE)
+    found = [
+        f"{path.name}:{number}: {line.strip()}"
+        for path in (PACKAGE / "geometry").glob("*.py")
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if words.search(line)
+    ]
+    assert found == []
+
+
+@cache
+def modules() -> tuple[ModuleType, ...]:
+    names = [info.name for info in pkgutil.walk_packages(mlg_troubleshoot.__path__, "mlg_troubleshoot.")]
+    return tuple(importlib.import_module(name) for name in names if not name.endswith("__main__"))
+
+
+def module_names() -> list[str]:
+    return [
+        ".".join(path.relative_to(ROOT).with_suffix("").parts)
+        for path in sources()
+        if path.name not in {"__init__.py", "__main__.py"}
+    ]
+
+
+def public(module: ModuleType) -> Iterator[tuple[str, Any]]:
+    """Public functions, classes and methods that a module defines."""
+    for name, thing in vars(module).items():
+        if name.startswith("_") or getattr(thing, "__module__", None) != module.__name__:
+            continue
+        if inspect.isfunction(thing):
+            yield name, thing
+        elif inspect.isclass(thing):
+            yield name, thing
+            for part, member in vars(thing).items():
+                function = member.__func__ if isinstance(member, classmethod | staticmethod) else member
+                if not part.startswith("_") and inspect.isfunction(function):
+                    yield f"{name}.{part}", function
+
+
+def documented(thing: Any, section: str = "Parameters") -> list[Parameter]:
+    return list(NumpyDocString(inspect.getdoc(thing) or "")[section])
+
+
+def names_of(entries: list[Parameter]) -> list[str]:
+    return [name.strip().lstrip("*") for entry in entries for name in entry.name.split(",")]
+
+
+def accepted(thing: Any) -> list[str]:
+    """Names of the parameters that a caller gives."""
+    if inspect.isclass(thing) and (thing.__init__ is object.__init__ or getattr(thing, "_is_protocol", False)):
+        return []
+    try:
+        parameters = inspect.signature(thing).parameters
+    except ValueError:
+        return []
+    return [name for name in parameters if name not in {"self", "cls"} and not name.startswith("_")]
+
+
+def takes_a_message(thing: Any) -> bool:
+    return inspect.isclass(thing) and issubclass(thing, BaseException | str | int)
+
+
+def says_all_in_one_line(label: str, thing: Any) -> bool:
+    """A small method, or a function of one parameter, whose one line leaves nothing to explain."""
+    one_line = "\n" not in (inspect.getdoc(thing) or "")
+    return one_line and ("." in label or len(accepted(thing)) == 1)
+
+
+def is_a_command(thing: Any) -> bool:
+    """Commands document their options where the help shows them."""
+    return thing.__module__.startswith("mlg_troubleshoot.cli")
+
+
+@pytest.mark.parametrize("name", module_names())
+def test_every_public_name_has_a_docstring(name: str) -> None:
+    module = importlib.import_module(name)
+    assert module.__doc__
+    missing = [label for label, thing in public(module) if not vars_doc(thing)]
+    assert missing == []
+
+
+def vars_doc(thing: Any) -> str | None:
+    """The docstring that stands at the thing itself, not one that it inherits."""
+    doc = thing.__doc__
+    # A dataclass without a docstring gets its signature as one.
+    return None if doc is None or doc.startswith(f"{thing.__name__}(") else doc
+
+
+@pytest.mark.parametrize("name", module_names())
+def test_documented_parameters_are_those_of_the_signature(name: str) -> None:
+    wrong = []
+    for label, thing in public(importlib.import_module(name)):
+        found, wanted = names_of(documented(thing)), accepted(thing)
+        if not found and (takes_a_message(thing) or is_a_command(thing) or says_all_in_one_line(label, thing)):
+            continue
+        if sorted(found) != sorted(wanted):
+            wrong.append(f"{label}: documented {found}, takes {wanted}")
+    assert wrong == []
+
+
+NUMERIC = re.compile(r"\bfloat\b|\bndarray\b|\barray_like\b")
+NOT_NUMERIC = re.compile(r"\bof (?:str|int|bool)\b|\bmapping of str to str\b|dict of str to str")
+HAS_UNIT = re.compile(r"\[[^\[\]]+\]\.?$")
+# Rooms whose numbers are lengths, angles and probabilities.
+ROOMS_WITH_UNITS = ("geometry", "gear", "decision")
+# A value in a unit that the object itself says, and the two results of a search that are named there.
+UNIT_SAID_ELSEWHERE = {"LengthUnit.to_inches", "LengthUnit.from_inches", "WrittenLength", "Sourced"}
+
+
+@pytest.mark.parametrize("name", [n for n in module_names() if n.split(".")[1] in ROOMS_WITH_UNITS])
+def test_every_numeric_line_of_a_docstring_ends_in_its_unit(name: str) -> None:
+    wrong = []
+    for label, thing in public(importlib.import_module(name)):
+        if label in UNIT_SAID_ELSEWHERE:
+            continue
+        for entry in (e for s in ("Parameters", "Returns", "Attributes") for e in documented(thing, s)):
+            if NUMERIC.search(entry.type) and not NOT_NUMERIC.search(entry.type):
+                text = " ".join(entry.desc).strip()
+                if not HAS_UNIT.search(text):
+                    wrong.append(f"{label}: {entry.name} : {entry.type}: {text}")
+    assert wrong == []
+
+
+def test_every_module_of_the_package_can_be_imported() -> None:
+    assert len(modules()) > 20
+
+
+def test_results_cannot_be_changed_after_they_are_made() -> None:
+    thawed = [
+        f"{module.__name__}.{label}"
+        for module in modules()
+        if module.__name__.split(".")[1] in (*ROOMS_WITH_UNITS, "studies")
+        for label, thing in public(module)
+        if inspect.isclass(thing) and is_dataclass(thing) and not thing.__dataclass_params__.frozen  # type: ignore[attr-defined]
+    ]
+    assert thawed == []
+
+
+def test_the_package_holds_no_machine_path() -> None:
+    pattern = re.compile(r"[\"'(\s]/(?:home|work|root|tmp)/")
+    found = [path.name for path in sources() if pattern.search(path.read_text(encoding="utf-8"))]
+    assert found == []
