@@ -15,13 +15,14 @@ from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
 from mlg_troubleshoot.decision.next_action import next_to_measure
 from mlg_troubleshoot.decision.prediction import Extension
 from mlg_troubleshoot.decision.ranking import rank_joints
-from mlg_troubleshoot.errors import OutputError, Problem, TroubleshootError, UsageError
+from mlg_troubleshoot.errors import InconclusiveDataError, OutputError, Problem, TroubleshootError, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
 from mlg_troubleshoot.studies.table import load_index_table
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:
+    from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension
     from mlg_troubleshoot.records import ReadOptions, ReadResult
     from mlg_troubleshoot.reporting import ReportProvenance, WrittenReport
     from mlg_troubleshoot.studies.verification import VerifiedNumber
@@ -529,3 +530,167 @@ def _trial_inspection(gear: Gear) -> Inspection:
         convention=ClearanceConvention.RADIAL,
         clearance_in={joint.number: 2.0 * joint.limit.value for joint in gear.joints},
     )
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnoseOptions:
+    """What the user asks of a diagnosis.
+
+    Parameters
+    ----------
+    gear : str
+        Shipped gear or gear file.
+    unit : LengthUnit or None
+        Unit of lengths that do not say one.
+    convention : ClearanceConvention or None
+        Convention of rows that do not say one.
+    sheet : str or None
+        Worksheet.
+    cause_files : tuple of Path
+        Python files with the user's own causes.
+    permutations : int
+        Data sets drawn with nothing wrong.
+    seed : int
+        Seed of all randomness.
+    """
+
+    gear: str = DEFAULT_GEAR
+    unit: LengthUnit | None = None
+    convention: ClearanceConvention | None = None
+    sheet: str | None = None
+    cause_files: tuple[Path, ...] = ()
+    permutations: int = 999
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnoseResult:
+    """What a diagnosis found.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    diagnosis : Diagnosis
+        Verdict, causes, gain, remainder.
+    extension : ModelExtension or None
+        The extended model; None unless a cause is named.
+    problems : tuple of Problem
+        What is wrong with the input.
+    notes : tuple of str
+        Notes on the input as a whole.
+    inputs_sha256 : mapping of str to str
+        Hash of each input file by name.
+    """
+
+    gear: Gear
+    diagnosis: Diagnosis
+    extension: ModelExtension | None
+    problems: tuple[Problem, ...]
+    notes: tuple[str, ...]
+    inputs_sha256: Mapping[str, str]
+
+
+# A clearance that no joint can have is refused by a check; here it is a row whose slip is to be found.
+_ANY_CLEARANCE_IN = 10.0
+
+
+def diagnose_files(
+    sources: Sequence[Path | BinaryIO], options: DiagnoseOptions, progress: Callable[[float], None] | None = None
+) -> DiagnoseResult:
+    """Compare the measured displacements of tables with the model's predictions.
+
+    Parameters
+    ----------
+    sources : sequence of Path or binary file
+        Tables.
+    options : DiagnoseOptions
+        What the user declared.
+    progress : callable, optional
+        Called with the share that is done.
+
+    Returns
+    -------
+    DiagnoseResult
+        Verdict, causes, extension and gain.
+
+    Raises
+    ------
+    InconclusiveDataError
+        If the tables cannot answer the question.
+    """
+    from mlg_troubleshoot.diagnosis import ModelExtension, diagnose, load_causes, table_from_inspections
+    from mlg_troubleshoot.records import read_many
+
+    gear = load_gear(options.gear)
+    own = tuple(cause for file in options.cause_files for cause in load_causes(file))
+    reading = replace(
+        read_options(
+            gear,
+            CheckOptions(gear=options.gear, unit=options.unit, convention=options.convention, sheet=options.sheet),
+        ),
+        clearance_hard_max_in=_ANY_CLEARANCE_IN,
+    )
+    read = read_many(sources, reading)
+    valid = read.inspections
+    if not valid:
+        first = read.problems[0] if read.problems else None
+        why = "no row could be read" if first is None else f"{first.place()}: expected {first.expected}"
+        raise InconclusiveDataError(f"nothing to diagnose: {why}", "" if first is None else first.remedy)
+    diagnosis = diagnose(
+        gear.model,
+        table_from_inspections(valid, gear),
+        gear.discrepancies,
+        own_causes=own,
+        permutations=options.permutations,
+        seed=options.seed,
+        progress=progress,
+    )
+    diagnosis = replace(diagnosis, rows_read=len(read.rows))
+    hashes = {file.name: file.sha256 for file in read.files if file.sha256 is not None}
+    extension = None
+    if diagnosis.terms:
+        extension = ModelExtension(
+            gear, diagnosis.terms, diagnosis.residual_u_in, tuple(hashes.values()), diagnosis.rows_used
+        )
+    return DiagnoseResult(gear, diagnosis, extension, read.problems, read.notes, hashes)
+
+
+def write_extension(extension: ModelExtension, file: Path) -> None:
+    """Write an extension as TOML.
+
+    Parameters
+    ----------
+    extension : ModelExtension
+        The extension.
+    file : Path
+        File to write.
+    """
+    from mlg_troubleshoot.diagnosis import save_extension
+
+    save_extension(extension, file)
+
+
+def load_model_extension(files: Sequence[Path], gear: str, cause_files: Sequence[Path] = ()) -> ModelExtension | None:
+    """Load the extensions that a check shall predict with.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Extension files; several are stacked.
+    gear : str
+        Shipped gear or gear file.
+    cause_files : sequence of Path
+        Python files with the user's own causes.
+
+    Returns
+    -------
+    ModelExtension or None
+        The extension; None if no file is given.
+    """
+    if not files:
+        return None
+    from mlg_troubleshoot.diagnosis import load_causes, load_extension
+
+    own = tuple(cause for file in cause_files for cause in load_causes(file))
+    return load_extension(files, load_gear(gear), own)

@@ -131,8 +131,11 @@ def check(
     page: Annotated[Page, typer.Option("--page", help="Paper of the report.")] = Page.A4,
     repairs: Annotated[bool, typer.Option("--repairs", help="Repair sets for each gear of a batch.")] = False,
     extension: Annotated[
-        Path | None,
-        typer.Option("--extension", metavar="TOML", help="Predict with an extension of the model."),
+        list[Path] | None,
+        typer.Option("--extension", metavar="TOML", help="Predict with an extension of the model; may repeat."),
+    ] = None,
+    causes: Annotated[
+        list[Path] | None, typer.Option("--causes", metavar="FILE.py", help="Your own causes that the extension names.")
     ] = None,
     annotate: Annotated[
         Path | None,
@@ -173,13 +176,70 @@ def check(
                 formats=tuple(str(f) for f in formats or (ReportFormat.HTML, ReportFormat.PDF)),
                 page=str(page),
                 repairs=repairs,
-                extension=extension,
+                extension=tuple(extension or ()),
+                causes=tuple(causes or ()),
                 annotate=annotate,
                 csv=csv,
                 resume=resume,
                 as_json=as_json,
                 quiet=quiet,
             )
+        )
+
+
+@app.command(
+    epilog="Example: [b]mlg diagnose fleet.csv --write-extension EXT.toml[/b], then "
+    "[b]mlg check FILE --extension EXT.toml[/b]"
+)
+def diagnose(
+    files: Annotated[
+        list[str], typer.Argument(metavar="FILE...", help="Tables with measured plunger displacements, or -.")
+    ],
+    write_extension: Annotated[
+        Path | None, typer.Option("--write-extension", metavar="EXT.toml", help="Keep the extended model.")
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", metavar="DIR", help="Write a printable report to this folder.")
+    ] = None,
+    page: Annotated[Page, typer.Option("--page", help="Paper of the report.")] = Page.A4,
+    causes: Annotated[
+        list[Path] | None, typer.Option("--causes", metavar="FILE.py", help="Your own causes, beside the catalogue.")
+    ] = None,
+    permutations: Annotated[
+        int, typer.Option("--permutations", min=99, max=99999, help="Data sets drawn with nothing wrong.")
+    ] = 999,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all randomness.")] = 0,
+    gear: GearOption = "hawker-800xp",
+    unit: UnitOption = None,
+    convention: ConventionOption = None,
+    sheet: Annotated[str | None, typer.Option("--sheet", help="Worksheet.")] = None,
+    as_json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Compare measured with predicted: what is wrong, the cause by name, the extension, the gain.
+
+    Exit codes: 0 nothing found · 1 something found · 3 cannot be concluded from this table · 2 usage.
+    """
+    with Boundary():
+        from mlg_troubleshoot import workflows
+        from mlg_troubleshoot.cli import diagnose as command
+
+        command.run(
+            files,
+            workflows.DiagnoseOptions(
+                gear=gear,
+                unit=None if unit is None else _unit(unit),
+                convention=None if convention is None else _convention(convention),
+                sheet=sheet,
+                cause_files=tuple(causes or ()),
+                permutations=permutations,
+                seed=seed,
+            ),
+            write_extension=write_extension,
+            report=report,
+            page=str(page),
+            as_json=as_json,
+            quiet=quiet,
         )
 
 

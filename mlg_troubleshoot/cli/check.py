@@ -42,7 +42,8 @@ class CheckArguments:
     formats: tuple[str, ...]
     page: str
     repairs: bool
-    extension: Path | None
+    extension: tuple[Path, ...]
+    causes: tuple[Path, ...]
     annotate: Path | None
     csv: Path | None
     resume: bool
@@ -66,7 +67,7 @@ def run(arguments: CheckArguments) -> None:
         column_map=_column_map(arguments.column_map),
         decimal_comma=arguments.decimal_comma,
         repairs=True if arguments.repairs else None,
-        extension=None,
+        extension=workflows.load_model_extension(arguments.extension, arguments.gear, arguments.causes),
     )
     result = _result(arguments, options)
     _show(arguments, result)
