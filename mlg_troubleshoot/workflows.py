@@ -175,7 +175,7 @@ def check_files(
 
     gear = load_gear(options.gear)
     read = read_many(sources, read_options(gear, options), progress=on_read)
-    hashes = {file.name: file.sha256 for file in read.files}
+    hashes = {file.name: file.sha256 for file in read.files if file.sha256 is not None}
     result = _judge(gear, read.rows, read.problems, read.notes, hashes, options, on_judged)
     return replace(result, read=read)
 
@@ -311,6 +311,8 @@ def write_reports(
     OutputError
         If the folder cannot be written to.
     """
+    if directory.exists() and not directory.is_dir():
+        raise OutputError(f"{directory} is a file, not a folder", "Give a folder that you may write to.")
     from mlg_troubleshoot.reporting import write_reports as write_all
 
     return write_all(
@@ -591,8 +593,8 @@ class DiagnoseResult:
     inputs_sha256: Mapping[str, str]
 
 
-# A clearance that no joint can have is refused by a check; here it is a row whose slip is to be found.
-_ANY_CLEARANCE_IN = 10.0
+# A length that cannot be is refused by a check; here it is a row whose slip is to be found.
+_ANY_LENGTH_IN = 10.0
 
 
 def diagnose_files(
@@ -629,7 +631,8 @@ def diagnose_files(
             gear,
             CheckOptions(gear=options.gear, unit=options.unit, convention=options.convention, sheet=options.sheet),
         ),
-        clearance_hard_max_in=_ANY_CLEARANCE_IN,
+        clearance_hard_max_in=_ANY_LENGTH_IN,
+        plunger_hard_max_in=_ANY_LENGTH_IN,
     )
     read = read_many(sources, reading)
     valid = read.inspections
@@ -669,6 +672,52 @@ def write_extension(extension: ModelExtension, file: Path) -> None:
     from mlg_troubleshoot.diagnosis import save_extension
 
     save_extension(extension, file)
+
+
+def write_diagnosis_report(result: DiagnoseResult, options: DiagnoseOptions, directory: Path, page: str) -> list[Path]:
+    """Write the report of a diagnosis as HTML and, where the engine can, as PDF.
+
+    Parameters
+    ----------
+    result : DiagnoseResult
+        The diagnosis.
+    options : DiagnoseOptions
+        What the user declared.
+    directory : Path
+        Folder to write to; it is made if it does not exist.
+    page : str
+        ``A4`` or ``Letter``.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written to.
+    """
+    from mlg_troubleshoot.reporting import ReportProvenance
+    from mlg_troubleshoot.reporting.diagnosis_report import write_diagnosis_report as write
+
+    written = write(
+        result.diagnosis,
+        result.gear,
+        directory,
+        extension=result.extension,
+        provenance=ReportProvenance(
+            program_version=version("mlg-troubleshoot"),
+            input_sha256=dict(result.inputs_sha256),
+            geometry_sha256=result.gear.geometry_sha256,
+            created=datetime.now(UTC).astimezone(),
+            seed=options.seed,
+        ),
+        page=page,
+        problems=result.problems,
+        notes=result.notes,
+    )
+    return [path for path in (written.html, written.pdf) if path is not None]
 
 
 def load_model_extension(files: Sequence[Path], gear: str, cause_files: Sequence[Path] = ()) -> ModelExtension | None:

@@ -111,6 +111,9 @@ def check(
             "--measured", metavar="VALUE", help="Measured plunger displacement at mid-position, e.g. 0.041in."
         ),
     ] = None,
+    margin: Annotated[
+        str | None, typer.Option("--margin", metavar="VALUE", help="This gear's own margin, e.g. 0.028in.")
+    ] = None,
     gear: GearOption = "hawker-800xp",
     unit: UnitOption = None,
     convention: ConventionOption = None,
@@ -145,7 +148,7 @@ def check(
         Path | None, typer.Option("--csv", metavar="OUT.csv", help="Verdicts as a CSV, one line a gear.")
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the last unfinished entry.")] = False,
-    seed: Annotated[int, typer.Option("--seed", help="Accepted everywhere; a check uses no random numbers.")] = 0,
+    _seed: Annotated[int, typer.Option("--seed", help="Accepted everywhere; a check uses no random numbers.")] = 0,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -166,6 +169,7 @@ def check(
                 record_id=record_id,
                 outcome=outcome,
                 measured=measured,
+                margin=margin,
                 gear=gear,
                 unit=None if unit is None else _unit(unit),
                 convention=None if convention is None else _convention(convention),

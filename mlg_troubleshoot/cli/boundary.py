@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import sys
 import traceback
 from types import TracebackType
 
@@ -11,6 +13,12 @@ import typer
 from mlg_troubleshoot.errors import InconclusiveDataError, InputFileError, OutputError, TroubleshootError
 
 USAGE, NOTHING_JUDGED, OUTPUT, INTERNAL, INTERRUPTED = 2, 3, 5, 70, 130
+_CANNOT_WRITE = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
+
+
+def abandon_stdout() -> None:
+    """Drop what is still to be written to stdout: the reader of the pipe went away, the work goes on."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 class Boundary:
@@ -34,9 +42,13 @@ class Boundary:
                 typer.echo("\nInterrupted.", err=True)
             raise typer.Exit(INTERRUPTED) from None
         if isinstance(error, BrokenPipeError):
-            # The reader of a pipe went away: nothing is wrong with the run, and nobody is left to tell.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-            raise typer.Exit(0) from None
+            # Results survive a closed pipe (see output.py); what else was cut short was not finished.
+            abandon_stdout()
+            raise typer.Exit(OUTPUT) from None
+        if isinstance(error, OSError) and error.errno in _CANNOT_WRITE:
+            typer.echo(f"Error: {error.filename or 'the output'} cannot be written: {error.strerror}", err=True)
+            typer.echo("What to do: Make room, or write to another place.", err=True)
+            raise typer.Exit(OUTPUT) from None
         if isinstance(error, TroubleshootError):
             typer.echo(f"Error: {error.message}", err=True)
             if error.remedy:

@@ -6,7 +6,7 @@ import io
 import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import BinaryIO
@@ -14,11 +14,17 @@ from typing import BinaryIO
 import typer
 
 from mlg_troubleshoot import workflows
-from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, Outcome, Side
+from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN, EnteredClearance, Inspection, Outcome, Side
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, parse_length, parse_signed_length
+from mlg_troubleshoot.units import (
+    ClearanceConvention,
+    LengthUnit,
+    WrittenLength,
+    parse_length,
+    parse_signed_length,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +38,7 @@ class CheckArguments:
     record_id: str | None
     outcome: str | None
     measured: str | None
+    margin: str | None
     gear: str
     unit: LengthUnit | None
     convention: ClearanceConvention | None
@@ -59,6 +66,8 @@ def run(arguments: CheckArguments) -> None:
     arguments : CheckArguments
         The flags.
     """
+    if arguments.annotate is not None and (len(arguments.files) != 1 or arguments.files[0] == "-"):
+        raise UsageError("--annotate needs exactly one workbook", "Give one .xlsx FILE.")
     options = workflows.CheckOptions(
         gear=arguments.gear,
         unit=arguments.unit,
@@ -74,8 +83,6 @@ def run(arguments: CheckArguments) -> None:
     if arguments.csv is not None:
         workflows.write_verdicts(result, arguments.csv)
     if arguments.annotate is not None:
-        if len(arguments.files) != 1 or arguments.files[0] == "-":
-            raise UsageError("--annotate needs exactly one workbook", "Give one .xlsx FILE.")
         workflows.annotate(result, Path(arguments.files[0]), arguments.annotate)
     if arguments.report is not None:
         _write_reports(arguments, options, result)
@@ -92,12 +99,13 @@ def _result(arguments: CheckArguments, options: workflows.CheckOptions) -> workf
         arguments.record_id,
         arguments.outcome,
         arguments.measured,
+        arguments.margin,
     )
     if arguments.files:
         if any(single):
             raise UsageError(
-                "--set, --tail, --side, --record-id, --outcome and --measured describe one gear entered by hand, "
-                "and a FILE was given as well",
+                "--set, --tail, --side, --record-id, --outcome, --measured and --margin describe one gear entered by "
+                "hand, and a FILE was given as well",
                 "Give either a FILE or the values of one gear.",
             )
         return _from_files(arguments, options)
@@ -154,8 +162,11 @@ def _from_flags(arguments: CheckArguments, gear: Gear) -> Inspection:
     if missing or arguments.tail is None or arguments.side is None or arguments.convention is None:
         raise UsageError(
             f"--set needs {', '.join(missing)}",
-            "Say which gear, and what a clearance reading is: there is no default.",
+            "Say which gear (--tail N123 --side LH) and what a clearance reading is (--convention RADIAL, DIAMETRAL "
+            "or TOTAL_PLAY): there is no default.",
         )
+    if not arguments.tail.strip():
+        raise UsageError("--tail is empty", "Give the tail number of the aircraft.")
     clearances: dict[int, float] = {}
     entered: dict[int, EnteredClearance] = {}
     for text in arguments.values:
@@ -170,8 +181,9 @@ def _from_flags(arguments: CheckArguments, gear: Gear) -> Inspection:
         convention=arguments.convention,
         clearance_in=clearances,
         entered=entered,
-        gauge_u_in=0.0005 / arguments.convention.per_radial,
-        readings_in=_readings(arguments),
+        gauge_u_in=DEFAULT_GAUGE_U_IN / arguments.convention.per_radial,
+        readings_in=_readings(arguments, gear),
+        margin_in=_margin(arguments, gear),
         outcome=_outcome(arguments.outcome),
         warnings=tuple(
             _confirm(gear, number, value) for number, value in clearances.items() if value > gear.confirm_above.value
@@ -198,8 +210,8 @@ def _one_value(
             f"--set {text!r}: {gear.name} has no joint {number}",
             f"Its joints are {_numbers(gear.joint_numbers)}.",
         )
-    length = parse_length(written)
-    radial = length.inches(arguments.unit) / convention.per_radial
+    length, inches = _length(f"--set {text!r}", written, arguments.unit, parse_length)
+    radial = inches / convention.per_radial
     if radial > gear.hard_limit.value:
         raise UsageError(
             f"--set {text!r}: {radial:.4f} in radial is above {gear.hard_limit.value:g} in, which no joint can have",
@@ -229,10 +241,37 @@ def _outcome(text: str | None) -> Outcome | None:
         raise UsageError(f"--outcome {text!r} is not RETRACTED or FAILED", "Give RETRACTED or FAILED.") from None
 
 
-def _readings(arguments: CheckArguments) -> tuple[float, ...]:
+def _length(
+    option: str, text: str, unit: LengthUnit | None, parse: Callable[[str], WrittenLength]
+) -> tuple[WrittenLength, float]:
+    """Read the length of an option; what is wrong with it is said with the option."""
+    try:
+        length = parse(text)
+        return length, length.inches(unit)
+    except UsageError as error:
+        raise UsageError(f"{option}: {error.message}", error.remedy) from None
+
+
+def _readings(arguments: CheckArguments, gear: Gear) -> tuple[float, ...]:
     if arguments.measured is None:
         return ()
-    return (parse_signed_length(arguments.measured).inches(arguments.unit),)
+    option = f"--measured {arguments.measured!r}"
+    _written, value = _length(option, arguments.measured, arguments.unit, parse_signed_length)
+    most = workflows.read_options(gear, workflows.CheckOptions()).plunger_hard_max_in
+    if abs(value) > most:
+        raise UsageError(f"{option} is more than {most:g} in, farther than the plunger can go", "Check its unit.")
+    return (value,)
+
+
+def _margin(arguments: CheckArguments, gear: Gear) -> float | None:
+    if arguments.margin is None:
+        return None
+    option = f"--margin {arguments.margin!r}"
+    _written, value = _length(option, arguments.margin, arguments.unit, parse_length)
+    most = workflows.read_options(gear, workflows.CheckOptions()).plunger_hard_max_in
+    if not 0.0 < value <= most:
+        raise UsageError(f"{option} is not above 0 and up to {most:g} in", "Check its unit.")
+    return value
 
 
 def _from_prompts(arguments: CheckArguments, gear: Gear) -> Inspection:
@@ -249,24 +288,36 @@ def _from_prompts(arguments: CheckArguments, gear: Gear) -> Inspection:
         convention=arguments.convention,
         record_id=arguments.record_id,
     )
-    return ask_inspection(gear, RichTerminal(), store, preset, saved=saved, advice=_advice(gear))
+    outcome, readings, margin = _outcome(arguments.outcome), _readings(arguments, gear), _margin(arguments, gear)
+    asked = ask_inspection(gear, RichTerminal(), store, preset, saved=saved, advice=_advice(gear))
+    return replace(
+        asked,
+        outcome=asked.outcome or outcome,
+        readings_in=asked.readings_in or readings,
+        margin_in=margin if asked.margin_in is None else asked.margin_in,
+    )
 
 
 def _advice(gear: Gear) -> Callable[[Mapping[int, float], Sequence[int]], str | None]:
     """Say after each critical joint which one is worth most next."""
 
-    def advise(measured: Mapping[int, float], _left: Sequence[int]) -> str | None:
+    def advise(measured: Mapping[int, float], left: Sequence[int]) -> str | None:
         joint = workflows.next_joint(gear, measured)
-        return None if joint is None else f"Worth most next: {gear.joint(joint).label} (type #{joint})."
+        return (
+            None
+            if joint is None or joint not in left
+            else f"Worth most next: {gear.joint(joint).label} (type #{joint})."
+        )
 
     return advise
 
 
 def _show(arguments: CheckArguments, result: workflows.CheckResult) -> None:
     if arguments.as_json:
+        from mlg_troubleshoot.cli import output
         from mlg_troubleshoot.reporting.json_form import check_as_json
 
-        typer.echo(
+        output.write(
             json.dumps(
                 check_as_json(result.gear, result.judgements, result.problems, result.notes),
                 allow_nan=False,

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import typer
-from rich.console import Console
 from rich.text import Text
 
 from mlg_troubleshoot import workflows
+from mlg_troubleshoot.cli import output
 
 
 def run(gear: str) -> None:
@@ -17,7 +17,7 @@ def run(gear: str) -> None:
     gear : str
         Shipped gear or gear file.
     """
-    console = Console(highlight=False)
+    console = output.console()
     findings = workflows.examine_installation(gear)
     for finding in findings:
         mark = "ok      " if finding.works else ("MISSING " if finding.needed else "optional")

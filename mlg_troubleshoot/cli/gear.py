@@ -7,11 +7,11 @@ from collections import Counter
 from dataclasses import asdict
 
 import typer
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from mlg_troubleshoot import workflows
+from mlg_troubleshoot.cli import output
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 
@@ -28,9 +28,9 @@ def show(name: str, *, as_json: bool) -> None:
     """
     gear = load_gear(name)
     if as_json:
-        typer.echo(json.dumps(_as_json(gear), indent=1))
+        output.write(json.dumps(_as_json(gear), indent=1))
         return
-    console = Console(highlight=False)
+    console = output.console()
     console.print(Text(f"{gear.name} ({gear.id})", style="bold"))
     console.print(Text(f"Geometry: {gear.provenance}. File {gear.path.name}, hash {gear.geometry_sha256[:12]}."))
     kinds = Counter(str(number.kind) for number in gear.numbers)
@@ -113,9 +113,9 @@ def verify(name: str, *, as_json: bool) -> None:
     numbers = workflows.verify_gear(name)
     failed = [n for n in numbers if n.should_hold and not n.holds]
     if as_json:
-        typer.echo(json.dumps({"gear": gear.id, "numbers": [asdict(n) for n in numbers]}, indent=1))
+        output.write(json.dumps({"gear": gear.id, "numbers": [asdict(n) for n in numbers]}, indent=1))
     else:
-        console = Console(highlight=False)
+        console = output.console()
         console.print(Text(f"{gear.name}: geometry {gear.provenance}", style="bold"))
         table = Table(box=None, pad_edge=False, header_style="bold")
         table.add_column("what the paper prints (section)")
@@ -126,7 +126,11 @@ def verify(name: str, *, as_json: bool) -> None:
             mark = "" if n.holds else (": DOES NOT HOLD" if n.should_hold else ", known")
             style = "bold red" if n in failed else ""
             table.add_row(
-                f"{n.quantity} ({n.section})", n.printed, f"{n.computed:.4g} {n.unit}".strip(), n.status + mark, style=style
+                f"{n.quantity} ({n.section})",
+                n.printed,
+                f"{n.computed:.4g} {n.unit}".strip(),
+                n.status + mark,
+                style=style,
             )
         console.print(table)
         verdict = "all that should hold hold" if not failed else f"{len(failed)} that should hold do not"

@@ -6,11 +6,21 @@ from collections import Counter
 from collections.abc import Sequence
 
 from rich.console import Console
+from rich.padding import Padding
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected, Verdict
+from mlg_troubleshoot.cli import output
+from mlg_troubleshoot.decision.assessment import (
+    Action,
+    Assessment,
+    JointFinding,
+    Judgement,
+    Rejected,
+    Verdict,
+)
+from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.workflows import CheckResult
@@ -31,14 +41,9 @@ MARKS = {
     Verdict.INCONCLUSIVE: "~",
 }
 _LINES_OF_A_BATCH = 60
+_JOINT_COLUMNS = 19
+_WIDE = 100
 _LINES_OF_PROBLEMS = 40
-
-
-def _console(*, to_stderr: bool = False) -> Console:
-    console = Console(stderr=to_stderr, highlight=False)
-    if not console.is_terminal:
-        return Console(stderr=to_stderr, highlight=False, width=110)
-    return console
 
 
 def show_notes(notes: Sequence[str]) -> None:
@@ -49,9 +54,9 @@ def show_notes(notes: Sequence[str]) -> None:
     notes : sequence of str
         The notes.
     """
-    console = _console(to_stderr=True)
+    console = output.console(to_stderr=True)
     for note in notes:
-        console.print(Text(f"Note: {note}"))
+        _message(console, f"Note: {note}")
 
 
 def show_problems(problems: Sequence[Problem]) -> None:
@@ -64,16 +69,33 @@ def show_problems(problems: Sequence[Problem]) -> None:
     """
     if not problems:
         return
-    console = _console(to_stderr=True)
+    console = output.console(to_stderr=True)
     noun = "problem" if len(problems) == 1 else "problems"
     console.print(Text(f"{len(problems)} {noun} in the input:", style="bold"))
     for problem in problems[:_LINES_OF_PROBLEMS]:
-        found = "" if problem.value is None else f" found {problem.value!r};"
-        console.print(Text(f"  {problem.place()}:{found} expected {problem.expected}."))
-        console.print(Text(f"    What to do: {problem.remedy}"))
+        _message(console, f"{problem.place()}: {_what(problem)}", indent=2)
+        _message(console, f"What to do: {problem.remedy}", indent=4)
     if len(problems) > _LINES_OF_PROBLEMS:
         rest = len(problems) - _LINES_OF_PROBLEMS
-        console.print(Text(f"  … and {rest} more; --json lists all of them, --annotate marks them in your workbook."))
+        _message(
+            console, f"… and {rest} more; --json lists all of them, --annotate marks them in your workbook.", indent=2
+        )
+
+
+def _message(console: Console, text: str, indent: int = 0) -> None:
+    """Print a message: folded under its own indent on a terminal, one line of a file elsewhere."""
+    if console.is_terminal:
+        console.print(Padding(Text(text), (0, 0, 0, indent)))
+    else:
+        console.print(Text(" " * indent + text), soft_wrap=True)
+
+
+def _what(problem: Problem) -> str:
+    if problem.value is None:
+        return f"expected {problem.expected}."
+    if problem.row is None and problem.column is None:
+        return f"{problem.value}; expected {problem.expected}."
+    return f"found {problem.value!r}; expected {problem.expected}."
 
 
 def show_one(judgement: Judgement, gear: Gear) -> None:
@@ -86,7 +108,7 @@ def show_one(judgement: Judgement, gear: Gear) -> None:
     gear : Gear
         The gear.
     """
-    console = _console()
+    console = output.console()
     if isinstance(judgement, Rejected):
         row = judgement.row
         title = f"{row.tail_no or 'tail ?'}  {row.side or 'side ?'}  {row.record_id or 'record ?'}"
@@ -114,7 +136,7 @@ def show_one(judgement: Judgement, gear: Gear) -> None:
             subtitle=Text(f"[{MARKS[a.verdict]}] {a.verdict.words}", style=STYLES[a.verdict]),
         )
     )
-    console.print(_joint_table(a))
+    console.print(_joint_table(a, console))
     alike = sorted({tuple(sorted((f.joint, *f.alike))) for f in a.joints if f.alike})
     if alike:
         pairs = ", ".join("#" + " = #".join(str(n) for n in group) for group in alike)
@@ -132,27 +154,36 @@ def show_one(judgement: Judgement, gear: Gear) -> None:
     )
 
 
-def _joint_table(a: Assessment) -> Table:
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for heading, side in (
-        ("rank", "right"),
-        ("joint", "left"),
-        ("clearance in", "right"),
-        ("limit in", "right"),
-        ("contributes in", "right"),
-        ("S first", "right"),
-        ("S total", "right"),
-        ("amplif.", "right"),
-        ("rank range", "right"),
+def _table(console: Console) -> Table:
+    gap = 2 if console.width >= _WIDE else 1
+    return Table(box=None, pad_edge=False, padding=(0, gap, 0, 0), header_style="bold")
+
+
+def _joint_table(a: Assessment, console: Console) -> Table:
+    table = _table(console)
+    # Two-line headings: with them every column, and first of all the joint, has its place in 80 columns.
+    for heading in (
+        "rank",
+        "joint",
+        "clearance\nin",
+        "limit\nin",
+        "contri-\nbutes in",
+        "S\nfirst",
+        "S\ntotal",
+        "ampli-\nfication",
+        "rank\nrange",
     ):
-        table.add_column(heading, justify="right" if side == "right" else "left", no_wrap=heading != "joint")
+        name = heading == "joint"
+        table.add_column(
+            heading, justify="left" if name else "right", no_wrap=not name, min_width=_JOINT_COLUMNS if name else None
+        )
     for f in a.ranked:
         table.add_row(*_joint_cells(f), style="bold" if f.over_limit else "")
     return table
 
 
 def _joint_cells(f: JointFinding) -> tuple[str, ...]:
-    clearance = "not measured" if f.clearance_in is None else f"{f.clearance_in:.4f}"
+    clearance = "unmeasured" if f.clearance_in is None else f"{f.clearance_in:.4f}"
     low, high = f.rank_range
     return (
         str(f.rank),
@@ -209,31 +240,35 @@ def show_batch(result: CheckResult) -> None:
     result : CheckResult
         The check.
     """
-    console = _console()
+    console = output.console()
     counts = result.counts
     summary = Text(f"{len(result.judgements)} inspections: ")
     summary.append(" · ".join(f"{counts[v]} {v.value.replace('_', ' ').lower()}" for v in Verdict if counts[v]))
     console.print(summary)
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for heading in ("", "verdict", "tail", "side", "record", "worst in", "margin", "chance", "next"):
+    table = _table(console)
+    headings = ["", "verdict", "tail", "side", "record", "worst in", "margin", "chance", "next"]
+    shown = [h for h in headings if h != "margin" or console.width >= _WIDE]
+    for heading in shown:
         numeric = heading in {"worst in", "margin", "chance"}
         table.add_column(
             heading, justify="right" if numeric else "left", no_wrap=heading != "next", overflow="ellipsis"
         )
     ordered = sorted(result.judgements, key=_urgency)
     for judgement in ordered[:_LINES_OF_A_BATCH]:
-        table.add_row(*_batch_cells(judgement))
+        cells = dict(zip(headings, _batch_cells(judgement), strict=True))
+        table.add_row(*(cells[heading] for heading in shown))
     console.print(table)
     if len(ordered) > _LINES_OF_A_BATCH:
-        console.print(Text(f"… and {len(ordered) - _LINES_OF_A_BATCH} more gears; --csv or --json lists all of them."))
+        console.print(Text(f"… and {len(ordered) - _LINES_OF_A_BATCH} more; --csv or --json lists all of them."))
     worst = Counter(f.joint for j in result.judgements if isinstance(j, Assessment) for f in j.joints if f.over_limit)
     if worst:
         listed = ", ".join(f"#{joint} on {count}" for joint, count in worst.most_common())
         console.print(Text(f"Joints over their limit: {listed} inspections."))
     console.print(
         Text(
-            f"Model: {result.gear.name}, geometry {result.gear.provenance}. 'worst' is a bound; 'chance' is of exceeding "
-            "the margin with random directions. Troubleshooting aid, not maintenance data.",
+            f"Model: {result.gear.name}, geometry {result.gear.provenance}. 'worst' is the displacement in the worst "
+            "directions, a bound; 'chance' is of exceeding the margin with random directions. Troubleshooting aid, not "
+            "maintenance data; within margin is not an approval for return to service.",
             style="dim",
         )
     )
@@ -253,7 +288,7 @@ def _batch_cells(judgement: Judgement) -> tuple[Text | str, ...]:
             "-",
             "-",
             "-",
-            judgement.next_action.text,
+            _next(judgement),
         )
     i = judgement.inspection
     worst, chance = judgement.predicted_displacement_in, judgement.probability_exceed_random_directions
@@ -266,5 +301,22 @@ def _batch_cells(judgement: Judgement) -> tuple[Text | str, ...]:
         "open" if worst is None else f"{worst:.4f}",
         f"{judgement.margin_in:.4f}",
         "-" if chance is None else f"{100 * chance:.0f} %",
-        judgement.next_action.text,
+        _next(judgement),
     )
+
+
+def _next(judgement: Judgement) -> str:
+    """The next action in a few words: the whole sentence stands in the view of one gear and in --csv."""
+    action = judgement.next_action
+    joints = ", ".join(f"#{joint}" for joint in action.joints)
+    match action.action:
+        case Action.CORRECT:
+            return action.text.removeprefix("Do not use. ").rstrip(".").lower()
+        case Action.RESTORE:
+            return f"restore {joints}"
+        case Action.CONTINUE:
+            failed = isinstance(judgement, Assessment) and judgement.inspection.outcome is Outcome.FAILED
+            return "not the joints: look elsewhere" if failed else "continue fault isolation"
+        case Action.MEASURE:
+            again = {Verdict.OUTSIDE_MARGIN: "inspect", Verdict.INCONCLUSIVE: "measure again"}
+            return f"{again.get(judgement.verdict, 'measure')} {joints}"

@@ -26,7 +26,10 @@ _STEP_IN = 1e-5
 class Extension(Protocol):
     """An extension of the model, as a diagnosis makes it."""
 
-    residual_u_in: float
+    @property
+    def residual_u_in(self) -> float:
+        """Standard uncertainty of the extended model: the scatter that it leaves. [in]"""
+        ...
 
     def adjust(self, inspections: Sequence[Inspection], clearance_in: Array) -> Adjustment:
         """Return what differs from the plain model for these inspections."""

@@ -61,10 +61,10 @@ def rank_joints(
     """
     assumed = np.array([clearance_in.get(j.number, 0.5 * j.limit.value) for j in gear.joints])
     over = [j.is_over_limit(clearance_in.get(j.number, 0.0)) for j in gear.joints]
-    orders = [_order(gear, over, contribution, table) for contribution in ensemble_amplification(gear) * assumed]
+    places = _places(np.array(over), ensemble_amplification(gear) * assumed, table.total_order)
+    best, worst = places.min(axis=0).tolist(), places.max(axis=0).tolist()
     findings = []
     for j, joint in enumerate(gear.joints):
-        ranks = [order.index(j) + 1 for order in orders]
         clearance = clearance_in.get(joint.number)
         indices = table.joints[j]
         findings.append(
@@ -78,8 +78,8 @@ def rank_joints(
                 first_order=indices.first_order,
                 total_order=indices.total_order,
                 plunger_amplification=indices.plunger_amplification,
-                rank=ranks[0],
-                rank_range=(min(ranks), max(ranks)),
+                rank=int(places[0, j]),
+                rank_range=(best[j], worst[j]),
                 alike=gear.alike[joint.number],
                 allowance_in=None if allowance_in is None else allowance_in.get(joint.number),
             )
@@ -87,9 +87,9 @@ def rank_joints(
     return tuple(findings)
 
 
-def _order(gear: Gear, over: list[bool], contribution: Array, table: IndexTable) -> list[int]:
-    def key(j: int) -> tuple[bool, float, float, int]:
-        # Rounded: both ends of one link contribute alike, and rounding noise must not order them.
-        return (not over[j], -round(float(contribution[j]), 9), -round(table.joints[j].total_order, 6), j)
-
-    return sorted(range(len(gear.joints)), key=key)
+def _places(over: NDArray[np.bool_], contribution: Array, total_order: Array) -> NDArray[np.intp]:
+    """Place of each joint on each linkage, from 1."""
+    # Rounded: both ends of one link contribute alike, and rounding noise must not order them.
+    keys = (-np.round(total_order, 6), -np.round(contribution, 9), ~over)
+    order = np.lexsort([np.broadcast_to(key, contribution.shape) for key in keys], axis=-1)
+    return np.argsort(order, axis=-1) + 1

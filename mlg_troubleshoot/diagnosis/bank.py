@@ -55,7 +55,9 @@ def build_bank(scene: Scene, catalogue: Array) -> Bank:
     shapes: list[tuple[Array, tuple[str, ...]]] = []
     main = {name: z for name, z in smooth.items() if not name.startswith(("clearance_", "axial_float_"))}
     for name, z in smooth.items():
-        shapes += [(z, (name,)), (z**2, (name,)), (z**3, (name,)), (np.maximum(z, 0.0), (name,))]
+        shapes += [(z, (name,)), (z**2, (name,)), (z**3, (name,))]
+        bends = (0.15, 0.3, 0.5, 0.7, 0.85) if name in main else (0.5,)
+        shapes += [(np.maximum(z - np.quantile(z, q), 0.0), (name,)) for q in bends]
     if "day" in scene.table.quantities:
         day = np.nan_to_num(scene.table.quantities["day"])
         for period in _PERIODS_DAYS:

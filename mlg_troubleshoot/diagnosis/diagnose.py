@@ -214,6 +214,7 @@ def diagnose(
         misfit,
         scene.over_in,
         table.tails,
+        table.gears,
         extra,
         candidates,
         columns,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,7 +96,7 @@ def measure_gain(
         train, test = fold != k, fold == k
         if not test.any() or not train.any():
             continue
-        part = replace(noise, relative=noise.relative[train], tails=noise.tails[train], loadings=noise.loadings[train])
+        part = noise.take(train)
         used = np.any(columns[train] != 0.0, axis=0)
         values = np.zeros(columns.shape[1])
         if used.any():

@@ -21,14 +21,24 @@ from mlg_troubleshoot.diagnosis.screen import Fit, Screen, fit
 Array = NDArray[np.float64]
 Key = tuple[str, str | None]
 
-ALARM = 0.04
-SECOND = 0.005
-UNLISTED_ALARM = 0.008
+ALARM = 0.03
+# A name needs clearer evidence than an alarm does.
+NAME = 0.002
+SECOND = 0.002
+UNLISTED_ALARM = 0.001
 # Log-likelihood by which a rival must fall behind to be ruled out.
 RULED_OUT = 2.5
+RULED_OUT_FAINT = 4.0
 # A second cause below this share of the first one's effect is taken for a slip of the first one's form.
 SECOND_SHARE = 1.0 / 3.0
+# Where something must be left all the same, a weaker listed cause is accepted down to this share.
+WEAK_SHARE = 0.12
+# Log-likelihood by which a shift of all rows must lead, being no listed cause, to be believed.
+CONSTANT = 1.5
+# A remainder in the named cause's own variable refutes its form from this share of the effect on.
+OWN_SHARE = 0.2
 _PAIR_POOL = 24
+_COUNTED = 10
 
 
 @dataclass(frozen=True)
@@ -80,6 +90,8 @@ class Inference:
         Measured less predicted, and predicted. [in]
     tails : ndarray of str, shape (n,)
         Tail of each row.
+    gears : ndarray of str, shape (n,)
+        Single gear of each row.
     extra_in : ndarray, shape (n,)
         Further standard deviation of a row. [in]
     candidates : sequence of Candidate
@@ -101,6 +113,7 @@ class Inference:
         misfit: Array,
         predicted: Array,
         tails: NDArray[np.str_],
+        gears: NDArray[np.str_],
         extra_in: Array,
         candidates: Sequence[Candidate],
         columns: Array,
@@ -112,6 +125,7 @@ class Inference:
         self.misfit = misfit - EXPECTED_SLOPE * predicted
         self.predicted = predicted
         self.tails = tails
+        self.gears = gears
         self.extra = extra_in
         self.candidates = candidates
         self.columns = columns
@@ -131,7 +145,7 @@ class Inference:
         Finding
             Verdict, names, rivals and remainder.
         """
-        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.extra)
+        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra)
         screen = Screen(noise, self.columns, self.signs)
         gain = screen.run(self.misfit[:, None]).gain[:, 0]
         score = gain - self.penalty
@@ -162,39 +176,75 @@ class Inference:
         return scale * (np.sqrt(2.0 * max(bar, 0.0)) + 0.84) / np.sqrt(len(self.misfit))
 
     def _named(self, lead: int, p_alarm: float, smallest: float) -> Finding:
-        chosen, p_values = [lead], [p_alarm]
-        second = self._second(chosen)
+        constant = self._constant(lead)
+        if constant is not None:
+            p, variables = constant
+            noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra)
+            return Finding("UNLISTED", (), (), (p_alarm,), variables, p, noise, None, smallest, ())
+        finding = self._with([lead], [p_alarm], self._second([lead], SECOND_SHARE), smallest)
+        if finding.verdict == "UNLISTED":
+            # What is left may be a weaker cause of the catalogue: a listed cause goes before an unlisted one.
+            weaker = self._second([lead], WEAK_SHARE)
+            if weaker is not None:
+                again = self._with([lead], [p_alarm], weaker, smallest)
+                if again.verdict != "UNLISTED":
+                    return again
+        return finding
+
+    def _with(
+        self, chosen: list[int], p_values: list[float], second: tuple[list[int], float] | None, smallest: float
+    ) -> Finding:
+        """Check one cause, or two, against their rivals and against what they leave."""
         if second is not None:
-            chosen, p_second = second
-            p_values.append(p_second)
+            chosen, p_values = second[0], [p_values[0], second[1]]
         rivals: list[int] = []
         behind: dict[Key, float] = {}
+        clear = p_values[0] <= NAME
         for place in range(len(chosen)):
             others = [c for k, c in enumerate(chosen) if k != place]
-            better, near, rest = self._rivals(chosen[place], others)
+            better, near, rest = self._rivals(chosen[place], others, clear)
             chosen[place] = better
             rivals += near
             behind.update(rest)
         noise, fitted = self._refit(chosen)
-        remainder_p, variables, share = self._remainder(noise, chosen, fitted)
+        remainder_p, variables, refuted = self._remainder(noise, chosen, fitted)
         ruled_out = tuple(sorted(behind, key=lambda key: behind[key]))
-        if remainder_p <= UNLISTED_ALARM and share >= SECOND_SHARE:
+        if refuted:
             return Finding(
                 "UNLISTED", (), (), tuple(p_values), variables, remainder_p, noise, None, smallest, ruled_out
             )
-        verdict = "AMBIGUOUS" if rivals else "NAMED"
+        rivals = list(dict.fromkeys(rivals))
+        verdict = "AMBIGUOUS" if rivals or not clear else "NAMED"
         return Finding(
             verdict, tuple(chosen), tuple(rivals), tuple(p_values), (), remainder_p, noise, fitted, smallest, ruled_out
         )
 
+    def _constant(self, lead: int) -> tuple[float, tuple[str, ...]] | None:
+        """Tell whether a shift of all rows alike explains clearly more than any cause; no listed cause does that.
+
+        What moves besides is looked for with the shift taken out.
+        """
+        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra)
+        everywhere = np.ones((len(self.misfit), 1))
+        both = Screen(noise, np.hstack([everywhere, self.columns[:, [lead]]]), np.array([0, self.signs[lead]]))
+        gain = both.run(self.misfit[:, None]).gain[:, 0]
+        if gain[0] < gain[1] - self.penalty[lead] + CONSTANT:
+            return None
+        screen = Screen(noise, self.bank.columns, np.zeros(self.bank.columns.shape[1]), everywhere)
+        shapes = screen.run(self.misfit[:, None]).gain[:, 0]
+        ratio, scale = screen.tail_ratio(self.misfit)
+        p = _chance(np.max(screen.run(self._null(noise, ratio, scale)).gain, axis=0), float(np.max(shapes)))
+        variables = self.bank.variables[int(np.argmax(shapes))] if p <= ALARM else ("all rows",)
+        return min(p, ALARM), variables
+
     def _refit(self, chosen: Sequence[int]) -> tuple[NoiseModel, Fit]:
-        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.extra)
+        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra)
         columns = self.columns[:, list(chosen)]
         fitted = fit(noise, columns, self.misfit)
-        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.extra, columns @ fitted.values)
+        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, columns @ fitted.values)
         return noise, fit(noise, columns, self.misfit)
 
-    def _second(self, chosen: list[int]) -> tuple[list[int], float] | None:
+    def _second(self, chosen: list[int], least_share: float) -> tuple[list[int], float] | None:
         """Look for the best pair, and accept it if its second cause stands out and is no slip of form."""
         noise, _fitted = self._refit(chosen)
         screen = Screen(noise, self.columns, self.signs)
@@ -209,19 +259,14 @@ class Inference:
                 pool.append(int(k))
             if len(pool) == _PAIR_POOL:
                 break
-        best: tuple[float, int, int] | None = None
-        for first in pool:
-            partner = Screen(noise, self.columns, self.signs, self.columns[:, [first]])
-            total = single[first] + partner.run(self.misfit[:, None]).gain[:, 0] - self.penalty
-            for k in np.argsort(-total):
-                if self.candidates[int(k)].cause.name != self.candidates[first].cause.name or (
-                    self.candidates[int(k)].key != self.candidates[first].key
-                ):
-                    if best is None or total[k] > best[0]:
-                        best = (float(total[k]), first, int(k))
-                    break
-        if best is None:
+        together = screen.pairs(self.misfit, np.array(pool)) - self.penalty[:, None] - self.penalty[pool]
+        for place, first in enumerate(pool):
+            same = [i for i, c in enumerate(self.candidates) if c.key == self.candidates[first].key]
+            together[same, place] = -np.inf
+        partner, place = np.unravel_index(int(np.argmax(together)), together.shape)
+        if not np.isfinite(together[partner, place]):
             return None
+        best = (float(together[partner, place]), pool[int(place)], int(partner))
         pair = [best[1], best[2]]
         pair.sort(key=lambda k: -single[k])
         _noise, fitted = self._refit(pair)
@@ -231,7 +276,7 @@ class Inference:
         if any(wrong):
             return None
         sizes = [float(np.sqrt(np.mean((self.columns[:, k] * v) ** 2))) for k, v in zip(pair, fitted.values, strict=True)]
-        if min(sizes) < SECOND_SHARE * max(sizes):
+        if min(sizes) < least_share * max(sizes):
             return None
         held = Screen(noise, self.columns, self.signs, self.columns[:, [pair[0]]])
         ratio, scale = held.tail_ratio(self.misfit)
@@ -241,7 +286,7 @@ class Inference:
         p = _chance(at_random, observed)
         return (pair, p) if p <= SECOND else None
 
-    def _rivals(self, lead: int, others: Sequence[int]) -> tuple[int, list[int], dict[Key, float]]:
+    def _rivals(self, lead: int, others: Sequence[int], clear: bool) -> tuple[int, list[int], dict[Key, float]]:
         """Best candidate in the lead's place, the rivals that are near it, and how far the rest is behind."""
         noise, _fitted = self._refit([lead, *others])
         screen = Screen(noise, self.columns, self.signs, self.columns[:, list(others)] if others else None)
@@ -258,26 +303,55 @@ class Inference:
             if key == self.candidates[winner].key or not np.isfinite(score[k]):
                 continue
             distance = min(score[winner] - score[k], gain[winner] - gain[k] + 2.0)
-            if distance < RULED_OUT:
+            if distance < (RULED_OUT if clear else RULED_OUT_FAINT):
                 near.append(k)
             elif gain[k] > 2.0:
                 behind[key] = float(distance)
         return winner, near, behind
 
-    def _remainder(self, noise: NoiseModel, chosen: Sequence[int], fitted: Fit) -> tuple[float, tuple[str, ...], float]:
-        """Chance of the strongest shape in what is left, its variables, and its size beside the named effect."""
+    def _remainder(
+        self, noise: NoiseModel, chosen: Sequence[int], fitted: Fit
+    ) -> tuple[float, tuple[str, ...], bool]:
+        """Chance of the strongest shape in what is left, its variables, and whether it refutes what is named.
+
+        A large remainder of any shape does; a smaller one does if it moves with the named cause's own variable.
+        """
         held = self.columns[:, list(chosen)]
         screen = Screen(noise, self.bank.columns, np.zeros(self.bank.columns.shape[1]), held)
         gain = screen.run(self.misfit[:, None]).gain[:, 0]
         ratio, scale = screen.tail_ratio(self.misfit)
-        at_random = np.max(screen.run(self._null(noise, ratio, scale)).gain, axis=0)
+        random_gain = screen.run(self._null(noise, ratio, scale)).gain
         self.progress(0.9)
         top = int(np.argmax(gain))
-        both = fit(noise, np.column_stack([held, self.bank.columns[:, top]]), self.misfit)
-        size = float(np.std(self.bank.columns[:, top])) * abs(float(both.values[-1]))
+        p = _chance(np.max(random_gain, axis=0), float(gain[top]))
         named = float(np.sqrt(np.mean((held @ fitted.values) ** 2)))
-        return _chance(at_random, float(gain[top])), self.bank.variables[top], size / max(named, 1e-12)
+        if p <= UNLISTED_ALARM and self._size(noise, held, top) >= SECOND_SHARE * named:
+            return p, self.bank.variables[top], True
+        needs = {name for k in chosen for name in self.candidates[k].cause.needs}
+        own = [i for i, names in enumerate(self.bank.variables) if set(names) <= needs]
+        if own:
+            strongest = own[int(np.argmax(gain[own]))]
+            p_own = _chance(np.max(random_gain[own], axis=0), float(gain[strongest]))
+            if p_own <= UNLISTED_ALARM and self._size(noise, held, strongest) >= OWN_SHARE * named:
+                return min(p, p_own), self.bank.variables[strongest], True
+        return p, self.bank.variables[top], False
+
+    def _size(self, noise: NoiseModel, held: Array, shape: int) -> float:
+        """Standard deviation over the rows of a fitted shape, what is named fitted with it. [in]"""
+        both = fit(noise, np.column_stack([held, self.bank.columns[:, shape]]), self.misfit)
+        return float(np.std(self.bank.columns[:, shape])) * abs(float(both.values[-1]))
 
 
 def _chance(at_random: Array, observed: float) -> float:
-    return float((1 + np.sum(at_random >= observed)) / (1 + len(at_random)))
+    """Chance that the largest of many gains is as large by chance.
+
+    Counted where enough drawn maxima lie beyond; further out from the extreme-value distribution (Gumbel) that
+    fits them, so that a small chance needs no more drawn sets than a large one.
+    """
+    beyond = int(np.sum(at_random >= observed))
+    if beyond >= _COUNTED:
+        return (1 + beyond) / (1 + len(at_random))
+    width = max(float(np.std(at_random)) * np.sqrt(6.0) / np.pi, 1e-9)
+    place = float(np.mean(at_random)) - np.euler_gamma * width
+    fitted = float(-np.expm1(-np.exp(-(observed - place) / width)))
+    return max(min(fitted, (1 + beyond) / (1 + len(at_random))), 1e-12)

@@ -22,6 +22,8 @@ EXPECTED_SLOPE = -0.006
 # Bias that the null model allows beyond that, one standard deviation: of the mean [in], and of the slope [1].
 BIAS_IN = 0.0002
 SLOPE = 0.006
+# Scatter between the gears of one tail, in units of the scatter of a row: their levels of wear are known so well.
+GEAR_RATIO = 0.25
 # Ratios of the scatter between tails to the scatter of a row that are tried.
 TAIL_RATIOS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.4, 2.0)
 
@@ -36,20 +38,39 @@ class NoiseModel:
         Standard deviation of each row in units of the common one. [1]
     tails : ndarray of int, shape (n,)
         Number of the tail of each row.
+    gears : ndarray of int, shape (n,)
+        Number of the single gear of each row.
     loadings : ndarray, shape (n, 2)
         Bias and slope, each at one standard deviation in units of the common one. [1]
     """
 
     relative: Array
     tails: NDArray[np.int64]
+    gears: NDArray[np.int64]
     loadings: Array
+
+    def take(self, rows: NDArray[np.bool_]) -> NoiseModel:
+        """Return the noise of some of the rows.
+
+        Parameters
+        ----------
+        rows : ndarray of bool, shape (n,)
+            The rows.
+
+        Returns
+        -------
+        NoiseModel
+            Their noise.
+        """
+        return NoiseModel(self.relative[rows], self.tails[rows], self.gears[rows], self.loadings[rows])
 
     def factors(self, tail_ratio: float) -> Array:
         """Low-rank part of the covariance, shape (n, k). [1]"""
+        each = GEAR_RATIO * (self.gears[:, None] == np.arange(self.gears.max() + 1))
         if tail_ratio == 0.0:
-            return self.loadings
+            return np.hstack([each, self.loadings])
         indicator = (self.tails[:, None] == np.arange(self.tails.max() + 1)).astype(float)
-        return np.hstack([tail_ratio * indicator, self.loadings])
+        return np.hstack([tail_ratio * indicator, each, self.loadings])
 
     def precision_times(self, columns: Array, tail_ratio: float) -> tuple[Array, float]:
         """Multiply columns by the inverse covariance (Woodbury).
@@ -164,7 +185,12 @@ def tail_numbers(tails: Sequence[str] | NDArray[np.str_]) -> NDArray[np.int64]:
 
 
 def build_noise(
-    misfit: Array, predicted: Array, tails: NDArray[np.str_], extra_in: Array, explained: Array | None = None
+    misfit: Array,
+    predicted: Array,
+    tails: NDArray[np.str_],
+    gears: NDArray[np.str_],
+    extra_in: Array,
+    explained: Array | None = None,
 ) -> tuple[NoiseModel, float]:
     """Estimate the noise model from the misfit.
 
@@ -176,6 +202,8 @@ def build_noise(
         Prediction. [in]
     tails : ndarray of str, shape (n,)
         Tail of each row.
+    gears : ndarray of str, shape (n,)
+        Single gear of each row.
     extra_in : ndarray, shape (n,)
         Further standard deviation of a row, by filled clearances. [in]
     explained : ndarray, shape (n,), optional
@@ -200,10 +228,22 @@ def build_noise(
     scale = max(robust_scale(centred / relative), 1e-6)
     relative = np.sqrt(relative**2 + (extra_in / scale) ** 2)
     # Rows far out in the tails of the distribution count less, but never as nothing.
-    standard = np.abs(centred) / (scale * relative)
+    standard = np.minimum(np.abs(centred), _companion(rest, numbers)) / (scale * relative)
     relative = relative * np.maximum(1.0, standard / 3.0)
     loadings = np.column_stack([np.full(len(misfit), BIAS_IN), SLOPE * predicted]) / scale
-    return NoiseModel(relative, numbers, loadings), scale
+    return NoiseModel(relative, numbers, tail_numbers(gears), loadings), scale
+
+
+def _companion(values: Array, tails: NDArray[np.int64]) -> Array:
+    """Distance of each row to the nearest other row of its tail: rows that stand out together are no outliers. [in]"""
+    nearest = np.full(len(values), np.inf)
+    for tail in range(tails.max() + 1):
+        rows = np.flatnonzero(tails == tail)
+        if len(rows) > 1:
+            apart = np.abs(values[rows][:, None] - values[rows])
+            np.fill_diagonal(apart, np.inf)
+            nearest[rows] = apart.min(axis=1)
+    return nearest
 
 
 def _growth(centred: Array, predicted: Array) -> Array:

@@ -100,6 +100,39 @@ class Screen:
             best = np.maximum(best, -0.5 * n * np.log(left / n) - 0.5 * log_determinant)
         return Gain(best - null, null)
 
+    def pairs(self, data: Array, pool: Array) -> Array:
+        """Gain in log-likelihood of each candidate together with each of a few partners.
+
+        Parameters
+        ----------
+        data : ndarray, shape (n,)
+            Misfit. [in]
+        pool : ndarray of int, shape (n_pool,)
+            The partners.
+
+        Returns
+        -------
+        ndarray, shape (n_candidates, n_pool)
+            Gain over the null, profiled over scale and tail scatter; −inf where the two are alike. [1]
+        """
+        n = len(data)
+        best = np.full((self.columns.shape[1], len(pool)), -np.inf)
+        null = -np.inf
+        for index in range(len(TAIL_RATIOS)):
+            rest, along = self._base(data[:, None], index)
+            weighted, square, _held, log_determinant = self._parts[index]
+            null = max(null, float(-0.5 * n * np.log(rest[0] / n) - 0.5 * log_determinant))
+            cross = self.columns.T @ weighted[:, pool]
+            own = np.maximum(square, 1e-300)
+            first = along[pool, 0] ** 2 / own[pool]
+            left = square[:, None] - cross**2 / own[pool]
+            apart = left > 1e-3 * own[:, None]
+            second = (along - cross * (along[pool, 0] / own[pool])) ** 2 / np.where(apart, left, 1.0)
+            remaining = np.maximum(rest[0] - first - np.where(apart, second, -np.inf), 1e-12 * rest[0])
+            likelihood = -0.5 * n * np.log(remaining / n) - 0.5 * log_determinant
+            best = np.maximum(best, np.where(apart, likelihood, -np.inf))
+        return np.asarray(best - null)
+
     def tail_ratio(self, data: Array) -> tuple[float, float]:
         """Most likely scatter between tails and common scale of one data set, candidates left out.
 

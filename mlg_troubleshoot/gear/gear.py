@@ -153,6 +153,10 @@ class Gear:
     path: Path
     indices_file: Path
 
+    def __hash__(self) -> int:
+        # Its parts are many: what is cached for a gear must not cost a walk through all of them.
+        return hash((self.id, self.geometry_sha256, self.ensemble_sha256))
+
     @cached_property
     def model(self) -> LinkageModel:
         """The calibrated reference linkage."""

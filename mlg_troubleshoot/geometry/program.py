@@ -17,6 +17,27 @@ from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, S
 
 
 @dataclass(frozen=True, slots=True)
+class Closure:
+    """A joint on two links: what its formulas solve, for whoever can use it directly.
+
+    Parameters
+    ----------
+    joint, start, end : tuple of str
+        Names of the coordinates of the joint and of the links' other ends.
+    square : str
+        Square of the first link's length in the plane; the second link's is constant.
+    area : str
+        Cross product of the two links, from their ends to the joint.
+    """
+
+    joint: tuple[str, str]
+    start: tuple[str, str]
+    end: tuple[str, str]
+    square: str
+    area: str
+
+
+@dataclass(frozen=True, slots=True)
 class Program:
     """Formulas that locate every joint of a mechanism, in order, and its numbers by name.
 
@@ -32,6 +53,8 @@ class Program:
         Name of the output.
     virtual_links : tuple of int
         Virtual links, each the two inputs ``vx{n}`` and ``vy{n}``. [in]
+    closures : tuple of Closure
+        Joints on two links, in order.
     """
 
     parameters: dict[str, float]
@@ -39,6 +62,7 @@ class Program:
     joints: dict[str, tuple[str, str]]
     output: str
     virtual_links: tuple[int, ...]
+    closures: tuple[Closure, ...] = ()
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -93,6 +117,7 @@ class _Writer:
         self.parameters: dict[str, float] = {}
         self.lines: list[tuple[str, str]] = []
         self.joints: dict[str, tuple[str, str]] = {}
+        self.closures: list[Closure] = []
 
     def parameter(self, name: str, value: float) -> str:
         if name not in self.parameters:
@@ -203,7 +228,9 @@ def write_program(mechanism: Mechanism) -> Program:
             case Slider():
                 _slider(w, step)
     output = _output(w)
-    return Program(w.parameters, tuple(w.lines), w.joints, output, mechanism.virtual_links)
+    return Program(
+        w.parameters, tuple(w.lines), w.joints, output, mechanism.virtual_links, tuple(w.closures)
+    )
 
 
 def _travel(w: _Writer) -> str:
@@ -237,21 +264,23 @@ def _dyad(w: _Writer, step: Dyad) -> None:
     apart = w.let(f"{dx} * {dx} + {dy} * {dy}")
     inverse = w.let(f"1.0 / {apart}")
     if height is None:
+        square = f"{reach} * {reach}"
         # Eq. 3 in factors (Heron): nothing cancels where the two links lie almost in line.
         more, less = w.let(f"{reach} + {second}"), w.let(f"{reach} - {second}")
         along = w.let(f"0.5 + 0.5 * ({more} * {less}) * {inverse}")
         factors = w.let(f"({more} * {more} - {apart}) * ({apart} - {less} * {less})")
-        across = w.let(f"0.5 * {sign} * sqrt({factors}) * {inverse}")
     else:
         square = w.let(f"{reach} * {reach} - {height} * {height}")
         along = w.let(f"0.5 + 0.5 * ({square} - {second} * {second}) * {inverse}")
         excess = w.let(f"{apart} - {square} - {second} * {second}")
         factors = w.let(f"4.0 * {second} * {second} * {square} - {excess} * {excess}")
-        across = w.let(f"0.5 * {sign} * sqrt({factors}) * {inverse}")
+    area = w.let(f"0.5 * {sign} * sqrt({factors})")
+    across = w.let(f"{area} * {inverse}")
     w.joints[step.joint] = (
         w.let(f"{ax} + {along} * {dx} - {across} * {dy}"),
         w.let(f"{ay} + {along} * {dy} + {across} * {dx}"),
     )
+    w.closures.append(Closure(w.joints[step.joint], (ax, ay), (bx, by), square, area))
 
 
 def _lever(w: _Writer, step: Lever) -> None:

@@ -37,6 +37,8 @@ class ReadOptions:
         A radial clearance above this is refused. [in]
     clearance_confirm_above_in : float
         A radial clearance above this is accepted with a warning. [in]
+    plunger_hard_max_in : float
+        A measured plunger displacement beyond this, either way, is refused. [in]
     """
 
     unit: LengthUnit | None = None
@@ -48,6 +50,7 @@ class ReadOptions:
     joint_names: Mapping[int, str] = field(default_factory=dict)
     clearance_hard_max_in: float = 0.050
     clearance_confirm_above_in: float = 0.015
+    plunger_hard_max_in: float = 0.5
 
 
 @dataclass(frozen=True, slots=True)

@@ -61,7 +61,6 @@ _LENGTH_RANGE_IN: dict[Kind, tuple[float, float]] = {
     Kind.GAUGE_U: (0.0, 0.02),
     Kind.PLUNGER_GAUGE_U: (0.0, 0.05),
     Kind.PLUNGER_DOWN_LOCK: (-0.2, 0.2),
-    Kind.PLUNGER_DISPLACEMENT: (-0.5, 0.5),
     Kind.MARGIN: (0.0, 0.2),
     Kind.MARGIN_U: (0.0, 0.1),
 }
@@ -583,7 +582,8 @@ class RowReader:
         return lengths, tuple(value for _, value in readings), floats or _NO_FLOATS
 
     def _one_length(self, cell: str | float | OddCell, field: Field, row_unit: LengthUnit | None) -> float:
-        low, high = _LENGTH_RANGE_IN[field.kind]
+        most = self._options.plunger_hard_max_in
+        low, high = _LENGTH_RANGE_IN.get(field.kind, (-most, most))
         unit = field.unit or row_unit or LengthUnit.INCH
         what = field.kind.value.replace("_", " ")
         expected = f"{what} from {unit.from_inches(low):.4g} to {unit.from_inches(high):.4g} {unit.value}"

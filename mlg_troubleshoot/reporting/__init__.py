@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
@@ -245,7 +247,7 @@ def write_reports(
     """
     documents = (inspection_document(j, gear, provenance, problems) for j in judgements)
     reports = publish_all(
-        documents,
+        _told_apart(documents),
         len(judgements),
         directory,
         formats=formats,
@@ -265,3 +267,12 @@ def write_reports(
         created=provenance.created,
     )
     return (summary, *reports)
+
+
+def _told_apart(documents: Iterable[Document]) -> Iterator[Document]:
+    """Number the files of inspections that carry the same identity: none overwrites another."""
+    seen: Counter[str] = Counter()
+    for document in documents:
+        seen[document.stem] += 1
+        again = seen[document.stem]
+        yield document if again == 1 else replace(document, stem=f"{document.stem}-{again}")

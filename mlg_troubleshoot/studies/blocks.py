@@ -390,7 +390,7 @@ def _on_cluster(study: BlockStudy, blocks: list[Block], scheduler: Scheduler) ->
     from distributed import as_completed
 
     waiting = {scheduler.submit(compute_block, study, block, pure=False): block for block in blocks}
-    for future in as_completed(list(waiting)):
+    for future in as_completed(list(waiting)):  # type: ignore[no-untyped-call]
         yield waiting[future], future.result()
 
 

@@ -23,8 +23,7 @@ from mlg_troubleshoot.geometry.intervals import Box, Range, cosine_range
 Array = NDArray[np.float64]
 _STROKES = 16
 _BATCH = 64
-W = 1.0
-_MOST_BOXES = 20_000
+_MOST_BOXES = 4000
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +127,9 @@ class _Search:
         numbers = model.joint_numbers
         groups: dict[tuple[int, ...], list[int]] = {}
         for j in np.flatnonzero(clearance > 0.0):
-            step = next((s.virtual_links for s in model.mechanism.steps if numbers[j] in s.virtual_links), (numbers[j],))
+            step = next(
+                (s.virtual_links for s in model.mechanism.steps if numbers[j] in s.virtual_links), (numbers[j],)
+            )
             groups.setdefault(step, []).append(int(j))
         # Links at both ends of one rigid link displace it by their sum: one disc of the summed length.
         self.groups = tuple(tuple(group) for group in groups.values())
@@ -165,8 +166,6 @@ class _Search:
             bounds = np.fmin(bounds, moved.value[1])
             width = boxes.high - boxes.low
             smear = np.maximum(np.abs(low), np.abs(high)) * width
-            if self.over_stroke:
-                smear[-1] *= W
             narrower = self._narrowed(boxes, low, high)
             possible = np.all(narrower.low <= narrower.high, axis=0)
             boxes = Box(narrower.low[:, possible], narrower.high[:, possible])
@@ -200,7 +199,6 @@ class _Search:
 
     def _displacement(self, boxes: Box) -> Range:
         kernel = self.model.kernel
-        numbers = kernel.parameters.tolist()
         variables = boxes.variables()
         stroke = variables.pop() if self.over_stroke else self.model.stroke[1]
         links: list[Range | float] = list(kernel.no_clearance())
@@ -208,8 +206,8 @@ class _Search:
             j = group[0]
             links[2 * j : 2 * j + 2] = variables[2 * k : 2 * k + 2]
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            moved = kernel.run(stroke, links, numbers)
-            still = kernel.run(stroke, kernel.no_clearance(), numbers)
+            moved = kernel.enclose(stroke, links)
+            still = kernel.enclose(stroke, kernel.no_clearance())
             result: Range = self.sense * self.model.rate * (moved - still)
         return result
 

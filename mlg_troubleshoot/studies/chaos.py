@@ -58,7 +58,7 @@ class ChaosFit:
         """Variance of the polynomial."""
         return float(np.sum(self.coefficients[1:] ** 2))
 
-    def share(self, group: tuple[int, ...]) -> float:
+    def closed(self, group: tuple[int, ...]) -> float:
         """Closed index of a group: what it explains alone, interactions within it included.
 
         Parameters
@@ -75,22 +75,6 @@ class ChaosFit:
         squares = self.coefficients[1:] ** 2
         return float(squares[outside[1:] == 0].sum() / self.variance)
 
-    def total_share(self, group: tuple[int, ...]) -> float:
-        """Total index of a group: everything that it takes part in.
-
-        Parameters
-        ----------
-        group : tuple of int
-            Places of the variables.
-
-        Returns
-        -------
-        float
-            Share of the variance. [1]
-        """
-        within = self.exponents[1:, list(group)].sum(axis=1) > 0
-        return float((self.coefficients[1:] ** 2)[within].sum() / self.variance)
-
     def index_error(self, accuracy_of: Array) -> Array:
         """Error of indices from what the polynomial leaves out.
 
@@ -105,7 +89,8 @@ class ChaosFit:
             Bound of the omitted share, and twice the effect of its aliasing on the coefficients. [1]
         """
         level = np.clip(accuracy_of, self.residual, 1.0)
-        return np.asarray(self.residual + 4.0 * np.sqrt(level * self.residual / self.trained_on))
+        free = max(self.trained_on - len(self.coefficients), 1)
+        return np.asarray(self.residual + 4.0 * np.sqrt(level * self.residual / free))
 
 
 def chaos_indices(
@@ -151,7 +136,7 @@ def chaos_indices(
         before = np.inf if best is None else best.residual
         best = _best_fit(points, values, checks, check_values, before, best)
         if best is not None:
-            found = _indices(best, n, design, seed, used, float(best.coefficients[0]))
+            found = _indices(best, design, seed, used, float(best.coefficients[0]))
             if found.half_width <= accuracy and best.corner_miss <= _CORNER_MISS:
                 return found, best
         gains = best is None or best.residual < 0.5 * before
@@ -197,7 +182,7 @@ def _best_fit(
         residual = float(np.mean(misses[:_HELD_OUT] ** 2)) / spread
         if residual < last:
             corner = float(np.abs(misses[_HELD_OUT:]).max()) / np.sqrt(spread)
-            found = ChaosFit(exponents, coefficients, residual, corner, len(points))
+            found = ChaosFit(exponents, np.asarray(coefficients, float), residual, corner, len(points))
             last = residual
             if residual < 1e-10:
                 break
@@ -206,7 +191,7 @@ def _best_fit(
     return found
 
 
-def _indices(fit: ChaosFit, n: int, design: str, seed: int, used: int, mean: float) -> Indices:
+def _indices(fit: ChaosFit, design: str, seed: int, used: int, mean: float) -> Indices:
     squares = fit.coefficients[1:] ** 2
     present = fit.exponents[1:] > 0
     order = present.sum(axis=1)

@@ -70,6 +70,28 @@ def interval(values: Array, half: Array) -> Array:
     return np.stack([values - half, values + half], axis=1)
 
 
+def student_half(scatter: Array, count: int) -> Array:
+    """Half width of the 95 % interval of a mean of independent values.
+
+    Parameters
+    ----------
+    scatter : ndarray, shape (n,)
+        Standard deviation of one value. [1]
+    count : int
+        Number of values, at least 2; else the result is NaN.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Half widths. [1]
+    """
+    from scipy.special import stdtrit
+
+    if count < 2:
+        return np.full_like(scatter, np.nan)
+    return np.asarray(float(stdtrit(count - 1, 0.975)) * scatter / np.sqrt(count))
+
+
 def without_numbers(
     design: str, seed: int, n: int, evaluations: int, failed: int, note: str, moments: tuple[float, float]
 ) -> Indices:

@@ -104,6 +104,27 @@ def worst_directions(model: LinkageModel, limits_in: Array, *, compiled: bool = 
     return HeldDirections(model, worst.governing_directions[0], sense, compiled)
 
 
+def worst_sense(model: LinkageModel, limits_in: Array, sense: float) -> HeldDirections:
+    """Worst directions of one sense at the limits, then held.
+
+    Parameters
+    ----------
+    model : LinkageModel
+        The calibrated linkage.
+    limits_in : ndarray, shape (n_joints,)
+        Largest clearance of each joint. [in]
+    sense : float
+        +1 for over-travel, −1 for under-travel. [1]
+
+    Returns
+    -------
+    HeldDirections
+        The response.
+    """
+    worst = worst_case(model, limits_in[None, :])
+    return HeldDirections(model, (worst.over_directions if sense > 0.0 else worst.under_directions)[0], sense)
+
+
 def worst_per_sample(model: LinkageModel) -> Response:
     """Worst directions found anew for every sample's own clearances: slow, and not smooth where they jump.
 

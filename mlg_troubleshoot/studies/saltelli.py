@@ -7,13 +7,14 @@ independent and a bootstrap over them is many times too wide.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from mlg_troubleshoot.studies.indices import Indices, failed_note, interval, without_numbers
+from mlg_troubleshoot.studies.indices import Indices, failed_note, interval, student_half, without_numbers
 from mlg_troubleshoot.studies.response import Response
 
 Array = NDArray[np.float64]
@@ -32,6 +33,7 @@ def saltelli_indices(
     groups: tuple[tuple[int, ...], ...] | None = None,
     progress: Callable[[int, float], None] | None = None,
     note: str = "",
+    used: int = 0,
 ) -> Indices:
     """Compute indices with more and more points until every interval is as narrow as wanted.
 
@@ -55,6 +57,8 @@ def saltelli_indices(
         Called with the evaluations done and the largest half width so far.
     note : str
         Put in front of the result's own note.
+    used : int
+        Evaluations spent before, counted in the result.
 
     Returns
     -------
@@ -63,13 +67,20 @@ def saltelli_indices(
     """
     sets = tuple((i,) for i in range(n)) if groups is None else groups
     children = rng.spawn(SCRAMBLES)
-    power, used = _FIRST_POWER, 0
+    power = _FIRST_POWER
     streams = [_Stream(child, n) for child in children]
     sums = [_Sums(len(sets)) for _ in children]
+    found: Indices | None = None
     while True:
-        for stream, total in zip(streams, sums, strict=True):
-            for a, b in stream.up_to(power):
-                used += total.add(response, a, b, sets)
+        try:
+            for stream, total in zip(streams, sums, strict=True):
+                for a, b in stream.up_to(power):
+                    used += total.add(response, a, b, sets)
+        except KeyboardInterrupt:
+            if found is None:
+                raise
+            stopped = f"interrupted at intervals of ± {found.half_width:.2g}"
+            return replace(found, note=f"{note}; {stopped}" if note else stopped)
         failed = sum(total.failed for total in sums)
         design = f"Saltelli and Jansen on {SCRAMBLES} scrambles of 2^{power} Sobol points"
         if failed:
@@ -158,24 +169,15 @@ def _pooled(sums: list[_Sums], design: str, seed: int, used: int, note: str) -> 
         design,
         seed,
         first.mean(axis=0),
-        interval(first.mean(axis=0), _half(first)),
+        interval(first.mean(axis=0), student_half(first.std(axis=0, ddof=1), len(sums))),
         total.mean(axis=0),
-        interval(total.mean(axis=0), _half(total)),
+        interval(total.mean(axis=0), student_half(total.std(axis=0, ddof=1), len(sums))),
         float(moments[:, 0].mean()),
         float(variance.mean()),
         used,
         0,
         note,
     )
-
-
-def _half(samples: Array) -> Array:
-    """Half width of the 95 % interval of a mean of independent values (Student)."""
-    from scipy.special import stdtrit
-
-    count = len(samples)
-    spread = samples.std(axis=0, ddof=1) / np.sqrt(count)
-    return np.asarray(float(stdtrit(count - 1, 0.975)) * spread)
 
 
 def fast_indices(
@@ -204,10 +206,4 @@ def fast_indices(
     found, fit = chaos_indices(response, n, rng, seed, accuracy, most=min(2048, most))
     if fit is not None or found.failed:
         return found
-    sampled = saltelli_indices(response, n, rng, seed, accuracy, most, None, progress, found.note)
-    return Indices(
-        **{
-            **{name: getattr(sampled, name) for name in Indices.__slots__},
-            "evaluations": sampled.evaluations + found.evaluations,
-        }
-    )
+    return saltelli_indices(response, n, rng, seed, accuracy, most, None, progress, found.note, used=found.evaluations)

@@ -2,13 +2,412 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.studies.amplification import amplification
-from mlg_troubleshoot.studies.response import worst_directions
+from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.studies.amplification import Amplification, amplification
+from mlg_troubleshoot.studies.chaos import chaos_indices
+from mlg_troubleshoot.studies.groups import GroupIndices, group_indices, link_groups
+from mlg_troubleshoot.studies.indices import Indices, interval, student_half
+from mlg_troubleshoot.studies.inputs import Inputs, beyond_margin, joint_groups, with_random_directions
+from mlg_troubleshoot.studies.response import HeldDirections, Response, worst_directions, worst_sense
+from mlg_troubleshoot.studies.saltelli import fast_indices, saltelli_indices
 from mlg_troubleshoot.studies.table import IndexTable, JointIndices, rank_ranges, ranks
-from mlg_troubleshoot.studies.tensor import tensor_indices
+from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int | None], None]
+
+
+class Design(StrEnum):
+    """How a study chooses its points."""
+
+    FAST = "fast"
+    SAMPLED = "sampled"
+    TENSOR = "tensor"
+    LHS = "lhs"
+    LHS_CCD = "lhs+ccd"
+    CCD = "ccd"
+
+
+class Directions(StrEnum):
+    """How a study turns the virtual links."""
+
+    WORST = "worst"
+    OVER = "over"
+    UNDER = "under"
+    RANDOM = "random"
+    FIXED = "fixed"
+
+
+@dataclass(frozen=True, slots=True)
+class StudyOptions:
+    """What a study is asked for.
+
+    Parameters
+    ----------
+    design : Design
+        How the points are chosen.
+    accuracy : float
+        Wanted error of every index, where the design can be told. [1]
+    seed : int
+        Seed of everything random.
+    distribution : str
+        Distribution of the clearances.
+    limits_in : ndarray, shape (n_joints,), or None
+        Limits in place of the gear's. [in]
+    directions : Directions
+        How the virtual links are turned.
+    fixed_rad : ndarray, shape (n_joints,), or None
+        Directions set by a load, with ``fixed``. [rad]
+    beyond_margin : bool
+        Look at exceeding the margin instead of the displacement.
+    most : int
+        Evaluations to stop at.
+    n1, n2, iterations : int or None
+        Size of a paper design in place of the paper's.
+    workers : int
+        Cores for the total-order study of ``lhs``.
+    state : Path or None
+        File to resume that study from.
+    scheduler : object or None
+        Dask client to compute it with.
+    """
+
+    design: Design = Design.FAST
+    accuracy: float = 1e-3
+    seed: int = 0
+    distribution: str = "uniform"
+    limits_in: Array | None = None
+    directions: Directions = Directions.WORST
+    fixed_rad: Array | None = None
+    beyond_margin: bool = False
+    most: int = 1 << 24
+    n1: int | None = None
+    n2: int | None = None
+    iterations: int | None = None
+    workers: int = 2
+    state: Path | None = None
+    scheduler: Any = None
+
+    @property
+    def is_standard(self) -> bool:
+        """True if the result is the table that goes with a gear."""
+        return (
+            self.design in (Design.FAST, Design.SAMPLED, Design.TENSOR)
+            and self.distribution == "uniform"
+            and self.limits_in is None
+            and self.directions is Directions.WORST
+            and not self.beyond_margin
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class StudyResult:
+    """What a study found.
+
+    Parameters
+    ----------
+    table : IndexTable
+        Indices of every joint with their spread over the ensemble.
+    indices : Indices
+        The same of the reference, with moments and notes.
+    plain : ndarray, shape (n_joints,), or None
+        First-order indices of a paper design before its bias is removed. [1]
+    groups : tuple of GroupIndices
+        Both ends of each link as one; empty if the design cannot tell.
+    growth : Amplification
+        Amplification indices of the reference.
+    finished : bool
+        False if it was interrupted: the table holds what was done.
+    """
+
+    table: IndexTable
+    indices: Indices
+    plain: Array | None
+    groups: tuple[GroupIndices, ...]
+    growth: Amplification
+    finished: bool
+
+
+@dataclass(slots=True)
+class _Run:
+    """One linkage's response, and what the design found on it."""
+
+    indices: Indices
+    plain: Array | None = None
+    groups: tuple[GroupIndices, ...] = ()
+    finished: bool = True
+
+
+def run_study(gear: Gear, options: StudyOptions, progress: Progress | None = None) -> StudyResult:
+    """Run a study of a gear: its reference by the chosen design, its ensemble by the fast route.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    options : StudyOptions
+        What is asked for.
+    progress : callable, optional
+        Called with the stage's name, what is done and the whole.
+
+    Returns
+    -------
+    StudyResult
+        The result; after Ctrl-C, what was done.
+
+    Raises
+    ------
+    UsageError
+        If the options do not go together.
+    """
+    if not options.accuracy > 0.0:
+        raise UsageError(f"accuracy {options.accuracy}", "Give a positive number, for example 0.001.")
+    inputs = Inputs(gear.limits_in if options.limits_in is None else options.limits_in, options.distribution)
+    if len(inputs.limits_in) != len(gear.joints):
+        raise UsageError(f"{len(inputs.limits_in)} limits for {len(gear.joints)} joints", "Give one for each joint.")
+
+    def told(name: str) -> Callable[[int, int | None], None]:
+        return lambda done, total: None if progress is None else progress(name, done, total)
+
+    run = _reference(gear, inputs, options, told)
+    first, total = [run.indices.first_order], [run.indices.total_order]
+    evaluations, failed = run.indices.evaluations, run.indices.failed
+    advance = told("ensemble")
+    finished = run.finished and "interrupted" not in run.indices.note
+    for k, model in enumerate(gear.ensemble_models[1:], start=1):
+        try:
+            found = _on_linkage(gear, model, inputs, options, k)
+            advance(k, len(gear.ensemble) - 1)
+        except KeyboardInterrupt:
+            finished = False
+            break
+        first.append(found.first_order)
+        total.append(found.total_order)
+        evaluations, failed = evaluations + found.evaluations, failed + found.failed
+    growth = amplification(gear)
+    table = _table(gear, inputs, options, run.indices, growth, np.array(first), np.array(total), evaluations, failed)
+    return StudyResult(table, run.indices, run.plain, run.groups, growth, finished)
+
+
+def _response(gear: Gear, model: LinkageModel, inputs: Inputs, options: StudyOptions) -> tuple[Response, int]:
+    """Response on the unit cube and its number of variables."""
+    n = len(inputs.limits_in)
+    cube: Response
+    if options.directions is Directions.RANDOM:
+        cube, n = with_random_directions(model, inputs), 2 * n
+    else:
+        cube = inputs.on_unit_cube(_held(model, inputs, options))
+    if options.beyond_margin:
+        cube = beyond_margin(cube, gear.margin.value)
+    return cube, n
+
+
+def _held(model: LinkageModel, inputs: Inputs, options: StudyOptions) -> HeldDirections:
+    if options.directions is Directions.FIXED:
+        if options.fixed_rad is None or len(options.fixed_rad) != len(inputs.limits_in):
+            raise UsageError("directions fixed by load", "Give one direction for each joint.")
+        return HeldDirections(model, np.asarray(options.fixed_rad, float))
+    if options.directions is Directions.WORST:
+        return worst_directions(model, inputs.limits_in)
+    return worst_sense(model, inputs.limits_in, 1.0 if options.directions is Directions.OVER else -1.0)
+
+
+def _stream(options: StudyOptions, linkage: int) -> np.random.Generator:
+    return np.random.default_rng(np.random.SeedSequence(options.seed, spawn_key=(linkage,)))
+
+
+def _on_linkage(gear: Gear, model: LinkageModel, inputs: Inputs, options: StudyOptions, k: int) -> Indices:
+    cube, n = _response(gear, model, inputs, options)
+    if options.directions is Directions.RANDOM:
+        sets = joint_groups(len(inputs.limits_in))
+        return saltelli_indices(cube, n, _stream(options, k), options.seed, max(options.accuracy, 3e-3), 1 << 20, sets)
+    if options.design is Design.TENSOR:
+        return _of_tensor(tensor_indices(cube, np.ones(n)), None, options.seed)
+    most = 1 << 18 if options.beyond_margin else options.most
+    return fast_indices(cube, n, _stream(options, k), options.seed, options.accuracy, most)
+
+
+def _reference(
+    gear: Gear, inputs: Inputs, options: StudyOptions, told: Callable[[str], Callable[[int, int | None], None]]
+) -> _Run:
+    cube, n = _response(gear, gear.model, inputs, options)
+    if options.design in (Design.LHS, Design.LHS_CCD, Design.CCD):
+        if options.directions is Directions.RANDOM:
+            raise UsageError(
+                f"design {options.design} with random directions", "The paper's designs hold directions; use sampled."
+            )
+        return _paper(gear, cube, inputs, options, told)
+    if options.directions is Directions.RANDOM:
+        sets = joint_groups(len(inputs.limits_in))
+        advance = told("samples")
+        found = saltelli_indices(
+            cube,
+            n,
+            _stream(options, 0),
+            options.seed,
+            options.accuracy,
+            options.most,
+            sets,
+            lambda done, _width: advance(done, None),
+        )
+        return _Run(found)
+    if options.design is Design.TENSOR:
+        tensor, coarse = tensor_indices(cube, np.ones(n)), tensor_indices(cube, np.ones(n), order=2)
+        groups = group_indices(gear, tensor, link_groups(gear))
+        return _Run(_of_tensor(tensor, coarse, options.seed), groups=groups)
+    advance = told("samples")
+    if options.design is Design.FAST:
+        indices, fit = chaos_indices(cube, n, _stream(options, 0), options.seed, options.accuracy)
+        if fit is not None or indices.failed:
+            return _Run(indices, groups=() if fit is None else group_indices(gear, fit, link_groups(gear)))
+        note, extra = indices.note, indices.evaluations
+    else:
+        note, extra = "", 0
+    sampled = saltelli_indices(
+        cube,
+        n,
+        _stream(options, 0),
+        options.seed,
+        options.accuracy,
+        options.most,
+        None,
+        lambda done, _width: advance(done, None),
+        note,
+        used=extra,
+    )
+    return _Run(sampled)
+
+
+def _of_tensor(tensor: TensorIndices, coarse: TensorIndices | None, seed: int) -> Indices:
+    wide = np.zeros_like(tensor.first_order)
+    first = wide if coarse is None else np.abs(tensor.first_order - coarse.first_order)
+    total = wide if coarse is None else np.abs(tensor.total_order - coarse.total_order)
+    return Indices(
+        f"tensor of {len(tensor.weights)} Gauss points a joint",
+        seed,
+        tensor.first_order,
+        interval(tensor.first_order, first),
+        tensor.total_order,
+        interval(tensor.total_order, total),
+        tensor.mean,
+        tensor.variance,
+        tensor.evaluations + (0 if coarse is None else coarse.evaluations),
+        tensor.failed,
+        "intervals are the difference to two Gauss points a joint" if coarse is not None else "",
+    )
+
+
+def _paper(
+    gear: Gear,
+    cube: Response,
+    inputs: Inputs,
+    options: StudyOptions,
+    told: Callable[[str], Callable[[int, int | None], None]],
+) -> _Run:
+    """Run the paper's design for the first order and, for ``lhs``, its study of the total order."""
+    from mlg_troubleshoot.studies.blocks import block_study, total_order_study
+    from mlg_troubleshoot.studies.paper import ITERATIONS, PAPER_DESIGNS, PaperDesign, replicated_first_order
+
+    paper = PAPER_DESIGNS[str(options.design)]
+    n = len(inputs.limits_in)
+    n1 = paper.n1 if options.n1 is None else options.n1
+    n2 = paper.n2 if options.n2 is None or not paper.n2 else options.n2
+    n_ccd = paper.n_ccd
+    if n_ccd:
+        from mlg_troubleshoot.studies.designs import central_composite
+
+        n_ccd = len(central_composite(n))
+    iterations = ITERATIONS if options.iterations is None else options.iterations
+    design = PaperDesign(paper.name, n1, n2, n_ccd)
+    found = replicated_first_order(cube, n, design, options.seed, iterations, told("first order"))
+    half = student_half(found.scatter, found.iterations)
+    total, spread = np.full(n, np.nan), np.full(n, np.nan)
+    evaluations, failed, finished = found.evaluations, found.failed, found.iterations == iterations
+    note = f"first order corrected for the bias (1 - S)/{n1}"
+    if options.design is Design.LHS and finished and not options.beyond_margin:
+        response = _held(gear.model, inputs, options)
+        study = block_study(response, inputs, gear.geometry_sha256, options.seed, n1, n2, iterations)
+        totals = total_order_study(study, options.workers, options.state, options.scheduler, told("total order"))
+        total, spread = totals.total_order, student_half(totals.scatter, totals.iterations)
+        evaluations, failed = evaluations + totals.evaluations, failed + totals.failed
+        finished = totals.blocks_done == totals.blocks
+        if totals.note:
+            note += f"; {totals.note}"
+    if not finished:
+        note += "; interrupted, averages of what was done"
+    name = f"{paper.name}: n1 = {n1}, n2 = {n2}, nCCD = {n_ccd}, mean of {found.iterations} iterations"
+    indices = Indices(
+        name,
+        options.seed,
+        found.corrected,
+        interval(found.corrected, half),
+        total,
+        interval(total, spread),
+        np.nan,
+        np.nan,
+        evaluations,
+        failed,
+        note,
+    )
+    return _Run(indices, plain=found.plain, finished=finished)
+
+
+def _table(
+    gear: Gear,
+    inputs: Inputs,
+    options: StudyOptions,
+    reference: Indices,
+    growth: Amplification,
+    first: Array,
+    total: Array,
+    evaluations: int,
+    failed: int,
+) -> IndexTable:
+    places, spans = ranks(first[0]), rank_ranges(first)
+    joints = []
+    for i, joint in enumerate(gear.joints):
+        joints.append(
+            JointIndices(
+                joint=joint.number,
+                limit_in=float(inputs.limits_in[i]),
+                first_order=float(first[0, i]),
+                first_order_interval=_pair(reference.first_order_interval[i]),
+                total_order=float(total[0, i]),
+                total_order_interval=_pair(reference.total_order_interval[i]),
+                plunger_amplification=float(growth.exact[i]),
+                max_amplification_index=float(growth.max_stage[i]),
+                rank=int(places[i]),
+                rank_range=spans[i],
+                first_order_spread=(float(first[:, i].min()), float(first[:, i].max())),
+                total_order_spread=(float(total[:, i].min()), float(total[:, i].max())),
+            )
+        )
+    return IndexTable(
+        gear_id=gear.id,
+        geometry_sha256=gear.geometry_sha256,
+        ensemble_sha256=gear.ensemble_sha256,
+        provenance=gear.provenance,
+        seed=options.seed,
+        design=reference.design,
+        evaluations=evaluations,
+        failed=failed,
+        joints=tuple(joints),
+    )
+
+
+def _pair(ends: Array) -> tuple[float, float]:
+    return float(ends[0]), float(ends[1])
 
 
 def exact_table(gear: Gear, seed: int = 0) -> IndexTable:
@@ -28,42 +427,4 @@ def exact_table(gear: Gear, seed: int = 0) -> IndexTable:
     IndexTable
         The table.
     """
-    limits = np.asarray(gear.limits_in, float)
-    found = [tensor_indices(worst_directions(model, limits), limits, order=3) for model in gear.ensemble_models]
-    coarse = tensor_indices(worst_directions(gear.model, limits), limits, order=2)
-    reference = found[0]
-    first = np.array([each.first_order for each in found])
-    total = np.array([each.total_order for each in found])
-    growth = amplification(gear)
-    places, spans = ranks(first[0]), rank_ranges(first)
-    joints = []
-    for i, joint in enumerate(gear.joints):
-        wide = abs(reference.first_order[i] - coarse.first_order[i])
-        wide_total = abs(reference.total_order[i] - coarse.total_order[i])
-        joints.append(
-            JointIndices(
-                joint=joint.number,
-                limit_in=joint.limit.value,
-                first_order=float(first[0, i]),
-                first_order_interval=(float(first[0, i] - wide), float(first[0, i] + wide)),
-                total_order=float(total[0, i]),
-                total_order_interval=(float(total[0, i] - wide_total), float(total[0, i] + wide_total)),
-                plunger_amplification=float(growth.exact[i]),
-                max_amplification_index=float(growth.max_stage[i]),
-                rank=int(places[i]),
-                rank_range=spans[i],
-                first_order_spread=(float(first[:, i].min()), float(first[:, i].max())),
-                total_order_spread=(float(total[:, i].min()), float(total[:, i].max())),
-            )
-        )
-    return IndexTable(
-        gear_id=gear.id,
-        geometry_sha256=gear.geometry_sha256,
-        ensemble_sha256=gear.ensemble_sha256,
-        provenance=gear.provenance,
-        seed=seed,
-        design="tensor of 3 Gauss points a joint",
-        evaluations=sum(each.evaluations for each in found) + coarse.evaluations,
-        failed=sum(each.failed for each in found) + coarse.failed,
-        joints=tuple(joints),
-    )
+    return run_study(gear, StudyOptions(design=Design.TENSOR, seed=seed)).table

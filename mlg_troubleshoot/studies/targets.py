@@ -49,6 +49,10 @@ class Target:
         False if it is known not to hold.
     search : bool
         True if a reconstruction must meet it.
+    claim : str
+        The statement of the source that this number bears on; empty if it is a number only.
+    why : str
+        What explains the outcome.
     """
 
     quantity: str
@@ -66,6 +70,8 @@ class Target:
     reading: str
     expected: bool
     search: bool
+    claim: str
+    why: str
 
     def holds(self, computed: float) -> bool:
         """Tell whether a computed number is in the accepted range.
@@ -179,6 +185,8 @@ def _target(entry: TomlTable) -> Target:
         reading=entry.text("reading", "maximum"),
         expected=entry.flag("expected", True),
         search=entry.flag("search"),
+        claim=entry.text("claim", ""),
+        why=entry.text("why", ""),
     )
     entry.finish()
     return target

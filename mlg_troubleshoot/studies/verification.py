@@ -252,7 +252,9 @@ def _end_rate(facts: Facts, _: Target) -> float:
 
 def _sharpening(facts: Facts, target: Target) -> float:
     whole, corners = facts.indices.first_order, facts.corner_indices.first_order
-    return float(facts.of(corners / corners.sum() - whole / whole.sum(), target.joints).sum())
+    if target.reading != "raw":
+        whole, corners = whole / whole.sum(), corners / corners.sum()
+    return float(facts.of(corners - whole, target.joints).sum())
 
 
 def _amplification_excess(facts: Facts, target: Target) -> float:

@@ -99,6 +99,7 @@ def package() -> Callable[..., bytes]:
         prolog: str = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>',
         book_pr: str = "",
         styles: str | None = None,
+        strings: str | None = None,
         parts: Mapping[str, bytes | str] | None = None,
         sheet_xml: str | bytes | None = None,
         compression: int = zipfile.ZIP_DEFLATED,
@@ -110,6 +111,8 @@ def package() -> Callable[..., bytes]:
         relations = f'<Relationship Id="rId1" Type="{_REL}/worksheet" Target="worksheets/sheet1.xml"/>'
         if styles is not None:
             relations += f'<Relationship Id="rId2" Type="{_REL}/styles" Target="styles.xml"/>'
+        if strings is not None:
+            relations += f'<Relationship Id="rId3" Type="{_REL}/sharedStrings" Target="/xl/sharedStrings.xml"/>'
         content: dict[str, bytes | str] = {
             "[Content_Types].xml": f'<Types xmlns="{_PACKAGE}content-types"/>',
             "_rels/.rels": f'<Relationships xmlns="{_PACKAGE}relationships"><Relationship Id="rId1" '
@@ -121,6 +124,8 @@ def package() -> Callable[..., bytes]:
         }
         if styles is not None:
             content["xl/styles.xml"] = styles
+        if strings is not None:
+            content["xl/sharedStrings.xml"] = strings
         content.update(parts or {})
         buffer = io.BytesIO()
         with zipfile.ZipFile(buffer, "w", compression) as archive:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import datetime
 import io
 import random
-import zipfile
 
 import python_calamine
 
@@ -87,18 +86,18 @@ def test_a_sheet_with_prefixed_elements_is_read(package):
     assert ours(package(sheet_xml=xml)) == {1: [None, "ab"]}
 
 
-def test_a_shared_text_in_pieces_is_joined_without_its_pronunciation(package, xlsx):
-    data = xlsx([["漢字"]])
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        parts = {name: archive.read(name) for name in archive.namelist()}
-    parts["xl/sharedStrings.xml"] = (
-        "<sst><si><r><t>漢</t></r><r><rPr/><t>字</t></r><rPh sb='0' eb='1'><t>かんじ</t></rPh></si></sst>".encode()
+def test_a_shared_text_in_pieces_is_joined_without_its_pronunciation(package):
+    strings = (
+        "<sst><si><t>first_x0041_</t></si><si><r><t>漢</t></r><r><rPr/><t>字</t></r>"
+        "<rPh sb='0' eb='1'><t>かんじ</t></rPh></si><si><t/></si></sst>"
     )
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w") as archive:
-        for name, content in parts.items():
-            archive.writestr(name, content)
-    assert ours(buffer.getvalue()) == {1: ["漢字"]}
+    cells = "".join(f'<c r="{c}1" t="s"><v>{n}</v></c>' for c, n in (("A", 1), ("B", 0), ("C", 2), ("D", 1)))
+    assert ours(package(f'<row r="1">{cells}</row>', strings=strings)) == {1: ["漢字", "firstA", None, "漢字"]}
+
+
+def test_a_shared_text_that_does_not_exist_makes_the_workbook_damaged(package, read):
+    data = package('<row r="1"><c r="A1" t="s"><v>7</v></c></row>', strings="<sst><si><t>a</t></si></sst>")
+    assert [p.code for p in read(data, "t.xlsx").problems] == ["file_damaged"]
 
 
 def test_a_sheet_in_utf_16_is_read(package):

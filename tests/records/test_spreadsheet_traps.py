@@ -349,6 +349,11 @@ def test_24_a_work_order_that_looks_like_a_number_is_text(read, table, xlsx):
     assert read(xlsx([header, (*GOOD, "1E5")]), "t.xlsx").rows[0].carried["work_order"] == "1E5"
 
 
+@pytest.mark.parametrize("text", ["0026-03-04", "2206-03-04"])
+def test_25_a_year_that_cannot_be_meant_is_refused(read, table, text):
+    assert only(read(table((*HEADER, "inspection_date"), [(*GOOD, text)]))).code == "date_out_of_range"
+
+
 @pytest.mark.parametrize("text", ["03/04/2026", "3.4.2026", "03-04-26"])
 def test_25_a_date_that_is_not_iso_is_refused_as_ambiguous(read, table, text):
     result = read(table((*HEADER, "inspection_date"), [(*GOOD, text)]))
@@ -464,6 +469,13 @@ def test_29_several_sheets_with_inspections_are_an_error_that_lists_them(read, x
     assert "'Inspections', 'Other'" in only(result).value
     assert "--sheet" in only(result).remedy
     assert not result.rows
+
+
+def test_29_a_sheet_of_instructions_is_no_candidate_even_with_an_example(read, xlsx):
+    def change(book):
+        _second_sheet(book, [["Instructions"], ["Fill in like this:"], HEADER, ("X1", *GOOD[1:])], "How to")
+
+    assert [r.record_id for r in read(xlsx(change=change), "t.xlsx").rows] == ["R1"]
 
 
 def test_29_the_named_sheet_is_read(read, xlsx):
@@ -632,7 +644,7 @@ def test_38_a_document_type_is_refused(read, package, declaration):
 
 def test_38_entities_in_the_shared_strings_are_refused(read, package):
     bomb = '<!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]><sst><si><t>&b;</t></si></sst>'
-    assert only(read(package(parts={"xl/sharedStrings.xml": bomb}), "t.xlsx")).code == "xml_declaration"
+    assert only(read(package(strings=bomb), "t.xlsx")).code == "xml_declaration"
 
 
 def test_38_a_document_type_in_utf_16_is_refused(read, package):

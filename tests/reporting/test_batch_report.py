@@ -119,6 +119,14 @@ def test_the_summary_links_the_reports(
     assert all((tmp_path / link).is_file() for link in links)
 
 
+def test_inspections_of_the_same_identity_do_not_overwrite_each_other(
+    judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path
+) -> None:
+    twice = [judge(SOUND), judge(FAILURE)]
+    written = write_reports(twice, [], gear, tmp_path, provenance=provenance, formats=("html",))
+    assert len({report.html for report in written}) == 3
+
+
 def test_one_inspection_gets_no_summary(judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path) -> None:
     assert len(write_reports([judge(SOUND)], [], gear, tmp_path, provenance=provenance, formats=("html",))) == 1
 

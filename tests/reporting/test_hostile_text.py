@@ -113,8 +113,9 @@ def test_long_remarks_stand_in_full(judge: Judge, make: Callable[..., Made]) -> 
     assert "LAST" in made.text
 
 
-def test_a_word_without_end_does_not_shrink_the_page(judge: Judge, make: Callable[..., Made]) -> None:
-    made = make(judge(FAILURE, carried={"x" * 300: "y" * 900}), formats=("pdf",))
+def test_a_word_without_end_does_not_shrink_the_page(rejected: Rejected, make: Callable[..., Made]) -> None:
+    problem = Problem("x", "fleet.csv", None, 7, "x" * 300, "C7", "y" * 900, "LH or RH", "Write LH or RH.")
+    made = make(rejected, formats=("pdf",), problems=(problem,))
     sizes: list[float] = []
 
     def note(_text: str, cm: list[float], tm: list[float], _font: object, size: float) -> None:

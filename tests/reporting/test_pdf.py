@@ -56,6 +56,14 @@ def test_the_fonts_are_the_bundled_ones(failure: Made) -> None:
     assert names == {"DejaVuSans", "DejaVuSans-Bold"}
 
 
+def test_a_computer_without_fonts_makes_the_same_pdf(
+    judge: Judge, make: Callable[..., Made], failure: Made, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "fonts.conf").write_text("<fontconfig></fontconfig>", encoding="utf-8")
+    monkeypatch.setenv("FONTCONFIG_FILE", str(tmp_path / "fonts.conf"))
+    assert make(judge(FAILURE), formats=("pdf",)).pdf == failure.pdf
+
+
 @pytest.mark.parametrize("words", ["N123AB", "OUTSIDE MARGIN", "short link inner bearing", "0.0130 OVER LIMIT"])
 def test_text_can_be_searched(words: str, failure: Made) -> None:
     assert words in text_of(failure.pdf)

@@ -11,6 +11,9 @@ from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.gear.adjustment import Adjustment
 
 
+_ROOM_QUANTILES = (0.05, 0.3, 0.6, 0.8)
+
+
 class _JointShare(Cause):
     """A joint contributes more or less than its measured clearance in the worst direction."""
 
@@ -56,7 +59,10 @@ class OvalWear(_JointShare):
 
 
 class JointContact(Cause):
-    """Two adjacent joints cannot take up both clearances."""
+    """Two adjacent joints cannot take up both clearances.
+
+    Two forms: a share of the smaller contribution is lost, or the two together have room for so much only.
+    """
 
     name: ClassVar[str] = "joint_contact"
     parameter: ClassVar[str] = "share_not_taken_up"
@@ -67,18 +73,29 @@ class JointContact(Cause):
     separates: ClassVar[str] = "one plunger reading with each of the two joints shimmed in turn"
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
-        """Yield one candidate for each pair of neighbours that the gear names."""
+        """Yield candidates of both forms for each pair of neighbours that the gear names."""
         for first, second in scene.where.contact:
-            a, b = scene.place(first), scene.place(second)
-            if np.any(np.minimum(scene.clearance_in[:, a], scene.clearance_in[:, b]) > 0.0):
-                yield Candidate(self, f"joints {first},{second}", {"pair": (first, second)})
+            a, b = scene.clearance_in[:, scene.place(first)], scene.clearance_in[:, scene.place(second)]
+            if not np.any(np.minimum(a, b) > 0.0):
+                continue
+            label = f"joints {first},{second}"
+            yield Candidate(self, label, {"pair": (first, second), "room_in": None})
+            for share in _ROOM_QUANTILES:
+                yield Candidate(self, label, {"pair": (first, second), "room_in": float(np.quantile(a + b, share))})
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
-        """Take from the joint that contributes less a share of its clearance, down to none."""
+        """Take clearance from the two: from the one that contributes less, or what is beyond the room from both."""
         a, b = (scene.place(joint) for joint in candidate.setting["pair"])
-        first_is_less = scene.contribution_in[:, a] <= scene.contribution_in[:, b]
         clearance = scene.clearance_in.copy()
-        keep = max(1.0 - value, 0.0)
-        clearance[:, a] *= np.where(first_is_less, keep, 1.0)
-        clearance[:, b] *= np.where(first_is_less, 1.0, keep)
+        room = candidate.setting.get("room_in")
+        if room is None:
+            first_is_less = scene.contribution_in[:, a] <= scene.contribution_in[:, b]
+            keep = max(1.0 - value, 0.0)
+            clearance[:, a] *= np.where(first_is_less, keep, 1.0)
+            clearance[:, b] *= np.where(first_is_less, 1.0, keep)
+        else:
+            both = clearance[:, a] + clearance[:, b]
+            lost = np.minimum(value, 1.0) * np.maximum(both - room, 0.0) / np.maximum(both, 1e-12)
+            clearance[:, a] *= 1.0 - lost
+            clearance[:, b] *= 1.0 - lost
         return Adjustment(clearance)

@@ -183,7 +183,7 @@ class RiggingOffset(Cause):
             ]
         for label, setting, rows in groups:
             yield Candidate(self, label, {**setting, "day": None, "since": None})
-            for day in _change_days(days[rows], 2, 12):
+            for day in _change_days(days[rows], 1, 12):
                 yield Candidate(self, label, {**setting, "day": day, "since": _date(scene, day)})
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:

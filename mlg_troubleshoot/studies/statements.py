@@ -1,0 +1,147 @@
+"""Which statements of the source hold, in which reading, and on how many of the linkages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.studies.targets import Target, load_targets, targets_file
+from mlg_troubleshoot.studies.verification import Facts
+
+
+class Outcome(StrEnum):
+    """What became of a statement."""
+
+    HOLDS = "holds"
+    READING = "holds only under a reading"
+    SOME = "holds on some linkages"
+    FAILS = "does not hold"
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """One computed number that bears on a statement, on every linkage.
+
+    Parameters
+    ----------
+    quantity, accepted, unit : str
+        What it is, what is accepted and its unit.
+    values : tuple of float
+        The number on each linkage, the reference first. [unit]
+    holds : tuple of bool
+        Where it is accepted.
+    why : str
+        What explains it.
+    """
+
+    quantity: str
+    accepted: str
+    unit: str
+    values: tuple[float, ...]
+    holds: tuple[bool, ...]
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """A statement of the source and what the linkages say to it.
+
+    Parameters
+    ----------
+    claim : str
+        The statement, in short.
+    section : str
+        Where it stands.
+    outcome : Outcome
+        What became of it.
+    linkages : tuple of str
+        Names of the linkages, the reference first.
+    evidence : tuple of Evidence
+        The numbers; several if the statement has parts or readings.
+    """
+
+    claim: str
+    section: str
+    outcome: Outcome
+    linkages: tuple[str, ...]
+    evidence: tuple[Evidence, ...]
+
+    @property
+    def paragraph(self) -> str:
+        """The statement with its numbers, as a report prints it."""
+        parts = [f"{self.claim} (section {self.section}): {self.outcome}."]
+        for each in self.evidence:
+            low, high = min(each.values), max(each.values)
+            unit = f" {each.unit}" if each.unit else ""
+            parts.append(
+                f"{each.quantity[0].upper()}{each.quantity[1:]}: {each.values[0]:.4g}{unit} on {self.linkages[0]}, "
+                f"{low:.4g} to {high:.4g} over {len(each.values)} linkages; {each.accepted} on {sum(each.holds)}. "
+                f"{each.why}"
+            )
+        return " ".join(parts)
+
+
+def check_statements(
+    gear: Gear, targets: Path | None = None, progress: Callable[[int, int], None] | None = None
+) -> tuple[Statement, ...]:
+    """Check every statement of a targets file on the reference and the whole ensemble.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    targets : Path, optional
+        Targets file, else the one beside the gear file.
+    progress : callable, optional
+        Called with the linkages done and their number.
+
+    Returns
+    -------
+    tuple of Statement
+        Statements in the order of the file.
+    """
+    entries = load_targets(targets_file(gear) if targets is None else targets)
+    columns: list[list[float]] = []
+    for model in gear.ensemble_models:
+        facts = Facts(gear, model)
+        columns.append([facts.measure(target) for target in entries])
+        if progress is not None:
+            progress(len(columns), len(gear.ensemble))
+    by_claim: dict[str, list[int]] = {}
+    for i, target in enumerate(entries):
+        if target.claim:
+            by_claim.setdefault(target.claim, []).append(i)
+    names = tuple(linkage.name for linkage in gear.ensemble)
+    found = []
+    for claim, places in by_claim.items():
+        evidence = tuple(_evidence(entries[i], [column[i] for column in columns]) for i in places)
+        readings = {entries[i].reading for i in places}
+        found.append(
+            Statement(
+                claim, entries[places[0]].section, _outcome(evidence, by_reading=len(readings) > 1), names, evidence
+            )
+        )
+    return tuple(found)
+
+
+def _evidence(target: Target, values: list[float]) -> Evidence:
+    return Evidence(
+        target.quantity,
+        target.tolerance,
+        target.unit,
+        tuple(values),
+        tuple(target.holds(value) for value in values),
+        target.why,
+    )
+
+
+def _outcome(evidence: tuple[Evidence, ...], *, by_reading: bool) -> Outcome:
+    everywhere = [all(each.holds) for each in evidence]
+    if all(everywhere):
+        return Outcome.HOLDS
+    if by_reading and any(everywhere):
+        return Outcome.READING
+    return Outcome.SOME if any(any(each.holds) for each in evidence) else Outcome.FAILS

@@ -1,0 +1,1 @@
+"""The diagnosis: data faults, causes, extension, gain, verdict."""

@@ -1,0 +1,84 @@
+"""Write the diagnosis data sets of ``inspection_data/``: ``python -m tests.hidden_effect.data_sets inspection_data``.
+
+They are synthetic. The independent simulator makes them from a seed, and this file says what is hidden in each.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from .simulator import EffectSpec, Fleet, FleetSpec, follow_up, simulate_fleet, write_csv
+from .simulator.records import write_csv as write_columns
+
+#: What is hidden in each file, and the seed that made it.
+DATA_SETS: dict[str, tuple[FleetSpec, int]] = {
+    "measured_pressure": (
+        FleetSpec(
+            kind="single",
+            effects=(EffectSpec("elastic_compliance", None, 15.0),),
+            faults=("mm_as_in", "swapped_joints"),
+        ),
+        41_001,
+    ),
+    "measured_pin_direction": (
+        FleetSpec(
+            kind="single",
+            effects=(EffectSpec("direction_not_worst_case", "joint 3", 25.0),),
+        ),
+        41_002,
+    ),
+    "measured_nothing_wrong": (FleetSpec(), 41_003),
+}
+_LATER_ROWS = 40
+
+
+def later_rows(fleet: Fleet, seed: int) -> dict[str, list[object]]:
+    """Inspect a fleet again, under the circumstances of other rows of its own.
+
+    Parameters
+    ----------
+    fleet : Fleet
+        The fleet.
+    seed : int
+        Seed of the further inspections.
+
+    Returns
+    -------
+    dict of str to list
+        Columns of the further inspections alone.
+    """
+    rows = len(fleet.table["record_id"])
+    again = [{"tail_no": fleet.table["tail_no"][k]} for k in range(0, rows, rows // _LATER_ROWS)]
+    more = follow_up(fleet, again, seed).table
+    return {column: values[rows:] for column, values in more.items()}
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Write every data set into a folder.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        The folder.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    if len(arguments) != 1 or not Path(arguments[0]).is_dir():
+        print("Give the folder to write to: python -m tests.hidden_effect.data_sets inspection_data", file=sys.stderr)
+        return 2
+    folder = Path(arguments[0])
+    for name, (spec, seed) in DATA_SETS.items():
+        fleet = simulate_fleet(spec, seed)
+        write_csv(fleet, folder / f"{name}.csv")
+        if name == "measured_pressure":
+            write_columns(later_rows(fleet, seed + 1000), folder / "measured_pressure_later.csv")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))

@@ -1,0 +1,73 @@
+"""A proved bound over all directions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.model import links_from
+from mlg_troubleshoot.geometry.intervals import Box
+from mlg_troubleshoot.studies.certified import certified_bound
+
+FAILURE = np.array([0.0, 0.0, 0.013, 0.0, 0.007, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_the_bound_at_mid_position_is_reached_to_1e_6(gear: Gear, sense: float) -> None:
+    found = certified_bound(gear.model, gear.limits_in, sense, mid_only=True)
+    assert found.gap_in <= 1e-6
+    links = links_from(gear.limits_in, found.directions)
+    assert sense * float(gear.model.displacement(links)) == pytest.approx(found.found_in, abs=1e-12)
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_the_bound_of_the_failure_case_holds_over_the_whole_stroke(gear: Gear, sense: float) -> None:
+    found = certified_bound(gear.model, FAILURE, sense)
+    assert found.gap_in <= 1e-6
+    assert found.stroke_in == gear.model.stroke[1]
+
+
+def test_the_sequential_rule_is_within_a_thousandth_of_the_proved_worst(gear: Gear) -> None:
+    proved = certified_bound(gear.model, gear.limits_in, 1.0, mid_only=True).found_in
+    sequential = float(worst_case(gear.model, gear.limits_in[None]).over_in[0])
+    assert 0.0 <= proved - sequential < 1e-3 * proved
+
+
+def test_no_random_directions_and_lengths_exceed_the_bound(gear: Gear) -> None:
+    rng = np.random.default_rng(0)
+    found = certified_bound(gear.model, gear.limits_in, 1.0, mid_only=True)
+    clearance = gear.limits_in * np.sqrt(rng.random((20_000, 10)))
+    moved = gear.model.displacement(links_from(clearance, 2.0 * np.pi * rng.random((20_000, 10))))
+    near = found.directions + 0.1 * rng.standard_normal((20_000, 10))
+    close = gear.model.displacement(links_from(np.broadcast_to(gear.limits_in, near.shape), near))
+    assert max(float(moved.max()), float(close.max())) <= found.bound_in
+
+
+def test_a_linkage_that_may_not_close_has_no_bound(gear: Gear) -> None:
+    assert certified_bound(gear.model, np.full(10, 0.2), 1.0, mid_only=True).bound_in == np.inf
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(1e-6, 0.004))
+def test_an_enclosure_holds_value_and_gradient_of_every_point_in_it(gear: Gear, seed: int, width: float) -> None:
+    rng = np.random.default_rng(seed)
+    kernel = gear.model.kernel
+    middle = rng.uniform(-0.005, 0.005, 20)
+    low, high = middle - width * rng.random(20), middle + width * rng.random(20)
+    stroke = gear.model.stroke[1]
+    enclosed = kernel.enclose(stroke, Box(low[:, None], high[:, None]).variables())
+    inside = low + (high - low) * rng.random((40, 20))
+    values = kernel.output(stroke, list(inside.T))
+    assert np.all(enclosed.value[0] <= values)
+    assert np.all(values <= enclosed.value[1])
+    step = 1e-6
+    for i in (0, 5, 11, 19):
+        ahead, behind = inside.copy(), inside.copy()
+        ahead[:, i] += step
+        behind[:, i] -= step
+        slope = (kernel.output(stroke, list(ahead.T)) - kernel.output(stroke, list(behind.T))) / (2 * step)
+        assert np.all(enclosed.slope[0][i] - 1e-6 <= slope)
+        assert np.all(slope <= enclosed.slope[1][i] + 1e-6)

@@ -1,0 +1,54 @@
+"""The paper's designs, section 2.2 and Fig. 5."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.studies.designs import central_composite, first_order_design, replicated_levels
+
+
+def test_the_papers_138_points_are_128_corners_and_one_axial_point_a_joint() -> None:
+    points = central_composite(10)
+    corner = np.all((points == 0.0) | (points == 1.0), axis=1)
+    assert (len(points), int(corner.sum())) == (138, 128)
+    assert np.all((points[~corner] == 0.5).sum(axis=1) == 9)
+
+
+@pytest.mark.parametrize(("n", "corners"), [(8, 64), (9, 128), (10, 128)])
+def test_no_two_pairs_of_joints_are_confounded_at_the_corners(n: int, corners: int) -> None:
+    signs = 2.0 * central_composite(n, corners) - 1.0
+    for length in range(1, 5):
+        for word in combinations(range(n), length):
+            assert abs(np.prod(signs[:, list(word)], axis=1).sum()) < corners
+
+
+def test_an_impossible_number_of_points_is_refused_with_the_possible_ones() -> None:
+    with pytest.raises(UsageError) as caught:
+        central_composite(10, 130)
+    assert "138" in caught.value.remedy
+
+
+def test_every_replicate_has_every_level_once() -> None:
+    levels = replicated_levels(3, 4, 20, np.random.default_rng(0))
+    assert np.array_equal(np.sort(levels, axis=1), np.broadcast_to(np.arange(20)[None, :, None], (4, 20, 3)))
+
+
+@pytest.mark.parametrize(("n2", "with_ccd"), [(50, False), (50, True), (0, True)])
+def test_the_samples_of_a_group_share_one_clearance_and_differ_in_the_others(n2: int, with_ccd: bool) -> None:
+    rows = first_order_design(10, 6, n2, central_composite(10) if with_ccd else None, np.random.default_rng(0))
+    for variable in (0, 7):
+        order = np.argsort(rows.places[:, :, variable], axis=1)
+        grouped = np.take_along_axis(rows.points, order[:, :, None], axis=1)
+        assert np.ptp(grouped[:, :, variable], axis=0).max() == 0.0
+        assert np.ptp(grouped[:, :, variable + 1], axis=0).mean() > 0.3
+
+
+def test_every_replicate_holds_all_composite_points() -> None:
+    ccd = central_composite(10)
+    rows = first_order_design(10, 3, 862, ccd, np.random.default_rng(0))
+    assert rows.points.shape == (3, 1000, 10)
+    assert np.array_equal(rows.points[2, 862:], ccd)

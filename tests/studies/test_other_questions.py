@@ -1,0 +1,125 @@
+"""Distributions, margin, groups, given data, statements."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.errors import InconclusiveDataError, UsageError
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.studies.given_data import given_data_indices
+from mlg_troubleshoot.studies.groups import group_indices, link_groups
+from mlg_troubleshoot.studies.inputs import DISTRIBUTIONS, Inputs, beyond_margin
+from mlg_troubleshoot.studies.response import HeldDirections, worst_per_sample
+from mlg_troubleshoot.studies.statements import Outcome, Statement, check_statements
+from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
+
+
+@pytest.mark.parametrize("distribution", DISTRIBUTIONS)
+def test_every_distribution_stays_between_zero_and_the_limit(distribution: str) -> None:
+    inputs = Inputs(np.array([0.0075]), distribution)
+    assert inputs.at(np.array([[0.0], [1.0]])).ravel() == pytest.approx([0.0, 0.0075])
+
+
+def test_a_rising_distribution_has_its_mean_at_two_thirds() -> None:
+    unit = (np.arange(100_000)[:, None] + 0.5) / 100_000
+    assert Inputs(np.array([1.0]), "rising").at(unit).mean() == pytest.approx(2.0 / 3.0, abs=1e-5)
+
+
+def test_an_unknown_distribution_and_a_limit_of_zero_are_refused() -> None:
+    with pytest.raises(UsageError):
+        Inputs(np.array([0.01]), "normal")
+    with pytest.raises(UsageError):
+        Inputs(np.array([0.0]))
+
+
+def test_a_gear_that_does_not_close_counts_as_beyond_the_margin() -> None:
+    exceeds = beyond_margin(lambda x: x[:, 0], 0.03)
+    assert exceeds(np.array([[0.02], [0.04], [np.nan], [-0.04]])).tolist() == [0.0, 1.0, 1.0, 1.0]
+
+
+def test_the_groups_are_the_links_of_the_linkage(gear: Gear) -> None:
+    assert link_groups(gear) == ((1,), (2,), (3, 5), (4,), (6, 7), (8,), (9, 10))
+
+
+def test_a_group_of_both_ends_of_a_link_has_the_sum_of_their_shares(gear: Gear, exact: TensorIndices) -> None:
+    found = {group.joints: group for group in group_indices(gear, exact, link_groups(gear))}
+    assert found[3, 5].closed == pytest.approx(exact.first_order[2] + exact.first_order[4], abs=1e-4)
+    assert found[3, 5].total >= found[3, 5].closed
+
+
+def test_the_tensor_is_exact_for_ishigami_with_many_points(request: pytest.FixtureRequest) -> None:
+    oracle = request.getfixturevalue("ishigami")
+    found = tensor_indices(oracle.function, np.ones(3), order=20)
+    assert found.first_order == pytest.approx(oracle.first_order, abs=1e-9)
+    assert found.total_order == pytest.approx(oracle.total_order, abs=1e-9)
+
+
+def test_three_gauss_points_are_enough_for_the_linkage(gear: Gear, response: HeldDirections) -> None:
+    coarse = tensor_indices(response, gear.limits_in, order=2)
+    fine = tensor_indices(response, gear.limits_in, order=3)
+    assert fine.first_order == pytest.approx(coarse.first_order, abs=2e-5)
+
+
+def test_directions_found_anew_for_every_sample_change_the_displacement_by_less_than_1e_5_in(
+    gear: Gear, response: HeldDirections
+) -> None:
+    clearance = gear.limits_in * np.random.default_rng(0).random((500, 10))
+    anew = worst_per_sample(gear.model)(clearance)
+    assert np.abs(anew - response(clearance)).max() < 1e-5
+
+
+def test_given_data_find_the_indices_of_many_inspections(gear: Gear, response: HeldDirections) -> None:
+    rng = np.random.default_rng(0)
+    clearance = gear.limits_in * rng.random((4000, 10))
+    found = given_data_indices(clearance, response(clearance), rng, resamples=200)
+    exact = tensor_indices(response, gear.limits_in).first_order
+    assert np.all((found.interval[:, 0] - 0.01 <= exact) & (exact <= found.interval[:, 1] + 0.01))
+    assert found.first_order == pytest.approx(exact, abs=0.04)
+
+
+def test_given_data_give_no_share_to_a_joint_without_effect() -> None:
+    rng = np.random.default_rng(1)
+    x = rng.random((60, 2))
+    shares = [given_data_indices(rng.random((60, 2)), x[:, 0], rng, 20).first_order for _ in range(40)]
+    assert abs(float(np.mean(shares))) < 0.02
+
+
+def test_an_unmeasured_joint_is_not_imputed() -> None:
+    rng = np.random.default_rng(0)
+    x = rng.random((50, 2))
+    x[:35, 1] = np.nan
+    found = given_data_indices(x, x[:, 0], rng, 50)
+    assert np.isfinite(found.first_order[0])
+    assert np.isnan(found.first_order[1])
+    assert found.rows.tolist() == [50, 15]
+
+
+def test_a_handful_of_inspections_is_refused() -> None:
+    with pytest.raises(InconclusiveDataError, match="12 inspections"):
+        given_data_indices(np.ones((12, 3)), np.ones(12), np.random.default_rng(0))
+
+
+@pytest.fixture(scope="module")
+def statements(gear: Gear) -> dict[str, Statement]:
+    return {statement.claim: statement for statement in check_statements(gear)}
+
+
+@pytest.mark.parametrize(
+    ("words", "outcome"),
+    [
+        ("#2, #3, #4 and #5 each", Outcome.HOLDS),
+        ("#1 to #5 together", Outcome.HOLDS),
+        ("convex", Outcome.HOLDS),
+        ("From LHS to CCD", Outcome.READING),
+        ("gives #2 a higher", Outcome.READING),
+        ("near the input", Outcome.HOLDS),
+        ("large enough to be seen", Outcome.FAILS),
+    ],
+)
+def test_a_statement_of_section_4_3_has_its_outcome_on_all_ten_linkages(
+    statements: dict[str, Statement], words: str, outcome: Outcome
+) -> None:
+    found = [statement for claim, statement in statements.items() if words in claim]
+    assert [statement.outcome for statement in found] == [outcome]
+    assert len(found[0].linkages) == 10

@@ -1,0 +1,75 @@
+"""The study as ``mlg study`` runs it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.studies.study import Design, Directions, StudyOptions, run_study
+from mlg_troubleshoot.studies.table import IndexTable
+
+
+def test_the_fast_study_agrees_with_the_shipped_table_on_every_joint(gear: Gear, table: IndexTable) -> None:
+    found = run_study(gear, StudyOptions())
+    assert found.table.first_order == pytest.approx(table.first_order, abs=1e-3)
+    assert found.table.total_order == pytest.approx(table.total_order, abs=1e-3)
+
+
+def test_a_seed_gives_the_same_table_again(gear: Gear) -> None:
+    assert run_study(gear, StudyOptions(seed=3)).table == run_study(gear, StudyOptions(seed=3)).table
+    assert run_study(gear, StudyOptions(seed=3)).table != run_study(gear, StudyOptions(seed=0)).table
+
+
+def test_under_travel_has_indices_of_its_own(gear: Gear, table: IndexTable) -> None:
+    found = run_study(gear, StudyOptions(directions=Directions.UNDER))
+    assert found.table.first_order == pytest.approx(table.first_order, abs=0.02)
+    assert not np.allclose(found.table.first_order, table.first_order, atol=1e-4)
+
+
+def test_directions_fixed_by_a_load_need_one_for_each_joint(gear: Gear) -> None:
+    with pytest.raises(UsageError):
+        run_study(gear, StudyOptions(directions=Directions.FIXED, fixed_rad=np.zeros(3)))
+    found = run_study(gear, StudyOptions(directions=Directions.FIXED, fixed_rad=np.zeros(10)))
+    assert found.table.first_order.sum() == pytest.approx(1.0, abs=0.01)
+
+
+def test_the_papers_design_reports_plain_and_corrected_indices(gear: Gear) -> None:
+    found = run_study(gear, StudyOptions(design=Design.LHS, n1=10, n2=100, iterations=2, workers=1))
+    assert found.plain is not None
+    assert found.plain.min() > found.table.first_order.min()
+    assert "bias" in found.indices.note
+    assert np.all(np.isfinite(found.table.total_order))
+
+
+def test_a_design_with_composite_points_gives_no_total_order(gear: Gear) -> None:
+    found = run_study(gear, StudyOptions(design=Design.CCD, n1=10, iterations=2))
+    assert np.all(np.isnan(found.table.total_order))
+
+
+def test_a_paper_design_with_random_directions_is_refused(gear: Gear) -> None:
+    with pytest.raises(UsageError, match="random"):
+        run_study(gear, StudyOptions(design=Design.LHS, directions=Directions.RANDOM))
+
+
+def test_an_accuracy_of_zero_is_refused(gear: Gear) -> None:
+    with pytest.raises(UsageError):
+        run_study(gear, StudyOptions(accuracy=0.0))
+
+
+def test_joints_1_to_5_have_95_percent_on_every_linkage(gear: Gear) -> None:
+    leading = [
+        run_study(gear, StudyOptions(limits_in=gear.limits_in, design=Design.TENSOR)).table.first_order[:5].sum()
+    ]
+    assert min(leading) >= 0.95
+
+
+def test_an_interruption_in_the_ensemble_leaves_the_reference(gear: Gear) -> None:
+    def stop(name: str, done: int, _total: int | None) -> None:
+        if name == "ensemble" and done == 3:
+            raise KeyboardInterrupt
+
+    found = run_study(gear, StudyOptions(), stop)
+    assert not found.finished
+    assert np.all(np.isfinite(found.table.first_order))

@@ -1,0 +1,83 @@
+"""The precomputed table of indices."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.errors import GearFileError
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.studies.study import exact_table
+from mlg_troubleshoot.studies.table import IndexTable, load_index_table, rank_ranges, ranks, write_index_table
+
+
+@pytest.fixture
+def elsewhere(gear: Gear, table: IndexTable, tmp_path: Path) -> Gear:
+    write_index_table(table, tmp_path / "indices.json")
+    return replace(gear, indices_file=tmp_path / "indices.json")
+
+
+def _changed(gear: Gear, **values: object) -> None:
+    raw = json.loads(gear.indices_file.read_text())
+    raw["gear"].update(values)
+    gear.indices_file.write_text(json.dumps(raw))
+
+
+def test_the_shipped_table_is_what_the_study_gives(gear: Gear, table: IndexTable) -> None:
+    again = exact_table(gear)
+    assert again.first_order == pytest.approx(table.first_order, abs=1e-10)
+    assert again.total_order == pytest.approx(table.total_order, abs=1e-10)
+    assert replace(again, joints=()) == replace(table, joints=())
+
+
+def test_a_written_table_reads_back(elsewhere: Gear, table: IndexTable) -> None:
+    assert load_index_table(elsewhere) == table
+
+
+@pytest.mark.parametrize("what", ["id", "geometry_sha256", "ensemble_sha256"])
+def test_a_table_of_another_geometry_is_refused(elsewhere: Gear, what: str) -> None:
+    _changed(elsewhere, **{what: "0" * 64})
+    with pytest.raises(GearFileError, match="another") as caught:
+        load_index_table(elsewhere)
+    assert "--write-table" in caught.value.remedy
+
+
+def test_a_table_for_other_limits_is_refused(elsewhere: Gear) -> None:
+    raw = json.loads(elsewhere.indices_file.read_text())
+    raw["joints"][2]["limit_in"] = 0.01
+    elsewhere.indices_file.write_text(json.dumps(raw))
+    with pytest.raises(GearFileError, match=r"joint 3 at 0\.01 in"):
+        load_index_table(elsewhere)
+
+
+def test_a_missing_table_says_how_to_make_one(gear: Gear, tmp_path: Path) -> None:
+    with pytest.raises(GearFileError, match="missing") as caught:
+        load_index_table(replace(gear, indices_file=tmp_path / "none.json"))
+    assert "mlg study" in caught.value.remedy
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"schema_version": 99}', '{"schema_version": 1}'])
+def test_a_spoilt_table_is_refused_with_a_message(elsewhere: Gear, text: str) -> None:
+    elsewhere.indices_file.write_text(text)
+    with pytest.raises(GearFileError):
+        load_index_table(elsewhere)
+
+
+def test_joints_that_differ_by_less_than_1e_4_share_a_rank() -> None:
+    assert ranks(np.array([0.2, 0.30002, 0.30001, 0.1])).tolist() == [3, 1, 1, 4]
+
+
+def test_a_rank_range_spans_the_linkages() -> None:
+    assert rank_ranges(np.array([[0.3, 0.2], [0.1, 0.2]])) == [(1, 2), (1, 2)]
+
+
+def test_the_leading_group_is_joints_2_to_5_on_every_linkage(table: IndexTable) -> None:
+    assert all(entry.rank_range[1] <= 4 for entry in table.joints[1:5])
+
+
+def test_each_of_joints_2_to_5_has_at_least_18_percent_on_every_linkage(table: IndexTable) -> None:
+    assert min(entry.first_order_spread[0] for entry in table.joints[1:5]) >= 0.18

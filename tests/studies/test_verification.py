@@ -1,0 +1,73 @@
+"""Printed numbers beside computed ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mlg_troubleshoot.errors import GearFileError
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.studies.targets import load_targets, targets_file
+from mlg_troubleshoot.studies.verification import VerifiedNumber, verify
+
+
+@pytest.fixture(scope="module")
+def rows(gear: Gear) -> tuple[VerifiedNumber, ...]:
+    return verify(gear)
+
+
+def _changed(gear: Gear, tmp_path: Path, old: str, new: str) -> Path:
+    text = targets_file(gear).read_text(encoding="utf-8")
+    assert old in text
+    path = tmp_path / "targets.toml"
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    return path
+
+
+def test_everything_that_should_hold_holds(rows: tuple[VerifiedNumber, ...]) -> None:
+    assert [row.quantity for row in rows if row.should_hold and not row.holds] == []
+
+
+def test_what_is_known_not_to_hold_does_not(rows: tuple[VerifiedNumber, ...]) -> None:
+    assert [row.quantity for row in rows if row.holds and not row.should_hold] == []
+
+
+def test_the_failure_case_gives_the_printed_displacement(rows: tuple[VerifiedNumber, ...]) -> None:
+    assert rows[0].computed == pytest.approx(0.0472, abs=5e-5)
+    assert rows[0].status == "fitted"
+
+
+def test_the_size_of_the_interactions_is_reported_as_not_reproduced(rows: tuple[VerifiedNumber, ...]) -> None:
+    assert rows[-1].status == "not reproduced"
+    assert rows[-1].computed < 1e-3
+
+
+def test_a_number_that_is_off_is_said_not_to_hold(gear: Gear, tmp_path: Path) -> None:
+    path = _changed(gear, tmp_path, "value = 0.0472", "value = 0.0572")
+    row = verify(gear, path)[0]
+    assert (row.holds, row.status, row.should_hold) == (False, "not reproduced", True)
+
+
+def test_an_unknown_measure_is_named_with_the_known_ones(gear: Gear, tmp_path: Path) -> None:
+    path = _changed(gear, tmp_path, 'measure = "worst_displacement"', 'measure = "worst"')
+    with pytest.raises(GearFileError, match="'worst'") as caught:
+        verify(gear, path)
+    assert "worst_displacement" in caught.value.remedy
+
+
+def test_a_joint_that_the_gear_does_not_have_is_named(gear: Gear, tmp_path: Path) -> None:
+    path = _changed(gear, tmp_path, "{ 3 = 0.013", "{ 13 = 0.013")
+    with pytest.raises(GearFileError, match="no joint 13"):
+        verify(gear, path)
+
+
+def test_a_misspelt_key_is_named(gear: Gear, tmp_path: Path) -> None:
+    path = _changed(gear, tmp_path, "tolerance = 0.00005", "tolerence = 0.00005")
+    with pytest.raises(GearFileError, match=r"tolerance|tolerence"):
+        load_targets(path)
+
+
+def test_a_gear_without_targets_is_told_so(tmp_path: Path) -> None:
+    with pytest.raises(GearFileError, match="no printed numbers"):
+        load_targets(tmp_path / "none.toml")
