@@ -53,6 +53,10 @@ def study(
     statements: Annotated[
         bool, typer.Option("--statements", help="Which statements of section 4.3 hold, with the numbers.")
     ] = False,
+    bound: Annotated[
+        bool,
+        typer.Option("--bound", help="Worst displacement at the limits: sequential rule, global search, proved bound."),
+    ] = False,
     most: Annotated[int, typer.Option("--most", min=1, help="Evaluations to stop at.")] = 1 << 24,
     n1: Annotated[int | None, typer.Option("--n1", help="Repetitions of a paper design, 100.")] = None,
     n2: Annotated[int | None, typer.Option("--n2", help="Levels of a paper design, 1000 or 862.")] = None,
@@ -94,6 +98,7 @@ def study(
                 scheduler=scheduler,
                 beyond_margin=beyond_margin,
                 statements=statements,
+                bound=bound,
                 write_table=write_table,
                 as_json=as_json,
                 quiet=quiet,

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import typer
 
 from mlg_troubleshoot.cli.boundary import INTERRUPTED
-from mlg_troubleshoot.cli.progress import stages
+from mlg_troubleshoot.cli.progress import Advance, stages
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
@@ -21,6 +21,7 @@ from mlg_troubleshoot.studies.statements import Statement, check_statements
 from mlg_troubleshoot.studies.study import Design, Directions, StudyOptions, StudyResult, run_study
 from mlg_troubleshoot.studies.table import write_index_table
 from mlg_troubleshoot.studies.targets import targets_file
+from mlg_troubleshoot.studies.worst_search import WorstSearch, search_worst
 
 _BAR = 16
 _Choice = TypeVar("_Choice", Design, Directions)
@@ -52,8 +53,9 @@ class StudyArguments:
         File to resume from.
     scheduler : str or None
         Address of a Dask scheduler.
-    beyond_margin, statements, write_table, as_json, quiet : bool
-        Look at exceeding the margin, check the paper's statements, write the gear's table, write JSON, be quiet.
+    beyond_margin, statements, bound, write_table, as_json, quiet : bool
+        Look at exceeding the margin, check the paper's statements, prove the worst displacement, write the
+        gear's table, write JSON, be quiet.
     csv : Path or None
         Write a CSV here.
     """
@@ -75,6 +77,7 @@ class StudyArguments:
     scheduler: str | None
     beyond_margin: bool
     statements: bool
+    bound: bool
     write_table: bool
     as_json: bool
     quiet: bool
@@ -106,10 +109,11 @@ def run(arguments: StudyArguments) -> None:
                     f"{gear.name} has no printed statements", f"Write {targets_file(gear).name} beside it."
                 )
             statements = check_statements(gear, progress=lambda done, total: advance("statements", done, total))
+        searches = _searches(gear, options, advance) if arguments.bound and result.finished else ()
     if arguments.as_json:
-        typer.echo(json.dumps(as_json(gear, result, statements, arguments), indent=1, allow_nan=False))
+        typer.echo(json.dumps(as_json(gear, result, statements, searches, arguments), indent=1, allow_nan=False))
     else:
-        _show(gear, result, statements, arguments)
+        _show(gear, result, statements, searches, arguments)
     if arguments.csv is not None:
         _write_csv(gear, result, arguments.csv)
     if arguments.write_table:
@@ -120,6 +124,18 @@ def run(arguments: StudyArguments) -> None:
     if not result.finished:
         typer.echo("Interrupted: the numbers above are of what was done.", err=True)
         raise typer.Exit(INTERRUPTED)
+
+
+def _searches(gear: Gear, options: StudyOptions, advance: Advance) -> tuple[WorstSearch, ...]:
+    import numpy as np
+
+    found = []
+    for k, sense in enumerate((1.0, -1.0)):
+        rng = np.random.default_rng(np.random.SeedSequence(options.seed, spawn_key=(1000 + k,)))
+        limits = gear.limits_in if options.limits_in is None else options.limits_in
+        found.append(search_worst(gear.model, limits, sense, rng, options.seed))
+        advance("proof", k + 1, 2)
+    return tuple(found)
 
 
 def _options(arguments: StudyArguments, gear: Gear, stack: ExitStack) -> StudyOptions:
@@ -179,7 +195,11 @@ def _client(address: str) -> Any:
 
 
 def as_json(
-    gear: Gear, result: StudyResult, statements: tuple[Statement, ...], arguments: StudyArguments
+    gear: Gear,
+    result: StudyResult,
+    statements: tuple[Statement, ...],
+    searches: tuple[WorstSearch, ...],
+    arguments: StudyArguments,
 ) -> dict[str, Any]:
     """Return the study as plain values, as the JSON contract has it; what is not known is null.
 
@@ -191,6 +211,8 @@ def as_json(
         What the study found.
     statements : tuple of Statement
         What became of the paper's statements.
+    searches : tuple of WorstSearch
+        Worst displacement of each sense.
     arguments : StudyArguments
         What was asked for.
 
@@ -225,6 +247,18 @@ def as_json(
             {**asdict(statement), "outcome": str(statement.outcome), "paragraph": statement.paragraph}
             for statement in statements
         ],
+        "bounds": [
+            {
+                "sense": "over-travel" if found.sense > 0 else "under-travel",
+                "sequential_in": found.sequential_in,
+                "searched_in": found.searched_in,
+                "found_in": found.proved.found_in,
+                "bound_in": found.proved.bound_in,
+                "stroke_in": found.proved.stroke_in,
+                "directions_rad": found.proved.directions.tolist(),
+            }
+            for found in searches
+        ],
     }
     cleaned: dict[str, Any] = _without_nan(values)
     return cleaned
@@ -240,7 +274,13 @@ def _without_nan(value: Any) -> Any:
     return value
 
 
-def _show(gear: Gear, result: StudyResult, statements: tuple[Statement, ...], arguments: StudyArguments) -> None:
+def _show(
+    gear: Gear,
+    result: StudyResult,
+    statements: tuple[Statement, ...],
+    searches: tuple[WorstSearch, ...],
+    arguments: StudyArguments,
+) -> None:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -289,6 +329,17 @@ def _show(gear: Gear, result: StudyResult, statements: tuple[Statement, ...], ar
             "that fit the printed numbers · A_iP: plunger movement per clearance · max A: largest stage-wise index"
         )
     )
+    for found in searches:
+        sense = "over-travel" if found.sense > 0 else "under-travel"
+        proved = found.proved
+        gap = "could not be proved" if math.isinf(proved.bound_in) else f"proved ≤ {proved.bound_in:.6f} in"
+        console.print(
+            Text(
+                f"Worst {sense} with every clearance at its limit: {proved.found_in:.6f} in, {gap} over all directions "
+                f"and the whole stroke (sequential rule {found.sequential_in:.6f}, "
+                f"global search {found.searched_in:.6f})."
+            )
+        )
     for statement in statements:
         console.print()
         console.print(Text(statement.paragraph))

@@ -15,7 +15,7 @@ from mlg_troubleshoot.diagnosis.extension import Term
 from mlg_troubleshoot.diagnosis.faults import DataFault, screen_faults
 from mlg_troubleshoot.diagnosis.gain import Gain, measure_gain
 from mlg_troubleshoot.diagnosis.inference import Finding, Inference
-from mlg_troubleshoot.diagnosis.noise import estimate_repeatability
+from mlg_troubleshoot.diagnosis.noise import estimate_repeatability, small_trends
 from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.errors import InconclusiveDataError
@@ -216,6 +216,7 @@ def diagnose(
         table.tails,
         table.gears,
         extra,
+        small_trends(table),
         candidates,
         columns,
         build_bank(scene, columns),

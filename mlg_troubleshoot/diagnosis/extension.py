@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
-from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
+from mlg_troubleshoot.diagnosis.table import FACTORS, QUANTITIES, DiagnosisTable, table_from_inspections
 from mlg_troubleshoot.errors import GearFileError, OutputError
-from mlg_troubleshoot.gear.adjustment import Adjustment
+from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Discrepancies, Gear
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
@@ -242,10 +242,33 @@ def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ())
                 f"instead of {gear.geometry_sha256[:12]})",
                 "Diagnose again with this gear, or name the gear that it was made on with --gear.",
             )
-        terms += [_term(entry, file, own) for entry in raw["terms"]]
-        hashes += [str(h) for h in raw["data_sha256"]]
-        rows, residual = int(raw["rows"]), float(raw["residual_u_in"])
+        try:
+            added = [_term(entry, file, own) for entry in raw["terms"]]
+            _try_out(added, gear)
+            hashes += [str(h) for h in raw["data_sha256"]]
+            rows, residual = int(raw["rows"]), float(raw["residual_u_in"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise GearFileError(f"{file}: damaged: {error}", "Give a file as mlg diagnose wrote it.") from error
+        terms += added
     return ModelExtension(gear, tuple(terms), residual, tuple(hashes), rows)
+
+
+def _try_out(terms: Sequence[Term], gear: Gear) -> None:
+    """Predict one gear with the terms, so that a number or a setting that they lack is found when they are read."""
+    one = np.zeros(1)
+    table = DiagnosisTable(
+        clearance_in=np.full((1, len(gear.joint_numbers)), 0.001),
+        readings_in=one[:, None],
+        record_id=("trial",),
+        row=np.ones(1, np.int64),
+        margin_in=one,
+        gauge_u_in=one,
+        quantities=dict.fromkeys(QUANTITIES, one),
+        factors=dict.fromkeys(FACTORS, np.array([""])),
+        axial_float_in=np.zeros((1, len(gear.joint_numbers))),
+        first_day="2000-01-01",
+    )
+    adjusted_worst_case(gear.model, adjustment_of(terms, gear.model, table, table.clearance_in, gear.discrepancies))
 
 
 def _read(file: Path) -> dict[str, Any]:

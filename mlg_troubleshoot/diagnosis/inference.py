@@ -21,7 +21,7 @@ from mlg_troubleshoot.diagnosis.screen import Fit, Screen, fit
 Array = NDArray[np.float64]
 Key = tuple[str, str | None]
 
-ALARM = 0.03
+ALARM = 0.04
 # A name needs clearer evidence than an alarm does.
 NAME = 0.002
 SECOND = 0.002
@@ -29,6 +29,8 @@ UNLISTED_ALARM = 0.001
 # Log-likelihood by which a rival must fall behind to be ruled out.
 RULED_OUT = 2.5
 RULED_OUT_FAINT = 4.0
+# Cosine from which two effects count as the same effect under two names.
+ALIKE = 0.985
 # A second cause below this share of the first one's effect is taken for a slip of the first one's form.
 SECOND_SHARE = 1.0 / 3.0
 # Where something must be left all the same, a weaker listed cause is accepted down to this share.
@@ -94,6 +96,8 @@ class Inference:
         Single gear of each row.
     extra_in : ndarray, shape (n,)
         Further standard deviation of a row. [in]
+    trends : ndarray, shape (n, k)
+        Small trends that are always there. [1]
     candidates : sequence of Candidate
         The catalogue's candidates.
     columns : ndarray, shape (n, n_candidates)
@@ -115,6 +119,7 @@ class Inference:
         tails: NDArray[np.str_],
         gears: NDArray[np.str_],
         extra_in: Array,
+        trends: Array,
         candidates: Sequence[Candidate],
         columns: Array,
         bank: Bank,
@@ -127,6 +132,7 @@ class Inference:
         self.tails = tails
         self.gears = gears
         self.extra = extra_in
+        self.trends = trends
         self.candidates = candidates
         self.columns = columns
         self.bank = bank
@@ -145,7 +151,7 @@ class Inference:
         Finding
             Verdict, names, rivals and remainder.
         """
-        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra)
+        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends)
         screen = Screen(noise, self.columns, self.signs)
         gain = screen.run(self.misfit[:, None]).gain[:, 0]
         score = gain - self.penalty
@@ -179,7 +185,7 @@ class Inference:
         constant = self._constant(lead)
         if constant is not None:
             p, variables = constant
-            noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra)
+            noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends)
             return Finding("UNLISTED", (), (), (p_alarm,), variables, p, noise, None, smallest, ())
         finding = self._with([lead], [p_alarm], self._second([lead], SECOND_SHARE), smallest)
         if finding.verdict == "UNLISTED":
@@ -224,7 +230,7 @@ class Inference:
 
         What moves besides is looked for with the shift taken out.
         """
-        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra)
+        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends)
         everywhere = np.ones((len(self.misfit), 1))
         both = Screen(noise, np.hstack([everywhere, self.columns[:, [lead]]]), np.array([0, self.signs[lead]]))
         gain = both.run(self.misfit[:, None]).gain[:, 0]
@@ -238,10 +244,10 @@ class Inference:
         return min(p, ALARM), variables
 
     def _refit(self, chosen: Sequence[int]) -> tuple[NoiseModel, Fit]:
-        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra)
+        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends)
         columns = self.columns[:, list(chosen)]
         fitted = fit(noise, columns, self.misfit)
-        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, columns @ fitted.values)
+        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends, columns @ fitted.values)
         return noise, fit(noise, columns, self.misfit)
 
     def _second(self, chosen: list[int], least_share: float) -> tuple[list[int], float] | None:
@@ -302,12 +308,19 @@ class Inference:
         for key, k in best.items():
             if key == self.candidates[winner].key or not np.isfinite(score[k]):
                 continue
-            distance = min(score[winner] - score[k], gain[winner] - gain[k] + 2.0)
+            distance = score[winner] - score[k]
+            if self._alike(winner, k):
+                # The data hardly tell these two apart: which one has more targets must not decide.
+                distance = min(distance, gain[winner] - gain[k])
             if distance < (RULED_OUT if clear else RULED_OUT_FAINT):
                 near.append(k)
             elif gain[k] > 2.0:
                 behind[key] = float(distance)
         return winner, near, behind
+
+    def _alike(self, a: int, b: int) -> bool:
+        first, second = self.columns[:, a], self.columns[:, b]
+        return abs(first @ second) > ALIKE * float(np.linalg.norm(first) * np.linalg.norm(second))
 
     def _remainder(
         self, noise: NoiseModel, chosen: Sequence[int], fitted: Fit

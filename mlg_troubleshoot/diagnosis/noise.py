@@ -24,6 +24,9 @@ BIAS_IN = 0.0002
 SLOPE = 0.006
 # Scatter between the gears of one tail, in units of the scatter of a row: their levels of wear are known so well.
 GEAR_RATIO = 0.25
+# Trends over a quantity, and habits of a gauge or a technician, that are no cause yet, in the same units.
+TREND = 0.06
+HABIT = 0.08
 # Ratios of the scatter between tails to the scatter of a row that are tried.
 TAIL_RATIOS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.4, 2.0)
 
@@ -40,8 +43,8 @@ class NoiseModel:
         Number of the tail of each row.
     gears : ndarray of int, shape (n,)
         Number of the single gear of each row.
-    loadings : ndarray, shape (n, 2)
-        Bias and slope, each at one standard deviation in units of the common one. [1]
+    loadings : ndarray, shape (n, k)
+        Bias, slope and small trends, each at one standard deviation in units of the common one. [1]
     """
 
     relative: Array
@@ -184,12 +187,40 @@ def tail_numbers(tails: Sequence[str] | NDArray[np.str_]) -> NDArray[np.int64]:
     return np.unique(np.asarray(tails), return_inverse=True)[1].astype(np.int64)
 
 
+def small_trends(table: DiagnosisTable) -> Array:
+    """Trends and habits that are always there in some small measure: people, gauges, seasons, wear.
+
+    Parameters
+    ----------
+    table : DiagnosisTable
+        The rows.
+
+    Returns
+    -------
+    ndarray, shape (n, k)
+        Each at one standard deviation, in units of the scatter of a row. [1]
+    """
+    parts = []
+    for values in table.quantities.values():
+        known = np.isfinite(values)
+        if known.sum() > 2 and np.std(values[known]) > 0.0:
+            z = (values - np.mean(values[known])) / np.std(values[known])
+            parts.append(TREND * np.where(known, z, 0.0))
+            parts.append(TREND * np.where(known, z * z - 1.0, 0.0) / np.sqrt(2.0))
+    for name in ("gauge_id", "technician_id", "side", "approach"):
+        texts = table.factors.get(name)
+        if texts is not None:
+            parts += [HABIT * (texts == value) for value in np.unique(texts) if value]
+    return np.column_stack(parts) if parts else np.empty((len(table), 0))
+
+
 def build_noise(
     misfit: Array,
     predicted: Array,
     tails: NDArray[np.str_],
     gears: NDArray[np.str_],
     extra_in: Array,
+    trends: Array,
     explained: Array | None = None,
 ) -> tuple[NoiseModel, float]:
     """Estimate the noise model from the misfit.
@@ -206,6 +237,8 @@ def build_noise(
         Single gear of each row.
     extra_in : ndarray, shape (n,)
         Further standard deviation of a row, by filled clearances. [in]
+    trends : ndarray, shape (n, k)
+        Small trends that are always there, in units of the scatter of a row. [1]
     explained : ndarray, shape (n,), optional
         What a tentative cause explains; removed before the scatter is estimated. [in]
 
@@ -230,7 +263,8 @@ def build_noise(
     # Rows far out in the tails of the distribution count less, but never as nothing.
     standard = np.minimum(np.abs(centred), _companion(rest, numbers)) / (scale * relative)
     relative = relative * np.maximum(1.0, standard / 3.0)
-    loadings = np.column_stack([np.full(len(misfit), BIAS_IN), SLOPE * predicted]) / scale
+    bias = np.column_stack([np.full(len(misfit), BIAS_IN), SLOPE * predicted]) / scale
+    loadings = np.hstack([bias, trends])
     return NoiseModel(relative, numbers, tail_numbers(gears), loadings), scale
 
 

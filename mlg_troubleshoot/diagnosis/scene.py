@@ -16,6 +16,10 @@ from mlg_troubleshoot.gear.model import LinkageModel, links_from
 
 Array = NDArray[np.float64]
 
+_MOST_SIGMAS = 2.0
+# Wear of a gear at any time is at least this share of its mean: an overhaul resets the landings, not every joint.
+_LEAST_SHAPE = 0.3
+
 
 def likely_clearances(table: DiagnosisTable) -> tuple[Array, Array]:
     """Most likely clearances behind the readings, and those of joints that were not read.
@@ -53,7 +57,10 @@ def likely_clearances(table: DiagnosisTable) -> tuple[Array, Array]:
         true = np.maximum(share, 0.01) * level
         trust = true / (true + noise)
         read = np.where(known, readings[:, j], expected)
-        likely[:, j] = expected + trust * (read - expected)
+        drawn = expected + trust * (read - expected)
+        # A reading is never overruled by more than its own uncertainty makes likely.
+        reach = _MOST_SIGMAS * np.sqrt(noise)
+        likely[:, j] = np.where(known, np.clip(drawn, read - reach, read + reach), drawn)
         spread[:, j] = np.where(known, 0.0, np.sqrt(true))
     return np.maximum(likely, 0.0), spread
 
@@ -67,7 +74,7 @@ def _expected(
     growth = _relative_landings(landings, gears)
     rate = 0.0
     for _ in range(4):
-        shape = 1.0 + rate * growth
+        shape = np.maximum(1.0 + rate * growth, _LEAST_SHAPE)
         level = np.bincount(gears[known], (values / shape)[known], minlength=len(count)) / np.maximum(count, 1.0)
         centred = values - level[gears] * shape
         along = level[gears] * growth
@@ -75,7 +82,7 @@ def _expected(
         if square <= 0.0:
             break
         rate = float(np.clip(rate + np.sum((centred * along)[known]) / square, -0.5, 2.0))
-    shape = 1.0 + rate * growth
+    shape = np.maximum(1.0 + rate * growth, _LEAST_SHAPE)
     within = float(np.sum((values - level[gears] * shape)[known] ** 2) / max(known.sum() - np.sum(count > 0), 1.0))
     between = max(float(np.var(level[count > 0])) - within / max(float(np.mean(count[count > 0])), 1.0), 0.0)
     # A gear's level is drawn to the fleet's where it rests on few readings.

@@ -171,10 +171,10 @@ class Range:
         )
 
     def __sub__(self, other: Any) -> Range:
-        return self + (-other)
+        return self.__add__(-other)
 
     def __rsub__(self, other: Any) -> Range:
-        return -self + other
+        return self.__neg__().__add__(other)
 
     def __mul__(self, other: Any) -> Range:
         if other is self:
@@ -182,9 +182,7 @@ class Range:
         if isinstance(other, Range):
             crossed = _outer(self.slope, other.slope)
             turned = crossed[0].swapaxes(0, 1), crossed[1].swapaxes(0, 1)
-            bend = _plus(
-                _plus(_times(self.bend, other.value), _times(other.bend, self.value)), _plus(crossed, turned)
-            )
+            bend = _plus(_plus(_times(self.bend, other.value), _times(other.bend, self.value)), _plus(crossed, turned))
             return Range(
                 _times(self.value, other.value),
                 _plus(_times(self.slope, other.value), _times(other.slope, self.value)),
@@ -210,12 +208,12 @@ class Range:
 
     def __truediv__(self, other: Any) -> Range:
         if isinstance(other, Range):
-            return self * other.__rtruediv__(1.0)
-        return self * (1.0 / other)
+            return self.__mul__(other.__rtruediv__(1.0))
+        return self.__mul__(1.0 / other)
 
     def __rtruediv__(self, other: Any) -> Range:
         result = self._through(_inverse)
-        return result if other == 1.0 else result * other
+        return result if other == 1.0 else result.__mul__(other)
 
     def _through(self, function: Callable[[Pair], tuple[Pair, Pair, Pair]]) -> Range:
         """Apply a function that gives enclosures of itself and its two derivatives over a range."""
@@ -297,9 +295,7 @@ def narrowed_by_links(joint: Joint, start: Joint, end: Joint, square: Any, area:
     return c[0], c[1]
 
 
-def _first_guess(
-    c: tuple[Range, ...], a: tuple[Range, ...], b: tuple[Range, ...], grown: Range, cross: Pair
-) -> None:
+def _first_guess(c: tuple[Range, ...], a: tuple[Range, ...], b: tuple[Range, ...], grown: Range, cross: Pair) -> None:
     """Enclose the joint from its middle alone, where its formulas give next to nothing.
 
     A box around the middle is guessed. If the gradients over it carry the joint nowhere out of it, the joint
@@ -361,9 +357,7 @@ def _dot(u: Sequence[Any], slopes: tuple[Pair, Pair]) -> Pair:
     return _plus(_times(_bounds(u[0]), slopes[0]), _times(_bounds(u[1]), slopes[1]))
 
 
-def _solved(
-    u: Sequence[Any], v: Sequence[Any], inverse: Pair, first: Pair, second: Pair
-) -> tuple[Pair, Pair]:
+def _solved(u: Sequence[Any], v: Sequence[Any], inverse: Pair, first: Pair, second: Pair) -> tuple[Pair, Pair]:
     """Solve u · x = first, v · x = second."""
     x = _plus(_times(first, _bounds(v[1])), _negated(_times(second, _bounds(u[1]))))
     y = _plus(_times(second, _bounds(u[0])), _negated(_times(first, _bounds(v[0]))))

@@ -228,9 +228,7 @@ def write_program(mechanism: Mechanism) -> Program:
             case Slider():
                 _slider(w, step)
     output = _output(w)
-    return Program(
-        w.parameters, tuple(w.lines), w.joints, output, mechanism.virtual_links, tuple(w.closures)
-    )
+    return Program(w.parameters, tuple(w.lines), w.joints, output, mechanism.virtual_links, tuple(w.closures))
 
 
 def _travel(w: _Writer) -> str:

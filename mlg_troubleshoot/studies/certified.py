@@ -21,7 +21,7 @@ from mlg_troubleshoot.gear.model import LinkageModel, links_from
 from mlg_troubleshoot.geometry.intervals import Box, Range, cosine_range
 
 Array = NDArray[np.float64]
-_STROKES = 16
+_STROKES = 64
 _BATCH = 64
 _MOST_BOXES = 4000
 
@@ -60,7 +60,12 @@ class CertifiedBound:
 
 
 def certified_bound(
-    model: LinkageModel, clearance_in: Array, sense: float = 1.0, gap_in: float = 1e-6, mid_only: bool = False
+    model: LinkageModel,
+    clearance_in: Array,
+    sense: float = 1.0,
+    gap_in: float = 1e-6,
+    mid_only: bool = False,
+    most_boxes: int = _MOST_BOXES,
 ) -> CertifiedBound:
     """Enclose the largest displacement over all directions and the whole release stroke.
 
@@ -76,6 +81,8 @@ def certified_bound(
         Wanted difference of bound and best found. [in]
     mid_only : bool
         Only at mid-position, else over the whole stroke.
+    most_boxes : int
+        Boxes to give up after.
 
     Returns
     -------
@@ -85,7 +92,7 @@ def certified_bound(
     search = _Search(model, np.asarray(clearance_in, float), sense, mid_only)
     waiting = search.start()
     settled, examined = -np.inf, 0
-    while waiting.low.size and examined < _MOST_BOXES:
+    while waiting.low.size and examined < most_boxes:
         count = min(_BATCH, waiting.low.shape[1])
         boxes = Box(waiting.low[:, -count:], waiting.high[:, -count:])
         waiting = Box(waiting.low[:, :-count], waiting.high[:, :-count])

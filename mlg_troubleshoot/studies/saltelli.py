@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from mlg_troubleshoot.studies.compat import seeded
 from mlg_troubleshoot.studies.indices import Indices, failed_note, interval, student_half, without_numbers
 from mlg_troubleshoot.studies.response import Response
 
@@ -100,13 +100,9 @@ class _Stream:
     """Scrambled Sobol points in both halves of the variables, continued on demand."""
 
     def __init__(self, rng: Generator, n: int) -> None:
-        from scipy import __version__
         from scipy.stats import qmc
 
-        # The argument was called seed before scipy 1.15.
-        recent = tuple(int(part) for part in __version__.split(".")[:2]) >= (1, 15)
-        chosen: dict[str, Any] = {"rng" if recent else "seed": rng}
-        self._engine = qmc.Sobol(2 * n, scramble=True, **chosen)
+        self._engine = qmc.Sobol(2 * n, scramble=True, **seeded(rng))
         self._n = n
         self._drawn = 0
 

@@ -131,7 +131,7 @@ def test_the_convention_of_a_table_can_be_declared(table: Table) -> None:
 def test_the_factor_2_of_the_convention_changes_the_verdict(table: Table) -> None:
     path = table(row(clearance_convention=None, **{f"clearance_{n}_in": "0.004" for n in range(1, 6)}))
     verdicts = [mlg("check", path, "--convention", c, "--json").one["verdict"] for c in ("RADIAL", "TOTAL_PLAY")]
-    assert verdicts == ["OUTSIDE_MARGIN", "INCONCLUSIVE"]
+    assert verdicts == ["OUTSIDE_MARGIN", "WITHIN_MARGIN"]
 
 
 def test_standard_input_reads_the_csv(failure_json: Run) -> None:

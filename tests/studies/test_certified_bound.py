@@ -12,6 +12,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import links_from
 from mlg_troubleshoot.geometry.intervals import Box
 from mlg_troubleshoot.studies.certified import certified_bound
+from mlg_troubleshoot.studies.worst_search import search_worst
 
 FAILURE = np.array([0.0, 0.0, 0.013, 0.0, 0.007, 0.0, 0.0, 0.0, 0.0, 0.0])
 
@@ -31,6 +32,26 @@ def test_the_bound_of_the_failure_case_holds_over_the_whole_stroke(gear: Gear, s
     assert found.stroke_in == gear.model.stroke[1]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_the_bound_holds_over_the_whole_stroke_on_every_linkage(gear: Gear, sense: float) -> None:
+    for model in gear.ensemble_models:
+        found = certified_bound(model, gear.limits_in, sense)
+        assert found.gap_in <= 1e-6
+        assert found.stroke_in == model.stroke[1]
+
+
+def test_the_bound_holds_over_the_whole_stroke_of_linkage_c(gear: Gear) -> None:
+    found = certified_bound(gear.ensemble_models[2], gear.limits_in)
+    assert found.gap_in <= 1e-6
+
+
+def test_differential_evolution_finds_what_is_proved(gear: Gear) -> None:
+    found = search_worst(gear.model, FAILURE, 1.0, np.random.default_rng(0), 0, generations=150)
+    assert found.sequential_in <= found.proved.found_in
+    assert found.searched_in == pytest.approx(found.proved.found_in, abs=1e-7)
+
+
 def test_the_sequential_rule_is_within_a_thousandth_of_the_proved_worst(gear: Gear) -> None:
     proved = certified_bound(gear.model, gear.limits_in, 1.0, mid_only=True).found_in
     sequential = float(worst_case(gear.model, gear.limits_in[None]).over_in[0])
@@ -48,7 +69,7 @@ def test_no_random_directions_and_lengths_exceed_the_bound(gear: Gear) -> None:
 
 
 def test_a_linkage_that_may_not_close_has_no_bound(gear: Gear) -> None:
-    assert certified_bound(gear.model, np.full(10, 0.2), 1.0, mid_only=True).bound_in == np.inf
+    assert certified_bound(gear.model, np.full(10, 0.2), 1.0, mid_only=True, most_boxes=300).bound_in == np.inf
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(1e-6, 0.004))

@@ -1,0 +1,114 @@
+"""The worst directions by three routes: the paper's sequential rule, a global search, a proved bound.
+
+The paper's conclusion leaves "more advanced algorithms such as a genetic algorithm" as future work. Differential
+evolution searches all directions and the whole stroke at once; the proof of
+:mod:`~mlg_troubleshoot.studies.certified` says how much any search can have missed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.gear.model import LinkageModel, links_from
+from mlg_troubleshoot.studies.certified import CertifiedBound, certified_bound
+from mlg_troubleshoot.studies.compat import seeded
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class WorstSearch:
+    """The worst displacement of one sense by three routes.
+
+    Parameters
+    ----------
+    sense : float
+        +1 for over-travel, −1 for under-travel. [1]
+    seed : int
+        Seed of the search.
+    sequential_in : float
+        By the paper's rule, joint by joint at mid-position. [in]
+    searched_in : float
+        By differential evolution over all directions and the stroke. [in]
+    evaluations : int
+        Solutions of the linkage that the search took.
+    proved : CertifiedBound
+        What none can exceed.
+    """
+
+    sense: float
+    seed: int
+    sequential_in: float
+    searched_in: float
+    evaluations: int
+    proved: CertifiedBound
+
+
+def search_worst(
+    model: LinkageModel, clearance_in: Array, sense: float, rng: Generator, seed: int, generations: int = 300
+) -> WorstSearch:
+    """Find the worst displacement by the sequential rule, by differential evolution and by proof.
+
+    Parameters
+    ----------
+    model : LinkageModel
+        The calibrated linkage.
+    clearance_in : ndarray, shape (n_joints,)
+        Clearances. [in]
+    sense : float
+        +1 for over-travel, −1 for under-travel. [1]
+    rng : Generator
+        Source of the search.
+    seed : int
+        Its seed, for the result.
+    generations : int
+        Generations of the search.
+
+    Returns
+    -------
+    WorstSearch
+        The three results.
+    """
+    clearance = np.asarray(clearance_in, float)
+    worst = worst_case(model, clearance[None])
+    sequential = float((worst.over_in if sense > 0.0 else -worst.under_in)[0])
+    searched, evaluations = _evolved(model, clearance, sense, rng, generations)
+    return WorstSearch(sense, seed, sequential, searched, evaluations, certified_bound(model, clearance, sense))
+
+
+def _evolved(
+    model: LinkageModel, clearance: Array, sense: float, rng: Generator, generations: int
+) -> tuple[float, int]:
+    from scipy.optimize import differential_evolution
+
+    worn = np.flatnonzero(clearance > 0.0)
+    bounds: Any = [(-np.pi, np.pi)] * len(worn) + [(min(model.stroke), max(model.stroke))]
+    count = 0
+
+    def lost(points: Array) -> Any:
+        nonlocal count
+        count += points.shape[1]
+        directions = np.zeros((points.shape[1], len(clearance)))
+        directions[:, worn] = points[:-1].T
+        links = links_from(np.broadcast_to(clearance, directions.shape), directions)
+        moved = sense * model.displacement(links, None, points[-1])
+        return np.where(np.isfinite(moved), -moved, 1e3)
+
+    options: dict[str, Any] = {
+        "popsize": 12,
+        "maxiter": generations,
+        "tol": 1e-10,
+        "atol": 1e-12,
+        "polish": False,
+        "vectorized": True,
+        "updating": "deferred",
+        **seeded(rng),
+    }
+    found = differential_evolution(lost, bounds, **options)
+    return -float(found.fun), count

@@ -1,0 +1,205 @@
+"""Bad input: exit 2 or 3, a message that says what to do, never a traceback; good rows still work."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import DATA, FAILURE, HAND, Run, Table, mlg, row
+
+PDF = b"%PDF-1.4\n%\xe2\xe3\xcf\xd3\n1 0 obj\n<< /Type /Catalog >>\nendobj\n"
+ONE_VALUE = (*HAND, "--convention", "RADIAL", "--set")
+
+
+def refused(found: Run, code: int, *said: str) -> None:
+    """Nothing on stdout, a message with a remedy on stderr, no traceback."""
+    assert (found.code, found.out) == (code, "")
+    assert "Traceback" not in found.err
+    assert "What to do:" in found.err
+    for words in said:
+        assert words in found.err
+
+
+def test_nothing_in_says_what_to_pass() -> None:
+    refused(mlg("check"), 2, "nothing to check", "--set JOINT=VALUE", "standard input")
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    refused(mlg("check", tmp_path / "lost.csv"), 3, "lost.csv", "there is no such file")
+
+
+@pytest.mark.parametrize("name", ["table.csv", "table.xlsx"])
+def test_a_file_of_no_bytes_is_called_empty(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).touch()
+    refused(mlg("check", tmp_path / name), 3, name, "the file is empty", "No row could be judged.")
+
+
+def test_an_empty_standard_input_is_called_empty() -> None:
+    refused(mlg("check", "-"), 3, "empty")
+
+
+def test_a_pdf_named_csv_is_called_a_pdf(tmp_path: Path) -> None:
+    path = tmp_path / "report.csv"
+    path.write_bytes(PDF)
+    refused(mlg("check", path), 3, "report.csv", "a PDF document")
+
+
+def test_a_folder_without_tables_says_so(tmp_path: Path) -> None:
+    refused(mlg("check", tmp_path), 3, tmp_path.name)
+
+
+BAD_CELLS = {
+    "text": ({"clearance_3_in": "worn"}, "clearance_3_in", "worn"),
+    "negative": ({"clearance_3_in": "-0.001"}, "clearance_3_in", "less than zero"),
+    "not a number": ({"clearance_3_in": "NaN"}, "clearance_3_in", "NaN"),
+    "infinite": ({"clearance_3_in": "inf"}, "clearance_3_in", "inf"),
+    "millimetres as inches": ({"clearance_3_in": "0.33"}, "clearance_3_in", "millimetres (factor 25.4)"),
+    "thou as inches": ({"clearance_3_in": "13"}, "clearance_3_in", "thou (factor 1000)"),
+    "decimal comma": ({"clearance_3_in": "0,013"}, "clearance_3_in", "--decimal-comma"),
+    "no side": ({"side": ""}, "side", "LH or RH"),
+    "another side": ({"side": "LEFTISH"}, "side", "LH or RH"),
+    "another convention": ({"clearance_convention": "RADIUS"}, "clearance_convention", "RADIAL"),
+    "no tail": ({"tail_no": ""}, "tail_no", "tail"),
+    "no record": ({"record_id": ""}, "record_id", "record"),
+    "margin of nothing": ({"margin_in": "0"}, "margin_in", "margin"),
+}
+
+
+@pytest.mark.parametrize(("changes", "column", "said"), BAD_CELLS.values(), ids=BAD_CELLS)
+def test_a_bad_cell_makes_its_row_invalid_and_says_why(
+    changes: dict[str, str], column: str, said: str, table: Table
+) -> None:
+    found = mlg("check", table(row(**changes)), "--json")
+    assert found.code == 3
+    assert found.one["verdict"] == "INVALID"
+    (problem,) = found.json["problems"]
+    assert problem["column"] == column
+    assert said in json.dumps(problem, ensure_ascii=False)
+
+
+@pytest.mark.parametrize("changes", [changes for changes, _, _ in BAD_CELLS.values()], ids=BAD_CELLS)
+def test_good_rows_survive_bad_ones(changes: dict[str, str], table: Table) -> None:
+    bad = row(**{"record_id": "B", "tail_no": "N9", **changes})
+    path = table(row(record_id="A"), bad, row(record_id="C", side="RH"))
+    verdicts = [i["verdict"] for i in mlg("check", path, "--json").json["inspections"]]
+    assert verdicts == ["WITHIN_MARGIN", "INVALID", "WITHIN_MARGIN"]
+
+
+def test_both_sides_missing_makes_both_rows_invalid(table: Table) -> None:
+    found = mlg("check", table(row(record_id="A", side=""), row(record_id="B", side="")), "--json")
+    assert found.code == 3
+    assert [p["cell"] for p in found.json["problems"]] == ["C2", "C3"]
+
+
+def test_a_table_without_a_side_column_says_which_column_is_missing(table: Table) -> None:
+    found = mlg("check", table(row(side=None)))
+    assert found.code == 3
+    assert "a column side" in found.err
+
+
+def test_a_joint_11_is_refused_with_the_joints_that_there_are(table: Table) -> None:
+    found = mlg("check", table(row(clearance_11_in="0.001")))
+    assert found.code == 3
+    assert "no joint 11: its joints are 1 to 10" in found.err
+
+
+def test_a_problem_names_file_cell_column_and_value(table: Table) -> None:
+    found = mlg("check", table(row(clearance_3_in="worn")))
+    assert "table.csv, cell G2, column 'clearance_3_in': found 'worn'" in found.err
+
+
+def test_every_bad_cell_of_a_row_has_its_own_problem(table: Table) -> None:
+    found = mlg("check", table(row(side="", clearance_3_in="worn", clearance_5_in="-1")), "--json")
+    assert [p["cell"] for p in found.json["problems"]] == ["C2", "G2", "I2"]
+
+
+def test_a_problem_is_one_line_of_a_file_however_long_it_is(table: Table) -> None:
+    found = mlg("check", table(row(clearance_3_in="worn" * 40)))
+    assert sum("worn" in line for line in found.err.splitlines()) == 1
+
+
+def test_an_invalid_row_carries_no_number(table: Table) -> None:
+    found = mlg("check", table(row(side="")), "--json").one
+    numbers = {key: value for key, value in found.items() if key.endswith("_in") or key.startswith("probability")}
+    assert len(numbers) == 11
+    assert set(numbers.values()) == {None}
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ("3=worn", "'worn' is not a length"),
+        ("3=-0.001in", "is negative"),
+        ("3=nan", "'nan' is not a length"),
+        ("3=0,013in", "decimal comma"),
+        ("3=0.33in", "above 0.05 in"),
+        ("3=1/64in", "fraction"),
+        ("3", "is not JOINT=VALUE"),
+        ("x=0.001in", "is not JOINT=VALUE"),
+        ("11=0.001in", "has no joint 11"),
+        ("3=", "is not a length"),
+    ],
+)
+def test_a_bad_value_on_the_command_line_is_refused_with_its_option(value: str, said: str) -> None:
+    refused(mlg(*ONE_VALUE, value), 2, f"--set {value!r}", said)
+
+
+def test_a_joint_given_twice_is_refused() -> None:
+    refused(mlg(*ONE_VALUE, "3=0.001in", "--set", "3=0.002in"), 2, "joint 3 twice")
+
+
+def test_an_empty_tail_number_is_refused() -> None:
+    found = mlg("check", "--tail", " ", "--side", "LH", "--convention", "RADIAL", "--set", "3=0.001in")
+    refused(found, 2, "--tail is empty")
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "said"),
+    [
+        ("--side", "LEFT", "LH or RH"),
+        ("--convention", "RADIUS", "RADIAL"),
+        ("--unit", "furlong", "in, thou or mm"),
+        ("--outcome", "STUCK", "RETRACTED or FAILED"),
+        ("--measured", "0.041", "has no unit"),
+        ("--measured", "4in", "farther than the plunger can go"),
+        ("--margin", "0in", "not above 0"),
+        ("--gear", "a380", "there is no gear 'a380'"),
+    ],
+)
+def test_a_bad_option_is_refused_with_what_is_allowed(option: str, value: str, said: str) -> None:
+    refused(mlg(*ONE_VALUE, "3=0.001in", option, value), 2, said)
+
+
+def test_values_by_hand_beside_a_file_are_refused() -> None:
+    refused(mlg("check", FAILURE, "--set", "3=0.001in"), 2, "Give either a FILE or the values of one gear.")
+
+
+def test_a_mapping_without_a_column_is_refused() -> None:
+    refused(mlg("check", FAILURE, "--map", "Spiel 3"), 2, "HEADER=COLUMN")
+
+
+def test_annotating_standard_input_is_refused_before_anything_is_shown(tmp_path: Path) -> None:
+    found = mlg("check", "-", "--annotate", tmp_path / "out.xlsx", stdin=FAILURE.read_bytes())
+    refused(found, 2, "--annotate needs exactly one workbook")
+
+
+def test_a_template_that_was_not_filled_in_says_so(tmp_path: Path) -> None:
+    mlg("template", tmp_path / "empty.xlsx")
+    refused(mlg("check", tmp_path / "empty.xlsx"), 3, "there is no inspection in it")
+
+
+@pytest.mark.parametrize("source", ["lost.csv", DATA / "failure_case.csv"], ids=["no file", "no measurement"])
+def test_a_diagnosis_of_nothing_exits_3(source: object) -> None:
+    refused(mlg("diagnose", source), 3)
+
+
+def test_an_extension_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    refused(mlg("check", FAILURE, "--extension", tmp_path / "lost.toml"), 2, "lost.toml")
+
+
+def test_a_gear_file_that_is_no_toml_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "gear.toml"
+    path.write_text("[[points", encoding="utf-8")
+    refused(mlg("check", FAILURE, "--gear", path), 2, "gear.toml", "cannot be read as TOML")

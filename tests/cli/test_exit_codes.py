@@ -1,0 +1,121 @@
+"""Exit codes of the contract: 0 · 1 · 2 · 3 · 5 · 70 · 130."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import FAILURE, FLEET, Run, Table, mlg, row
+from mlg_troubleshoot import workflows
+
+
+def test_within_the_margin_exits_0(table: Table) -> None:
+    assert mlg("check", table(row())).code == 0
+
+
+def test_a_joint_over_its_limit_exits_1_whatever_the_prediction_says(table: Table) -> None:
+    found = mlg("check", table(row(clearance_10_in="0.0080")), "--json")
+    assert (found.one["verdict"], found.code) == ("WITHIN_MARGIN", 1)
+
+
+def test_a_failed_outcome_exits_1_whatever_the_prediction_says(table: Table) -> None:
+    found = mlg("check", table(row(outcome="FAILED")), "--json")
+    assert (found.one["verdict"], found.code) == ("WITHIN_MARGIN", 1)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "changes"),
+    [
+        ("OUTSIDE_MARGIN", {"clearance_2_in": "0.0075", "clearance_3_in": "0.0075", "clearance_4_in": "0.0075"}),
+        ("INCOMPLETE", {"clearance_4_in": ""}),
+        ("INCONCLUSIVE", {"clearance_3_in": "0.007", "clearance_4_in": "0.003"}),
+    ],
+)
+def test_any_other_verdict_exits_1(verdict: str, changes: dict[str, str], table: Table) -> None:
+    found = mlg("check", table(row(**changes)), "--json")
+    assert (found.one["verdict"], found.code) == (verdict, 1)
+
+
+def test_one_invalid_row_among_good_ones_exits_1(table: Table) -> None:
+    assert mlg("check", table(row(), row(record_id="R2", side=""))).code == 1
+
+
+def test_no_row_that_could_be_judged_exits_3(table: Table) -> None:
+    assert mlg("check", table(row(side=""))).code == 3
+
+
+@pytest.mark.parametrize("arguments", [("check", "--wrong"), ("chek",), ("check", FAILURE, "--format", "docx")])
+def test_usage_exits_2(arguments: tuple[object, ...]) -> None:
+    assert mlg(*arguments).code == 2
+
+
+@pytest.fixture
+def occupied(tmp_path: Path) -> Path:
+    """A file that stands where a folder is wanted."""
+    path = tmp_path / "occupied"
+    path.write_text("", encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("option", ["--report", "--csv", "--annotate"])
+def test_an_output_that_cannot_be_written_exits_5(option: str, occupied: Path) -> None:
+    target = occupied if option == "--report" else occupied / "out.xlsx"
+    found = mlg("check", FAILURE.with_suffix(".xlsx"), option, target)
+    assert found.code == 5
+    assert "occupied" in found.err
+    assert "What to do:" in found.err
+
+
+def test_a_template_that_cannot_be_written_exits_5(occupied: Path) -> None:
+    assert mlg("template", occupied / "new.xlsx").code == 5
+
+
+def test_a_template_does_not_replace_a_file_unasked(tmp_path: Path) -> None:
+    path = tmp_path / "mine.xlsx"
+    path.write_text("mine", encoding="utf-8")
+    assert (mlg("template", path).code, path.read_text(encoding="utf-8")) == (5, "mine")
+
+
+def test_a_template_replaces_a_file_by_force(tmp_path: Path) -> None:
+    path = tmp_path / "mine.xlsx"
+    path.write_text("mine", encoding="utf-8")
+    assert (mlg("template", path, "--force").code, path.read_bytes()[:2]) == (0, b"PK")
+
+
+def broken(*_arguments: object, **_options: object) -> None:
+    raise ZeroDivisionError("a defect")
+
+
+def test_a_defect_of_the_program_exits_70_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workflows, "check_files", broken)
+    found = mlg("check", FAILURE)
+    assert (found.code, found.out) == (70, "")
+    assert "Internal error: ZeroDivisionError: a defect" in found.err
+    assert "Traceback" not in found.err
+
+
+def test_a_defect_shows_its_traceback_when_asked_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workflows, "check_files", broken)
+    monkeypatch.setenv("MLG_DEBUG", "1")
+    assert "Traceback" in mlg("check", FAILURE).err
+
+
+def interrupted(*_arguments: object, **_options: object) -> None:
+    raise KeyboardInterrupt
+
+
+def test_an_interrupt_exits_130(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workflows, "check_files", interrupted)
+    found = mlg("check", FAILURE)
+    assert (found.code, found.err.strip()) == (130, "Interrupted.")
+
+
+@pytest.fixture(scope="module")
+def batch() -> Run:
+    """The fleet, as text."""
+    return mlg("check", FLEET)
+
+
+def test_the_fleet_needs_attention(batch: Run) -> None:
+    assert batch.code == 1

@@ -1,0 +1,179 @@
+"""What else a check writes: every row once, the verdicts as CSV, the annotated workbook, reports, the template."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import openpyxl
+import pytest
+
+from cli.conftest import DATA, FAILURE, FLEET, HAND, Run, Table, mlg, row
+
+VERDICTS = {"WITHIN_MARGIN", "OUTSIDE_MARGIN", "INCONCLUSIVE", "INCOMPLETE", "INVALID"}
+
+
+def data_rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_every_data_row_stands_exactly_once_in_the_json(fleet_json: Run) -> None:
+    records = [cells["record_id"] for cells in data_rows(FLEET)]
+    assert [i["record_id"] for i in fleet_json.json["inspections"]] == records
+
+
+def test_every_data_row_stands_exactly_once_even_if_it_is_bad(table: Table) -> None:
+    rows = [row(record_id="A", side=""), row(record_id="B", clearance_3_in="worn"), row(record_id=""), row()]
+    found = mlg("check", table(*rows), "--json").json["inspections"]
+    assert [i["record_id"] for i in found] == ["A", "B", None, "R1"]
+
+
+def test_two_files_give_their_rows_in_order(table: Table) -> None:
+    first, second = table(row(record_id="A"), name="1.csv"), table(row(record_id="B"), name="2.csv")
+    assert [i["record_id"] for i in mlg("check", first, second, "--json").json["inspections"]] == ["A", "B"]
+
+
+def test_a_folder_gives_the_rows_of_its_tables(table: Table, tmp_path: Path) -> None:
+    table(row(record_id="A"), name="1.csv")
+    table(row(record_id="B"), name="2.csv")
+    assert len(mlg("check", tmp_path, "--json").json["inspections"]) == 2
+
+
+def test_a_tail_number_stays_text(table: Table) -> None:
+    assert mlg("check", table(row(tail_no="007")), "--json").one["tail_no"] == "007"
+
+
+def test_blank_is_not_measured_and_zero_is_measured(table: Table) -> None:
+    joints = mlg("check", table(row(clearance_6_in="", clearance_7_in="0")), "--json").one["joints"]
+    assert [joints[5]["clearance_in"], joints[6]["clearance_in"]] == [None, 0.0]
+
+
+def test_an_unknown_column_is_named_and_not_dropped_in_silence(table: Table) -> None:
+    assert "hangar" in mlg("check", table(row(hangar="7"))).err
+
+
+def test_the_order_of_the_columns_does_not_matter(table: Table) -> None:
+    turned = dict(reversed(row(clearance_3_in="0.013").items()))
+    found = [mlg("check", table(cells), "--json").one for cells in (row(clearance_3_in="0.013"), turned)]
+    assert found[0] == found[1]
+
+
+def test_a_gears_own_margin_decides_about_it(table: Table) -> None:
+    found = [mlg("check", table(row(margin_in=margin)), "--json").one for margin in ("", "0.005")]
+    assert [i["margin_in"] for i in found] == [0.03, 0.005]
+    assert [i["verdict"] for i in found] == ["WITHIN_MARGIN", "OUTSIDE_MARGIN"]
+
+
+def test_a_measured_displacement_beyond_the_margin_is_said_first() -> None:
+    found = mlg(*HAND, "--convention", "RADIAL", "--set", "3=0.001in", "--measured", "-0.041in")
+    assert found.out.splitlines()[1].startswith("│ Measured")
+
+
+def test_a_margin_can_be_given_by_hand() -> None:
+    found = mlg(*HAND, "--convention", "RADIAL", "--set", "3=0.001in", "--margin", "0.028in", "--json")
+    assert found.one["margin_in"] == 0.028
+
+
+def test_a_header_can_be_mapped(table: Table) -> None:
+    cells = row(clearance_3_in=None) | {"Spiel 3": "0.33"}
+    joints = mlg("check", table(cells), "--map", "Spiel 3=clearance_3_mm", "--json").one["joints"]
+    assert joints[2]["clearance_in"] == pytest.approx(0.33 / 25.4)
+
+
+def test_repair_sets_of_a_batch_are_computed_on_demand_only(table: Table) -> None:
+    path = table(row(clearance_3_in="0.013"), row(record_id="R2"))
+    assert [i["repair_sets"] for i in mlg("check", path, "--json").json["inspections"]] == [None, None]
+    asked = mlg("check", path, "--json", "--repairs").json["inspections"]
+    assert asked[0]["repair_sets"][0]["joints"] == [3]
+
+
+def test_the_csv_has_one_line_for_each_row_in_its_order(tmp_path: Path) -> None:
+    mlg("check", FLEET, "--csv", tmp_path / "out.csv")
+    found = data_rows(tmp_path / "out.csv")
+    assert [cells["record_id"] for cells in found] == [cells["record_id"] for cells in data_rows(FLEET)]
+    assert {cells["verdict"] for cells in found} <= VERDICTS
+
+
+def test_the_annotated_workbook_keeps_every_cell_and_adds_the_verdict(tmp_path: Path) -> None:
+    source, out = DATA / "failure_case.xlsx", tmp_path / "out.xlsx"
+    mlg("check", source, "--annotate", out)
+    before, after = (openpyxl.load_workbook(path).worksheets[0] for path in (source, out))
+    kept = [[cell.value for cell in cells] for cells in after.iter_rows(max_col=before.max_column)]
+    assert kept[: before.max_row] == [[cell.value for cell in cells] for cells in before.iter_rows()]
+    added = [cell.value for cell in after[2][before.max_column :]]
+    assert "OUTSIDE_MARGIN" in added
+
+
+def test_annotating_leaves_the_source_as_it_was(tmp_path: Path) -> None:
+    source = tmp_path / "mine.xlsx"
+    shutil.copyfile(DATA / "failure_case.xlsx", source)
+    mlg("check", source, "--annotate", tmp_path / "out.xlsx")
+    assert source.read_bytes() == (DATA / "failure_case.xlsx").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory: pytest.TempPathFactory) -> Sequence[Path]:
+    """The reports of the failure case, in a folder that is made for them."""
+    folder = tmp_path_factory.mktemp("reports") / "new" / "folder"
+    mlg("check", FAILURE, "--report", folder)
+    return sorted(folder.iterdir())
+
+
+def test_a_report_is_one_html_and_one_pdf(reports: Sequence[Path]) -> None:
+    assert [path.suffix for path in reports] == [".html", ".pdf"]
+
+
+def test_the_report_says_the_verdict_and_the_prediction(reports: Sequence[Path]) -> None:
+    text = reports[0].read_text(encoding="utf-8")
+    assert "OUTSIDE MARGIN" in text
+    assert "0.0472" in text
+
+
+def test_the_fonts_of_the_pdf_are_embedded(reports: Sequence[Path]) -> None:
+    pypdf = pytest.importorskip("pypdf")
+    for page in pypdf.PdfReader(reports[1]).pages:
+        fonts = page["/Resources"]["/Font"]
+        descriptors = [
+            (f.get_object().get("/DescendantFonts") or [f])[0].get_object()["/FontDescriptor"] for f in fonts.values()
+        ]
+        assert descriptors
+        assert all({"/FontFile", "/FontFile2", "/FontFile3"} & set(d.get_object()) for d in descriptors)
+
+
+@pytest.mark.parametrize("kind", ["html", "pdf"])
+def test_one_format_can_be_chosen(kind: str, tmp_path: Path) -> None:
+    mlg("check", FAILURE, "--format", kind, "--report", tmp_path)
+    assert [path.suffix for path in tmp_path.iterdir()] == [f".{kind}"]
+
+
+def test_a_batch_has_a_report_for_each_gear_and_a_summary(table: Table, tmp_path: Path) -> None:
+    path = table(row(record_id="A"), row(record_id="B", side=""), row(record_id="C", side="RH"))
+    mlg("check", path, "--format", "html", "--report", tmp_path / "out")
+    assert len(list((tmp_path / "out").iterdir())) == 4
+
+
+def fill_in(path: Path, cells: dict[str, object]) -> None:
+    """Write one inspection into a template, as a person would: under the headers."""
+    book = openpyxl.load_workbook(path)
+    for sheet in book.worksheets:
+        for header in sheet.iter_rows():
+            names = {str(cell.value): cell for cell in header if cell.value is not None}
+            if "record_id" in names:
+                for column, value in cells.items():
+                    sheet.cell(names[column].row + 1, names[column].column, value)
+                book.save(path)
+                return
+    raise AssertionError("the template has no table of inspections")
+
+
+def test_a_template_that_was_filled_in_reads_back(tmp_path: Path) -> None:
+    path = tmp_path / "inspections.xlsx"
+    mlg("template", path)
+    clearances = {f"clearance_{n}_in": {3: 0.013, 5: 0.007}.get(n, 0.001) for n in range(1, 11)}
+    fill_in(path, {"record_id": "R1", "tail_no": "N1", "side": "RH", "clearance_convention": "RADIAL", **clearances})
+    found = mlg("check", path, "--json").one
+    assert found["side"] == "RH"
+    assert {f"clearance_{j['joint']}_in": j["clearance_in"] for j in found["joints"]} == clearances

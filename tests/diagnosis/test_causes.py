@@ -1,0 +1,279 @@
+"""Each cause changes the number of the model that its physics says, and its column is that change's slope."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import date, timedelta
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.diagnosis import CATALOGUE, Candidate, Cause, Scene
+from mlg_troubleshoot.diagnosis.causes import JointContact, OutOfPlaneTilt, RiggingOffset
+from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.gear.adjustment import adjusted_worst_case
+from mlg_troubleshoot.gear.gear import Gear
+
+from .conftest import only, scene_of
+
+BY_NAME = {cause.name: cause for cause in CATALOGUE}
+# The names, the columns they need and the allowed sign of the parameter, from the contract and the physics.
+NEEDS = {
+    "out_of_plane_tilt": ("axial_float",),
+    "elastic_compliance": ("hydraulic_pressure_psi",),
+    "thermal_growth": ("temperature_c",),
+    "direction_not_worst_case": (),
+    "oval_wear": (),
+    "unlisted_wear": ("gear_landings",),
+    "rigging_offset": ("tail_no",),
+    "date_step": ("day",),
+    "gauge_bias": ("gauge_id",),
+    "technician_bias": ("technician_id",),
+    "side_difference": ("side",),
+    "calibration_rate": (),
+    "approach_hysteresis": ("approach",),
+    "joint_contact": (),
+}
+ONE_SIGN = {"out_of_plane_tilt": 1, "direction_not_worst_case": -1, "oval_wear": 1, "joint_contact": 1}
+
+
+def first(cause: Cause, scene: Scene) -> Candidate:
+    return next(iter(cause.candidates(scene)))
+
+
+def test_the_catalogue_holds_the_causes_of_the_contract() -> None:
+    assert set(BY_NAME) == set(NEEDS)
+
+
+@pytest.mark.parametrize("name", NEEDS)
+def test_a_cause_says_which_columns_it_needs(name: str) -> None:
+    assert BY_NAME[name].needs == NEEDS[name]
+
+
+@pytest.mark.parametrize("name", NEEDS)
+def test_a_sign_is_fixed_only_where_physics_fixes_it(name: str) -> None:
+    assert BY_NAME[name].sign == ONE_SIGN.get(name, 0)
+
+
+@pytest.mark.parametrize("name", NEEDS)
+def test_a_cause_speaks_to_a_technician(name: str) -> None:
+    cause = BY_NAME[name]
+    assert min(map(len, (cause.sentence, cause.inspect, cause.separates))) > 15
+
+
+@pytest.mark.parametrize("name", NEEDS)
+def test_a_cause_of_size_zero_changes_nothing(name: str, gear: Gear, scene: Scene) -> None:
+    cause = BY_NAME[name]
+    adjustment = cause.adjust(scene, first(cause, scene), 0.0)
+    assert adjusted_worst_case(gear.model, adjustment).over_in == pytest.approx(scene.over_in, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", NEEDS)
+def test_the_column_of_a_cause_is_the_slope_of_the_true_worst_case(name: str, gear: Gear, scene: Scene) -> None:
+    cause, worst = BY_NAME[name], build_scene(gear.model, scene.table, gear.discrepancies)[1]
+    candidate = first(cause, scene)
+    column = effect_columns(scene, worst, [candidate])[:, 0]
+    step = 1e-3 * cause.trial
+    moved = adjusted_worst_case(gear.model, cause.adjust(scene, candidate, step)).over_in
+    slope = (moved - scene.over_in) / step
+    assert np.max(np.abs(slope)) > 0.0
+    assert column == pytest.approx(slope, abs=0.03 * np.max(np.abs(slope)))
+
+
+def test_tilt_shrinks_a_link_by_the_cosine_of_its_floats_over_the_span(scene: Scene) -> None:
+    cause, span = OutOfPlaneTilt(), 1.5
+    factors = cause.adjust(scene, only(cause, scene), 1.0 / span**2).scaled["length.3-5"]
+    floats = scene.table.axial_float_in
+    assert floats is not None
+    tilt = np.arcsin(np.hypot(floats[:, 2], floats[:, 4]) / span)
+    assert factors == pytest.approx(np.cos(tilt), abs=1e-12)
+
+
+def test_a_lever_is_tilted_by_the_float_of_its_pivot_alone(scene: Scene) -> None:
+    cause = OutOfPlaneTilt()
+    table = scene.table
+    assert table.axial_float_in is not None
+    floats = table.axial_float_in.copy()
+    floats[:, 3] = 0.0
+    still = replace(scene, table=replace(table, axial_float_in=floats))
+    assert cause.adjust(still, only(cause, still), 1.0).scaled["length.5-4"] == pytest.approx(1.0, abs=0.0)
+
+
+def test_tilt_shortens_and_never_lengthens(scene: Scene) -> None:
+    scaled = OutOfPlaneTilt().adjust(scene, only(OutOfPlaneTilt(), scene), 5.0).scaled
+    assert all(np.all(factor <= 1.0) for factor in scaled.values())
+
+
+def test_tilt_is_shown_as_the_bearing_span_that_it_implies() -> None:
+    assert OutOfPlaneTilt().shown(1.0 / 1.5**2) == {"bearing_span_in": pytest.approx(1.5)}
+
+
+def test_a_stretch_is_nothing_at_full_pressure(scene: Scene) -> None:
+    cause = BY_NAME["elastic_compliance"]
+    full = replace(scene.table, quantities={"hydraulic_pressure_psi": np.full(len(scene.table), 3000.0)})
+    at_full = replace(scene, table=full)
+    changed = cause.adjust(at_full, first(cause, at_full), 1e-6).changed
+    assert all(np.all(change == 0.0) for change in changed.values())
+
+
+def test_growth_moves_fixed_points_and_leaves_the_links(scene: Scene) -> None:
+    scaled = BY_NAME["thermal_growth"].adjust(scene, only(BY_NAME["thermal_growth"], scene), 1e-5).scaled
+    assert not any(name.startswith(("length.", "lever.")) for name in scaled)
+
+
+def test_growth_is_in_proportion_to_the_distance_from_20_c(scene: Scene) -> None:
+    cause = BY_NAME["thermal_growth"]
+    factor = next(iter(cause.adjust(scene, only(cause, scene), 1e-5).scaled.values()))
+    assert factor == pytest.approx(1.0 + 1e-5 * (scene.table.quantities["temperature_c"] - 20.0), abs=1e-12)
+
+
+def test_unlisted_wear_shifts_the_lever_per_thousand_landings(scene: Scene) -> None:
+    cause = BY_NAME["unlisted_wear"]
+    (shift,) = cause.adjust(scene, only(cause, scene), 0.002).changed.values()
+    assert shift == pytest.approx(0.002 * scene.table.quantities["gear_landings"] / 1000.0)
+
+
+@pytest.mark.parametrize(("name", "value"), [("direction_not_worst_case", -0.4), ("oval_wear", 0.4)])
+def test_a_joint_s_cause_touches_that_joint_alone(name: str, value: float, scene: Scene) -> None:
+    cause = BY_NAME[name]
+    candidate = next(c for c in cause.candidates(scene) if c.target == "joint 3")
+    change = cause.adjust(scene, candidate, value).clearance_in / scene.clearance_in
+    assert change[:, 2] == pytest.approx(1.0 + value)
+    assert np.delete(change, 2, axis=1) == pytest.approx(1.0)
+
+
+def test_a_clearance_that_is_not_taken_up_is_never_negative(scene: Scene) -> None:
+    cause = BY_NAME["direction_not_worst_case"]
+    assert np.min(cause.adjust(scene, first(cause, scene), -7.0).clearance_in) == 0.0
+
+
+def test_a_joint_without_any_clearance_is_no_candidate(gear: Gear, plain: DiagnosisTable) -> None:
+    clearance = plain.clearance_in.copy()
+    clearance[:, 6] = 0.0
+    scene = scene_of(gear.model, replace(plain, clearance_in=clearance), gear.discrepancies)
+    targets = {c.target for c in BY_NAME["oval_wear"].candidates(scene)}
+    assert "joint 7" not in targets
+    assert "joint 6" in targets
+
+
+def test_contact_is_tried_on_neighbours_only(scene: Scene) -> None:
+    pairs = {c.target for c in JointContact().candidates(scene)}
+    assert pairs == {f"joints {p}" for p in ("1,2", "2,3", "3,5", "4,5", "5,6", "6,7", "7,8", "7,9", "9,10")}
+
+
+def test_contact_never_adds_clearance(scene: Scene) -> None:
+    cause = JointContact()
+    for candidate in cause.candidates(scene):
+        assert np.all(cause.adjust(scene, candidate, 0.7).clearance_in <= scene.clearance_in + 1e-15)
+
+
+def test_contact_takes_at_most_the_contribution_of_the_one_that_gives_less(gear: Gear, scene: Scene) -> None:
+    cause = JointContact()
+    candidate = next(c for c in cause.candidates(scene) if c.target == "joints 3,5")
+    least = np.min(scene.contribution_in[:, [2, 4]], axis=1)
+    lost = scene.over_in - adjusted_worst_case(gear.model, cause.adjust(scene, candidate, 1.0)).over_in
+    assert np.all(lost <= 1.02 * least + 1e-6)
+
+
+def test_contact_leaves_all_other_joints(scene: Scene) -> None:
+    cause = JointContact()
+    candidate = next(c for c in cause.candidates(scene) if c.target == "joints 7,9")
+    others = [0, 1, 2, 3, 4, 5, 7, 9]
+    moved = cause.adjust(scene, candidate, 0.9).clearance_in
+    assert np.array_equal(moved[:, others], scene.clearance_in[:, others])
+
+
+@pytest.mark.parametrize("name", ["gauge_bias", "technician_bias"])
+def test_a_bias_acts_on_the_rows_of_its_level_alone(name: str, scene: Scene) -> None:
+    cause = BY_NAME[name]
+    candidate = first(cause, scene)
+    column = scene.table.factors[cause.needs[0]]
+    moved = cause.adjust(scene, candidate, 0.002).offset_in
+    assert moved == pytest.approx(np.where(column == candidate.setting["value"], 0.002, 0.0))
+
+
+def test_an_empty_gauge_is_no_gauge(gear: Gear, plain: DiagnosisTable) -> None:
+    gauges = plain.factors["gauge_id"].copy()
+    gauges[:20] = ""
+    scene = scene_of(gear.model, replace(plain, factors={**plain.factors, "gauge_id": gauges}), gear.discrepancies)
+    assert "gauge " not in {c.target for c in BY_NAME["gauge_bias"].candidates(scene)}
+
+
+def test_sides_are_not_compared_where_there_is_one(gear: Gear, plain: DiagnosisTable) -> None:
+    alike = np.full(len(plain), "LH")
+    scene = scene_of(gear.model, replace(plain, factors={**plain.factors, "side": alike}), gear.discrepancies)
+    assert list(BY_NAME["side_difference"].candidates(scene)) == []
+
+
+def test_the_rate_scales_the_prediction(gear: Gear, scene: Scene) -> None:
+    cause = BY_NAME["calibration_rate"]
+    moved = adjusted_worst_case(gear.model, cause.adjust(scene, only(cause, scene), 0.05)).over_in
+    assert moved == pytest.approx(1.05 * scene.over_in, rel=1e-9)
+
+
+def test_the_directions_of_approach_differ_by_the_parameter(scene: Scene) -> None:
+    cause = BY_NAME["approach_hysteresis"]
+    offset = cause.adjust(scene, first(cause, scene), 0.004).offset_in
+    assert offset is not None
+    extending = scene.table.factors["approach"] == "EXTENDING"
+    assert np.mean(offset[extending]) - np.mean(offset[~extending]) == pytest.approx(0.004)
+
+
+def test_a_rigging_change_concerns_one_aircraft_or_one_of_its_gears(scene: Scene) -> None:
+    targets = {c.target for c in RiggingOffset().candidates(scene)}
+    assert {"tail N103", "tail N103 LH", "tail N103 RH"} <= targets
+
+
+def test_a_gear_and_its_aircraft_are_variants_of_one_name(scene: Scene) -> None:
+    keys = {c.key for c in RiggingOffset().candidates(scene) if str(c.target).startswith("tail N103")}
+    assert keys == {("rigging_offset", "tail N103")}
+
+
+def test_a_rigging_change_acts_from_its_day_on(scene: Scene) -> None:
+    cause = RiggingOffset()
+    candidate = next(c for c in cause.candidates(scene) if c.target == "tail N103" and c.setting["day"] is not None)
+    offset = cause.adjust(scene, candidate, 0.01).offset_in
+    own = scene.table.factors["tail_no"] == "N103"
+    later = scene.table.quantities["day"] >= candidate.setting["day"]
+    assert np.array_equal(offset != 0.0, own & later)
+
+
+def test_the_date_of_a_change_is_found_in_a_table_with_another_first_day(gear: Gear, scene: Scene) -> None:
+    cause = RiggingOffset()
+    candidate = next(c for c in cause.candidates(scene) if c.target == "tail N103" and c.setting["day"] is not None)
+    since = date.fromisoformat(candidate.setting["since"])
+    start = since - timedelta(days=10)
+    days = np.arange(len(scene.table), dtype=float)
+    table = replace(
+        scene.table,
+        quantities={**scene.table.quantities, "day": days},
+        factors={**scene.table.factors, "tail_no": np.full(len(scene.table), "N103")},
+        first_day=start.isoformat(),
+    )
+    moved = cause.adjust(replace(scene, table=table), candidate, 0.01).offset_in
+    assert np.array_equal(moved != 0.0, days >= 10)
+
+
+@pytest.mark.parametrize("name", ["rigging_offset", "date_step"])
+def test_a_change_without_dates_in_the_table_does_nothing(name: str, scene: Scene) -> None:
+    cause = BY_NAME[name]
+    candidate = next(c for c in cause.candidates(scene) if c.setting["day"] is not None)
+    kept = {key: values for key, values in scene.table.quantities.items() if key != "day"}
+    bare = replace(scene, table=replace(scene.table, quantities=kept))
+    assert not np.any(cause.adjust(bare, candidate, 0.01).offset_in)
+
+
+@pytest.mark.parametrize("name", ["elastic_compliance", "thermal_growth"])
+def test_a_missing_cell_makes_a_cause_do_nothing_in_that_row(name: str, gear: Gear, scene: Scene) -> None:
+    cause = BY_NAME[name]
+    column = cause.needs[0]
+    values = scene.table.quantities[column].copy()
+    values[3] = np.nan
+    gap = replace(scene, table=replace(scene.table, quantities={**scene.table.quantities, column: values}))
+    moved = adjusted_worst_case(gear.model, cause.adjust(gap, first(cause, gap), cause.trial)).over_in
+    assert moved[3] == pytest.approx(scene.over_in[3], abs=1e-12)
+
+
+def test_the_contributions_of_the_joints_add_up_to_the_prediction(scene: Scene) -> None:
+    assert scene.contribution_in.sum(axis=1) == pytest.approx(scene.over_in, rel=0.1)

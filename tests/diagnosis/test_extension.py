@@ -1,0 +1,219 @@
+"""An extension is kept in a file, belongs to one geometry, stacks, and changes what a check predicts."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.diagnosis import (
+    CATALOGUE,
+    Candidate,
+    ModelExtension,
+    Scene,
+    Term,
+    load_extension,
+    save_extension,
+    table_from_inspections,
+)
+from mlg_troubleshoot.diagnosis.extension import adjustment_of
+from mlg_troubleshoot.errors import GearFileError, OutputError, TroubleshootError
+from mlg_troubleshoot.gear.adjustment import adjusted_worst_case
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.units import ClearanceConvention
+from mlg_troubleshoot.workflows import CheckOptions, CheckResult, check_inspection
+
+BY_NAME = {cause.name: cause for cause in CATALOGUE}
+HOSTILE = 'N"1\\2 [[terms]] \n# ü № "'
+
+
+def term(name: str, value: float, target: str | None = None, /, **setting: object) -> Term:
+    return Term(Candidate(BY_NAME[name], target, setting), value, (0.9 * value, 1.1 * value))
+
+
+STRETCH = term("elastic_compliance", 2e-6, length="length.F-1")
+RATE = term("calibration_rate", 0.05)
+GAUGE = term("gauge_bias", 0.004, "gauge G-1", value="G-1")
+RIGGED = term("rigging_offset", -0.01, "tail N1", tail="N1", day=12.0, since="2024-03-05")
+CONTACT = term("joint_contact", 0.8, "joints 3,5", pair=(3, 5), room_in=None)
+
+
+def extension(gear: Gear, *terms: Term) -> ModelExtension:
+    return ModelExtension(gear, terms, 0.0031, ("ab" * 32,), 200)
+
+
+def inspection(**changes: object) -> Inspection:
+    plain = Inspection(
+        record_id="R1",
+        tail_no="N1",
+        side=Side.LH,
+        convention=ClearanceConvention.RADIAL,
+        clearance_in=dict.fromkeys(range(1, 11), 0.002),
+        hydraulic_pressure_psi=1000.0,
+        inspection_date=date(2024, 3, 6),
+        gauge_id="G-1",
+    )
+    return replace(plain, **changes)
+
+
+def offset_of(gear: Gear, terms: tuple[Term, ...], **changes: object) -> float:
+    """What terms add to the worst case of one inspection. [in]"""
+    one = inspection(**changes)
+    clearance = np.array([[one.clearance_in[n] for n in gear.joint_numbers]])
+    table = table_from_inspections([one], gear)
+    plain = adjusted_worst_case(gear.model, adjustment_of((), gear.model, table, clearance, gear.discrepancies)).over_in
+    moved = adjusted_worst_case(
+        gear.model, adjustment_of(terms, gear.model, table, clearance, gear.discrepancies)
+    ).over_in
+    return float(moved[0] - plain[0])
+
+
+@pytest.mark.parametrize("saved", [STRETCH, RATE, GAUGE, RIGGED, CONTACT], ids=lambda t: t.candidate.cause.name)
+def test_a_term_comes_back_from_its_file_as_it_was(saved: Term, gear: Gear, tmp_path: Path) -> None:
+    save_extension(extension(gear, saved), tmp_path / "e.toml")
+    (back,) = load_extension([tmp_path / "e.toml"], gear).terms
+    assert (back.value, back.interval) == (saved.value, saved.interval)
+    assert (back.candidate.cause.name, back.candidate.target) == (saved.candidate.cause.name, saved.candidate.target)
+    assert {k: v for k, v in back.candidate.setting.items() if v is not None} == {
+        k: v for k, v in saved.candidate.setting.items() if v is not None
+    }
+
+
+def test_a_term_that_came_back_predicts_the_same(gear: Gear, tmp_path: Path) -> None:
+    terms = (STRETCH, RATE, GAUGE, RIGGED, CONTACT)
+    save_extension(extension(gear, *terms), tmp_path / "e.toml")
+    assert offset_of(gear, load_extension([tmp_path / "e.toml"], gear).terms) == offset_of(gear, terms)
+
+
+def test_hostile_text_comes_back_as_it_was(gear: Gear, tmp_path: Path) -> None:
+    saved = term("rigging_offset", 0.01, f"tail {HOSTILE}", tail=HOSTILE, day=None, since=None)
+    save_extension(extension(gear, saved), tmp_path / "e.toml")
+    (back,) = load_extension([tmp_path / "e.toml"], gear).terms
+    assert (back.candidate.target, back.candidate.setting["tail"]) == (f"tail {HOSTILE}", HOSTILE)
+
+
+def test_the_file_says_on_which_data_and_geometry_it_rests(gear: Gear, tmp_path: Path) -> None:
+    save_extension(extension(gear, RATE), tmp_path / "e.toml")
+    raw = tomllib.loads((tmp_path / "e.toml").read_text(encoding="utf-8"))
+    assert (raw["geometry_sha256"], raw["data_sha256"], raw["rows"]) == (gear.geometry_sha256, ["ab" * 32], 200)
+
+
+def test_the_file_keeps_the_scatter_that_is_left(gear: Gear, tmp_path: Path) -> None:
+    save_extension(extension(gear, RATE), tmp_path / "e.toml")
+    assert load_extension([tmp_path / "e.toml"], gear).residual_u_in == 0.0031
+
+
+def test_an_extension_of_another_geometry_is_refused(gear: Gear, tmp_path: Path) -> None:
+    save_extension(extension(replace(gear, geometry_sha256="0" * 64), RATE), tmp_path / "e.toml")
+    with pytest.raises(GearFileError, match="made on another geometry") as refused:
+        load_extension([tmp_path / "e.toml"], gear)
+    assert "Diagnose again" in refused.value.remedy
+
+
+def test_a_file_that_is_no_extension_is_refused(gear: Gear, tmp_path: Path) -> None:
+    (tmp_path / "e.toml").write_text("schema = 1\n", encoding="utf-8")
+    with pytest.raises(GearFileError, match="not an extension"):
+        load_extension([tmp_path / "e.toml"], gear)
+
+
+@pytest.mark.parametrize(
+    ("written", "instead"),
+    [
+        ("value = 0.05", 'value = "much"'),
+        ("interval_95 = [0.045000000000000005, 0.05500000000000001]", "interval_95 = [0.1]"),
+        ("interval_95 = [0.045000000000000005, 0.05500000000000001]", ""),
+        ('cause = "calibration_rate"', ""),
+        ("[[terms]]", "[terms]"),
+        ("rows = 200", 'rows = "some"'),
+        ("residual_u_in = 0.0031", 'residual_u_in = "small"'),
+    ],
+)
+def test_a_damaged_extension_is_refused_with_its_name(written: str, instead: str, gear: Gear, tmp_path: Path) -> None:
+    file = tmp_path / "e.toml"
+    save_extension(extension(gear, RATE), file)
+    text = file.read_text(encoding="utf-8")
+    assert written in text
+    file.write_text(text.replace(written, instead), encoding="utf-8")
+    with pytest.raises(TroubleshootError, match="e.toml"):
+        load_extension([file], gear)
+
+
+@pytest.mark.parametrize(
+    "damaged", ["gauge_bias", "rigging_offset", "elastic_compliance", "joint_contact", "oval_wear", "approach_hysteresis"]
+)
+def test_a_term_without_its_setting_is_refused(damaged: str, gear: Gear, tmp_path: Path) -> None:
+    file = tmp_path / "e.toml"
+    save_extension(extension(gear, term(damaged, 0.01)), file)
+    with pytest.raises(TroubleshootError, match="e.toml"):
+        load_extension([file], gear)
+
+
+def test_a_cause_that_is_not_known_asks_for_the_file_of_causes(gear: Gear, tmp_path: Path) -> None:
+    file = tmp_path / "e.toml"
+    save_extension(extension(gear, RATE), file)
+    file.write_text(file.read_text(encoding="utf-8").replace("calibration_rate", "moon_phase"), encoding="utf-8")
+    with pytest.raises(GearFileError, match="moon_phase") as refused:
+        load_extension([file], gear)
+    assert "--causes" in refused.value.remedy
+
+
+def test_an_extension_that_cannot_be_written_says_so(gear: Gear, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(OutputError, match="cannot be written"):
+        save_extension(extension(gear, RATE), tmp_path / "file" / "e.toml")
+
+
+def test_offsets_add_up(gear: Gear) -> None:
+    assert offset_of(gear, (GAUGE, RIGGED)) == pytest.approx(0.004 - 0.01, abs=1e-12)
+
+
+def test_files_stack_in_their_order(gear: Gear, tmp_path: Path) -> None:
+    save_extension(extension(gear, GAUGE), tmp_path / "one.toml")
+    save_extension(extension(gear, RIGGED), tmp_path / "two.toml")
+    both = load_extension([tmp_path / "one.toml", tmp_path / "two.toml"], gear)
+    assert offset_of(gear, both.terms) == pytest.approx(0.004 - 0.01, abs=1e-12)
+
+
+def test_stretches_of_one_link_add_up(gear: Gear) -> None:
+    twice = term("elastic_compliance", 4e-6, length="length.F-1")
+    assert offset_of(gear, (STRETCH, STRETCH)) == pytest.approx(offset_of(gear, (twice,)), abs=1e-12)
+
+
+def test_a_missing_column_makes_a_term_do_nothing(gear: Gear) -> None:
+    assert offset_of(gear, (STRETCH,), hydraulic_pressure_psi=None) == 0.0
+
+
+@pytest.mark.parametrize(("day", "moved"), [(date(2024, 3, 4), 0.0), (date(2024, 3, 5), -0.01), (date(2030, 1, 1), -0.01)])
+def test_a_change_since_a_date_acts_in_a_table_that_starts_on_another_day(day: date, moved: float, gear: Gear) -> None:
+    assert offset_of(gear, (RIGGED,), inspection_date=day) == pytest.approx(moved, abs=1e-12)
+
+
+def test_another_tail_is_not_touched(gear: Gear) -> None:
+    assert offset_of(gear, (RIGGED,), tail_no="N2") == 0.0
+
+
+def checked(gear: Gear, *terms: Term) -> CheckResult:
+    options = CheckOptions(extension=extension(gear, *terms) if terms else None)
+    return check_inspection(inspection(), options)
+
+
+def test_a_check_predicts_with_the_extension(gear: Gear) -> None:
+    plain, extended = (checked(gear, *terms).judgements[0] for terms in ((), (GAUGE,)))
+    assert extended.over_travel_in - plain.over_travel_in == pytest.approx(0.004, abs=1e-9)
+
+
+def test_the_model_s_uncertainty_becomes_the_scatter_that_was_left(gear: Gear) -> None:
+    assert checked(gear, GAUGE).judgements[0].budget.model_in == pytest.approx(0.0031)
+
+
+def test_an_extension_describes_itself_in_words(gear: Gear) -> None:
+    assert extension(gear, GAUGE).describe() == "Readings with gauge G-1 are shifted; fitted to 200 measured rows"
+
+
+def test_a_scene_knows_where_a_joint_stands(scene: Scene) -> None:
+    assert scene.place(3) == 2
