@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from rich.console import Console
 from rich.padding import Padding
@@ -21,6 +21,7 @@ from mlg_troubleshoot.decision.assessment import (
     Verdict,
 )
 from mlg_troubleshoot.decision.inspection import Outcome
+from mlg_troubleshoot.decision.wording import percent
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.workflows import CheckResult
@@ -121,12 +122,8 @@ def show_one(judgement: Judgement, gear: Gear) -> None:
     if a.measured_statement is not None:
         body.append(a.measured_statement + "\n", style="bold")
     body.append(a.headline + "\n")
-    if a.geometry_spread_in is not None and a.probability_within_margin is not None:
-        low, high = a.geometry_spread_in
-        body.append(
-            f"Probability that the worst case is within the margin {100 * a.probability_within_margin:.1f} %; "
-            f"the other reconstructed linkages give {low:.4f} to {high:.4f} in.\n"
-        )
+    for sentence in _numbers(a):
+        body.append(sentence + "\n")
     body.append("NEXT: ", style="bold")
     body.append(a.next_action.text, style="bold")
     console.print(
@@ -152,6 +149,20 @@ def show_one(judgement: Judgement, gear: Gear) -> None:
             style="dim",
         )
     )
+
+
+def _numbers(a: Assessment) -> Iterator[str]:
+    """What stands beside the prediction: probability, spread over the linkages, unmeasured joints."""
+    if a.geometry_spread_in is not None and a.probability_within_margin is not None:
+        low, high = a.geometry_spread_in
+        yield (
+            f"Probability that the worst case is within the margin: {percent(a.probability_within_margin)}. "
+            f"The ensemble of reconstructed linkages gives {low:.4f} to {high:.4f} in."
+        )
+    missing = [f.joint for f in a.joints if f.clearance_in is None]
+    if missing:
+        upper = "the linkage does not close" if a.predicted_upper_in is None else f"{a.predicted_upper_in:.4f} in"
+        yield f"Unmeasured joints count as 0 in these numbers; with them at their limit the worst case is: {upper}."
 
 
 def _table(console: Console) -> Table:
@@ -213,7 +224,7 @@ def _repair_table(a: Assessment) -> Table:
             ", ".join(f"#{n}" for n in s.joints),
             f"{s.access_minutes:.0f}",
             f"{s.predicted_displacement_in:.4f}",
-            f"{100 * s.probability_within_margin:.1f} %",
+            percent(s.probability_within_margin),
         )
     return table
 
@@ -300,7 +311,7 @@ def _batch_cells(judgement: Judgement) -> tuple[Text | str, ...]:
         i.record_id,
         "open" if worst is None else f"{worst:.4f}",
         f"{judgement.margin_in:.4f}",
-        "-" if chance is None else f"{100 * chance:.0f} %",
+        "-" if chance is None else percent(chance),
         _next(judgement),
     )
 

@@ -23,6 +23,7 @@ from mlg_troubleshoot.decision.prediction import BatchPrediction, Extension, pre
 from mlg_troubleshoot.decision.ranking import rank_joints
 from mlg_troubleshoot.decision.repair import repair_sets
 from mlg_troubleshoot.decision.rule import verdict
+from mlg_troubleshoot.decision.wording import percent
 from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.studies.table import IndexTable
@@ -197,7 +198,7 @@ def _headline(
 ) -> str:
     if not np.isfinite(displacement):
         return "With these clearances the linkage does not close in its worst position: outside any margin."
-    numbers = f"worst case {displacement:.4f} in, chance with random directions {100 * chance:.0f} %"
+    numbers = f"worst case {displacement:.4f} in, chance with random directions {percent(chance)}"
     if found is Verdict.OUTSIDE_MARGIN:
         return f"Clearances could push the plunger outside its margin of {margin:.4f} in ({numbers})."
     if found is Verdict.WITHIN_MARGIN:
@@ -208,7 +209,7 @@ def _headline(
         return f"Cannot clear: not measured {open_joints} ({numbers} from the measured joints alone)."
     return (
         f"Too close to the margin of {margin:.4f} in to say ({numbers}; "
-        f"probability that the bound is within the margin {100 * p_within:.0f} %)."
+        f"probability that the bound is within the margin {percent(p_within)})."
     )
 
 

@@ -72,9 +72,7 @@ def build_bank(scene: Scene, catalogue: Array) -> Bank:
     keys = list(classes)
     for i, key in enumerate(keys):
         shapes += [(classes[key] * main[b], (key[0], b)) for b in names]
-        shapes += [
-            (classes[key] * classes[other], (key[0], other[0])) for other in keys[i + 1 :] if other[0] != key[0]
-        ]
+        shapes += [(classes[key] * classes[other], (key[0], other[0])) for other in keys[i + 1 :] if other[0] != key[0]]
     return _distinct(shapes, catalogue)
 
 

@@ -202,7 +202,9 @@ def diagnose(
     scene, worst, extra = build_scene(model, table, where)
     catalogue = (*CATALOGUE, *own_causes)
     testable = [cause for cause in catalogue if set(cause.needs) <= set(table.columns)]
-    not_testable = tuple((c.name, next(n for n in c.needs if n not in table.columns)) for c in catalogue if c not in testable)
+    not_testable = tuple(
+        (c.name, next(n for n in c.needs if n not in table.columns)) for c in catalogue if c not in testable
+    )
     candidates = [candidate for cause in testable for candidate in cause.candidates(scene)]
     columns = effect_columns(scene, worst, candidates)
     moving = np.isfinite(columns).all(axis=0) & (np.abs(columns).max(axis=0) > 0.0)
@@ -224,7 +226,21 @@ def diagnose(
         rng,
         progress,
     ).run()
-    return _report(model, table, read, faults, not_testable, candidates, columns, misfit, scene.over_in, finding, seed, permutations, rng)
+    return _report(
+        model,
+        table,
+        read,
+        faults,
+        not_testable,
+        candidates,
+        columns,
+        misfit,
+        scene.over_in,
+        finding,
+        seed,
+        permutations,
+        rng,
+    )
 
 
 def _answerable(table: DiagnosisTable) -> DiagnosisTable:
@@ -253,10 +269,10 @@ def _enough(table: DiagnosisTable) -> None:
     tails = len(np.unique(table.tails))
     if "tail_no" in table.factors and tails < LEAST_TAILS:
         raise InconclusiveDataError(
-            f"all rows are of {tails} aircraft: what is wrong with the model cannot be told from what is special about them",
+            f"all rows are of {tails} aircraft: what is wrong with the model cannot be told from what is theirs alone",
             f"Record inspections of at least {LEAST_TAILS} aircraft.",
         )
-    if np.ptp(worst_range := np.nan_to_num(table.clearance_in).sum(axis=1)) == 0.0 and worst_range[0] == 0.0:
+    if not np.nan_to_num(table.clearance_in).any():
         raise InconclusiveDataError(
             "every clearance is zero, so the prediction is the same everywhere",
             "Record clearances as measured; leave a joint blank that was not measured.",
@@ -281,7 +297,8 @@ def _report(
     named = _named(candidates, columns, finding)
     raw = worst_case(model, np.nan_to_num(table.clearance_in)).over_in
     raw_misfit = table.measured_in - raw
-    gain, terms = None, ()
+    gain: Gain | None = None
+    terms: tuple[Term, ...] = ()
     left = misfit
     if finding.verdict == "NAMED" and finding.fit is not None:
         held = columns[:, list(finding.chosen)]

@@ -243,7 +243,7 @@ def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ())
                 "Diagnose again with this gear, or name the gear that it was made on with --gear.",
             )
         try:
-            added = [_term(entry, file, own) for entry in raw["terms"]]
+            added = [_term(dict(entry), file, own) for entry in raw["terms"]]
             _try_out(added, gear)
             hashes += [str(h) for h in raw["data_sha256"]]
             rows, residual = int(raw["rows"]), float(raw["residual_u_in"])
@@ -275,10 +275,17 @@ def _read(file: Path) -> dict[str, Any]:
     try:
         raw = tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise GearFileError(f"{file}: cannot be read as an extension: {error}", "Give a file that mlg diagnose wrote.") from error
-    missing = [k for k in ("schema", "geometry_sha256", "data_sha256", "rows", "residual_u_in", "terms") if k not in raw]
+        raise GearFileError(
+            f"{file}: cannot be read as an extension: {error}", "Give a file that mlg diagnose wrote."
+        ) from error
+    missing = [
+        k for k in ("schema", "geometry_sha256", "data_sha256", "rows", "residual_u_in", "terms") if k not in raw
+    ]
     if missing or raw["schema"] != SCHEMA:
-        raise GearFileError(f"{file}: not an extension: {', '.join(missing) or 'schema'} missing or unknown", "Give a file that mlg diagnose wrote.")
+        raise GearFileError(
+            f"{file}: not an extension: {', '.join(missing) or 'schema'} missing or unknown",
+            "Give a file that mlg diagnose wrote.",
+        )
     return raw
 
 

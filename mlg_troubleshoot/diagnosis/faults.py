@@ -179,7 +179,9 @@ def _reading_spread(table: DiagnosisTable) -> Array:
 def _gathers(table: DiagnosisTable, misfit: Array, centre: float, scale: float, place: int) -> bool:
     """Tell whether other rows of the same tail, gauge or technician stand out alike: then it is an effect."""
     off = misfit[place] - centre
-    alike = np.isfinite(misfit) & (np.sign(misfit - centre) == np.sign(off)) & (np.abs(misfit - centre) > 0.4 * abs(off))
+    alike = (
+        np.isfinite(misfit) & (np.sign(misfit - centre) == np.sign(off)) & (np.abs(misfit - centre) > 0.4 * abs(off))
+    )
     alike &= np.abs(misfit - centre) < 2.5 * abs(off)
     for name in ("tail_no", "gauge_id", "technician_id"):
         texts = table.factors.get(name)
@@ -276,9 +278,7 @@ def _surprise(values: Sequence[float], typical: Sequence[float]) -> float:
     return total
 
 
-def _slips(
-    model: LinkageModel, table: DiagnosisTable, expected: Array, place: int, clearance: Array
-) -> list[_Slip]:
+def _slips(model: LinkageModel, table: DiagnosisTable, expected: Array, place: int, clearance: Array) -> list[_Slip]:
     written, readings = table.clearance_in[place], table.readings_in[place]
     seen = readings[np.isfinite(readings)]
     measured = float(np.median(seen))
@@ -288,7 +288,7 @@ def _slips(
     def name(j: int) -> str:
         return f"clearance_{model.joint_numbers[j]}_in"
 
-    known = np.flatnonzero(np.isfinite(written))
+    known = [int(j) for j in np.flatnonzero(np.isfinite(written))]
     for j in known:
         for kind, factor in (("mm_as_in", 1.0 / MM_PER_IN), ("factor_10", 0.1), ("factor_10", 10.0)):
             right = float(written[j] * factor)
@@ -309,8 +309,8 @@ def _slips(
             pair = [typical[a], typical[b]]
             evidence = _surprise([written[a], written[b]], pair) - _surprise([written[b], written[a]], pair)
             cells = (
-                (name(int(a)), float(written[a]), float(written[b])),
-                (name(int(b)), float(written[b]), float(written[a])),
+                (name(a), float(written[a]), float(written[b])),
+                (name(b), float(written[b]), float(written[a])),
             )
             slips.append(_Slip("swapped_joints", new, measured, cells, evidence))
     for k in np.flatnonzero(np.isfinite(readings)):
@@ -330,15 +330,15 @@ def _slips(
                 slips.append(_Slip(kind, clearance.copy(), agreed, ((column, float(readings[k]), right),), 3.0))
         if len(others):
             column = f"plunger_displacement{_suffix(int(k))}_in"
-            cells_ = ((column, float(readings[k]), None),)
-            slips.append(_Slip("implausible", clearance.copy(), float(np.mean(others)), cells_, 3.0))
+            wrong = ((column, float(readings[k]), None),)
+            slips.append(_Slip("implausible", clearance.copy(), float(np.mean(others)), wrong, 3.0))
     for factor, kind in ((1.0 / MM_PER_IN, "mm_as_in"), (0.1, "factor_10")):
         if len(seen) > 1:
-            cells_ = tuple(
+            all_cells = tuple(
                 (f"plunger_displacement{_suffix(int(k))}_in", float(readings[k]), float(readings[k] * factor))
                 for k in np.flatnonzero(np.isfinite(readings))
             )
-            slips.append(_Slip(kind, clearance.copy(), measured * factor, cells_, 3.0))
+            slips.append(_Slip(kind, clearance.copy(), measured * factor, all_cells, 3.0))
     return slips
 
 
@@ -365,15 +365,11 @@ def _swapped_sides(table: DiagnosisTable) -> tuple[list[DataFault], DiagnosisTab
         if len(off) == 1:
             row, own, other = off[0]
             corrected[row] = other
-            found.append(
-                DataFault(row, int(table.row[row]), table.record_id[row], "side", "swapped_side", own, other)
-            )
+            found.append(DataFault(row, int(table.row[row]), table.record_id[row], "side", "swapped_side", own, other))
     return found, replace(table, factors={**table.factors, "side": corrected}) if found else table
 
 
-def _on_the_other_line(
-    day: Array, landings: Array, row: int, own: NDArray[np.intp], other: NDArray[np.intp]
-) -> bool:
+def _on_the_other_line(day: Array, landings: Array, row: int, own: NDArray[np.intp], other: NDArray[np.intp]) -> bool:
     mine = own[own != row]
     at_own, u_own = _line(day[mine], landings[mine], float(day[row]))
     at_other, u_other = _line(day[other], landings[other], float(day[row]))

@@ -179,7 +179,7 @@ class Inference:
     def _smallest(self, at_random: Array, scale: float) -> float:
         """Effect whose expected gain clears the alarm with four chances in five: (t − 0.84)² / 2 = bar."""
         bar = float(np.quantile(at_random, 1.0 - ALARM)) + float(np.median(self.penalty))
-        return scale * (np.sqrt(2.0 * max(bar, 0.0)) + 0.84) / np.sqrt(len(self.misfit))
+        return float(scale * (np.sqrt(2.0 * max(bar, 0.0)) + 0.84) / np.sqrt(len(self.misfit)))
 
     def _named(self, lead: int, p_alarm: float, smallest: float) -> Finding:
         constant = self._constant(lead)
@@ -247,7 +247,9 @@ class Inference:
         noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends)
         columns = self.columns[:, list(chosen)]
         fitted = fit(noise, columns, self.misfit)
-        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends, columns @ fitted.values)
+        noise, _ = build_noise(
+            self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends, columns @ fitted.values
+        )
         return noise, fit(noise, columns, self.misfit)
 
     def _second(self, chosen: list[int], least_share: float) -> tuple[list[int], float] | None:
@@ -269,26 +271,26 @@ class Inference:
         for place, first in enumerate(pool):
             same = [i for i, c in enumerate(self.candidates) if c.key == self.candidates[first].key]
             together[same, place] = -np.inf
-        partner, place = np.unravel_index(int(np.argmax(together)), together.shape)
-        if not np.isfinite(together[partner, place]):
+        partner, beside = divmod(int(np.argmax(together)), together.shape[1])
+        best = float(together[partner, beside])
+        if not np.isfinite(best):
             return None
-        best = (float(together[partner, place]), pool[int(place)], int(partner))
-        pair = [best[1], best[2]]
+        pair = [pool[beside], partner]
         pair.sort(key=lambda k: -single[k])
         _noise, fitted = self._refit(pair)
-        wrong = [
-            self.signs[k] != 0 and np.sign(v) != self.signs[k] for k, v in zip(pair, fitted.values, strict=True)
-        ]
+        wrong = [self.signs[k] != 0 and np.sign(v) != self.signs[k] for k, v in zip(pair, fitted.values, strict=True)]
         if any(wrong):
             return None
-        sizes = [float(np.sqrt(np.mean((self.columns[:, k] * v) ** 2))) for k, v in zip(pair, fitted.values, strict=True)]
+        sizes = [
+            float(np.sqrt(np.mean((self.columns[:, k] * v) ** 2))) for k, v in zip(pair, fitted.values, strict=True)
+        ]
         if min(sizes) < least_share * max(sizes):
             return None
         held = Screen(noise, self.columns, self.signs, self.columns[:, [pair[0]]])
         ratio, scale = held.tail_ratio(self.misfit)
         null = self._null(noise, ratio, scale)
         at_random = np.max(held.run(null).gain - self.penalty[:, None], axis=0)
-        observed = float(best[0] - np.max(single))
+        observed = best - float(np.max(single))
         p = _chance(at_random, observed)
         return (pair, p) if p <= SECOND else None
 
@@ -320,11 +322,9 @@ class Inference:
 
     def _alike(self, a: int, b: int) -> bool:
         first, second = self.columns[:, a], self.columns[:, b]
-        return abs(first @ second) > ALIKE * float(np.linalg.norm(first) * np.linalg.norm(second))
+        return abs(float(first @ second)) > ALIKE * float(np.linalg.norm(first) * np.linalg.norm(second))
 
-    def _remainder(
-        self, noise: NoiseModel, chosen: Sequence[int], fitted: Fit
-    ) -> tuple[float, tuple[str, ...], bool]:
+    def _remainder(self, noise: NoiseModel, chosen: Sequence[int], fitted: Fit) -> tuple[float, tuple[str, ...], bool]:
         """Chance of the strongest shape in what is left, its variables, and whether it refutes what is named.
 
         A large remainder of any shape does; a smaller one does if it moves with the named cause's own variable.

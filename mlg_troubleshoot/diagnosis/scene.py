@@ -114,9 +114,7 @@ def _resolution(values: Array) -> float:
     return step if step >= 1e-4 and bool(np.mean(on_grid) > 0.9) else 0.0
 
 
-def build_scene(
-    model: LinkageModel, table: DiagnosisTable, where: Discrepancies
-) -> tuple[Scene, WorstCase, Array]:
+def build_scene(model: LinkageModel, table: DiagnosisTable, where: Discrepancies) -> tuple[Scene, WorstCase, Array]:
     """Predict every row with the plain model.
 
     Parameters
@@ -148,9 +146,7 @@ def build_scene(
         if np.any(u_clearance[:, j] > 0):
             moved = clearance.copy()
             moved[:, j] += 1e-5
-            slopes[:, j] = (
-                model.displacement(links_from(moved, worst.over_directions)) - worst.over_in
-            ) / 1e-5
+            slopes[:, j] = (model.displacement(links_from(moved, worst.over_directions)) - worst.over_in) / 1e-5
     scene = Scene(model, table, clearance, model.joint_numbers, where, worst.over_in, contribution)
     return scene, worst, np.sqrt(np.sum((slopes * u_clearance) ** 2, axis=1))
 

@@ -154,13 +154,13 @@ def table_from_inspections(inspections: Sequence[Inspection], gear: Gear) -> Dia
     days = [None if i.inspection_date is None else i.inspection_date.toordinal() for i in inspections]
     known = [day for day in days if day is not None]
     first = min(known) if known else None
-    quantities = {
+    quantities: dict[str, list[float | None]] = {
         "temperature_c": [i.temperature_c for i in inspections],
         "hydraulic_pressure_psi": [i.hydraulic_pressure_psi for i in inspections],
         "gear_landings": [i.gear_landings for i in inspections],
         "day": [None if day is None or first is None else day - first for day in days],
     }
-    factors = {
+    factors: dict[str, list[str]] = {
         "tail_no": [i.tail_no for i in inspections],
         "side": [str(i.side) for i in inspections],
         "gauge_id": [i.gauge_id or "" for i in inspections],

@@ -360,7 +360,8 @@ def _plots(residuals: Residuals) -> list[PlotPair]:
             )
             for c in d.also_possible[:_MOST_PANELS]
         ]
-        return [{"left": panels[0], "right": panels[-1], "caption": "Two of the causes that cannot be told apart"}]
+        right = panels[1] if len(panels) > 1 else drawn.measured_against_predicted(residuals)
+        return [{"left": panels[0], "right": right, "caption": "What the data cannot tell apart"}]
     if d.unlisted_variables:
         return [_unlisted_plots(residuals, d.unlisted_variables)]
     left = drawn.residual_plot(before, drawn.against_column(residuals, "predicted"), axis, "")

@@ -144,7 +144,8 @@ def test_a_damaged_extension_is_refused_with_its_name(written: str, instead: str
 
 
 @pytest.mark.parametrize(
-    "damaged", ["gauge_bias", "rigging_offset", "elastic_compliance", "joint_contact", "oval_wear", "approach_hysteresis"]
+    "damaged",
+    ["gauge_bias", "rigging_offset", "elastic_compliance", "joint_contact", "oval_wear", "approach_hysteresis"],
 )
 def test_a_term_without_its_setting_is_refused(damaged: str, gear: Gear, tmp_path: Path) -> None:
     file = tmp_path / "e.toml"
@@ -188,7 +189,9 @@ def test_a_missing_column_makes_a_term_do_nothing(gear: Gear) -> None:
     assert offset_of(gear, (STRETCH,), hydraulic_pressure_psi=None) == 0.0
 
 
-@pytest.mark.parametrize(("day", "moved"), [(date(2024, 3, 4), 0.0), (date(2024, 3, 5), -0.01), (date(2030, 1, 1), -0.01)])
+@pytest.mark.parametrize(
+    ("day", "moved"), [(date(2024, 3, 4), 0.0), (date(2024, 3, 5), -0.01), (date(2030, 1, 1), -0.01)]
+)
 def test_a_change_since_a_date_acts_in_a_table_that_starts_on_another_day(day: date, moved: float, gear: Gear) -> None:
     assert offset_of(gear, (RIGGED,), inspection_date=day) == pytest.approx(moved, abs=1e-12)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.gear.adjustment import Adjustment
@@ -177,14 +177,14 @@ def filled(values: Array, neutral: float) -> Array:
     return np.where(np.isfinite(values), values, neutral)
 
 
-def offset(scene: Scene, where: Array, value: float) -> Adjustment:
+def offset(scene: Scene, where: ArrayLike, value: float) -> Adjustment:
     """Return a displacement that comes on top in some rows.
 
     Parameters
     ----------
     scene : Scene
         Model and rows.
-    where : ndarray, shape (n,)
+    where : array_like, shape (n,)
         1 in the rows that it acts on, 0 elsewhere, or a share. [1]
     value : float
         The displacement. [in]

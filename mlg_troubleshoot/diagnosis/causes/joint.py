@@ -10,7 +10,6 @@ import numpy as np
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.gear.adjustment import Adjustment
 
-
 _ROOM_QUANTILES = (0.05, 0.3, 0.6, 0.8)
 
 
@@ -53,7 +52,9 @@ class OvalWear(_JointShare):
     name: ClassVar[str] = "oval_wear"
     trial: ClassVar[float] = 0.1
     sign: ClassVar[int] = 1
-    sentence: ClassVar[str] = "The bore of {target} is oval: its clearance in the load direction is larger than measured"
+    sentence: ClassVar[str] = (
+        "The bore of {target} is oval: its clearance in the load direction is larger than measured"
+    )
     inspect: ClassVar[str] = "Bore of that joint in two directions"
     separates: ClassVar[str] = "the bore of that joint measured across and along the load"
 

@@ -24,7 +24,9 @@ class OutOfPlaneTilt(Cause):
     sign: ClassVar[int] = 1
     sentence: ClassVar[str] = "End float lets links tilt out of their plane, which shortens them"
     inspect: ClassVar[str] = "End float and thrust washers of the short link, the locking lever and the link assembly"
-    separates: ClassVar[str] = "end float of joints 3, 4 and 5, and one plunger reading with the float taken up by shims"
+    separates: ClassVar[str] = (
+        "end float of joints 3, 4 and 5, and one plunger reading with the float taken up by shims"
+    )
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield one candidate where the gear says which floats tilt which link."""

@@ -118,7 +118,9 @@ class ApproachHysteresis(Cause):
     parameter: ClassVar[str] = "extending_minus_retracting_in"
     trial: ClassVar[float] = 0.001
     sentence: ClassVar[str] = "Lost motion: the reading depends on the direction of approach"
-    inspect: ClassVar[str] = "Approach mid-position always in the same direction; look for friction in the link assembly"
+    inspect: ClassVar[str] = (
+        "Approach mid-position always in the same direction; look for friction in the link assembly"
+    )
     separates: ClassVar[str] = "one gear read twice, approached extending and retracting"
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
@@ -177,7 +179,11 @@ class RiggingOffset(Cause):
         if "side" in table.factors:
             gears = table.gears
             groups += [
-                (f"tail {v}", {"tail": str(tails[gears == v][0]), "side": str(table.factors["side"][gears == v][0])}, gears == v)
+                (
+                    f"tail {v}",
+                    {"tail": str(tails[gears == v][0]), "side": str(table.factors["side"][gears == v][0])},
+                    gears == v,
+                )
                 for v in levels(gears)
                 if np.unique(gears[tails == tails[gears == v][0]]).size > 1
             ]

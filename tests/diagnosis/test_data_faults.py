@@ -1,0 +1,159 @@
+"""Slips of the pen are shown and repaired in the analysis only; what gathers in one tail is an effect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.diagnosis import DiagnosisTable, diagnose
+from mlg_troubleshoot.diagnosis.faults import screen_faults
+from mlg_troubleshoot.gear.gear import Gear
+
+from .conftest import fleet
+
+ROW = 40
+Slip = Callable[[DiagnosisTable], DiagnosisTable]
+
+
+def clearance(factor: float) -> Slip:
+    """Write the clearance of joint 3 in one row wrong by a factor."""
+
+    def slip(table: DiagnosisTable) -> DiagnosisTable:
+        values = table.clearance_in.copy()
+        values[ROW, 2] *= factor
+        return replace(table, clearance_in=values)
+
+    return slip
+
+
+def readings(factor: float, place: slice = slice(None)) -> Slip:
+    """Write plunger readings of one row wrong by a factor."""
+
+    def slip(table: DiagnosisTable) -> DiagnosisTable:
+        values = table.readings_in.copy()
+        values[ROW, place] *= factor
+        return replace(table, readings_in=values)
+
+    return slip
+
+
+def swapped(table: DiagnosisTable) -> DiagnosisTable:
+    """Swap joints 3 and 8 in one row whose clearances are made to differ."""
+    values = table.clearance_in.copy()
+    values[ROW, 2], values[ROW, 7] = values[ROW, 7], values[ROW, 2]
+    return replace(table, clearance_in=values)
+
+
+@pytest.fixture(scope="module")
+def sound(gear: Gear) -> DiagnosisTable:
+    """A fleet with nothing wrong, one row of which has a large and a small clearance, as its gear always has."""
+    table = fleet(gear.model)
+    values = table.clearance_in.copy()
+    own = table.gears == table.gears[ROW]
+    values[own, 2], values[own, 7] = 0.011, 0.0012
+    over = fleet(gear.model, clearance_in=values)
+    return over
+
+
+def faults(gear: Gear, table: DiagnosisTable) -> list[tuple[int, str, str]]:
+    return [(f.place, f.column, f.kind) for f in screen_faults(gear.model, table)[1]]
+
+
+def test_a_sound_fleet_has_no_faults(gear: Gear, sound: DiagnosisTable) -> None:
+    assert faults(gear, sound) == []
+
+
+@pytest.mark.parametrize(
+    ("slip", "column", "kind"),
+    [
+        (clearance(25.4), "clearance_3_in", "mm_as_in"),
+        (clearance(10.0), "clearance_3_in", "factor_10"),
+        (clearance(0.1), "clearance_3_in", "factor_10"),
+        (readings(25.4, slice(0, 1)), "plunger_displacement_in", "mm_as_in"),
+        (readings(25.4, slice(1, 2)), "plunger_displacement_2_in", "mm_as_in"),
+        (readings(10.0, slice(1, 2)), "plunger_displacement_2_in", "factor_10"),
+    ],
+    ids=["clearance mm", "clearance x 10", "clearance / 10", "reading mm", "second reading mm", "reading x 10"],
+)
+def test_a_slip_is_found_in_its_cell(slip: Slip, column: str, kind: str, gear: Gear, sound: DiagnosisTable) -> None:
+    assert faults(gear, slip(sound)) == [(ROW, column, kind)]
+
+
+def test_all_readings_of_a_row_in_millimetres_are_found(gear: Gear, sound: DiagnosisTable) -> None:
+    assert {(place, kind) for place, _column, kind in faults(gear, readings(25.4)(sound))} == {(ROW, "mm_as_in")}
+
+
+def test_two_swapped_joints_are_found_together(gear: Gear, sound: DiagnosisTable) -> None:
+    assert faults(gear, swapped(sound)) == [
+        (ROW, "clearance_3_in", "swapped_joints"),
+        (ROW, "clearance_8_in", "swapped_joints"),
+    ]
+
+
+def test_the_row_and_the_record_of_the_source_are_named(gear: Gear, sound: DiagnosisTable) -> None:
+    (fault,) = screen_faults(gear.model, clearance(25.4)(sound))[1]
+    assert (fault.row, fault.record_id) == (sound.row[ROW], sound.record_id[ROW])
+
+
+def test_the_suggestion_is_what_was_meant(gear: Gear, sound: DiagnosisTable) -> None:
+    (fault,) = screen_faults(gear.model, clearance(25.4)(sound))[1]
+    assert fault.suggested is not None
+    assert float(fault.suggested) == pytest.approx(0.011, abs=1e-5)
+
+
+def test_the_repair_is_in_the_analysis_only(gear: Gear, sound: DiagnosisTable) -> None:
+    table = clearance(25.4)(sound)
+    before = table.clearance_in.copy()
+    repaired = screen_faults(gear.model, table)[0]
+    assert np.array_equal(table.clearance_in, before)
+    assert repaired.clearance_in[ROW, 2] == pytest.approx(0.011, abs=1e-5)
+
+
+def test_other_cells_are_not_touched(gear: Gear, sound: DiagnosisTable) -> None:
+    repaired = screen_faults(gear.model, clearance(25.4)(sound))[0]
+    others = np.ones(sound.clearance_in.shape, bool)
+    others[ROW, 2] = False
+    assert np.array_equal(repaired.clearance_in[others], sound.clearance_in[others])
+
+
+def test_a_fault_does_not_become_a_cause(gear: Gear, sound: DiagnosisTable) -> None:
+    assert diagnose(gear.model, clearance(25.4)(sound), gear.discrepancies, permutations=199).verdict == "NONE"
+
+
+def test_rows_that_stand_out_in_one_tail_are_an_effect(gear: Gear) -> None:
+    table = fleet(gear.model, lambda t, _over: np.where(t.factors["tail_no"] == "N104", 0.03, 0.0))
+    assert faults(gear, table) == []
+
+
+def test_rows_that_stand_out_with_one_gauge_are_an_effect(gear: Gear) -> None:
+    gauges = np.where(np.arange(120) % 30 == 4, "G-9", "G-1")
+    factors = {**fleet(gear.model).factors, "gauge_id": gauges}
+    table = fleet(
+        gear.model, lambda t, _over: np.where(t.factors["gauge_id"] == "G-9", 0.03, 0.0), factors=factors
+    )
+    assert faults(gear, table) == []
+
+
+def test_a_row_without_explanation_is_implausible_and_not_used(gear: Gear, sound: DiagnosisTable) -> None:
+    values = sound.readings_in.copy()
+    values[ROW] = -0.9
+    _table, found, usable = screen_faults(gear.model, replace(sound, readings_in=values))
+    assert {f.kind for f in found} == {"implausible"}
+    assert not usable[ROW]
+
+
+def test_a_side_that_was_swapped_is_found_by_its_landings(gear: Gear) -> None:
+    table = fleet(gear.model)
+    day = table.quantities["day"]
+    landings = np.where(table.factors["side"] == "LH", 200.0, 2000.0) + 1.1 * day
+    side = table.factors["side"].copy()
+    side[ROW] = "RH" if side[ROW] == "LH" else "LH"
+    wrong = replace(
+        table,
+        quantities={**table.quantities, "gear_landings": landings},
+        factors={**table.factors, "side": side},
+    )
+    assert faults(gear, wrong) == [(ROW, "side", "swapped_side")]

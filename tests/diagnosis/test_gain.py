@@ -1,0 +1,163 @@
+"""The gain is measured on rows that the fit never saw, tail by tail."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.diagnosis import Diagnosis, diagnose
+from mlg_troubleshoot.diagnosis import gain as gain_module
+from mlg_troubleshoot.diagnosis.screen import fit
+from mlg_troubleshoot.gear.gear import Gear
+
+from .conftest import Array, DiagnosisTable, fleet
+
+
+def biased_gauge(table: DiagnosisTable, _over: Array) -> Array:
+    return np.where(table.factors["gauge_id"] == "G-2", 0.006, 0.0)
+
+
+def rigged_tail(table: DiagnosisTable, _over: Array) -> Array:
+    return np.where(table.factors["tail_no"] == "N103", 0.012, 0.0)
+
+
+@pytest.fixture(scope="module")
+def table(gear: Gear) -> DiagnosisTable:
+    """A fleet with one gauge that reads 6 thou more."""
+    return fleet(gear.model, biased_gauge)
+
+
+@pytest.fixture(scope="module")
+def found(gear: Gear, table: DiagnosisTable) -> Diagnosis:
+    """What the diagnosis says of it."""
+    return diagnose(gear.model, table, gear.discrepancies, permutations=199)
+
+
+@pytest.fixture
+def fitted_tails(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
+    """Numbers of rows that each fit of the cross-validation saw."""
+    seen: list[int] = []
+
+    def watched(noise: object, columns: Array, data: Array) -> object:
+        seen.append(len(data))
+        return fit(noise, columns, data)
+
+    monkeypatch.setattr(gain_module, "fit", watched)
+    yield seen
+
+
+def test_the_cause_is_named(found: Diagnosis) -> None:
+    assert [(c.candidate.cause.name, c.candidate.target) for c in found.causes] == [("gauge_bias", "gauge G-2")]
+
+
+def test_the_fitted_number_is_near_the_true_one(found: Diagnosis) -> None:
+    assert found.causes[0].value == pytest.approx(0.006, abs=0.001)
+
+
+def test_the_interval_holds_the_true_number(found: Diagnosis) -> None:
+    low, high = found.causes[0].interval
+    assert low < 0.006 < high
+
+
+def test_rows_of_one_tail_are_held_out_together(gear: Gear, table: DiagnosisTable, fitted_tails: list[int]) -> None:
+    diagnose(gear.model, table, gear.discrepancies, permutations=99)
+    # Ten tails of twelve rows: each fit leaves out whole tails.
+    assert fitted_tails
+    assert {len(table) - rows for rows in fitted_tails} == {12}
+
+
+def test_a_cause_of_one_aircraft_is_held_out_row_by_row(gear: Gear) -> None:
+    rigged = diagnose(gear.model, fleet(gear.model, rigged_tail), gear.discrepancies, permutations=199)
+    assert [c.candidate.cause.name for c in rigged.causes] == ["rigging_offset"]
+    assert rigged.gain is not None
+    assert rigged.gain.held_out_by == "row"
+
+
+def test_what_is_held_out_is_said(found: Diagnosis) -> None:
+    assert found.gain is not None
+    assert found.gain.held_out_by == "tail"
+
+
+def test_the_held_out_misfit_falls(found: Diagnosis) -> None:
+    assert found.gain is not None
+    assert found.gain.rms_after_in < 0.6 * found.gain.rms_before_in
+
+
+def test_the_share_removed_has_an_interval_above_zero(found: Diagnosis) -> None:
+    assert found.gain is not None
+    low, high = found.gain.share_interval
+    assert 0.0 < low < high < 1.0
+
+
+def test_decisions_are_counted_against_what_was_measured(found: Diagnosis) -> None:
+    assert found.gain is not None
+    outside = np.abs(found.used.measured_in) > found.used.margin_in
+    said_within = np.abs(found.predicted_in) <= found.used.margin_in
+    assert found.gain.false_within_before == np.sum(said_within & outside)
+    assert found.gain.false_outside_before == np.sum(~said_within & ~outside)
+
+
+def test_no_gain_is_claimed_where_nothing_is_named(gear: Gear, plain: DiagnosisTable) -> None:
+    nothing = diagnose(gear.model, plain, gear.discrepancies, permutations=199)
+    assert (nothing.verdict, nothing.gain, nothing.terms) == ("NONE", None, ())
+
+
+def test_nothing_found_says_what_would_have_been_found(gear: Gear, plain: DiagnosisTable) -> None:
+    nothing = diagnose(gear.model, plain, gear.discrepancies, permutations=199)
+    assert 0.0 < nothing.smallest_rms_in < 0.002
+
+
+@pytest.mark.parametrize("part", ["verdict", "causes", "gain", "remainder_p"])
+def test_the_same_seed_gives_the_same_diagnosis(part: str, gear: Gear, table: DiagnosisTable) -> None:
+    one, two = (diagnose(gear.model, table, gear.discrepancies, permutations=99, seed=3) for _ in range(2))
+    assert repr(getattr(one, part)) == repr(getattr(two, part))
+
+
+def test_the_seed_stands_in_the_result(gear: Gear, table: DiagnosisTable) -> None:
+    assert diagnose(gear.model, table, gear.discrepancies, permutations=99, seed=3).seed == 3
+
+
+def test_the_order_of_the_rows_does_not_matter_to_the_name(gear: Gear, table: DiagnosisTable) -> None:
+    turned = table.take(np.arange(len(table))[::-1])
+    found = diagnose(gear.model, turned, gear.discrepancies, permutations=199)
+    assert [(c.candidate.cause.name, c.candidate.target) for c in found.causes] == [("gauge_bias", "gauge G-2")]
+
+
+def test_a_cause_whose_column_is_missing_is_not_testable(gear: Gear, plain: DiagnosisTable) -> None:
+    bare = fleet(gear.model, quantities={}, factors={"tail_no": plain.factors["tail_no"]}, axial_float_in=None)
+    found = diagnose(gear.model, bare, gear.discrepancies, permutations=99)
+    assert dict(found.not_testable) == {
+        "out_of_plane_tilt": "axial_float",
+        "elastic_compliance": "hydraulic_pressure_psi",
+        "thermal_growth": "temperature_c",
+        "unlisted_wear": "gear_landings",
+        "date_step": "day",
+        "gauge_bias": "gauge_id",
+        "technician_bias": "technician_id",
+        "side_difference": "side",
+        "approach_hysteresis": "approach",
+    }
+
+
+def test_repeat_readings_tell_the_repeatability(found: Diagnosis) -> None:
+    assert found.repeatability_source == "repeat readings"
+    assert found.repeatability_in == pytest.approx(0.00075, rel=0.2)
+
+
+def test_without_repeat_readings_the_declared_one_is_marked(gear: Gear) -> None:
+    table = fleet(gear.model, plunger_gauge_u_in=np.full(120, 0.002))
+    single = diagnose(gear.model, _one_reading(table), gear.discrepancies, permutations=99)
+    assert (single.repeatability_in, single.repeatability_source) == (0.002, "declared")
+
+
+def test_without_either_it_is_unknown(gear: Gear) -> None:
+    single = diagnose(gear.model, _one_reading(fleet(gear.model)), gear.discrepancies, permutations=99)
+    assert (single.repeatability_in, single.repeatability_source) == (None, "unknown")
+
+
+def _one_reading(table: DiagnosisTable) -> DiagnosisTable:
+    from dataclasses import replace
+
+    return replace(table, readings_in=table.readings_in[:, :1])
