@@ -1,0 +1,125 @@
+"""Maintenance troubleshooting decision support for the joints of a landing gear.
+
+From a notebook or a script, everything that ``mlg`` does, without a terminal:
+
+>>> from mlg_troubleshoot import ClearanceConvention, Inspection, Side, check, load_gear, predict
+>>> gear = load_gear()
+>>> worst = predict({3: 0.013, 5: 0.007}, gear)
+>>> print(f"{worst.over_in[0]:+.4f} in, {worst.under_in[0]:+.4f} in")
++0.0472 in, -0.0429 in
+>>> found = check(
+...     Inspection("R1", "N123", Side.LH, ClearanceConvention.RADIAL, clearance_in={3: 0.013, 5: 0.007}), gear
+... )
+>>> print(found.verdict, [joint.joint for joint in found.ranked][:2])
+OUTSIDE_MARGIN [3, 5]
+
+Clearances inside are radial, in inches: :func:`parse_length` reads them as people write them, and a reading
+taken as bore minus pin or as total play is divided by ``ClearanceConvention.per_radial``.
+
+=======================  ==============================================================
+load_gear, Gear          a shipped gear, or a gear file of your own
+predict                  worst displacement of the plunger, for one gear or a batch
+Inspection, check        one inspection, and what the decision rule says about it
+check_files              whole tables: CSV, xlsx, xls, ods
+write_reports            printable reports of a checked table
+diagnose_files           measured against predicted: cause, extension, gain
+write_extension          the extension of a diagnosis, for `load_model_extension`
+load_index_table         precomputed sensitivity and amplification indices of a gear
+schema                   JSON Schema of what a command writes with ``--json``
+=======================  ==============================================================
+
+Names are imported when they are first used, so that importing the package stays fast.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.decision.assessment import Assessment, Verdict
+    from mlg_troubleshoot.decision.inspection import Inspection, Outcome, Side
+    from mlg_troubleshoot.errors import TroubleshootError
+    from mlg_troubleshoot.gear.gear import Gear
+    from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
+    from mlg_troubleshoot.schemas import schema
+    from mlg_troubleshoot.studies.table import load_index_table
+    from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, parse_length
+    from mlg_troubleshoot.workflows import (
+        CheckOptions,
+        CheckResult,
+        DiagnoseOptions,
+        DiagnoseResult,
+        check,
+        check_files,
+        diagnose_files,
+        load_model_extension,
+        predict,
+        write_extension,
+        write_reports,
+    )
+
+_HOME = {
+    "decision.assessment": ("Assessment", "Verdict"),
+    "decision.inspection": ("Inspection", "Outcome", "Side"),
+    "errors": ("TroubleshootError",),
+    "gear.gear": ("Gear",),
+    "gear.gear_file": ("load_gear", "shipped_gears"),
+    "schemas": ("schema",),
+    "studies.table": ("load_index_table",),
+    "units": ("ClearanceConvention", "LengthUnit", "parse_length"),
+    "workflows": (
+        "CheckOptions",
+        "CheckResult",
+        "DiagnoseOptions",
+        "DiagnoseResult",
+        "check",
+        "check_files",
+        "diagnose_files",
+        "load_model_extension",
+        "predict",
+        "write_extension",
+        "write_reports",
+    ),
+}
+_MODULES = {name: module for module, names in _HOME.items() for name in names}
+
+__all__ = [
+    "Assessment",
+    "CheckOptions",
+    "CheckResult",
+    "ClearanceConvention",
+    "DiagnoseOptions",
+    "DiagnoseResult",
+    "Gear",
+    "Inspection",
+    "LengthUnit",
+    "Outcome",
+    "Side",
+    "TroubleshootError",
+    "Verdict",
+    "check",
+    "check_files",
+    "diagnose_files",
+    "load_gear",
+    "load_index_table",
+    "load_model_extension",
+    "parse_length",
+    "predict",
+    "schema",
+    "shipped_gears",
+    "write_extension",
+    "write_reports",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value: object = getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

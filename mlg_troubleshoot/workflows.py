@@ -9,6 +9,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from mlg_troubleshoot.decision.assess import AssessOptions, assess
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Verdict
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, Side
@@ -16,6 +19,7 @@ from mlg_troubleshoot.decision.next_action import next_to_measure
 from mlg_troubleshoot.decision.prediction import Extension
 from mlg_troubleshoot.decision.ranking import rank_joints
 from mlg_troubleshoot.errors import InconclusiveDataError, OutputError, Problem, TroubleshootError, UsageError
+from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
 from mlg_troubleshoot.studies.table import load_index_table
@@ -196,6 +200,78 @@ def check_inspection(inspection: Inspection, options: CheckOptions) -> CheckResu
         One judgement.
     """
     return _judge(load_gear(options.gear), (inspection,), (), (), {}, options, None)
+
+
+def check(
+    inspection: Inspection,
+    gear: Gear | str | Path = DEFAULT_GEAR,
+    *,
+    repairs: bool = True,
+    extension: Extension | None = None,
+) -> Assessment:
+    """Judge one inspection, from Python.
+
+    Parameters
+    ----------
+    inspection : Inspection
+        What was measured.
+    gear : Gear, str or Path
+        The gear, its shipped name, or a gear file.
+    repairs : bool
+        Find the repair sets, and how much further each joint may wear.
+    extension : Extension, optional
+        An extension of the model.
+
+    Returns
+    -------
+    Assessment
+        Verdict, prediction, ranked joints and next action.
+    """
+    known = gear if isinstance(gear, Gear) else load_gear(gear)
+    (judged,) = assess([inspection], known, load_index_table(known), AssessOptions(repairs, repairs, extension))
+    if not isinstance(judged, Assessment):
+        raise TypeError(f"{type(inspection).__name__} is not an Inspection")
+    return judged
+
+
+def predict(clearance_in: Mapping[int, float] | ArrayLike, gear: Gear | str | Path = DEFAULT_GEAR) -> WorstCase:
+    """Predict the plunger displacement in the worst directions, from Python.
+
+    Parameters
+    ----------
+    clearance_in : mapping of int to float, or array_like of shape (n_joints,) or (n, n_joints)
+        Radial clearances: of one gear by joint number, joints that are not named being tight, or of n gears in
+        the order of the joints. [in]
+    gear : Gear, str or Path
+        The gear, its shipped name, or a gear file.
+
+    Returns
+    -------
+    WorstCase
+        Over-travel, under-travel, the larger of the two and the directions, one row a gear. [in, rad]
+
+    Raises
+    ------
+    UsageError
+        If the gear has no such joint, or a clearance is negative or not a number.
+    """
+    known = gear if isinstance(gear, Gear) else load_gear(gear)
+    numbers = known.joint_numbers
+    if isinstance(clearance_in, Mapping):
+        unknown = sorted(set(clearance_in) - set(numbers))
+        if unknown:
+            raise UsageError(
+                f"{known.name} has no joint {unknown[0]}", f"Its joints are {', '.join(map(str, numbers))}."
+            )
+        clearance_in = [clearance_in.get(number, 0.0) for number in numbers]
+    rows = np.atleast_2d(np.asarray(clearance_in, float))
+    if rows.ndim != 2 or rows.shape[1] != len(numbers):
+        raise UsageError(
+            f"clearances of shape {rows.shape} do not fit {len(numbers)} joints", "Give one column a joint."
+        )
+    if not np.all(rows >= 0.0):
+        raise UsageError(f"a clearance of {rows[~(rows >= 0.0)][0]:g} in is none", "Give zero or more.")
+    return worst_case(known.model, rows)
 
 
 def next_joint(gear: Gear, measured: Mapping[int, float]) -> int | None:
@@ -428,7 +504,7 @@ def write_verdicts(result: CheckResult, file: Path) -> None:
     write_csv(file, ("record_id", "tail_no", "side", *_VERDICT_COLUMNS, "file", "sheet", "row"), rows)
 
 
-def annotate(result: CheckResult, source: Path, out: Path) -> None:
+def annotate(result: CheckResult, source: Path, out: Path) -> tuple[str, ...]:
     """Write a copy of the user's workbook with bad cells marked and verdict columns added.
 
     Parameters
@@ -439,6 +515,11 @@ def annotate(result: CheckResult, source: Path, out: Path) -> None:
         The workbook.
     out : Path
         The copy.
+
+    Returns
+    -------
+    tuple of str
+        What the copy could not take over from the workbook, in plain words; empty if nothing.
 
     Raises
     ------
@@ -457,7 +538,7 @@ def annotate(result: CheckResult, source: Path, out: Path) -> None:
         )
         for j in result.judgements
     }
-    annotate_workbook(source, out, result.read, verdicts)
+    return annotate_workbook(source, out, result.read, verdicts)
 
 
 @dataclass(frozen=True, slots=True)

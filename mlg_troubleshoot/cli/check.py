@@ -83,7 +83,7 @@ def run(arguments: CheckArguments) -> None:
     if arguments.csv is not None:
         workflows.write_verdicts(result, arguments.csv)
     if arguments.annotate is not None:
-        workflows.annotate(result, Path(arguments.files[0]), arguments.annotate)
+        _annotate(arguments, arguments.annotate, result)
     if arguments.report is not None:
         _write_reports(arguments, options, result)
     if result.problems and not arguments.as_json and not result.judgements:
@@ -315,16 +315,13 @@ def _advice(gear: Gear) -> Callable[[Mapping[int, float], Sequence[int]], str | 
 def _show(arguments: CheckArguments, result: workflows.CheckResult) -> None:
     if arguments.as_json:
         from mlg_troubleshoot.cli import output
-        from mlg_troubleshoot.reporting.json_form import check_as_json
+        from mlg_troubleshoot.reporting.json_form import check_as_json, check_json_pieces
 
-        output.write(
-            json.dumps(
-                check_as_json(result.gear, result.judgements, result.problems, result.notes),
-                allow_nan=False,
-                ensure_ascii=False,
-                indent=None if len(result.judgements) > 1 else 1,
-            )
-        )
+        found = (result.gear, result.judgements, result.problems, result.notes)
+        if len(result.judgements) > 1:
+            output.write_pieces(check_json_pieces(*found))
+        else:
+            output.write(json.dumps(check_as_json(*found), allow_nan=False, ensure_ascii=False, indent=1))
         return
     from mlg_troubleshoot.cli import views
 
@@ -335,6 +332,16 @@ def _show(arguments: CheckArguments, result: workflows.CheckResult) -> None:
         views.show_one(result.judgements[0], result.gear)
     elif result.judgements:
         views.show_batch(result)
+
+
+def _annotate(arguments: CheckArguments, out: Path, result: workflows.CheckResult) -> None:
+    if result.read is not None and not result.read.layouts:
+        typer.echo(f"{out} was not written: no table was found to annotate.", err=True)
+        return
+    for loss in workflows.annotate(result, Path(arguments.files[0]), out):
+        typer.echo(f"Note: {loss}.", err=True)
+    if not arguments.quiet:
+        typer.echo(f"Annotated workbook: {out}", err=True)
 
 
 def _write_reports(arguments: CheckArguments, options: workflows.CheckOptions, result: workflows.CheckResult) -> None:

@@ -119,8 +119,8 @@ def verify(name: str, *, as_json: bool) -> None:
         console.print(Text(f"{gear.name}: geometry {gear.provenance}", style="bold"))
         table = Table(box=None, pad_edge=False, header_style="bold")
         table.add_column("what the paper prints (section)")
-        for heading in ("printed", "model"):
-            table.add_column(heading, justify="right", max_width=14)
+        table.add_column("printed", justify="right", max_width=14 if console.width < 100 else 26)
+        table.add_column("model", justify="right")
         table.add_column("status", no_wrap=True)
         for n in numbers:
             mark = "" if n.holds else (": DOES NOT HOLD" if n.should_hold else ", known")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import typer
 from rich.console import Console
 
@@ -49,5 +51,20 @@ def write(text: str) -> None:
     """
     try:
         typer.echo(text)
+    except BrokenPipeError:
+        abandon_stdout()
+
+
+def write_pieces(pieces: Iterable[str]) -> None:
+    """Write a long result to stdout piece by piece; a reader that goes away ends the writing.
+
+    Parameters
+    ----------
+    pieces : iterable of str
+        The result.
+    """
+    try:
+        for piece in pieces:
+            typer.echo(piece, nl=False)
     except BrokenPipeError:
         abandon_stdout()

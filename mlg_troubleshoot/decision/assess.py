@@ -17,11 +17,15 @@ from mlg_troubleshoot.decision.assessment import (
     UncertaintyBudget,
     Verdict,
 )
+from mlg_troubleshoot.decision.confidence import check_probability
+from mlg_troubleshoot.decision.explain import explain
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
+from mlg_troubleshoot.decision.measuring import advise, worth_of_readings
 from mlg_troubleshoot.decision.next_action import FAILED_BUT_WITHIN, choose, correct
 from mlg_troubleshoot.decision.prediction import BatchPrediction, Extension, predict_batch
 from mlg_troubleshoot.decision.ranking import rank_joints
 from mlg_troubleshoot.decision.repair import repair_sets
+from mlg_troubleshoot.decision.rigging import rigging_alternative
 from mlg_troubleshoot.decision.rule import verdict
 from mlg_troubleshoot.decision.wording import percent
 from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
@@ -43,12 +47,19 @@ class AssessOptions:
         Search the repair sets of each gear that is not within its margin.
     allowances : bool
         Find how much further each joint may wear.
+    advice : bool
+        Say what further measuring is worth, check the probability by Monte Carlo, and find which joints explain
+        a measured displacement.
+    seed : int
+        Seed of the Monte Carlo draws.
     extension : Extension or None
         An extension of the model to predict with.
     """
 
     repairs: bool = False
     allowances: bool = False
+    advice: bool = False
+    seed: int = 1
     extension: Extension | None = None
 
 
@@ -146,7 +157,7 @@ def _assess_one(
     sets = None
     if options.repairs:
         sets = repair_sets(gear, inspection, margin, options.extension) if found is not Verdict.WITHIN_MARGIN else ()
-    over, under = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
+    worst = over, under = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
     upper = float(batch.upper.displacement_in[i])
     chance = float(batch.chance_random[i])
     model_source = (
@@ -154,6 +165,26 @@ def _assess_one(
         if options.extension is None
         else f"residual scatter of the diagnosis ({options.extension.describe()})"
     )
+    budget = None
+    if known:
+        budget = UncertaintyBudget(
+            float(lower.u_clearances_in[i]),
+            float(lower.u_geometry_in[i]),
+            float(lower.u_model_in[i]),
+            float(batch.margin_u_in[i]),
+            model_source,
+        )
+    measuring = advise(gear, inspection, margin, options.extension) if options.advice and closes else None
+    next_joint = None
+    if measuring is not None:
+        next_joint = measuring.joint
+    elif found is Verdict.INCOMPLETE:
+        next_joint = _next_joint(gear, inspection, margin, options.extension, findings, worst)
+    rigging = None
+    if options.repairs and budget is not None and found in (Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE):
+        rigging = rigging_alternative(gear, inspection, worst, margin, budget, options.extension)
+    rng = np.random.default_rng(options.seed)
+    residual = None if options.extension is None else options.extension.residual_u_in
     return Assessment(
         inspection=inspection,
         verdict=found,
@@ -167,24 +198,39 @@ def _assess_one(
         probability_within_margin=p_lower,
         probability_exceed_random_directions=chance if closes else None,
         geometry_spread_in=(float(lower.spread_low_in[i]), float(lower.spread_high_in[i])) if known else None,
-        budget=UncertaintyBudget(
-            float(lower.u_clearances_in[i]),
-            float(lower.u_geometry_in[i]),
-            float(lower.u_model_in[i]),
-            float(batch.margin_u_in[i]),
-            model_source,
-        )
-        if known
-        else None,
+        budget=budget,
         over_directions_rad=tuple(lower.worst.over_directions[i].tolist()) if closes else (),
         under_directions_rad=tuple(lower.worst.under_directions[i].tolist()) if closes else (),
         joints=findings,
-        next_action=choose(gear, found, findings, inspection.outcome, sets),
+        next_action=choose(gear, found, findings, inspection.outcome, sets, next_joint),
         headline=_headline(found, displacement, chance, margin, p_lower, findings, inspection.outcome),
         measured_statement=measured_plunger.statement(inspection, margin),
         repair_sets=sets,
         warnings=_warnings(gear, inspection, findings, closes, over, under, u),
+        measuring=measuring,
+        rigging=rigging,
+        confidence=check_probability(gear, inspection, worst, margin, budget, rng)
+        if options.advice and budget is not None
+        else None,
+        posterior=explain(gear, inspection, rng, residual_u_in=residual) if options.advice else None,
     )
+
+
+def _next_joint(
+    gear: Gear,
+    inspection: Inspection,
+    margin_in: float,
+    extension: Extension | None,
+    findings: Sequence[JointFinding],
+    worst_in: tuple[float, float],
+) -> int | None:
+    """The joint to measure next, without the work of comparing where there is no choice."""
+    missing = [f.joint for f in findings if f.clearance_in is None]
+    critical = [number for number in missing if gear.joint(number).critical]
+    if len(critical or missing) == 1:
+        return (critical or missing)[0]
+    anchor = worst_in if np.all(np.isfinite(worst_in)) else None
+    return worth_of_readings(gear, inspection, margin_in, extension, anchor)[0].joint
 
 
 def _headline(

@@ -128,6 +128,117 @@ class RepairSet:
 
 
 @dataclass(frozen=True, slots=True)
+class Rigging:
+    """What re-rigging alone would do: the plunger's range shifted to the middle, the clearances left as they are.
+
+    Parameters
+    ----------
+    shift_in : float
+        By how much to shift the plunger. [in]
+    predicted_displacement_in : float
+        Worst case afterwards: half of the range between the worst cases of both senses. [in]
+    probability_within_margin : float
+        Probability that this bound is within the margin. [1]
+    probability_exceed_random_directions : float
+        Chance of leaving the margin afterwards with uniformly random directions. [1]
+    """
+
+    shift_in: float
+    predicted_displacement_in: float
+    probability_within_margin: float
+    probability_exceed_random_directions: float
+
+
+@dataclass(frozen=True, slots=True)
+class ReadingWorth:
+    """What measuring one joint is worth.
+
+    Parameters
+    ----------
+    joint : int
+        Number of the joint.
+    minutes : float
+        Time to reach it from the state of the inspection, areas that are open already being free. [min]
+    risk_drop : float
+        Expected drop of the decision risk; 0 where this reading alone cannot change the decision. [1]
+    variance_in2 : float
+        Share of the variance of the worst case that the reading removes. [in²]
+    critical : bool
+        True if no gear can be cleared without it.
+    """
+
+    joint: int
+    minutes: float
+    risk_drop: float
+    variance_in2: float
+    critical: bool
+
+    def per_minute(self, *, by_risk: bool) -> float:
+        """Worth per minute.
+
+        Parameters
+        ----------
+        by_risk : bool
+            True for the drop in risk, False for the variance. [1 or in², per min]
+
+        Returns
+        -------
+        float
+            Worth.
+        """
+        return (self.risk_drop if by_risk else self.variance_in2) / self.minutes
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuringAdvice:
+    """Which joint to measure next, and whether one may stop.
+
+    Parameters
+    ----------
+    worth : tuple of ReadingWorth
+        The unmeasured joints, best first.
+    stop : bool
+        True if more measuring will not change the verdict.
+    verdict : Verdict
+        The verdict that stands if one may stop, else the verdict so far.
+    text : str
+        The advice as a sentence.
+    """
+
+    worth: tuple[ReadingWorth, ...]
+    stop: bool
+    verdict: Verdict
+    text: str
+
+    @property
+    def joint(self) -> int | None:
+        """The joint to measure next; None if all are measured."""
+        return self.worth[0].joint if self.worth else None
+
+
+@dataclass(frozen=True, slots=True)
+class Confidence:
+    """How far the probability of being within the margin can be trusted as a number.
+
+    Parameters
+    ----------
+    analytic : float
+        With the response taken as linear in the errors of the readings. [1]
+    monte_carlo : float
+        With its curvature, by Monte Carlo. [1]
+    standard_error : float
+        Of the Monte Carlo value. [1]
+    draws : int
+        Number of draws.
+    """
+
+    analytic: float
+    monte_carlo: float
+    standard_error: float
+    draws: int
+
+
+@dataclass(frozen=True, slots=True)
 class UncertaintyBudget:
     """Standard uncertainties behind the probability, at the prediction with unmeasured joints at 0.
 
@@ -150,6 +261,74 @@ class UncertaintyBudget:
     model_in: float
     margin_in: float
     model_source: str
+
+
+@dataclass(frozen=True, slots=True)
+class GroupChance:
+    """Chance that a joint, or one of two that the plunger cannot tell apart, is worn beyond its limit.
+
+    Parameters
+    ----------
+    joints : tuple of int
+        The joint, or the ends of one link.
+    probability : float
+        Chance that at least one of them is worn. [1]
+    """
+
+    joints: tuple[int, ...]
+    probability: float
+
+
+@dataclass(frozen=True, slots=True)
+class ClearanceInterval:
+    """What is known of one joint's clearance after the readings.
+
+    Parameters
+    ----------
+    joint : int
+        Number of the joint.
+    low_in, median_in, high_in : float
+        Median and ends of the central 90 % interval of the radial clearance. [in]
+    worn : float
+        Chance that it is beyond its limit. [1]
+    """
+
+    joint: int
+    low_in: float
+    median_in: float
+    high_in: float
+    worn: float
+
+
+@dataclass(frozen=True, slots=True)
+class Posterior:
+    """Which joints explain a measured plunger displacement.
+
+    Parameters
+    ----------
+    groups : tuple of GroupChance
+        Groups of joints, most likely worn first.
+    no_joint_worn : float
+        Chance that no joint is worn beyond its limit. [1]
+    not_clearance : float
+        Chance that something other than clearance displaced the plunger. [1]
+    intervals : tuple of ClearanceInterval
+        One for each joint, in the order of the joints' numbers.
+    called_worn : tuple of tuple of int
+        Groups that are more likely worn than not.
+    effective_draws : float
+        Independent draws that the result is worth.
+    text : str
+        The finding as a sentence.
+    """
+
+    groups: tuple[GroupChance, ...]
+    no_joint_worn: float
+    not_clearance: float
+    intervals: tuple[ClearanceInterval, ...]
+    called_worn: tuple[tuple[int, ...], ...]
+    effective_draws: float
+    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,6 +375,14 @@ class Assessment:
         Repair sets; None if they were not asked for.
     warnings : tuple of str
         Everything else a user must see.
+    measuring : MeasuringAdvice or None
+        What further measuring is worth; None if it was not asked for or the linkage does not close.
+    rigging : Rigging or None
+        What re-rigging alone would do; None if it was not asked for or is not needed.
+    confidence : Confidence or None
+        Monte Carlo check of the probability; None if it was not asked for or there is no uncertainty.
+    posterior : Posterior or None
+        Which joints explain the measured displacement; None if none was measured or it was not asked for.
     """
 
     inspection: Inspection
@@ -219,6 +406,10 @@ class Assessment:
     measured_statement: str | None
     repair_sets: tuple[RepairSet, ...] | None
     warnings: tuple[str, ...]
+    measuring: MeasuringAdvice | None = None
+    rigging: Rigging | None = None
+    confidence: Confidence | None = None
+    posterior: Posterior | None = None
 
     @property
     def ranked(self) -> tuple[JointFinding, ...]:

@@ -62,6 +62,7 @@ def choose(
     findings: Sequence[JointFinding],
     outcome: Outcome | None,
     sets: Sequence[RepairSet] | None,
+    next_joint: int | None = None,
 ) -> NextAction:
     """Choose the next action for a valid inspection.
 
@@ -77,6 +78,8 @@ def choose(
         What the gear did.
     sets : sequence of RepairSet or None
         Repair sets, best first; None if they were not computed.
+    next_joint : int, optional
+        The joint whose reading is worth most; without it, the one that removes most variance per minute.
 
     Returns
     -------
@@ -98,7 +101,7 @@ def choose(
         first = tuple(f.joint for f in ranked if f.clearance_in)[:3] or tuple(f.joint for f in ranked)[:3]
         return NextAction(Action.MEASURE, first, f"Clearances could contribute. Inspect in this order: {_list(first)}.")
     if verdict is Verdict.INCOMPLETE:
-        joint = next_to_measure(gear, findings)
+        joint = next_to_measure(gear, findings) if next_joint is None else next_joint
         if joint is None:
             raise ValueError("an inspection with every joint measured cannot be incomplete")
         return NextAction(Action.MEASURE, (joint,), f"Cannot clear. Measure #{joint} {gear.joint(joint).name} next.")

@@ -21,7 +21,7 @@ from mlg_troubleshoot.diagnosis.screen import Fit, Screen, fit
 Array = NDArray[np.float64]
 Key = tuple[str, str | None]
 
-ALARM = 0.04
+ALARM = 0.03
 # A name needs clearer evidence than an alarm does.
 NAME = 0.002
 SECOND = 0.002

@@ -291,6 +291,6 @@ def _growth(centred: Array, predicted: Array) -> Array:
     fitted = np.maximum(level + slope * at, 0.3 * np.median(size) + 1e-12)
     # A slope within its own error is no growth.
     error = np.std(size - level - slope * at) / (np.std(at) * np.sqrt(len(at)))
-    if slope < 2.5 * error:
+    if slope < 1.0 * error:
         return np.ones(len(at))
     return np.asarray(fitted / np.median(fitted))

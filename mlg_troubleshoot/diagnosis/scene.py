@@ -77,19 +77,21 @@ def _expected(
         shape = np.maximum(1.0 + rate * growth, _LEAST_SHAPE)
         level = np.bincount(gears[known], (values / shape)[known], minlength=len(count)) / np.maximum(count, 1.0)
         centred = values - level[gears] * shape
+        # Wear scatters in proportion to its level, so each gear's rows count relative to it.
+        weight = 1.0 / np.maximum(level[gears], 0.25 * overall) ** 2
         along = level[gears] * growth
-        square = float(np.sum(along[known] ** 2))
+        square = float(np.sum((weight * along**2)[known]))
         if square <= 0.0:
             break
-        rate = float(np.clip(rate + np.sum((centred * along)[known]) / square, -0.5, 2.0))
+        rate = float(np.clip(rate + np.sum((weight * centred * along)[known]) / square, -0.5, 2.0))
     shape = np.maximum(1.0 + rate * growth, _LEAST_SHAPE)
     within = float(np.sum((values - level[gears] * shape)[known] ** 2) / max(known.sum() - np.sum(count > 0), 1.0))
     between = max(float(np.var(level[count > 0])) - within / max(float(np.mean(count[count > 0])), 1.0), 0.0)
     # A gear's level is drawn to the fleet's where it rests on few readings.
-    weight = between / np.maximum(between + within / np.maximum(count, 1.0), 1e-30)
-    drawn = np.where(count > 0, overall + weight * (level - overall), overall)
+    own = between / np.maximum(between + within / np.maximum(count, 1.0), 1e-30)
+    drawn = np.where(count > 0, overall + own * (level - overall), overall)
     expected = drawn[gears] * shape
-    degrees = max(1.0 - float(np.sum(weight[count > 0])) / known.sum(), 0.2)
+    degrees = max(1.0 - float(np.sum(own[count > 0])) / known.sum(), 0.2)
     return expected, (values - expected) ** 2 / degrees
 
 

@@ -130,6 +130,8 @@ def load_gear(name_or_path: str | Path = DEFAULT_GEAR) -> Gear:
 def _parse(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise GearFileError(f"{path}: there is no such file", "Put it beside the gear file that names it.") from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise GearFileError(f"{path}: cannot be read as TOML: {error}", "Correct the file and run again.") from error
 

@@ -174,10 +174,12 @@ class Range:
         return self.__add__(-other)
 
     def __rsub__(self, other: Any) -> Range:
-        return self.__neg__().__add__(other)
+        turned: Range = -self
+        return turned.__add__(other)
 
     def __mul__(self, other: Any) -> Range:
-        if other is self:
+        twice = other is self
+        if twice:
             return self._square()
         if isinstance(other, Range):
             crossed = _outer(self.slope, other.slope)

@@ -67,6 +67,7 @@ class Kernel:
         self.parameters.flags.writeable = False
         self._output = _function(program, (program.output,))
         self._loop: Callable[..., None] | None = None
+        self._joints: Callable[..., tuple[Any, ...]] | None = None
 
     def parameter_index(self, name: str) -> int:
         """Return the place of a parameter.
@@ -148,10 +149,11 @@ class Kernel:
         """
         names = self._program.joints
         wanted = tuple(dict.fromkeys(n for pair in names.values() for n in pair))
-        function = _function(self._program, wanted)
+        if self._joints is None:
+            self._joints = _function(self._program, wanted)
         with np.errstate(invalid="ignore", divide="ignore"):
             numbers = self.parameters.tolist() if parameters is None else parameters
-            values = dict(zip(wanted, function(position, links, numbers), strict=True))
+            values = dict(zip(wanted, self._joints(position, links, numbers), strict=True))
         return {joint: (np.asarray(values[x]), np.asarray(values[y])) for joint, (x, y) in names.items()}
 
     def no_clearance(self) -> list[float]:

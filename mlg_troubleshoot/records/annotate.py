@@ -65,7 +65,7 @@ def annotate_workbook(
     keep_macros = Path(out).suffix.lower() == ".xlsm"
     try:
         book = load_workbook(io.BytesIO(data), keep_vba=keep_macros, rich_text=True)
-    except (BadZipFile, KeyError, ValueError, TypeError, AttributeError, IndexError, SyntaxError) as error:
+    except (BadZipFile, KeyError, ValueError, TypeError, AttributeError, IndexError, SyntaxError, OSError) as error:
         raise OutputError(
             f"{source} cannot be copied ({type(error).__name__}): a part of it is not understood",
             "Open it in a spreadsheet program, save it again as .xlsx, and annotate the copy.",

@@ -233,7 +233,8 @@ def split_by(residuals: Residuals, name: str, other: Against) -> tuple[NDArray[n
         known = np.isfinite(column.values)
         half = float(np.median(column.values[known])) if known.any() else np.nan
         words = column_words(name)
-        return np.asarray(column.values >= half), f"{words} {half:g} and more", f"{words} below {half:g}"
+        shown = f"{half:.0f}" if abs(half) >= 100.0 else f"{half:.3g}"
+        return np.asarray(column.values >= half), f"{words} {shown} and more", f"{words} below {shown}"
     if column.groups is None:
         return None
     x = other.values

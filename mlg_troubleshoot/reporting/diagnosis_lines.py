@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mlg_troubleshoot.diagnosis import Diagnosis, NamedCause
+from mlg_troubleshoot.diagnosis.faults import DataFault
 from mlg_troubleshoot.reporting.formats import number
 
 THOU_PER_IN = 1000.0
 NOISE_ABOVE = 0.05
 _SHOWN = 8
+_CELLS = 2
 _KINDS = {
     "mm_as_in": "millimetres entered as inches",
     "factor_10": "decimal point slipped",
@@ -163,12 +166,11 @@ def seven_lines(d: Diagnosis) -> tuple[Line, ...]:
 
 
 def _data(d: Diagnosis) -> str:
-    faults = "; ".join(
-        f"row {f.row} {f.column}: {f.value}, {kind_words(f.kind)}"
-        + (f", {f.suggested} used here" if f.suggested is not None else ", not used")
-        for f in d.faults[:_SHOWN]
-    )
-    more = f" and {len(d.faults) - _SHOWN} more" if len(d.faults) > _SHOWN else ""
+    slips: dict[tuple[int, str], list[DataFault]] = {}
+    for fault in d.faults:
+        slips.setdefault((fault.row, fault.kind), []).append(fault)
+    faults = "; ".join(_slip(cells) for cells in list(slips.values())[:_SHOWN])
+    more = f" and {len(slips) - _SHOWN} more" if len(slips) > _SHOWN else ""
     untested = ", ".join(f"{cause} (no {column})" for cause, column in d.not_testable)
     parts = [f"{d.rows_read} rows, {d.rows_used} used."]
     parts.append(
@@ -177,6 +179,15 @@ def _data(d: Diagnosis) -> str:
     if untested:
         parts.append(f"NOT TESTABLE: {untested}.")
     return " ".join(parts)
+
+
+def _slip(cells: Sequence[DataFault]) -> str:
+    """One slip of the pen, which may be in several cells of a row."""
+    changes = ", ".join(
+        f"{f.column} {f.value} → {'not used' if f.suggested is None else f.suggested}" for f in cells[:_CELLS]
+    )
+    more = f" and {len(cells) - _CELLS} more" if len(cells) > _CELLS else ""
+    return f"row {cells[0].row}, {kind_words(cells[0].kind)} ({changes}{more})"
 
 
 def _misfit(d: Diagnosis) -> str:

@@ -276,6 +276,8 @@ def _headline(d: Diagnosis) -> str:
     if d.verdict == "NAMED":
         each = "; ".join(f"{cause_words(c)}: {_thou(c.effect_rms_in)} rms" for c in d.causes)
         return f"{each}. Every rival is ruled out."
+    if d.verdict == "AMBIGUOUS" and len(d.also_possible) == 1:
+        return f"{cause_words(d.also_possible[0])}? Too faint to be named. The model is unchanged."
     if d.verdict == "AMBIGUOUS":
         return (
             f"{several(len(d.also_possible), 'cause')} explain the misfit alike. None is named, the model is unchanged."

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import json
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, NextAction, Rejected
@@ -34,12 +35,52 @@ def check_as_json(
         Values for :func:`json.dumps`.
     """
     return {
+        **_head(gear),
+        "inspections": [_inspection(j, gear) for j in judgements],
+        **_tail(problems, warnings),
+    }
+
+
+def check_json_pieces(
+    gear: Gear, judgements: Iterable[Judgement], problems: Sequence[Problem], warnings: Sequence[str]
+) -> Iterator[str]:
+    """Write the same form as JSON text piece by piece, one inspection a line: a large batch never stands in memory.
+
+    Parameters
+    ----------
+    gear, judgements, problems, warnings
+        As for :func:`check_as_json`.
+
+    Yields
+    ------
+    str
+        The next piece of one JSON document.
+    """
+    yield _text(_head(gear))[:-1] + ', "inspections": [\n'
+    separator = ""
+    for judgement in judgements:
+        yield separator + _text(_inspection(judgement, gear))
+        separator = ",\n"
+    yield "\n], " + _text(_tail(problems, warnings))[1:] + "\n"
+
+
+def _text(value: dict[str, Any]) -> str:
+    return json.dumps(value, allow_nan=False, ensure_ascii=False)
+
+
+def _head(gear: Gear) -> dict[str, Any]:
+    return {
         "schema_version": SCHEMA_VERSION,
         "gear": {"id": gear.id, "geometry_sha256": gear.geometry_sha256, "provenance": gear.provenance},
-        "inspections": [_assessment(j) if isinstance(j, Assessment) else _rejected(j, gear) for j in judgements],
-        "problems": [problem.as_dict() for problem in problems],
-        "warnings": list(warnings),
     }
+
+
+def _tail(problems: Sequence[Problem], warnings: Sequence[str]) -> dict[str, Any]:
+    return {"problems": [problem.as_dict() for problem in problems], "warnings": list(warnings)}
+
+
+def _inspection(judgement: Judgement, gear: Gear) -> dict[str, Any]:
+    return _assessment(judgement) if isinstance(judgement, Assessment) else _rejected(judgement, gear)
 
 
 def _action(action: NextAction) -> dict[str, Any]:

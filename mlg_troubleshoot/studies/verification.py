@@ -14,13 +14,14 @@ from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
-from mlg_troubleshoot.studies.amplification import Amplification, amplification
+from mlg_troubleshoot.studies.amplification import STROKES, Amplification, amplification
 from mlg_troubleshoot.studies.response import HeldDirections, worst_directions
 from mlg_troubleshoot.studies.targets import Target, load_targets, targets_file
 from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
 
 Array = NDArray[np.float64]
 _CURVE = 401
+_QUICK_CURVE = 61
 _CORNERS = (np.array([0.0, 1.0]), np.array([0.5, 0.5]))
 
 
@@ -113,11 +114,14 @@ class Facts:
         The gear, for joints, limits and calibration.
     model : LinkageModel
         The linkage.
+    quick : bool
+        With fewer positions and points: good to 1e-4, for a search.
     """
 
-    def __init__(self, gear: Gear, model: LinkageModel) -> None:
+    def __init__(self, gear: Gear, model: LinkageModel, *, quick: bool = False) -> None:
         self.gear = gear
         self.model = model
+        self.quick = quick
         self.limits = np.asarray(gear.limits_in, float)
 
     def measure(self, target: Target) -> float:
@@ -159,7 +163,7 @@ class Facts:
     @cached_property
     def indices(self) -> TensorIndices:
         """Indices over the whole range of clearances."""
-        return tensor_indices(self.response, self.limits)
+        return tensor_indices(self.response, self.limits, order=2 if self.quick else 3)
 
     @cached_property
     def corner_indices(self) -> TensorIndices:
@@ -169,12 +173,12 @@ class Facts:
     @cached_property
     def growth(self) -> Amplification:
         """Amplification indices over the release."""
-        return amplification(self.gear, self.model)
+        return amplification(self.gear, self.model, _QUICK_CURVE if self.quick else STROKES)
 
     @cached_property
     def curve(self) -> tuple[Array, Array]:
         """Stroke and plunger position over the release, Fig. 12. [in]"""
-        stroke = np.linspace(*self.model.stroke, _CURVE)
+        stroke = np.linspace(*self.model.stroke, _QUICK_CURVE if self.quick else _CURVE)
         return stroke, self.model.plunger(stroke)
 
     def of(self, values: Array, joints: tuple[int, ...]) -> Array:
@@ -245,9 +249,20 @@ def _least_curvature(facts: Facts, _: Target) -> float:
 
 def _end_rate(facts: Facts, _: Target) -> float:
     stroke, position = facts.curve
-    least = int(np.argmin(position))
-    mean = (position[-1] - position[least]) / (stroke[-1] - stroke[least])
-    return float((position[-1] - position[-2]) / (stroke[1] - stroke[0]) / mean)
+    step = stroke[1] - stroke[0]
+    at, least = _least(stroke, position)
+    mean = (position[-1] - least) / (stroke[-1] - at)
+    return float((3.0 * position[-1] - 4.0 * position[-2] + position[-3]) / (2.0 * step) / mean)
+
+
+def _least(stroke: Array, position: Array) -> tuple[float, float]:
+    """Stroke and position of the least displacement, by a parabola through the lowest three points."""
+    i = int(np.argmin(position))
+    if i in (0, len(position) - 1):
+        return float(stroke[i]), float(position[i])
+    before, at, after = position[i - 1 : i + 2]
+    offset = 0.5 * (before - after) / (before - 2.0 * at + after)
+    return float(stroke[i] + offset * (stroke[1] - stroke[0])), float(at - 0.25 * (before - after) * offset)
 
 
 def _sharpening(facts: Facts, target: Target) -> float:

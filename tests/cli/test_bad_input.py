@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import DATA, FAILURE, HAND, Run, Table, mlg, row
+from tests.cli.conftest import DATA, FAILURE, HAND, Run, Table, mlg, row
 
 PDF = b"%PDF-1.4\n%\xe2\xe3\xcf\xd3\n1 0 obj\n<< /Type /Catalog >>\nendobj\n"
 ONE_VALUE = (*HAND, "--convention", "RADIAL", "--set")

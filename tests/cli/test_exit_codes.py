@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import FAILURE, FLEET, Run, Table, mlg, row
 from mlg_troubleshoot import workflows
+from tests.cli.conftest import FAILURE, FLEET, Run, Table, mlg, row
 
 
 def test_within_the_margin_exits_0(table: Table) -> None:

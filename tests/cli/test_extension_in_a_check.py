@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import FAILURE, Run, mlg
-from hidden_effect.simulator.generate import draw_fleet, write_csv
+from tests.cli.conftest import FAILURE, Run, mlg
+from tests.hidden_effect.simulator.generate import draw_fleet, write_csv
 
-PERMUTATIONS = ("--permutations", "199")
+PERMUTATIONS = ("--permutations", "99")
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from pathlib import Path
 import openpyxl
 import pytest
 
-from cli.conftest import DATA, FAILURE, HAND, Run, Table, mlg, ranked, row
+from tests.cli.conftest import DATA, FAILURE, HAND, Run, Table, mlg, ranked, row
 
 BLANK = {f"clearance_{n}_in": "" for n in range(1, 11)}
 

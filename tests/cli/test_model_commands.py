@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cli.conftest import Run, mlg
+from tests.cli.conftest import Run, mlg
 
 
 @pytest.fixture(scope="module")

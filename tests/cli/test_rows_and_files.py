@@ -10,7 +10,7 @@ from pathlib import Path
 import openpyxl
 import pytest
 
-from cli.conftest import DATA, FAILURE, FLEET, HAND, Run, Table, mlg, row
+from tests.cli.conftest import DATA, FAILURE, FLEET, HAND, Run, Table, mlg, row
 
 VERDICTS = {"WITHIN_MARGIN", "OUTSIDE_MARGIN", "INCONCLUSIVE", "INCOMPLETE", "INVALID"}
 

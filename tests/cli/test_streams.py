@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import FAILURE, FLEET, Run, Table, mlg, row
+from tests.cli.conftest import FAILURE, FLEET, Run, Table, mlg, row
 
 COMMAND = (sys.executable, "-m", "mlg_troubleshoot")
 needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="needs pipes of POSIX")

@@ -7,8 +7,8 @@ import re
 import pytest
 from rich.console import Console
 
-from cli.conftest import FAILURE, FLEET, Run, Table, mlg, row
 from mlg_troubleshoot.cli import output
+from tests.cli.conftest import FAILURE, FLEET, Run, Table, mlg, row
 
 WIDTHS = pytest.mark.parametrize("width", [80, 110])
 JOINTS = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from decision.conftest import Judge, every_joint
+from tests.decision.conftest import Judge, every_joint
 from mlg_troubleshoot.decision.assess import AssessOptions, assess
 from mlg_troubleshoot.decision.inspection import InvalidRow, Side
 from mlg_troubleshoot.errors import Problem

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from decision.conftest import Judge, every_joint, inspected
+from tests.decision.conftest import Judge, every_joint, inspected
 from mlg_troubleshoot.decision.assess import AssessOptions, allowance
 from mlg_troubleshoot.decision.assessment import Action, Verdict
 from mlg_troubleshoot.decision.inspection import Outcome

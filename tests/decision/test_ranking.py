@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from decision.conftest import Judge, every_joint
+from tests.decision.conftest import Judge, every_joint
 from mlg_troubleshoot.decision.ranking import ensemble_amplification, rank_joints
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.studies.table import IndexTable

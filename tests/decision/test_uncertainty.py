@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from decision.conftest import Judge, every_joint, inspected
+from tests.decision.conftest import Judge, every_joint, inspected
 from mlg_troubleshoot.decision.assess import AssessOptions
 from mlg_troubleshoot.decision.assessment import UncertaintyBudget
 from mlg_troubleshoot.decision.inspection import Inspection

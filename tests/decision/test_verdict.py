@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import norm, qmc
 
-from decision.conftest import Judge, every_joint, inspected
+from tests.decision.conftest import Judge, every_joint, inspected
 from mlg_troubleshoot.decision.assess import assess
 from mlg_troubleshoot.decision.assessment import Assessment, Rejected, Verdict
 from mlg_troubleshoot.decision.inspection import InvalidRow, Outcome, Side

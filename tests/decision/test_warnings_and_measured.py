@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from decision.conftest import Judge, every_joint, inspected
+from tests.decision.conftest import Judge, every_joint, inspected
 from mlg_troubleshoot.decision.assessment import Action, Verdict
 from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.decision.measured import disagreement, reading_uncertainty

@@ -54,8 +54,7 @@ def sound(gear: Gear) -> DiagnosisTable:
     values = table.clearance_in.copy()
     own = table.gears == table.gears[ROW]
     values[own, 2], values[own, 7] = 0.011, 0.0012
-    over = fleet(gear.model, clearance_in=values)
-    return over
+    return fleet(gear.model, clearance_in=values)
 
 
 def faults(gear: Gear, table: DiagnosisTable) -> list[tuple[int, str, str]]:
@@ -131,9 +130,7 @@ def test_rows_that_stand_out_in_one_tail_are_an_effect(gear: Gear) -> None:
 def test_rows_that_stand_out_with_one_gauge_are_an_effect(gear: Gear) -> None:
     gauges = np.where(np.arange(120) % 30 == 4, "G-9", "G-1")
     factors = {**fleet(gear.model).factors, "gauge_id": gauges}
-    table = fleet(
-        gear.model, lambda t, _over: np.where(t.factors["gauge_id"] == "G-9", 0.03, 0.0), factors=factors
-    )
+    table = fleet(gear.model, lambda t, _over: np.where(t.factors["gauge_id"] == "G-9", 0.03, 0.0), factors=factors)
     assert faults(gear, table) == []
 
 

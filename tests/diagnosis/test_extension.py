@@ -139,7 +139,7 @@ def test_a_damaged_extension_is_refused_with_its_name(written: str, instead: str
     text = file.read_text(encoding="utf-8")
     assert written in text
     file.write_text(text.replace(written, instead), encoding="utf-8")
-    with pytest.raises(TroubleshootError, match="e.toml"):
+    with pytest.raises(TroubleshootError, match=r"e\.toml"):
         load_extension([file], gear)
 
 
@@ -150,7 +150,7 @@ def test_a_damaged_extension_is_refused_with_its_name(written: str, instead: str
 def test_a_term_without_its_setting_is_refused(damaged: str, gear: Gear, tmp_path: Path) -> None:
     file = tmp_path / "e.toml"
     save_extension(extension(gear, term(damaged, 0.01)), file)
-    with pytest.raises(TroubleshootError, match="e.toml"):
+    with pytest.raises(TroubleshootError, match=r"e\.toml"):
         load_extension([file], gear)
 
 

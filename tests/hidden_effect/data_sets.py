@@ -8,8 +8,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from .simulator import EffectSpec, Fleet, FleetSpec, follow_up, simulate_fleet, write_csv
+from .simulator.records import RESOLUTION_IN
 from .simulator.records import write_csv as write_columns
 
 #: What is hidden in each file, and the seed that made it.
@@ -30,11 +32,14 @@ DATA_SETS: dict[str, tuple[FleetSpec, int]] = {
         41_002,
     ),
     "measured_nothing_wrong": (FleetSpec(), 41_003),
+    "measured_frozen_grease": (FleetSpec(), 41_004),
 }
+#: What frost takes off a reading in ``measured_frozen_grease`` [in/°C].
+DRAG_IN_PER_C = 0.001
 _LATER_ROWS = 40
 
 
-def later_rows(fleet: Fleet, seed: int) -> dict[str, list[object]]:
+def later_rows(fleet: Fleet, seed: int) -> dict[str, list[Any]]:
     """Inspect a fleet again, under the circumstances of other rows of its own.
 
     Parameters
@@ -53,6 +58,21 @@ def later_rows(fleet: Fleet, seed: int) -> dict[str, list[object]]:
     again = [{"tail_no": fleet.table["tail_no"][k]} for k in range(0, rows, rows // _LATER_ROWS)]
     more = follow_up(fleet, again, seed).table
     return {column: values[rows:] for column, values in more.items()}
+
+
+def drag(table: dict[str, list[Any]]) -> None:
+    """Take off the readings what frozen grease does: an effect that is on nobody's list but the reader's own.
+
+    Parameters
+    ----------
+    table : dict of str to list
+        Inspection table, changed in place.
+    """
+    for column in (name for name in table if name.startswith("plunger_displacement")):
+        for row, temperature in enumerate(table["temperature_c"]):
+            if temperature is not None and temperature < 0.0 and table[column][row] is not None:
+                reading = table[column][row] + DRAG_IN_PER_C * temperature
+                table[column][row] = round(round(reading / RESOLUTION_IN) * RESOLUTION_IN, 6)
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -74,6 +94,8 @@ def main(arguments: Sequence[str]) -> int:
     folder = Path(arguments[0])
     for name, (spec, seed) in DATA_SETS.items():
         fleet = simulate_fleet(spec, seed)
+        if name == "measured_frozen_grease":
+            drag(fleet.table)
         write_csv(fleet, folder / f"{name}.csv")
         if name == "measured_pressure":
             write_columns(later_rows(fleet, seed + 1000), folder / "measured_pressure_later.csv")

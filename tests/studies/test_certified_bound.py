@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import links_from
-from mlg_troubleshoot.geometry.intervals import Box
 from mlg_troubleshoot.studies.certified import certified_bound
 from mlg_troubleshoot.studies.worst_search import search_worst
 
@@ -70,25 +67,3 @@ def test_no_random_directions_and_lengths_exceed_the_bound(gear: Gear) -> None:
 
 def test_a_linkage_that_may_not_close_has_no_bound(gear: Gear) -> None:
     assert certified_bound(gear.model, np.full(10, 0.2), 1.0, mid_only=True, most_boxes=300).bound_in == np.inf
-
-
-@given(st.integers(0, 2**32 - 1), st.floats(1e-6, 0.004))
-def test_an_enclosure_holds_value_and_gradient_of_every_point_in_it(gear: Gear, seed: int, width: float) -> None:
-    rng = np.random.default_rng(seed)
-    kernel = gear.model.kernel
-    middle = rng.uniform(-0.005, 0.005, 20)
-    low, high = middle - width * rng.random(20), middle + width * rng.random(20)
-    stroke = gear.model.stroke[1]
-    enclosed = kernel.enclose(stroke, Box(low[:, None], high[:, None]).variables())
-    inside = low + (high - low) * rng.random((40, 20))
-    values = kernel.output(stroke, list(inside.T))
-    assert np.all(enclosed.value[0] <= values)
-    assert np.all(values <= enclosed.value[1])
-    step = 1e-6
-    for i in (0, 5, 11, 19):
-        ahead, behind = inside.copy(), inside.copy()
-        ahead[:, i] += step
-        behind[:, i] -= step
-        slope = (kernel.output(stroke, list(ahead.T)) - kernel.output(stroke, list(behind.T))) / (2 * step)
-        assert np.all(enclosed.slope[0][i] - 1e-6 <= slope)
-        assert np.all(slope <= enclosed.slope[1][i] + 1e-6)

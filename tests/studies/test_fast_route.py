@@ -56,6 +56,18 @@ def test_a_kinked_response_does_not_fool_the_fast_route(on_cube: Response, kind:
     assert "not smooth" in found.note
 
 
+def test_a_kink_that_only_the_farthest_corner_shows_is_found(on_cube: Response) -> None:
+    inside = on_cube(_rng(5).random((2000, 10)))
+    assert inside.max() < 0.1 < float(on_cube(np.ones((1, 10)))[0])
+    _, fit = chaos_indices(lambda u: on_cube(u) + 50.0 * np.maximum(on_cube(u) - 0.1, 0.0), 10, _rng(), 0)
+    assert fit is None
+
+
+def test_a_ripple_that_vanishes_at_every_corner_is_found(on_cube: Response) -> None:
+    _, fit = chaos_indices(lambda u: on_cube(u) + 0.0003 * np.sin(14.0 * np.pi * u[:, 0]), 10, _rng(), 0)
+    assert fit is None
+
+
 def test_a_refused_response_is_sampled_and_the_note_says_so(on_cube: Response) -> None:
     def kinked(unit: np.ndarray) -> np.ndarray:
         return np.maximum(on_cube(unit), 0.045)

@@ -19,7 +19,8 @@ def test_the_fast_study_agrees_with_the_shipped_table_on_every_joint(gear: Gear,
 
 def test_a_seed_gives_the_same_table_again(gear: Gear) -> None:
     assert run_study(gear, StudyOptions(seed=3)).table == run_study(gear, StudyOptions(seed=3)).table
-    assert run_study(gear, StudyOptions(seed=3)).table != run_study(gear, StudyOptions(seed=0)).table
+    first, other = (run_study(gear, StudyOptions(seed=seed)).table.first_order for seed in (3, 0))
+    assert not np.array_equal(first, other)
 
 
 def test_under_travel_has_indices_of_its_own(gear: Gear, table: IndexTable) -> None:
@@ -56,13 +57,6 @@ def test_a_paper_design_with_random_directions_is_refused(gear: Gear) -> None:
 def test_an_accuracy_of_zero_is_refused(gear: Gear) -> None:
     with pytest.raises(UsageError):
         run_study(gear, StudyOptions(accuracy=0.0))
-
-
-def test_joints_1_to_5_have_95_percent_on_every_linkage(gear: Gear) -> None:
-    leading = [
-        run_study(gear, StudyOptions(limits_in=gear.limits_in, design=Design.TENSOR)).table.first_order[:5].sum()
-    ]
-    assert min(leading) >= 0.95
 
 
 def test_an_interruption_in_the_ensemble_leaves_the_reference(gear: Gear) -> None:

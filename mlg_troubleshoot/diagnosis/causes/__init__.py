@@ -42,6 +42,22 @@ CATALOGUE: tuple[Cause, ...] = (
 )
 
 
+# What running a user's file may raise.
+_BROKEN = (
+    SyntaxError,
+    ImportError,
+    NameError,
+    AttributeError,
+    TypeError,
+    ValueError,
+    LookupError,
+    ArithmeticError,
+    AssertionError,
+    OSError,
+    RuntimeError,
+)
+
+
 def load_causes(file: Path) -> tuple[Cause, ...]:
     """Load a user's own causes from a Python file.
 
@@ -66,7 +82,7 @@ def load_causes(file: Path) -> tuple[Cause, ...]:
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except (SyntaxError, ImportError, NameError, AttributeError, TypeError, ValueError) as error:
+    except _BROKEN as error:
         raise UsageError(f"{file} cannot be loaded: {error}", "Correct the file and run again.") from error
     found = [
         value()

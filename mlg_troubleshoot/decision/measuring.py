@@ -1,0 +1,236 @@
+"""Which joint to measure next, by what its reading is worth per minute, and when to stop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.decision.assessment import MeasuringAdvice, ReadingWorth, Verdict
+from mlg_troubleshoot.decision.belief import draw_shares, quick_probability
+from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.prediction import Extension, clearances, predict
+from mlg_troubleshoot.decision.response import responses
+from mlg_troubleshoot.decision.rule import CONFORMANCE, verdict, zone
+from mlg_troubleshoot.gear.gear import Gear
+
+Array = NDArray[np.float64]
+
+# At a conformance probability of 95 % one wrong WITHIN weighs as much as this many wrong OUTSIDE.
+COST_OF_WRONG_WITHIN = CONFORMANCE / (1.0 - CONFORMANCE)
+# A drop in risk below this is noise of the draws: the reading has no value of its own.
+_NO_VALUE = 2e-3
+_DRAWS = 1024
+
+
+def decision_risk(probability: Array | float) -> Array:
+    """Expected cost of the better of WITHIN and OUTSIDE.
+
+    Parameters
+    ----------
+    probability : ndarray or float
+        Probability of being within the margin. [1]
+
+    Returns
+    -------
+    ndarray
+        Cost; 1 is that of one wrong OUTSIDE. [1]
+    """
+    p = np.asarray(probability, float)
+    risk: Array = np.minimum(COST_OF_WRONG_WITHIN * (1.0 - p), p)
+    return risk
+
+
+def access_of_one_more(gear: Gear, number: int, measured: Sequence[int]) -> float:
+    """Time to reach one more joint, its area being open if another joint in it was measured.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    number : int
+        The joint.
+    measured : sequence of int
+        Joints measured so far.
+
+    Returns
+    -------
+    float
+        Time. [min]
+    """
+    joint = gear.joint(number)
+    opened = {gear.joint(other).area for other in measured}
+    area = sum(area.access.value for area in gear.areas if area.name == joint.area and area.name not in opened)
+    return joint.access.value + area
+
+
+def worth_of_readings(
+    gear: Gear,
+    inspection: Inspection,
+    margin_in: float,
+    extension: Extension | None = None,
+    anchor: tuple[float, float] | None = None,
+) -> tuple[ReadingWorth, ...]:
+    """Find what measuring each unmeasured joint is worth, best first, critical joints before all others.
+
+    The unmeasured joints are drawn from their distribution (`belief`). For each joint the probability of being
+    within the margin, once its clearance is known, is a smooth function of that clearance, fitted to the draws by a
+    cubic; what the risk falls by on average is the value of the reading. Where no single reading has a value, the
+    share of the variance of the worst case takes its place. Draws and expansion serve the ranking only.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    inspection : Inspection
+        What was measured so far.
+    margin_in : float
+        Allowed displacement. [in]
+    extension : Extension, optional
+        An extension of the model.
+    anchor : tuple of float, optional
+        Exact worst cases of both senses with unmeasured joints at 0. [in]
+
+    Returns
+    -------
+    tuple of ReadingWorth
+        One for each unmeasured joint.
+    """
+    found = clearances([inspection], gear, np.full(len(gear.joints), np.nan))[0]
+    missing = np.flatnonzero(~np.isfinite(found))
+    numbers = [gear.joint_numbers[j] for j in missing]
+    taken = [number for number in gear.joint_numbers if number not in numbers]
+    minutes = [access_of_one_more(gear, number, taken) for number in numbers]
+    linkages = responses(gear)
+    if anchor is not None:
+        linkages = (linkages[0].anchored(np.nan_to_num(found), *anchor), *linkages[1:])
+    limits = gear.limits_in
+    shares = draw_shares((found / limits)[np.isfinite(found)], len(missing), _DRAWS)
+    drawn = np.tile(np.nan_to_num(found), (_DRAWS, 1))
+    drawn[:, missing] = shares * limits[missing]
+    p = quick_probability(
+        linkages,
+        drawn,
+        np.ones(len(limits), bool),
+        inspection.gauge_u_in,
+        (margin_in, inspection.margin_u_in),
+        None if extension is None else extension.residual_u_in,
+    )
+    drops = np.array([_risk_drop(shares[:, k], p) for k in range(len(missing))])
+    variances = linkages[0].slopes(drawn.mean(axis=0))[missing] ** 2 * drawn[:, missing].var(axis=0)
+    drops, variances = _same_for_both_ends(gear, numbers, drops), _same_for_both_ends(gear, numbers, variances)
+    worth = [
+        ReadingWorth(number, minutes[k], float(drops[k]), float(variances[k]), gear.joint(number).critical)
+        for k, number in enumerate(numbers)
+    ]
+    first = [w for w in worth if w.critical] or worth
+    valued = any(w.risk_drop > _NO_VALUE for w in first)
+    return tuple(sorted(worth, key=lambda w: (not w.critical, -w.per_minute(by_risk=valued))))
+
+
+def _risk_drop(share: Array, p: Array) -> float:
+    fitted = np.polynomial.Polynomial.fit(share, p, 3)(share)
+    drop = float(decision_risk(p.mean()) - decision_risk(np.clip(fitted, 0.0, 1.0)).mean())
+    return drop if drop > _NO_VALUE else 0.0
+
+
+def _same_for_both_ends(gear: Gear, numbers: Sequence[int], values: Array) -> Array:
+    """Mean over joints that act alike, so that the draws do not decide between them."""
+    same = values.copy()
+    for k, number in enumerate(numbers):
+        ends = [i for i, other in enumerate(numbers) if other == number or other in gear.alike[number]]
+        same[k] = values[ends].mean()
+    return same
+
+
+def advise(
+    gear: Gear,
+    inspection: Inspection,
+    margin_in: float,
+    extension: Extension | None = None,
+) -> MeasuringAdvice:
+    """Say which joint to measure next and whether one may stop.
+
+    One may stop where the verdict is the same with every unmeasured joint measured as 0 and measured at its limit:
+    the worst case grows with every clearance, so nothing between can differ. A joint beyond its limit is found only
+    by measuring it.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    inspection : Inspection
+        What was measured so far.
+    margin_in : float
+        Allowed displacement. [in]
+    extension : Extension, optional
+        An extension of the model.
+
+    Returns
+    -------
+    MeasuringAdvice
+        The advice, with a sentence.
+    """
+    found = clearances([inspection], gear, np.full(len(gear.joints), np.nan))[0]
+    open_joints = ~np.isfinite(found)
+    critical = np.array([joint.critical for joint in gear.joints])
+    lowest = np.where(open_joints, 0.0, found)
+    ends = np.array([lowest, np.where(open_joints, gear.limits_in, found)])
+    masks = np.array([~open_joints, np.ones(len(found), bool)])
+    rows = np.array([ends[0], ends[1], ends[0], ends[1]])
+    prediction = predict(
+        gear, [inspection] * 4, rows, masks[[0, 0, 1, 1]], np.full(4, inspection.gauge_u_in), extension
+    )
+    p = prediction.probability_within(np.full(4, margin_in), np.full(4, inspection.margin_u_in))
+    now = verdict(float(p[0]), float(p[1]), critical_missing=bool(np.any(open_joints & critical)))
+    low, high = zone(float(p[2])), zone(float(p[3]))
+    settled = low is high
+    if not open_joints.any():
+        precise = _can_precision_settle(gear, inspection, margin_in, extension, found, now)
+        return MeasuringAdvice((), stop=not precise, verdict=low, text=_all_measured(now, precise))
+    anchor = None
+    over, under = float(prediction.worst.over_in[0]), float(prediction.worst.under_in[0])
+    if np.isfinite(over) and np.isfinite(under):
+        anchor = (over, under)
+    worth = worth_of_readings(gear, inspection, margin_in, extension, anchor)
+    return MeasuringAdvice(worth, stop=settled, verdict=low if settled else now, text=_text(gear, worth, settled, low))
+
+
+def _text(gear: Gear, worth: Sequence[ReadingWorth], settled: bool, verdict_then: Verdict) -> str:
+    best = worth[0]
+    name = f"#{best.joint} {gear.joint(best.joint).name}"
+    if settled:
+        return (
+            f"More measuring will not change the verdict ({verdict_then.words}), unless a joint is over its limit: you "
+            "may stop."
+        )
+    minutes = f"about {best.minutes:.0f} min access"
+    if best.risk_drop > 0.0:
+        return f"Worth most next: {name} ({minutes})."
+    return f"Next: {name} ({minutes}); no single reading decides, it removes most of the uncertainty per minute."
+
+
+def _all_measured(now: Verdict, precise: bool) -> str:
+    if now is not Verdict.INCONCLUSIVE:
+        return "All joints are measured: more measuring will not change the verdict."
+    if precise:
+        return "All joints are measured. More precise readings may still settle it."
+    return (
+        "All joints are measured, and more precise readings will not settle it: the uncertainty of the geometry and of "
+        "the model is larger than that of the readings. Measure the plunger displacement at mid-position."
+    )
+
+
+def _can_precision_settle(
+    gear: Gear, inspection: Inspection, margin_in: float, extension: Extension | None, found: Array, now: Verdict
+) -> bool:
+    """True if exact readings, within two standard uncertainties of these ones, could leave INCONCLUSIVE."""
+    if now is not Verdict.INCONCLUSIVE:
+        return False
+    slopes = responses(gear)[0].slopes(found)
+    step = 2.0 * inspection.gauge_u_in * slopes / np.sqrt(np.sum(slopes**2))
+    rows = np.maximum(np.array([found - step, found + step]), 0.0)
+    prediction = predict(gear, [inspection] * 2, rows, np.zeros((2, len(found)), bool), np.zeros(2), extension)
+    p = prediction.probability_within(np.full(2, margin_in), np.full(2, inspection.margin_u_in))
+    return any(zone(float(value)) is not Verdict.INCONCLUSIVE for value in p)

@@ -1,0 +1,358 @@
+"""Forward model and sensitivity indices beside other libraries: ``python tests/benchmarks/bench_studies.py``.
+
+Not collected by pytest. Everything runs in one process on one core in turn, so that the ratios mean something on
+a shared machine; each time is the least of several runs. A library that is not installed is left out and named:
+``pip install numba SALib openturns pylinkage python-solvespace``. ``--full`` adds the paper-size total-order study.
+"""
+
+# The number of threads must be set before numpy is imported.
+# ruff: noqa: E402
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.geometry.kernel import Kernel, numba_is_installed
+from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Mechanism, Output, Plane, Point, Slider
+from mlg_troubleshoot.studies.chaos import chaos_indices
+from mlg_troubleshoot.studies.inputs import Inputs
+from mlg_troubleshoot.studies.response import HeldDirections, nominal_response
+from mlg_troubleshoot.studies.tensor import tensor_indices
+
+Array = NDArray[np.float64]
+ACCURACY = 1e-3
+SEEDS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One line of the result."""
+
+    what: str
+    value: str
+    target: str
+    holds: bool | None
+
+
+def least(work: Callable[[], object], runs: int = 5) -> float:
+    """Least time of several runs. [s]"""
+    times = []
+    for _ in range(runs):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+DYADS = (("C", "B", "D", 7.0, 9.0), ("H", "C", "G", 8.0, 9.0))
+LINE, ROD = 2.0, 8.0
+
+
+def chain() -> Mechanism:
+    """Four-bar of the published case, another dyad and a slider behind it."""
+    points = (
+        Point("A", "plane", 0.0, 0.0, fixed=True),
+        Point("D", "plane", 6.0, 0.0, fixed=True, virtual_link=4),
+        Point("G", "plane", 12.0, 0.0, fixed=True),
+        Point("B", "plane", *(2.0 * np.array([np.cos(0.5), np.sin(0.5)])).tolist()),
+    )
+    located = {p.name: complex(p.x, p.y) for p in points}
+    for joint, start, end, first, second in DYADS:
+        located[joint] = _meet(located[start], located[end], first, second)
+    h = located["H"]
+    located["K"] = complex(h.real + float(np.sqrt(ROD**2 - (h.imag - LINE) ** 2)), LINE)
+    points += tuple(Point(j, "plane", located[j].real, located[j].imag) for j in ("C", "H", "K"))
+    steps = (
+        Crank("B", "A"),
+        *(Dyad(j, start, end, 1.0, (k + 1,)) for k, (j, start, end, _, _) in enumerate(DYADS)),
+        Slider("K", "H", 0.0, 1.0, (3,)),
+    )
+    return Mechanism((Plane("plane"),), points, steps, Output("position", "K"), 0.5)
+
+
+def _meet(a: complex, b: complex, first: float, second: float) -> complex:
+    apart = abs(b - a)
+    along = (first**2 - second**2 + apart**2) / (2.0 * apart)
+    return a + (b - a) / apart * complex(along, np.sqrt(first**2 - along**2))
+
+
+def forward(response: HeldDirections) -> list[Line]:
+    """Forward model on the real linkage, and the same small chain in other libraries."""
+    rng = np.random.default_rng(0)
+    clearance = np.ascontiguousarray(0.0075 * rng.random((10, 1 << 20)))
+    out = np.empty(clearance.shape[1])
+    kernel, stroke = response.model.kernel, response.model.stroke[1]
+
+    def rate(compiled: bool) -> float:
+        def work() -> object:
+            return kernel.batch(stroke, clearance, response.directions, compiled=compiled, out=out)
+
+        work()
+        if np.isnan(out).any():
+            raise SystemExit("the linkage does not close on the benchmark's samples")
+        return len(out) / least(work)
+
+    lines = []
+    numpy_rate = rate(compiled=False)
+    lines.append(Line("real linkage, numpy", f"{numpy_rate / 1e6:.1f} M/s", "≥ 8 M/s", numpy_rate >= 8e6))
+    if numba_is_installed():
+        numba_rate = rate(compiled=True)
+        lines.append(Line("real linkage, numba", f"{numba_rate / 1e6:.1f} M/s", "≥ 50 M/s", numba_rate >= 50e6))
+    return lines + _chain_rates()
+
+
+def _chain_rates() -> list[Line]:
+    kernel = Kernel(chain())
+    count = 1 << 20
+    clearance = 0.01 * np.random.default_rng(0).random((4, count))
+    compiled = numba_is_installed()
+    out = np.empty(count)
+
+    def own() -> object:
+        return kernel.batch(0.5, clearance, np.zeros(4), compiled=compiled, out=out)
+
+    own()
+    own_rate = count / least(own)
+    lines = [Line("small chain, this package", f"{own_rate / 1e6:.1f} M/s", "", None)]
+    here = kernel.positions(0.5, kernel.no_clearance())["K"]
+    for name, peer, factor in (("pylinkage simulate_batch", _pylinkage, 100), ("python-solvespace", _solvespace, 3000)):
+        try:
+            peer_rate, place = peer()
+        except ImportError:
+            lines.append(Line(f"small chain, {name}", "not installed", "", None))
+            continue
+        if np.hypot(place[0] - here[0], place[1] - here[1]) > 1e-6:
+            raise SystemExit(f"{name} does not solve the same chain: {place} against {here}")
+        ratio = own_rate / peer_rate
+        lines.append(
+            Line(
+                f"small chain, {name}", f"{peer_rate / 1e3:.1f} k/s, ratio {ratio:.0f}", f"≥ {factor}", ratio >= factor
+            )
+        )
+    return lines
+
+
+def _pylinkage() -> tuple[float, tuple[float, float]]:
+    from pylinkage import Crank as PeerCrank
+    from pylinkage import Ground, Linkage, RRPDyad, RRRDyad
+    from pylinkage.bridge.solver_conversion import linkage_to_solver_data
+    from pylinkage.population._batch_sim import simulate_batch
+
+    m = chain()
+    ground = {p.name: Ground(p.x, p.y, name=p.name) for p in m.points if p.fixed}
+    parts: dict[str, object] = dict(ground)
+    parts["B"] = PeerCrank(ground["A"], radius=2.0, angular_velocity=0.0, initial_angle=0.5, name="B")
+    for joint, start, end, first, second in DYADS:
+        p = m.point(joint)
+        parts[joint] = RRRDyad(parts[start], parts[end], first, second, x=p.x, y=p.y, name=joint)
+    k = m.point("K")
+    ends = Ground(0.0, LINE, name="L1"), Ground(30.0, LINE, name="L2")
+    parts |= {"L1": ends[0], "L2": ends[1], "K": RRPDyad(parts["H"], *ends, ROD, x=k.x, y=k.y, name="K")}
+    linkage = Linkage(list(parts.values()))
+    data = linkage_to_solver_data(linkage)
+    count = 2000
+    constraints = np.tile(data.constraints, (count, 1))
+    positions = np.tile(data.positions, (count, 1, 1))
+    track = simulate_batch(data, constraints, positions, 1)
+    place = track[0, 0, -1]
+    return count / least(lambda: simulate_batch(data, constraints, positions, 1)), (float(place[0]), float(place[1]))
+
+
+def _solvespace() -> tuple[float, tuple[float, float]]:
+    from python_solvespace import SolverSystem
+
+    m = chain()
+    system = SolverSystem()
+    plane = system.create_2d_base()
+    handles = {p.name: system.add_point_2d(p.x, p.y, plane) for p in m.points}
+    for p in m.points:
+        if p.fixed or p.name == "B":
+            system.dragged(handles[p.name], plane)
+    for joint, start, end, first, second in DYADS:
+        system.distance(handles[joint], handles[start], first, plane)
+        system.distance(handles[joint], handles[end], second, plane)
+    ends = system.add_point_2d(0.0, LINE, plane), system.add_point_2d(30.0, LINE, plane)
+    for end in ends:
+        system.dragged(end, plane)
+    system.coincident(handles["K"], system.add_line_2d(*ends, plane), plane)
+    system.distance(handles["K"], handles["H"], ROD, plane)
+    count = 200
+    rng = np.random.default_rng(0)
+    starts = [(m.point("K").x + dx, m.point("K").y + dy) for dx, dy in 0.01 * rng.standard_normal((count, 2))]
+
+    def work() -> None:
+        for x, y in starts:
+            system.set_params(handles["K"].params, [x, y])
+            system.solve()
+
+    rate = count / least(work, 3)
+    x, y = system.params(handles["K"].params)
+    return rate, (x, y)
+
+
+def indices(response: HeldDirections) -> list[Line]:
+    """Time to every index within the accuracy, worst of ten seeds."""
+    limits = np.asarray(response.model.joint_numbers, float) * 0.0 + 0.0075
+    cube = Inputs(limits).on_unit_cube(response)
+    exact = tensor_indices(response, limits, order=4)
+
+    def error(first: Array, total: Array) -> float:
+        return float(max(np.abs(first - exact.first_order).max(), np.abs(total - exact.total_order).max()))
+
+    own_errors, own_counts = [], []
+    for seed in range(SEEDS):
+        found, _ = chaos_indices(cube, 10, np.random.default_rng(seed), seed, ACCURACY)
+        own_errors.append(error(found.first_order, found.total_order))
+        own_counts.append(found.evaluations)
+    own = least(lambda: chaos_indices(cube, 10, np.random.default_rng(0), 0, ACCURACY), 50)
+    holds = max(own_errors) <= ACCURACY and max(own_counts) <= 512
+    lines = [
+        Line(
+            "indices to 1e-3, fast route",
+            f"{own * 1e3:.2f} ms, {max(own_counts)} evaluations, worst error {max(own_errors):.1g}",
+            "≤ 512, ≤ 1e-3",
+            holds,
+        )
+    ]
+    for name, peer, factor in (
+        ("OpenTURNS chaos", _openturns, 3),
+        ("scipy sobol_indices", _scipy, 300),
+        ("SALib", _salib, 1000),
+    ):
+        try:
+            needed, seconds, worst = peer(cube, error)
+        except ImportError:
+            lines.append(Line(f"indices, {name}", "not installed", "", None))
+            continue
+        ratio = seconds / own
+        text = f"{seconds * 1e3:.1f} ms, {needed} evaluations, worst error {worst:.1g}, ratio {ratio:.0f}"
+        lines.append(Line(f"indices, {name}", text, f"≥ {factor}", ratio >= factor))
+    return lines
+
+
+Error = Callable[[Array, Array], float]
+
+
+def _growing(
+    run: Callable[[int, int], tuple[Array, Array]], error: Error, power: int, per: int
+) -> tuple[int, float, float]:
+    """Double the points until the worst of ten seeds is within the accuracy; then time one run."""
+    while True:
+        worst = max(error(*run(power, seed)) for seed in range(SEEDS))
+        if worst <= ACCURACY or power == 17:
+            return per << power, least(partial(run, power, 0), 3), worst
+        power += 1
+
+
+def _scipy(cube: Callable[[Array], Array], error: Error) -> tuple[int, float, float]:
+    from scipy.stats import sobol_indices, uniform
+
+    def run(power: int, seed: int) -> tuple[Array, Array]:
+        found = sobol_indices(
+            func=lambda x: cube(np.ascontiguousarray(x.T)),
+            n=1 << power,
+            dists=[uniform()] * 10,
+            rng=np.random.default_rng(seed),
+        )
+        return found.first_order, found.total_order
+
+    return _growing(run, error, 7, 12)
+
+
+def _salib(cube: Callable[[Array], Array], error: Error) -> tuple[int, float, float]:
+    from SALib.analyze import sobol as analyze
+    from SALib.sample import sobol as sample
+
+    problem = {"num_vars": 10, "names": [str(i) for i in range(10)], "bounds": [[0.0, 1.0]] * 10}
+
+    def run(power: int, seed: int) -> tuple[Array, Array]:
+        points = sample.sample(problem, 1 << power, seed=seed)
+        found = analyze.analyze(problem, cube(points), seed=seed)
+        return np.asarray(found["S1"]), np.asarray(found["ST"])
+
+    return _growing(run, error, 7, 22)
+
+
+def _openturns(cube: Callable[[Array], Array], error: Error) -> tuple[int, float, float]:
+    import openturns as ot
+
+    ot.Log.Show(ot.Log.NONE)
+    inputs = ot.JointDistribution([ot.Uniform(0.0, 1.0)] * 10)
+    basis = ot.OrthogonalProductPolynomialFactory([ot.LegendreFactory()] * 10, ot.LinearEnumerateFunction(10))
+
+    def run(seed: int) -> tuple[Array, Array]:
+        ot.RandomGenerator.SetSeed(seed)
+        sample = ot.LHSExperiment(inputs, 512).generate()
+        values = cube(np.asarray(sample))
+        best = None
+        for degree in (1, 2, 3):
+            size = basis.getEnumerateFunction().getBasisSizeFromTotalDegree(degree)
+            algorithm = ot.LeastSquaresExpansion(sample[:384], ot.Sample(values[:384, None]), inputs, basis, size, "QR")
+            algorithm.run()
+            result = algorithm.getResult()
+            misses = np.asarray(result.getMetaModel()(sample[384:]))[:, 0] - values[384:]
+            residual = float((misses**2).mean())
+            if best is None or residual < best[0]:
+                best = (residual, result)
+        assert best is not None
+        found = ot.FunctionalChaosSobolIndices(best[1])
+        return (
+            np.array([found.getSobolIndex(i) for i in range(10)]),
+            np.array([found.getSobolTotalIndex(i) for i in range(10)]),
+        )
+
+    worst = max(error(*run(seed)) for seed in range(3))
+    return 512, least(lambda: run(0), 5), worst
+
+
+def paper_study(response: HeldDirections) -> list[Line]:
+    """The paper-size total-order study on two cores."""
+    import resource
+
+    from mlg_troubleshoot.studies.blocks import block_study, total_order_study
+
+    gear = load_gear()
+    study = block_study(response, Inputs(gear.limits_in), gear.geometry_sha256, 0)
+    start = time.perf_counter()
+    total_order_study(study, workers=2)
+    seconds = time.perf_counter() - start
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    return [
+        Line(
+            f"total-order study, {study.evaluations / 1e9:.3f}e9 solutions", f"{seconds:.1f} s", "≤ 90 s", seconds <= 90
+        ),
+        Line("its memory", f"{memory:.0f} MiB", "≤ 500 MiB", memory <= 500),
+    ]
+
+
+def main() -> int:
+    """Run everything, print a table, return 1 if a target is missed."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--full", action="store_true", help="also the paper-size total-order study")
+    full = parser.parse_args().full
+    warnings.simplefilter("ignore")
+    response = nominal_response(load_gear())
+    lines = paper_study(response) if full else []
+    lines = [*forward(response), *indices(response), *lines]
+    for line in lines:
+        mark = "" if line.holds is None else ("holds" if line.holds else "MISSED")
+        print(f"{line.what:45s} {line.value:62s} {line.target:14s} {mark}")
+    return 1 if any(line.holds is False for line in lines) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,127 @@
+"""``mlg check`` on a real terminal: questions in, verdict out, and an entry that was broken off."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.benchmarks.bench_check import write_inspections
+from tests.cli.conftest import FLEET, ROOT
+
+pexpect = pytest.importorskip("pexpect")
+pytestmark = [
+    pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal"),
+    pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning"),
+]
+PROMPT = "> "
+FIRST_FIVE = ("0.001", ".001 in", "13 thou", "0.0254 mm", ".007")
+
+Start = Callable[..., "pexpect.spawn"]
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Start]:
+    """Start ``mlg`` on a terminal of 80×40, with a home of its own."""
+    started = []
+
+    def begin(*arguments: object) -> pexpect.spawn:
+        child = pexpect.spawn(
+            sys.executable,
+            ["-m", "mlg_troubleshoot", *(str(a) for a in arguments)],
+            dimensions=(40, 80),
+            env={
+                "PATH": os.environ["PATH"],
+                "HOME": str(tmp_path),
+                "PYTHONPATH": str(ROOT),
+                "TERM": "xterm-256color",
+                "LANG": "C.UTF-8",
+            },
+            encoding="utf-8",
+            timeout=20,
+        )
+        child.delaybeforesend = None
+        started.append(child)
+        return child
+
+    yield begin
+    for child in started:
+        child.close(force=True)
+
+
+def answer(child: pexpect.spawn, *answers: str) -> None:
+    for text in answers:
+        child.expect_exact(PROMPT)
+        child.sendline(text)
+
+
+def finish(child: pexpect.spawn) -> int:
+    child.expect(pexpect.EOF)
+    child.close()
+    return int(child.exitstatus)
+
+
+def test_answers_lead_to_a_verdict_and_the_exit_code(start: Start) -> None:
+    child = start("check")
+    answer(child, "N123", "l", "i", "r", *FIRST_FIVE, "done", "f", "", "")
+    child.expect_exact("OUTSIDE MARGIN")
+    child.expect_exact("#3 short link inner")
+    assert finish(child) == 1
+
+
+def test_an_interrupt_says_how_to_go_on_and_exits_130(start: Start) -> None:
+    child = start("check")
+    answer(child, "N123", "l")
+    child.expect_exact(PROMPT)
+    child.sendintr()
+    child.expect_exact("mlg check --resume")
+    assert finish(child) == 130
+
+
+def test_an_interrupted_entry_goes_on_where_it_stopped(start: Start) -> None:
+    child = start("check")
+    answer(child, "N123", "l", "i", "r", "0.001")
+    child.expect_exact("joint 2 of 10")
+    child.sendintr()
+    finish(child)
+    again = start("check", "--resume")
+    again.expect_exact("joint 2 of 10")
+    again.sendintr()
+    assert finish(again) == 130
+
+
+def test_flags_answer_questions_beforehand(start: Start) -> None:
+    child = start("check", "--tail", "N77", "--side", "RH", "--unit", "thou", "--convention", "TOTAL_PLAY")
+    child.expect_exact("N77 RH")
+    child.expect_exact("joint 1 of 10")
+    child.sendintr()
+    assert finish(child) == 130
+
+
+def test_a_joint_that_was_just_skipped_is_not_asked_for_next(start: Start) -> None:
+    child = start("check", "--tail", "N77", "--side", "RH", "--unit", "in", "--convention", "RADIAL")
+    answer(child, ".001", ".001", ".001", ".001", "s")
+    child.expect_exact("joint 6 of 10")
+    assert "Worth most next: #5" not in child.before
+    child.sendintr()
+    finish(child)
+
+
+def test_a_large_batch_shows_its_progress(start: Start, tmp_path: Path) -> None:
+    write_inspections(tmp_path / "batch.csv", 1500)
+    child = start("check", tmp_path / "batch.csv")
+    child.expect(r"Judging .*/1500")
+    child.expect_exact("1500 inspections:")
+    assert finish(child) == 1
+
+
+def test_a_batch_fits_the_terminal(start: Start) -> None:
+    child = start("check", FLEET)
+    child.expect(r"\[1mverdict")
+    child.expect_exact("Model:")
+    plain = [line for line in child.before.splitlines() if "258-" in line]
+    assert len(plain) == 46
+    finish(child)

@@ -1,0 +1,190 @@
+"""A table that cannot answer says what it lacks and what to record: exit 3, no traceback, no name."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from mlg_troubleshoot.cli.app import app
+from mlg_troubleshoot.diagnosis import DiagnosisTable, diagnose
+from mlg_troubleshoot.errors import InconclusiveDataError
+from mlg_troubleshoot.gear.gear import Gear
+
+from .conftest import fleet
+
+Spoil = Callable[[DiagnosisTable], DiagnosisTable]
+
+
+def no_measured(table: DiagnosisTable) -> DiagnosisTable:
+    return replace(table, readings_in=np.full_like(table.readings_in, np.nan))
+
+
+def five_rows(table: DiagnosisTable) -> DiagnosisTable:
+    return table.take(slice(0, 5))
+
+
+def one_tail(table: DiagnosisTable) -> DiagnosisTable:
+    return replace(table, factors={**table.factors, "tail_no": np.full(len(table), "N1")})
+
+
+def no_clearances(table: DiagnosisTable) -> DiagnosisTable:
+    return replace(table, clearance_in=np.full_like(table.clearance_in, np.nan))
+
+
+def all_zero(table: DiagnosisTable) -> DiagnosisTable:
+    return replace(table, clearance_in=np.zeros_like(table.clearance_in))
+
+
+CANNOT: dict[str, tuple[Spoil, str, str]] = {
+    "no measured displacement": (no_measured, "no row has a measured plunger displacement", "plunger_displacement_in"),
+    "five rows": (five_rows, "5 usable rows are too few", "at least 20"),
+    "one tail": (one_tail, "all rows are of 1 aircraft", "at least 4 aircraft"),
+    "no clearances": (no_clearances, "no row with a measured displacement has a clearance", "clearances"),
+    "all clearances zero": (all_zero, "every clearance is zero", "blank"),
+}
+
+
+@pytest.mark.parametrize("case", CANNOT)
+def test_a_table_that_cannot_answer_says_why(case: str, gear: Gear, plain: DiagnosisTable) -> None:
+    spoil, why, _remedy = CANNOT[case]
+    with pytest.raises(InconclusiveDataError, match=why):
+        diagnose(gear.model, spoil(plain), gear.discrepancies, permutations=99)
+
+
+@pytest.mark.parametrize("case", CANNOT)
+def test_it_says_what_to_record_next_time(case: str, gear: Gear, plain: DiagnosisTable) -> None:
+    spoil, _why, remedy = CANNOT[case]
+    with pytest.raises(InconclusiveDataError) as refused:
+        diagnose(gear.model, spoil(plain), gear.discrepancies, permutations=99)
+    assert remedy in refused.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [("temperature_c", 15.0), ("hydraulic_pressure_psi", 2500.0), ("gear_landings", 0.0), ("day", 3.0)],
+)
+def test_a_constant_column_names_nothing(column: str, value: float, gear: Gear, plain: DiagnosisTable) -> None:
+    constant = {**plain.quantities, column: np.full(len(plain), value)}
+    found = diagnose(gear.model, replace(plain, quantities=constant), gear.discrepancies, permutations=199)
+    assert found.verdict == "NONE"
+
+
+@pytest.mark.parametrize("factor", ["gauge_id", "technician_id", "side", "approach"])
+def test_a_constant_name_names_nothing(factor: str, gear: Gear, plain: DiagnosisTable) -> None:
+    constant = {**plain.factors, factor: np.full(len(plain), "X")}
+    found = diagnose(gear.model, replace(plain, factors=constant), gear.discrepancies, permutations=199)
+    assert found.verdict == "NONE"
+
+
+def test_constant_clearances_are_no_reason_to_fail(gear: Gear, plain: DiagnosisTable) -> None:
+    alike = fleet(gear.model, clearance_in=np.full_like(plain.clearance_in, 0.002))
+    assert diagnose(gear.model, alike, gear.discrepancies, permutations=199).verdict == "NONE"
+
+
+def test_measured_values_that_never_differ_are_no_reason_to_fail(gear: Gear, plain: DiagnosisTable) -> None:
+    stuck = replace(plain, readings_in=np.full_like(plain.readings_in, 0.02))
+    assert diagnose(gear.model, stuck, gear.discrepancies, permutations=99).verdict in {
+        "NONE",
+        "NAMED",
+        "AMBIGUOUS",
+        "UNLISTED",
+    }
+
+
+def test_a_column_with_one_value_known_is_no_reason_to_fail(gear: Gear, plain: DiagnosisTable) -> None:
+    lonely = np.full(len(plain), np.nan)
+    lonely[7] = 21.0
+    table = replace(plain, quantities={**plain.quantities, "temperature_c": lonely})
+    assert diagnose(gear.model, table, gear.discrepancies, permutations=99).verdict == "NONE"
+
+
+# At the command line
+
+HEADER = ["record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in"]
+
+
+def write(file: Path, rows: list[list[object]], *columns: str) -> Path:
+    with file.open("w", newline="", encoding="utf-8") as out:
+        csv.writer(out).writerows([[*HEADER, *columns], *rows])
+    return file
+
+
+def inspections(n: int, *cells: object, tails: int = 6) -> list[list[object]]:
+    """Rows with two clearances and further cells."""
+    return [[f"R{k}", f"N{k % tails}", "LH", "RADIAL", 0.002 + k * 1e-5, 0.003, *cells] for k in range(n)]
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(app, ["diagnose", *arguments])
+
+
+COMMANDS: dict[str, tuple[list[list[object]], tuple[str, ...], str]] = {
+    "no measured displacement": (inspections(30), (), "no row has a measured plunger displacement"),
+    "five rows": (inspections(5, 0.02), ("plunger_displacement_in",), "5 usable rows are too few"),
+    "one tail": (inspections(30, 0.02, tails=1), ("plunger_displacement_in",), "all rows are of 1 aircraft"),
+    "no clearances": (
+        [[*row[:4], "", "", 0.02] for row in inspections(30)],
+        ("plunger_displacement_in",),
+        "clearance",
+    ),
+    "all clearances zero": (
+        [[*row[:4], 0, 0, 0.001] for row in inspections(30)],
+        ("plunger_displacement_in",),
+        "every clearance is zero",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", COMMANDS)
+def test_the_command_leaves_with_3(case: str, tmp_path: Path) -> None:
+    rows, columns, _why = COMMANDS[case]
+    assert run(str(write(tmp_path / "t.csv", rows, *columns))).exit_code == 3
+
+
+@pytest.mark.parametrize("case", COMMANDS)
+def test_the_command_says_why_and_what_to_do(case: str, tmp_path: Path) -> None:
+    rows, columns, why = COMMANDS[case]
+    said = run(str(write(tmp_path / "t.csv", rows, *columns))).stderr
+    assert why in said
+    assert "What to do:" in said
+    assert "Traceback" not in said
+
+
+def test_nothing_stands_on_stdout_where_nothing_is_concluded(tmp_path: Path) -> None:
+    rows, columns, _why = COMMANDS["five rows"]
+    assert run(str(write(tmp_path / "t.csv", rows, *columns)), "--json").stdout == ""
+
+
+def test_a_file_that_is_not_there_leaves_with_a_message(tmp_path: Path) -> None:
+    found = run(str(tmp_path / "none.csv"))
+    assert found.exit_code in {2, 3}
+    assert "none.csv" in found.stderr
+
+
+def test_an_empty_file_leaves_with_3(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("", encoding="utf-8")
+    assert run(str(tmp_path / "t.csv")).exit_code == 3
+
+
+@pytest.mark.parametrize("text", ["x = (", "import nothing_of_that_name", "y = 1", "1/0"])
+def test_a_file_of_causes_that_is_none_leaves_with_2(text: str, tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(text, encoding="utf-8")
+    rows, columns, _why = COMMANDS["five rows"]
+    found = run(str(write(tmp_path / "t.csv", rows, *columns)), "--causes", str(tmp_path / "own.py"))
+    assert found.exit_code == 2
+    assert "own.py" in found.stderr
+
+
+def test_the_json_of_a_diagnosis_holds_no_number_that_is_none(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    rows = [[*row, 0.02 + rng.normal(0.0, 0.002)] for row in inspections(40)]
+    found = run(str(write(tmp_path / "t.csv", rows, "plunger_displacement_in")), "--json", "--permutations", "99")
+    assert json.loads(found.stdout)["schema_version"] == 1
+    assert not {"NaN", "Infinity"} & set(found.stdout.split())

@@ -1,0 +1,124 @@
+"""The shipped diagnosis data sets are what their description says, and its commands print what it shows."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from mlg_troubleshoot.diagnosis import Diagnosis
+from mlg_troubleshoot.workflows import DiagnoseOptions, diagnose_files
+
+from ..hidden_effect import data_sets
+from .story import CUT, FOLDER, STORY, copied, examples, printed
+
+TEXT = STORY.read_text(encoding="utf-8")
+EXAMPLES = examples(TEXT)
+FILES = sorted(file.name for file in FOLDER.glob("measured_*.csv"))
+
+
+@cache
+def diagnosis(name: str, *causes: str) -> Diagnosis:
+    files = tuple(FOLDER / cause for cause in causes)
+    return diagnose_files([FOLDER / name], DiagnoseOptions(cause_files=files, permutations=199)).diagnosis
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the data sets; its examples run in their order."""
+    return copied(tmp_path_factory.mktemp("story"))
+
+
+def number_free(text: str) -> list[str]:
+    """Words of an output in any order, numbers and wrapping left out: other machines round otherwise."""
+    return sorted(re.findall(r"[^\W\d_]{3,}", text))
+
+
+def test_the_story_shows_examples() -> None:
+    assert len(EXAMPLES) == 7
+
+
+def test_the_examples_print_what_the_story_shows(place: Path) -> None:
+    for command, shown in EXAMPLES:
+        now = printed(command, place)
+        if shown.endswith(CUT):
+            now = "\n".join(now.splitlines()[: len(shown.splitlines()) - 1])
+        assert number_free(now) == number_free(shown), f"{command}\n{now}\nRenew: python -m tests.diagnosis.story"
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_every_data_set_is_described(file: str) -> None:
+    assert f"| `{file}` |" in TEXT
+
+
+def test_the_data_sets_are_called_synthetic() -> None:
+    assert "All of them are synthetic." in TEXT
+
+
+def test_the_command_makes_the_data_sets_again_byte_for_byte(tmp_path: Path) -> None:
+    assert data_sets.main([str(tmp_path)]) == 0
+    assert {f.name: f.read_bytes() for f in tmp_path.iterdir()} == {n: (FOLDER / n).read_bytes() for n in FILES}
+
+
+def test_the_command_says_what_it_needs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert data_sets.main([]) == 2
+    assert "Give the folder" in capsys.readouterr().err
+
+
+def test_the_seeds_in_the_description_are_those_of_the_command() -> None:
+    said = {name: int(seed) for name, seed in re.findall(r"\| `(measured_\w+)\.csv` \|.*\| (\d+) \|", TEXT)}
+    made = {name: seed for name, (_spec, seed) in data_sets.DATA_SETS.items()}
+    assert said == {**made, "measured_pressure_later": made["measured_pressure"] + 1000}
+
+
+def test_the_pressure_is_named() -> None:
+    assert [c.candidate.cause.name for c in diagnosis("measured_pressure.csv").causes] == ["elastic_compliance"]
+
+
+def test_the_row_in_millimetres_is_found() -> None:
+    faults = {(f.record_id, f.kind) for f in diagnosis("measured_pressure.csv").faults}
+    assert ("R0097", "mm_as_in") in faults
+    assert {record for record, _kind in faults} <= {"R0097", "R0190"}
+
+
+def test_the_joint_whose_pin_rests_aside_is_named() -> None:
+    (cause,) = diagnosis("measured_pin_direction.csv").causes
+    assert (cause.candidate.cause.name, cause.candidate.target) == ("direction_not_worst_case", "joint 3")
+
+
+def test_nothing_is_found_where_nothing_is_wrong() -> None:
+    assert (diagnosis("measured_nothing_wrong.csv").verdict, diagnosis("measured_nothing_wrong.csv").faults) == (
+        "NONE",
+        (),
+    )
+
+
+def test_frozen_grease_is_not_on_the_list() -> None:
+    found = diagnosis("measured_frozen_grease.csv")
+    assert (found.verdict, found.unlisted_variables) == ("UNLISTED", ("temperature_c",))
+
+
+def test_a_cause_of_one_s_own_is_named() -> None:
+    found = diagnosis("measured_frozen_grease.csv", "own_cause.py")
+    assert [c.candidate.cause.name for c in found.causes] == ["frozen_grease"]
+
+
+def test_the_number_of_a_cause_of_one_s_own_comes_out_right() -> None:
+    (cause,) = diagnosis("measured_frozen_grease.csv", "own_cause.py").causes
+    assert cause.interval[0] < -data_sets.DRAG_IN_PER_C < cause.interval[1]
+
+
+@pytest.mark.parametrize("file", ["measured_pressure.csv", "measured_pin_direction.csv"])
+def test_a_cause_of_one_s_own_takes_no_name_from_another(file: str) -> None:
+    names = [c.candidate.cause.name for c in diagnosis(file, "own_cause.py").causes]
+    assert names == [c.candidate.cause.name for c in diagnosis(file).causes]
+
+
+def test_nothing_is_found_with_a_cause_more() -> None:
+    assert diagnosis("measured_nothing_wrong.csv", "own_cause.py").verdict == "NONE"
+
+
+def test_the_example_of_a_cause_stands_in_the_story_as_it_is() -> None:
+    assert (FOLDER / "own_cause.py").read_text(encoding="utf-8").rstrip() in TEXT

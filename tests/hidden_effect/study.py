@@ -1,0 +1,294 @@
+"""The study: thousands of fleets with hidden effects, diagnosed blind; one command writes its table.
+
+    python -m tests.hidden_effect.study --workers 2
+
+The program was tuned on other seeds than the study uses: the study's begin at 1,000,000.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import time
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+# One thread a worker: the matrices are small, and two workers share two cores.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+
+from mlg_troubleshoot import load_gear
+from mlg_troubleshoot.diagnosis import Diagnosis, diagnose
+from mlg_troubleshoot.errors import InconclusiveDataError
+from tests.hidden_effect import simulator
+from tests.hidden_effect.as_table import as_table
+
+FIRST_SEED = 1_000_000
+PERMUTATIONS = 199
+RESULT = Path(__file__).with_name("study_result.json")
+
+Task = dict[str, Any]
+Record = dict[str, Any]
+
+PLAN: dict[str, int] = {
+    **{f"null:{name}": 400 for name in simulator.NULLS},
+    "single:5": 140,
+    "single:7": 140,
+    "single:10": 420,
+    "single:15": 294,
+    "single:25": 294,
+    "confounded:7": 84,
+    "confounded:10": 126,
+    "off_catalogue": 264,
+    "double": 150,
+    "aliased": 80,
+    "missing_column": 60,
+}
+
+
+def tasks(plan: dict[str, int], first_seed: int = FIRST_SEED) -> Iterator[Task]:
+    """Yield what to simulate, each with a seed of its own."""
+    causes = list(simulator.CATALOGUE)
+    seed = first_seed
+    for group, count in plan.items():
+        kind, _, option = group.partition(":")
+        for i in range(count):
+            arguments: dict[str, Any] = {"kind": kind}
+            if kind == "null":
+                arguments["null"] = option
+            elif option:
+                arguments |= {"strength": float(option), "cause": causes[i % len(causes)]}
+            yield {"group": group, "seed": seed, "arguments": arguments}
+            seed += 1
+
+
+def run(task: Task) -> Record:
+    """Simulate one fleet, diagnose its table alone, and only then compare with the label."""
+    fleet = simulator.draw_fleet(task["seed"], **task["arguments"])
+    table = as_table(fleet.table)
+    gear = load_gear()
+    start = time.process_time()
+    try:
+        found: Diagnosis | None = diagnose(gear.model, table, gear.discrepancies, permutations=PERMUTATIONS)
+    except InconclusiveDataError:
+        found = None
+    seconds = time.process_time() - start
+    return {"group": task["group"], "seed": task["seed"], "seconds": seconds, **_compare(fleet, found)}
+
+
+def _same(name: tuple[str, str | None], truth: tuple[str, str | None]) -> bool:
+    """A tail may be named for one of its gears, and a gear by its tail."""
+    if name[0] != truth[0] or name[1] == truth[1]:
+        return name == truth
+    return name[0] == "rigging_offset" and str(truth[1]).split(" ")[:2] == str(name[1]).split(" ")[:2]
+
+
+def _compare(fleet: simulator.Fleet, found: Diagnosis | None) -> Record:
+    label = fleet.label
+    truth = [(cause, target) for cause, target in label.causes]
+    listed = {name for name, _target in truth} <= set(simulator.CATALOGUE)
+    record: Record = {
+        "cause": truth[0][0] if truth else None,
+        "strength": label.strength,
+        "strengths": [e.strength for e in label.effects],
+        "verdict": "INCONCLUSIVE" if found is None else found.verdict,
+        "named": [],
+        "right": False,
+        "wrong": False,
+        "in_set": False,
+    }
+    wrong_cells = {(f.record_id, f.column) for f in label.faults}
+    wrong_rows = {f.record_id for f in label.faults}
+    record["faults"] = len(wrong_rows)
+    record["rows"] = len(fleet.table["record_id"])
+    if found is None:
+        record |= {"faults_found": 0, "false_faults": 0}
+        return record
+    proposed = {f.record_id for f in found.faults}
+    record["faults_found"] = len(wrong_rows & proposed)
+    record["cells_found"] = len(wrong_cells & {(f.record_id, f.column) for f in found.faults})
+    record["false_faults"] = len(proposed - wrong_rows)
+    names = [(c.candidate.cause.name, c.candidate.target) for c in found.causes]
+    also = [(c.candidate.cause.name, c.candidate.target) for c in found.also_possible]
+    record["named"] = names
+    if listed and truth:
+        record["right"] = len(names) == len(truth) and all(any(_same(n, t) for n in names) for t in truth)
+        record["in_set"] = all(any(_same(n, t) for n in (*names, *also)) for t in truth)
+        record["some_right"] = any(_same(n, t) for n in names for t in truth)
+        record["wrong"] = bool(names) and not all(any(_same(n, t) for t in truth) for n in names)
+        aliases = [(cause, target) for cause, target in label.aliases]
+        if aliases:
+            record["aliases_listed"] = all(any(_same(n, t) for n in (*names, *also)) for t in aliases)
+    else:
+        record["wrong"] = bool(names)
+    record["variables"] = list(found.unlisted_variables)
+    record["variables_right"] = bool(found.unlisted_variables) and set(found.unlisted_variables) <= set(
+        _own_names(label.variables)
+    )
+    if found.gain is not None:
+        before, after = found.gain.rms_before_in**2, found.gain.rms_after_in**2
+        record["worse"] = after > before
+        place = {name: k for k, name in enumerate(fleet.table["record_id"])}
+        truth_in = label.truth_term[[place[name] for name in found.used.record_id]]
+        best = before - float(np.mean((found.misfit_in - truth_in) ** 2))
+        record["share_of_true_gain"] = (before - after) / best if best > 0.0 else None
+    return record
+
+
+def _own_names(variables: Iterable[str]) -> set[str]:
+    """The simulator's column names as the diagnosis calls them."""
+    own = set()
+    for name in variables:
+        if name.startswith(("clearance_", "axial_float_")):
+            own.add(name.removesuffix("_in"))
+        else:
+            own.add("day" if name == "inspection_date" else name)
+    return own
+
+
+def _rate(hits: int, n: int) -> dict[str, float | int]:
+    """A rate with its Wilson 95 % interval."""
+    if n == 0:
+        return {"n": 0, "rate": float("nan"), "low": 0.0, "high": 1.0}
+    z, p = 1.96, hits / n
+    centre = (p + z * z / (2 * n)) / (1 + z * z / n)
+    half = z * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n)
+    return {"n": n, "rate": p, "low": float(centre - half), "high": float(centre + half)}
+
+
+def summarise(records: list[Record]) -> dict[str, Any]:
+    """Turn the records into the table of targets, the power curve and the confusion matrix."""
+    by_group: dict[str, list[Record]] = defaultdict(list)
+    for record in records:
+        by_group[record["group"]].append(record)
+
+    def rate(rows: list[Record], hit: str | Any) -> dict[str, float | int]:
+        chosen = hit if callable(hit) else lambda r: bool(r[hit])
+        return _rate(sum(bool(chosen(r)) for r in rows), len(rows))
+
+    strong = [r for g in ("single:10", "single:15", "single:25") for r in by_group[g]]
+    every = list(records)
+    null = [r for g, rows in by_group.items() if g.startswith("null:") for r in rows]
+    off = by_group["off_catalogue"]
+    alarmed = [r for g, rows in by_group.items() if g.startswith(("single", "confounded")) for r in rows]
+    alarmed = [r for r in alarmed if r["verdict"] in {"NAMED", "AMBIGUOUS", "UNLISTED"}]
+    both_strong = [r for r in by_group["double"] if min(r["strengths"], default=0.0) >= 9.5]
+    gains = [r["share_of_true_gain"] for r in strong if r["right"] and r.get("share_of_true_gain") is not None]
+    extended = [r for r in every if "worse" in r]
+    faults = sum(r["faults"] for r in every)
+    targets = {
+        "unique and right, S >= 10": rate(strong, "right"),
+        "unique and right, S = 10": rate(by_group["single:10"], "right"),
+        "unique and right, S = 15": rate(by_group["single:15"], "right"),
+        "unique and right, S = 25": rate(by_group["single:25"], "right"),
+        "unique and right, S = 7": rate(by_group["single:7"], "right"),
+        "unique and right, S = 5": rate(by_group["single:5"], "right"),
+        "unique and right, confounded fleet, S = 10": rate(by_group["confounded:10"], "right"),
+        "unique and right, confounded fleet, S = 7": rate(by_group["confounded:7"], "right"),
+        "right or in the ambiguous set, S >= 10": rate(strong, "in_set"),
+        "wrong unique name, anywhere": rate(every, "wrong"),
+        "wrong unique name, single cause, S >= 10": rate(strong, "wrong"),
+        "true cause in the reported set, given an alarm": rate(alarmed, "in_set"),
+        **{
+            f"false alarm on null {g.removeprefix('null:')}": rate(rows, lambda r: r["verdict"] != "NONE")
+            for g, rows in by_group.items()
+            if g.startswith("null:")
+        },
+        "false alarm on all nulls": rate(null, lambda r: r["verdict"] != "NONE"),
+        "wrong extension on nulls": rate(null, lambda r: r["verdict"] == "NAMED"),
+        "off-catalogue: flagged": rate(off, lambda r: r["verdict"] != "NONE"),
+        "off-catalogue: variables right": rate([r for r in off if r["verdict"] == "UNLISTED"], "variables_right"),
+        "off-catalogue: misnamed": rate(off, "wrong"),
+        "exactly aliased causes: all listed": rate(
+            [r for r in by_group["aliased"] if r["verdict"] != "NONE"], lambda r: r.get("aliases_listed", r["in_set"])
+        ),
+        "two causes, each S >= 10: both named": rate(both_strong, "right"),
+        "needed column removed: not misnamed": rate(by_group["missing_column"], lambda r: not r["wrong"]),
+        "uniquely named extension makes unseen rows worse": rate(extended, "worse"),
+        "data faults found (rows)": _rate(sum(r["faults_found"] for r in every), faults),
+    }
+    confusion: dict[str, Counter[str]] = defaultdict(Counter)
+    for r in strong:
+        said = "+".join(n for n, _t in r["named"]) if r["named"] else r["verdict"]
+        if r["named"] and not r["right"]:
+            said += " (other target)" if said == r["cause"] else ""
+        confusion[r["cause"]][said] += 1
+    return {
+        "targets": targets,
+        "by_cause_s10": {
+            cause: rate([r for r in strong if r["cause"] == cause], "right") for cause in simulator.CATALOGUE
+        },
+        "gain_share_of_true_term": {
+            "n": len(gains),
+            "median": float(np.median(gains)) if gains else None,
+            "first_percentile": float(np.quantile(gains, 0.01)) if gains else None,
+            "at_least_0.9": float(np.mean(np.array(gains) >= 0.9)) if gains else None,
+        },
+        "false_faults_per_1000_rows": 1000.0 * sum(r["false_faults"] for r in every) / sum(r["rows"] for r in every),
+        "confusion_s10_and_more": {cause: dict(row) for cause, row in confusion.items()},
+        "seconds_per_fleet": {
+            "median": float(np.median([r["seconds"] for r in every])),
+            "largest": float(np.max([r["seconds"] for r in every])),
+        },
+    }
+
+
+def study(plan: dict[str, int], workers: int, first_seed: int = FIRST_SEED) -> dict[str, Any]:
+    """Run a plan on several processes and summarise it."""
+    work = list(tasks(plan, first_seed))
+    records: list[Record] = []
+    start = time.monotonic()
+    with ProcessPoolExecutor(workers) as pool:
+        for record in pool.map(run, work, chunksize=8):
+            records.append(record)
+            if len(records) % 100 == 0:
+                done, spent = len(records), time.monotonic() - start
+                print(
+                    f"{done} of {len(work)} fleets, about {spent / done * (len(work) - done) / 60:.0f} min left",
+                    flush=True,
+                )
+    return {
+        "fleets": len(records),
+        "first_seed": first_seed,
+        "permutations": PERMUTATIONS,
+        "plan": plan,
+        **summarise(records),
+    }
+
+
+def show(result: dict[str, Any]) -> None:
+    """Print the table of targets."""
+    print(f"{result['fleets']} fleets, seeds from {result['first_seed']}")
+    for name, rate in result["targets"].items():
+        print(
+            f"{name:55s} {100 * rate['rate']:6.1f} %  ({100 * rate['low']:.1f} to {100 * rate['high']:.1f}; n {rate['n']})"
+        )
+    print("gain as a share of the true term's:", result["gain_share_of_true_term"])
+    print("false data faults per 1,000 rows:", round(result["false_faults_per_1000_rows"], 2))
+    for cause, row in result["confusion_s10_and_more"].items():
+        print(f"{cause:26s} {row}")
+    print("seconds of processor time per fleet:", result["seconds_per_fleet"])
+
+
+def main() -> None:
+    """Run the whole study, or a share of it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--share", type=float, default=1.0, help="share of the plan to run")
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
+    parser.add_argument("--write", action="store_true", help=f"write {RESULT.name}")
+    arguments = parser.parse_args()
+    plan = {group: max(1, round(count * arguments.share)) for group, count in PLAN.items()}
+    result = study(plan, arguments.workers, arguments.first_seed)
+    show(result)
+    if arguments.write:
+        RESULT.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,161 @@
+"""An effect is hidden in a fleet by the independent simulator; the diagnosis must find it from the table alone.
+
+The seed of each case is 40,000 plus its place in the list. No seed was chosen for its outcome. What was hidden
+is compared after the diagnosis, which reads the CSV file that the simulator wrote.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension
+from mlg_troubleshoot.workflows import CheckOptions, CheckResult, DiagnoseOptions, check_files, diagnose_files
+
+from .data_sets import later_rows
+from .simulator import CATALOGUE, NULLS, Fleet, draw_fleet, write_csv
+from .simulator.records import write_csv as write_columns
+
+FIRST_SEED, STRENGTH, PERMUTATIONS = 40_000, 20.0, 199
+CAUSES = tuple(CATALOGUE)
+OFF_CATALOGUE = ("grease_drag", "cold_oil_under_load")
+CASES: tuple[tuple[str, dict[str, Any]], ...] = (
+    *(("single", {"cause": cause, "strength": STRENGTH}) for cause in CAUSES),
+    *(("null", {"null": null}) for null in NULLS),
+    *(("off_catalogue", {"cause": cause, "strength": STRENGTH}) for cause in OFF_CATALOGUE),
+    ("aliased", {"strength": STRENGTH}),
+    ("double", {"strength": STRENGTH}),
+)
+PLACE = {words.get("cause") or words.get("null") or kind: k for k, (kind, words) in enumerate(CASES)}
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """A fleet, and what the diagnosis made of its table."""
+
+    fleet: Fleet
+    diagnosis: Diagnosis
+    extension: ModelExtension | None
+
+    @property
+    def named(self) -> set[tuple[str, str | None]]:
+        """Named causes with their targets; a single gear is a variant of its aircraft."""
+        return {_plain(c.candidate.cause.name, c.candidate.target) for c in self.diagnosis.causes}
+
+    @property
+    def hidden(self) -> set[tuple[str, str | None]]:
+        """What was hidden, written in the same way."""
+        return {_plain(*cause) for cause in self.fleet.label.causes}
+
+
+def _plain(cause: str, target: str | None) -> tuple[str, str | None]:
+    return cause, target.removesuffix(" LH").removesuffix(" RH") if target else None
+
+
+@cache
+def case(name: str) -> Hidden:
+    """Hide, write, read, diagnose: once for all tests of a worker."""
+    kind, words = CASES[PLACE[name]]
+    fleet = draw_fleet(FIRST_SEED + PLACE[name], kind, **words)
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "fleet.csv"
+        write_csv(fleet, file)
+        result = diagnose_files([file], DiagnoseOptions(permutations=PERMUTATIONS))
+    return Hidden(fleet, result.diagnosis, result.extension)
+
+
+@cache
+def misfit_later(name: str, extended: bool) -> float:
+    """Root mean square of measured less checked displacement on later inspections of the same gears. [in]"""
+    found = case(name)
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "later.csv"
+        write_columns(later_rows(found.fleet, FIRST_SEED + 500 + PLACE[name]), file)
+        options = CheckOptions(extension=found.extension if extended else None)
+        return _rms(check_files([file], options))
+
+
+def _rms(result: CheckResult) -> float:
+    misfit = [j.inspection.measured_displacement_in - j.over_travel_in for j in result.judgements]
+    return float(np.sqrt(np.mean(np.square(misfit))))
+
+
+@pytest.mark.parametrize("cause", CAUSES)
+def test_a_hidden_cause_is_named_with_its_target(cause: str) -> None:
+    found = case(cause)
+    assert (found.diagnosis.verdict, found.named) == ("NAMED", found.hidden)
+
+
+@pytest.mark.parametrize("cause", CAUSES)
+def test_the_extension_gains_on_rows_that_the_fit_never_saw(cause: str) -> None:
+    gain = case(cause).diagnosis.gain
+    assert gain is not None
+    assert gain.rms_after_in < 0.85 * gain.rms_before_in
+
+
+@pytest.mark.parametrize("cause", CAUSES)
+def test_a_check_of_later_inspections_is_better_with_the_extension(cause: str) -> None:
+    assert misfit_later(cause, extended=True) < 0.95 * misfit_later(cause, extended=False)
+
+
+@pytest.mark.parametrize("cause", CAUSES)
+def test_what_is_left_looks_like_noise(cause: str) -> None:
+    assert case(cause).diagnosis.remainder_p > 0.001
+
+
+@pytest.mark.parametrize("null", NULLS)
+def test_nothing_is_found_where_nothing_is_wrong(null: str) -> None:
+    assert case(null).diagnosis.verdict == "NONE"
+
+
+@pytest.mark.parametrize("null", NULLS)
+def test_nothing_found_comes_with_what_would_have_been_found(null: str) -> None:
+    assert 0.0 < case(null).diagnosis.smallest_rms_in < 0.004
+
+
+@pytest.mark.parametrize("effect", OFF_CATALOGUE)
+def test_an_effect_that_is_not_on_the_list_is_not_given_a_name(effect: str) -> None:
+    assert case(effect).diagnosis.verdict == "UNLISTED"
+
+
+@pytest.mark.parametrize("effect", OFF_CATALOGUE)
+def test_the_columns_of_an_unlisted_effect_are_named(effect: str) -> None:
+    found = case(effect)
+    assert set(found.diagnosis.unlisted_variables) == set(found.fleet.label.variables)
+
+
+@pytest.mark.parametrize("effect", OFF_CATALOGUE)
+def test_an_unlisted_effect_does_not_extend_the_model(effect: str) -> None:
+    assert case(effect).extension is None
+
+
+def test_causes_that_touch_the_same_rows_are_all_listed() -> None:
+    found = case("aliased")
+    listed = {_plain(c.candidate.cause.name, c.candidate.target) for c in found.diagnosis.also_possible}
+    assert found.diagnosis.verdict == "AMBIGUOUS"
+    assert {_plain(*cause) for cause in found.fleet.label.aliases} <= listed
+
+
+def test_causes_that_cannot_be_told_apart_come_with_the_reading_that_splits_them() -> None:
+    assert all(len(c.candidate.cause.separates) > 20 for c in case("aliased").diagnosis.also_possible)
+
+
+def test_causes_that_cannot_be_told_apart_do_not_extend_the_model() -> None:
+    assert case("aliased").extension is None
+
+
+def test_two_hidden_causes_are_both_named() -> None:
+    found = case("double")
+    assert (found.diagnosis.verdict, found.named) == ("NAMED", found.hidden)
+
+
+def test_two_named_causes_gain_on_rows_that_the_fit_never_saw() -> None:
+    gain = case("double").diagnosis.gain
+    assert gain is not None
+    assert gain.rms_after_in < 0.7 * gain.rms_before_in

@@ -1,0 +1,79 @@
+"""Where the coordinates come from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.errors import InconclusiveDataError, UsageError
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.studies.reconstruct import Reconstruction, member_toml, reconstruct
+from mlg_troubleshoot.studies.targets import Target, load_targets, targets_file
+
+
+@pytest.fixture(scope="module")
+def targets(gear: Gear) -> tuple[Target, ...]:
+    return load_targets(targets_file(gear))
+
+
+@pytest.fixture(scope="module")
+def shifted(gear: Gear, targets: tuple[Target, ...]) -> Reconstruction:
+    """Linkage A with joint 3 pushed aside by a quarter of an inch, polished again."""
+    mechanism = gear.reference.mechanism
+    points = tuple(replace(p, y=p.y + 0.1) if p.name == "3" else p for p in mechanism.points)
+    start = replace(gear.reference, mechanism=replace(mechanism, points=points))
+    return reconstruct(gear, targets, np.random.default_rng(0), 0, start=start, minutes=1.0)
+
+
+def test_a_start_is_polished_until_every_printed_number_is_met(shifted: Reconstruction) -> None:
+    assert shifted.meets_all
+
+
+def test_printed_values_bind_and_most_of_the_linkage_stays_free(shifted: Reconstruction) -> None:
+    binding = {each.target.measure for each in shifted.met if each.binds}
+    assert {"worst_displacement", "max_amplification_index"} <= binding
+    assert 3 <= shifted.determined < 10 < shifted.numbers
+
+
+@pytest.mark.slow
+def test_a_true_number_that_is_added_narrows_what_is_free(
+    gear: Gear, targets: tuple[Target, ...], shifted: Reconstruction
+) -> None:
+    known = replace(
+        next(t for t in targets if t.measure == "end_rate"), low=2.0, high=2.1, tolerance="2.05 ± 0.05", search=True
+    )
+    more = reconstruct(gear, (*targets, known), np.random.default_rng(0), 0, start=shifted.linkage, minutes=1.0)
+    assert more.meets_all
+    assert more.determined > shifted.determined
+
+
+def test_the_found_linkage_can_be_added_to_the_ensemble(gear: Gear, shifted: Reconstruction, tmp_path: Path) -> None:
+    for file in gear.path.parent.glob("hawker-800xp*"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    ensemble = tmp_path / "hawker-800xp-ensemble.toml"
+    ensemble.write_text(ensemble.read_text() + "\n" + member_toml(shifted.linkage, "K"))
+    enlarged = load_gear(tmp_path / "hawker-800xp.toml")
+    assert [linkage.name for linkage in enlarged.ensemble][-1] == "K"
+    links = [0.001 * (-1) ** i for i in range(20)]
+    again = enlarged.ensemble_models[-1].displacement(links)
+    assert float(again) == pytest.approx(float(gear.model_of(shifted.linkage).displacement(links)), abs=1e-12)
+
+
+def test_targets_that_cannot_be_met_end_with_a_message(gear: Gear, targets: tuple[Target, ...]) -> None:
+    with pytest.raises(InconclusiveDataError, match="no linkage met"):
+        reconstruct(gear, targets, np.random.default_rng(0), 0, minutes=0.01)
+
+
+def test_a_file_without_numbers_to_search_is_refused(gear: Gear, targets: tuple[Target, ...]) -> None:
+    with pytest.raises(UsageError):
+        reconstruct(gear, tuple(replace(t, search=False) for t in targets), np.random.default_rng(0), 0)
+
+
+@pytest.mark.slow
+def test_a_linkage_is_found_from_scratch(gear: Gear, targets: tuple[Target, ...]) -> None:
+    found = reconstruct(gear, targets, np.random.default_rng(1), 1, minutes=15.0)
+    assert found.meets_all

@@ -1,0 +1,145 @@
+"""The public Python interface: what a notebook imports from ``mlg_troubleshoot``."""
+
+from __future__ import annotations
+
+import ast
+import doctest
+import inspect
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mlg_troubleshoot as mlg
+
+ROOT = Path(__file__).parents[1]
+FAILURE = {3: 0.013, 5: 0.007}
+HEAVY = ("numpy", "scipy", "pandas", "openpyxl", "jinja2", "rich")
+
+
+def inspection(clearance_in: dict[int, float]) -> mlg.Inspection:
+    return mlg.Inspection("R1", "N123", mlg.Side.LH, mlg.ClearanceConvention.RADIAL, clearance_in)
+
+
+def test_the_example_of_the_package_is_true() -> None:
+    found = doctest.testmod(mlg, raise_on_error=True)
+    assert found.attempted > 3
+
+
+@pytest.mark.parametrize("name", mlg.__all__)
+def test_every_public_name_can_be_imported_and_is_documented(name: str) -> None:
+    thing = getattr(mlg, name)
+    assert inspect.getdoc(thing)
+
+
+def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="has no attribute 'chek'"):
+        mlg.chek  # noqa: B018
+
+
+def test_every_name_can_be_completed() -> None:
+    assert set(mlg.__all__) <= set(dir(mlg))
+
+
+def test_the_checker_and_the_interpreter_import_the_same_names() -> None:
+    tree = ast.parse(Path(mlg.__file__).read_text(encoding="utf-8"))
+    typed = {
+        alias.name: str(node.module).removeprefix("mlg_troubleshoot.")
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and str(node.module).startswith("mlg_troubleshoot")
+        for alias in node.names
+    }
+    assert typed == mlg._MODULES
+
+
+def loaded_by(code: str) -> set[str]:
+    done = subprocess.run(
+        [sys.executable, "-c", f"import sys\n{code}\nprint(*sys.modules)"],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=ROOT,
+    )
+    return set(done.stdout.split("\n")[-2].split())
+
+
+def test_importing_the_package_imports_nothing_heavy() -> None:
+    assert loaded_by("import mlg_troubleshoot") & set(HEAVY) == set()
+
+
+def test_the_help_imports_no_model_and_no_table() -> None:
+    code = "from mlg_troubleshoot.cli import main\nsys.argv = ['mlg', '--help']\ntry: main()\nexcept SystemExit: pass"
+    assert loaded_by(code) & {"numpy", "scipy", "pandas", "openpyxl", "jinja2"} == set()
+
+
+def test_a_check_of_one_file_imports_neither_pandas_nor_scipy() -> None:
+    code = (
+        "from mlg_troubleshoot.cli import main\n"
+        "sys.argv = ['mlg', 'check', 'inspection_data/failure_case.csv']\n"
+        "try: main()\nexcept SystemExit: pass"
+    )
+    assert loaded_by(code) & {"pandas", "scipy", "openpyxl", "jinja2"} == set()
+
+
+def test_predict_gives_the_failure_case() -> None:
+    worst = mlg.predict(FAILURE)
+    assert worst.magnitude_in == pytest.approx([0.0472], abs=2e-4)
+
+
+def test_predict_takes_a_batch_in_the_order_of_the_joints() -> None:
+    rows = np.zeros((2, 10))
+    rows[1, [2, 4]] = 0.013, 0.007
+    worst = mlg.predict(rows)
+    assert worst.magnitude_in[0] == 0.0
+    assert worst.magnitude_in[1] == mlg.predict(FAILURE).magnitude_in[0]
+
+
+def test_predict_takes_a_gear_its_name_or_its_file() -> None:
+    gear = mlg.load_gear()
+    found = {float(mlg.predict(FAILURE, g).over_in[0]) for g in (gear, gear.id, gear.path, str(gear.path))}
+    assert len(found) == 1
+
+
+@pytest.mark.parametrize(
+    ("clearance", "said"),
+    [
+        ({11: 0.001}, "has no joint 11"),
+        ({3: -0.001}, "-0.001 in"),
+        ({3: float("nan")}, "nan in"),
+        ([0.001] * 9, "do not fit 10 joints"),
+    ],
+    ids=str,
+)
+def test_predict_refuses_what_is_no_clearance(clearance: object, said: str) -> None:
+    with pytest.raises(mlg.TroubleshootError, match=said):
+        mlg.predict(clearance)  # type: ignore[arg-type]
+
+
+def test_check_says_what_the_command_says() -> None:
+    found = mlg.check(inspection(FAILURE))
+    assert found.verdict is mlg.Verdict.OUTSIDE_MARGIN
+    assert [joint.joint for joint in found.ranked][:2] == [3, 5]
+
+
+def test_check_without_repairs_computes_none() -> None:
+    assert mlg.check(inspection(FAILURE), repairs=False).repair_sets is None
+
+
+def test_check_with_repairs_finds_the_set() -> None:
+    sets = mlg.check(inspection(FAILURE)).repair_sets
+    assert sets is not None
+    assert sets[0].joints == (3,)
+
+
+def test_tables_can_be_checked_and_reported(tmp_path: Path) -> None:
+    options = mlg.CheckOptions()
+    result = mlg.check_files([ROOT / "inspection_data" / "failure_case.csv"], options)
+    (written,) = mlg.write_reports(result, options, tmp_path, formats=("html",))
+    assert written.html is not None
+    assert written.html.exists()
+
+
+def test_the_package_says_that_it_is_typed() -> None:
+    assert (Path(mlg.__file__).parent / "py.typed").exists()
