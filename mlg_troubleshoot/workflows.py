@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mlg_troubleshoot.decision.assess import AssessOptions, assess
-from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Verdict
+from mlg_troubleshoot.decision.assessment import Assessment, Judgement, MeasuringAdvice, Verdict
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, Side
-from mlg_troubleshoot.decision.next_action import next_to_measure
+from mlg_troubleshoot.decision.measuring import advise
 from mlg_troubleshoot.decision.prediction import Extension
-from mlg_troubleshoot.decision.ranking import rank_joints
 from mlg_troubleshoot.errors import InconclusiveDataError, OutputError, Problem, TroubleshootError, UsageError
 from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Gear
@@ -52,8 +51,9 @@ class CheckOptions:
         Columns by header.
     decimal_comma : bool
         True if ``0,013`` means 0.013.
-    repairs, allowances : bool or None
-        Compute repair sets and allowances; None does so for a single inspection.
+    repairs, allowances, advice : bool or None
+        Compute repair sets, allowances, and what further measuring and the measured displacement say; None does so
+        for a single inspection.
     extension : Extension or None
         An extension of the model.
     """
@@ -66,6 +66,7 @@ class CheckOptions:
     decimal_comma: bool = False
     repairs: bool | None = None
     allowances: bool | None = None
+    advice: bool | None = None
     extension: Extension | None = None
 
 
@@ -218,7 +219,7 @@ def check(
     gear : Gear, str or Path
         The gear, its shipped name, or a gear file.
     repairs : bool
-        Find the repair sets, and how much further each joint may wear.
+        Find the repair sets, how much further each joint may wear, and what further measuring is worth.
     extension : Extension, optional
         An extension of the model.
 
@@ -228,7 +229,12 @@ def check(
         Verdict, prediction, ranked joints and next action.
     """
     known = gear if isinstance(gear, Gear) else load_gear(gear)
-    (judged,) = assess([inspection], known, load_index_table(known), AssessOptions(repairs, repairs, extension))
+    (judged,) = assess(
+        [inspection],
+        known,
+        load_index_table(known),
+        AssessOptions(repairs, repairs, advice=repairs, extension=extension),
+    )
     if not isinstance(judged, Assessment):
         raise TypeError(f"{type(inspection).__name__} is not an Inspection")
     return judged
@@ -274,8 +280,10 @@ def predict(clearance_in: Mapping[int, float] | ArrayLike, gear: Gear | str | Pa
     return worst_case(known.model, rows)
 
 
-def next_joint(gear: Gear, measured: Mapping[int, float]) -> int | None:
-    """Choose the joint whose reading is worth most next.
+def next_joint(
+    gear: Gear, measured: Mapping[int, float], margin_in: float | None = None, extension: Extension | None = None
+) -> MeasuringAdvice:
+    """Say which joint's reading is worth most next, and whether one may stop measuring.
 
     Parameters
     ----------
@@ -283,13 +291,46 @@ def next_joint(gear: Gear, measured: Mapping[int, float]) -> int | None:
         The gear.
     measured : mapping of int to float
         Radial clearances measured so far. [in]
+    margin_in : float, optional
+        This gear's margin, else the gear file's. [in]
+    extension : Extension, optional
+        An extension of the model.
 
     Returns
     -------
-    int or None
-        Number of the joint; None if all are measured.
+    MeasuringAdvice
+        The joint and a sentence.
     """
-    return next_to_measure(gear, rank_joints(gear, load_index_table(gear), measured))
+    so_far = replace(_trial_inspection(gear), clearance_in=dict(measured), margin_in=margin_in)
+    return advise(gear, so_far, gear.margin.value if margin_in is None else margin_in, extension)
+
+
+def before_and_after(judgements: Sequence[Judgement]) -> tuple[Assessment, Assessment] | None:
+    """Return two inspections of one gear in the order of their dates: before and after a repair.
+
+    Parameters
+    ----------
+    judgements : sequence of Assessment or Rejected
+        What was judged.
+
+    Returns
+    -------
+    tuple of Assessment or None
+        Both; None unless these are exactly two judged inspections of one gear. Without both dates the order of the
+        input counts.
+    """
+    if len(judgements) != 2:
+        return None
+    first, second = judgements
+    if not (isinstance(first, Assessment) and isinstance(second, Assessment)):
+        return None
+    one, two = first.inspection, second.inspection
+    if (one.tail_no, one.side) != (two.tail_no, two.side):
+        return None
+    dates = (one.inspection_date, two.inspection_date)
+    if dates[0] is not None and dates[1] is not None and dates[1] < dates[0]:
+        return second, first
+    return first, second
 
 
 def _judge(
@@ -317,6 +358,7 @@ def _judge(
         AssessOptions(
             repairs=single if options.repairs is None else options.repairs,
             allowances=single if options.allowances is None else options.allowances,
+            advice=single if options.advice is None else options.advice,
             extension=options.extension,
         ),
         advance,

@@ -9,6 +9,10 @@ from typing import Annotated
 import typer
 
 from mlg_troubleshoot.cli.boundary import Boundary
+from mlg_troubleshoot.cli.reconstruct import EPILOG as RECONSTRUCT_EPILOG
+from mlg_troubleshoot.cli.reconstruct import reconstruct
+from mlg_troubleshoot.cli.study import EPILOG as STUDY_EPILOG
+from mlg_troubleshoot.cli.study import study
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 app = typer.Typer(
@@ -291,3 +295,7 @@ def doctor(gear: GearOption = "hawker-800xp") -> None:
         from mlg_troubleshoot.cli import doctor as command
 
         command.run(gear)
+
+
+app.command(epilog=STUDY_EPILOG)(study)
+gear_app.command(epilog=RECONSTRUCT_EPILOG)(reconstruct)

@@ -299,15 +299,14 @@ def _from_prompts(arguments: CheckArguments, gear: Gear) -> Inspection:
 
 
 def _advice(gear: Gear) -> Callable[[Mapping[int, float], Sequence[int]], str | None]:
-    """Say after each critical joint which one is worth most next."""
+    """Say after each critical joint which one is worth most next, or that one may stop."""
 
     def advise(measured: Mapping[int, float], left: Sequence[int]) -> str | None:
-        joint = workflows.next_joint(gear, measured)
-        return (
-            None
-            if joint is None or joint not in left
-            else f"Worth most next: {gear.joint(joint).label} (type #{joint})."
-        )
+        advice = workflows.next_joint(gear, measured)
+        if advice.stop and left:
+            return f"{advice.text} Type done."
+        joint = next((worth.joint for worth in advice.worth if worth.joint in left), None)
+        return None if joint is None else f"Worth most next: {gear.joint(joint).label} (type #{joint})."
 
     return advise
 
@@ -332,6 +331,9 @@ def _show(arguments: CheckArguments, result: workflows.CheckResult) -> None:
         views.show_one(result.judgements[0], result.gear)
     elif result.judgements:
         views.show_batch(result)
+        both = workflows.before_and_after(result.judgements)
+        if both is not None:
+            views.show_before_and_after(*both)
 
 
 def _annotate(arguments: CheckArguments, out: Path, result: workflows.CheckResult) -> None:

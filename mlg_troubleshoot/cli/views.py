@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 
 from rich.console import Console
 from rich.padding import Padding
@@ -21,7 +22,7 @@ from mlg_troubleshoot.decision.assessment import (
     Verdict,
 )
 from mlg_troubleshoot.decision.inspection import Outcome
-from mlg_troubleshoot.decision.wording import percent
+from mlg_troubleshoot.decision.wording import confidence_words, percent, rigging_sentence
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.workflows import CheckResult
@@ -45,6 +46,8 @@ _LINES_OF_A_BATCH = 60
 _JOINT_COLUMNS = 19
 _WIDE = 100
 _LINES_OF_PROBLEMS = 40
+_PROBLEM_COLUMN = 22
+_JOINTS_OF_A_LINE = 3
 
 
 def show_notes(notes: Sequence[str]) -> None:
@@ -73,14 +76,48 @@ def show_problems(problems: Sequence[Problem]) -> None:
     console = output.console(to_stderr=True)
     noun = "problem" if len(problems) == 1 else "problems"
     console.print(Text(f"{len(problems)} {noun} in the input:", style="bold"))
-    for problem in problems[:_LINES_OF_PROBLEMS]:
-        _message(console, f"{problem.place()}: {_what(problem)}", indent=2)
-        _message(console, f"What to do: {problem.remedy}", indent=4)
+    shown = problems[:_LINES_OF_PROBLEMS]
+    if console.is_terminal and len(problems) > 1:
+        _show_problem_tables(console, shown)
+    else:
+        for problem in shown:
+            _show_problem(console, problem)
     if len(problems) > _LINES_OF_PROBLEMS:
         rest = len(problems) - _LINES_OF_PROBLEMS
         _message(
             console, f"… and {rest} more; --json lists all of them, --annotate marks them in your workbook.", indent=2
         )
+
+
+def _show_problem(console: Console, problem: Problem) -> None:
+    _message(console, f"{problem.place()}: {_what(problem)}", indent=2)
+    _message(console, f"What to do: {problem.remedy}", indent=4)
+
+
+def _show_problem_tables(console: Console, problems: Sequence[Problem]) -> None:
+    """One table for each sheet; what is wrong with a file as a whole stands before its tables."""
+    for (file, sheet), found in groupby(problems, key=lambda p: (p.file, p.sheet)):
+        group = list(found)
+        for problem in group:
+            if problem.row is None:
+                _show_problem(console, problem)
+        placed = [problem for problem in group if problem.row is not None]
+        if not placed:
+            continue
+        place = ", ".join(part for part in (file, None if sheet is None else f"sheet {sheet!r}") if part is not None)
+        table = _table(console)
+        table.title, table.title_justify, table.title_style = Text(place), "left", ""
+        for heading in ("cell", "column", "found"):
+            table.add_column(heading, overflow="fold", max_width=_PROBLEM_COLUMN)
+        table.add_column("expected, and what to do", ratio=1)
+        for problem in placed:
+            table.add_row(
+                Text(problem.cell or f"row {problem.row}"),
+                Text(problem.column or "-"),
+                Text("nothing" if problem.value is None else problem.value),
+                Text(f"{problem.expected}.\n{problem.remedy}"),
+            )
+        console.print(table)
 
 
 def _message(console: Console, text: str, indent: int = 0) -> None:
@@ -126,6 +163,10 @@ def show_one(judgement: Judgement, gear: Gear) -> None:
         body.append(sentence + "\n")
     body.append("NEXT: ", style="bold")
     body.append(a.next_action.text, style="bold")
+    if a.measuring is not None and a.measuring.text not in a.next_action.text:
+        body.append("\n" + a.measuring.text)
+    if a.posterior is not None:
+        body.append("\n" + a.posterior.text)
     console.print(
         Panel(
             body,
@@ -140,6 +181,8 @@ def show_one(judgement: Judgement, gear: Gear) -> None:
         console.print(Text(f"Both ends of one link act alike ({pairs}): the plunger cannot tell which end is worn."))
     if a.repair_sets:
         console.print(_repair_table(a))
+    if a.rigging is not None:
+        console.print(Text(rigging_sentence(a.rigging)))
     for warning in a.warnings:
         console.print(Text(f"* {warning}"))
     console.print(
@@ -151,12 +194,48 @@ def show_one(judgement: Judgement, gear: Gear) -> None:
     )
 
 
+def show_before_and_after(before: Assessment, after: Assessment) -> None:
+    """Show two inspections of one gear side by side, joint by joint.
+
+    Parameters
+    ----------
+    before, after : Assessment
+        The judgements.
+    """
+    console = output.console()
+    table = Table(box=None, pad_edge=False, header_style="bold", title="Before and after", title_justify="left")
+    table.add_column("", overflow="fold")
+    for a in (before, after):
+        table.add_column(a.inspection.record_id, justify="right", overflow="fold")
+    table.add_column("change", justify="right")
+    table.add_row("verdict", *(Text(a.verdict.value, style=STYLES[a.verdict]) for a in (before, after)), "")
+    for label, one, two in (
+        ("worst case in", before.predicted_displacement_in, after.predicted_displacement_in),
+        ("margin in", before.margin_in, after.margin_in),
+        ("measured in", before.inspection.measured_displacement_in, after.inspection.measured_displacement_in),
+    ):
+        table.add_row(label, *_change(one, two))
+    chances = (before.probability_within_margin, after.probability_within_margin)
+    table.add_row("probability within", *("-" if p is None else percent(p) for p in chances), "")
+    for one_joint, two_joint in zip(before.joints, after.joints, strict=True):
+        if one_joint.clearance_in is not None or two_joint.clearance_in is not None:
+            label = f"#{one_joint.joint} {one_joint.name} in"
+            table.add_row(label, *_change(one_joint.clearance_in, two_joint.clearance_in))
+    console.print(table)
+
+
+def _change(one: float | None, two: float | None) -> tuple[str, str, str]:
+    values = tuple("-" if value is None else f"{value:.4f}" for value in (one, two))
+    return values[0], values[1], "" if one is None or two is None else f"{two - one:+.4f}"
+
+
 def _numbers(a: Assessment) -> Iterator[str]:
     """What stands beside the prediction: probability, spread over the linkages, unmeasured joints."""
     if a.geometry_spread_in is not None and a.probability_within_margin is not None:
         low, high = a.geometry_spread_in
         yield (
-            f"Probability that the worst case is within the margin: {percent(a.probability_within_margin)}. "
+            f"Probability that the worst case is within the margin: {percent(a.probability_within_margin)}"
+            f"{confidence_words(a.confidence)}. "
             f"The ensemble of reconstructed linkages gives {low:.4f} to {high:.4f} in."
         )
     missing = [f.joint for f in a.joints if f.clearance_in is None]
@@ -260,9 +339,12 @@ def show_batch(result: CheckResult) -> None:
     headings = ["", "verdict", "tail", "side", "record", "worst in", "margin", "chance", "next"]
     shown = [h for h in headings if h != "margin" or console.width >= _WIDE]
     for heading in shown:
-        numeric = heading in {"worst in", "margin", "chance"}
         table.add_column(
-            heading, justify="right" if numeric else "left", no_wrap=heading != "next", overflow="ellipsis"
+            heading,
+            justify="right" if heading in {"worst in", "margin", "chance"} else "left",
+            no_wrap=True,
+            overflow="ellipsis",
+            min_width=len(heading),
         )
     ordered = sorted(result.judgements, key=_urgency)
     for judgement in ordered[:_LINES_OF_A_BATCH]:
@@ -319,7 +401,9 @@ def _batch_cells(judgement: Judgement) -> tuple[Text | str, ...]:
 def _next(judgement: Judgement) -> str:
     """The next action in a few words: the whole sentence stands in the view of one gear and in --csv."""
     action = judgement.next_action
-    joints = ", ".join(f"#{joint}" for joint in action.joints)
+    joints = ", ".join(f"#{joint}" for joint in action.joints[:_JOINTS_OF_A_LINE])
+    if len(action.joints) > _JOINTS_OF_A_LINE:
+        joints += f" +{len(action.joints) - _JOINTS_OF_A_LINE}"
     match action.action:
         case Action.CORRECT:
             return action.text.removeprefix("Do not use. ").rstrip(".").lower()

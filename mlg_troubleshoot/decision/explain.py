@@ -189,14 +189,12 @@ def _weighted_quantiles(values: Array, weight: Array) -> tuple[float, float, flo
     return low, median, high
 
 
-def _text(
-    chances: Sequence[GroupChance], called: Sequence[tuple[int, ...]], none: float, not_clearance: float
-) -> str:
+def _text(chances: Sequence[GroupChance], called: Sequence[tuple[int, ...]], none: float, not_clearance: float) -> str:
     first = " or ".join(f"#{n}" for n in chances[0].joints)
     second = " or ".join(f"#{n}" for n in chances[1].joints) if len(chances) > 1 else ""
     also = f", then {second} {percent(chances[1].probability)}" if second else ""
     ranked = f"most likely worn {first} ({percent(chances[0].probability)}{also})"
-    if not_clearance > 0.5:
+    if not_clearance > 0.8:
         return f"Something other than joint clearance likely moved the plunger ({percent(not_clearance)}); {ranked}."
     if called:
         return f"The measured displacement points to wear: {ranked}; not clearance at all {percent(not_clearance)}."

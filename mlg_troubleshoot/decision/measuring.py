@@ -202,7 +202,7 @@ def _text(gear: Gear, worth: Sequence[ReadingWorth], settled: bool, verdict_then
     name = f"#{best.joint} {gear.joint(best.joint).name}"
     if settled:
         return (
-            f"More measuring will not change the verdict ({verdict_then.words}), unless a joint is over its limit: you "
+            f"More measuring does not change the verdict ({verdict_then.words}), unless a joint is over its limit: you "
             "may stop."
         )
     minutes = f"about {best.minutes:.0f} min access"
@@ -213,11 +213,11 @@ def _text(gear: Gear, worth: Sequence[ReadingWorth], settled: bool, verdict_then
 
 def _all_measured(now: Verdict, precise: bool) -> str:
     if now is not Verdict.INCONCLUSIVE:
-        return "All joints are measured: more measuring will not change the verdict."
+        return "All joints are measured: more measuring does not change the verdict."
     if precise:
         return "All joints are measured. More precise readings may still settle it."
     return (
-        "All joints are measured, and more precise readings will not settle it: the uncertainty of the geometry and of "
+        "All joints are measured, and more precise readings do not settle it: the uncertainty of the geometry and of "
         "the model is larger than that of the readings. Measure the plunger displacement at mid-position."
     )
 

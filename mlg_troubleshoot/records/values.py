@@ -139,7 +139,7 @@ def read_length(
             "It cannot be less than zero. Enter the value as measured, or empty the cell if it was not measured.",
         )
     if written is not None and unit is not None and written is not unit:
-        same = show_number(unit.from_inches(written.to_inches(value)))
+        same = f"{unit.from_inches(written.to_inches(value)):.6g}"
         raise CellFaultError(
             "unit_contradiction",
             f"{expected}, in the unit of the column ({unit.value})",

@@ -11,6 +11,7 @@ from markupsafe import Markup
 
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Rejected, Verdict
 from mlg_troubleshoot.decision.inspection import Inspection, RowSource, Side
+from mlg_troubleshoot.decision.wording import confidence_words, rigging_sentence
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.sources import SourceKind
@@ -133,6 +134,22 @@ class RepairRow(TypedDict):
     minutes: str
 
 
+class PosteriorContext(TypedDict):
+    """Which joints explain the measured displacement."""
+
+    statement: str
+    rows: list[PosteriorRow]
+    note: str
+
+
+class PosteriorRow(TypedDict):
+    """One group of joints that the plunger cannot tell apart."""
+
+    joints: str
+    probability: str
+    intervals: str
+
+
 class MeasuredContext(TypedDict):
     """What was measured at the plunger."""
 
@@ -204,6 +221,9 @@ class InspectionContext(DocumentContext):
     curve_note: str
     symptom: SymptomContext | None
     repairs: list[RepairRow] | None
+    rigging: str
+    measuring: str
+    posterior: PosteriorContext | None
     budget: list[Fact]
     budget_note: str
     signatories: list[Fact]
@@ -272,6 +292,9 @@ def inspection_context(assessment: Assessment, gear: Gear, provenance: ReportPro
         "curve_note": "Drawn without the extension that the prediction includes." if provenance.extension else "",
         "symptom": _symptom(gear, a),
         "repairs": _repairs(a),
+        "rigging": rigging_sentence(a.rigging) if a.rigging else "",
+        "measuring": a.measuring.text if a.measuring and a.measuring.text not in a.next_action.text else "",
+        "posterior": _posterior(a),
         "budget": _budget(a),
         "budget_note": a.budget.model_source if a.budget else "",
         "signatories": [
@@ -428,9 +451,13 @@ def _key_figures(a: Assessment) -> list[KeyFigure]:
             "label": "Worst case within margin",
             "value": percent(a.probability_within_margin),
             "also": "probability",
-            "meaning": f"{uncertainty} 95 % or more is within, 5 % or less outside.",
+            "meaning": f"{uncertainty} 95 % or more is within, 5 % or less outside.{_checked(a)}",
         },
     ]
+
+
+def _checked(a: Assessment) -> str:
+    return f" Checked{confidence_words(a.confidence)}." if a.confidence else ""
 
 
 def _chance(a: Assessment) -> str:
@@ -602,6 +629,31 @@ def _repairs(a: Assessment) -> list[RepairRow] | None:
         }
         for one in a.repair_sets
     ]
+
+
+def _posterior(a: Assessment) -> PosteriorContext | None:
+    found = a.posterior
+    if found is None:
+        return None
+    intervals = {interval.joint: interval for interval in found.intervals}
+    rows: list[PosteriorRow] = [
+        {
+            "joints": joint_list(group.joints),
+            "probability": percent(group.probability),
+            "intervals": "; ".join(
+                f"#{n} {number(intervals[n].low_in, 4)} to {number(intervals[n].high_in, 4)}" for n in group.joints
+            ),
+        }
+        for group in found.groups
+    ]
+    return {
+        "statement": found.text,
+        "rows": rows,
+        "note": (
+            "Assumed beforehand: each link or pivot worn with a chance of 5 %, another cause 5 %, directions random. "
+            f"Both ends of one link stand together. Worth {found.effective_draws:.0f} independent draws."
+        ),
+    }
 
 
 def _budget(a: Assessment) -> list[Fact]:

@@ -4,9 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict
 from typing import Any
 
-from mlg_troubleshoot.decision.assessment import Assessment, Judgement, NextAction, Rejected
+from mlg_troubleshoot.decision.assessment import (
+    Assessment,
+    Confidence,
+    Judgement,
+    MeasuringAdvice,
+    NextAction,
+    Posterior,
+    Rejected,
+    Rigging,
+)
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 
@@ -135,8 +145,16 @@ def _assessment(a: Assessment) -> dict[str, Any]:
             }
             for s in a.repair_sets
         ],
+        **{key: None if part is None else asdict(part) for key, part in zip(_EXTRA, _parts(a), strict=True)},
         "warnings": warnings,
     }
+
+
+_EXTRA = ("rigging", "measuring", "confidence", "posterior")
+
+
+def _parts(a: Assessment) -> tuple[Rigging | None, MeasuringAdvice | None, Confidence | None, Posterior | None]:
+    return a.rigging, a.measuring, a.confidence, a.posterior
 
 
 _NUMBERS = (
@@ -185,5 +203,6 @@ def _rejected(r: Rejected, gear: Gear) -> dict[str, Any]:
         ],
         "next_action": _action(r.next_action),
         "repair_sets": None,
+        **dict.fromkeys(_EXTRA),
         "warnings": list(r.warnings),
     }

@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 import random
+import sys
 import zipfile
 from collections import Counter
 from dataclasses import dataclass, field
@@ -14,12 +16,23 @@ import openpyxl
 import pytest
 
 from mlg_troubleshoot.records.cells import LETTERS
+from mlg_troubleshoot.reporting.json_form import check_as_json, check_json_pieces
+from mlg_troubleshoot.workflows import CheckOptions, check_files
 from tests.cli.conftest import mlg
 
+needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="needs a terminal of POSIX")
 COLUMNS = (
     *("record_id", "tail_no", "side", "clearance_convention"),
     *(f"clearance_{n}_in" for n in range(1, 11)),
-    *("inspection_date", "gear_landings", "temperature_c", "margin_in", "plunger_displacement_in", "outcome", "remarks"),
+    *(
+        "inspection_date",
+        "gear_landings",
+        "temperature_c",
+        "margin_in",
+        "plunger_displacement_in",
+        "outcome",
+        "remarks",
+    ),
 )
 ROWS = 2000
 SHARE = 0.03
@@ -59,7 +72,15 @@ def make_fleet(seed: int) -> Fleet:
     for n in range(ROWS):
         row: list[object] = [f"R{n:05d}", f"{n % 200:03d}", rng.choice(("LH", "RH")), "TOTAL_PLAY"]
         row += [None if rng.random() < 0.05 else round(rng.uniform(0.0, 0.012), 4) for _ in range(10)]
-        row += ["2026-03-04", n, 18.5, 0.03, round(rng.uniform(-0.02, 0.04), 4), rng.choice(("FAILED", None)), "ok, 1/8 turn"]
+        row += [
+            "2026-03-04",
+            n,
+            18.5,
+            0.03,
+            round(rng.uniform(-0.02, 0.04), 4),
+            rng.choice(("FAILED", None)),
+            "ok, 1/8 turn",
+        ]
         row[6] = 0.004
         for index, column in enumerate(COLUMNS):
             choices = SPOILING.get(kind_of(column)) or HARMLESS.get(kind_of(column))
@@ -172,3 +193,323 @@ def test_rows_in_are_rows_judged_and_rows_reported(checked):
     assert [i["record_id"] for i in found["inspections"]] == [row[0] for row in fleet.rows[1:]]
     assert {n for n, verdict in enumerate(verdicts, 2) if verdict == "INVALID"} == fleet.spoilt
     assert sum(v != "INVALID" for v in verdicts) + len(fleet.spoilt) == ROWS
+
+
+HEADER = ("record_id", "tail_no", "side", "clearance_convention", *(f"clearance_{n}_in" for n in range(1, 11)))
+
+
+def sound(record_id: str, **changes: object) -> list[object]:
+    """Return a row of a gear that is well within its margin, with some cells changed."""
+    cells = {**dict.fromkeys(HEADER, 0.0005), "record_id": record_id, "tail_no": "N1", "side": "LH"}
+    cells["clearance_convention"] = "RADIAL"
+    return list({**cells, **changes}.values())
+
+
+def workbook(path, *sheets):
+    """Write a workbook, each sheet a name and its rows."""
+    book = openpyxl.Workbook()
+    book.remove(book.worksheets[0])
+    for name, rows in sheets:
+        sheet = book.create_sheet(name)
+        for row in rows:
+            sheet.append(row)
+    book.save(path)
+    return path
+
+
+def as_csv(*rows):
+    """Write rows as CSV."""
+    buffer = io.StringIO()
+    csv.writer(buffer).writerows(rows)
+    return buffer.getvalue()
+
+
+@pytest.fixture
+def mixed(tmp_path):
+    """Write a workbook with a good row, a worn one, two bad cells in one row, and a joint over its limit."""
+    rows = [
+        HEADER,
+        sound("GOOD"),
+        sound("WORN", **{f"clearance_{n}_in": 0.007 for n in range(1, 11)}),
+        sound("BAD", side="left", clearance_3_in="n/a"),
+        sound("OVER", clearance_10_in=0.012),
+    ]
+    return workbook(tmp_path / "mixed.xlsx", ("Inspections", rows))
+
+
+def records(run):
+    return [i["record_id"] for i in run.json["inspections"]]
+
+
+def test_the_summary_counts_each_verdict(mixed):
+    first = mlg("check", mixed).out.splitlines()[0]
+    assert first == "4 inspections: 1 invalid · 1 outside margin · 2 within margin"
+
+
+def test_the_worst_gear_stands_first_and_every_gear_on_one_line(mixed):
+    lines = [line for line in mlg("check", mixed).out.splitlines() if " N1 " in line]
+    assert [next(r for r in ("GOOD", "WORN", "BAD", "OVER") if r in line) for line in lines] == [
+        *("WORN", "BAD"),
+        *("OVER", "GOOD"),
+    ]
+
+
+def test_joints_over_their_limit_are_counted_over_the_batch(mixed):
+    assert "Joints over their limit: #10 on 1 inspections." in mlg("check", mixed).out
+
+
+def test_each_problem_is_told_with_place_value_and_remedy(mixed):
+    said = mlg("check", mixed).err
+    assert "2 problems in the input:" in said
+    for words in ("cell C4", "'left'", "Enter LH if that is meant", "cell G4", "'n/a'"):
+        assert words in said
+
+
+def test_the_csv_says_the_same_as_the_json(mixed, tmp_path):
+    out = tmp_path / "out.csv"
+    run = mlg("check", mixed, "--csv", out, "--json")
+    with out.open(newline="", encoding="utf-8") as file:
+        lines = list(csv.DictReader(file))
+    for line, inspection in zip(lines, run.json["inspections"], strict=True):
+        number = inspection["predicted_displacement_in"]
+        assert (line["record_id"], line["verdict"]) == (inspection["record_id"], inspection["verdict"])
+        assert line["predicted_displacement_in"] == ("" if number is None else repr(number))
+
+
+def test_the_annotated_workbook_marks_exactly_the_bad_cells(mixed, tmp_path):
+    out = tmp_path / "out.xlsx"
+    mlg("check", mixed, "--annotate", out)
+    sheet = openpyxl.load_workbook(out).worksheets[0]
+    assert [cell.coordinate for row in sheet.iter_rows() for cell in row if cell.comment] == ["C4", "G4"]
+
+
+def test_the_annotated_workbook_has_a_verdict_for_every_row(mixed, tmp_path):
+    out = tmp_path / "out.xlsx"
+    mlg("check", mixed, "--annotate", out)
+    sheet = openpyxl.load_workbook(out).worksheets[0]
+    column = next(cell.column for cell in sheet[1] if cell.value == "verdict")
+    assert [sheet.cell(row, column).value for row in range(2, 6)] == [
+        *("WITHIN_MARGIN", "OUTSIDE_MARGIN"),
+        *("INVALID", "WITHIN_MARGIN"),
+    ]
+
+
+def test_what_the_annotated_workbook_lacks_is_said(mixed, tmp_path):
+    with zipfile.ZipFile(mixed, "a") as archive:
+        archive.writestr("xl/ctrlProps/ctrlProp1.xml", "<formControlPr/>")
+    run = mlg("check", mixed, "--annotate", tmp_path / "out.xlsx")
+    assert "the annotated copy lacks 1 of the form controls of the workbook" in run.err
+
+
+def test_a_workbook_that_was_refused_is_not_annotated_and_leaves_with_nothing_judged(tmp_path):
+    path = workbook(tmp_path / "other.xlsx", ("Prices", [("bolt", 3), ("nut", 4)]))
+    run = mlg("check", path, "--annotate", tmp_path / "out.xlsx")
+    assert run.code == 3
+    assert "was not written" in run.err
+    assert not (tmp_path / "out.xlsx").exists()
+
+
+def test_a_workbook_that_cannot_be_copied_is_an_output_error_and_the_results_still_come(mixed, tmp_path):
+    with zipfile.ZipFile(mixed) as old:
+        parts = {name: old.read(name) for name in old.namelist()}
+    parts["[Content_Types].xml"] = f'<Types xmlns="{PACKAGE}/content-types"/>'.encode()
+    with zipfile.ZipFile(mixed, "w") as new:
+        for name, data in parts.items():
+            new.writestr(name, data)
+    run = mlg("check", mixed, "--annotate", tmp_path / "out.xlsx")
+    assert run.code == 5
+    assert "4 inspections" in run.out
+    assert "cannot be copied" in run.err
+
+
+def test_several_files_a_pattern_and_a_folder_are_one_batch_each(tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.csv").write_text(as_csv(HEADER, sound(name)))
+    workbook(tmp_path / "c.xlsx", ("Inspections", [HEADER, sound("c")]))
+    assert records(mlg("check", tmp_path / "b.csv", tmp_path / "c.xlsx", "--json")) == ["b", "c"]
+    assert records(mlg("check", tmp_path / "*.csv", "--json")) == ["a", "b"]
+    assert records(mlg("check", tmp_path, "--json")) == ["a", "b", "c"]
+
+
+def test_a_broken_file_among_others_is_a_problem_and_the_others_are_judged(tmp_path):
+    (tmp_path / "a.csv").write_text(as_csv(HEADER, sound("a")))
+    (tmp_path / "b.xlsx").write_bytes(b"PK\x03\x04 broken")
+    run = mlg("check", tmp_path, "--json")
+    assert records(run) == ["a"]
+    assert [p["file"] for p in run.json["problems"]] == [str(tmp_path / "b.xlsx")]
+
+
+def test_two_tables_in_a_workbook_are_asked_about(tmp_path):
+    path = workbook(tmp_path / "w.xlsx", ("LH", [HEADER, sound("a")]), ("RH", [HEADER, sound("b", side="RH")]))
+    run = mlg("check", path)
+    assert run.code == 3
+    assert '--sheet "LH"' in run.err
+
+
+@pytest.mark.parametrize(("sheet", "expected"), [("*", ["a", "b"]), ("RH", ["b"])])
+def test_the_sheets_to_read_can_be_named_or_all_taken(tmp_path, sheet, expected):
+    path = workbook(
+        tmp_path / "w.xlsx",
+        ("LH", [HEADER, sound("a")]),
+        ("RH", [HEADER, sound("b", side="RH")]),
+        ("Notes", [("nothing", "here")]),
+    )
+    assert records(mlg("check", path, "--sheet", sheet, "--json")) == expected
+
+
+@pytest.mark.parametrize("kind", ["csv", "xlsx"])
+def test_a_table_comes_from_standard_input(tmp_path, kind):
+    data = as_csv(HEADER, sound("a"), sound("b")).encode()
+    if kind == "xlsx":
+        data = workbook(tmp_path / "w.xlsx", ("Inspections", [HEADER, sound("a"), sound("b")])).read_bytes()
+    assert records(mlg("check", "-", "--json", stdin=data)) == ["a", "b"]
+
+
+FORM = {
+    **{"Record id": "F1", "Tail no": "007", "Side": "RH", "Clearance convention": "TOTAL_PLAY", "Unit": "mm"},
+    **{f"Clearance #{n}": 0.02 for n in range(1, 11)},
+}
+
+
+def filled_form(sheet, values):
+    """Fill in the right column of a form by the labels of the left one."""
+    for row in sheet.iter_rows(max_col=2):
+        if row[0].value in values:
+            row[1].value = values[row[0].value]
+
+
+@pytest.fixture
+def forms(tmp_path):
+    """Write the template with its form filled in twice, once with a bad cell."""
+    path = tmp_path / "forms.xlsx"
+    mlg("template", path)
+    book = openpyxl.load_workbook(path)
+    (name,) = [s.title for s in book.worksheets if any(row[0].value == "Record id" for row in s.iter_rows(max_col=1))]
+    second = book.copy_worksheet(book[name])
+    second.title = "Second form"
+    filled_form(book[name], FORM)
+    filled_form(second, FORM | {"Record id": "F2", "Clearance #3": "worn"})
+    book.save(path)
+    return path
+
+
+def test_a_form_a_sheet_is_one_inspection_each(forms):
+    run = mlg("check", forms, "--json")
+    assert [(i["record_id"], i["tail_no"], i["verdict"]) for i in run.json["inspections"]] == [
+        ("F1", "007", "WITHIN_MARGIN"),
+        ("F2", "007", "INVALID"),
+    ]
+
+
+def test_a_form_in_millimetres_of_total_play_is_read_in_radial_inches(forms):
+    joints = mlg("check", forms, "--json").json["inspections"][0]["joints"]
+    assert [j["clearance_in"] for j in joints] == pytest.approx([0.02 / 25.4 / 2] * 10)
+
+
+def test_a_bad_cell_of_a_form_is_named_on_its_sheet(forms):
+    (problem,) = mlg("check", forms, "--json").json["problems"]
+    assert (problem["sheet"], problem["value"]) == ("Second form", "worn")
+    assert openpyxl.load_workbook(forms)["Second form"][problem["cell"]].value == "worn"
+
+
+def test_a_long_table_is_one_inspection_a_record(tmp_path):
+    header = ("record_id", "tail_no", "side", "clearance_convention", "joint", "clearance_in")
+    path = tmp_path / "long.csv"
+    path.write_text(as_csv(header, *(("R1", "N1", "LH", "RADIAL", n, 0.0005) for n in range(1, 11))))
+    (found,) = mlg("check", path, "--json").json["inspections"]
+    assert found["verdict"] == "WITHIN_MARGIN"
+
+
+def test_a_row_is_judged_alike_alone_and_in_a_batch(tmp_path):
+    rng = random.Random(9)
+    rows = [
+        sound(
+            f"R{n}",
+            **{
+                f"clearance_{j}_in": None if rng.random() < 0.1 else round(rng.uniform(0, 0.01), 4)
+                for j in range(1, 11)
+            },
+        )
+        for n in range(12)
+    ]
+    path = tmp_path / "all.csv"
+    path.write_text(as_csv(HEADER, *rows))
+    batch = mlg("check", path, "--repairs", "--json").json["inspections"]
+    for n in (0, 5, 11):
+        (tmp_path / "one.csv").write_text(as_csv(HEADER, rows[n]))
+        (alone,) = mlg("check", tmp_path / "one.csv", "--repairs", "--json").json["inspections"]
+        # What is worked out for a single inspection only is null in a batch.
+        in_both = [key for key in alone if key != "joints" and batch[n][key] is not None]
+        assert [alone[key] for key in in_both] == [batch[n][key] for key in in_both]
+        for one, same in zip(alone["joints"], batch[n]["joints"], strict=True):
+            assert one | {"allowance_in": None} == same
+
+
+def test_a_text_in_the_results_never_becomes_a_formula(tmp_path):
+    (tmp_path / "in.csv").write_text(as_csv(HEADER, sound("=cmd()", tail_no="+1")))
+    mlg("check", tmp_path / "in.csv", "--csv", tmp_path / "out.csv")
+    line = (tmp_path / "out.csv").read_text().splitlines()[1]
+    assert line.startswith("'=cmd(),'+1,")
+
+
+def in_a_terminal(*arguments, columns=80):
+    """Run the command in a terminal and return everything that it showed."""
+    pexpect = pytest.importorskip("pexpect")
+    environment = {**os.environ, "TERM": "xterm-256color", "NO_COLOR": "1"}
+    child = pexpect.spawn(
+        sys.executable,
+        ["-m", "mlg_troubleshoot", *(str(a) for a in arguments)],
+        encoding="utf-8",
+        timeout=120,
+        dimensions=(24, columns),
+        env=environment,
+    )
+    shown = child.read()
+    child.close()
+    return shown
+
+
+@needs_posix
+def test_problems_stand_in_a_table_on_a_terminal(mixed):
+    lines = [line.rstrip() for line in in_a_terminal("check", mixed, columns=120).splitlines()]
+    heading = next(n for n, line in enumerate(lines) if line.split()[:3] == ["cell", "column", "found"])
+    in_table = [line.split()[:3] for line in lines[heading + 1 : heading + 4]]
+    assert ["C4", "side", "left"] in in_table
+    assert ["G4", "clearance_3_in", "n/a"] in in_table
+
+
+@needs_posix
+def test_a_gear_is_one_line_however_many_joints_are_worn(tmp_path):
+    worn = sound("WORN", outcome="FAILED", **{f"clearance_{n}_in": 0.007 for n in range(1, 11)})
+    (tmp_path / "t.csv").write_text(as_csv([*HEADER, "outcome"], worn, sound("GOOD", outcome=None)))
+    lines = in_a_terminal("check", tmp_path / "t.csv").splitlines()
+    at = next(n for n, line in enumerate(lines) if "WORN" in line)
+    assert "restore" in lines[at]
+    assert "GOOD" in lines[at + 1]
+
+
+@needs_posix
+def test_a_long_batch_shows_how_far_it_is(tmp_path):
+    rows = [sound(f"R{n}", clearance_3_in=0.001 + n * 1e-6) for n in range(2500)]
+    (tmp_path / "t.csv").write_text(as_csv(HEADER, *rows))
+    shown = in_a_terminal("check", tmp_path / "t.csv")
+    assert "Judging" in shown
+    assert "/2500" in shown
+    assert "2500 inspections: 2500 within margin" in shown
+
+
+@needs_posix
+def test_quiet_shows_no_progress(tmp_path):
+    rows = [sound(f"R{n}", clearance_3_in=0.001 + n * 1e-6) for n in range(2500)]
+    (tmp_path / "t.csv").write_text(as_csv(HEADER, *rows))
+    assert "Judging" not in in_a_terminal("check", tmp_path / "t.csv", "--quiet")
+
+
+def test_the_json_of_a_batch_written_in_pieces_is_the_whole_form(gear, mixed):
+    result = check_files([mixed], CheckOptions())
+    parts = (gear, result.judgements, result.problems, result.notes)
+    assert json.loads("".join(check_json_pieces(*parts))) == json.loads(json.dumps(check_as_json(*parts)))
+
+
+def test_the_json_of_nothing_judged_is_whole_too(gear):
+    assert json.loads("".join(check_json_pieces(gear, [], [], ["a note"])))["warnings"] == ["a note"]
