@@ -306,7 +306,11 @@ def _advice(gear: Gear) -> Callable[[Mapping[int, float], Sequence[int]], str | 
         if advice.stop and left:
             return f"{advice.text} Type done."
         joint = next((worth.joint for worth in advice.worth if worth.joint in left), None)
-        return None if joint is None else f"Worth most next: {gear.joint(joint).label} (type #{joint})."
+        if joint is None:
+            return None
+        if advice.expected is not None and joint == advice.joint:
+            return f"{advice.text} Type #{joint}, or done."
+        return f"Worth most next: {gear.joint(joint).label} (type #{joint})."
 
     return advise
 

@@ -7,6 +7,7 @@ import json
 import math
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -183,14 +184,14 @@ def _choice(kind: type[_Choice], text: str, what: str) -> _Choice:
 
 def _client(address: str) -> Any:
     try:
-        from distributed import Client
+        distributed: Any = import_module("distributed")
     except ImportError:
         raise UsageError(
             "--scheduler needs dask.distributed", "Install the extra: pip install 'mlg-troubleshoot[cluster]'"
         ) from None
     try:
-        return Client(address, timeout="10s")  # type: ignore[no-untyped-call]
-    except OSError as error:
+        return distributed.Client(address, timeout="10s")
+    except (OSError, ValueError) as error:
         raise UsageError(f"no Dask scheduler at {address}: {error}", "Start one, or leave out --scheduler.") from error
 
 
@@ -295,7 +296,7 @@ def _show(
     failed = f"{table.failed} did not close" if table.failed else "none failed"
     console.print(Text(f"{table.evaluations} solutions of the linkage over {len(gear.ensemble)} linkages, {failed}."))
     if result.indices.note:
-        console.print(Text(f"Note: {result.indices.note}."))
+        console.print(Text(f"Note: {result.indices.note.rstrip('.')}."))
     shown = Table(box=None, pad_edge=False, header_style="bold")
     for heading in ("joint", "first", "±", "", "total", "linkages", "rank", "A_iP", "max A"):
         shown.add_column(heading, justify="left" if heading in {"joint", ""} else "right", no_wrap=True)

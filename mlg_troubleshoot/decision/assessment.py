@@ -201,6 +201,11 @@ class MeasuringAdvice:
         True if more measuring will not change the verdict.
     verdict : Verdict
         The verdict that stands if one may stop, else the verdict so far.
+    expected_within : float
+        Chance that the gear is within its margin, unmeasured joints taken by their distribution. For the advice
+        only: a verdict takes them at their bounds. [1]
+    expected : Verdict or None
+        WITHIN_MARGIN or OUTSIDE_MARGIN where that chance is at least the conformance probability, else None.
     text : str
         The advice as a sentence.
     """
@@ -208,6 +213,8 @@ class MeasuringAdvice:
     worth: tuple[ReadingWorth, ...]
     stop: bool
     verdict: Verdict
+    expected_within: float
+    expected: Verdict | None
     text: str
 
     @property

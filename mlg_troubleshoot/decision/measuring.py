@@ -13,6 +13,7 @@ from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.prediction import Extension, clearances, predict
 from mlg_troubleshoot.decision.response import responses
 from mlg_troubleshoot.decision.rule import CONFORMANCE, verdict, zone
+from mlg_troubleshoot.decision.wording import percent
 from mlg_troubleshoot.gear.gear import Gear
 
 Array = NDArray[np.float64]
@@ -97,6 +98,38 @@ def worth_of_readings(
     tuple of ReadingWorth
         One for each unmeasured joint.
     """
+    return outlook(gear, inspection, margin_in, extension, anchor)[0]
+
+
+def outlook(
+    gear: Gear,
+    inspection: Inspection,
+    margin_in: float,
+    extension: Extension | None = None,
+    anchor: tuple[float, float] | None = None,
+) -> tuple[tuple[ReadingWorth, ...], float]:
+    """Find what each reading is worth, and the chance that the gear is within its margin.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    inspection : Inspection
+        What was measured so far.
+    margin_in : float
+        Allowed displacement. [in]
+    extension : Extension, optional
+        An extension of the model.
+    anchor : tuple of float, optional
+        Exact worst cases of both senses with unmeasured joints at 0. [in]
+
+    Returns
+    -------
+    worth : tuple of ReadingWorth
+        One for each unmeasured joint.
+    within : float
+        Mean over the draws of the probability of being within the margin. [1]
+    """
     found = clearances([inspection], gear, np.full(len(gear.joints), np.nan))[0]
     missing = np.flatnonzero(~np.isfinite(found))
     numbers = [gear.joint_numbers[j] for j in missing]
@@ -126,7 +159,8 @@ def worth_of_readings(
     ]
     first = [w for w in worth if w.critical] or worth
     valued = any(w.risk_drop > _NO_VALUE for w in first)
-    return tuple(sorted(worth, key=lambda w: (not w.critical, -w.per_minute(by_risk=valued))))
+    ordered = tuple(sorted(worth, key=lambda w: (not w.critical, -w.per_minute(by_risk=valued))))
+    return ordered, float(p.mean())
 
 
 def _risk_drop(share: Array, p: Array) -> float:
@@ -188,27 +222,46 @@ def advise(
     settled = low is high
     if not open_joints.any():
         precise = _can_precision_settle(gear, inspection, margin_in, extension, found, now)
-        return MeasuringAdvice((), stop=not precise, verdict=low, text=_all_measured(now, precise))
+        certain = None if now is Verdict.INCONCLUSIVE else now
+        return MeasuringAdvice((), not precise, now, float(p[0]), certain, _all_measured(now, precise))
     anchor = None
     over, under = float(prediction.worst.over_in[0]), float(prediction.worst.under_in[0])
     if np.isfinite(over) and np.isfinite(under):
         anchor = (over, under)
-    worth = worth_of_readings(gear, inspection, margin_in, extension, anchor)
-    return MeasuringAdvice(worth, stop=settled, verdict=low if settled else now, text=_text(gear, worth, settled, low))
+    worth, within = outlook(gear, inspection, margin_in, extension, anchor)
+    expected = zone(within)
+    return MeasuringAdvice(
+        worth,
+        stop=settled,
+        verdict=low if settled else now,
+        expected_within=within,
+        expected=None if expected is Verdict.INCONCLUSIVE else expected,
+        text=_settled(low) if settled else _text(gear, worth, within),
+    )
 
 
-def _text(gear: Gear, worth: Sequence[ReadingWorth], settled: bool, verdict_then: Verdict) -> str:
+def _settled(verdict_then: Verdict) -> str:
+    return (
+        f"More measuring does not change the verdict ({verdict_then.words}), unless a joint is over its limit: you may "
+        "stop."
+    )
+
+
+def _text(gear: Gear, worth: Sequence[ReadingWorth], within: float) -> str:
     best = worth[0]
     name = f"#{best.joint} {gear.joint(best.joint).name}"
-    if settled:
-        return (
-            f"More measuring does not change the verdict ({verdict_then.words}), unless a joint is over its limit: you "
-            "may stop."
-        )
     minutes = f"about {best.minutes:.0f} min access"
-    if best.risk_drop > 0.0:
-        return f"Worth most next: {name} ({minutes})."
-    return f"Next: {name} ({minutes}); no single reading decides, it removes most of the uncertainty per minute."
+    if zone(within) is Verdict.INCONCLUSIVE:
+        if best.risk_drop > 0.0:
+            return f"Worth most next: {name} ({minutes})."
+        return f"Next: {name} ({minutes}); no single reading decides, it removes most of the uncertainty per minute."
+    likely = within >= CONFORMANCE
+    chance = percent(within if likely else 1.0 - within)
+    where = "inside the margin" if likely else "outside the margin"
+    return (
+        f"If the unmeasured joints are worn like the measured ones, the worst case is {where} (chance {chance}): enough "
+        f"to go on troubleshooting. To be certain, measure {name} next ({minutes})."
+    )
 
 
 def _all_measured(now: Verdict, precise: bool) -> str:

@@ -20,6 +20,7 @@ from concurrent.futures import (
 )
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Protocol
@@ -387,10 +388,10 @@ def _on_this_machine(study: BlockStudy, blocks: list[Block], workers: int) -> It
 
 
 def _on_cluster(study: BlockStudy, blocks: list[Block], scheduler: Scheduler) -> Iterator[tuple[Block, BlockSums]]:
-    from distributed import as_completed
+    distributed: Any = import_module("distributed")
 
     waiting = {scheduler.submit(compute_block, study, block, pure=False): block for block in blocks}
-    for future in as_completed(list(waiting)):  # type: ignore[no-untyped-call]
+    for future in distributed.as_completed(list(waiting)):
         yield waiting[future], future.result()
 
 

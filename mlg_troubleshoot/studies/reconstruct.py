@@ -334,21 +334,17 @@ class _Search:
         return Reconstruction(linkage, tuple(met), len(vector), determined, loosest, self.tried, seed)
 
     def _binding_slopes(self, vector: Array, met: list[Met]) -> Array:
-        rows = []
-        for each in met:
-            if not each.binds:
-                continue
-            row = []
-            for i in range(len(vector)):
-                ends = []
-                for sign in (1.0, -1.0):
-                    moved = vector.copy()
-                    moved[i] += sign * 1e-4
-                    facts = Facts(self.gear, self.gear.model_of(self.space.linkage(moved)), quick=True)
-                    ends.append(facts.measure(each.target))
-                row.append((ends[0] - ends[1]) / 2e-4)
-            rows.append(row)
-        return np.array(rows)
+        binding = [each.target for each in met if each.binds]
+        columns = []
+        for i in range(len(vector)):
+            ends = []
+            for sign in (1.0, -1.0):
+                moved = vector.copy()
+                moved[i] += sign * 1e-4
+                facts = Facts(self.gear, self.gear.model_of(self.space.linkage(moved)), quick=True)
+                ends.append(np.array([facts.measure(target) for target in binding]))
+            columns.append((ends[0] - ends[1]) / 2e-4)
+        return np.array(columns).T
 
 
 def _miss(target: Target, computed: float) -> float:

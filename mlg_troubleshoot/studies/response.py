@@ -100,8 +100,11 @@ def worst_directions(model: LinkageModel, limits_in: Array, *, compiled: bool = 
         The response.
     """
     worst = worst_case(model, limits_in[None, :])
-    sense = 1.0 if worst.over_in[0] >= -worst.under_in[0] else -1.0
-    return HeldDirections(model, worst.governing_directions[0], sense, compiled)
+    over, under = worst.over_in[0], -worst.under_in[0]
+    # A sense in which the linkage does not close governs: its samples must be seen to fail.
+    is_over = bool(np.isnan(over) or (over >= under))
+    directions = (worst.over_directions if is_over else worst.under_directions)[0]
+    return HeldDirections(model, directions, 1.0 if is_over else -1.0, compiled)
 
 
 def worst_sense(model: LinkageModel, limits_in: Array, sense: float) -> HeldDirections:

@@ -238,20 +238,32 @@ def summarise(records: list[Record]) -> dict[str, Any]:
     }
 
 
-def study(plan: dict[str, int], workers: int, first_seed: int = FIRST_SEED) -> dict[str, Any]:
-    """Run a plan on several processes and summarise it."""
-    work = list(tasks(plan, first_seed))
+def study(
+    plan: dict[str, int], workers: int, first_seed: int = FIRST_SEED, kept: Path | None = None
+) -> dict[str, Any]:
+    """Run a plan on several processes and summarise it.
+
+    The groups are mixed, so that a part of the plan is as good a sample as the whole. With a file to keep the
+    records in, a run that was stopped goes on where it was.
+    """
+    listed = list(tasks(plan, first_seed))
+    work = [listed[int(k)] for k in np.random.default_rng(first_seed).permutation(len(listed))]
     records: list[Record] = []
-    start = time.monotonic()
+    if kept is not None and kept.exists():
+        records = [json.loads(line) for line in kept.read_text(encoding="utf-8").splitlines()]
+        done_seeds = {record["seed"] for record in records}
+        work = [task for task in work if task["seed"] not in done_seeds]
+    start, before = time.monotonic(), len(records)
     with ProcessPoolExecutor(workers) as pool:
-        for record in pool.map(run, work, chunksize=8):
+        for record in pool.map(run, work, chunksize=4):
             records.append(record)
-            if len(records) % 100 == 0:
-                done, spent = len(records), time.monotonic() - start
-                print(
-                    f"{done} of {len(work)} fleets, about {spent / done * (len(work) - done) / 60:.0f} min left",
-                    flush=True,
-                )
+            if kept is not None:
+                with kept.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(record) + "\n")
+            done = len(records) - before
+            if done % 100 == 0:
+                left = (time.monotonic() - start) / done * (len(work) - done) / 60
+                print(f"{len(records)} of {before + len(work)} fleets, about {left:.0f} min left", flush=True)
     return {
         "fleets": len(records),
         "first_seed": first_seed,
@@ -281,10 +293,11 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--share", type=float, default=1.0, help="share of the plan to run")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
+    parser.add_argument("--keep", type=Path, help="file to keep records in, to go on after a stop")
     parser.add_argument("--write", action="store_true", help=f"write {RESULT.name}")
     arguments = parser.parse_args()
     plan = {group: max(1, round(count * arguments.share)) for group, count in PLAN.items()}
-    result = study(plan, arguments.workers, arguments.first_seed)
+    result = study(plan, arguments.workers, arguments.first_seed, arguments.keep)
     show(result)
     if arguments.write:
         RESULT.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")

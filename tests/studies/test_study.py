@@ -54,6 +54,13 @@ def test_a_paper_design_with_random_directions_is_refused(gear: Gear) -> None:
         run_study(gear, StudyOptions(design=Design.LHS, directions=Directions.RANDOM))
 
 
+def test_limits_at_which_the_linkage_does_not_close_are_shown_and_not_hidden(gear: Gear) -> None:
+    found = run_study(gear, StudyOptions(limits_in=np.full(10, 0.06)))
+    assert found.table.failed > 0
+    assert np.all(np.isnan(found.indices.first_order))
+    assert "do not close" in found.indices.note
+
+
 def test_an_accuracy_of_zero_is_refused(gear: Gear) -> None:
     with pytest.raises(UsageError):
         run_study(gear, StudyOptions(accuracy=0.0))

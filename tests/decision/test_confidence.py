@@ -1,0 +1,81 @@
+"""The number of the probability checked by Monte Carlo, and what re-rigging alone would do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.decision.assess import AssessOptions
+from mlg_troubleshoot.decision.wording import confidence_words, rigging_sentence
+from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.gear.gear import Gear
+from tests.decision.conftest import Judge, every_joint
+
+ADVICE = AssessOptions(advice=True)
+REPAIRS = AssessOptions(repairs=True)
+
+
+@pytest.mark.parametrize("clearance_in", [0.0, 0.0014, 0.0016, 0.002, 0.0025, 0.003, 0.004])
+@pytest.mark.parametrize("gauge_u_in", [0.0005, 0.002])
+def test_curvature_moves_the_probability_by_less_than_one_percent(
+    judge: Judge, clearance_in: float, gauge_u_in: float
+) -> None:
+    checked = judge(every_joint(clearance_in), ADVICE, gauge_u_in=gauge_u_in).confidence
+    assert checked is not None
+    assert abs(checked.monte_carlo - checked.analytic) < 0.01
+
+
+def test_the_analytic_value_is_the_probability_of_the_contract(judge: Judge) -> None:
+    found = judge(every_joint(0.002), ADVICE)
+    assert found.confidence is not None
+    assert found.confidence.analytic == pytest.approx(found.probability_within_margin, abs=1e-12)
+
+
+def test_advice_does_not_change_the_verdict_or_its_probability(judge: Judge) -> None:
+    plain, advised = judge(every_joint(0.002)), judge(every_joint(0.002), ADVICE)
+    assert (plain.verdict, plain.probability_within_margin) == (advised.verdict, advised.probability_within_margin)
+
+
+def test_the_error_of_the_monte_carlo_value_is_its_scatter_between_seeds(judge: Judge) -> None:
+    found = [judge(every_joint(0.002), AssessOptions(advice=True, seed=s), gauge_u_in=0.002) for s in range(12)]
+    checks = [a.confidence for a in found if a.confidence is not None]
+    scatter = np.std([c.monte_carlo for c in checks], ddof=1)
+    assert 0.4 < scatter / np.mean([c.standard_error for c in checks]) < 2.0
+
+
+def test_a_worse_gauge_is_in_the_monte_carlo_value(judge: Judge) -> None:
+    fine = judge(every_joint(0.0015), ADVICE, gauge_u_in=0.0001).confidence
+    coarse = judge(every_joint(0.0015), ADVICE, gauge_u_in=0.002).confidence
+    assert fine is not None
+    assert coarse is not None
+    assert coarse.monte_carlo < fine.monte_carlo - 0.02
+
+
+def test_the_error_stands_beside_the_probability(judge: Judge) -> None:
+    assert "±" in confidence_words(judge(every_joint(0.002), ADVICE).confidence)
+    assert confidence_words(None) == ""
+
+
+def test_re_rigging_leaves_half_of_the_range_between_both_worst_cases(gear: Gear, judge: Judge) -> None:
+    found = judge(every_joint(0.004), REPAIRS).rigging
+    exact = worst_case(gear.model, np.full((1, 10), 0.004))
+    assert found is not None
+    assert found.predicted_displacement_in == pytest.approx(0.5 * (exact.over_in[0] - exact.under_in[0]), abs=1e-12)
+    assert exact.over_in[0] + found.shift_in == pytest.approx(-(exact.under_in[0] + found.shift_in), abs=1e-12)
+
+
+def test_re_rigging_cannot_clear_the_published_failure(judge: Judge) -> None:
+    found = judge({3: 0.013, 5: 0.007}, REPAIRS).rigging
+    assert found is not None
+    assert found.probability_within_margin < 0.05
+    assert found.probability_exceed_random_directions > 0.2
+
+
+def test_a_gear_within_its_margin_has_no_rigging_alternative(judge: Judge) -> None:
+    assert judge(every_joint(0.001), REPAIRS).rigging is None
+
+
+def test_the_sentence_on_re_rigging_says_that_the_joints_stay_worn(judge: Judge) -> None:
+    found = judge({3: 0.013, 5: 0.007}, REPAIRS).rigging
+    assert found is not None
+    assert rigging_sentence(found).endswith("the joints stay worn.")

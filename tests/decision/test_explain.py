@@ -1,0 +1,127 @@
+"""Which joints explain a measured displacement."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.decision.assess import AssessOptions
+from mlg_troubleshoot.decision.assessment import Posterior
+from mlg_troubleshoot.decision.explain import Prior, explain, groups_of
+from mlg_troubleshoot.gear.gear import Gear
+from tests.benchmarks import worn_gears
+from tests.decision.conftest import Judge, every_joint, inspected
+
+
+def explained(gear: Gear, clearance_in: dict[int, float], reading_in: float, **more: object) -> Posterior:
+    found = explain(
+        gear, inspected(clearance_in, readings_in=(reading_in,)), np.random.default_rng(2), draws=8192, **more
+    )
+    assert found is not None
+    return found
+
+
+def chance(found: Posterior, joint: int) -> float:
+    return next(group.probability for group in found.groups if joint in group.joints)
+
+
+def test_the_two_ends_of_one_link_form_one_group(gear: Gear) -> None:
+    assert groups_of(gear) == ((1,), (2,), (3, 5), (4,), (6, 7), (8,), (9, 10))
+
+
+def test_without_a_plunger_reading_nothing_is_explained(gear: Gear) -> None:
+    assert explain(gear, inspected({3: 0.013}), np.random.default_rng(2)) is None
+
+
+def test_the_only_unmeasured_link_explains_a_large_displacement(gear: Gear) -> None:
+    sound = {j: 0.0005 for j in range(1, 11) if j not in (3, 5)}
+    found = explained(gear, sound, 0.028)
+    assert found.groups[0].joints == (3, 5)
+    assert found.called_worn == ((3, 5),)
+
+
+def test_a_displacement_that_clearances_cannot_reach_is_not_clearance(gear: Gear) -> None:
+    assert explained(gear, every_joint(0.0005), 0.04).not_clearance > 0.99
+
+
+def test_no_displacement_does_not_call_any_joint_worn(gear: Gear) -> None:
+    assert explained(gear, {}, 0.0).called_worn == ()
+
+
+def test_a_displacement_raises_the_chance_of_wear(gear: Gear) -> None:
+    sound = {j: 0.0005 for j in range(1, 11) if j not in (2, 4)}
+    assert chance(explained(gear, sound, 0.025), 2) > 3.0 * chance(explained(gear, sound, 0.0), 2)
+
+
+def test_a_joint_that_moves_the_plunger_more_explains_a_large_displacement_better(gear: Gear) -> None:
+    sound = {j: 0.0005 for j in range(1, 11) if j not in (2, 8)}
+    found = explained(gear, sound, 0.02)
+    assert chance(found, 2) > chance(found, 8)
+
+
+def test_a_joint_read_beyond_its_limit_is_worn(gear: Gear) -> None:
+    assert chance(explained(gear, {3: 0.013}, 0.02), 3) > 0.999
+
+
+def test_the_interval_of_a_measured_joint_is_its_reading_with_its_uncertainty(gear: Gear) -> None:
+    found = explained(gear, every_joint(0.004), 0.0).intervals[5]
+    assert (found.low_in, found.high_in) == pytest.approx((0.004 - 1.645 * 0.0005, 0.004 + 1.645 * 0.0005), abs=1e-4)
+
+
+def test_the_two_ends_of_an_unmeasured_link_get_the_same_interval(gear: Gear) -> None:
+    sound = {j: 0.0005 for j in range(1, 11) if j not in (3, 5)}
+    one, other = (explained(gear, sound, 0.01).intervals[j - 1] for j in (3, 5))
+    assert one.median_in == pytest.approx(other.median_in, rel=0.2)
+
+
+def test_the_sense_of_the_displacement_tells_little(gear: Gear) -> None:
+    sound = {j: 0.0005 for j in range(1, 11) if j != 2}
+    assert chance(explained(gear, sound, 0.02), 2) == pytest.approx(chance(explained(gear, sound, -0.02), 2), abs=0.1)
+
+
+def test_what_is_assumed_beforehand_matters_and_can_be_changed(gear: Gear) -> None:
+    often = explained(gear, {}, 0.02, prior=Prior(worn=0.3))
+    seldom = explained(gear, {}, 0.02, prior=Prior(worn=0.01))
+    assert often.no_joint_worn < seldom.no_joint_worn
+
+
+def test_importance_sampling_agrees_with_drawing_from_the_prior(gear: Gear) -> None:
+    # An independent linkage and plain rejection: gears whose plunger stands near the reading.
+    fleet = worn_gears.explained_fleet(60_000, np.random.default_rng(3))
+    near = np.abs(fleet.plunger_in - 0.02) < 0.001
+    worn = fleet.true_in[near] > worn_gears.LIMIT_IN
+    found = explain(gear, inspected({}, readings_in=(0.02,)), np.random.default_rng(2))
+    assert found is not None
+    for group in found.groups:
+        share = worn[:, [j - 1 for j in group.joints]].any(axis=1).mean()
+        assert group.probability == pytest.approx(share, abs=0.035)
+    assert found.not_clearance == pytest.approx(fleet.other_cause[near].mean(), abs=0.02)
+
+
+def test_ninety_percent_intervals_cover_the_clearances_of_a_simulated_fleet(gear: Gear) -> None:
+    rng = np.random.default_rng(11)
+    fleet = worn_gears.explained_fleet(150, rng)
+    inside = []
+    for row in range(150):
+        read = {j: float(fleet.read_in[row, j - 1]) for j in range(1, 11) if rng.random() < 0.5}
+        found = explain(
+            gear, inspected(read, readings_in=(float(fleet.plunger_in[row]),)), np.random.default_rng(row), draws=2048
+        )
+        assert found is not None
+        inside += [
+            i.low_in <= fleet.true_in[row, i.joint - 1] <= i.high_in for i in found.intervals if i.joint not in read
+        ]
+    assert 0.86 < np.mean(inside) < 0.94
+
+
+def test_the_posterior_is_in_the_assessment_of_a_measured_gear(judge: Judge) -> None:
+    found = judge({3: 0.013, 5: 0.007}, AssessOptions(advice=True), readings_in=(0.04,))
+    assert found.posterior is not None
+    assert found.posterior.groups[0].joints == (3, 5)
+
+
+def test_the_seed_decides_the_draws(gear: Gear) -> None:
+    first, again = (explained(gear, {}, 0.02) for _ in range(2))
+    assert first == replace(again)

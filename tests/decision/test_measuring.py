@@ -1,0 +1,185 @@
+"""Which joint to measure next, and when to stop."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.decision.assessment import MeasuringAdvice, Verdict
+from mlg_troubleshoot.decision.belief import draw_shares, level_weights, normal_cdf, quick_probability
+from mlg_troubleshoot.decision.measuring import (
+    COST_OF_WRONG_WITHIN,
+    access_of_one_more,
+    advise,
+    decision_risk,
+    worth_of_readings,
+)
+from mlg_troubleshoot.decision.prediction import predict
+from mlg_troubleshoot.decision.response import expand, responses
+from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.model import links_from
+from tests.decision.conftest import Judge, every_joint, inspected
+
+MARGIN_IN = 0.03
+
+
+def advised(gear: Gear, clearance_in: dict[int, float], margin_in: float = MARGIN_IN) -> MeasuringAdvice:
+    return advise(gear, inspected(clearance_in), margin_in)
+
+
+def test_the_second_order_worst_case_is_within_one_percent_up_to_the_limit(gear: Gear) -> None:
+    clearance = np.random.default_rng(4).uniform(0.0, 0.0075, (200, 10))
+    exact = worst_case(gear.model, clearance)
+    over, under = responses(gear)[0].worst(clearance)
+    assert np.max(np.abs(over / exact.over_in - 1.0)) < 0.01
+    assert np.max(np.abs(under / exact.under_in - 1.0)) < 0.01
+
+
+def test_the_second_order_displacement_follows_the_linkage_in_any_direction(gear: Gear) -> None:
+    rng = np.random.default_rng(5)
+    links = links_from(rng.uniform(0.0, 0.0075, (200, 10)), rng.uniform(0.0, 6.28, (200, 10)))
+    exact = gear.model.displacement(links)
+    found = expand(gear.model).displacement(np.array(links).T)
+    assert np.max(np.abs(found - exact)) < 2e-4
+
+
+def test_an_anchored_expansion_is_exact_for_its_gear(gear: Gear) -> None:
+    clearance = np.array([every_joint(0.004)[j] for j in range(1, 11)])
+    exact = worst_case(gear.model, clearance[None, :])
+    anchored = responses(gear)[0].anchored(clearance, float(exact.over_in[0]), float(exact.under_in[0]))
+    assert anchored.worst(clearance) == pytest.approx((exact.over_in[0], exact.under_in[0]), abs=1e-15)
+
+
+def test_the_quick_probability_agrees_with_the_rule(gear: Gear) -> None:
+    clearance = np.random.default_rng(6).uniform(0.0, 0.004, (50, 10))
+    every = np.ones((50, 10), bool)
+    exact = predict(gear, [inspected({})] * 50, clearance, every, np.full(50, 0.0005))
+    p = exact.probability_within(np.full(50, MARGIN_IN), np.zeros(50))
+    quick = quick_probability(responses(gear), clearance, every[0], 0.0005, (MARGIN_IN, 0.0), None)
+    assert np.max(np.abs(quick - p)) < 0.02
+
+
+def test_a_wrong_within_costs_nineteen_times_a_wrong_outside() -> None:
+    assert pytest.approx(19.0) == COST_OF_WRONG_WITHIN
+    assert decision_risk(1.0 - 1e-3) == pytest.approx(0.019)
+    assert decision_risk(1e-3) == pytest.approx(1e-3)
+
+
+def test_the_risk_is_greatest_at_the_conformance_probability() -> None:
+    p = np.linspace(0.0, 1.0, 2001)
+    assert p[np.argmax(decision_risk(p))] == pytest.approx(0.95)
+
+
+def test_drawn_wear_stays_between_nothing_and_the_limit() -> None:
+    drawn = draw_shares(np.array([0.2]), 9, 1000)
+    assert 0.0 <= drawn.min()
+    assert drawn.max() <= 1.0
+
+
+def test_a_gear_whose_measured_joints_are_worn_is_expected_to_be_worn_elsewhere() -> None:
+    assert draw_shares(np.full(3, 0.9), 4, 1000).mean() > 2.0 * draw_shares(np.full(3, 0.1), 4, 1000).mean()
+
+
+def test_drawn_wear_has_the_mean_of_its_distribution() -> None:
+    # With very little wear measured on many joints the lowest level, 5 % of the limit, is nearly certain.
+    few = np.full(40, 0.001)
+    assert level_weights(few)[0] > 0.99
+    assert draw_shares(few, 3, 4096).mean() == pytest.approx(0.05, rel=0.03)
+
+
+def test_the_normal_distribution_has_its_known_values() -> None:
+    assert normal_cdf(np.array([0.0, 1.6448536, -1.6448536])) == pytest.approx([0.5, 0.95, 0.05], abs=1e-7)
+
+
+def test_an_area_that_is_open_costs_no_minutes_again(gear: Gear) -> None:
+    assert access_of_one_more(gear, 5, ()) == 23
+    assert access_of_one_more(gear, 5, (3,)) == 8
+    assert access_of_one_more(gear, 6, (3,)) == 26
+
+
+def test_missing_critical_joints_stand_before_all_others(gear: Gear) -> None:
+    worth = worth_of_readings(gear, inspected({3: 0.001, 9: 0.001}), MARGIN_IN)
+    assert {w.joint for w in worth[:4]} == {1, 2, 4, 5}
+
+
+def test_the_next_joint_is_worth_most_per_minute_of_access(gear: Gear) -> None:
+    worth = [w for w in worth_of_readings(gear, inspected({3: 0.001, 5: 0.001}), MARGIN_IN) if w.critical]
+    assert worth[0].risk_drop > 0.0
+    assert worth[0].risk_drop / worth[0].minutes == max(w.risk_drop / w.minutes for w in worth)
+
+
+def test_a_reading_that_is_worth_more_may_still_come_later_because_of_its_access(gear: Gear) -> None:
+    worth = {w.joint: w for w in worth_of_readings(gear, inspected({3: 0.001, 5: 0.001}), MARGIN_IN)}
+    assert worth[4].risk_drop > worth[2].risk_drop
+    assert list(worth).index(2) < list(worth).index(4)
+
+
+def test_where_no_single_reading_has_a_value_the_variance_per_minute_decides(gear: Gear) -> None:
+    worth = [w for w in worth_of_readings(gear, inspected({}), MARGIN_IN) if w.critical]
+    assert {w.risk_drop for w in worth} == {0.0}
+    assert worth[0].variance_in2 / worth[0].minutes == max(w.variance_in2 / w.minutes for w in worth)
+
+
+def test_both_ends_of_one_link_are_worth_the_same(gear: Gear) -> None:
+    worth = {w.joint: w for w in worth_of_readings(gear, inspected({1: 0.001, 2: 0.001}), MARGIN_IN)}
+    assert worth[3].risk_drop == worth[5].risk_drop
+    assert worth[9].variance_in2 == worth[10].variance_in2
+
+
+def test_a_reading_is_never_worth_less_than_nothing(gear: Gear) -> None:
+    for measured in ({}, {2: 0.002}, {2: 0.007, 4: 0.006}):
+        assert min(w.risk_drop for w in worth_of_readings(gear, inspected(measured), MARGIN_IN)) >= 0.0
+
+
+def test_outside_already_one_may_stop(gear: Gear) -> None:
+    found = advised(gear, {3: 0.013, 5: 0.007})
+    assert (found.stop, found.verdict) == (True, Verdict.OUTSIDE_MARGIN)
+    assert "does not change the verdict" in found.text
+
+
+def test_measuring_goes_on_while_the_verdict_is_open(gear: Gear) -> None:
+    assert not advised(gear, {3: 0.001, 5: 0.001}).stop
+
+
+def test_where_one_may_stop_no_reading_up_to_the_limit_changes_the_verdict(gear: Gear, judge: Judge) -> None:
+    start = {3: 0.006, 5: 0.006, 2: 0.006}
+    assert advised(gear, start).stop
+    rng = np.random.default_rng(8)
+    for _ in range(5):
+        rest = {j: float(rng.uniform(0.0, 0.0075)) for j in range(1, 11) if j not in start}
+        assert judge(start | rest).verdict is Verdict.OUTSIDE_MARGIN
+
+
+def test_with_all_but_light_joints_measured_one_may_stop_within(gear: Gear) -> None:
+    found = advised(gear, every_joint(0.0005) | {}, MARGIN_IN)
+    assert (found.stop, found.verdict, found.joint) == (True, Verdict.WITHIN_MARGIN, None)
+
+
+def test_the_gear_is_expected_within_before_it_is_certain(gear: Gear) -> None:
+    found = advised(gear, dict.fromkeys(range(1, 6), 0.001))
+    assert not found.stop
+    assert found.expected is Verdict.WITHIN_MARGIN
+    assert "To be certain, measure" in found.text
+
+
+def test_an_expectation_never_becomes_a_verdict(judge: Judge) -> None:
+    assert judge(dict.fromkeys((2, 3, 4, 5), 0.0002)).verdict is Verdict.INCOMPLETE
+
+
+def test_an_inconclusive_gear_that_precision_cannot_settle_is_told_so(gear: Gear) -> None:
+    found = advised(gear, every_joint(0.0023))
+    assert found.verdict is Verdict.INCONCLUSIVE
+    precise = predict(
+        gear, [inspected({})], np.full((1, 10), 0.0023), np.zeros((1, 10), bool), np.zeros(1)
+    ).probability_within(np.array([MARGIN_IN]), np.zeros(1))
+    assert 0.05 < precise[0] < 0.95
+
+
+def test_the_next_action_is_the_joint_that_is_worth_most(judge: Judge, gear: Gear) -> None:
+    measured = {3: 0.001, 5: 0.001}
+    assert judge(measured).next_action.joints == (advised(gear, measured).joint,)
+
+
+def test_the_advice_is_the_same_at_every_call(gear: Gear) -> None:
+    assert advised(gear, {3: 0.002}) == advised(gear, {3: 0.002})
