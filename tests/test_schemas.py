@@ -85,6 +85,10 @@ def test_the_shipped_table_of_indices_fits_the_schema_of_a_study(gear: Gear) -> 
     assert complain("study", json.loads(gear.indices_file.read_text(encoding="utf-8"))) == []
 
 
+def test_every_study_fits_its_schema() -> None:
+    assert complain("study", mlg("study", "--json", "--quiet").json) == []
+
+
 @pytest.fixture(scope="module")
 def judged() -> Iterator[Any]:
     """The failure case as a document, to be spoilt."""

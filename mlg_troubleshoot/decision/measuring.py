@@ -43,6 +43,24 @@ def decision_risk(probability: Array | float) -> Array:
     return risk
 
 
+def enough(within: float) -> Verdict | None:
+    """Say which verdict an expectation is enough for, to go on troubleshooting.
+
+    Parameters
+    ----------
+    within : float
+        Chance of being within the margin, unmeasured joints taken by their distribution. [1]
+
+    Returns
+    -------
+    Verdict or None
+        WITHIN_MARGIN or OUTSIDE_MARGIN where being wrong costs at most what a just conforming OUTSIDE does; else None.
+    """
+    if decision_risk(within) > (1.0 - CONFORMANCE) * (1.0 + 1e-9):
+        return None
+    return Verdict.WITHIN_MARGIN if within > 0.5 else Verdict.OUTSIDE_MARGIN
+
+
 def access_of_one_more(gear: Gear, number: int, measured: Sequence[int]) -> float:
     """Time to reach one more joint, its area being open if another joint in it was measured.
 
@@ -229,13 +247,12 @@ def advise(
     if np.isfinite(over) and np.isfinite(under):
         anchor = (over, under)
     worth, within = outlook(gear, inspection, margin_in, extension, anchor)
-    expected = zone(within)
     return MeasuringAdvice(
         worth,
         stop=settled,
         verdict=low if settled else now,
         expected_within=within,
-        expected=None if expected is Verdict.INCONCLUSIVE else expected,
+        expected=enough(within),
         text=_settled(low) if settled else _text(gear, worth, within),
     )
 
@@ -251,16 +268,16 @@ def _text(gear: Gear, worth: Sequence[ReadingWorth], within: float) -> str:
     best = worth[0]
     name = f"#{best.joint} {gear.joint(best.joint).name}"
     minutes = f"about {best.minutes:.0f} min access"
-    if zone(within) is Verdict.INCONCLUSIVE:
+    if enough(within) is None:
         if best.risk_drop > 0.0:
             return f"Worth most next: {name} ({minutes})."
         return f"Next: {name} ({minutes}); no single reading decides, it removes most of the uncertainty per minute."
-    likely = within >= CONFORMANCE
+    likely = within > 0.5
     chance = percent(within if likely else 1.0 - within)
     where = "inside the margin" if likely else "outside the margin"
     return (
-        f"If the unmeasured joints are worn like the measured ones, the worst case is {where} (chance {chance}): enough "
-        f"to go on troubleshooting. To be certain, measure {name} next ({minutes})."
+        f"If the unmeasured joints are worn like the measured ones, the worst case is {where} (chance {chance}): "
+        f"enough to go on troubleshooting. To be certain, measure {name} next ({minutes})."
     )
 
 

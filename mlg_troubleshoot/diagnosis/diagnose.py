@@ -195,23 +195,63 @@ def diagnose(
     where = where or Discrepancies()
     read = len(table)
     table = _answerable(table)
-    table, faults, usable = screen_faults(model, table)
-    table = table.take(usable & np.isfinite(table.measured_in))
-    table = table.take(np.isfinite(build_scene(model, table, where)[0].over_in))
-    _enough(table)
-    scene, worst, extra = build_scene(model, table, where)
+    table, faults = _without_faults(model, table, where, None)
     catalogue = (*CATALOGUE, *own_causes)
     testable = [cause for cause in catalogue if set(cause.needs) <= set(table.columns)]
     not_testable = tuple(
         (c.name, next(n for n in c.needs if n not in table.columns)) for c in catalogue if c not in testable
     )
+    rng = np.random.default_rng(seed)
+    case = _infer(model, table, where, testable, permutations, rng, progress)
+    if case.finding.fit is not None:
+        # A large effect hides slips of single cells: look again with what is named taken out.
+        explained = case.columns[:, list(case.finding.chosen)] @ case.finding.fit.values
+        again, more = _without_faults(model, table, where, explained)
+        if more:
+            table, faults = again, (*faults, *more)
+            case = _infer(model, table, where, testable, permutations, rng, progress)
+    return _report(model, table, read, faults, not_testable, case, seed, permutations, rng)
+
+
+@dataclass(frozen=True)
+class _Case:
+    """Candidates with their effects, the misfit and what the inference makes of it."""
+
+    candidates: Sequence[Candidate]
+    columns: Array
+    misfit: Array
+    predicted: Array
+    finding: Finding
+
+
+def _without_faults(
+    model: LinkageModel, table: DiagnosisTable, where: Discrepancies, explained: Array | None
+) -> tuple[DiagnosisTable, tuple[DataFault, ...]]:
+    """Repair or set aside rows with data faults, and rows whose linkage does not close."""
+    table, faults, usable = screen_faults(model, table, explained)
+    table = table.take(usable & np.isfinite(table.measured_in))
+    table = table.take(np.isfinite(build_scene(model, table, where)[0].over_in))
+    _enough(table)
+    return table, faults
+
+
+def _infer(
+    model: LinkageModel,
+    table: DiagnosisTable,
+    where: Discrepancies,
+    testable: Sequence[Cause],
+    permutations: int,
+    rng: np.random.Generator,
+    progress: Callable[[float], None] | None,
+) -> _Case:
+    scene, worst, extra = build_scene(model, table, where)
     candidates = [candidate for cause in testable for candidate in cause.candidates(scene)]
     columns = effect_columns(scene, worst, candidates)
     moving = np.isfinite(columns).all(axis=0) & (np.abs(columns).max(axis=0) > 0.0)
     candidates = [c for c, keep in zip(candidates, moving, strict=True) if keep]
     columns = columns[:, moving]
     misfit = table.measured_in - scene.over_in
-    rng = np.random.default_rng(seed)
+    as_read = np.where(np.isfinite(table.clearance_in), table.clearance_in, scene.clearance_in)
     finding = Inference(
         misfit,
         scene.over_in,
@@ -219,6 +259,7 @@ def diagnose(
         table.gears,
         extra,
         small_trends(table),
+        np.nan_to_num(worst_case(model, as_read).over_in - scene.over_in),
         candidates,
         columns,
         build_bank(scene, columns),
@@ -226,21 +267,7 @@ def diagnose(
         rng,
         progress,
     ).run()
-    return _report(
-        model,
-        table,
-        read,
-        faults,
-        not_testable,
-        candidates,
-        columns,
-        misfit,
-        scene.over_in,
-        finding,
-        seed,
-        permutations,
-        rng,
-    )
+    return _Case(candidates, columns, misfit, scene.over_in, finding)
 
 
 def _answerable(table: DiagnosisTable) -> DiagnosisTable:
@@ -285,15 +312,13 @@ def _report(
     read: int,
     faults: tuple[DataFault, ...],
     not_testable: tuple[tuple[str, str], ...],
-    candidates: Sequence[Candidate],
-    columns: Array,
-    misfit: Array,
-    predicted: Array,
-    finding: Finding,
+    case: _Case,
     seed: int,
     permutations: int,
     rng: np.random.Generator,
 ) -> Diagnosis:
+    candidates, columns, misfit = case.candidates, case.columns, case.misfit
+    predicted, finding = case.predicted, case.finding
     named = _named(candidates, columns, finding)
     raw = worst_case(model, np.nan_to_num(table.clearance_in)).over_in
     raw_misfit = table.measured_in - raw

@@ -74,7 +74,7 @@ class _Slip:
 
 
 def screen_faults(
-    model: LinkageModel, table: DiagnosisTable
+    model: LinkageModel, table: DiagnosisTable, explained: Array | None = None
 ) -> tuple[DiagnosisTable, tuple[DataFault, ...], NDArray[np.bool_]]:
     """Find data faults, and repair them for the analysis where one slip explains them.
 
@@ -84,6 +84,8 @@ def screen_faults(
         The linkage.
     table : DiagnosisTable
         The rows; each has at least one reading.
+    explained : ndarray, shape (n,), optional
+        What a named cause explains of each row's misfit; taken out before rows are judged. [in]
 
     Returns
     -------
@@ -97,11 +99,13 @@ def screen_faults(
     expected = _typical(table)
     clearance = np.where(np.isfinite(table.clearance_in), table.clearance_in, expected)
     measured = np.nanmedian(table.readings_in, axis=1)
+    named = np.zeros(len(table)) if explained is None else explained
     misfit = measured - worst_case(model, clearance).over_in
     known = np.isfinite(misfit)
-    centre = float(np.median(misfit[known])) if known.any() else 0.0
-    scale = max(robust_scale(misfit[known]) if known.any() else 0.0, 0.0008)
-    local = _local_level(table, misfit, centre, scale)
+    left = misfit - named
+    centre = float(np.median(left[known])) if known.any() else 0.0
+    scale = max(robust_scale(left[known]) if known.any() else 0.0, 0.0008)
+    local = _local_level(table, left, centre, scale) + named
     spread = _reading_spread(table)
     far = ~known | (np.abs(misfit - local) > _FAR * scale) | (spread > _FAR * scale)
     far |= (table.clearance_in > 8.0 * np.maximum(expected, 0.0005)).any(axis=1) & (
@@ -116,7 +120,7 @@ def screen_faults(
         )
         plain = slip is not None and slip.clearance_evidence > _CLEARANCE_ALONE
         alone = spread[place] > _FAR * scale
-        if known[place] and not (plain or alone) and _gathers(table, misfit, centre, scale, int(place)):
+        if known[place] and not (plain or alone) and _gathers(table, left, centre, scale, int(place)):
             continue
         faults += found
         if slip is not None:
@@ -333,7 +337,7 @@ def _slips(model: LinkageModel, table: DiagnosisTable, expected: Array, place: i
             wrong = ((column, float(readings[k]), None),)
             slips.append(_Slip("implausible", clearance.copy(), float(np.mean(others)), wrong, 3.0))
     for factor, kind in ((1.0 / MM_PER_IN, "mm_as_in"), (0.1, "factor_10")):
-        if len(seen) > 1:
+        if len(seen) > 1 and float(np.ptp(seen)) * factor < 0.012:
             all_cells = tuple(
                 (f"plunger_displacement{_suffix(int(k))}_in", float(readings[k]), float(readings[k] * factor))
                 for k in np.flatnonzero(np.isfinite(readings))
@@ -350,7 +354,22 @@ def _swapped_sides(table: DiagnosisTable) -> tuple[list[DataFault], DiagnosisTab
         return [], table
     found: list[DataFault] = []
     corrected = side.copy()
+
+    def swap(row: int) -> None:
+        own = str(side[row])
+        corrected[row] = "RH" if own == "LH" else "LH"
+        fault = DataFault(
+            row, int(table.row[row]), table.record_id[row], "side", "swapped_side", own, str(corrected[row])
+        )
+        found.append(fault)
+
     for name in np.unique(tail):
+        pairs, doubled = _pairs(table, np.flatnonzero(tail == name))
+        if pairs >= 2:
+            # Inspected in pairs: a swapped side leaves one side twice on its day; without that there is none.
+            if doubled is not None:
+                swap(doubled)
+            continue
         known = (tail == name) & np.isfinite(landings) & np.isfinite(day)
         rows = {s: np.flatnonzero(known & (side == s)) for s in ("LH", "RH")}
         if min(len(r) for r in rows.values()) < 4:
@@ -363,10 +382,46 @@ def _swapped_sides(table: DiagnosisTable) -> tuple[list[DataFault], DiagnosisTab
         ]
         # Two lines that fit this badly are no evidence; one row off its line and on the other one is.
         if len(off) == 1:
-            row, own, other = off[0]
-            corrected[row] = other
-            found.append(DataFault(row, int(table.row[row]), table.record_id[row], "side", "swapped_side", own, other))
+            swap(off[0][0])
     return found, replace(table, factors={**table.factors, "side": corrected}) if found else table
+
+
+def _pairs(table: DiagnosisTable, rows: NDArray[np.intp]) -> tuple[int, int | None]:
+    """Days on which a tail was inspected on both sides, and the row that was most likely written to the wrong side."""
+    side, day = table.factors["side"], table.quantities["day"]
+    days = [float(d) for d in np.unique(day[rows][np.isfinite(day[rows])])]
+    pairs = 0
+    suspects: list[NDArray[np.intp]] = []
+    for d in days:
+        same = rows[day[rows] == d]
+        if len(same) == 2:
+            if side[same[0]] != side[same[1]]:
+                pairs += 1
+            elif side[same[0]] in {"LH", "RH"}:
+                suspects.append(same)
+    if len(suspects) != 1:
+        return pairs, None
+    first, second = (_nearness_to_other_side(table, rows, int(row)) for row in suspects[0])
+    return pairs, int(suspects[0][0] if first > second else suspects[0][1])
+
+
+def _nearness_to_other_side(table: DiagnosisTable, rows: NDArray[np.intp], row: int) -> float:
+    """How much nearer a row is to the other side's landings and wear than to its own side's. [1]"""
+    side, day = table.factors["side"], table.quantities["day"]
+    landings = table.quantities["gear_landings"]
+    rest = rows[rows != row]
+    total = 0.0
+    for sign, wanted in ((1.0, True), (-1.0, False)):
+        group = rest[(side[rest] == side[row]) == wanted]
+        timed = group[np.isfinite(landings[group]) & np.isfinite(day[group])]
+        if len(timed) >= 2 and np.isfinite(landings[row]):
+            at, scatter = _line(day[timed], landings[timed], float(day[row]))
+            total += sign * min(abs(float(landings[row]) - at) / (3.0 * scatter + 20.0), 50.0)
+        known = np.isfinite(table.clearance_in[row]) & np.isfinite(table.clearance_in[group]).any(axis=0)
+        if len(group) and known.any():
+            usual = np.nanmedian(table.clearance_in[group][:, known], axis=0)
+            total += sign * _surprise(table.clearance_in[row][known].tolist(), usual.tolist())
+    return total
 
 
 def _on_the_other_line(day: Array, landings: Array, row: int, own: NDArray[np.intp], other: NDArray[np.intp]) -> bool:

@@ -98,6 +98,8 @@ class Inference:
         Further standard deviation of a row. [in]
     trends : ndarray, shape (n, k)
         Small trends that are always there. [1]
+    drawn_in : ndarray, shape (n,)
+        By how much drawing the readings to their expectation changed the prediction. [in]
     candidates : sequence of Candidate
         The catalogue's candidates.
     columns : ndarray, shape (n, n_candidates)
@@ -120,6 +122,7 @@ class Inference:
         gears: NDArray[np.str_],
         extra_in: Array,
         trends: Array,
+        drawn_in: Array,
         candidates: Sequence[Candidate],
         columns: Array,
         bank: Bank,
@@ -133,6 +136,7 @@ class Inference:
         self.gears = gears
         self.extra = extra_in
         self.trends = trends
+        self.drawn = drawn_in
         self.candidates = candidates
         self.columns = columns
         self.bank = bank
@@ -151,7 +155,7 @@ class Inference:
         Finding
             Verdict, names, rivals and remainder.
         """
-        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends)
+        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends, self.drawn)
         screen = Screen(noise, self.columns, self.signs)
         gain = screen.run(self.misfit[:, None]).gain[:, 0]
         score = gain - self.penalty
@@ -185,7 +189,9 @@ class Inference:
         constant = self._constant(lead)
         if constant is not None:
             p, variables = constant
-            noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends)
+            noise, _ = build_noise(
+                self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends, self.drawn
+            )
             return Finding("UNLISTED", (), (), (p_alarm,), variables, p, noise, None, smallest, ())
         finding = self._with([lead], [p_alarm], self._second([lead], SECOND_SHARE), smallest)
         if finding.verdict == "UNLISTED":
@@ -230,7 +236,7 @@ class Inference:
 
         What moves besides is looked for with the shift taken out.
         """
-        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends)
+        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends, self.drawn)
         everywhere = np.ones((len(self.misfit), 1))
         both = Screen(noise, np.hstack([everywhere, self.columns[:, [lead]]]), np.array([0, self.signs[lead]]))
         gain = both.run(self.misfit[:, None]).gain[:, 0]
@@ -244,11 +250,18 @@ class Inference:
         return min(p, ALARM), variables
 
     def _refit(self, chosen: Sequence[int]) -> tuple[NoiseModel, Fit]:
-        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends)
+        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends, self.drawn)
         columns = self.columns[:, list(chosen)]
         fitted = fit(noise, columns, self.misfit)
         noise, _ = build_noise(
-            self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends, columns @ fitted.values
+            self.misfit,
+            self.predicted,
+            self.tails,
+            self.gears,
+            self.extra,
+            self.trends,
+            self.drawn,
+            columns @ fitted.values,
         )
         return noise, fit(noise, columns, self.misfit)
 

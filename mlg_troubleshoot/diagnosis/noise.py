@@ -22,6 +22,10 @@ EXPECTED_SLOPE = -0.006
 # Bias that the null model allows beyond that, one standard deviation: of the mean [in], and of the slope [1].
 BIAS_IN = 0.0002
 SLOPE = 0.006
+# Doubt about how well clearances were really read: share of the drawing that may be too much or too little. [1]
+DRAWN = 0.7
+# Scatter of a row is at least this share of the predictions' size: nothing is known better than that. [1]
+LEAST_SCATTER = 0.01
 # Scatter between the gears of one tail, in units of the scatter of a row: their levels of wear are known so well.
 GEAR_RATIO = 0.25
 # Trends over a quantity, and habits of a gauge or a technician, that are no cause yet, in the same units.
@@ -221,6 +225,7 @@ def build_noise(
     gears: NDArray[np.str_],
     extra_in: Array,
     trends: Array,
+    drawn_in: Array,
     explained: Array | None = None,
 ) -> tuple[NoiseModel, float]:
     """Estimate the noise model from the misfit.
@@ -239,6 +244,8 @@ def build_noise(
         Further standard deviation of a row, by filled clearances. [in]
     trends : ndarray, shape (n, k)
         Small trends that are always there, in units of the scatter of a row. [1]
+    drawn_in : ndarray, shape (n,)
+        By how much drawing the readings to their expectation changed the prediction. [in]
     explained : ndarray, shape (n,), optional
         What a tentative cause explains; removed before the scatter is estimated. [in]
 
@@ -256,14 +263,15 @@ def build_noise(
         rows = numbers == tail
         if rows.sum() > 2:
             centred[rows] -= np.median(rest[rows])
-    scale = max(robust_scale(centred), 1e-6)
+    least = max(LEAST_SCATTER * float(np.sqrt(np.mean(predicted**2))), 1e-9)
+    scale = max(robust_scale(centred), least)
     relative = _growth(centred, predicted)
-    scale = max(robust_scale(centred / relative), 1e-6)
+    scale = max(robust_scale(centred / relative), least)
     relative = np.sqrt(relative**2 + (extra_in / scale) ** 2)
     # Rows far out in the tails of the distribution count less, but never as nothing.
     standard = np.minimum(np.abs(centred), _companion(rest, numbers)) / (scale * relative)
     relative = relative * np.maximum(1.0, standard / 3.0)
-    bias = np.column_stack([np.full(len(misfit), BIAS_IN), SLOPE * predicted]) / scale
+    bias = np.column_stack([np.full(len(misfit), BIAS_IN), SLOPE * predicted, DRAWN * drawn_in]) / scale
     loadings = np.hstack([bias, trends])
     return NoiseModel(relative, numbers, tail_numbers(gears), loadings), scale
 

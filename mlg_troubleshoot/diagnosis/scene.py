@@ -17,6 +17,7 @@ from mlg_troubleshoot.gear.model import LinkageModel, links_from
 Array = NDArray[np.float64]
 
 _MOST_SIGMAS = 2.0
+_READ_BETTER = 0.85
 # Wear of a gear at any time is at least this share of its mean: an overhaul resets the landings, not every joint.
 _LEAST_SHAPE = 0.3
 
@@ -47,7 +48,7 @@ def likely_clearances(table: DiagnosisTable) -> tuple[Array, Array]:
     gears = np.unique(table.gears, return_inverse=True)[1]
     for j in range(readings.shape[1]):
         known = np.isfinite(readings[:, j])
-        if not known.any():
+        if not np.any(readings[known, j] > 0.0):
             continue
         expected, own = _expected(readings[:, j], known, gears, table.quantities.get("gear_landings"))
         noise = table.gauge_u_in**2 + _resolution(readings[known, j]) ** 2 / 12.0
@@ -139,6 +140,11 @@ def build_scene(model: LinkageModel, table: DiagnosisTable, where: Discrepancies
     """
     clearance, u_clearance = likely_clearances(table)
     worst = adjusted_worst_case(model, Adjustment(clearance))
+    as_read = np.where(np.isfinite(table.clearance_in), table.clearance_in, clearance)
+    plain = adjusted_worst_case(model, Adjustment(as_read))
+    if _spread(table.measured_in - plain.over_in) < _READ_BETTER * _spread(table.measured_in - worst.over_in):
+        # The readings as they are fit clearly better: they were read better than declared.
+        clearance, worst = as_read, plain
     contribution = np.empty_like(clearance)
     slopes = np.zeros_like(clearance)
     for j in range(clearance.shape[1]):
@@ -151,6 +157,12 @@ def build_scene(model: LinkageModel, table: DiagnosisTable, where: Discrepancies
             slopes[:, j] = (model.displacement(links_from(moved, worst.over_directions)) - worst.over_in) / 1e-5
     scene = Scene(model, table, clearance, model.joint_numbers, where, worst.over_in, contribution)
     return scene, worst, np.sqrt(np.sum((slopes * u_clearance) ** 2, axis=1))
+
+
+def _spread(misfit: Array) -> float:
+    """Scatter of a misfit about its median, robust; infinite where nothing can be compared. [in]"""
+    known = misfit[np.isfinite(misfit)]
+    return float(np.median(np.abs(known - np.median(known)))) if len(known) else np.inf
 
 
 def effect(scene: Scene, worst: WorstCase, adjustment: Adjustment) -> Array:

@@ -283,13 +283,13 @@ def inspection_context(assessment: Assessment, gear: Gear, provenance: ReportPro
         "measured": _measured(a),
         "key_figures": _key_figures(a),
         "gauge": drawn.margin_gauge(a),
-        "schematic": _schematic(gear, a),
+        "schematic": _schematic(gear, a, extended=bool(provenance.extension)),
         "convention": inspection.convention.value.replace("_", " ").lower(),
         "joints": _joints(gear, a),
         "unmeasured": _unmeasured(a),
         "bars_note": _bars_note(a),
         "curve": drawn.plunger_curve(gear, a),
-        "curve_note": "Drawn without the extension that the prediction includes." if provenance.extension else "",
+        "curve_note": _WITHOUT_EXTENSION if provenance.extension else "",
         "symptom": _symptom(gear, a),
         "repairs": _repairs(a),
         "rigging": rigging_sentence(a.rigging) if a.rigging else "",
@@ -502,7 +502,10 @@ def _measured(a: Assessment) -> MeasuredContext | None:
     }
 
 
-def _schematic(gear: Gear, a: Assessment) -> SchematicContext:
+_WITHOUT_EXTENSION = "Drawn without the extension that the prediction includes."
+
+
+def _schematic(gear: Gear, a: Assessment, *, extended: bool) -> SchematicContext:
     figure = schematic(gear, a)
     total = sum(width for _, _, width in figure.panels)
     note = ""
@@ -512,6 +515,8 @@ def _schematic(gear: Gear, a: Assessment) -> SchematicContext:
             f"→ clearance as a virtual link, drawn {figure.exaggeration} times its size, "
             f"in the worst direction for {sense}."
         )
+    if extended:
+        note = f"{note} {_WITHOUT_EXTENSION}".lstrip()
     return {
         "panels": [{"svg": svg, "share": f"{width / total:.4f}"} for _, svg, width in figure.panels],
         "legend": [

@@ -163,8 +163,8 @@ def main() -> int:
         own, calamine = json.loads(done.stdout)
         missed += own > 3.0 * calamine
         print(
-            f"reading {options.rows:,} rows x {len(HEADER)} columns of xlsx: {own:.2f} s, python-calamine {calamine:.2f} s, "
-            f"ratio {own / calamine:.2f} (at most 3)",
+            f"reading {options.rows:,} rows x {len(HEADER)} columns of xlsx: {own:.2f} s, "
+            f"python-calamine {calamine:.2f} s, ratio {own / calamine:.2f} (at most 3)",
             flush=True,
         )
         verdicts, reports = str(Path(folder) / "out.csv"), str(Path(folder) / "reports")

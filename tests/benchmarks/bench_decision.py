@@ -26,7 +26,7 @@ from mlg_troubleshoot.decision.assessment import RepairSet, Verdict
 from mlg_troubleshoot.decision.belief import draw_shares, quick_probability
 from mlg_troubleshoot.decision.explain import explain
 from mlg_troubleshoot.decision.inspection import Inspection, Side
-from mlg_troubleshoot.decision.measuring import access_of_one_more, worth_of_readings
+from mlg_troubleshoot.decision.measuring import access_of_one_more, enough, worth_of_readings
 from mlg_troubleshoot.decision.prediction import predict
 from mlg_troubleshoot.decision.repair import repair_sets
 from mlg_troubleshoot.decision.response import responses
@@ -218,8 +218,7 @@ def measure(gear: Gear, read: Array, order: Order, stop: str) -> Tally:
         for row, found in zip(going, now, strict=True):
             verdicts[row] = found
             if stop == "expected" and found is Verdict.INCOMPLETE:
-                p = _expected(gear, read[row], measured[row])
-                verdicts[row] = Verdict.WITHIN_MARGIN if p >= 0.95 else Verdict.OUTSIDE_MARGIN if p <= 0.05 else found
+                verdicts[row] = enough(_expected(gear, read[row], measured[row])) or found
         if stop != "never":
             going = np.array([row for row in going if verdicts[row] is Verdict.INCOMPLETE], int)
         if not len(going):
@@ -246,8 +245,8 @@ def measuring(n: int) -> None:
         "paper's order, all ten": (fixed_order, "never"),
         "paper's order, product's rule to stop": (fixed_order, "verdict"),
         "product, until the verdict is certain": (by_worth, "verdict"),
-        "paper's order, stop at 95 % expected": (fixed_order, "expected"),
-        "product's advice: stop at 95 % expected": (by_worth, "expected"),
+        "paper's order, stop where expected": (fixed_order, "expected"),
+        "product's advice: stop where expected": (by_worth, "expected"),
     }
     found = {}
     for name, (order, stop) in cases.items():
@@ -256,9 +255,9 @@ def measuring(n: int) -> None:
     for name, other in (
         ("product, until the verdict is certain", "paper's order, all ten"),
         ("product, until the verdict is certain", "paper's order, product's rule to stop"),
-        ("product's advice: stop at 95 % expected", "paper's order, all ten"),
-        ("product's advice: stop at 95 % expected", "paper's order, product's rule to stop"),
-        ("product's advice: stop at 95 % expected", "paper's order, stop at 95 % expected"),
+        ("product's advice: stop where expected", "paper's order, all ten"),
+        ("product's advice: stop where expected", "paper's order, product's rule to stop"),
+        ("product's advice: stop where expected", "paper's order, stop where expected"),
     ):
         share = float(found[name].readings.mean() / found[other].readings.mean())
         minutes = float(found[name].minutes.mean() / found[other].minutes.mean())

@@ -67,6 +67,10 @@ def test_an_output_that_cannot_be_written_exits_5(option: str, occupied: Path) -
     assert "What to do:" in found.err
 
 
+def test_a_file_where_the_folder_of_the_reports_should_be_is_called_one(occupied: Path) -> None:
+    assert "is a file, not a folder" in mlg("check", FAILURE, "--report", occupied).err
+
+
 def test_a_template_that_cannot_be_written_exits_5(occupied: Path) -> None:
     assert mlg("template", occupied / "new.xlsx").code == 5
 

@@ -17,7 +17,7 @@ from tests.decision.conftest import Judge, every_joint, inspected
 
 def explained(gear: Gear, clearance_in: dict[int, float], reading_in: float, **more: object) -> Posterior:
     found = explain(
-        gear, inspected(clearance_in, readings_in=(reading_in,)), np.random.default_rng(2), draws=8192, **more
+        gear, inspected(clearance_in, readings_in=(reading_in,)), np.random.default_rng(2), draws=4096, **more
     )
     assert found is not None
     return found
@@ -89,7 +89,7 @@ def test_what_is_assumed_beforehand_matters_and_can_be_changed(gear: Gear) -> No
 
 def test_importance_sampling_agrees_with_drawing_from_the_prior(gear: Gear) -> None:
     # An independent linkage and plain rejection: gears whose plunger stands near the reading.
-    fleet = worn_gears.explained_fleet(60_000, np.random.default_rng(3))
+    fleet = worn_gears.explained_fleet(40_000, np.random.default_rng(3))
     near = np.abs(fleet.plunger_in - 0.02) < 0.001
     worn = fleet.true_in[near] > worn_gears.LIMIT_IN
     found = explain(gear, inspected({}, readings_in=(0.02,)), np.random.default_rng(2))
@@ -102,9 +102,9 @@ def test_importance_sampling_agrees_with_drawing_from_the_prior(gear: Gear) -> N
 
 def test_ninety_percent_intervals_cover_the_clearances_of_a_simulated_fleet(gear: Gear) -> None:
     rng = np.random.default_rng(11)
-    fleet = worn_gears.explained_fleet(150, rng)
+    fleet = worn_gears.explained_fleet(120, rng)
     inside = []
-    for row in range(150):
+    for row in range(120):
         read = {j: float(fleet.read_in[row, j - 1]) for j in range(1, 11) if rng.random() < 0.5}
         found = explain(
             gear, inspected(read, readings_in=(float(fleet.plunger_in[row]),)), np.random.default_rng(row), draws=2048

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from tests.decision.conftest import Judge, every_joint
 from mlg_troubleshoot.decision.assess import AssessOptions, assess
 from mlg_troubleshoot.decision.inspection import InvalidRow, Side
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.json_form import check_as_json
 from mlg_troubleshoot.studies.table import IndexTable
+from tests.decision.conftest import Judge, every_joint
 
 INSPECTION = {
     *("record_id", "tail_no", "side", "verdict", "predicted_displacement_in", "over_travel_in", "under_travel_in"),

@@ -12,6 +12,7 @@ from mlg_troubleshoot.decision.measuring import (
     access_of_one_more,
     advise,
     decision_risk,
+    enough,
     worth_of_readings,
 )
 from mlg_troubleshoot.decision.prediction import predict
@@ -73,7 +74,7 @@ def test_the_risk_is_greatest_at_the_conformance_probability() -> None:
 
 def test_drawn_wear_stays_between_nothing_and_the_limit() -> None:
     drawn = draw_shares(np.array([0.2]), 9, 1000)
-    assert 0.0 <= drawn.min()
+    assert drawn.min() >= 0.0
     assert drawn.max() <= 1.0
 
 
@@ -151,8 +152,8 @@ def test_where_one_may_stop_no_reading_up_to_the_limit_changes_the_verdict(gear:
         assert judge(start | rest).verdict is Verdict.OUTSIDE_MARGIN
 
 
-def test_with_all_but_light_joints_measured_one_may_stop_within(gear: Gear) -> None:
-    found = advised(gear, every_joint(0.0005) | {}, MARGIN_IN)
+def test_with_every_joint_measured_one_may_stop(gear: Gear) -> None:
+    found = advised(gear, every_joint(0.0005))
     assert (found.stop, found.verdict, found.joint) == (True, Verdict.WITHIN_MARGIN, None)
 
 
@@ -163,17 +164,32 @@ def test_the_gear_is_expected_within_before_it_is_certain(gear: Gear) -> None:
     assert "To be certain, measure" in found.text
 
 
+def test_one_may_stop_within_although_light_joints_are_unmeasured(gear: Gear) -> None:
+    found = advised(gear, dict.fromkeys(range(1, 9), 0.0))
+    assert (found.stop, found.verdict, found.joint) == (True, Verdict.WITHIN_MARGIN, 9)
+
+
+def test_an_expectation_is_enough_where_being_wrong_costs_as_little_either_way() -> None:
+    assert enough(0.05) is Verdict.OUTSIDE_MARGIN
+    assert enough(0.051) is None
+    assert enough(0.997) is None
+    assert enough(0.9975) is Verdict.WITHIN_MARGIN
+
+
 def test_an_expectation_never_becomes_a_verdict(judge: Judge) -> None:
     assert judge(dict.fromkeys((2, 3, 4, 5), 0.0002)).verdict is Verdict.INCOMPLETE
 
 
 def test_an_inconclusive_gear_that_precision_cannot_settle_is_told_so(gear: Gear) -> None:
-    found = advised(gear, every_joint(0.0023))
-    assert found.verdict is Verdict.INCONCLUSIVE
-    precise = predict(
-        gear, [inspected({})], np.full((1, 10), 0.0023), np.zeros((1, 10), bool), np.zeros(1)
-    ).probability_within(np.array([MARGIN_IN]), np.zeros(1))
-    assert 0.05 < precise[0] < 0.95
+    found = advise(gear, inspected(every_joint(0.0021), gauge_u_in=0.0001), MARGIN_IN)
+    assert (found.stop, found.verdict) == (True, Verdict.INCONCLUSIVE)
+    assert "do not settle it" in found.text
+
+
+def test_an_inconclusive_gear_that_precision_may_settle_is_told_so(gear: Gear) -> None:
+    found = advised(gear, every_joint(0.0019))
+    assert (found.stop, found.verdict) == (False, Verdict.INCONCLUSIVE)
+    assert "may still settle it" in found.text
 
 
 def test_the_next_action_is_the_joint_that_is_worth_most(judge: Judge, gear: Gear) -> None:

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.decision.conftest import Judge, every_joint, inspected
 from mlg_troubleshoot.decision.assess import AssessOptions, allowance
 from mlg_troubleshoot.decision.assessment import Action, Verdict
 from mlg_troubleshoot.decision.inspection import Outcome
@@ -16,6 +15,7 @@ from mlg_troubleshoot.decision.prediction import predict
 from mlg_troubleshoot.decision.repair import access_minutes, repair_sets
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
+from tests.decision.conftest import Judge, every_joint, inspected
 
 FAILURE = {3: 0.013, 5: 0.007}
 # The failure with the other joints in good condition.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from tests.decision.conftest import Judge, every_joint
 from mlg_troubleshoot.decision.ranking import ensemble_amplification, rank_joints
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.studies.table import IndexTable
+from tests.decision.conftest import Judge, every_joint
 
 
 def order(judge: Judge, clearance: dict[int, float]) -> list[int]:

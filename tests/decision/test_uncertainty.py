@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from tests.decision.conftest import Judge, every_joint, inspected
 from mlg_troubleshoot.decision.assess import AssessOptions
 from mlg_troubleshoot.decision.assessment import UncertaintyBudget
 from mlg_troubleshoot.decision.inspection import Inspection
@@ -15,6 +14,7 @@ from mlg_troubleshoot.decision.prediction import predict
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
+from tests.decision.conftest import Judge, every_joint, inspected
 
 WORN = every_joint(0.002, j3=0.005, j8=0.0)
 

@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import norm, qmc
 
-from tests.decision.conftest import Judge, every_joint, inspected
 from mlg_troubleshoot.decision.assess import assess
 from mlg_troubleshoot.decision.assessment import Assessment, Rejected, Verdict
 from mlg_troubleshoot.decision.inspection import InvalidRow, Outcome, Side
@@ -21,6 +20,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.json_form import check_as_json
 from mlg_troubleshoot.studies.table import IndexTable
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from tests.decision.conftest import Judge, every_joint, inspected
 
 FAILURE = {3: 0.013, 5: 0.007}
 probability = st.floats(0, 1)

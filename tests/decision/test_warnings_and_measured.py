@@ -6,12 +6,12 @@ import math
 
 import pytest
 
-from tests.decision.conftest import Judge, every_joint, inspected
 from mlg_troubleshoot.decision.assessment import Action, Verdict
 from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.decision.measured import disagreement, reading_uncertainty
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.json_form import check_as_json
+from tests.decision.conftest import Judge, every_joint, inspected
 
 NOT_EXPLAINED = "Joint clearances do not explain this failure: check hydraulics, reversing valve, doors."
 

@@ -7,6 +7,7 @@ import io
 import json
 import os
 import random
+import re
 import sys
 import zipfile
 from collections import Counter
@@ -466,7 +467,7 @@ def in_a_terminal(*arguments, columns=80):
     )
     shown = child.read()
     child.close()
-    return shown
+    return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown)
 
 
 @needs_posix
