@@ -44,6 +44,7 @@ MARKS = {
 }
 _LINES_OF_A_BATCH = 60
 _JOINT_COLUMNS = 19
+_LIMIT = "limit\nin"
 _WIDE = 100
 _LINES_OF_PROBLEMS = 40
 _PROBLEM_COLUMN = 22
@@ -252,23 +253,20 @@ def _table(console: Console) -> Table:
 def _joint_table(a: Assessment, console: Console) -> Table:
     table = _table(console)
     # Two-line headings: with them every column, and first of all the joint, has its place in 80 columns.
-    for heading in (
-        "rank",
-        "joint",
-        "clearance\nin",
-        "limit\nin",
-        "contri-\nbutes in",
-        "S\nfirst",
-        "S\ntotal",
-        "ampli-\nfication",
-        "rank\nrange",
-    ):
+    headings = (
+        *("rank", "joint", "clearance\nin", _LIMIT, "contri-\nbutes in", "S\nfirst", "S\ntotal"),
+        *("ampli-\nfication", "rank\nrange"),
+    )
+    # A narrow terminal leaves the limit to the warning of the joint that is over it, for the sake of the names.
+    shown = [heading for heading in headings if heading != _LIMIT or console.width >= _WIDE]
+    for heading in shown:
         name = heading == "joint"
         table.add_column(
             heading, justify="left" if name else "right", no_wrap=not name, min_width=_JOINT_COLUMNS if name else None
         )
     for f in a.ranked:
-        table.add_row(*_joint_cells(f), style="bold" if f.over_limit else "")
+        cells = dict(zip(headings, _joint_cells(f), strict=True))
+        table.add_row(*(cells[heading] for heading in shown), style="bold" if f.over_limit else "")
     return table
 
 

@@ -49,12 +49,30 @@ class NoiseModel:
         Number of the single gear of each row.
     loadings : ndarray, shape (n, k)
         Bias, slope and small trends, each at one standard deviation in units of the common one. [1]
+    floor_in : float
+        Scatter that every row has at least. [in]
     """
 
     relative: Array
     tails: NDArray[np.int64]
     gears: NDArray[np.int64]
     loadings: Array
+    floor_in: float
+
+    def floored(self, square: Array) -> Array:
+        """Add what no row can be better than to a residual sum of squares.
+
+        Parameters
+        ----------
+        square : ndarray
+            Residual sums of squares. [in²]
+
+        Returns
+        -------
+        ndarray
+            With the least scatter of every row. [in²]
+        """
+        return np.maximum(square, 0.0) + len(self.relative) * self.floor_in**2
 
     def take(self, rows: NDArray[np.bool_]) -> NoiseModel:
         """Return the noise of some of the rows.
@@ -69,7 +87,7 @@ class NoiseModel:
         NoiseModel
             Their noise.
         """
-        return NoiseModel(self.relative[rows], self.tails[rows], self.gears[rows], self.loadings[rows])
+        return NoiseModel(self.relative[rows], self.tails[rows], self.gears[rows], self.loadings[rows], self.floor_in)
 
     def factors(self, tail_ratio: float) -> Array:
         """Low-rank part of the covariance, shape (n, k). [1]"""
@@ -273,7 +291,7 @@ def build_noise(
     relative = relative * np.maximum(1.0, standard / 3.0)
     bias = np.column_stack([np.full(len(misfit), BIAS_IN), SLOPE * predicted, DRAWN * drawn_in]) / scale
     loadings = np.hstack([bias, trends])
-    return NoiseModel(relative, numbers, tail_numbers(gears), loadings), scale
+    return NoiseModel(relative, numbers, tail_numbers(gears), loadings, 0.5 * least), scale
 
 
 def _companion(values: Array, tails: NDArray[np.int64]) -> Array:

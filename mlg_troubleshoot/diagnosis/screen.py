@@ -69,7 +69,7 @@ class Screen:
             inner = np.linalg.pinv(self.fixed.T @ held)
             along = held.T @ data
             rest = rest - np.einsum("ij,ij->j", along, inner @ along)
-        return rest, weighted.T @ data
+        return self.noise.floored(rest), weighted.T @ data
 
     def run(self, data: Array) -> Gain:
         """Compute the gains for one or many data sets.
@@ -205,8 +205,7 @@ def fit(noise: NoiseModel, columns: Array, data: Array) -> Fit:
         inner = columns.T @ product[:, :k]
         inverse = np.linalg.pinv(inner)
         values = inverse @ (columns.T @ product[:, k])
-        rest = float(data @ product[:, k] - values @ inner @ values)
-        rest = max(rest, 1e-12 * float(data @ product[:, k]))
+        rest = float(noise.floored(data @ product[:, k] - values @ inner @ values))
         likelihood = -0.5 * n * np.log(rest / n) - 0.5 * log_determinant
         if best is None or likelihood > best.log_likelihood:
             scale = np.sqrt(rest / max(n - k, 1))

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mlg_troubleshoot.gear.model import LinkageModel, links_from
+from mlg_troubleshoot.gear.model import LinkageModel
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gear.independent_solver import LoopClosure, read_linkages
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
+from tests.gear.independent_solver import LoopClosure, read_linkages
 
 SAMPLES_A, SAMPLES_OTHERS = 200, 20
 

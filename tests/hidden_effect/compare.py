@@ -95,9 +95,7 @@ def run(seed: int) -> dict[str, Any]:
     """Compare all methods on one fleet."""
     warnings.simplefilter("ignore")
     causes = list(simulator.CATALOGUE)
-    fleet = simulator.draw_fleet(
-        seed, kind="single", cause=causes[seed % len(causes)], strength=STRENGTH, faults=False
-    )
+    fleet = simulator.draw_fleet(seed, kind="single", cause=causes[seed % len(causes)], strength=STRENGTH, faults=False)
     table = as_table(fleet.table)
     usable = np.isfinite(table.measured_in)
     table, truth = table.take(usable), fleet.label.truth_term[usable]
@@ -109,6 +107,7 @@ def run(seed: int) -> dict[str, Any]:
     low = scene.over_in <= np.quantile(scene.over_in, 0.6)
     left: dict[str, dict[str, float]] = defaultdict(dict)
     for name, train, test in (("in range", ~held, held), ("extrapolating", low, ~low)):
+
         def rms(correction: np.ndarray, rows: np.ndarray = test) -> float:
             return float(np.sqrt(np.mean((truth[rows] - correction) ** 2)))
 
@@ -171,7 +170,9 @@ def main() -> None:
         values = [r["own_formula"][key] for r in records if key in r["own_formula"]]
         summary[key] = {"n": len(values), "median": float(np.median(values)) if values else None}
     for method, left in summary["left_thou"].items():
-        print(f"{method:32s} {left['in range']:6.2f} {left['extrapolating']:6.2f}   thou left, median of {len(records)} fleets")
+        print(
+            f"{method:32s} {left['in range']:6.2f} {left['extrapolating']:6.2f}   thou left, median of {len(records)} fleets"
+        )
     print("effect left, independent data:", summary["independent_left"], " own formula:", summary["own_left"])
     if arguments.write:
         RESULT.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")

@@ -238,9 +238,7 @@ def summarise(records: list[Record]) -> dict[str, Any]:
     }
 
 
-def study(
-    plan: dict[str, int], workers: int, first_seed: int = FIRST_SEED, kept: Path | None = None
-) -> dict[str, Any]:
+def study(plan: dict[str, int], workers: int, first_seed: int = FIRST_SEED, kept: Path | None = None) -> dict[str, Any]:
     """Run a plan on several processes and summarise it.
 
     The groups are mixed, so that a part of the plan is as good a sample as the whole. With a file to keep the

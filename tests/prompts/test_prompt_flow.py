@@ -16,7 +16,7 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.geometry.mechanism import Lever, Output, Step
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
-from prompts.scripted import (
+from tests.prompts.scripted import (
     NOON,
     PLAY_INCHES,
     PLAY_MM,

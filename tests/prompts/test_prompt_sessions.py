@@ -24,7 +24,7 @@ from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import LengthUnit
-from prompts.scripted import NOON, NOTHING, PLAY_INCHES, RADIAL_INCHES, ScriptedTerminal, inspect, play
+from tests.prompts.scripted import NOON, NOTHING, PLAY_INCHES, RADIAL_INCHES, ScriptedTerminal, inspect, play
 
 TEN = [".004"] * 10
 HEADING = ["N123AB", "l", "i", "r"]
