@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
+from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension
     from mlg_troubleshoot.records import ReadOptions, ReadResult
     from mlg_troubleshoot.reporting import ReportProvenance, WrittenReport
+    from mlg_troubleshoot.studies.findings import StudyFindings
     from mlg_troubleshoot.studies.verification import VerifiedNumber
 
 ALL_JUDGED, NOT_ALL_WITHIN, NOTHING_JUDGED = 0, 1, 3
@@ -841,6 +843,48 @@ def write_diagnosis_report(result: DiagnoseResult, options: DiagnoseOptions, dir
         notes=result.notes,
     )
     return [path for path in (written.html, written.pdf) if path is not None]
+
+
+def write_study_report(findings: StudyFindings, directory: Path, page: str) -> WrittenReport:
+    """Write the report of a study as HTML and, where the engine can, as PDF.
+
+    Parameters
+    ----------
+    findings : StudyFindings
+        The study.
+    directory : Path
+        Folder to write to; it is made if it does not exist.
+    page : str
+        ``A4`` or ``Letter``.
+
+    Returns
+    -------
+    WrittenReport
+        The files, and what to know about them.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written to.
+    """
+    from mlg_troubleshoot.reporting import ReportProvenance
+    from mlg_troubleshoot.reporting.study_report import write_study_report as write
+    from mlg_troubleshoot.studies.targets import targets_file
+
+    targets = targets_file(findings.gear)
+    hashes = {targets.name: sha256(targets.read_bytes()).hexdigest()} if findings.statements else {}
+    return write(
+        findings,
+        directory,
+        provenance=ReportProvenance(
+            program_version=version("mlg-troubleshoot"),
+            input_sha256=hashes,
+            geometry_sha256=findings.gear.geometry_sha256,
+            created=datetime.now(UTC).astimezone(),
+            seed=findings.options.seed,
+        ),
+        page=page,
+    )
 
 
 def load_model_extension(files: Sequence[Path], gear: str, cause_files: Sequence[Path] = ()) -> ModelExtension | None:

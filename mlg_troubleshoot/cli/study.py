@@ -72,6 +72,11 @@ def study(
     write_table: Annotated[
         bool, typer.Option("--write-table", help="Write the table that mlg check uses, beside the gear file.")
     ] = False,
+    report: Annotated[
+        Path | None,
+        typer.Option("--report", metavar="DIR", help="Write a printable report with figures, statements and bound."),
+    ] = None,
+    page: Annotated[str, typer.Option("--page", metavar="A4|Letter", help="Paper of the report.")] = "A4",
     as_json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to stdout.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
 ) -> None:
@@ -103,5 +108,7 @@ def study(
                 as_json=as_json,
                 quiet=quiet,
                 csv=csv,
+                report=report,
+                page=page,
             )
         )

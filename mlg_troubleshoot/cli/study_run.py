@@ -6,7 +6,7 @@ import csv as csv_module
 import json
 import math
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
@@ -18,8 +18,9 @@ from mlg_troubleshoot.cli.progress import Advance, stages
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.studies.findings import StudyFindings
 from mlg_troubleshoot.studies.statements import Statement, check_statements
-from mlg_troubleshoot.studies.study import Design, Directions, StudyOptions, StudyResult, run_study
+from mlg_troubleshoot.studies.study import Design, Directions, StudyOptions, StudyResult, compare_designs, run_study
 from mlg_troubleshoot.studies.table import write_index_table
 from mlg_troubleshoot.studies.targets import targets_file
 from mlg_troubleshoot.studies.worst_search import WorstSearch, search_worst
@@ -59,6 +60,10 @@ class StudyArguments:
         gear's table, write JSON, be quiet.
     csv : Path or None
         Write a CSV here.
+    report : Path or None
+        Write a report to this folder.
+    page : str
+        Paper of the report.
     """
 
     gear: str
@@ -83,6 +88,8 @@ class StudyArguments:
     as_json: bool
     quiet: bool
     csv: Path | None
+    report: Path | None
+    page: str
 
 
 def run(arguments: StudyArguments) -> None:
@@ -94,6 +101,11 @@ def run(arguments: StudyArguments) -> None:
         What the command line asks for.
     """
     gear = load_gear(arguments.gear)
+    if arguments.report is not None:
+        from mlg_troubleshoot.reporting.publish import PAGES
+
+        if arguments.page not in PAGES:
+            raise UsageError(f"page {arguments.page!r} is not known", f"Give one of {', '.join(PAGES)}.")
     with ExitStack() as stack:
         options = _options(arguments, gear, stack)
         if arguments.write_table and not options.is_standard:
@@ -103,20 +115,17 @@ def run(arguments: StudyArguments) -> None:
             )
         advance = stack.enter_context(stages(quiet=arguments.quiet))
         result = run_study(gear, options, advance)
-        statements: tuple[Statement, ...] = ()
-        if arguments.statements and result.finished:
-            if not targets_file(gear).exists():
-                raise UsageError(
-                    f"{gear.name} has no printed statements", f"Write {targets_file(gear).name} beside it."
-                )
-            statements = check_statements(gear, progress=lambda done, total: advance("statements", done, total))
-        searches = _searches(gear, options, advance) if arguments.bound and result.finished else ()
+        findings = _findings(gear, options, result, arguments, advance)
+    statements = findings.statements if arguments.statements else ()
+    searches = findings.searches if arguments.bound else ()
     if arguments.as_json:
         typer.echo(json.dumps(as_json(gear, result, statements, searches, arguments), indent=1, allow_nan=False))
     else:
         _show(gear, result, statements, searches, arguments)
     if arguments.csv is not None:
         _write_csv(gear, result, arguments.csv)
+    if arguments.report is not None:
+        _write_report(findings, arguments.report, arguments.page)
     if arguments.write_table:
         if not result.finished:
             raise UsageError("the study was interrupted, its table is not complete", "Run it again to the end.")
@@ -125,6 +134,38 @@ def run(arguments: StudyArguments) -> None:
     if not result.finished:
         typer.echo("Interrupted: the numbers above are of what was done.", err=True)
         raise typer.Exit(INTERRUPTED)
+
+
+def _findings(
+    gear: Gear, options: StudyOptions, result: StudyResult, arguments: StudyArguments, advance: Advance
+) -> StudyFindings:
+    """Add to a finished study what was asked for beside it; a report shows all of it."""
+    findings = StudyFindings(gear, options, result)
+    if not result.finished:
+        return findings
+    has_statements = targets_file(gear).exists()
+    if arguments.statements and not has_statements:
+        raise UsageError(f"{gear.name} has no printed statements", f"Write {targets_file(gear).name} beside it.")
+    wants_report = arguments.report is not None
+    if wants_report:
+        findings = replace(findings, designs=compare_designs(gear, options, advance))
+    if arguments.statements or (wants_report and has_statements):
+        found = check_statements(gear, progress=lambda done, total: advance("statements", done, total))
+        findings = replace(findings, statements=found)
+    if arguments.bound or wants_report:
+        findings = replace(findings, searches=_searches(gear, options, advance))
+    return findings
+
+
+def _write_report(findings: StudyFindings, directory: Path, page: str) -> None:
+    from mlg_troubleshoot.workflows import write_study_report
+
+    written = write_study_report(findings, directory, page)
+    for note in written.notes:
+        typer.echo(f"Note: {note}", err=True)
+    for path in (written.html, written.pdf):
+        if path is not None:
+            typer.echo(f"Report: {path}", err=True)
 
 
 def _searches(gear: Gear, options: StudyOptions, advance: Advance) -> tuple[WorstSearch, ...]:

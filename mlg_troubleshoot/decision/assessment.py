@@ -179,12 +179,12 @@ class ReadingWorth:
         Parameters
         ----------
         by_risk : bool
-            True for the drop in risk, False for the variance. [1 or in², per min]
+            True for the drop in risk, False for the variance.
 
         Returns
         -------
         float
-            Worth.
+            Worth. [1/min or in²/min]
         """
         return (self.risk_drop if by_risk else self.variance_in2) / self.minutes
 
@@ -324,7 +324,7 @@ class Posterior:
     called_worn : tuple of tuple of int
         Groups that are more likely worn than not.
     effective_draws : float
-        Independent draws that the result is worth.
+        Independent draws that the result is worth. [1]
     text : str
         The finding as a sentence.
     """

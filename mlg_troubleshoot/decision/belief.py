@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.decision.response import Response
-from mlg_troubleshoot.gear.directions import random_directions
 
 Array = NDArray[np.float64]
 
@@ -42,35 +40,56 @@ def level_weights(measured_share: Array) -> Array:
     return chances
 
 
-def draw_shares(measured_share: Array, n_unmeasured: int, n: int) -> Array:
-    """Draw the wear of the unmeasured joints of one gear, evenly: the same draws at every call.
-
-    Parameters
-    ----------
-    measured_share : ndarray, shape (n_measured,)
-        Measured clearances as shares of their limits. [1]
-    n_unmeasured : int
-        Number of joints to draw.
-    n : int
-        Number of draws.
+def moments() -> tuple[Array, Array]:
+    """Mean and variance of a joint's wear at each level.
 
     Returns
     -------
-    ndarray, shape (n, n_unmeasured)
-        Clearances as shares of their limits, 0 to 1. [1]
+    mean : ndarray, shape (n_levels,)
+        Means as shares of the limit. [1]
+    variance : ndarray, shape (n_levels,)
+        Variances. [1]
     """
-    even = _even(n_unmeasured + 1, n)
-    steps = np.cumsum(level_weights(measured_share))
-    level = _LEVELS[np.minimum(np.searchsorted(steps, even[:, 0]), len(_LEVELS) - 1)][:, None]
-    shares: Array = -level * np.log1p(-even[:, 1:] * -np.expm1(-1.0 / level))
+    cut = np.exp(-1.0 / _LEVELS)
+    mean = _LEVELS - cut / (1.0 - cut)
+    square = (2.0 * _LEVELS**2 - cut * (1.0 + 2.0 * _LEVELS + 2.0 * _LEVELS**2)) / (1.0 - cut)
+    return mean, square - mean**2
+
+
+def quantiles(n: int) -> Array:
+    """Wear at evenly spaced chances, for each level.
+
+    Parameters
+    ----------
+    n : int
+        Number of quantiles.
+
+    Returns
+    -------
+    ndarray, shape (n_levels, n)
+        Shares of the limit, each as likely as the others of its level. [1]
+    """
+    chance = (np.arange(n) + 0.5) / n
+    level = _LEVELS[:, None]
+    shares: Array = -level * np.log1p(chance * np.expm1(-1.0 / level))
     return shares
 
 
-@lru_cache(maxsize=32)
-def _even(dimensions: int, n: int) -> Array:
-    points = random_directions(dimensions, n) / (2.0 * np.pi)
-    points.flags.writeable = False
-    return points
+def level_likelihood(share: Array) -> Array:
+    """Density of a joint's wear at each level.
+
+    Parameters
+    ----------
+    share : ndarray, shape (n,)
+        Shares of the limit. [1]
+
+    Returns
+    -------
+    ndarray, shape (n, n_levels)
+        Densities. [1]
+    """
+    density: Array = np.exp(-share[:, None] / _LEVELS) / (_LEVELS * -np.expm1(-1.0 / _LEVELS))
+    return density
 
 
 def normal_cdf(z: Array) -> Array:
@@ -90,39 +109,53 @@ def normal_cdf(z: Array) -> Array:
     return np.reshape(np.array(flat), np.shape(z))
 
 
-def quick_probability(
-    linkages: Sequence[Response],
-    clearance_in: Array,
-    measured: NDArray[np.bool_],
-    gauge_u_in: float,
-    margin: tuple[float, float],
-    residual_u_in: float | None,
-) -> Array:
-    """Probability that the worst case is within the margin, by the second-order expansion.
+def tabled_normal_cdf(z: Array) -> Array:
+    """Standard normal distribution from a table, for many values at once.
+
+    Parameters
+    ----------
+    z : ndarray
+        Standard scores. [1]
+
+    Returns
+    -------
+    ndarray
+        Probabilities, within 1e-6. [1]
+    """
+    return np.interp(z, _SCORES, _TABLE)
+
+
+_SCORES = np.linspace(-8.0, 8.0, 6401)
+_TABLE = normal_cdf(_SCORES)
+
+
+def uncertainty_parts(
+    linkages: Sequence[Response], clearance_in: Array, gauge_u_in: float, margin_u_in: float
+) -> tuple[Array, Array, Array]:
+    """Worst case by the second-order expansion, its slopes, and its uncertainty without that of the model.
 
     Parameters
     ----------
     linkages : sequence of Response
         Expansions of the ensemble, the reference first.
     clearance_in : ndarray, shape (n, n_joints)
-        Clearances. [in]
-    measured : ndarray of bool, shape (n_joints,)
-        Which of them carry the uncertainty of a reading.
+        Clearances, all of them read. [in]
     gauge_u_in : float
         Standard uncertainty of one reading. [in]
-    margin : tuple of float
-        Margin and its standard uncertainty. [in]
-    residual_u_in : float or None
-        Standard uncertainty of an extended model; None takes the provisional one. [in]
+    margin_u_in : float
+        Standard uncertainty of the margin. [in]
 
     Returns
     -------
-    ndarray, shape (n,)
-        Probabilities, with the uncertainties of the decision rule. [1]
+    worst : ndarray, shape (n,)
+        Worst displacement. [in]
+    slopes : ndarray, shape (n, n_joints)
+        Its slopes. [1]
+    u : ndarray, shape (n,)
+        Readings, geometry and margin together. [in]
     """
     members = np.array([linkage.magnitude(clearance_in) for linkage in linkages])
     u_geometry = members.std(axis=0, ddof=1) if len(members) > 1 else np.zeros(len(clearance_in))
-    u_readings = gauge_u_in * np.sqrt(np.sum((linkages[0].slopes(clearance_in) * measured) ** 2, axis=1))
-    u_model = np.maximum(0.003, 0.10 * members[0]) if residual_u_in is None else residual_u_in
-    u = np.sqrt(u_readings**2 + u_geometry**2 + u_model**2 + margin[1] ** 2)
-    return normal_cdf((margin[0] - members[0]) / u)
+    slopes = linkages[0].slopes(clearance_in)
+    u_readings = gauge_u_in * np.sqrt(np.sum(slopes**2, axis=1))
+    return members[0], slopes, np.sqrt(u_readings**2 + u_geometry**2 + margin_u_in**2)

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.decision.assessment import MeasuringAdvice, ReadingWorth, Verdict
-from mlg_troubleshoot.decision.belief import draw_shares, quick_probability
+from mlg_troubleshoot.decision.belief import (
+    level_likelihood,
+    level_weights,
+    moments,
+    quantiles,
+    tabled_normal_cdf,
+    uncertainty_parts,
+)
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.prediction import Extension, clearances, predict
-from mlg_troubleshoot.decision.response import responses
+from mlg_troubleshoot.decision.response import Response, responses
 from mlg_troubleshoot.decision.rule import CONFORMANCE, verdict, zone
 from mlg_troubleshoot.decision.wording import percent
 from mlg_troubleshoot.gear.gear import Gear
@@ -20,9 +28,9 @@ Array = NDArray[np.float64]
 
 # At a conformance probability of 95 % one wrong WITHIN weighs as much as this many wrong OUTSIDE.
 COST_OF_WRONG_WITHIN = CONFORMANCE / (1.0 - CONFORMANCE)
-# A drop in risk below this is noise of the draws: the reading has no value of its own.
-_NO_VALUE = 2e-3
-_DRAWS = 1024
+# A drop in risk below this is rounding: the reading has no value of its own.
+_NO_VALUE = 1e-6
+_QUANTILES = 12
 
 
 def decision_risk(probability: Array | float) -> Array:
@@ -93,10 +101,10 @@ def worth_of_readings(
 ) -> tuple[ReadingWorth, ...]:
     """Find what measuring each unmeasured joint is worth, best first, critical joints before all others.
 
-    The unmeasured joints are drawn from their distribution (`belief`). For each joint the probability of being
-    within the margin, once its clearance is known, is a smooth function of that clearance, fitted to the draws by a
-    cubic; what the risk falls by on average is the value of the reading. Where no single reading has a value, the
-    share of the variance of the worst case takes its place. Draws and expansion serve the ranking only.
+    The unmeasured joints are taken by their distribution (`belief`). For each joint the probability of being within
+    the margin, once its clearance is known, follows for a range of clearances; what the risk falls by on average is
+    the value of the reading. Where no single reading has a value, the share of the variance of the worst case takes
+    its place. Distribution and expansion serve the ranking only.
 
     Parameters
     ----------
@@ -146,7 +154,7 @@ def outlook(
     worth : tuple of ReadingWorth
         One for each unmeasured joint.
     within : float
-        Mean over the draws of the probability of being within the margin. [1]
+        Probability of being within the margin, over levels of wear. [1]
     """
     found = clearances([inspection], gear, np.full(len(gear.joints), np.nan))[0]
     missing = np.flatnonzero(~np.isfinite(found))
@@ -156,21 +164,9 @@ def outlook(
     linkages = responses(gear)
     if anchor is not None:
         linkages = (linkages[0].anchored(np.nan_to_num(found), *anchor), *linkages[1:])
-    limits = gear.limits_in
-    shares = draw_shares((found / limits)[np.isfinite(found)], len(missing), _DRAWS)
-    drawn = np.tile(np.nan_to_num(found), (_DRAWS, 1))
-    drawn[:, missing] = shares * limits[missing]
-    p = quick_probability(
-        linkages,
-        drawn,
-        np.ones(len(limits), bool),
-        inspection.gauge_u_in,
-        (margin_in, inspection.margin_u_in),
-        None if extension is None else extension.residual_u_in,
-    )
-    drops = np.array([_risk_drop(shares[:, k], p) for k in range(len(missing))])
-    variances = linkages[0].slopes(drawn.mean(axis=0))[missing] ** 2 * drawn[:, missing].var(axis=0)
-    drops, variances = _same_for_both_ends(gear, numbers, drops), _same_for_both_ends(gear, numbers, variances)
+    belief = _Belief.of(gear, inspection, margin_in, extension, linkages, found)
+    drops = np.array([belief.risk_drop(int(j)) for j in missing])
+    variances = np.array([belief.variance(int(j)) for j in missing])
     worth = [
         ReadingWorth(number, minutes[k], float(drops[k]), float(variances[k]), gear.joint(number).critical)
         for k, number in enumerate(numbers)
@@ -178,22 +174,74 @@ def outlook(
     first = [w for w in worth if w.critical] or worth
     valued = any(w.risk_drop > _NO_VALUE for w in first)
     ordered = tuple(sorted(worth, key=lambda w: (not w.critical, -w.per_minute(by_risk=valued))))
-    return ordered, float(p.mean())
+    return ordered, belief.within()
 
 
-def _risk_drop(share: Array, p: Array) -> float:
-    fitted = np.polynomial.Polynomial.fit(share, p, 3)(share)
-    drop = float(decision_risk(p.mean()) - decision_risk(np.clip(fitted, 0.0, 1.0)).mean())
-    return drop if drop > _NO_VALUE else 0.0
+@dataclass(frozen=True, slots=True)
+class _Belief:
+    """One gear with its unmeasured joints distributed, level of wear by level of wear.
 
+    At each level the worst case is taken as normal: a sum over several joints, of which none dominates.
+    """
 
-def _same_for_both_ends(gear: Gear, numbers: Sequence[int], values: Array) -> Array:
-    """Mean over joints that act alike, so that the draws do not decide between them."""
-    same = values.copy()
-    for k, number in enumerate(numbers):
-        ends = [i for i, other in enumerate(numbers) if other == number or other in gear.alike[number]]
-        same[k] = values[ends].mean()
-    return same
+    weight: Array
+    worst: Array
+    slopes: Array
+    mean: Array
+    spread: Array
+    u_rest: Array
+    limits: Array
+    margin_in: float
+    residual_u_in: float | None
+
+    @classmethod
+    def of(
+        cls,
+        gear: Gear,
+        inspection: Inspection,
+        margin_in: float,
+        extension: Extension | None,
+        linkages: Sequence[Response],
+        found: Array,
+    ) -> _Belief:
+        """Take the unmeasured joints at their mean for each level, and linearise there."""
+        limits, known = gear.limits_in, np.isfinite(found)
+        share, variance = moments()
+        mean = np.where(known, np.nan_to_num(found), share[:, None] * limits)
+        worst, slopes, u_rest = uncertainty_parts(linkages, mean, inspection.gauge_u_in, inspection.margin_u_in)
+        spread = np.where(known, 0.0, variance[:, None] * limits**2)
+        residual = None if extension is None else extension.residual_u_in
+        weight = level_weights((found / limits)[known])
+        return cls(weight, worst, slopes, mean, spread, u_rest, limits, margin_in, residual)
+
+    def _chance(self, worst: Array, variance: Array) -> Array:
+        """Chance of being within the margin, from the worst case expected and the variance of what is open."""
+        u_model = np.maximum(0.003, 0.10 * worst) if self.residual_u_in is None else self.residual_u_in
+        u = np.sqrt(variance + self.u_rest**2 + u_model**2)
+        return tabled_normal_cdf((self.margin_in - worst) / u)
+
+    def within(self) -> float:
+        """Chance of being within the margin with what is measured so far."""
+        return float(self.weight @ self._chance(self.worst, np.sum(self.slopes**2 * self.spread, axis=1)))
+
+    def risk_drop(self, j: int) -> float:
+        """Expected drop of the risk by a reading of one joint."""
+        shares = quantiles(_QUANTILES)
+        weight = np.repeat(self.weight / _QUANTILES, _QUANTILES)
+        level = self.weight * level_likelihood(shares.ravel())
+        level /= level.sum(axis=1, keepdims=True)
+        clearance = shares.ravel()[:, None] * self.limits[j]
+        worst = self.worst + self.slopes[:, j] * (clearance - self.mean[:, j])
+        open_still = np.sum(np.delete(self.slopes**2 * self.spread, j, axis=1), axis=1)
+        known = np.sum(level * self._chance(worst, open_still), axis=1)
+        drop = float(decision_risk(weight @ known) - weight @ decision_risk(known))
+        return drop if drop > _NO_VALUE else 0.0
+
+    def variance(self, j: int) -> float:
+        """Variance of the worst case that a reading of one joint removes. [in²]"""
+        within = float(self.weight @ (self.slopes[:, j] ** 2 * self.spread[:, j]))
+        means = self.slopes[:, j] * self.mean[:, j]
+        return within + float(self.weight @ (means - self.weight @ means) ** 2)
 
 
 def advise(

@@ -70,9 +70,9 @@ class Statement:
     evidence: tuple[Evidence, ...]
 
     @property
-    def paragraph(self) -> str:
-        """The statement with its numbers, as a report prints it."""
-        parts = [f"{self.claim} (section {self.section}): {self.outcome}."]
+    def numbers(self) -> str:
+        """What the linkages say, in sentences: each number, where it is accepted and why it is so."""
+        parts = []
         for each in self.evidence:
             low, high = min(each.values), max(each.values)
             unit = f" {each.unit}" if each.unit else ""
@@ -82,6 +82,11 @@ class Statement:
                 f"{each.why}"
             )
         return " ".join(parts)
+
+    @property
+    def paragraph(self) -> str:
+        """The statement with its numbers, as a terminal prints it."""
+        return f"{self.claim} (section {self.section}): {self.outcome}. {self.numbers}"
 
 
 def check_statements(

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,9 @@ from mlg_troubleshoot.studies.response import HeldDirections, Response, worst_di
 from mlg_troubleshoot.studies.saltelli import fast_indices, saltelli_indices
 from mlg_troubleshoot.studies.table import IndexTable, JointIndices, rank_ranges, ranks
 from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.studies.paper import PaperDesign, ReplicatedIndices
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, int, int | None], None]
@@ -317,19 +320,12 @@ def _paper(
 ) -> _Run:
     """Run the paper's design for the first order and, for ``lhs``, its study of the total order."""
     from mlg_troubleshoot.studies.blocks import block_study, total_order_study
-    from mlg_troubleshoot.studies.paper import ITERATIONS, PAPER_DESIGNS, PaperDesign, replicated_first_order
+    from mlg_troubleshoot.studies.paper import ITERATIONS, PAPER_DESIGNS, replicated_first_order
 
-    paper = PAPER_DESIGNS[str(options.design)]
     n = len(inputs.limits_in)
-    n1 = paper.n1 if options.n1 is None else options.n1
-    n2 = paper.n2 if options.n2 is None or not paper.n2 else options.n2
-    n_ccd = paper.n_ccd
-    if n_ccd:
-        from mlg_troubleshoot.studies.designs import central_composite
-
-        n_ccd = len(central_composite(n))
+    design = _sized(PAPER_DESIGNS[str(options.design)], n, options)
+    n1, n2 = design.n1, design.n2
     iterations = ITERATIONS if options.iterations is None else options.iterations
-    design = PaperDesign(paper.name, n1, n2, n_ccd)
     found = replicated_first_order(cube, n, design, options.seed, iterations, told("first order"))
     half = student_half(found.scatter, found.iterations)
     total, spread = np.full(n, np.nan), np.full(n, np.nan)
@@ -346,7 +342,7 @@ def _paper(
             note += f"; {totals.note}"
     if not finished:
         note += "; interrupted, averages of what was done"
-    name = f"{paper.name}: n1 = {n1}, n2 = {n2}, nCCD = {n_ccd}, mean of {found.iterations} iterations"
+    name = f"{design.name}: n1 = {n1}, n2 = {n2}, nCCD = {design.n_ccd}, mean of {found.iterations} iterations"
     indices = Indices(
         name,
         options.seed,
@@ -361,6 +357,52 @@ def _paper(
         note,
     )
     return _Run(indices, plain=found.plain, finished=finished)
+
+
+def _sized(paper: PaperDesign, n: int, options: StudyOptions) -> PaperDesign:
+    """Return a paper design in the size asked for, with the composite points of this number of variables."""
+    from mlg_troubleshoot.studies.designs import central_composite
+
+    return replace(
+        paper,
+        n1=paper.n1 if options.n1 is None else options.n1,
+        n2=paper.n2 if options.n2 is None or not paper.n2 else options.n2,
+        n_ccd=len(central_composite(n)) if paper.n_ccd else 0,
+    )
+
+
+def compare_designs(
+    gear: Gear, options: StudyOptions, progress: Progress | None = None
+) -> tuple[ReplicatedIndices, ...]:
+    """Estimate the first-order indices of the reference with each design of the paper (Fig. 13c).
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    options : StudyOptions
+        Clearances, directions, seed and size; its own design does not matter.
+    progress : callable, optional
+        Called with the stage's name, what is done and the whole.
+
+    Returns
+    -------
+    tuple of ReplicatedIndices
+        One a design: lhs, lhs+ccd, ccd. Empty with random directions, which the paper's designs do not have.
+    """
+    from mlg_troubleshoot.studies.paper import ITERATIONS, PAPER_DESIGNS, replicated_first_order
+
+    if options.directions is Directions.RANDOM:
+        return ()
+    inputs = Inputs(gear.limits_in if options.limits_in is None else options.limits_in, options.distribution)
+    cube, n = _response(gear, gear.model, inputs, options)
+    iterations = ITERATIONS if options.iterations is None else options.iterations
+    found = []
+    for k, paper in enumerate(PAPER_DESIGNS.values(), start=1):
+        found.append(replicated_first_order(cube, n, _sized(paper, n, options), options.seed, iterations))
+        if progress is not None:
+            progress("designs", k, len(PAPER_DESIGNS))
+    return tuple(found)
 
 
 def _table(

@@ -99,6 +99,10 @@ def main() -> int:
         ]
         print(f"{'command':<36}{'wall s':>9}{'target s':>10}{'processor s':>13}{'memory MiB':>12}{'target MiB':>12}")
         missed = 0
+        if hasattr(os, "getloadavg"):
+            print(
+                f"(load average {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores: if higher, wall exceeds processor)"
+            )
         for case in cases:
             found = measure(case.arguments, case.runs)
             late, large = found.wall_s > case.most_s, found.memory_mib > MEMORY_MIB

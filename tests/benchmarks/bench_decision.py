@@ -23,10 +23,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from mlg_troubleshoot.decision.assess import AssessOptions, assess
 from mlg_troubleshoot.decision.assessment import RepairSet, Verdict
-from mlg_troubleshoot.decision.belief import draw_shares, quick_probability
 from mlg_troubleshoot.decision.explain import explain
 from mlg_troubleshoot.decision.inspection import Inspection, Side
-from mlg_troubleshoot.decision.measuring import access_of_one_more, enough, worth_of_readings
+from mlg_troubleshoot.decision.measuring import access_of_one_more, enough, outlook, worth_of_readings
 from mlg_troubleshoot.decision.prediction import predict
 from mlg_troubleshoot.decision.repair import repair_sets
 from mlg_troubleshoot.decision.response import responses
@@ -180,11 +179,8 @@ def _verdicts(gear: Gear, read: Array, measured: NDArray[np.bool_]) -> list[Verd
 
 def _expected(gear: Gear, read: Array, measured: NDArray[np.bool_]) -> float:
     """Chance that this gear is within its margin by the distribution that ranks readings."""
-    missing = np.flatnonzero(~measured)
-    drawn = np.tile(read, (512, 1))
-    drawn[:, missing] = draw_shares((read / gear.limits_in)[measured], len(missing), 512) * gear.limits_in[missing]
-    p = quick_probability(responses(gear), drawn, np.ones(10, bool), worn_gears.GAUGE_U_IN, (MARGIN_IN, 0.0), None)
-    return float(p.mean())
+    so_far = inspection({j + 1: float(read[j]) for j in np.flatnonzero(measured)})
+    return outlook(gear, so_far, MARGIN_IN)[1]
 
 
 Order = Callable[[Gear, Array, NDArray[np.bool_]], int]

@@ -22,10 +22,14 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def extension(measured: Path) -> Path:
-    """The extension that the diagnosis of that fleet writes."""
-    path = measured.with_name("extension.toml")
-    mlg("diagnose", measured, *PERMUTATIONS, "--write-extension", path, "--quiet")
-    return path
+    """Where the diagnosis of that fleet writes its extension."""
+    return measured.with_name("extension.toml")
+
+
+@pytest.fixture(scope="module")
+def diagnosed(measured: Path, extension: Path) -> Run:
+    """The diagnosis of that fleet, as text; it writes the extension."""
+    return mlg("diagnose", measured, *PERMUTATIONS, "--write-extension", extension)
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +39,7 @@ def plain(measured: Path) -> Run:
 
 
 @pytest.fixture(scope="module")
-def extended(measured: Path, extension: Path) -> Run:
+def extended(measured: Path, extension: Path, diagnosed: Run) -> Run:
     """The check of that fleet with the extension."""
     return mlg("check", measured, "--extension", extension, "--json")
 
@@ -46,19 +50,22 @@ def misfit(run: Run) -> float:
     return (sum(used) / len(used)) ** 0.5
 
 
-def test_a_diagnosis_that_finds_something_exits_1(measured: Path) -> None:
-    assert mlg("diagnose", measured, *PERMUTATIONS).code == 1
+def test_a_diagnosis_that_finds_something_exits_1(diagnosed: Run) -> None:
+    assert diagnosed.code == 1
 
 
-def test_a_diagnosis_speaks_in_seven_lines(measured: Path) -> None:
-    lines = mlg("diagnose", measured, *PERMUTATIONS).out.splitlines()
+def test_a_diagnosis_speaks_in_seven_lines(diagnosed: Run) -> None:
+    lines = diagnosed.out.splitlines()
     numbered = [line.split()[1] for line in lines if line[:1].isdigit() and line[1:2] == " "]
     assert numbered == ["DATA", "MISFIT", "CAUSE", "MODEL", "GAIN", "LEFT", "DO"]
 
 
-def test_the_same_seed_gives_the_same_diagnosis(measured: Path) -> None:
-    runs = [mlg("diagnose", measured, *PERMUTATIONS, "--seed", "5", "--json").out for _ in range(2)]
-    assert runs[0] == runs[1]
+def test_the_same_seed_gives_the_same_diagnosis(measured: Path, diagnosed: Run) -> None:
+    assert mlg("diagnose", measured, *PERMUTATIONS).out == diagnosed.out
+
+
+def test_a_diagnosis_says_how_to_use_its_extension(diagnosed: Run, extension: Path) -> None:
+    assert f"mlg check FILE --extension {extension}" in diagnosed.err
 
 
 def test_the_extension_moves_the_prediction_to_the_measurement(plain: Run, extended: Run) -> None:
@@ -81,7 +88,7 @@ def test_the_extension_brings_the_uncertainty_of_the_model(plain: Run, extended:
     assert sum(after) < sum(before)
 
 
-def test_an_extension_of_another_geometry_is_refused(extension: Path) -> None:
+def test_an_extension_of_another_geometry_is_refused(extension: Path, diagnosed: Run) -> None:
     other = extension.with_name("other.toml")
     text = extension.read_text(encoding="utf-8")
     digest = text.split('geometry_sha256 = "')[1][:64]

@@ -68,7 +68,7 @@ def test_re_rigging_cannot_clear_the_published_failure(judge: Judge) -> None:
     found = judge({3: 0.013, 5: 0.007}, REPAIRS).rigging
     assert found is not None
     assert found.probability_within_margin < 0.05
-    assert found.probability_exceed_random_directions > 0.2
+    assert 0.2 < found.probability_exceed_random_directions < 0.3
 
 
 def test_a_gear_within_its_margin_has_no_rigging_alternative(judge: Judge) -> None:

@@ -96,3 +96,16 @@ def test_numbers_are_not_rounded(form: dict, judge: Judge) -> None:
 def test_a_problem_has_its_nine_keys_in_order(form: dict) -> None:
     keys = ["code", "file", "sheet", "row", "column", "cell", "value", "expected", "remedy"]
     assert [list(problem) for problem in form["problems"]] == [keys]
+
+
+def test_what_was_not_asked_for_is_null(form: dict) -> None:
+    assert [form["inspections"][0][key] for key in ("measuring", "confidence", "posterior")] == [None] * 3
+    assert [form["inspections"][1][key] for key in ("rigging", "measuring", "confidence", "posterior")] == [None] * 4
+
+
+def test_with_advice_the_posterior_names_groups_and_intervals(gear: Gear, judge: Judge) -> None:
+    judged = judge({3: 0.013, 5: 0.007}, AssessOptions(advice=True), readings_in=(0.041,))
+    (row,) = check_as_json(gear, [judged], [], [])["inspections"]
+    assert row["posterior"]["groups"][0]["joints"] == (3, 5)
+    assert [interval["joint"] for interval in row["posterior"]["intervals"]] == list(range(1, 11))
+    assert row["measuring"]["stop"] is True

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from mlg_troubleshoot.decision.assess import AssessOptions
 from mlg_troubleshoot.decision.assessment import MeasuringAdvice, Verdict
-from mlg_troubleshoot.decision.belief import draw_shares, level_weights, normal_cdf, quick_probability
+from mlg_troubleshoot.decision.belief import (
+    level_likelihood,
+    level_weights,
+    moments,
+    normal_cdf,
+    quantiles,
+    tabled_normal_cdf,
+    uncertainty_parts,
+)
 from mlg_troubleshoot.decision.measuring import (
     COST_OF_WRONG_WITHIN,
     access_of_one_more,
     advise,
     decision_risk,
     enough,
+    outlook,
     worth_of_readings,
 )
 from mlg_troubleshoot.decision.prediction import predict
@@ -52,13 +64,13 @@ def test_an_anchored_expansion_is_exact_for_its_gear(gear: Gear) -> None:
     assert anchored.worst(clearance) == pytest.approx((exact.over_in[0], exact.under_in[0]), abs=1e-15)
 
 
-def test_the_quick_probability_agrees_with_the_rule(gear: Gear) -> None:
+def test_the_quick_uncertainty_agrees_with_the_rule(gear: Gear) -> None:
     clearance = np.random.default_rng(6).uniform(0.0, 0.004, (50, 10))
-    every = np.ones((50, 10), bool)
-    exact = predict(gear, [inspected({})] * 50, clearance, every, np.full(50, 0.0005))
-    p = exact.probability_within(np.full(50, MARGIN_IN), np.zeros(50))
-    quick = quick_probability(responses(gear), clearance, every[0], 0.0005, (MARGIN_IN, 0.0), None)
-    assert np.max(np.abs(quick - p)) < 0.02
+    exact = predict(gear, [inspected({})] * 50, clearance, np.ones((50, 10), bool), np.full(50, 0.0005))
+    worst, _slopes, u = uncertainty_parts(responses(gear), clearance, 0.0005, 0.001)
+    wanted = np.sqrt(exact.u_clearances_in**2 + exact.u_geometry_in**2 + 0.001**2)
+    assert worst == pytest.approx(exact.displacement_in, rel=0.005)
+    assert u == pytest.approx(wanted, rel=0.03)
 
 
 def test_a_wrong_within_costs_nineteen_times_a_wrong_outside() -> None:
@@ -72,21 +84,47 @@ def test_the_risk_is_greatest_at_the_conformance_probability() -> None:
     assert p[np.argmax(decision_risk(p))] == pytest.approx(0.95)
 
 
-def test_drawn_wear_stays_between_nothing_and_the_limit() -> None:
-    drawn = draw_shares(np.array([0.2]), 9, 1000)
-    assert drawn.min() >= 0.0
-    assert drawn.max() <= 1.0
+def test_wear_stays_between_nothing_and_the_limit() -> None:
+    shares = quantiles(50)
+    assert shares.min() >= 0.0
+    assert shares.max() <= 1.0
+
+
+def test_the_quantiles_have_the_moments_of_their_level() -> None:
+    shares = quantiles(4000)
+    mean, variance = moments()
+    assert shares.mean(axis=1) == pytest.approx(mean, rel=2e-3)
+    assert shares.var(axis=1) == pytest.approx(variance, rel=1e-2)
+
+
+def test_the_density_of_each_level_integrates_to_one() -> None:
+    share = (np.arange(20_000) + 0.5) / 20_000
+    assert level_likelihood(share).mean(axis=0) == pytest.approx(1.0, rel=1e-4)
 
 
 def test_a_gear_whose_measured_joints_are_worn_is_expected_to_be_worn_elsewhere() -> None:
-    assert draw_shares(np.full(3, 0.9), 4, 1000).mean() > 2.0 * draw_shares(np.full(3, 0.1), 4, 1000).mean()
+    mean, _variance = moments()
+    assert level_weights(np.full(3, 0.9)) @ mean > 2.0 * level_weights(np.full(3, 0.1)) @ mean
 
 
-def test_drawn_wear_has_the_mean_of_its_distribution() -> None:
-    # With very little wear measured on many joints the lowest level, 5 % of the limit, is nearly certain.
-    few = np.full(40, 0.001)
-    assert level_weights(few)[0] > 0.99
-    assert draw_shares(few, 3, 4096).mean() == pytest.approx(0.05, rel=0.03)
+def test_the_table_of_the_normal_distribution_is_exact_to_a_millionth() -> None:
+    z = np.random.default_rng(1).normal(0.0, 2.0, 500)
+    assert tabled_normal_cdf(z) == pytest.approx(normal_cdf(z), abs=1e-6)
+
+
+def test_the_chance_of_being_within_agrees_with_drawing_gears(gear: Gear) -> None:
+    # Gears drawn level by level, each judged by the exact prediction.
+    measured = {3: 0.003, 5: 0.003}
+    _worth, within = outlook(gear, inspected(measured), MARGIN_IN)
+    rng = np.random.default_rng(9)
+    shares = quantiles(400)
+    weights = level_weights(np.array([0.003, 0.003]) / 0.0075)
+    level = rng.choice(len(weights), 400, p=weights)
+    clearance = 0.0075 * np.array([rng.choice(shares[k], 10) for k in level])
+    clearance[:, 2], clearance[:, 4] = 0.003, 0.003
+    exact = predict(gear, [inspected({})] * 400, clearance, np.ones((400, 10), bool), np.full(400, 0.0005))
+    p = exact.probability_within(np.full(400, MARGIN_IN), np.zeros(400))
+    assert within == pytest.approx(p.mean(), abs=3.0 * p.std() / 20.0)
 
 
 def test_the_normal_distribution_has_its_known_values() -> None:
@@ -105,27 +143,31 @@ def test_missing_critical_joints_stand_before_all_others(gear: Gear) -> None:
 
 
 def test_the_next_joint_is_worth_most_per_minute_of_access(gear: Gear) -> None:
-    worth = [w for w in worth_of_readings(gear, inspected({3: 0.001, 5: 0.001}), MARGIN_IN) if w.critical]
+    worth = [w for w in worth_of_readings(gear, inspected({9: 0.0005}), MARGIN_IN) if w.critical]
     assert worth[0].risk_drop > 0.0
     assert worth[0].risk_drop / worth[0].minutes == max(w.risk_drop / w.minutes for w in worth)
+    # The variance alone would choose another joint.
+    assert worth[0].joint != max(worth, key=lambda w: w.variance_in2 / w.minutes).joint
 
 
 def test_a_reading_that_is_worth_more_may_still_come_later_because_of_its_access(gear: Gear) -> None:
-    worth = {w.joint: w for w in worth_of_readings(gear, inspected({3: 0.001, 5: 0.001}), MARGIN_IN)}
-    assert worth[4].risk_drop > worth[2].risk_drop
-    assert list(worth).index(2) < list(worth).index(4)
+    critical = dict.fromkeys(range(1, 6), 0.0015)
+    worth = {w.joint: w for w in worth_of_readings(gear, inspected(critical), MARGIN_IN)}
+    assert worth[8].risk_drop > worth[6].risk_drop
+    assert list(worth).index(6) < list(worth).index(8)
 
 
 def test_where_no_single_reading_has_a_value_the_variance_per_minute_decides(gear: Gear) -> None:
-    worth = [w for w in worth_of_readings(gear, inspected({}), MARGIN_IN) if w.critical]
+    # Two badly worn ends: no single reading can make WITHIN the better answer again.
+    worth = [w for w in worth_of_readings(gear, inspected({3: 0.0074, 5: 0.0074}), MARGIN_IN) if w.critical]
     assert {w.risk_drop for w in worth} == {0.0}
     assert worth[0].variance_in2 / worth[0].minutes == max(w.variance_in2 / w.minutes for w in worth)
 
 
 def test_both_ends_of_one_link_are_worth_the_same(gear: Gear) -> None:
     worth = {w.joint: w for w in worth_of_readings(gear, inspected({1: 0.001, 2: 0.001}), MARGIN_IN)}
-    assert worth[3].risk_drop == worth[5].risk_drop
-    assert worth[9].variance_in2 == worth[10].variance_in2
+    assert worth[3].risk_drop == pytest.approx(worth[5].risk_drop, rel=1e-3)
+    assert worth[9].variance_in2 == pytest.approx(worth[10].variance_in2, rel=1e-3)
 
 
 def test_a_reading_is_never_worth_less_than_nothing(gear: Gear) -> None:
@@ -199,3 +241,15 @@ def test_the_next_action_is_the_joint_that_is_worth_most(judge: Judge, gear: Gea
 
 def test_the_advice_is_the_same_at_every_call(gear: Gear) -> None:
     assert advised(gear, {3: 0.002}) == advised(gear, {3: 0.002})
+
+
+def test_with_advice_the_next_action_is_the_same(judge: Judge) -> None:
+    measured = {3: 0.001, 5: 0.001}
+    assert judge(measured, AssessOptions(advice=True)).next_action == judge(measured).next_action
+
+
+def test_a_critical_joint_is_next_even_where_another_would_tell_more(gear: Gear) -> None:
+    joints = tuple(replace(joint, critical=joint.number == 9) for joint in gear.joints)
+    worth = worth_of_readings(replace(gear, joints=joints), inspected({}), MARGIN_IN)
+    assert worth[0].joint == 9
+    assert worth[0].variance_in2 / worth[0].minutes < worth[1].variance_in2 / worth[1].minutes

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.hidden_effect.study import PLAN, RESULT, study
+from tests.hidden_effect.study import PLAN, RESULT, markdown, study
 
 OTHER_SEEDS = 7_000_000
 
@@ -26,6 +27,11 @@ def test_the_committed_study_ran_the_whole_plan(committed: dict[str, Any]) -> No
 
 def test_every_rate_of_the_committed_study_says_on_how_many_fleets(committed: dict[str, Any]) -> None:
     assert all(rate["n"] > 0 and rate["low"] <= rate["rate"] <= rate["high"] for rate in committed["targets"].values())
+
+
+def test_the_readme_shows_the_table_of_the_committed_study(committed: dict[str, Any]) -> None:
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    assert markdown(committed) in readme
 
 
 @pytest.mark.slow
