@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.records import ReadOptions, ReadResult
     from mlg_troubleshoot.reporting import ReportProvenance, WrittenReport
     from mlg_troubleshoot.studies.findings import StudyFindings
+    from mlg_troubleshoot.studies.given_data import GivenDataIndices
     from mlg_troubleshoot.studies.verification import VerifiedNumber
 
 ALL_JUDGED, NOT_ALL_WITHIN, NOTHING_JUDGED = 0, 1, 3
@@ -843,6 +844,60 @@ def write_diagnosis_report(result: DiagnoseResult, options: DiagnoseOptions, dir
         notes=result.notes,
     )
     return [path for path in (written.html, written.pdf) if path is not None]
+
+
+@dataclass(frozen=True, slots=True)
+class GivenDataResult:
+    """First-order indices of measured inspections.
+
+    Parameters
+    ----------
+    file : str
+        Name of the table.
+    rows_read, rows_used : int
+        Rows in it, and those that are valid and have a measured displacement.
+    indices : GivenDataIndices
+        The indices.
+    """
+
+    file: str
+    rows_read: int
+    rows_used: int
+    indices: GivenDataIndices
+
+
+def given_data_study(file: Path, gear: Gear, seed: int) -> GivenDataResult:
+    """Estimate first-order indices from the inspections of a table: no model, only what was measured.
+
+    Parameters
+    ----------
+    file : Path
+        Inspections with measured plunger displacements.
+    gear : Gear
+        The gear.
+    seed : int
+        Seed of the resampling for the intervals.
+
+    Returns
+    -------
+    GivenDataResult
+        Indices, and how many rows they rest on.
+
+    Raises
+    ------
+    InconclusiveDataError
+        If fewer than 20 rows have a displacement.
+    """
+    from mlg_troubleshoot.diagnosis import table_from_inspections
+    from mlg_troubleshoot.records import read_many
+    from mlg_troubleshoot.studies.given_data import given_data_indices
+
+    read = read_many([file], read_options(gear, CheckOptions()))
+    measured = [each for each in read.inspections if each.measured_displacement_in is not None]
+    displacement = np.array([each.measured_displacement_in for each in measured], dtype=np.float64)
+    clearance = table_from_inspections(measured, gear).clearance_in
+    indices = given_data_indices(clearance, displacement, np.random.default_rng(seed))
+    return GivenDataResult(file.name, len(read.rows), len(measured), indices)
 
 
 def write_study_report(findings: StudyFindings, directory: Path, page: str) -> WrittenReport:

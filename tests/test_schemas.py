@@ -18,6 +18,7 @@ from tests.cli.conftest import FAILURE, FLEET, HAND, mlg
 from tests.hidden_effect.simulator.generate import draw_fleet, write_csv
 
 Change = Callable[[Any], object]
+ROOT = Path(__file__).parents[1]
 BAD_ROWS = (
     b"record_id,tail_no,side,clearance_convention,clearance_1_in\n"
     b"A,N1,,RADIAL,0.001\nB,N1,LH,RADIAL,worn\nC,N1,LH,RADIAL,0.001\n,,,,\nD,,XX,,-1\n"
@@ -85,8 +86,19 @@ def test_the_shipped_table_of_indices_fits_the_schema_of_a_study(gear: Gear) -> 
     assert complain("study", json.loads(gear.indices_file.read_text(encoding="utf-8"))) == []
 
 
-def test_every_study_fits_its_schema() -> None:
-    assert complain("study", mlg("study", "--json", "--quiet").json) == []
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--statements",),
+        ("--design", "lhs", "--n1", "4", "--n2", "20", "--iterations", "2", "--workers", "1"),
+        ("--design", "ccd", "--n1", "4", "--iterations", "2"),
+        ("--limit", "0.06"),
+        ("--given", ROOT / "inspection_data" / "measured_pressure.csv"),
+    ],
+    ids=["fast", "paper's design", "without total order", "does not close", "given data"],
+)
+def test_a_study_of_any_kind_fits_its_schema(options: tuple[object, ...]) -> None:
+    assert complain("study", mlg("study", *options, "--json").json) == []
 
 
 @pytest.fixture(scope="module")

@@ -72,6 +72,10 @@ def study(
     write_table: Annotated[
         bool, typer.Option("--write-table", help="Write the table that mlg check uses, beside the gear file.")
     ] = False,
+    given: Annotated[
+        Path | None,
+        typer.Option("--given", metavar="FILE", help="Beside them the indices of measured inspections, without model."),
+    ] = None,
     report: Annotated[
         Path | None,
         typer.Option("--report", metavar="DIR", help="Write a printable report with figures, statements and bound."),
@@ -108,6 +112,7 @@ def study(
                 as_json=as_json,
                 quiet=quiet,
                 csv=csv,
+                given=given,
                 report=report,
                 page=page,
             )

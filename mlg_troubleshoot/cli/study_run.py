@@ -9,7 +9,7 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import typer
 
@@ -24,6 +24,9 @@ from mlg_troubleshoot.studies.study import Design, Directions, StudyOptions, Stu
 from mlg_troubleshoot.studies.table import write_index_table
 from mlg_troubleshoot.studies.targets import targets_file
 from mlg_troubleshoot.studies.worst_search import WorstSearch, search_worst
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.workflows import GivenDataResult
 
 _BAR = 16
 _Choice = TypeVar("_Choice", Design, Directions)
@@ -60,6 +63,8 @@ class StudyArguments:
         gear's table, write JSON, be quiet.
     csv : Path or None
         Write a CSV here.
+    given : Path or None
+        Inspections to take indices from, beside the study.
     report : Path or None
         Write a report to this folder.
     page : str
@@ -88,6 +93,7 @@ class StudyArguments:
     as_json: bool
     quiet: bool
     csv: Path | None
+    given: Path | None
     report: Path | None
     page: str
 
@@ -101,11 +107,8 @@ def run(arguments: StudyArguments) -> None:
         What the command line asks for.
     """
     gear = load_gear(arguments.gear)
-    if arguments.report is not None:
-        from mlg_troubleshoot.reporting.publish import PAGES
-
-        if arguments.page not in PAGES:
-            raise UsageError(f"page {arguments.page!r} is not known", f"Give one of {', '.join(PAGES)}.")
+    _check_page(arguments)
+    given = _given(arguments, gear)
     with ExitStack() as stack:
         options = _options(arguments, gear, stack)
         if arguments.write_table and not options.is_standard:
@@ -119,9 +122,14 @@ def run(arguments: StudyArguments) -> None:
     statements = findings.statements if arguments.statements else ()
     searches = findings.searches if arguments.bound else ()
     if arguments.as_json:
-        typer.echo(json.dumps(as_json(gear, result, statements, searches, arguments), indent=1, allow_nan=False))
+        values = as_json(gear, result, statements, searches, arguments)
+        if given is not None:
+            values["given_data"] = _given_as_json(gear, given)
+        typer.echo(json.dumps(values, indent=1, allow_nan=False))
     else:
         _show(gear, result, statements, searches, arguments)
+        if given is not None:
+            _show_given(gear, given)
     if arguments.csv is not None:
         _write_csv(gear, result, arguments.csv)
     if arguments.report is not None:
@@ -134,6 +142,24 @@ def run(arguments: StudyArguments) -> None:
     if not result.finished:
         typer.echo("Interrupted: the numbers above are of what was done.", err=True)
         raise typer.Exit(INTERRUPTED)
+
+
+def _check_page(arguments: StudyArguments) -> None:
+    """Refuse an unknown paper before the work, not after it."""
+    if arguments.report is None:
+        return
+    from mlg_troubleshoot.reporting.publish import PAGES
+
+    if arguments.page not in PAGES:
+        raise UsageError(f"page {arguments.page!r} is not known", f"Give one of {', '.join(PAGES)}.")
+
+
+def _given(arguments: StudyArguments, gear: Gear) -> GivenDataResult | None:
+    if arguments.given is None:
+        return None
+    from mlg_troubleshoot.workflows import given_data_study
+
+    return given_data_study(arguments.given, gear, arguments.seed)
 
 
 def _findings(
@@ -385,6 +411,46 @@ def _show(
     for statement in statements:
         console.print()
         console.print(Text(statement.paragraph))
+
+
+def _given_as_json(gear: Gear, given: GivenDataResult) -> dict[str, Any]:
+    found = given.indices
+    values: dict[str, Any] = _without_nan(
+        {
+            "file": given.file,
+            "rows_read": given.rows_read,
+            "rows_used": given.rows_used,
+            "joints": [
+                {"joint": number, "first_order": first, "first_order_interval": ends, "rows": rows}
+                for number, first, ends, rows in zip(
+                    gear.joint_numbers,
+                    found.first_order.tolist(),
+                    found.interval.tolist(),
+                    found.rows.tolist(),
+                    strict=True,
+                )
+            ],
+        }
+    )
+    return values
+
+
+def _show_given(gear: Gear, given: GivenDataResult) -> None:
+    from mlg_troubleshoot.cli import output
+
+    found = given.indices
+    each = ", ".join(
+        f"#{number} {_number(first)} ({_number(ends[0])} to {_number(ends[1])})"
+        for number, first, ends in zip(
+            gear.joint_numbers, found.first_order.tolist(), found.interval.tolist(), strict=True
+        )
+    )
+    output.console().print(
+        f"Without a model, from {given.rows_used} measured of {given.rows_read} inspections in {given.file}, "
+        f"first order with 95 % intervals: {each}. Where joints wear together each explains what the others do, too, "
+        "and these add to more than 1.",
+        markup=False,
+    )
 
 
 def _number(value: float) -> str:

@@ -331,6 +331,11 @@ class Inference:
                 near.append(k)
             elif gain[k] > 2.0:
                 behind[key] = float(distance)
+        if not clear and not near:
+            # Faint evidence never leaves one cause alone: the next best stays possible.
+            near = [k for key, k in best.items() if key != self.candidates[winner].key and np.isfinite(score[k])][:1]
+            for k in near:
+                behind.pop(self.candidates[k].key, None)
         return winner, near, behind
 
     def _alike(self, a: int, b: int) -> bool:

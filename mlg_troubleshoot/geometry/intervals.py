@@ -66,7 +66,7 @@ class Box:
     Parameters
     ----------
     low, high : ndarray, shape (n_variables, n_boxes)
-        Ranges.
+        Ranges. [in or rad]
     """
 
     low: Array
@@ -109,17 +109,17 @@ class Range:
     Parameters
     ----------
     value : pair of ndarray, shape (n_boxes,)
-        Bounds of the value.
+        Bounds of the value. [unit of the quantity]
     slope : pair of ndarray, shape (n_variables, n_boxes)
-        Bounds of the gradient.
+        Bounds of the gradient. [unit of the quantity / in]
     bend : pair of ndarray, shape (n_variables, n_variables, n_boxes)
-        Bounds of the second derivatives.
+        Bounds of the second derivatives. [unit of the quantity / in²]
     at_middle : pair of ndarray, shape (n_boxes,)
-        Bounds of the value in the middle of the box.
+        Bounds of the value in the middle of the box. [unit of the quantity]
     slope_at_middle : pair of ndarray, shape (n_variables, n_boxes)
-        Bounds of the gradient there.
+        Bounds of the gradient there. [unit of the quantity / in]
     offsets : pair of ndarray, shape (n_variables, n_boxes)
-        Ranges of the variables about the middle.
+        Ranges of the variables about the middle. [in]
     """
 
     __slots__ = ("at_middle", "bend", "offsets", "slope", "slope_at_middle", "value")

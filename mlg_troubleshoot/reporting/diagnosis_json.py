@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension, NamedCause
 from mlg_troubleshoot.reporting.json_form import SCHEMA_VERSION
 
@@ -60,7 +62,7 @@ def diagnosis_as_json(diagnosis: Diagnosis, extension: ModelExtension | None) ->
         "ruled_out": [{"cause": cause, "target": target} for cause, target in d.ruled_out],
         "smallest_detectable_rms_in": d.smallest_rms_in,
         "extension": None if extension is None else _extension(extension),
-        "gain": None if d.gain is None else _gain(d),
+        "gain": _gain(d),
         "remainder": {
             "p_value": d.remainder_p,
             "looks_like_noise": d.remainder_is_noise,
@@ -108,7 +110,7 @@ def _extension(extension: ModelExtension) -> dict[str, Any]:
 def _gain(d: Diagnosis) -> dict[str, Any]:
     g = d.gain
     if g is None:
-        return {}
+        return _no_gain(d)
     return {
         "held_out_rms_before_in": g.rms_before_in,
         "held_out_rms_after_in": g.rms_after_in,
@@ -119,4 +121,23 @@ def _gain(d: Diagnosis) -> dict[str, Any]:
         "false_outside_before": g.false_outside_before,
         "false_outside_after": g.false_outside_after,
         "verdicts_changed": list(g.verdicts_changed),
+    }
+
+
+def _no_gain(d: Diagnosis) -> dict[str, Any]:
+    """The model is not extended: everything after is as before."""
+    outside = np.abs(d.used.measured_in) > d.used.margin_in
+    said_within = np.abs(d.predicted_in) <= d.used.margin_in
+    rms = float(np.sqrt(np.mean(d.misfit_in**2)))
+    false_within, false_outside = int(np.sum(said_within & outside)), int(np.sum(~said_within & ~outside))
+    return {
+        "held_out_rms_before_in": rms,
+        "held_out_rms_after_in": rms,
+        "share_removed_interval_95": [0.0, 0.0],
+        "held_out_by": None,
+        "false_within_before": false_within,
+        "false_within_after": false_within,
+        "false_outside_before": false_outside,
+        "false_outside_after": false_outside,
+        "verdicts_changed": [],
     }

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.errors import GearFileError, OutputError
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
 
 Array = NDArray[np.float64]
 SCHEMA_VERSION = 1
@@ -252,7 +253,8 @@ def write_index_table(table: IndexTable, path: Path) -> None:
 
 
 def _remedy(gear: Gear) -> str:
-    name = gear.id if gear.path.stem == gear.id else str(gear.path)
+    shipped = gear.id in shipped_gears() and load_gear(gear.id).path == gear.path
+    name = gear.id if shipped else str(gear.path)
     return f"Run: mlg study --gear {name} --write-table"
 
 
