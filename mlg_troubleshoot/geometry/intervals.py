@@ -268,7 +268,7 @@ def narrowed_by_links(joint: Joint, start: Joint, end: Joint, square: Any, area:
     Returns
     -------
     tuple of Range or float
-        The joint, narrowed; unchanged if it does not vary.
+        The joint, narrowed; unchanged if it does not vary. [in]
     """
     ranges = [part for part in joint if isinstance(part, Range)]
     if len(ranges) < 2:
