@@ -15,7 +15,7 @@ from mlg_troubleshoot.diagnosis.extension import Term
 from mlg_troubleshoot.diagnosis.faults import DataFault, screen_faults
 from mlg_troubleshoot.diagnosis.gain import Gain, measure_gain
 from mlg_troubleshoot.diagnosis.inference import Finding, Inference
-from mlg_troubleshoot.diagnosis.noise import estimate_repeatability, small_trends
+from mlg_troubleshoot.diagnosis.noise import Rows, estimate_repeatability, small_trends
 from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.errors import InconclusiveDataError
@@ -230,7 +230,7 @@ def _without_faults(
     """Repair or set aside rows with data faults, and rows whose linkage does not close."""
     table, faults, usable = screen_faults(model, table, explained)
     table = table.take(usable & np.isfinite(table.measured_in))
-    table = table.take(np.isfinite(build_scene(model, table, where)[0].over_in))
+    table = table.take(np.isfinite(build_scene(model, table, where).scene.over_in))
     _enough(table)
     return table, faults
 
@@ -244,29 +244,25 @@ def _infer(
     rng: np.random.Generator,
     progress: Callable[[float], None] | None,
 ) -> _Case:
-    scene, worst, extra = build_scene(model, table, where)
+    plain = build_scene(model, table, where)
+    scene = plain.scene
     candidates = [candidate for cause in testable for candidate in cause.candidates(scene)]
-    columns = effect_columns(scene, worst, candidates)
+    columns = effect_columns(scene, plain.worst, candidates)
     moving = np.isfinite(columns).all(axis=0) & (np.abs(columns).max(axis=0) > 0.0)
     candidates = [c for c, keep in zip(candidates, moving, strict=True) if keep]
     columns = columns[:, moving]
     misfit = table.measured_in - scene.over_in
-    as_read = np.where(np.isfinite(table.clearance_in), table.clearance_in, scene.clearance_in)
-    finding = Inference(
-        misfit,
+    rows = Rows(
         scene.over_in,
         table.tails,
         table.gears,
-        extra,
-        small_trends(table),
-        np.nan_to_num(worst_case(model, as_read).over_in - scene.over_in),
-        candidates,
-        columns,
-        build_bank(scene, columns),
-        permutations,
-        rng,
-        progress,
-    ).run()
+        plain.u_filled_in,
+        plain.u_read_in,
+        plain.drawn_in,
+        *small_trends(table),
+    )
+    bank = build_bank(scene, columns)
+    finding = Inference(misfit, rows, candidates, columns, bank, permutations, rng, progress).run()
     return _Case(candidates, columns, misfit, scene.over_in, finding)
 
 

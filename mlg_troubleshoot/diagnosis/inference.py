@@ -7,6 +7,7 @@ reported. Candidates of one cause share its prior, so a cause with many targets 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.diagnosis.bank import Bank
 from mlg_troubleshoot.diagnosis.causes.base import Candidate
-from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, NoiseModel, build_noise
+from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, NoiseModel, Rows, build_noise
 from mlg_troubleshoot.diagnosis.screen import Fit, Screen, fit
 
 Array = NDArray[np.float64]
@@ -88,18 +89,10 @@ class Inference:
 
     Parameters
     ----------
-    misfit, predicted : ndarray, shape (n,)
-        Measured less predicted, and predicted. [in]
-    tails : ndarray of str, shape (n,)
-        Tail of each row.
-    gears : ndarray of str, shape (n,)
-        Single gear of each row.
-    extra_in : ndarray, shape (n,)
-        Further standard deviation of a row. [in]
-    trends : ndarray, shape (n, k)
-        Small trends that are always there. [1]
-    drawn_in : ndarray, shape (n,)
-        By how much drawing the readings to their expectation changed the prediction. [in]
+    misfit : ndarray, shape (n,)
+        Measured less predicted. [in]
+    rows : Rows
+        What is known of the rows.
     candidates : sequence of Candidate
         The catalogue's candidates.
     columns : ndarray, shape (n, n_candidates)
@@ -117,12 +110,7 @@ class Inference:
     def __init__(
         self,
         misfit: Array,
-        predicted: Array,
-        tails: NDArray[np.str_],
-        gears: NDArray[np.str_],
-        extra_in: Array,
-        trends: Array,
-        drawn_in: Array,
+        rows: Rows,
         candidates: Sequence[Candidate],
         columns: Array,
         bank: Bank,
@@ -130,13 +118,8 @@ class Inference:
         rng: np.random.Generator,
         progress: Callable[[float], None] | None = None,
     ) -> None:
-        self.misfit = misfit - EXPECTED_SLOPE * predicted
-        self.predicted = predicted
-        self.tails = tails
-        self.gears = gears
-        self.extra = extra_in
-        self.trends = trends
-        self.drawn = drawn_in
+        self.misfit = misfit - EXPECTED_SLOPE * rows.predicted_in
+        self.rows = rows
         self.candidates = candidates
         self.columns = columns
         self.bank = bank
@@ -144,8 +127,8 @@ class Inference:
         self.rng = rng
         self.progress = progress or (lambda _share: None)
         self.signs = np.array([c.cause.sign for c in candidates])
-        names = [c.cause.name for c in candidates]
-        self.penalty = np.log([float(names.count(name)) for name in names]) if names else np.empty(0)
+        counts = Counter(c.cause.name for c in candidates)
+        self.penalty = np.log([float(counts[c.cause.name]) for c in candidates])
 
     def run(self) -> Finding:
         """Run the inference.
@@ -155,7 +138,7 @@ class Inference:
         Finding
             Verdict, names, rivals and remainder.
         """
-        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends, self.drawn)
+        noise = build_noise(self.misfit, self.rows)
         screen = Screen(noise, self.columns, self.signs)
         gain = screen.run(self.misfit[:, None]).gain[:, 0]
         score = gain - self.penalty
@@ -189,9 +172,7 @@ class Inference:
         constant = self._constant(lead)
         if constant is not None:
             p, variables = constant
-            noise, _ = build_noise(
-                self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends, self.drawn
-            )
+            noise = build_noise(self.misfit, self.rows)
             return Finding("UNLISTED", (), (), (p_alarm,), variables, p, noise, None, smallest, ())
         finding = self._with([lead], [p_alarm], self._second([lead], SECOND_SHARE), smallest)
         if finding.verdict == "UNLISTED":
@@ -236,7 +217,7 @@ class Inference:
 
         What moves besides is looked for with the shift taken out.
         """
-        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends, self.drawn)
+        noise = build_noise(self.misfit, self.rows)
         everywhere = np.ones((len(self.misfit), 1))
         both = Screen(noise, np.hstack([everywhere, self.columns[:, [lead]]]), np.array([0, self.signs[lead]]))
         gain = both.run(self.misfit[:, None]).gain[:, 0]
@@ -250,19 +231,10 @@ class Inference:
         return min(p, ALARM), variables
 
     def _refit(self, chosen: Sequence[int]) -> tuple[NoiseModel, Fit]:
-        noise, _ = build_noise(self.misfit, self.predicted, self.tails, self.gears, self.extra, self.trends, self.drawn)
+        noise = build_noise(self.misfit, self.rows)
         columns = self.columns[:, list(chosen)]
         fitted = fit(noise, columns, self.misfit)
-        noise, _ = build_noise(
-            self.misfit,
-            self.predicted,
-            self.tails,
-            self.gears,
-            self.extra,
-            self.trends,
-            self.drawn,
-            columns @ fitted.values,
-        )
+        noise = build_noise(self.misfit, self.rows, columns @ fitted.values)
         return noise, fit(noise, columns, self.misfit)
 
     def _second(self, chosen: list[int], least_share: float) -> tuple[list[int], float] | None:

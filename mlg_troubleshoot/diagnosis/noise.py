@@ -19,20 +19,52 @@ Array = NDArray[np.float64]
 
 # Pins scatter by some 6° about the worst direction, so a healthy fleet reads less than the bound by this share. [1]
 EXPECTED_SLOPE = -0.006
-# Bias that the null model allows beyond that, one standard deviation: of the mean [in], and of the slope [1].
-BIAS_IN = 0.0002
-SLOPE = 0.006
+# Bias that the null model allows beyond that, one standard deviation: of the mean [in], and of the slope [1]; and
+# what comes on top where clearances are read no better than the plunger.
+BIAS_IN, READ_BIAS_IN = 0.0001, 0.0001
+SLOPE, READ_SLOPE = 0.003, 0.003
 # Doubt about how well clearances were really read: share of the drawing that may be too much or too little. [1]
-DRAWN = 0.7
+DRAWN = 0.3
 # Scatter of a row is at least this share of the predictions' size: nothing is known better than that. [1]
 LEAST_SCATTER = 0.01
-# Scatter between the gears of one tail, in units of the scatter of a row: their levels of wear are known so well.
-GEAR_RATIO = 0.25
+# Scatter between the gears of one tail, in units of the scatter of a row, and what the errors of reading leave in
+# the level of wear of each.
+GEAR_RATIO, READ_GEAR_RATIO = 0.08, 0.28
 # Trends over a quantity, and habits of a gauge or a technician, that are no cause yet, in the same units.
-TREND = 0.06
-HABIT = 0.08
+TREND, READ_TREND = 0.03, 0.03
+HABIT, READ_HABIT = 0.04, 0.04
 # Ratios of the scatter between tails to the scatter of a row that are tried.
 TAIL_RATIOS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.4, 2.0)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """What is known of the rows before their misfit is looked at.
+
+    Parameters
+    ----------
+    predicted_in : ndarray, shape (n,)
+        Prediction. [in]
+    tails, gears : ndarray of str, shape (n,)
+        Tail and single gear of each row.
+    u_filled_in : ndarray, shape (n,)
+        Further standard deviation of a row, by clearances that were not read. [in]
+    u_read_in : float
+        Standard deviation by the reading of clearances. [in]
+    drawn_in : ndarray, shape (n,)
+        By how much drawing the readings to their expectation changed the prediction. [in]
+    trends, habits : ndarray, shape (n, k)
+        Shapes of trends and habits that are always there in some small measure. [1]
+    """
+
+    predicted_in: Array
+    tails: NDArray[np.str_]
+    gears: NDArray[np.str_]
+    u_filled_in: Array
+    u_read_in: float
+    drawn_in: Array
+    trends: Array
+    habits: Array
 
 
 @dataclass(frozen=True)
@@ -51,6 +83,8 @@ class NoiseModel:
         Bias, slope and small trends, each at one standard deviation in units of the common one. [1]
     floor_in : float
         Scatter that every row has at least. [in]
+    gear_ratio : float
+        Scatter between the gears of one tail over the scatter of a row. [1]
     """
 
     relative: Array
@@ -58,6 +92,7 @@ class NoiseModel:
     gears: NDArray[np.int64]
     loadings: Array
     floor_in: float
+    gear_ratio: float
 
     def floored(self, square: Array) -> Array:
         """Add what no row can be better than to a residual sum of squares.
@@ -87,11 +122,18 @@ class NoiseModel:
         NoiseModel
             Their noise.
         """
-        return NoiseModel(self.relative[rows], self.tails[rows], self.gears[rows], self.loadings[rows], self.floor_in)
+        return NoiseModel(
+            self.relative[rows],
+            self.tails[rows],
+            self.gears[rows],
+            self.loadings[rows],
+            self.floor_in,
+            self.gear_ratio,
+        )
 
     def factors(self, tail_ratio: float) -> Array:
         """Low-rank part of the covariance, shape (n, k). [1]"""
-        each = GEAR_RATIO * (self.gears[:, None] == np.arange(self.gears.max() + 1))
+        each = self.gear_ratio * (self.gears[:, None] == np.arange(self.gears.max() + 1))
         if tail_ratio == 0.0:
             return np.hstack([each, self.loadings])
         indicator = (self.tails[:, None] == np.arange(self.tails.max() + 1)).astype(float)
@@ -209,7 +251,7 @@ def tail_numbers(tails: Sequence[str] | NDArray[np.str_]) -> NDArray[np.int64]:
     return np.unique(np.asarray(tails), return_inverse=True)[1].astype(np.int64)
 
 
-def small_trends(table: DiagnosisTable) -> Array:
+def small_trends(table: DiagnosisTable) -> tuple[Array, Array]:
     """Trends and habits that are always there in some small measure: people, gauges, seasons, wear.
 
     Parameters
@@ -219,79 +261,70 @@ def small_trends(table: DiagnosisTable) -> Array:
 
     Returns
     -------
-    ndarray, shape (n, k)
-        Each at one standard deviation, in units of the scatter of a row. [1]
+    trends : ndarray, shape (n, k)
+        Straight and bent lines over each quantity, of unit root mean square. [1]
+    habits : ndarray, shape (n, m)
+        Rows of each gauge, technician, side and approach. [1]
     """
-    parts = []
+    trends, habits = [], []
     for values in table.quantities.values():
         known = np.isfinite(values)
         if known.sum() > 2 and np.std(values[known]) > 0.0:
             z = (values - np.mean(values[known])) / np.std(values[known])
-            parts.append(TREND * np.where(known, z, 0.0))
-            parts.append(TREND * np.where(known, z * z - 1.0, 0.0) / np.sqrt(2.0))
+            trends.append(np.where(known, z, 0.0))
+            trends.append(np.where(known, z * z - 1.0, 0.0) / np.sqrt(2.0))
     for name in ("gauge_id", "technician_id", "side", "approach"):
         texts = table.factors.get(name)
         if texts is not None:
-            parts += [HABIT * (texts == value) for value in np.unique(texts) if value]
-    return np.column_stack(parts) if parts else np.empty((len(table), 0))
+            habits += [(texts == value).astype(float) for value in np.unique(texts) if value]
+    empty = np.empty((len(table), 0))
+    return np.column_stack(trends) if trends else empty, np.column_stack(habits) if habits else empty
 
 
-def build_noise(
-    misfit: Array,
-    predicted: Array,
-    tails: NDArray[np.str_],
-    gears: NDArray[np.str_],
-    extra_in: Array,
-    trends: Array,
-    drawn_in: Array,
-    explained: Array | None = None,
-) -> tuple[NoiseModel, float]:
+def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> NoiseModel:
     """Estimate the noise model from the misfit.
 
     Parameters
     ----------
     misfit : ndarray, shape (n,)
         Measured less predicted. [in]
-    predicted : ndarray, shape (n,)
-        Prediction. [in]
-    tails : ndarray of str, shape (n,)
-        Tail of each row.
-    gears : ndarray of str, shape (n,)
-        Single gear of each row.
-    extra_in : ndarray, shape (n,)
-        Further standard deviation of a row, by filled clearances. [in]
-    trends : ndarray, shape (n, k)
-        Small trends that are always there, in units of the scatter of a row. [1]
-    drawn_in : ndarray, shape (n,)
-        By how much drawing the readings to their expectation changed the prediction. [in]
+    rows : Rows
+        What is known of the rows.
     explained : ndarray, shape (n,), optional
         What a tentative cause explains; removed before the scatter is estimated. [in]
 
     Returns
     -------
-    noise : NoiseModel
+    NoiseModel
         The model.
-    scale : float
-        Common standard deviation of a row, first guess. [in]
     """
     rest = misfit if explained is None else misfit - explained
-    numbers = tail_numbers(tails)
+    predicted = rows.predicted_in
+    numbers = tail_numbers(rows.tails)
     centred = rest.copy()
     for tail in range(numbers.max() + 1):
-        rows = numbers == tail
-        if rows.sum() > 2:
-            centred[rows] -= np.median(rest[rows])
+        own = numbers == tail
+        if own.sum() > 2:
+            centred[own] -= np.median(rest[own])
     least = max(LEAST_SCATTER * float(np.sqrt(np.mean(predicted**2))), 1e-9)
     scale = max(robust_scale(centred), least)
     relative = _growth(centred, predicted)
     scale = max(robust_scale(centred / relative), least)
-    relative = np.sqrt(relative**2 + (extra_in / scale) ** 2)
+    relative = np.sqrt(relative**2 + (rows.u_filled_in / scale) ** 2)
     # Rows far out in the tails of the distribution count less, but never as nothing.
     standard = np.minimum(np.abs(centred), _companion(rest, numbers)) / (scale * relative)
     relative = relative * np.maximum(1.0, standard / 3.0)
-    bias = np.column_stack([np.full(len(misfit), BIAS_IN), SLOPE * predicted, DRAWN * drawn_in]) / scale
-    loadings = np.hstack([bias, trends])
-    return NoiseModel(relative, numbers, tail_numbers(gears), loadings, 0.5 * least), scale
+    read = min(rows.u_read_in / scale, 1.0)
+    bias = [
+        np.full(len(misfit), (BIAS_IN + read * READ_BIAS_IN) / scale),
+        (SLOPE + read * READ_SLOPE) * predicted / scale,
+        DRAWN * rows.drawn_in / scale,
+    ]
+    trends = (TREND + read * READ_TREND) * rows.trends
+    habits = (HABIT + read * READ_HABIT) * rows.habits
+    loadings = np.hstack([np.column_stack(bias), trends, habits])
+    gear_ratio = float(np.hypot(GEAR_RATIO, read * READ_GEAR_RATIO))
+    return NoiseModel(relative, numbers, tail_numbers(rows.gears), loadings, 0.5 * least, gear_ratio)
 
 
 def _companion(values: Array, tails: NDArray[np.int64]) -> Array:

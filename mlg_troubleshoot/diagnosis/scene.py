@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,19 +11,20 @@ from numpy.typing import NDArray
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Scene
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
-from mlg_troubleshoot.gear.directions import WorstCase
+from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 
 Array = NDArray[np.float64]
 
 _MOST_SIGMAS = 2.0
-_READ_BETTER = 0.85
+# Doubt whether clearances were read as well as declared: standard deviation of the share of the declared error. [1]
+_SHARE_DOUBT = 0.35
 # Wear of a gear at any time is at least this share of its mean: an overhaul resets the landings, not every joint.
 _LEAST_SHAPE = 0.3
 
 
-def likely_clearances(table: DiagnosisTable) -> tuple[Array, Array]:
+def likely_clearances(table: DiagnosisTable) -> tuple[Array, Array, Array]:
     """Most likely clearances behind the readings, and those of joints that were not read.
 
     A gear's joint wears along its own history: its clearance is expected near the gear's own level, growing
@@ -40,11 +42,13 @@ def likely_clearances(table: DiagnosisTable) -> tuple[Array, Array]:
     -------
     likely : ndarray, shape (n, n_joints)
         Clearances without gaps. [in]
-    u_in : ndarray, shape (n, n_joints)
+    u_filled_in : ndarray, shape (n, n_joints)
         Standard uncertainty of the filled ones, 0 for the measured ones. [in]
+    u_read_in : ndarray, shape (n, n_joints)
+        Standard uncertainty that is left of the measured ones, 0 for the filled ones. [in]
     """
     readings = table.clearance_in
-    likely, spread = np.zeros_like(readings), np.zeros_like(readings)
+    likely, spread, left = np.zeros_like(readings), np.zeros_like(readings), np.zeros_like(readings)
     gears = np.unique(table.gears, return_inverse=True)[1]
     for j in range(readings.shape[1]):
         known = np.isfinite(readings[:, j])
@@ -63,7 +67,8 @@ def likely_clearances(table: DiagnosisTable) -> tuple[Array, Array]:
         reach = _MOST_SIGMAS * np.sqrt(noise)
         likely[:, j] = np.where(known, np.clip(drawn, read - reach, read + reach), drawn)
         spread[:, j] = np.where(known, 0.0, np.sqrt(true))
-    return np.maximum(likely, 0.0), spread
+        left[:, j] = np.where(known, np.sqrt(trust * noise), 0.0)
+    return np.maximum(likely, 0.0), spread, left
 
 
 def _expected(
@@ -117,8 +122,37 @@ def _resolution(values: Array) -> float:
     return step if step >= 1e-4 and bool(np.mean(on_grid) > 0.9) else 0.0
 
 
-def build_scene(model: LinkageModel, table: DiagnosisTable, where: Discrepancies) -> tuple[Scene, WorstCase, Array]:
+@dataclass(frozen=True)
+class Prediction:
+    """The plain prediction with what is not known about it.
+
+    Parameters
+    ----------
+    scene : Scene
+        Model, rows and plain prediction.
+    worst : WorstCase
+        Worst directions of each row.
+    u_filled_in : ndarray, shape (n,)
+        Standard uncertainty by clearances that were not read. [in]
+    u_read_in : float
+        Standard uncertainty by the reading of clearances, root mean square over the rows. [in]
+    drawn_in : ndarray, shape (n,)
+        By how much the prediction from the readings as they are lies above the one with all of them drawn to
+        their expectation. [in]
+    """
+
+    scene: Scene
+    worst: WorstCase
+    u_filled_in: Array
+    u_read_in: float
+    drawn_in: Array
+
+
+def build_scene(model: LinkageModel, table: DiagnosisTable, where: Discrepancies) -> Prediction:
     """Predict every row with the plain model.
+
+    Readings of clearances are drawn to their expectation as far as the measured displacements say that they
+    scatter as declared: a gauge that reads better than declared is believed more.
 
     Parameters
     ----------
@@ -131,38 +165,49 @@ def build_scene(model: LinkageModel, table: DiagnosisTable, where: Discrepancies
 
     Returns
     -------
-    scene : Scene
-        Model, rows and plain prediction.
-    worst : WorstCase
-        Worst directions of each row.
-    u_filled_in : ndarray, shape (n,)
-        Standard uncertainty of the prediction by filled clearances. [in]
+    Prediction
+        The prediction.
     """
-    clearance, u_clearance = likely_clearances(table)
+    likely, u_filled, u_read = likely_clearances(table)
+    as_read = np.where(np.isfinite(table.clearance_in), table.clearance_in, likely)
+    drawn = worst_case(model, likely).over_in - worst_case(model, as_read).over_in
+    share = _share_of_declared(table.measured_in - worst_case(model, as_read).over_in, drawn)
+    clearance = as_read + share * (likely - as_read)
     worst = adjusted_worst_case(model, Adjustment(clearance))
-    as_read = np.where(np.isfinite(table.clearance_in), table.clearance_in, clearance)
-    plain = adjusted_worst_case(model, Adjustment(as_read))
-    if _spread(table.measured_in - plain.over_in) < _READ_BETTER * _spread(table.measured_in - worst.over_in):
-        # The readings as they are fit clearly better: they were read better than declared.
-        clearance, worst = as_read, plain
-    contribution = np.empty_like(clearance)
-    slopes = np.zeros_like(clearance)
+    contribution, slopes = np.empty_like(clearance), np.empty_like(clearance)
     for j in range(clearance.shape[1]):
-        without = clearance.copy()
+        without, moved = clearance.copy(), clearance.copy()
         without[:, j] = 0.0
+        moved[:, j] += 1e-5
         contribution[:, j] = worst.over_in - model.displacement(links_from(without, worst.over_directions))
-        if np.any(u_clearance[:, j] > 0):
-            moved = clearance.copy()
-            moved[:, j] += 1e-5
-            slopes[:, j] = (model.displacement(links_from(moved, worst.over_directions)) - worst.over_in) / 1e-5
+        slopes[:, j] = (model.displacement(links_from(moved, worst.over_directions)) - worst.over_in) / 1e-5
     scene = Scene(model, table, clearance, model.joint_numbers, where, worst.over_in, contribution)
-    return scene, worst, np.sqrt(np.sum((slopes * u_clearance) ** 2, axis=1))
+    filled_in = np.sqrt(np.sum((slopes * u_filled) ** 2, axis=1))
+    read_in = share * float(np.sqrt(np.nanmean(np.sum((slopes * u_read) ** 2, axis=1))))
+    return Prediction(scene, worst, filled_in, read_in, np.nan_to_num(-drawn))
 
 
-def _spread(misfit: Array) -> float:
-    """Scatter of a misfit about its median, robust; infinite where nothing can be compared. [in]"""
-    known = misfit[np.isfinite(misfit)]
-    return float(np.median(np.abs(known - np.median(known)))) if len(known) else np.inf
+def _share_of_declared(misfit: Array, drawn: Array) -> float:
+    """Share of the declared error of clearances that the misfit shows, 0 to 1. [1]
+
+    What the error of a reading adds to the prediction, drawing takes off in part; so the misfit against the
+    readings as they are follows the drawing, all of it if they scatter as declared, nothing if they do not.
+    """
+    known = np.isfinite(misfit) & np.isfinite(drawn)
+    y, d = misfit[known], drawn[known]
+    if len(y) < 3 or np.ptp(d) == 0.0:
+        return 1.0
+    share, level = 1.0, float(np.median(y - d))
+    for _ in range(20):
+        rest = y - level - share * d
+        scale = max(1.4826 * float(np.median(np.abs(rest))), 1e-9)
+        weight = np.minimum(1.0, 2.0 * scale / np.maximum(np.abs(rest), 1e-12))
+        middle = float(weight @ d / weight.sum())
+        level = float(weight @ (y - share * d) / weight.sum())
+        told = float(weight @ (d - middle) ** 2) / scale**2
+        slope = float(weight @ ((d - middle) * y)) / scale**2
+        share = (slope + 1.0 / _SHARE_DOUBT**2) / (told + 1.0 / _SHARE_DOUBT**2)
+    return float(np.clip(share, 0.0, 1.0))
 
 
 def effect(scene: Scene, worst: WorstCase, adjustment: Adjustment) -> Array:

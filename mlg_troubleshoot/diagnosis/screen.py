@@ -113,7 +113,8 @@ class Screen:
         Returns
         -------
         ndarray, shape (n_candidates, n_pool)
-            Gain over the null, profiled over scale and tail scatter; −inf where the two are alike. [1]
+            Gain over the null, profiled over scale and tail scatter; −inf where the two are alike, or one of them
+            would have the wrong sign. [1]
         """
         n = len(data)
         best = np.full((self.columns.shape[1], len(pool)), -np.inf)
@@ -124,13 +125,18 @@ class Screen:
             null = max(null, float(-0.5 * n * np.log(rest[0] / n) - 0.5 * log_determinant))
             cross = self.columns.T @ weighted[:, pool]
             own = np.maximum(square, 1e-300)
-            first = along[pool, 0] ** 2 / own[pool]
-            left = square[:, None] - cross**2 / own[pool]
-            apart = left > 1e-3 * own[:, None]
-            second = (along - cross * (along[pool, 0] / own[pool])) ** 2 / np.where(apart, left, 1.0)
-            remaining = np.maximum(rest[0] - first - np.where(apart, second, -np.inf), 1e-12 * rest[0])
+            apart = square[:, None] * own[pool] - cross**2
+            clear = apart > 1e-3 * own[:, None] * own[pool]
+            # Least squares for both at once; a pair one of which would have the wrong sign is no pair.
+            apart = np.where(clear, apart, 1.0)
+            value = (along * own[pool] - cross * along[pool, 0]) / apart
+            partner = (along[pool, 0] * own[:, None] - cross * along) / apart
+            clear &= (self.signs[:, None] == 0) | (np.sign(value) == self.signs[:, None])
+            clear &= (self.signs[pool] == 0) | (np.sign(partner) == self.signs[pool])
+            explained = value * along + partner * along[pool, 0]
+            remaining = np.maximum(rest[0] - np.where(clear, explained, 0.0), 1e-12 * rest[0])
             likelihood = -0.5 * n * np.log(remaining / n) - 0.5 * log_determinant
-            best = np.maximum(best, np.where(apart, likelihood, -np.inf))
+            best = np.maximum(best, np.where(clear, likelihood, -np.inf))
         return np.asarray(best - null)
 
     def tail_ratio(self, data: Array) -> tuple[float, float]:

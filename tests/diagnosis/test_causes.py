@@ -71,7 +71,7 @@ def test_a_cause_of_size_zero_changes_nothing(name: str, gear: Gear, scene: Scen
 
 @pytest.mark.parametrize("name", NEEDS)
 def test_the_column_of_a_cause_is_the_slope_of_the_true_worst_case(name: str, gear: Gear, scene: Scene) -> None:
-    cause, worst = BY_NAME[name], build_scene(gear.model, scene.table, gear.discrepancies)[1]
+    cause, worst = BY_NAME[name], build_scene(gear.model, scene.table, gear.discrepancies).worst
     candidate = first(cause, scene)
     column = effect_columns(scene, worst, [candidate])[:, 0]
     step = 1e-3 * cause.trial

@@ -151,7 +151,7 @@ class DateStep(Cause):
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield one candidate for each day on which the change may have come."""
         days = scene.table.quantities["day"]
-        for day in _change_days(days, max(_LEAST_ROWS, len(days) // 25), 60):
+        for day in _change_days(days, max(_LEAST_ROWS, len(days) // 25), 400):
             yield Candidate(self, None, {"day": day, "since": _date(scene, day)})
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
