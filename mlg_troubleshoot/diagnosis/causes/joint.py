@@ -62,7 +62,8 @@ class OvalWear(_JointShare):
 class JointContact(Cause):
     """Two adjacent joints cannot take up both clearances.
 
-    Two forms: a share of the smaller contribution is lost, or the two together have room for so much only.
+    Three forms: a share of the smaller contribution is lost, or of the smaller clearance, or the two together
+    have room for so much only.
     """
 
     name: ClassVar[str] = "joint_contact"
@@ -81,6 +82,7 @@ class JointContact(Cause):
                 continue
             label = f"joints {first},{second}"
             yield Candidate(self, label, {"pair": (first, second), "room_in": None})
+            yield Candidate(self, label, {"pair": (first, second), "room_in": None, "smaller": "clearance"})
             for share in _ROOM_QUANTILES:
                 yield Candidate(self, label, {"pair": (first, second), "room_in": float(np.quantile(a + b, share))})
 
@@ -90,7 +92,8 @@ class JointContact(Cause):
         clearance = scene.clearance_in.copy()
         room = candidate.setting.get("room_in")
         if room is None:
-            first_is_less = scene.contribution_in[:, a] <= scene.contribution_in[:, b]
+            size = scene.clearance_in if candidate.setting.get("smaller") == "clearance" else scene.contribution_in
+            first_is_less = size[:, a] <= size[:, b]
             keep = max(1.0 - value, 0.0)
             clearance[:, a] *= np.where(first_is_less, keep, 1.0)
             clearance[:, b] *= np.where(first_is_less, 1.0, keep)
