@@ -198,18 +198,17 @@ def diagnose(
     table, faults = _without_faults(model, table, where, None)
     catalogue = (*CATALOGUE, *own_causes)
     testable = [cause for cause in catalogue if set(cause.needs) <= set(table.columns)]
-    not_testable = tuple(
-        (c.name, next(n for n in c.needs if n not in table.columns)) for c in catalogue if c not in testable
-    )
+    blind = [cause for cause in catalogue if cause not in testable]
+    not_testable = tuple((c.name, next(n for n in c.needs if n not in table.columns)) for c in blind)
     rng = np.random.default_rng(seed)
-    case = _infer(model, table, where, testable, permutations, rng, progress)
+    case = _infer(model, table, where, (testable, blind), permutations, rng, progress)
     if case.finding.fit is not None:
         # A large effect hides slips of single cells: look again with what is named taken out.
         explained = case.columns[:, list(case.finding.chosen)] @ case.finding.fit.values
         again, more = _without_faults(model, table, where, explained)
         if more:
             table, faults = again, (*faults, *more)
-            case = _infer(model, table, where, testable, permutations, rng, progress)
+            case = _infer(model, table, where, (testable, blind), permutations, rng, progress)
     return _report(model, table, read, faults, not_testable, case, seed, permutations, rng)
 
 
@@ -239,14 +238,16 @@ def _infer(
     model: LinkageModel,
     table: DiagnosisTable,
     where: Discrepancies,
-    testable: Sequence[Cause],
+    causes: tuple[Sequence[Cause], Sequence[Cause]],
     permutations: int,
     rng: np.random.Generator,
     progress: Callable[[float], None] | None,
 ) -> _Case:
     plain = build_scene(model, table, where)
     scene = plain.scene
+    testable, blind = causes
     candidates = [candidate for cause in testable for candidate in cause.candidates(scene)]
+    candidates += [candidate for cause in blind for candidate in cause.stand_ins(scene)]
     columns = effect_columns(scene, plain.worst, candidates)
     moving = np.isfinite(columns).all(axis=0) & (np.abs(columns).max(axis=0) > 0.0)
     candidates = [c for c, keep in zip(candidates, moving, strict=True) if keep]

@@ -128,7 +128,9 @@ class Inference:
         self.progress = progress or (lambda _share: None)
         self.signs = np.array([c.cause.sign for c in candidates])
         counts = Counter(c.cause.name for c in candidates)
-        self.penalty = np.log([float(counts[c.cause.name]) for c in candidates])
+        self.prior = np.log([float(counts[c.cause.name]) for c in candidates])
+        # What cannot be tested can be a rival, never a name.
+        self.penalty = np.where([c.stands_in for c in candidates], np.inf, self.prior)
 
     def run(self) -> Finding:
         """Run the inference.
@@ -284,13 +286,13 @@ class Inference:
         noise, _fitted = self._refit([lead, *others])
         screen = Screen(noise, self.columns, self.signs, self.columns[:, list(others)] if others else None)
         gain = screen.run(self.misfit[:, None]).gain[:, 0]
-        score = gain - self.penalty
+        score = gain - self.prior
         for k in others:
             score[[i for i, c in enumerate(self.candidates) if c.key == self.candidates[k].key]] = -np.inf
         best: dict[Key, int] = {}
         for k in np.argsort(-score):
             best.setdefault(self.candidates[int(k)].key, int(k))
-        winner = int(np.argmax(score))
+        winner = int(np.argmax(np.where(np.isfinite(self.penalty), score, -np.inf)))
         near, behind = [], {}
         for key, k in best.items():
             if key == self.candidates[winner].key or not np.isfinite(score[k]):

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 
@@ -35,6 +36,8 @@ TREND, READ_TREND = 0.03, 0.03
 HABIT, READ_HABIT = 0.04, 0.04
 # Ratios of the scatter between tails to the scatter of a row that are tried.
 TAIL_RATIOS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.4, 2.0)
+# With fewer tails none of them can be left out.
+_LEAST_TAILS = 6
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,8 @@ class NoiseModel:
         Scatter that every row has at least. [in]
     gear_ratio : float
         Scatter between the gears of one tail over the scatter of a row. [1]
+    tail_ratios : tuple of float
+        Ratios of the scatter between tails to the scatter of a row that are tried. [1]
     """
 
     relative: Array
@@ -93,6 +98,7 @@ class NoiseModel:
     loadings: Array
     floor_in: float
     gear_ratio: float
+    tail_ratios: tuple[float, ...] = TAIL_RATIOS
 
     def floored(self, square: Array) -> Array:
         """Add what no row can be better than to a residual sum of squares.
@@ -129,6 +135,7 @@ class NoiseModel:
             self.loadings[rows],
             self.floor_in,
             self.gear_ratio,
+            self.tail_ratios,
         )
 
     def factors(self, tail_ratio: float) -> Array:
@@ -324,7 +331,29 @@ def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> No
     habits = (HABIT + read * READ_HABIT) * rows.habits
     loadings = np.hstack([np.column_stack(bias), trends, habits])
     gear_ratio = float(np.hypot(GEAR_RATIO, read * READ_GEAR_RATIO))
-    return NoiseModel(relative, numbers, tail_numbers(rows.gears), loadings, 0.5 * least, gear_ratio)
+    ratios = _tail_ratios(rest / (scale * relative), numbers, gear_ratio)
+    return NoiseModel(relative, numbers, tail_numbers(rows.gears), loadings, 0.5 * least, gear_ratio, ratios)
+
+
+def _tail_ratios(standard: Array, tails: NDArray[np.int64], gear_ratio: float) -> tuple[float, ...]:
+    """Scatter between tails that is likely, over that of a row: from none to its estimate. [1]
+
+    By moments, about the fleet's level, without the tail that stands out most, which may be an effect, and
+    enlarged by what the largest of as many normal tails carries on average.
+    """
+    count = np.bincount(tails).astype(float)
+    if len(count) < _LEAST_TAILS:
+        return TAIL_RATIOS
+    mean = np.bincount(tails, standard) / count
+    chance = 1.0 / count + 0.5 * gear_ratio**2
+    level = float(np.median(mean))
+    square = (mean - level) ** 2
+    kept = np.ones(len(count), bool)
+    kept[np.argmax(square / (chance + np.median(square)))] = False
+    largest = float(norm.ppf(1.0 - 0.25 / len(count))) ** 2 / len(count)
+    between = float(np.mean(square[kept])) / (1.0 - largest)
+    most = float(np.sqrt(max(between - float(np.mean(chance[kept])), 0.0)))
+    return (*(ratio for ratio in TAIL_RATIOS if ratio < most), most) if most > 0.0 else (0.0,)
 
 
 def _companion(values: Array, tails: NDArray[np.int64]) -> Array:

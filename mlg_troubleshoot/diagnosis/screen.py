@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mlg_troubleshoot.diagnosis.noise import TAIL_RATIOS, NoiseModel
+from mlg_troubleshoot.diagnosis.noise import NoiseModel
 
 Array = NDArray[np.float64]
 
@@ -48,7 +48,7 @@ class Screen:
         self.columns = columns
         self.signs = signs
         self.fixed = np.empty((len(columns), 0)) if fixed is None else fixed
-        self._parts = [self._part(ratio) for ratio in TAIL_RATIOS]
+        self._parts = [self._part(ratio) for ratio in noise.tail_ratios]
 
     def _part(self, ratio: float) -> tuple[Array, Array, Array, float]:
         """V⁻¹ X, squared length of each column and projector of the fixed columns at one tail ratio."""
@@ -63,7 +63,7 @@ class Screen:
     def _base(self, data: Array, index: int) -> tuple[Array, Array]:
         """Residual sum of squares without candidates, and the products with each of them."""
         weighted, _square, held, _log = self._parts[index]
-        product, _ = self.noise.precision_times(data, TAIL_RATIOS[index])
+        product, _ = self.noise.precision_times(data, self.noise.tail_ratios[index])
         rest = np.einsum("ij,ij->j", data, product)
         if held.shape[1]:
             inner = np.linalg.pinv(self.fixed.T @ held)
@@ -87,7 +87,7 @@ class Screen:
         n = len(data)
         best = np.full((self.columns.shape[1], data.shape[1]), -np.inf)
         null = np.full(data.shape[1], -np.inf)
-        for index in range(len(TAIL_RATIOS)):
+        for index in range(len(self._parts)):
             rest, along = self._base(data, index)
             _weighted, square, _held, log_determinant = self._parts[index]
             flat = -0.5 * n * np.log(rest / n) - 0.5 * log_determinant
@@ -119,7 +119,7 @@ class Screen:
         n = len(data)
         best = np.full((self.columns.shape[1], len(pool)), -np.inf)
         null = -np.inf
-        for index in range(len(TAIL_RATIOS)):
+        for index in range(len(self._parts)):
             rest, along = self._base(data[:, None], index)
             weighted, square, _held, log_determinant = self._parts[index]
             null = max(null, float(-0.5 * n * np.log(rest[0] / n) - 0.5 * log_determinant))
@@ -156,12 +156,12 @@ class Screen:
         """
         n = len(data)
         likelihood, scales = [], []
-        for index in range(len(TAIL_RATIOS)):
+        for index in range(len(self._parts)):
             rest, _along = self._base(data[:, None], index)
             scales.append(float(np.sqrt(rest[0] / n)))
             likelihood.append(-0.5 * n * np.log(rest[0] / n) - 0.5 * self._parts[index][3])
         most = int(np.argmax(likelihood))
-        return TAIL_RATIOS[most], scales[most]
+        return self.noise.tail_ratios[most], scales[most]
 
 
 @dataclass(frozen=True)
@@ -206,7 +206,7 @@ def fit(noise: NoiseModel, columns: Array, data: Array) -> Fit:
     """
     n, k = columns.shape
     best: Fit | None = None
-    for ratio in TAIL_RATIOS:
+    for ratio in noise.tail_ratios:
         product, log_determinant = noise.precision_times(np.column_stack([columns, data]), ratio)
         inner = columns.T @ product[:, :k]
         inverse = np.linalg.pinv(inner)

@@ -65,11 +65,14 @@ class Candidate:
         Which joint, tail, gauge …
     setting : mapping
         What else is fixed, for example the day from which it acts.
+    stands_in : bool
+        True if its column is missing and something else stands for it: it can be a rival, never a name.
     """
 
     cause: Cause
     target: str | None = None
     setting: Mapping[str, Any] = field(default_factory=dict)
+    stands_in: bool = False
 
     @property
     def key(self) -> tuple[str, str | None]:
@@ -115,6 +118,23 @@ class Cause(ABC):
             One for each target and setting.
         """
         yield Candidate(self)
+
+    def stand_ins(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield what the cause would look like although a column that it needs is missing.
+
+        Such a candidate is never named, but keeps a cause that looks like it from being named alone.
+
+        Parameters
+        ----------
+        scene : Scene
+            Model and rows.
+
+        Yields
+        ------
+        Candidate
+            None unless something else in the table moves as the missing column would.
+        """
+        yield from ()
 
     @abstractmethod
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:

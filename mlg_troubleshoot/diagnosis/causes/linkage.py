@@ -114,9 +114,18 @@ class UnlistedWear(Cause):
         if scene.where.wear_shift:
             yield Candidate(self)
 
+    def stand_ins(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield one candidate in which the wear of the joints stands for the landings that nobody recorded."""
+        if scene.where.wear_shift:
+            yield Candidate(self, stands_in=True)
+
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Shift the lever in proportion to the landings."""
-        landings = filled(scene.table.quantities["gear_landings"], 0.0)
+        if candidate.stands_in:
+            worn = scene.clearance_in.mean(axis=0) > 0.0
+            landings = 1000.0 * np.mean(scene.clearance_in[:, worn] / scene.clearance_in[:, worn].mean(axis=0), axis=1)
+        else:
+            landings = filled(scene.table.quantities["gear_landings"], 0.0)
         return Adjustment(scene.clearance_in, changed={str(scene.where.wear_shift): value * landings / 1000.0})
 
 
