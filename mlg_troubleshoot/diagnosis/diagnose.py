@@ -58,12 +58,10 @@ class NamedCause:
 
     @property
     def parameters(self) -> dict[str, float | str]:
-        """The parameters as a person reads them, with the date of a change."""
+        """The parameters as a person reads them, with the date of a change or the exponent of wear."""
         shown: dict[str, float | str] = dict(self.candidate.cause.shown(self.value))
-        since = self.candidate.setting.get("since")
-        if since is not None:
-            shown["since"] = str(since)
-        return shown
+        fixed = self.candidate.setting
+        return shown | {name: fixed[name] for name in ("since", "wear_exponent") if fixed.get(name) is not None}
 
     @property
     def interval_shown(self) -> dict[str, tuple[float, float]]:

@@ -26,7 +26,9 @@ ALARM = 0.03
 # A name needs clearer evidence than an alarm does.
 NAME = 0.002
 SECOND = 0.002
-UNLISTED_ALARM = 0.001
+UNLISTED_ALARM = 0.004
+# Chance below which what is left refutes the named cause.
+REFUTED = 0.001
 # Log-likelihood by which a rival must fall behind to be ruled out.
 RULED_OUT = 2.5
 RULED_OUT_FAINT = 4.0
@@ -290,17 +292,20 @@ class Inference:
         for k in others:
             score[[i for i, c in enumerate(self.candidates) if c.key == self.candidates[k].key]] = -np.inf
         best: dict[Key, int] = {}
+        variants: dict[Key, list[int]] = {}
         for k in np.argsort(-score):
             best.setdefault(self.candidates[int(k)].key, int(k))
+            variants.setdefault(self.candidates[int(k)].key, []).append(int(k))
         winner = int(np.argmax(np.where(np.isfinite(self.penalty), score, -np.inf)))
         near, behind = [], {}
         for key, k in best.items():
             if key == self.candidates[winner].key or not np.isfinite(score[k]):
                 continue
             distance = score[winner] - score[k]
-            if self._alike(winner, k):
+            alike = [gain[i] for i in variants[key] if self._alike(winner, i)]
+            if alike:
                 # The data hardly tell these two apart: which one has more targets must not decide.
-                distance = min(distance, gain[winner] - gain[k])
+                distance = min(distance, gain[winner] - max(alike))
             if distance < (RULED_OUT if clear else RULED_OUT_FAINT):
                 near.append(k)
             elif gain[k] > 2.0:
@@ -330,14 +335,14 @@ class Inference:
         top = int(np.argmax(gain))
         p = _chance(np.max(random_gain, axis=0), float(gain[top]))
         named = float(np.sqrt(np.mean((held @ fitted.values) ** 2)))
-        if p <= UNLISTED_ALARM and self._size(noise, held, top) >= SECOND_SHARE * named:
+        if p <= REFUTED and self._size(noise, held, top) >= SECOND_SHARE * named:
             return p, self.bank.variables[top], True
         needs = {name for k in chosen for name in self.candidates[k].cause.needs}
         own = [i for i, names in enumerate(self.bank.variables) if set(names) <= needs]
         if own:
             strongest = own[int(np.argmax(gain[own]))]
             p_own = _chance(np.max(random_gain[own], axis=0), float(gain[strongest]))
-            if p_own <= UNLISTED_ALARM and self._size(noise, held, strongest) >= OWN_SHARE * named:
+            if p_own <= REFUTED and self._size(noise, held, strongest) >= OWN_SHARE * named:
                 return min(p, p_own), self.bank.variables[strongest], True
         return p, self.bank.variables[top], False
 

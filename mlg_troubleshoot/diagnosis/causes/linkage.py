@@ -12,6 +12,8 @@ from mlg_troubleshoot.gear.adjustment import Adjustment
 
 REFERENCE_TEMPERATURE_C = 20.0
 REFERENCE_PRESSURE_PSI = 3000.0
+# Range of exponents with which parts wear with landings.
+_WEAR_EXPONENTS = (0.85, 1.0, 1.2)
 
 
 class OutOfPlaneTilt(Cause):
@@ -110,9 +112,10 @@ class UnlistedWear(Cause):
     separates: ClassVar[str] = "one plunger reading after a new lock roller, clearances unchanged"
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
-        """Yield one candidate where the gear says which number such wear shifts."""
+        """Yield a few exponents of wear where the gear says which number it shifts."""
         if scene.where.wear_shift:
-            yield Candidate(self)
+            for exponent in _WEAR_EXPONENTS:
+                yield Candidate(self, None, {"wear_exponent": exponent})
 
     def stand_ins(self, scene: Scene) -> Iterator[Candidate]:
         """Yield one candidate in which the wear of the joints stands for the landings that nobody recorded."""
@@ -120,13 +123,15 @@ class UnlistedWear(Cause):
             yield Candidate(self, stands_in=True)
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
-        """Shift the lever in proportion to the landings."""
+        """Shift the lever in proportion to a power of the landings."""
         if candidate.stands_in:
             worn = scene.clearance_in.mean(axis=0) > 0.0
             landings = 1000.0 * np.mean(scene.clearance_in[:, worn] / scene.clearance_in[:, worn].mean(axis=0), axis=1)
         else:
-            landings = filled(scene.table.quantities["gear_landings"], 0.0)
-        return Adjustment(scene.clearance_in, changed={str(scene.where.wear_shift): value * landings / 1000.0})
+            landings = np.maximum(filled(scene.table.quantities["gear_landings"], 0.0), 0.0)
+        exponent = candidate.setting.get("wear_exponent", 1.0)
+        shift = {str(scene.where.wear_shift): value * (landings / 1000.0) ** exponent}
+        return Adjustment(scene.clearance_in, changed=shift)
 
 
 class CalibrationRate(Cause):
