@@ -22,11 +22,11 @@ from mlg_troubleshoot.diagnosis.screen import Fit, Screen, fit
 Array = NDArray[np.float64]
 Key = tuple[str, str | None]
 
-ALARM = 0.03
+ALARM = 0.025
 # A name needs clearer evidence than an alarm does.
 NAME = 0.002
 SECOND = 0.002
-UNLISTED_ALARM = 0.004
+UNLISTED_ALARM = 0.002
 # Chance below which what is left refutes the named cause.
 REFUTED = 0.001
 # Log-likelihood by which a rival must fall behind to be ruled out.
