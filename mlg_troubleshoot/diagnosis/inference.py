@@ -165,7 +165,8 @@ class Inference:
 
     def _null(self, noise: NoiseModel, ratio: float, scale: float) -> Array:
         normal = self.rng.standard_normal(4096)
-        return noise.draw(normal, ratio, scale, self.permutations, self.rng)
+        # Bias and slope are lengths: a scatter below what any row has would shrink them with it.
+        return noise.draw(normal, ratio, max(scale, 2.0 * noise.floor_in), self.permutations, self.rng)
 
     def _smallest(self, at_random: Array, scale: float) -> float:
         """Effect whose expected gain clears the alarm with four chances in five: (t − 0.84)² / 2 = bar."""

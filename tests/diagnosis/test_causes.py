@@ -128,10 +128,29 @@ def test_growth_is_in_proportion_to_the_distance_from_20_c(scene: Scene) -> None
     assert factor == pytest.approx(1.0 + 1e-5 * (scene.table.quantities["temperature_c"] - 20.0), abs=1e-12)
 
 
-def test_unlisted_wear_shifts_the_lever_per_thousand_landings(scene: Scene) -> None:
+@pytest.mark.parametrize("exponent", [0.85, 1.0, 1.2])
+def test_unlisted_wear_shifts_the_lever_with_a_power_of_the_landings(exponent: float, scene: Scene) -> None:
     cause = BY_NAME["unlisted_wear"]
-    (shift,) = cause.adjust(scene, only(cause, scene), 0.002).changed.values()
-    assert shift == pytest.approx(0.002 * scene.table.quantities["gear_landings"] / 1000.0)
+    candidate = next(c for c in cause.candidates(scene) if c.setting["wear_exponent"] == exponent)
+    (shift,) = cause.adjust(scene, candidate, 0.002).changed.values()
+    assert shift == pytest.approx(0.002 * (scene.table.quantities["gear_landings"] / 1000.0) ** exponent)
+
+
+def test_wear_of_the_joints_stands_for_landings_that_nobody_recorded(scene: Scene) -> None:
+    cause = BY_NAME["unlisted_wear"]
+    (stand_in,) = cause.stand_ins(scene)
+    (shift,) = cause.adjust(scene, stand_in, 0.002).changed.values()
+    assert np.corrcoef(shift, scene.clearance_in.sum(axis=1))[0, 1] > 0.9
+
+
+def test_contact_may_cost_the_smaller_clearance_where_that_contributes_more(gear: Gear, scene: Scene) -> None:
+    cause = JointContact()
+    candidate = next(
+        c for c in cause.candidates(scene) if c.target == "joints 9,10" and c.setting.get("smaller") == "clearance"
+    )
+    left = cause.adjust(scene, candidate, 1.0).clearance_in[:, [8, 9]]
+    assert np.all(left.max(axis=1) == scene.clearance_in[:, [8, 9]].max(axis=1))
+    assert np.all(left.min(axis=1) == 0.0)
 
 
 @pytest.mark.parametrize(("name", "value"), [("direction_not_worst_case", -0.4), ("oval_wear", 0.4)])
