@@ -416,7 +416,7 @@ def write_reports(
     directory : Path
         Folder to write to; it is made if it does not exist.
     formats : sequence of str
-        ``html``, ``pdf`` or both.
+        Any of ``html``, ``pdf`` and ``pdf-ua`` (tagged).
     page : str
         ``A4`` or ``Letter``.
     on_written : callable, optional
@@ -626,6 +626,7 @@ def examine_installation(gear: str = DEFAULT_GEAR) -> tuple[Ability, ...]:
     import tempfile
 
     from mlg_troubleshoot.geometry.kernel import numba_is_installed
+    from mlg_troubleshoot.reporting.tagged import tagged_pdf_engine
 
     python = f"{sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
     found = [Ability("Python", python, sys.version_info >= (3, 11), remedy="Install Python 3.11 or later.")]
@@ -647,6 +648,9 @@ def examine_installation(gear: str = DEFAULT_GEAR) -> tuple[Ability, ...]:
     found.append(
         Ability("fast kernel", speed, numba_is_installed(), needed=False, remedy="pip install 'mlg-troubleshoot[fast]'")
     )
+    tagged, detail = tagged_pdf_engine()
+    remedy = "pip install 'mlg-troubleshoot[tagged]'; on Debian also libpango-1.0-0 and libpangoft2-1.0-0"
+    found.append(Ability("tagged PDF/UA", detail, tagged, needed=False, remedy=remedy))
     return tuple(found)
 
 
@@ -843,7 +847,7 @@ def write_diagnosis_report(result: DiagnoseResult, options: DiagnoseOptions, dir
         problems=result.problems,
         notes=result.notes,
     )
-    return [path for path in (written.html, written.pdf) if path is not None]
+    return list(written.files)
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,6 +40,7 @@ class ReportFormat(StrEnum):
 
     HTML = "html"
     PDF = "pdf"
+    PDF_UA = "pdf-ua"
 
 
 class Page(StrEnum):
@@ -133,7 +134,10 @@ def check(
         Path | None, typer.Option("--report", metavar="DIR", help="Write printable reports to this folder.")
     ] = None,
     formats: Annotated[
-        list[ReportFormat] | None, typer.Option("--format", help="Report format, may repeat; default both.")
+        list[ReportFormat] | None,
+        typer.Option(
+            "--format", help="Report format, may repeat; default html and pdf. pdf-ua: tagged, for screen readers."
+        ),
     ] = None,
     page: Annotated[Page, typer.Option("--page", help="Paper of the report.")] = Page.A4,
     repairs: Annotated[bool, typer.Option("--repairs", help="Repair sets for each gear of a batch.")] = False,

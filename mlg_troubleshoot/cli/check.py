@@ -367,7 +367,7 @@ def _write_reports(arguments: CheckArguments, options: workflows.CheckOptions, r
     notes = dict.fromkeys(note for report in written for note in report.notes)
     for note in notes:
         typer.echo(f"Note: {note}", err=True)
-    files = [path for report in written for path in (report.html, report.pdf) if path is not None]
+    files = [path for report in written for path in report.files]
     if not files:
         raise OutputError("no report could be written", "See the notes above.")
     if not arguments.quiet:

@@ -189,9 +189,8 @@ def _write_report(findings: StudyFindings, directory: Path, page: str) -> None:
     written = write_study_report(findings, directory, page)
     for note in written.notes:
         typer.echo(f"Note: {note}", err=True)
-    for path in (written.html, written.pdf):
-        if path is not None:
-            typer.echo(f"Report: {path}", err=True)
+    for path in written.files:
+        typer.echo(f"Report: {path}", err=True)
 
 
 def _searches(gear: Gear, options: StudyOptions, advance: Advance) -> tuple[WorstSearch, ...]:

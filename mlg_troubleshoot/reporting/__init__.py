@@ -17,6 +17,7 @@ from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.reporting.publish import (
     FORMATS,
     PAGES,
+    USUAL_FORMATS,
     Progress,
     WrittenReport,
     publish,
@@ -27,6 +28,7 @@ from mlg_troubleshoot.reporting.publish import (
 __all__ = [
     "FORMATS",
     "PAGES",
+    "USUAL_FORMATS",
     "Document",
     "Progress",
     "ReportProvenance",
@@ -79,7 +81,7 @@ def write_inspection_report(
     directory: Path,
     *,
     provenance: ReportProvenance,
-    formats: Sequence[str] = FORMATS,
+    formats: Sequence[str] = USUAL_FORMATS,
     page: str = "A4",
     problems: Iterable[Problem] = (),
 ) -> WrittenReport:
@@ -96,7 +98,8 @@ def write_inspection_report(
     provenance : ReportProvenance
         Program, inputs and moment.
     formats : sequence of str
-        ``html``, ``pdf`` or both. Where no PDF can be made, the HTML is written in its place and a note says so.
+        Any of ``html``, ``pdf`` and ``pdf-ua`` (tagged). Where no PDF can be made, the HTML is written in its
+        place and a note says so.
     page : str
         ``A4`` or ``Letter``.
     problems : iterable of Problem, optional
@@ -158,7 +161,7 @@ def write_batch_report(
     directory: Path,
     *,
     provenance: ReportProvenance,
-    formats: Sequence[str] = FORMATS,
+    formats: Sequence[str] = USUAL_FORMATS,
     page: str = "A4",
     notes: Sequence[str] = (),
 ) -> WrittenReport:
@@ -177,7 +180,7 @@ def write_batch_report(
     provenance : ReportProvenance
         Program, inputs and moment.
     formats : sequence of str
-        ``html``, ``pdf`` or both.
+        Any of ``html``, ``pdf`` and ``pdf-ua`` (tagged).
     page : str
         ``A4`` or ``Letter``, in landscape.
     notes : sequence of str, optional
@@ -204,7 +207,7 @@ def write_reports(
     directory: Path,
     *,
     provenance: ReportProvenance,
-    formats: Sequence[str] = FORMATS,
+    formats: Sequence[str] = USUAL_FORMATS,
     page: str = "A4",
     notes: Sequence[str] = (),
     workers: int | None = None,
@@ -225,7 +228,7 @@ def write_reports(
     provenance : ReportProvenance
         Program, inputs and moment.
     formats : sequence of str
-        ``html``, ``pdf`` or both.
+        Any of ``html``, ``pdf`` and ``pdf-ua`` (tagged).
     page : str
         ``A4`` or ``Letter``.
     notes : sequence of str, optional

@@ -39,7 +39,7 @@ from mlg_troubleshoot.reporting.diagnosis_lines import (
 from mlg_troubleshoot.reporting.formats import ABSENT, inches, millimetres, number, percent, several
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
-from mlg_troubleshoot.reporting.publish import FORMATS, WrittenReport, publish, safe_stem
+from mlg_troubleshoot.reporting.publish import USUAL_FORMATS, WrittenReport, publish, safe_stem
 
 _WORDS = {
     "NAMED": "CAUSE NAMED",
@@ -143,7 +143,7 @@ def write_diagnosis_report(
     *,
     extension: ModelExtension | None,
     provenance: ReportProvenance,
-    formats: Sequence[str] = FORMATS,
+    formats: Sequence[str] = USUAL_FORMATS,
     page: str = "A4",
     problems: Iterable[Problem] = (),
     notes: Iterable[str] = (),
@@ -163,7 +163,7 @@ def write_diagnosis_report(
     provenance : ReportProvenance
         Program, inputs and moment.
     formats : sequence of str
-        ``html``, ``pdf`` or both.
+        Any of ``html``, ``pdf`` and ``pdf-ua`` (tagged).
     page : str
         ``A4`` or ``Letter``.
     problems : iterable of Problem, optional

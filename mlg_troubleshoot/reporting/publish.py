@@ -18,9 +18,11 @@ from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.reporting.glyphs import missing_characters, spell_out
 from mlg_troubleshoot.reporting.html import Document, render
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError, has_missing_glyphs
+from mlg_troubleshoot.reporting.tagged import make_tagged_pdf
 
 Progress = Callable[[int, int], None]
-FORMATS = ("html", "pdf")
+FORMATS = ("html", "pdf", "pdf-ua")
+USUAL_FORMATS = ("html", "pdf")
 PAGES = ("A4", "Letter")
 
 
@@ -30,7 +32,7 @@ class WrittenReport:
 
     Parameters
     ----------
-    html, pdf : Path or None
+    html, pdf, tagged : Path or None
         The files; None if it was not asked for, or could not be made.
     notes : tuple of str
         What the user must know about them.
@@ -38,7 +40,13 @@ class WrittenReport:
 
     html: Path | None
     pdf: Path | None
+    tagged: Path | None
     notes: tuple[str, ...]
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that were written."""
+        return tuple(path for path in (self.html, self.pdf, self.tagged) if path is not None)
 
 
 def safe_stem(*identity: str | None) -> str:
@@ -111,7 +119,7 @@ def publish(
     directory : Path
         Folder; it is made if it is missing.
     formats : sequence of str
-        ``html``, ``pdf`` or both. Where no PDF can be made, the HTML is written in its place.
+        Any of ``html``, ``pdf`` and ``pdf-ua`` (tagged). Where no PDF can be made, the HTML is written in its place.
     page : str
         ``A4`` or ``Letter``.
     created : datetime.datetime
@@ -135,31 +143,38 @@ def publish(
     if unknown or page not in PAGES:
         asked, known = (unknown[0], FORMATS) if unknown else (page, PAGES)
         raise UsageError(f"a report cannot be written as {asked!r}", f"Give one of {', '.join(known)}.")
-    web, paper = directory / f"{document.stem}.html", directory / f"{document.stem}.pdf"
-    wants_pdf = "pdf" in formats
-    own = PdfEngine() if wants_pdf and engine is None else None
+    web = directory / f"{document.stem}.html"
+    own = PdfEngine() if "pdf" in formats and engine is None else None
     running = engine or own
     try:
         if own is not None:
             _warm_up(own)
         html = render(document, page)
+        notes: list[str] = []
+        made: dict[str, Path] = {}
         if "html" in formats:
             write_file(web, html.encode("utf-8"))
-        notes: list[str] = []
-        made: bytes | None = None
-        if wants_pdf and running is not None:
+            made["html"] = web
+        for wanted, ending in (("pdf", ".pdf"), ("pdf-ua", "-ua.pdf")):
+            if wanted not in formats:
+                continue
             try:
-                made, notes = _pdf(document, page, created, running)
+                if wanted == "pdf" and running is not None:
+                    pdf, found = _pdf(document, page, created, running)
+                    notes += found
+                else:
+                    pdf = make_tagged_pdf(render(document, page, for_pdf=True))
             except PdfError as error:
-                if "html" not in formats:
-                    write_file(web, html.encode("utf-8"))
-                notes = [
-                    f"No PDF: {error}. Open {web.name} in a web browser and print it; it is laid out for {page} paper."
-                ]
-                return WrittenReport(web, None, tuple(notes))
-        if made is not None:
-            write_file(paper, made)
-        return WrittenReport(web if "html" in formats else None, paper if made else None, tuple(notes))
+                kind = "PDF" if wanted == "pdf" else "tagged PDF"
+                instead = f"Open {web.name} in a web browser and print it; it is laid out for {page} paper."
+                notes.append(f"No {kind}: {error}. {instead}")
+                continue
+            made[wanted] = directory / f"{document.stem}{ending}"
+            write_file(made[wanted], pdf)
+        if "html" not in formats and set(formats) - set(made):
+            write_file(web, html.encode("utf-8"))
+            made["html"] = web
+        return WrittenReport(made.get("html"), made.get("pdf"), made.get("pdf-ua"), tuple(notes))
     finally:
         if own is not None:
             own.close()

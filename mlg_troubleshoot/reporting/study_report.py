@@ -27,7 +27,7 @@ from mlg_troubleshoot.reporting.context import (
 from mlg_troubleshoot.reporting.formats import ABSENT, MINUS, joint_list, number, several
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
-from mlg_troubleshoot.reporting.publish import FORMATS, WrittenReport, publish, safe_stem
+from mlg_troubleshoot.reporting.publish import USUAL_FORMATS, WrittenReport, publish, safe_stem
 from mlg_troubleshoot.reporting.study_figures import BarSeries, Style
 from mlg_troubleshoot.studies.findings import StudyFindings
 from mlg_troubleshoot.studies.statements import Outcome
@@ -109,7 +109,7 @@ def write_study_report(
     directory: Path,
     *,
     provenance: ReportProvenance,
-    formats: Sequence[str] = FORMATS,
+    formats: Sequence[str] = USUAL_FORMATS,
     page: str = "A4",
 ) -> WrittenReport:
     """Write the report of a study.
@@ -123,7 +123,7 @@ def write_study_report(
     provenance : ReportProvenance
         Program, inputs and moment.
     formats : sequence of str
-        ``html``, ``pdf`` or both.
+        Any of ``html``, ``pdf`` and ``pdf-ua`` (tagged).
     page : str
         ``A4`` or ``Letter``.
 
