@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from tests.hidden_effect.study import PLAN, RESULT, markdown, study
+from tests.hidden_effect import ceiling
+from tests.hidden_effect.study import PLAN, RESULT, markdown, study, tasks
 
 OTHER_SEEDS = 7_000_000
 
@@ -33,6 +34,25 @@ def test_every_rate_of_the_committed_study_says_on_how_many_fleets(committed: di
 def test_the_readme_shows_the_table_of_the_committed_study(committed: dict[str, Any]) -> None:
     readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
     assert markdown(committed) in readme
+
+
+def test_the_readme_says_what_no_method_could_exceed() -> None:
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    result = json.loads(ceiling.RESULT.read_text(encoding="utf-8"))
+    assert ceiling.sentence(result) in " ".join(readme.split())
+
+
+def test_the_study_is_nowhere_better_than_the_best_test_could_be(committed: dict[str, Any]) -> None:
+    best = json.loads(ceiling.RESULT.read_text(encoding="utf-8"))["right"]
+    for strength in (10, 15, 25):
+        assert committed["targets"][f"unique and right, S = {strength}"]["low"] <= best[f"single:{strength}"]
+
+
+@pytest.mark.slow
+def test_a_sample_of_the_best_test_agrees_with_the_committed_figure() -> None:
+    committed = json.loads(ceiling.RESULT.read_text(encoding="utf-8"))["right"]["single:10"]
+    plan = list(tasks({"single:10": 56}, OTHER_SEEDS))
+    assert ceiling.ceiling(plan, 2)["right"]["single:10"] == pytest.approx(committed, abs=0.03)
 
 
 @pytest.mark.slow
