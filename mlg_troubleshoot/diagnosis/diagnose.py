@@ -15,7 +15,7 @@ from mlg_troubleshoot.diagnosis.extension import Term
 from mlg_troubleshoot.diagnosis.faults import DataFault, screen_faults
 from mlg_troubleshoot.diagnosis.gain import Gain, measure_gain
 from mlg_troubleshoot.diagnosis.inference import Finding, Inference
-from mlg_troubleshoot.diagnosis.noise import Rows, estimate_repeatability, small_trends
+from mlg_troubleshoot.diagnosis.noise import Rows, estimate_repeatability, measured_uncertainty, small_trends
 from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.errors import InconclusiveDataError
@@ -257,6 +257,7 @@ def _infer(
         table.gears,
         plain.u_filled_in,
         plain.u_read_in,
+        measured_uncertainty(table),
         plain.drawn_in,
         *small_trends(table),
     )
@@ -388,8 +389,7 @@ def _expected_scatter(model: LinkageModel, table: DiagnosisTable, repeatability:
     """Scatter that the gauges alone cause: readings, and clearances through the mechanism. [in]"""
     if not np.isfinite(repeatability):
         return None
-    count = np.maximum(np.isfinite(table.readings_in).sum(axis=1), 1)
     measured = np.isfinite(table.clearance_in)
     amplification = model.plunger_amplification()
     clearance = np.mean(table.gauge_u_in**2 * np.sum((measured * amplification) ** 2, axis=1))
-    return float(np.sqrt(np.mean(repeatability**2 / count) + clearance))
+    return float(np.sqrt(measured_uncertainty(table) ** 2 + clearance))

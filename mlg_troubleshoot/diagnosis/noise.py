@@ -24,7 +24,7 @@ EXPECTED_SLOPE = -0.0045
 # Bias that the null model allows beyond that, one standard deviation: of the mean [in], and of the slope [1]; and
 # what comes on top where clearances are read no better than the plunger.
 BIAS_IN, READ_BIAS_IN = 0.0001, 0.0001
-SLOPE, READ_SLOPE = 0.004, 0.002
+SLOPE, READ_SLOPE = 0.003, 0.003
 # Doubt about how well clearances were really read: share of the drawing that may be too much or too little. [1]
 DRAWN = 0.3
 # Scatter of a row is at least this share of the predictions' size: nothing is known better than that. [1]
@@ -55,6 +55,8 @@ class Rows:
         Further standard deviation of a row, by clearances that were not read. [in]
     u_read_in : float
         Standard deviation by the reading of clearances. [in]
+    u_measured_in : float
+        Standard deviation of a row's measured displacement by the plunger gauge alone, 0 if unknown. [in]
     drawn_in : ndarray, shape (n,)
         By how much drawing the readings to their expectation changed the prediction. [in]
     trends, habits : ndarray, shape (n, k)
@@ -66,6 +68,7 @@ class Rows:
     gears: NDArray[np.str_]
     u_filled_in: Array
     u_read_in: float
+    u_measured_in: float
     drawn_in: Array
     trends: Array
     habits: Array
@@ -227,6 +230,26 @@ def estimate_repeatability(table: DiagnosisTable) -> tuple[float, str]:
     return float("nan"), "unknown"
 
 
+def measured_uncertainty(table: DiagnosisTable) -> float:
+    """Standard deviation of a row's mean reading by the plunger gauge alone.
+
+    Parameters
+    ----------
+    table : DiagnosisTable
+        The rows.
+
+    Returns
+    -------
+    float
+        Root mean square over the rows; 0 if nothing tells. [in]
+    """
+    repeatability, _source = estimate_repeatability(table)
+    if not np.isfinite(repeatability):
+        return 0.0
+    count = np.maximum(np.isfinite(table.readings_in).sum(axis=1), 1)
+    return float(repeatability * np.sqrt(np.mean(1.0 / count)))
+
+
 def robust_scale(values: Array) -> float:
     """Standard deviation from the median absolute deviation.
 
@@ -322,7 +345,9 @@ def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> No
     # Rows far out in the tails of the distribution count less, but never as nothing.
     standard = np.minimum(np.abs(centred), _companion(rest, numbers)) / (scale * relative)
     relative = relative * np.maximum(1.0, standard / 3.0)
-    read = min(rows.u_read_in / scale, 1.0)
+    # Clearances cannot scatter more than the misfit does beyond the plunger gauge.
+    room = np.sqrt(max(scale**2 - rows.u_measured_in**2, 0.0))
+    read = min(rows.u_read_in, room) / scale
     bias = [
         np.full(len(misfit), (BIAS_IN + read * READ_BIAS_IN) / scale),
         (SLOPE + read * READ_SLOPE) * predicted / scale,
