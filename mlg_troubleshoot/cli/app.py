@@ -293,12 +293,12 @@ def gear_verify(context: typer.Context, as_json: JsonOption = False) -> None:
 
 
 @app.command(epilog="Example: [b]mlg doctor[/b]")
-def doctor(gear: GearOption = "hawker-800xp") -> None:
+def doctor(gear: GearOption = "hawker-800xp", as_json: JsonOption = False) -> None:
     """Check whether this installation can do everything."""
     with Boundary():
         from mlg_troubleshoot.cli import doctor as command
 
-        command.run(gear)
+        command.run(gear, as_json=as_json)
 
 
 app.command(epilog=STUDY_EPILOG)(study)

@@ -64,6 +64,12 @@ def test_the_doctor_finds_everything_that_is_needed() -> None:
     assert "PDF report: written, fonts embedded" in found.out
 
 
+def test_the_doctor_says_the_same_in_json() -> None:
+    abilities = {a["ability"]: a for a in mlg("doctor", "--json").json["abilities"]}
+    assert abilities["PDF report"]["works"]
+    assert not abilities["tagged PDF/UA"]["needed"]
+
+
 def test_the_version_is_that_of_the_package() -> None:
     from importlib.metadata import version
 
