@@ -7,14 +7,16 @@ from collections.abc import Callable
 
 import pytest
 
+from mlg_troubleshoot.decision.assess import AssessOptions, assess
 from mlg_troubleshoot.decision.assessment import Rejected, Verdict
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.sources import SourceKind
 from mlg_troubleshoot.reporting.inspection_figures import VERDICT_SHAPE
+from mlg_troubleshoot.studies.table import IndexTable
 
-from .conftest import FAILURE, SOUND, WORN, Judge, Made
+from .conftest import FAILURE, SOUND, WORN, Judge, Made, inspection
 
 Make = Callable[..., Made]
 
@@ -233,3 +235,28 @@ def test_an_invalid_row_says_what_to_correct(rejected: Rejected, make: Make) -> 
 
 def test_an_invalid_row_without_a_side_shows_a_question_mark(rejected: Rejected, make: Make) -> None:
     assert '<p class="side" aria-hidden="true">?</p>' in make(rejected, formats=("html",)).html
+
+
+def test_the_repair_table_shows_what_each_repair_leaves(failure: Made) -> None:
+    section = failure.text.replace("\u00a0", " ").split("Repair sets")[1]
+    assert re.search(r"#3 0\.0172 in > 99\.9 % \d+", section)
+
+
+def test_re_rigging_alone_stands_under_the_repairs(failure: Made) -> None:
+    assert "Re-rigging alone" in failure.text.split("Repair sets")[1]
+
+
+def test_the_report_says_when_more_measuring_changes_nothing(gear: Gear, table: IndexTable, make: Make) -> None:
+    (judged,) = assess([inspection(FAILURE)], gear, table, AssessOptions(repairs=True, advice=True))
+    assert "More measuring does not change the verdict" in make(judged, formats=("html",)).text
+
+
+def test_the_joints_that_explain_a_measured_displacement_have_a_table(
+    gear: Gear, table: IndexTable, make: Make
+) -> None:
+    (partly,) = assess(
+        [inspection({2: 0.001, 4: 0.001}, readings_in=(0.028,))], gear, table, AssessOptions(advice=True)
+    )
+    text = make(partly, formats=("html",)).text
+    assert "Which joints explain the measured displacement" in text
+    assert "#3 or #5" in text

@@ -1,0 +1,65 @@
+"""What the terminal says about the next joint, the repair, re-rigging and the joints that explain a reading."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from tests.cli.conftest import FAILURE, mlg
+
+HAND = ("check", "--tail", "N123", "--side", "LH", "--record-id", "R1", "--convention", "RADIAL")
+
+
+def said(*arguments: object) -> str:
+    """What a run shows, frames and line ends folded."""
+    return " ".join(re.sub(r"[│╭╮╰╯─]", " ", mlg(*arguments).out).split())
+
+
+@pytest.fixture(scope="module")
+def incomplete() -> str:
+    """A gear of which four joints were measured, none of them worn."""
+    clearances = [flag for joint in (1, 2, 3, 4) for flag in ("--set", f"{joint}=0.001in")]
+    return said(*HAND, *clearances)
+
+
+@pytest.fixture(scope="module")
+def explained() -> str:
+    """A gear whose plunger stands off, two joints measured."""
+    return said(*HAND, "--set", "2=0.001in", "--set", "4=0.001in", "--measured", "0.028in")
+
+
+@pytest.fixture(scope="module")
+def failure() -> str:
+    """The published failure."""
+    return said("check", FAILURE)
+
+
+def test_the_next_joint_is_named_with_its_minutes_of_access(incomplete: str) -> None:
+    assert re.search(r"Measure #5 short link outer bearing next\.", incomplete)
+    assert re.search(r"#5 short link outer bearing \(about \d+ min access\)", incomplete)
+
+
+def test_a_verdict_that_more_measuring_cannot_change_says_so(failure: str) -> None:
+    assert "More measuring does not change the verdict (OUTSIDE MARGIN)" in failure
+
+
+def test_the_smallest_repair_is_shown_with_what_it_leaves(failure: str) -> None:
+    assert re.search(r"restore access min worst case in probability within #3 \d+ 0\.0172 > 99\.9 %", failure)
+
+
+def test_re_rigging_alone_is_shown_with_the_risk_that_stays(failure: str) -> None:
+    assert re.search(r"Re-rigging alone .* would leave a worst case of 0\.0450 in", failure)
+    assert "the joints stay worn" in failure
+
+
+def test_the_probability_carries_its_own_error(failure: str) -> None:
+    assert re.search(r"Monte Carlo 0\.03 ± 0\.01 %", failure)
+
+
+def test_the_joints_that_explain_a_reading_are_given_as_pairs_that_act_alike(explained: str) -> None:
+    assert "#3 or #5" in explained
+
+
+def test_that_it_may_not_be_clearance_at_all_has_its_own_share(explained: str) -> None:
+    assert re.search(r"not clearance at all \d+ %", explained)
