@@ -53,7 +53,7 @@ def diagnosis_as_json(diagnosis: Diagnosis, extension: ModelExtension | None) ->
             {
                 "cause": c.candidate.cause.name,
                 "target": c.candidate.target,
-                "separating_reading": c.candidate.cause.separates,
+                "separating_reading": c.candidate.separates,
             }
             for c in d.also_possible
         ],

@@ -135,9 +135,11 @@ def cause_words(cause: NamedCause) -> str:
     Returns
     -------
     str
-        The sentence, its target included.
+        The sentence, its target included; of a cause that cannot be tested, that its column is missing.
     """
-    return cause.candidate.cause.words(cause.candidate.target)
+    candidate = cause.candidate
+    words = candidate.cause.words(candidate.target)
+    return f"{words} (not testable without {' and '.join(candidate.cause.needs)})" if candidate.stands_in else words
 
 
 def seven_lines(d: Diagnosis) -> tuple[Line, ...]:
@@ -303,7 +305,7 @@ def what_to_do(d: Diagnosis) -> str:
     if d.verdict == "NAMED":
         return "; ".join(c.candidate.cause.inspect for c in d.causes) + "."
     if d.verdict == "AMBIGUOUS":
-        return f"To split them, take: {d.also_possible[0].candidate.cause.separates}."
+        return f"To split them, take: {d.also_possible[0].candidate.separates}."
     if d.verdict == "UNLISTED":
         return f"Record what else differs with {_variables(d, ' and ')}; keep the model as it is."
     return "Nothing to change. More rows would find smaller effects."

@@ -544,7 +544,7 @@ def _changes_note(d: Diagnosis) -> str:
 
 def _do(d: Diagnosis) -> list[DoRow]:
     return [
-        {"cause": cause_words(c), "inspect": c.candidate.cause.inspect, "separates": c.candidate.cause.separates}
+        {"cause": cause_words(c), "inspect": c.candidate.cause.inspect, "separates": c.candidate.separates}
         for c in (d.causes or d.also_possible)
     ]
 

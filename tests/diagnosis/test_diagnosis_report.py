@@ -92,6 +92,21 @@ def unlisted(gear: Gear, make: Make) -> Made:
     return make(fleet(gear.model, cold_under_load, rows=160))
 
 
+@pytest.fixture(scope="module")
+def without_landings(gear: Gear, make: Make, plain: DiagnosisTable) -> Made:
+    """Predictions too large, in a table that does not say how many landings a gear has made."""
+    quantities = {name: each for name, each in plain.quantities.items() if name != "gear_landings"}
+    return make(fleet(gear.model, lambda _table, over: -0.08 * over, quantities=quantities))
+
+
+def test_a_cause_that_cannot_be_tested_is_a_rival_and_says_which_column_is_missing(without_landings: Made) -> None:
+    assert "shifts the lever (not testable without gear_landings)" in without_landings.text
+
+
+def test_what_separates_a_cause_that_cannot_be_tested_is_its_column(without_landings: Made) -> None:
+    assert "the same inspections with gear_landings recorded for each" in without_landings.text
+
+
 def test_the_verdict_stands_in_words(named: Made) -> None:
     assert re.search(r'<h2 class="verdict-words"[^>]*>CAUSE NAMED</h2>', named.html)
 

@@ -79,6 +79,13 @@ class Candidate:
         """Cause and target: candidates that share it are variants of one name."""
         return self.cause.name, self.cause.family(self.target)
 
+    @property
+    def separates(self) -> str:
+        """The one reading that would separate it from its rivals."""
+        if self.stands_in:
+            return f"the same inspections with {' and '.join(self.cause.needs)} recorded for each"
+        return self.cause.separates
+
 
 class Cause(ABC):
     """A physical cause of misfit, as a change inside the geometric model.
