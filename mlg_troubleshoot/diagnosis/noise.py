@@ -8,7 +8,7 @@ covariance; what stands out against it is an effect.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +32,16 @@ LEAST_SCATTER = 0.01
 # Scatter between the gears of one tail, in units of the scatter of a row, and what the errors of reading leave in
 # the level of wear of each.
 GEAR_RATIO, READ_GEAR_RATIO = 0.08, 0.28
-# Trends over a quantity, and habits of a gauge or a technician, that are no cause yet, in the same units.
+# Trends over a quantity, and habits of a side or an approach, that are no cause yet, in the same units.
 TREND, READ_TREND = 0.03, 0.03
 HABIT, READ_HABIT = 0.04, 0.04
+# Scatter between gauges, and between technicians, over that of a row, before the data are looked at: median, and
+# spread of its logarithm; the spread for gears; and the ratios that are tried.
+HABIT_OF_ONE, HABIT_SPREAD = 0.1, 0.7
+GEAR_SPREAD = 0.5
+_RATIOS = np.geomspace(0.02, 1.0, 24)
+# With fewer levels nothing can be told.
+_LEAST_LEVELS = 4
 # Ratios of the scatter between tails to the scatter of a row that are tried.
 TAIL_RATIOS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.4, 2.0)
 # With fewer tails none of them can be left out.
@@ -61,6 +68,8 @@ class Rows:
         By how much drawing the readings to their expectation changed the prediction. [in]
     trends, habits : ndarray, shape (n, k)
         Shapes of trends and habits that are always there in some small measure. [1]
+    readers : tuple of ndarray, shape (n, k)
+        Rows of each gauge, and of each technician. [1]
     """
 
     predicted_in: Array
@@ -72,6 +81,7 @@ class Rows:
     drawn_in: Array
     trends: Array
     habits: Array
+    readers: tuple[Array, ...]
 
 
 @dataclass(frozen=True)
@@ -282,7 +292,7 @@ def tail_numbers(tails: Sequence[str] | NDArray[np.str_]) -> NDArray[np.int64]:
     return np.unique(np.asarray(tails), return_inverse=True)[1].astype(np.int64)
 
 
-def small_trends(table: DiagnosisTable) -> tuple[Array, Array]:
+def small_trends(table: DiagnosisTable) -> tuple[Array, Array, tuple[Array, ...]]:
     """Trends and habits that are always there in some small measure: people, gauges, seasons, wear.
 
     Parameters
@@ -295,21 +305,30 @@ def small_trends(table: DiagnosisTable) -> tuple[Array, Array]:
     trends : ndarray, shape (n, k)
         Straight and bent lines over each quantity, of unit root mean square. [1]
     habits : ndarray, shape (n, m)
-        Rows of each gauge, technician, side and approach. [1]
+        Rows of each side and approach. [1]
+    readers : tuple of ndarray, shape (n, k)
+        Rows of each gauge, and of each technician. [1]
     """
-    trends, habits = [], []
+    trends = []
     for values in table.quantities.values():
         known = np.isfinite(values)
         if known.sum() > 2 and np.std(values[known]) > 0.0:
             z = (values - np.mean(values[known])) / np.std(values[known])
             trends.append(np.where(known, z, 0.0))
             trends.append(np.where(known, z * z - 1.0, 0.0) / np.sqrt(2.0))
-    for name in ("gauge_id", "technician_id", "side", "approach"):
-        texts = table.factors.get(name)
-        if texts is not None:
-            habits += [(texts == value).astype(float) for value in np.unique(texts) if value]
     empty = np.empty((len(table), 0))
-    return np.column_stack(trends) if trends else empty, np.column_stack(habits) if habits else empty
+    habits = np.hstack([empty, *(_levels(table, name) for name in ("side", "approach"))])
+    readers = tuple(levels for name in ("gauge_id", "technician_id") if (levels := _levels(table, name)).shape[1] > 1)
+    return np.column_stack(trends) if trends else empty, habits, readers
+
+
+def _levels(table: DiagnosisTable, name: str) -> Array:
+    """Rows of each level of a factor, one column each. [1]"""
+    texts = table.factors.get(name)
+    if texts is None:
+        return np.empty((len(table), 0))
+    levels = np.unique(texts)
+    return (texts[:, None] == levels[levels != ""]).astype(float)
 
 
 def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> NoiseModel:
@@ -355,10 +374,54 @@ def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> No
     ]
     trends = (TREND + read * READ_TREND) * rows.trends
     habits = (HABIT + read * READ_HABIT) * rows.habits
-    loadings = np.hstack([np.column_stack(bias), trends, habits])
     gear_ratio = float(np.hypot(GEAR_RATIO, read * READ_GEAR_RATIO))
     ratios = _tail_ratios(rest / (scale * relative), numbers, gear_ratio)
-    return NoiseModel(relative, numbers, tail_numbers(rows.gears), loadings, 0.5 * least, gear_ratio, ratios)
+    loadings = np.hstack([np.column_stack(bias), trends, habits])
+    gears = tail_numbers(rows.gears)
+    noise = NoiseModel(relative, numbers, gears, loadings, 0.5 * least, gear_ratio, ratios)
+    standard = rest / scale
+    own = [HABIT_OF_ONE] * len(rows.readers)
+    for place, levels in enumerate(rows.readers):
+        others = [HABIT_OF_ONE * other for k, other in enumerate(rows.readers) if k != place]
+        beside = replace(noise, loadings=np.hstack([loadings, *others]))
+        own[place] = _ratio(beside, levels, standard, HABIT_OF_ONE, HABIT_SPREAD)
+    loadings = np.hstack([loadings, *(ratio * levels for ratio, levels in zip(own, rows.readers, strict=True))])
+    alike = replace(noise, loadings=loadings, gear_ratio=0.0)
+    each = (gears[:, None] == np.arange(gears.max() + 1)).astype(float)
+    return replace(noise, loadings=loadings, gear_ratio=_ratio(alike, each, standard, gear_ratio, GEAR_SPREAD))
+
+
+def _ratio(noise: NoiseModel, levels: Array, rest: Array, expected: float, spread: float) -> float:
+    """Scatter between the levels of a factor over that of a row. [1]
+
+    Restricted likelihood with the fleet's level and the one that stands out most left free, because that may be an
+    effect; weighed with what is expected before the data are looked at (median, and spread of the logarithm), and
+    enlarged by what the one that stands out most among as many carries on average.
+    """
+    count = levels.shape[1]
+    if count < _LEAST_LEVELS:
+        return expected
+    held = np.column_stack([np.ones(len(rest)), levels])
+    product, _log = noise.precision_times(np.column_stack([held, rest]), noise.tail_ratios[-1])
+    inner, along = held.T @ product[:, :-1], held.T @ product[:, -1]
+    square, score = _apart(inner, along, 0)
+    most = int(np.argmax(score**2 / np.maximum(np.diag(square), 1e-9)))
+    square, score = _apart(square, score, most)
+    values, vectors = np.linalg.eigh(square)
+    weight = np.maximum(values, 0.0) * _RATIOS[:, None] ** 2
+    pull = (vectors.T @ score) ** 2 * _RATIOS[:, None] ** 2
+    likelihood = 0.5 * np.sum(pull / (1.0 + weight) - np.log1p(weight), axis=1)
+    likelihood -= 0.5 * (np.log(_RATIOS / expected) / spread) ** 2
+    chance = np.exp(likelihood - likelihood.max())
+    largest = float(norm.ppf(1.0 - 0.25 / count)) ** 2 / count
+    return float(np.sqrt(chance @ _RATIOS**2 / chance.sum() / (1.0 - largest)))
+
+
+def _apart(inner: Array, along: Array, free: int) -> tuple[Array, Array]:
+    """Products of columns with each other and with the data, one of the columns left free and taken out."""
+    kept = np.delete(np.arange(len(along)), free)
+    share = inner[kept, free] / max(float(inner[free, free]), 1e-9)
+    return inner[np.ix_(kept, kept)] - np.outer(share, inner[free, kept]), along[kept] - share * along[free]
 
 
 def _tail_ratios(standard: Array, tails: NDArray[np.int64], gear_ratio: float) -> tuple[float, ...]:

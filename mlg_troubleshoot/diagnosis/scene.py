@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Scene
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.diagnosis.wear import landings_of, wear_history
 from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
 from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Discrepancies
@@ -20,16 +21,13 @@ Array = NDArray[np.float64]
 _MOST_SIGMAS = 2.0
 # Doubt whether clearances were read as well as declared: standard deviation of the share of the declared error. [1]
 _SHARE_DOUBT = 0.35
-# Wear of a gear at any time is at least this share of its mean: an overhaul resets the landings, not every joint.
-_LEAST_SHAPE = 0.3
 
 
 def likely_clearances(table: DiagnosisTable) -> tuple[Array, Array, Array]:
     """Most likely clearances behind the readings, and those of joints that were not read.
 
-    A gear's joint wears along its own history: its clearance is expected near the gear's own level, growing
-    with landings as the fleet's does. A reading is drawn towards that expectation as far as its uncertainty
-    deserves it, judged by how much the readings really scatter about it (regression calibration). Otherwise
+    A gear's joint wears along its own history (`wear`). A reading is drawn towards what that makes expect as far as
+    its uncertainty deserves it, judged by how much the readings really scatter (regression calibration). Otherwise
     the scatter of the readings alone looks like a cause, because a reading that is too large by chance
     predicts too much. A joint that nobody measured counts as 0, as in the check.
 
@@ -50,66 +48,25 @@ def likely_clearances(table: DiagnosisTable) -> tuple[Array, Array, Array]:
     readings = table.clearance_in
     likely, spread, left = np.zeros_like(readings), np.zeros_like(readings), np.zeros_like(readings)
     gears = np.unique(table.gears, return_inverse=True)[1]
+    kilo, landed = landings_of(table.quantities.get("gear_landings"), gears)
     for j in range(readings.shape[1]):
         known = np.isfinite(readings[:, j])
         if not np.any(readings[known, j] > 0.0):
             continue
-        expected, own = _expected(readings[:, j], known, gears, table.quantities.get("gear_landings"))
-        noise = table.gauge_u_in**2 + _resolution(readings[known, j]) ** 2 / 12.0
-        # Wear scatters in proportion to its level: a gear with little of it is known better by its history.
-        level = np.maximum(expected, 1e-4) ** 2
-        share = float(np.mean(own[known] - noise[known]) / np.mean(level[known]))
-        true = np.maximum(share, 0.01) * level
-        trust = true / (true + noise)
-        read = np.where(known, readings[:, j], expected)
-        drawn = expected + trust * (read - expected)
+        rounded = _resolution(readings[known, j]) ** 2 / 12.0
+        told = np.where(landed, readings[:, j], np.nan) if np.any(known & landed) else readings[:, j]
+        history = wear_history(told, gears, kilo, table.gauge_u_in**2 + rounded)
+        noise = np.maximum(history.reading_in2, rounded)
+        # What wear is to be expected of an inspection without its landings is not known: its readings stand.
+        trust = np.where(landed, history.scatter_in2 / (history.scatter_in2 + noise), 1.0)
+        read = np.where(known, readings[:, j], history.expected_in)
+        drawn = history.expected_in + trust * (read - history.expected_in)
         # A reading is never overruled by more than its own uncertainty makes likely.
         reach = _MOST_SIGMAS * np.sqrt(noise)
         likely[:, j] = np.where(known, np.clip(drawn, read - reach, read + reach), drawn)
-        spread[:, j] = np.where(known, 0.0, np.sqrt(true))
-        left[:, j] = np.where(known, np.sqrt(trust * noise), 0.0)
+        spread[:, j] = np.where(known, 0.0, np.sqrt(history.scatter_in2 + history.unsure_in2))
+        left[:, j] = np.where(known, np.sqrt(trust * noise + (1.0 - trust) ** 2 * history.unsure_in2), 0.0)
     return np.maximum(likely, 0.0), spread, left
-
-
-def _expected(
-    values: Array, known: NDArray[np.bool_], gears: NDArray[np.intp], landings: Array | None
-) -> tuple[Array, Array]:
-    """Expected clearance of each row from its gear's rows, and its squared distance from it, unbiased. [in, in²]"""
-    overall = float(np.mean(values[known]))
-    count = np.bincount(gears[known], minlength=gears.max() + 1).astype(float)
-    growth = _relative_landings(landings, gears)
-    rate = 0.0
-    for _ in range(4):
-        shape = np.maximum(1.0 + rate * growth, _LEAST_SHAPE)
-        level = np.bincount(gears[known], (values / shape)[known], minlength=len(count)) / np.maximum(count, 1.0)
-        centred = values - level[gears] * shape
-        # Wear scatters in proportion to its level, so each gear's rows count relative to it.
-        weight = 1.0 / np.maximum(level[gears], 0.25 * overall) ** 2
-        along = level[gears] * growth
-        square = float(np.sum((weight * along**2)[known]))
-        if square <= 0.0:
-            break
-        rate = float(np.clip(rate + np.sum((weight * centred * along)[known]) / square, -0.5, 2.0))
-    shape = np.maximum(1.0 + rate * growth, _LEAST_SHAPE)
-    within = float(np.sum((values - level[gears] * shape)[known] ** 2) / max(known.sum() - np.sum(count > 0), 1.0))
-    between = max(float(np.var(level[count > 0])) - within / max(float(np.mean(count[count > 0])), 1.0), 0.0)
-    # A gear's level is drawn to the fleet's where it rests on few readings.
-    own = between / np.maximum(between + within / np.maximum(count, 1.0), 1e-30)
-    drawn = np.where(count > 0, overall + own * (level - overall), overall)
-    expected = drawn[gears] * shape
-    degrees = max(1.0 - float(np.sum(own[count > 0])) / known.sum(), 0.2)
-    return expected, (values - expected) ** 2 / degrees
-
-
-def _relative_landings(landings: Array | None, gears: NDArray[np.intp]) -> Array:
-    """Landings of each row against its gear's mean, as a fraction of that mean; 0 where unknown. [1]"""
-    if landings is None:
-        return np.zeros(len(gears))
-    known = np.isfinite(landings)
-    count = np.maximum(np.bincount(gears[known], minlength=gears.max() + 1), 1)
-    mean = np.bincount(gears[known], landings[known], minlength=gears.max() + 1) / count
-    own = np.maximum(mean[gears], 1.0)
-    return np.where(known, np.nan_to_num(landings) / own - 1.0, 0.0)
 
 
 def _resolution(values: Array) -> float:
