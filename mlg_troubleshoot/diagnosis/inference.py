@@ -22,7 +22,7 @@ from mlg_troubleshoot.diagnosis.screen import Fit, Screen, fit
 Array = NDArray[np.float64]
 Key = tuple[str, str | None]
 
-ALARM = 0.025
+ALARM = 0.012
 # A name needs clearer evidence than an alarm does.
 NAME = 0.002
 SECOND = 0.002
@@ -307,7 +307,8 @@ class Inference:
             if alike:
                 # The data hardly tell these two apart: which one has more targets must not decide.
                 distance = min(distance, gain[winner] - max(alike))
-            if distance < (RULED_OUT if clear else RULED_OUT_FAINT):
+            # A rival that explains more is never ruled out, however many targets its cause has.
+            if gain[k] > gain[winner] or distance < (RULED_OUT if clear else RULED_OUT_FAINT):
                 near.append(k)
             elif gain[k] > 2.0:
                 behind[key] = float(distance)
