@@ -328,7 +328,7 @@ def _levels(table: DiagnosisTable, name: str) -> Array:
     if texts is None:
         return np.empty((len(table), 0))
     levels = np.unique(texts)
-    return (texts[:, None] == levels[levels != ""]).astype(float)
+    return np.asarray(texts[:, None] == levels[levels != ""], float)
 
 
 def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> NoiseModel:

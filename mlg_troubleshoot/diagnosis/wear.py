@@ -154,7 +154,7 @@ def _lines(
     """Level and rate of each gear drawn to the fleet's, (count, 2), and their covariances, (count, 2, 2)."""
 
     def total(values: Array) -> Array:
-        return np.bincount(gear, weight * values, minlength=count)
+        return np.bincount(gear, weight * values, minlength=count).astype(float)
 
     prior = np.linalg.inv(spread)
     precision = np.empty((count, 2, 2))
@@ -163,7 +163,8 @@ def _lines(
     precision[:, 1, 1] = total(x * x) + prior[1, 1]
     unsure = np.linalg.inv(precision)
     right = np.column_stack([total(y), total(x * y)]) + prior @ fleet
-    return np.einsum("gij,gj->gi", unsure, right), unsure
+    lines: Array = np.einsum("gij,gj->gi", unsure, right)
+    return lines, np.asarray(unsure, float)
 
 
 def _variance(unsure: Array, gear: NDArray[np.intp], x: Array) -> Array:

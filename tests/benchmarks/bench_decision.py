@@ -129,7 +129,9 @@ def posterior(n: int) -> None:
     top = float(np.mean([0 <= e.place < 2 for e in found]))
     show(f"{n} gears, one worn joint, half read: worn group in the top two", f"{top:.1%}", ">= 95 %", met=top >= 0.95)
     best = worn_gears.best_places(worn, measured, rng)
-    print(f"    the best that anyone could do who knows how these gears were drawn: {np.mean(best < 2):.1%}", flush=True)
+    print(
+        f"    the best that anyone could do who knows how these gears were drawn: {np.mean(best < 2):.1%}", flush=True
+    )
     for k in range(8):
         some = [e for e in found if e.open_groups == k]
         if len(some) >= 20:

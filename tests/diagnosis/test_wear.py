@@ -1,0 +1,109 @@
+"""What to expect of a joint from the history of its gear."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.diagnosis.wear import WearHistory, landings_of, wear_history
+
+from .conftest import Array
+
+DECLARED_IN = 0.0005
+
+
+@dataclass(frozen=True)
+class Worn:
+    """One joint of 40 gears, six inspections each, worn in proportion to landings."""
+
+    gears: np.ndarray[tuple[int], np.dtype[np.intp]]
+    kilo: Array
+    true_in: Array
+    read_in: Array
+
+    def history(self, read_in: Array | None = None) -> WearHistory:
+        """Expect the joint from its readings, declared as uncertain by 0.5 thou each."""
+        readings = self.read_in if read_in is None else read_in
+        return wear_history(readings, self.gears, self.kilo, np.full(len(self.gears), DECLARED_IN**2))
+
+
+def worn(error_in: float, scatter: float = 0.0) -> Worn:
+    """Draw the gears; readings have this error, wear scatters about its line by this share."""
+    rng = np.random.default_rng(3)
+    gears = np.repeat(np.arange(40), 6)
+    kilo = np.repeat(rng.uniform(0.1, 2.0, 40), 6) + np.tile(np.arange(6) * 0.25, 40)
+    rate = rng.lognormal(np.log(0.0012), 0.5, 40)
+    line = 0.0008 + rate[gears] * kilo
+    true_in = line * (1.0 + rng.normal(0.0, scatter, len(gears)))
+    return Worn(gears, kilo, true_in, true_in + rng.normal(0.0, error_in, len(gears)))
+
+
+def rms(values: Array) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def test_what_is_expected_lies_nearer_the_truth_than_the_readings_do() -> None:
+    gear = worn(0.0003)
+    assert rms(gear.history().expected_in - gear.true_in) < 0.7 * rms(gear.read_in - gear.true_in)
+
+
+def test_readings_better_than_declared_are_recognised() -> None:
+    assert np.sqrt(worn(0.0002).history().reading_in2).max() == pytest.approx(0.0002, rel=0.25)
+
+
+def test_readings_as_good_as_declared_are_taken_as_declared() -> None:
+    assert np.sqrt(worn(DECLARED_IN).history().reading_in2).max() == pytest.approx(DECLARED_IN, rel=0.2)
+
+
+def test_readings_are_never_taken_to_be_worse_than_declared() -> None:
+    assert np.sqrt(worn(2.0 * DECLARED_IN).history().reading_in2).max() <= DECLARED_IN
+
+
+def test_scatter_of_wear_about_its_line_is_told_from_errors_of_reading() -> None:
+    gear = worn(0.0001, scatter=0.3)
+    assert rms(np.sqrt(gear.history().scatter_in2)) == pytest.approx(0.3 * rms(gear.true_in), rel=0.25)
+
+
+def test_a_joint_that_was_not_read_is_expected_from_its_gear_s_other_inspections() -> None:
+    gear = worn(0.0002)
+    gaps = gear.read_in.copy()
+    gaps[2::6] = np.nan
+    assert rms((gear.history(gaps).expected_in - gear.true_in)[2::6]) < 0.0002
+
+
+def test_a_gear_that_was_never_read_is_expected_to_wear_like_the_fleet() -> None:
+    gear = worn(0.0002)
+    gaps = np.where(gear.gears == 7, np.nan, gear.read_in)
+    found = gear.history(gaps).expected_in[gear.gears == 7]
+    assert found[-1] - found[0] == pytest.approx(0.0012 * 1.13 * 1.25, rel=0.3)
+
+
+def test_one_slip_hardly_moves_the_line_of_its_gear() -> None:
+    gear = worn(0.0002)
+    slipped = gear.read_in.copy()
+    slipped[62] *= 25.4
+    assert abs(gear.history(slipped).expected_in[60] - gear.history().expected_in[60]) < 0.001
+
+
+def test_exact_readings_are_kept() -> None:
+    gear = worn(0.0, scatter=0.3)
+    exact = wear_history(gear.read_in, gear.gears, gear.kilo, np.zeros(len(gear.gears)))
+    assert np.all(exact.reading_in2 == 0.0)
+
+
+def test_landings_that_are_missing_are_those_of_the_gear_on_average() -> None:
+    kilo, _known = landings_of(np.array([1000.0, np.nan, 3000.0, 500.0]), np.array([0, 0, 0, 1]))
+    assert kilo[1] == 2.0
+
+
+def test_nothing_is_learned_from_a_row_without_landings_where_others_have_them() -> None:
+    _kilo, known = landings_of(np.array([1000.0, np.nan]), np.array([0, 0]))
+    assert known.tolist() == [True, False]
+
+
+def test_without_any_landings_every_row_tells_its_gear_s_level() -> None:
+    _kilo, known = landings_of(None, np.array([0, 0]))
+    assert known.all()
