@@ -205,7 +205,8 @@ class MeasuringAdvice:
         Chance that the gear is within its margin, unmeasured joints taken by their distribution. For the advice
         only: a verdict takes them at their bounds. [1]
     expected : Verdict or None
-        WITHIN_MARGIN or OUTSIDE_MARGIN where that chance is enough to go on troubleshooting, else None.
+        WITHIN_MARGIN or OUTSIDE_MARGIN where that chance is enough to go on troubleshooting, INCONCLUSIVE where
+        measuring the other joints would hardly settle it, else None.
     text : str
         The advice as a sentence.
     """

@@ -31,6 +31,13 @@ COST_OF_WRONG_WITHIN = CONFORMANCE / (1.0 - CONFORMANCE)
 # A drop in risk below this is rounding: the reading has no value of its own.
 _NO_VALUE = 1e-6
 _QUANTILES = 12
+# An expectation is enough where being wrong costs at most this share of what a just conforming OUTSIDE does. [1]
+_ENOUGH_SHARE = 0.5
+# Chance from which a gear counts as too close to its margin for any reading of a joint to settle it. [1]
+_TOO_CLOSE = 0.9
+# Places and weights of a normal distribution, for the worst case once everything is measured.
+_SPOTS = np.linspace(-3.2, 3.2, 65)
+_SPOT_WEIGHTS = np.exp(-0.5 * _SPOTS**2) / np.exp(-0.5 * _SPOTS**2).sum()
 
 
 def decision_risk(probability: Array | float) -> Array:
@@ -51,22 +58,25 @@ def decision_risk(probability: Array | float) -> Array:
     return risk
 
 
-def enough(within: float) -> Verdict | None:
+def enough(within: float, too_close: float = 0.0) -> Verdict | None:
     """Say which verdict an expectation is enough for, to go on troubleshooting.
 
     Parameters
     ----------
     within : float
         Chance of being within the margin, unmeasured joints taken by their distribution. [1]
+    too_close : float
+        Chance that the verdict is INCONCLUSIVE even with every joint measured. [1]
 
     Returns
     -------
     Verdict or None
-        WITHIN_MARGIN or OUTSIDE_MARGIN where being wrong costs at most what a just conforming OUTSIDE does; else None.
+        WITHIN_MARGIN or OUTSIDE_MARGIN where being wrong costs at most half of what a just conforming OUTSIDE does;
+        INCONCLUSIVE where measuring the other joints would hardly settle it; else None.
     """
-    if decision_risk(within) > (1.0 - CONFORMANCE) * (1.0 + 1e-9):
-        return None
-    return Verdict.WITHIN_MARGIN if within > 0.5 else Verdict.OUTSIDE_MARGIN
+    if decision_risk(within) <= _ENOUGH_SHARE * (1.0 - CONFORMANCE) * (1.0 + 1e-9):
+        return Verdict.WITHIN_MARGIN if within > 0.5 else Verdict.OUTSIDE_MARGIN
+    return Verdict.INCONCLUSIVE if too_close >= _TOO_CLOSE else None
 
 
 def access_of_one_more(gear: Gear, number: int, measured: Sequence[int]) -> float:
@@ -124,7 +134,31 @@ def worth_of_readings(
     tuple of ReadingWorth
         One for each unmeasured joint.
     """
-    return outlook(gear, inspection, margin_in, extension, anchor)[0]
+    return outlook(gear, inspection, margin_in, extension, anchor).worth
+
+
+@dataclass(frozen=True, slots=True)
+class Outlook:
+    """What to expect of one gear with what is measured so far.
+
+    Parameters
+    ----------
+    worth : tuple of ReadingWorth
+        One for each unmeasured joint, best first.
+    within : float
+        Probability of being within the margin, over levels of wear. [1]
+    too_close : float
+        Probability that the verdict is INCONCLUSIVE once every joint is measured. [1]
+    """
+
+    worth: tuple[ReadingWorth, ...]
+    within: float
+    too_close: float
+
+    @property
+    def enough(self) -> Verdict | None:
+        """Which verdict this is enough for, to go on troubleshooting."""
+        return enough(self.within, self.too_close)
 
 
 def outlook(
@@ -133,8 +167,8 @@ def outlook(
     margin_in: float,
     extension: Extension | None = None,
     anchor: tuple[float, float] | None = None,
-) -> tuple[tuple[ReadingWorth, ...], float]:
-    """Find what each reading is worth, and the chance that the gear is within its margin.
+) -> Outlook:
+    """Find what each reading is worth, and the chances that the gear is within its margin or too close to it.
 
     Parameters
     ----------
@@ -151,10 +185,8 @@ def outlook(
 
     Returns
     -------
-    worth : tuple of ReadingWorth
-        One for each unmeasured joint.
-    within : float
-        Probability of being within the margin, over levels of wear. [1]
+    Outlook
+        Worth of each reading, and both chances.
     """
     found = clearances([inspection], gear, np.full(len(gear.joints), np.nan))[0]
     missing = np.flatnonzero(~np.isfinite(found))
@@ -174,7 +206,7 @@ def outlook(
     first = [w for w in worth if w.critical] or worth
     valued = any(w.risk_drop > _NO_VALUE for w in first)
     ordered = tuple(sorted(worth, key=lambda w: (not w.critical, -w.per_minute(by_risk=valued))))
-    return ordered, belief.within()
+    return Outlook(ordered, belief.within(), belief.too_close())
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,15 +246,24 @@ class _Belief:
         weight = level_weights((found / limits)[known])
         return cls(weight, worst, slopes, mean, spread, u_rest, limits, margin_in, residual)
 
-    def _chance(self, worst: Array, variance: Array) -> Array:
+    def _chance(self, worst: Array, variance: Array, u_rest: Array | None = None) -> Array:
         """Chance of being within the margin, from the worst case expected and the variance of what is open."""
+        u_rest = self.u_rest if u_rest is None else u_rest
         u_model = np.maximum(0.003, 0.10 * worst) if self.residual_u_in is None else self.residual_u_in
-        u = np.sqrt(variance + self.u_rest**2 + u_model**2)
+        u = np.sqrt(variance + u_rest**2 + u_model**2)
         return tabled_normal_cdf((self.margin_in - worst) / u)
 
     def within(self) -> float:
         """Chance of being within the margin with what is measured so far."""
         return float(self.weight @ self._chance(self.worst, np.sum(self.slopes**2 * self.spread, axis=1)))
+
+    def too_close(self) -> float:
+        """Chance that neither verdict conforms once every joint is measured."""
+        spread = np.sqrt(np.sum(self.slopes**2 * self.spread, axis=1))
+        worst = self.worst[:, None] + spread[:, None] * _SPOTS
+        within = self._chance(worst, np.zeros_like(worst), self.u_rest[:, None])
+        between = (within > 1.0 - CONFORMANCE) & (within < CONFORMANCE)
+        return float(np.sum(self.weight[:, None] * _SPOT_WEIGHTS * between))
 
     def risk_drop(self, j: int) -> float:
         """Expected drop of the risk by a reading of one joint."""
@@ -294,14 +335,14 @@ def advise(
     over, under = float(prediction.worst.over_in[0]), float(prediction.worst.under_in[0])
     if np.isfinite(over) and np.isfinite(under):
         anchor = (over, under)
-    worth, within = outlook(gear, inspection, margin_in, extension, anchor)
+    ahead = outlook(gear, inspection, margin_in, extension, anchor)
     return MeasuringAdvice(
-        worth,
+        ahead.worth,
         stop=settled,
         verdict=low if settled else now,
-        expected_within=within,
-        expected=enough(within),
-        text=_settled(low) if settled else _text(gear, worth, within),
+        expected_within=ahead.within,
+        expected=ahead.enough,
+        text=_settled(low) if settled else _text(gear, ahead, inspection),
     )
 
 
@@ -312,11 +353,18 @@ def _settled(verdict_then: Verdict) -> str:
     )
 
 
-def _text(gear: Gear, worth: Sequence[ReadingWorth], within: float) -> str:
-    best = worth[0]
+def _text(gear: Gear, ahead: Outlook, inspection: Inspection) -> str:
+    best, within = ahead.worth[0], ahead.within
     name = f"#{best.joint} {gear.joint(best.joint).name}"
     minutes = f"about {best.minutes:.0f} min access"
-    if enough(within) is None:
+    if ahead.enough is Verdict.INCONCLUSIVE:
+        plunger = "" if inspection.readings_in else " Measure the plunger displacement at mid-position."
+        return (
+            "If the unmeasured joints are worn like the measured ones, measuring them will hardly settle it: too close "
+            f"to the margin (chance {percent(ahead.too_close)}).{plunger} The joint that tells most is {name} "
+            f"({minutes})."
+        )
+    if ahead.enough is None:
         if best.risk_drop > 0.0:
             return f"Worth most next: {name} ({minutes})."
         return f"Next: {name} ({minutes}); no single reading decides, it removes most of the uncertainty per minute."

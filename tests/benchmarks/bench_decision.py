@@ -25,7 +25,7 @@ from mlg_troubleshoot.decision.assess import AssessOptions, assess
 from mlg_troubleshoot.decision.assessment import RepairSet, Verdict
 from mlg_troubleshoot.decision.explain import explain
 from mlg_troubleshoot.decision.inspection import Inspection, Side
-from mlg_troubleshoot.decision.measuring import access_of_one_more, enough, outlook, worth_of_readings
+from mlg_troubleshoot.decision.measuring import access_of_one_more, outlook, worth_of_readings
 from mlg_troubleshoot.decision.prediction import predict
 from mlg_troubleshoot.decision.repair import repair_sets
 from mlg_troubleshoot.decision.response import responses
@@ -181,10 +181,10 @@ def _verdicts(gear: Gear, read: Array, measured: NDArray[np.bool_]) -> list[Verd
     ]
 
 
-def _expected(gear: Gear, read: Array, measured: NDArray[np.bool_]) -> float:
-    """Chance that this gear is within its margin by the distribution that ranks readings."""
+def _expected(gear: Gear, read: Array, measured: NDArray[np.bool_]) -> Verdict | None:
+    """Which verdict the distribution that ranks readings is enough for."""
     so_far = inspection({j + 1: float(read[j]) for j in np.flatnonzero(measured)})
-    return outlook(gear, so_far, MARGIN_IN)[1]
+    return outlook(gear, so_far, MARGIN_IN).enough
 
 
 Order = Callable[[Gear, Array, NDArray[np.bool_]], int]
@@ -218,7 +218,7 @@ def measure(gear: Gear, read: Array, order: Order, stop: str) -> Tally:
         for row, found in zip(going, now, strict=True):
             verdicts[row] = found
             if stop == "expected" and found is Verdict.INCOMPLETE:
-                verdicts[row] = enough(_expected(gear, read[row], measured[row])) or found
+                verdicts[row] = _expected(gear, read[row], measured[row]) or found
         if stop != "never":
             going = np.array([row for row in going if verdicts[row] is Verdict.INCOMPLETE], int)
         if not len(going):

@@ -115,7 +115,7 @@ def test_the_table_of_the_normal_distribution_is_exact_to_a_millionth() -> None:
 def test_the_chance_of_being_within_agrees_with_drawing_gears(gear: Gear) -> None:
     # Gears drawn level by level, each judged by the exact prediction.
     measured = {3: 0.003, 5: 0.003}
-    _worth, within = outlook(gear, inspected(measured), MARGIN_IN)
+    within = outlook(gear, inspected(measured), MARGIN_IN).within
     rng = np.random.default_rng(9)
     shares = quantiles(400)
     weights = level_weights(np.array([0.003, 0.003]) / 0.0075)
@@ -212,10 +212,43 @@ def test_one_may_stop_within_although_light_joints_are_unmeasured(gear: Gear) ->
 
 
 def test_an_expectation_is_enough_where_being_wrong_costs_as_little_either_way() -> None:
-    assert enough(0.05) is Verdict.OUTSIDE_MARGIN
-    assert enough(0.051) is None
-    assert enough(0.997) is None
-    assert enough(0.9975) is Verdict.WITHIN_MARGIN
+    assert enough(0.025) is Verdict.OUTSIDE_MARGIN
+    assert enough(0.026) is None
+    assert enough(0.9986) is None
+    assert enough(0.9987) is Verdict.WITHIN_MARGIN
+
+
+def test_measuring_on_is_not_worth_it_where_the_verdict_will_be_too_close_anyway() -> None:
+    assert enough(0.5, too_close=0.9) is Verdict.INCONCLUSIVE
+    assert enough(0.5, too_close=0.89) is None
+
+
+def test_an_expectation_of_either_side_goes_before_too_close() -> None:
+    assert enough(0.01, too_close=0.95) is Verdict.OUTSIDE_MARGIN
+
+
+def test_the_chance_of_being_too_close_is_that_of_gears_drawn_from_the_same_distribution(gear: Gear) -> None:
+    measured = dict.fromkeys(range(1, 6), 0.0024)
+    limits, rng = gear.limits_in, np.random.default_rng(12)
+    shares = np.array([measured[j] for j in measured]) / limits[:5]
+    level = rng.choice(24, p=level_weights(shares), size=3000)
+    drawn = quantiles(400)[level[:, None], rng.integers(0, 400, (3000, 5))] * limits[5:]
+    clearance = np.column_stack([np.tile([0.0024] * 5, (3000, 1)), drawn])
+    found = predict(gear, [inspected(measured)] * 3000, clearance, np.ones((3000, 10), bool), np.full(3000, 0.0005))
+    p = found.probability_within(np.full(3000, MARGIN_IN), np.zeros(3000))
+    truth = np.mean((p > 0.05) & (p < 0.95))
+    assert outlook(gear, inspected(measured), MARGIN_IN).too_close == pytest.approx(truth, abs=0.05)
+
+
+def test_a_gear_that_no_further_joint_will_settle_is_told_to_measure_the_plunger(gear: Gear) -> None:
+    found = advised(gear, dict.fromkeys(range(1, 6), 0.0022))
+    assert found.expected is Verdict.INCONCLUSIVE
+    assert "Measure the plunger displacement at mid-position" in found.text
+
+
+def test_a_plunger_that_was_measured_is_not_asked_for_again(gear: Gear) -> None:
+    read = replace(inspected(dict.fromkeys(range(1, 6), 0.0022)), readings_in=(0.02,))
+    assert "Measure the plunger" not in advise(gear, read, MARGIN_IN).text
 
 
 def test_an_expectation_never_becomes_a_verdict(judge: Judge) -> None:
