@@ -51,9 +51,8 @@ def shipped_gears() -> tuple[str, ...]:
     return tuple(sorted(n for n in names if not n.endswith(("-ensemble", "-targets"))))
 
 
-@lru_cache(maxsize=8)
 def load_gear(name_or_path: str | Path = DEFAULT_GEAR) -> Gear:
-    """Load a gear by its shipped name or from a gear file.
+    """Load a gear by its shipped name or from a gear file; a file is read anew each time.
 
     Parameters
     ----------
@@ -75,14 +74,23 @@ def load_gear(name_or_path: str | Path = DEFAULT_GEAR) -> Gear:
         If the linkage cannot be assembled.
     """
     text = str(name_or_path)
-    path = Path(str(files("mlg_troubleshoot.gear"))) / "data" / f"{text}.toml"
-    if text not in shipped_gears():
-        path = Path(text)
-        if not path.is_file():
-            raise UsageError(
-                f"there is no gear {text!r}",
-                f"Give one of {', '.join(shipped_gears())}, or the path of a gear file.",
-            )
+    if text in shipped_gears():
+        return _shipped(text)
+    path = Path(text)
+    if not path.is_file():
+        raise UsageError(
+            f"there is no gear {text!r}",
+            f"Give one of {', '.join(shipped_gears())}, or the path of a gear file.",
+        )
+    return _read(path)
+
+
+@lru_cache(maxsize=8)
+def _shipped(name: str) -> Gear:
+    return _read(Path(str(files("mlg_troubleshoot.gear"))) / "data" / f"{name}.toml")
+
+
+def _read(path: Path) -> Gear:
     raw = _parse(path)
     table = TomlTable(raw, path)
     if table.whole("schema") != 1:

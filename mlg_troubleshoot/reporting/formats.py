@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from datetime import datetime
 
+from mlg_troubleshoot.decision import wording
 from mlg_troubleshoot.units import LengthUnit
 
 ABSENT = "–"
@@ -95,14 +96,7 @@ def percent(share: float | None) -> str:
     """
     if share is None or math.isnan(share):
         return ABSENT
-    if share in (0.0, 1.0):
-        return f"{100 * share:.0f}\u00a0%"
-    if share < 0.001:
-        return "<\u00a00.1\u00a0%"
-    if share > 0.999:
-        return ">\u00a099.9\u00a0%"
-    decimals = 1 if share < 0.1 or share > 0.9 else 0
-    return f"{100 * share:.{decimals}f}\u00a0%"
+    return wording.percent(share).replace(" ", "\u00a0")
 
 
 def joint_list(joints: Sequence[int]) -> str:

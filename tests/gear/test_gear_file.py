@@ -106,6 +106,13 @@ def test_a_copy_of_the_gear_file_predicts_the_same(gear: Gear, edited: Edit) -> 
     assert copy.model.plunger_amplification() == pytest.approx(gear.model.plunger_amplification(), abs=1e-15)
 
 
+def test_a_gear_file_that_was_edited_is_read_anew(edited: Edit) -> None:
+    path = edited("# Hawker", "# Copied from Hawker")
+    before = load_gear(path).geometry_sha256
+    path.write_text(path.read_text(encoding="utf-8").replace("at = [-1.8, -11.85]", "at = [-1.8, -11.851]"), "utf-8")
+    assert load_gear(path).geometry_sha256 != before
+
+
 def test_the_hawker_is_the_one_shipped_gear() -> None:
     assert shipped_gears() == (DEFAULT_GEAR,)
 
