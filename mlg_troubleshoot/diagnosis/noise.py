@@ -8,10 +8,11 @@ covariance; what stands out against it is an effect.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 from scipy.stats import norm
 
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
@@ -113,6 +114,7 @@ class NoiseModel:
     floor_in: float
     gear_ratio: float
     tail_ratios: tuple[float, ...] = TAIL_RATIOS
+    _roots: dict[float, tuple[Array, float]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def floored(self, square: Array) -> Array:
         """Add what no row can be better than to a residual sum of squares.
@@ -177,13 +179,37 @@ class NoiseModel:
         log_determinant : float
             Logarithm of the determinant of V. [1]
         """
-        weight = 1.0 / self.relative**2
-        low = self.factors(tail_ratio)
-        scaled = low * weight[:, None]
-        inner = np.eye(low.shape[1]) + low.T @ scaled
-        product = columns * weight[:, None]
-        product = product - scaled @ np.linalg.solve(inner, low.T @ product)
-        return product, float(np.linalg.slogdet(inner)[1] + 2.0 * np.sum(np.log(self.relative)))
+        root, log_determinant = self._root(tail_ratio)
+        return columns / self.relative[:, None] ** 2 - root.T @ (root @ columns), log_determinant
+
+    def square(self, data: Array, tail_ratio: float) -> Array:
+        """Squared length of data sets under the inverse covariance.
+
+        Parameters
+        ----------
+        data : ndarray, shape (n, n_sets)
+            Data sets. [in]
+        tail_ratio : float
+            Scatter between tails over scatter of a row. [1]
+
+        Returns
+        -------
+        ndarray, shape (n_sets,)
+            Squared lengths. [in²]
+        """
+        root, _log = self._root(tail_ratio)
+        own, common = data / self.relative[:, None], root @ data
+        return np.asarray(np.einsum("ij,ij->j", own, own) - np.einsum("ij,ij->j", common, common))
+
+    def _root(self, tail_ratio: float) -> tuple[Array, float]:
+        """R with V⁻¹ = diag(1 / relative²) − Rᵀ R, and the logarithm of V's determinant."""
+        if tail_ratio not in self._roots:
+            low = self.factors(tail_ratio)
+            scaled = low / self.relative[:, None] ** 2
+            lower = np.linalg.cholesky(np.eye(low.shape[1]) + low.T @ scaled)
+            log_determinant = 2.0 * float(np.sum(np.log(np.diag(lower))) + np.sum(np.log(self.relative)))
+            self._roots[tail_ratio] = solve_triangular(lower, scaled.T, lower=True), log_determinant
+        return self._roots[tail_ratio]
 
     def draw(self, residuals: Array, tail_ratio: float, scale: float, n: int, rng: np.random.Generator) -> Array:
         """Draw data sets in which nothing is wrong.

@@ -63,8 +63,7 @@ class Screen:
     def _base(self, data: Array, index: int) -> tuple[Array, Array]:
         """Residual sum of squares without candidates, and the products with each of them."""
         weighted, _square, held, _log = self._parts[index]
-        product, _ = self.noise.precision_times(data, self.noise.tail_ratios[index])
-        rest = np.einsum("ij,ij->j", data, product)
+        rest = self.noise.square(data, self.noise.tail_ratios[index])
         if held.shape[1]:
             inner = np.linalg.pinv(self.fixed.T @ held)
             along = held.T @ data
