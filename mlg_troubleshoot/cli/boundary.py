@@ -21,6 +21,14 @@ def abandon_stdout() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+def _settle_stdout() -> None:
+    """Write what is still to be written to stdout, or drop it: the interpreter must not fail on it at the end."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        abandon_stdout()
+
+
 class Boundary:
     """A context that turns what goes wrong inside into a message on stderr and the exit code of the contract.
 
@@ -48,6 +56,7 @@ class Boundary:
         if isinstance(error, OSError) and error.errno in _CANNOT_WRITE:
             typer.echo(f"Error: {error.filename or 'the output'} cannot be written: {error.strerror}", err=True)
             typer.echo("What to do: Make room, or write to another place.", err=True)
+            _settle_stdout()
             raise typer.Exit(OUTPUT) from None
         if isinstance(error, TroubleshootError):
             typer.echo(f"Error: {error.message}", err=True)
