@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, NoiseModel
+from mlg_troubleshoot.diagnosis.covariance import NoiseModel
+from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE
 from mlg_troubleshoot.diagnosis.screen import fit
 
 Array = NDArray[np.float64]

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.diagnosis.bank import Bank
 from mlg_troubleshoot.diagnosis.causes.base import Candidate
-from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, NoiseModel, Rows, build_noise
+from mlg_troubleshoot.diagnosis.covariance import NoiseModel
+from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, Rows, build_noise
 from mlg_troubleshoot.diagnosis.screen import Fit, Screen, fit
 
 Array = NDArray[np.float64]

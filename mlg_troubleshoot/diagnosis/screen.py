@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mlg_troubleshoot.diagnosis.noise import NoiseModel
+from mlg_troubleshoot.diagnosis.covariance import NoiseModel
 
 Array = NDArray[np.float64]
 

@@ -19,6 +19,8 @@ _ROUNDS = 25
 _SETTLED = 3
 # A gear's joint scatters as if it were worn at least this share of the fleet's mean. [1]
 _LEAST_LEVEL = 0.25
+# No joint is tighter than this for the purpose. [in]
+_TIGHT_IN = 1e-5
 # Scatter of wear about its line at the start, as a share of the level. [1]
 _SCATTER = 0.15
 # Rows of gears with three readings or more that are needed to tell errors of reading from scatter of wear.
@@ -97,24 +99,20 @@ def wear_history(reading_in: Array, gears: NDArray[np.intp], kilo: Array, readin
         Expectation and variances.
     """
     known = np.isfinite(reading_in)
-    gear, x, y, declared = (
-        gears[known],
-        kilo[known],
-        reading_in[known],
-        np.maximum(reading_in2[known], _LEAST_READING_IN2),
-    )
+    gear, x, y = gears[known], kilo[known], reading_in[known]
+    declared = np.maximum(reading_in2[known], _LEAST_READING_IN2)
     many = np.bincount(gear, minlength=gears.max() + 1)[gear] >= 3
     fleet, spread = _fleet(x, y)
-    least = _LEAST_LEVEL * float(np.mean(y))
+    least = max(_LEAST_LEVEL * float(np.mean(y)), _TIGHT_IN)
     least_spread = 1e-6 * spread
     level = np.maximum(fleet[0] + fleet[1] * x, least)
     scatter, share, far = _SCATTER**2, 1.0, np.ones(len(y))
     lines, unsure = np.empty((0, 2)), np.empty((0, 2, 2))
+    # Gears of which this joint was never read say nothing about the fleet.
+    seen = np.unique(gear)
     for step in range(_ROUNDS):
         variance = share * declared + scatter * level**2
         lines, unsure = _lines(gear, gears.max() + 1, x, y, far / variance, fleet, spread)
-        # Gears of which this joint was never read say nothing about the fleet.
-        seen = np.unique(gear)
         fleet = lines[seen].mean(axis=0)
         apart = lines[seen] - fleet
         spread = (unsure[seen].sum(axis=0) + apart.T @ apart) / len(seen) + least_spread

@@ -107,3 +107,13 @@ def test_nothing_is_learned_from_a_row_without_landings_where_others_have_them()
 def test_without_any_landings_every_row_tells_its_gear_s_level() -> None:
     _kilo, known = landings_of(None, np.array([0, 0]))
     assert known.all()
+
+
+def test_a_joint_that_is_tight_everywhere_stays_so() -> None:
+    gear = worn(0.0)
+    assert np.all(np.abs(gear.history(np.zeros(len(gear.gears))).expected_in) < 1e-6)
+
+
+def test_one_reading_alone_is_its_own_expectation() -> None:
+    alone = wear_history(np.array([0.002, np.nan]), np.array([0, 1]), np.array([1.0, 2.0]), np.full(2, DECLARED_IN**2))
+    assert alone.expected_in == pytest.approx([0.002, 0.002])
