@@ -14,21 +14,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.diagnosis.noise import robust_scale
+from mlg_troubleshoot.diagnosis.sides import swapped_sides
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.diagnosis.wear import joint_history, landings_of
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.units import MM_PER_IN
 
 Array = NDArray[np.float64]
 
+# Misfit by which a row must stand out, and within which its correction must bring it, in scatters of a row.
 _FAR = 5.5
 _NEAR = 3.0
-_LOG_SPREAD = 0.55
-_LEAST_CLEARANCE_EVIDENCE = 2.5
+# Standard deviations by which a clearance must lie off its gear's history to make its row worth a look.
+_ODD = 4.0
+# Wear about its history has heavier tails than a normal distribution: degrees of freedom of Student's t.
+_FREEDOM = 4.0
+# A clearance is never expected more sharply than this. [in]
+_LEAST_SPREAD_IN = 0.0005
+# Log-likelihoods by which cell and row must speak for a slip: each of them, and both together …
+_LEAST_CLEARANCE_EVIDENCE = 3.5
 _LEAST_ROW_EVIDENCE = 4.0
+_LEAST_EVIDENCE = 10.0
+# … or the cell nearly alone, or the row nearly alone with as little as this from the cell.
 _CLEARANCE_ALONE = 6.5
 _ROW_ALONE = 30.0
-_LEAST_EVIDENCE = 10.0
+_LEAST_ROW_ALONE = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +71,27 @@ class DataFault:
     kind: str
     value: str
     suggested: str | None
+
+
+@dataclass(frozen=True)
+class _Usual:
+    """Clearances to expect in each row by the wear of its gear, and their standard deviation, (n, n_joints). [in]"""
+
+    expected: Array
+    spread: Array
+
+    def off(self, clearance: Array, place: slice | int = slice(None), joints: Sequence[int] = ()) -> Array:
+        """How far clearances lie off what is usual, in standard deviations; of their logarithm if they are less. [1]"""
+        at = (place, list(joints)) if joints else place
+        usual, apart = self.expected[at], clearance - self.expected[at]
+        size = usual + _LEAST_SPREAD_IN
+        less = size * np.log((clearance + _LEAST_SPREAD_IN) / size)
+        return np.asarray(np.where(apart < 0.0, less, apart) / self.spread[at])
+
+    def surprise(self, place: int, joints: Sequence[int], values: Sequence[float]) -> float:
+        """How unlikely clearances are in a row, as minus a log-likelihood. [1]"""
+        off = self.off(np.asarray(values), place, joints)
+        return float(0.5 * (_FREEDOM + 1.0) * np.sum(np.log1p(off**2 / _FREEDOM)))
 
 
 @dataclass(frozen=True)
@@ -96,8 +128,8 @@ def screen_faults(
     usable : ndarray of bool, shape (n,)
         False for rows with a fault that has no suggestion.
     """
-    expected = _typical(table)
-    clearance = np.where(np.isfinite(table.clearance_in), table.clearance_in, expected)
+    everything = _usual(table, np.ones(len(table), bool))
+    clearance = np.where(np.isfinite(table.clearance_in), table.clearance_in, everything.expected)
     measured = np.nanmedian(table.readings_in, axis=1)
     named = np.zeros(len(table)) if explained is None else explained
     misfit = measured - worst_case(model, clearance).over_in
@@ -108,15 +140,16 @@ def screen_faults(
     local = _local_level(table, left, centre, scale) + named
     spread = _reading_spread(table)
     far = ~known | (np.abs(misfit - local) > _FAR * scale) | (spread > _FAR * scale)
-    far |= (table.clearance_in > 8.0 * np.maximum(expected, 0.0005)).any(axis=1) & (
+    far |= (np.abs(np.nan_to_num(everything.off(table.clearance_in))) > _ODD).any(axis=1) & (
         np.abs(misfit - local) > 0.5 * scale
     )
+    usual = _usual(table, ~far)
     faults: list[DataFault] = []
     usable = np.ones(len(table), bool)
     new_clearance, new_readings = table.clearance_in.copy(), table.readings_in.copy()
     for place in np.flatnonzero(far):
         found, slip, isolated = _explain(
-            model, table, expected, int(place), misfit, float(local[place]), scale, clearance[place]
+            model, table, usual, int(place), misfit, float(local[place]), scale, clearance[place]
         )
         plain = slip is not None and slip.clearance_evidence > _CLEARANCE_ALONE
         alone = spread[place] > _FAR * scale
@@ -134,28 +167,30 @@ def screen_faults(
         elif isolated:
             usable[place] = False
     repaired = replace(table, clearance_in=new_clearance, readings_in=new_readings)
-    swapped, repaired = _swapped_sides(repaired)
-    faults += swapped
+    swapped = swapped_sides(repaired)
+    faults += [
+        DataFault(row, int(table.row[row]), table.record_id[row], "side", "swapped_side", own, other)
+        for row, own, other in swapped
+    ]
+    if swapped:
+        side = repaired.factors["side"].copy()
+        side[[row for row, _own, _other in swapped]] = [other for _row, _own, other in swapped]
+        repaired = replace(repaired, factors={**repaired.factors, "side": side})
     return repaired, tuple(faults), usable
 
 
-def _typical(table: DiagnosisTable) -> Array:
-    """Typical clearance of each joint on each row's gear, robust against a wrong cell, shape (n, n_joints). [in]"""
-    values = table.clearance_in
-    overall = np.zeros(values.shape[1])
-    for j in range(values.shape[1]):
-        seen = values[np.isfinite(values[:, j]), j]
-        overall[j] = float(np.median(seen)) if len(seen) else 0.0
-    typical = np.tile(overall, (len(values), 1))
-    gears = table.gears
-    for gear in np.unique(gears):
-        rows = np.flatnonzero(gears == gear)
-        if len(rows) >= 3:
-            for j in range(values.shape[1]):
-                own = values[rows, j][np.isfinite(values[rows, j])]
-                if len(own) >= 3:
-                    typical[rows, j] = 0.7 * np.median(own) + 0.3 * overall[j]
-    return typical
+def _usual(table: DiagnosisTable, trusted: NDArray[np.bool_]) -> _Usual:
+    """Expect each row's clearances from what the trusted rows say about the wear of its gear and of the fleet."""
+    readings = np.where(trusted[:, None], table.clearance_in, np.nan)
+    gears = np.unique(table.gears, return_inverse=True)[1]
+    kilo, landed = landings_of(table.quantities.get("gear_landings"), gears)
+    expected, variance = np.zeros_like(readings), np.zeros_like(readings)
+    for j in range(readings.shape[1]):
+        history = joint_history(readings[:, j], gears, kilo, landed, table.gauge_u_in)
+        if history is not None:
+            expected[:, j] = history.expected_in
+            variance[:, j] = history.unsure_in2 + history.scatter_in2 + history.reading_in2
+    return _Usual(expected, np.sqrt(variance + _LEAST_SPREAD_IN**2))
 
 
 def _local_level(table: DiagnosisTable, misfit: Array, centre: float, scale: float) -> Array:
@@ -203,7 +238,7 @@ def _gathers(table: DiagnosisTable, misfit: Array, centre: float, scale: float, 
 def _explain(
     model: LinkageModel,
     table: DiagnosisTable,
-    expected: Array,
+    usual: _Usual,
     place: int,
     misfit: Array,
     level: float,
@@ -211,7 +246,7 @@ def _explain(
     clearance: Array,
 ) -> tuple[list[DataFault], _Slip | None, bool]:
     """Try every slip on one row; name the best one, or the row as implausible."""
-    slips = _slips(model, table, expected, place, clearance)
+    slips = _slips(model, table, usual, place, clearance)
     over = worst_case(model, np.array([s.clearance for s in slips])).over_in
     before = misfit[place]
     best: tuple[float, _Slip] | None = None
@@ -259,7 +294,7 @@ def _convincing(row_evidence: float, slip: _Slip) -> bool:
     together = row_evidence >= _LEAST_ROW_EVIDENCE and cell >= _LEAST_CLEARANCE_EVIDENCE
     if together and row_evidence + cell >= _LEAST_EVIDENCE:
         return True
-    if slip.kind in {"mm_as_in", "factor_10"} and row_evidence >= _ROW_ALONE and cell >= 0.4:
+    if row_evidence >= _ROW_ALONE and cell >= _LEAST_ROW_ALONE:
         return True
     return cell > _CLEARANCE_ALONE and row_evidence > -1.0 and max(written for _c, written, _r in slip.cells) > 0.02
 
@@ -273,20 +308,10 @@ def _reading_index(column: str) -> int:
     return 0 if not middle else int(middle) - 1
 
 
-def _surprise(values: Sequence[float], typical: Sequence[float]) -> float:
-    """How unlikely clearances are beside the typical ones of their gear, as minus a log-likelihood. [1]"""
-    total = 0.0
-    for value, usual in zip(values, typical, strict=True):
-        ratio = np.log((value + 0.0005) / (usual + 0.0005)) / _LOG_SPREAD
-        total += 0.5 * min(float(ratio) ** 2, 60.0)
-    return total
-
-
-def _slips(model: LinkageModel, table: DiagnosisTable, expected: Array, place: int, clearance: Array) -> list[_Slip]:
+def _slips(model: LinkageModel, table: DiagnosisTable, usual: _Usual, place: int, clearance: Array) -> list[_Slip]:
     written, readings = table.clearance_in[place], table.readings_in[place]
     seen = readings[np.isfinite(readings)]
     measured = float(np.median(seen))
-    typical = expected[place]
     slips: list[_Slip] = []
 
     def name(j: int) -> str:
@@ -300,18 +325,18 @@ def _slips(model: LinkageModel, table: DiagnosisTable, expected: Array, place: i
                 continue
             new = clearance.copy()
             new[j] = right
-            evidence = _surprise([written[j]], [typical[j]]) - _surprise([right], [typical[j]])
+            evidence = usual.surprise(place, [j], [written[j]]) - usual.surprise(place, [j], [right])
             slips.append(_Slip(kind, new, measured, ((name(j), float(written[j]), right),), evidence))
         new = clearance.copy()
-        new[j] = typical[j]
-        evidence = _surprise([written[j]], [typical[j]]) - 1.0
+        new[j] = usual.expected[place, j]
+        evidence = usual.surprise(place, [j], [written[j]]) - 1.0
         slips.append(_Slip("implausible", new, measured, ((name(j), float(written[j]), None),), evidence))
     for position, a in enumerate(known):
         for b in known[position + 1 :]:
             new = clearance.copy()
             new[a], new[b] = written[b], written[a]
-            pair = [typical[a], typical[b]]
-            evidence = _surprise([written[a], written[b]], pair) - _surprise([written[b], written[a]], pair)
+            pair = [a, b]
+            evidence = usual.surprise(place, pair, written[pair]) - usual.surprise(place, pair, written[pair[::-1]])
             cells = (
                 (name(a), float(written[a]), float(written[b])),
                 (name(b), float(written[b]), float(written[a])),
@@ -344,103 +369,3 @@ def _slips(model: LinkageModel, table: DiagnosisTable, expected: Array, place: i
             )
             slips.append(_Slip(kind, clearance.copy(), measured * factor, all_cells, 3.0))
     return slips
-
-
-def _swapped_sides(table: DiagnosisTable) -> tuple[list[DataFault], DiagnosisTable]:
-    """Rows whose landings do not lie on their own gear's line over time but on the other side's."""
-    side, tail = table.factors.get("side"), table.factors.get("tail_no")
-    landings, day = table.quantities.get("gear_landings"), table.quantities.get("day")
-    if side is None or tail is None or landings is None or day is None:
-        return [], table
-    found: list[DataFault] = []
-    corrected = side.copy()
-
-    def swap(row: int) -> None:
-        own = str(side[row])
-        corrected[row] = "RH" if own == "LH" else "LH"
-        fault = DataFault(
-            row, int(table.row[row]), table.record_id[row], "side", "swapped_side", own, str(corrected[row])
-        )
-        found.append(fault)
-
-    for name in np.unique(tail):
-        pairs, doubled = _pairs(table, np.flatnonzero(tail == name))
-        if pairs >= 2:
-            # Inspected in pairs: a swapped side leaves one side twice on its day; without that there is none.
-            if doubled is not None:
-                swap(doubled)
-            continue
-        known = (tail == name) & np.isfinite(landings) & np.isfinite(day)
-        rows = {s: np.flatnonzero(known & (side == s)) for s in ("LH", "RH")}
-        if min(len(r) for r in rows.values()) < 4:
-            continue
-        off = [
-            (int(row), own, other)
-            for own, other in (("LH", "RH"), ("RH", "LH"))
-            for row in rows[own]
-            if len(rows[own]) > 3 and _on_the_other_line(day, landings, int(row), rows[own], rows[other])
-        ]
-        # Two lines that fit this badly are no evidence; one row off its line and on the other one is.
-        if len(off) == 1:
-            swap(off[0][0])
-    return found, replace(table, factors={**table.factors, "side": corrected}) if found else table
-
-
-def _pairs(table: DiagnosisTable, rows: NDArray[np.intp]) -> tuple[int, int | None]:
-    """Days on which a tail was inspected on both sides, and the row that was most likely written to the wrong side."""
-    side, day = table.factors["side"], table.quantities["day"]
-    days = [float(d) for d in np.unique(day[rows][np.isfinite(day[rows])])]
-    pairs = 0
-    suspects: list[NDArray[np.intp]] = []
-    for d in days:
-        same = rows[day[rows] == d]
-        if len(same) == 2:
-            if side[same[0]] != side[same[1]]:
-                pairs += 1
-            elif side[same[0]] in {"LH", "RH"}:
-                suspects.append(same)
-    if len(suspects) != 1:
-        return pairs, None
-    first, second = (_nearness_to_other_side(table, rows, int(row)) for row in suspects[0])
-    return pairs, int(suspects[0][0] if first > second else suspects[0][1])
-
-
-def _nearness_to_other_side(table: DiagnosisTable, rows: NDArray[np.intp], row: int) -> float:
-    """How much nearer a row is to the other side's landings and wear than to its own side's. [1]"""
-    side, day = table.factors["side"], table.quantities["day"]
-    landings = table.quantities["gear_landings"]
-    rest = rows[rows != row]
-    total = 0.0
-    for sign, wanted in ((1.0, True), (-1.0, False)):
-        group = rest[(side[rest] == side[row]) == wanted]
-        timed = group[np.isfinite(landings[group]) & np.isfinite(day[group])]
-        if len(timed) >= 2 and np.isfinite(landings[row]):
-            at, scatter = _line(day[timed], landings[timed], float(day[row]))
-            total += sign * min(abs(float(landings[row]) - at) / (3.0 * scatter + 20.0), 50.0)
-        known = np.isfinite(table.clearance_in[row]) & np.isfinite(table.clearance_in[group]).any(axis=0)
-        if len(group) and known.any():
-            usual = np.nanmedian(table.clearance_in[group][:, known], axis=0)
-            total += sign * _surprise(table.clearance_in[row][known].tolist(), usual.tolist())
-    return total
-
-
-def _on_the_other_line(day: Array, landings: Array, row: int, own: NDArray[np.intp], other: NDArray[np.intp]) -> bool:
-    mine = own[own != row]
-    at_own, u_own = _line(day[mine], landings[mine], float(day[row]))
-    at_other, u_other = _line(day[other], landings[other], float(day[row]))
-    apart = abs(at_own - at_other)
-    return (
-        abs(landings[row] - at_own) > max(6.0 * u_own, 0.6 * apart)
-        and abs(landings[row] - at_other) < min(4.0 * u_other, 0.25 * apart)
-        and apart > 8.0 * (u_own + u_other)
-    )
-
-
-def _line(x: Array, y: Array, at: float) -> tuple[float, float]:
-    """Median line through points, read at one place, with a robust scatter."""
-    i, j = np.triu_indices(len(x), 1)
-    apart = np.abs(x[j] - x[i]) > 1e-9
-    slope = float(np.median((y[j] - y[i])[apart] / (x[j] - x[i])[apart])) if apart.any() else 0.0
-    level = float(np.median(y - slope * x))
-    scatter = max(robust_scale(y - level - slope * x), 8.0)
-    return level + slope * at, scatter

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Scene
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-from mlg_troubleshoot.diagnosis.wear import landings_of, wear_history
+from mlg_troubleshoot.diagnosis.wear import joint_history, landings_of
 from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
 from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Discrepancies
@@ -50,13 +50,10 @@ def likely_clearances(table: DiagnosisTable) -> tuple[Array, Array, Array]:
     gears = np.unique(table.gears, return_inverse=True)[1]
     kilo, landed = landings_of(table.quantities.get("gear_landings"), gears)
     for j in range(readings.shape[1]):
-        known = np.isfinite(readings[:, j])
-        if not np.any(readings[known, j] > 0.0):
+        history = joint_history(readings[:, j], gears, kilo, landed, table.gauge_u_in)
+        if history is None:
             continue
-        rounded = _resolution(readings[known, j]) ** 2 / 12.0
-        told = np.where(landed, readings[:, j], np.nan) if np.any(known & landed) else readings[:, j]
-        history = wear_history(told, gears, kilo, table.gauge_u_in**2 + rounded)
-        noise = np.maximum(history.reading_in2, rounded)
+        known, noise = np.isfinite(readings[:, j]), history.reading_in2
         # What wear is to be expected of an inspection without its landings is not known: its readings stand.
         trust = np.where(landed, history.scatter_in2 / (history.scatter_in2 + noise), 1.0)
         read = np.where(known, readings[:, j], history.expected_in)
@@ -67,16 +64,6 @@ def likely_clearances(table: DiagnosisTable) -> tuple[Array, Array, Array]:
         spread[:, j] = np.where(known, 0.0, np.sqrt(history.scatter_in2 + history.unsure_in2))
         left[:, j] = np.where(known, np.sqrt(trust * noise + (1.0 - trust) ** 2 * history.unsure_in2), 0.0)
     return np.maximum(likely, 0.0), spread, left
-
-
-def _resolution(values: Array) -> float:
-    """Step of the readings: the least difference between them, 0 if they lie on no grid. [in]"""
-    unique = np.unique(np.round(values, 7))
-    if len(unique) < 3:
-        return 0.0
-    step = float(np.min(np.diff(unique)))
-    on_grid = np.abs(unique / step - np.round(unique / step)) < 0.02
-    return step if step >= 1e-4 and bool(np.mean(on_grid) > 0.9) else 0.0
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ perhaps smaller than declared. All of these are estimated together by expectatio
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +77,48 @@ def landings_of(landings: Array | None, gears: NDArray[np.intp]) -> tuple[Array,
     total = np.bincount(gears[known], landings[known], minlength=gears.max() + 1)
     mean = np.where(count > 0, total / np.maximum(count, 1), np.mean(landings[known]))
     return np.where(known, landings, mean[gears]) / 1000.0, known
+
+
+def joint_history(
+    reading_in: Array, gears: NDArray[np.intp], kilo: Array, landed: NDArray[np.bool_], u_in: Array
+) -> WearHistory | None:
+    """Expect one joint's clearance in each row, readings rounded to the steps that they show.
+
+    Parameters
+    ----------
+    reading_in : ndarray, shape (n,)
+        Readings of the joint, NaN where it was not read. [in]
+    gears : ndarray of int, shape (n,)
+        Number of the gear of each row, from 0.
+    kilo : ndarray, shape (n,)
+        Thousands of landings.
+    landed : ndarray of bool, shape (n,)
+        Rows that wear may be learned from.
+    u_in : ndarray, shape (n,)
+        Declared standard deviation of a reading. [in]
+
+    Returns
+    -------
+    WearHistory or None
+        Expectation and variances; None where no wear was ever read.
+    """
+    known = np.isfinite(reading_in)
+    if not np.any(reading_in[known] > 0.0):
+        return None
+    rounded = _resolution(reading_in[known]) ** 2 / 12.0
+    told = np.where(landed, reading_in, np.nan) if np.any(known & landed) else reading_in
+    history = wear_history(told, gears, kilo, u_in**2 + rounded)
+    return replace(history, reading_in2=np.maximum(history.reading_in2, rounded))
+
+
+def _resolution(values: Array) -> float:
+    """Step of the readings: the least difference between them, 0 if they lie on no grid. [in]"""
+    unique = np.unique(np.round(values, 7))
+    if len(unique) < 3:
+        return 0.0
+    step = float(np.min(np.diff(unique)))
+    on_grid = np.abs(unique / step - np.round(unique / step)) < 0.02
+    return step if step >= 1e-4 and bool(np.mean(on_grid) > 0.9) else 0.0
 
 
 def wear_history(reading_in: Array, gears: NDArray[np.intp], kilo: Array, reading_in2: Array) -> WearHistory:

@@ -154,3 +154,74 @@ def test_a_side_that_was_swapped_is_found_by_its_landings(gear: Gear) -> None:
         factors={**table.factors, "side": side},
     )
     assert faults(gear, wrong) == [(ROW, "side", "swapped_side")]
+
+
+def worn_by_landings(gear: Gear) -> DiagnosisTable:
+    """A fleet of few inspections a gear, in which joint 5 wears twice as fast as the others."""
+    plain = fleet(gear.model, tails=30)
+    landings = np.linspace(300.0, 3000.0, 120)[np.random.default_rng(3).permutation(120)]
+    landings[ROW] = 2900.0
+    rate = np.where(np.arange(10) == 4, 2.2e-6, 1.0e-6)
+    scatter = np.random.default_rng(4).lognormal(0.0, 0.12, (120, 10))
+    return fleet(
+        gear.model,
+        tails=30,
+        noise_in=0.0005,
+        clearance_in=rate * landings[:, None] * scatter,
+        quantities={**plain.quantities, "gear_landings": landings},
+    )
+
+
+def test_a_heavily_worn_gear_is_not_at_fault(gear: Gear) -> None:
+    assert faults(gear, worn_by_landings(gear)) == []
+
+
+def test_two_swapped_joints_are_found_by_the_wear_that_their_landings_make_expect(gear: Gear) -> None:
+    table = worn_by_landings(gear)
+    values = table.clearance_in.copy()
+    values[ROW, [4, 6]] = values[ROW, [6, 4]]
+    assert faults(gear, replace(table, clearance_in=values)) == [
+        (ROW, "clearance_5_in", "swapped_joints"),
+        (ROW, "clearance_7_in", "swapped_joints"),
+    ]
+
+
+def test_one_of_two_readings_that_cannot_be_is_not_used(gear: Gear, sound: DiagnosisTable) -> None:
+    values = sound.readings_in.copy()
+    values[ROW, 1] += 0.06
+    assert faults(gear, replace(sound, readings_in=values)) == [(ROW, "plunger_displacement_2_in", "implausible")]
+
+
+def paired(gear: Gear, day_of_visit: list[float]) -> DiagnosisTable:
+    """Five aircraft inspected on both sides at each visit; right-hand gears have 1,500 landings more."""
+    visits = len(day_of_visit)
+    rows = 10 * visits
+    plain = fleet(gear.model, rows=rows, tails=5)
+    day = np.repeat(day_of_visit, 10)
+    side = np.tile(np.repeat(["LH", "RH"], 5), visits)
+    landings = np.where(side == "LH", 200.0, 1700.0) + 1.1 * day
+    return replace(
+        plain,
+        quantities={**plain.quantities, "day": day, "gear_landings": landings},
+        factors={**plain.factors, "side": side},
+    )
+
+
+def with_side(table: DiagnosisTable, row: int, side: str) -> DiagnosisTable:
+    """The table with another side written in one row."""
+    sides = table.factors["side"].copy()
+    sides[row] = side
+    return replace(table, factors={**table.factors, "side": sides})
+
+
+def test_two_visits_are_enough_to_find_a_swapped_side_by_its_landings(gear: Gear) -> None:
+    wrong = with_side(paired(gear, [10.0, 300.0]), 17, "LH")
+    assert faults(gear, wrong) == [(17, "side", "swapped_side")]
+
+
+def test_a_gear_read_twice_on_one_of_two_visits_is_no_swapped_side(gear: Gear) -> None:
+    table = paired(gear, [10.0, 300.0])
+    landings = table.quantities["gear_landings"].copy()
+    landings[17] = landings[12]
+    again = replace(table, quantities={**table.quantities, "gear_landings": landings})
+    assert faults(gear, with_side(again, 17, "LH")) == []

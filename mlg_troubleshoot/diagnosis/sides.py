@@ -1,0 +1,150 @@
+"""Rows written to the wrong side: a left-hand gear's inspection that is a right-hand one's, or the other way round.
+
+Landings and wear go on from one inspection of a gear to the next; a row that does not lie on its own gear's line but
+on the line of the aircraft's other gear was most likely written to the wrong side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.diagnosis.noise import robust_scale
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+
+Array = NDArray[np.float64]
+
+# Spread of the logarithm of a clearance about its gear's median. [1]
+_LOG_SPREAD = 0.55
+# By how much a row must be nearer to the other side, and nearer than its twin, where few days tell of pairs.
+_SIDE_ALONE = 4.0
+_SIDE_APART = 8.0
+
+
+def swapped_sides(table: DiagnosisTable) -> list[tuple[int, str, str]]:
+    """Find rows whose landings do not lie on their own gear's line over time but on the other side's.
+
+    Parameters
+    ----------
+    table : DiagnosisTable
+        The rows.
+
+    Returns
+    -------
+    list of (int, str, str)
+        Row counted from 0, side as written, side as most likely meant.
+    """
+    side, tail = table.factors.get("side"), table.factors.get("tail_no")
+    landings, day = table.quantities.get("gear_landings"), table.quantities.get("day")
+    if side is None or tail is None or landings is None or day is None:
+        return []
+    swapped: list[int] = []
+    rate = _landings_a_day(table)
+    for name in np.unique(tail):
+        pairs, doubled = _pairs(table, np.flatnonzero(tail == name), rate)
+        if doubled is not None:
+            # Inspected in pairs: a swapped side leaves one side twice on its day.
+            swapped.append(doubled)
+        if doubled is not None or pairs >= 2:
+            continue
+        known = (tail == name) & np.isfinite(landings) & np.isfinite(day)
+        rows = {s: np.flatnonzero(known & (side == s)) for s in ("LH", "RH")}
+        if min(len(r) for r in rows.values()) < 4:
+            continue
+        off = [
+            int(row)
+            for own, other in (("LH", "RH"), ("RH", "LH"))
+            for row in rows[own]
+            if _on_the_other_line(day, landings, int(row), rows[own], rows[other])
+        ]
+        # Two lines that fit this badly are no evidence; one row off its line and on the other one is.
+        if len(off) == 1:
+            swapped += off
+    return [(row, str(side[row]), "RH" if side[row] == "LH" else "LH") for row in swapped]
+
+
+def _landings_a_day(table: DiagnosisTable) -> float:
+    """Landings a day between inspections of one gear, median over the fleet; 0 if none was inspected twice."""
+    day, landings, gears = table.quantities["day"], table.quantities["gear_landings"], table.gears
+    known = np.flatnonzero(np.isfinite(day) & np.isfinite(landings))
+    order = known[np.lexsort((day[known], gears[known]))]
+    later, earlier = order[1:], order[:-1]
+    again = (gears[later] == gears[earlier]) & (day[later] > day[earlier])
+    if not again.any():
+        return 0.0
+    return float(np.median((landings[later] - landings[earlier])[again] / (day[later] - day[earlier])[again]))
+
+
+def _pairs(table: DiagnosisTable, rows: NDArray[np.intp], rate: float) -> tuple[int, int | None]:
+    """Days on which a tail was inspected on both sides, and the row that was most likely written to the wrong side."""
+    side, day = table.factors["side"], table.quantities["day"]
+    days = [float(d) for d in np.unique(day[rows][np.isfinite(day[rows])])]
+    pairs = 0
+    suspects: list[NDArray[np.intp]] = []
+    for d in days:
+        same = rows[day[rows] == d]
+        if len(same) == 2:
+            if side[same[0]] != side[same[1]]:
+                pairs += 1
+            elif side[same[0]] in {"LH", "RH"}:
+                suspects.append(same)
+    if len(suspects) != 1 or pairs == 0:
+        return pairs, None
+    two = suspects[0]
+    others = np.setdiff1d(rows, two)
+    near = [_nearness_to_other_side(table, others, int(row), rate) for row in two]
+    # One pair is no habit: then the row itself must lie with the other side.
+    if pairs == 1 and (max(near) < _SIDE_ALONE or max(near) - min(near) < _SIDE_APART):
+        return pairs, None
+    return pairs, int(two[0] if near[0] > near[1] else two[1])
+
+
+def _nearness_to_other_side(table: DiagnosisTable, others: NDArray[np.intp], row: int, rate: float) -> float:
+    """How much nearer a row is to the other side's landings and wear than to its own side's. [1]"""
+    side, day = table.factors["side"], table.quantities["day"]
+    landings = table.quantities["gear_landings"]
+    total = 0.0
+    for sign, wanted in ((1.0, True), (-1.0, False)):
+        group = others[(side[others] == side[row]) == wanted]
+        timed = group[np.isfinite(landings[group]) & np.isfinite(day[group])]
+        if len(timed) and np.isfinite(landings[row]):
+            at, scatter = _line(day[timed], landings[timed], float(day[row]), rate)
+            total += sign * min(abs(float(landings[row]) - at) / (3.0 * scatter + 20.0), 50.0)
+        known = np.isfinite(table.clearance_in[row]) & np.isfinite(table.clearance_in[group]).any(axis=0)
+        if len(group) and known.any():
+            usual = np.nanmedian(table.clearance_in[group][:, known], axis=0)
+            total += sign * _surprise(table.clearance_in[row][known].tolist(), usual.tolist())
+    return total
+
+
+def _on_the_other_line(day: Array, landings: Array, row: int, own: NDArray[np.intp], other: NDArray[np.intp]) -> bool:
+    mine = own[own != row]
+    at_own, u_own = _line(day[mine], landings[mine], float(day[row]))
+    at_other, u_other = _line(day[other], landings[other], float(day[row]))
+    apart = abs(at_own - at_other)
+    return (
+        abs(landings[row] - at_own) > max(6.0 * u_own, 0.6 * apart)
+        and abs(landings[row] - at_other) < min(4.0 * u_other, 0.25 * apart)
+        and apart > 8.0 * (u_own + u_other)
+    )
+
+
+def _line(x: Array, y: Array, at: float, usual_slope: float = 0.0) -> tuple[float, float]:
+    """Median line through points, read at one place, with a robust scatter; one point alone has the usual slope."""
+    i, j = np.triu_indices(len(x), 1)
+    apart = np.abs(x[j] - x[i]) > 1e-9
+    slope = float(np.median((y[j] - y[i])[apart] / (x[j] - x[i])[apart])) if apart.any() else usual_slope
+    level = float(np.median(y - slope * x))
+    scatter = max(robust_scale(y - level - slope * x), 8.0)
+    return level + slope * at, scatter
+
+
+def _surprise(values: Sequence[float], typical: Sequence[float]) -> float:
+    """How unlikely clearances are beside the typical ones of their gear, as minus a log-likelihood. [1]"""
+    total = 0.0
+    for value, usual in zip(values, typical, strict=True):
+        ratio = np.log((value + 0.0005) / (usual + 0.0005)) / _LOG_SPREAD
+        total += 0.5 * min(float(ratio) ** 2, 60.0)
+    return total
