@@ -678,6 +678,8 @@ class DiagnoseOptions:
         Convention of rows that do not say one.
     sheet : str or None
         Worksheet.
+    column_map : mapping of str to str
+        Columns by header.
     cause_files : tuple of Path
         Python files with the user's own causes.
     permutations : int
@@ -690,6 +692,7 @@ class DiagnoseOptions:
     unit: LengthUnit | None = None
     convention: ClearanceConvention | None = None
     sheet: str | None = None
+    column_map: Mapping[str, str] = field(default_factory=dict)
     cause_files: tuple[Path, ...] = ()
     permutations: int = 999
     seed: int = 0
@@ -759,7 +762,13 @@ def diagnose_files(
     reading = replace(
         read_options(
             gear,
-            CheckOptions(gear=options.gear, unit=options.unit, convention=options.convention, sheet=options.sheet),
+            CheckOptions(
+                gear=options.gear,
+                unit=options.unit,
+                convention=options.convention,
+                sheet=options.sheet,
+                column_map=options.column_map,
+            ),
         ),
         clearance_hard_max_in=_ANY_LENGTH_IN,
         plunger_hard_max_in=_ANY_LENGTH_IN,
@@ -770,9 +779,13 @@ def diagnose_files(
         first = read.problems[0] if read.problems else None
         why = "no row could be read" if first is None else f"{first.place()}: expected {first.expected}"
         raise InconclusiveDataError(f"nothing to diagnose: {why}", "" if first is None else first.remedy)
+    # The same inspection again is no further evidence. Rows that share an id and differ were refused.
+    once = list({inspection.record_id: inspection for inspection in reversed(valid)}.values())[::-1]
+    again = len(valid) - len(once)
+    notes = (*read.notes, f"{again} rows are inspections that stand there already: used once") if again else read.notes
     diagnosis = diagnose(
         gear.model,
-        table_from_inspections(valid, gear),
+        table_from_inspections(once, gear),
         gear.discrepancies,
         own_causes=own,
         permutations=options.permutations,
@@ -786,7 +799,7 @@ def diagnose_files(
         extension = ModelExtension(
             gear, diagnosis.terms, diagnosis.residual_u_in, tuple(hashes.values()), diagnosis.rows_used
         )
-    return DiagnoseResult(gear, diagnosis, extension, read.problems, read.notes, hashes)
+    return DiagnoseResult(gear, diagnosis, extension, read.problems, notes, hashes)
 
 
 def write_extension(extension: ModelExtension, file: Path) -> None:

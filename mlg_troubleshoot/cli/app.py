@@ -80,6 +80,10 @@ UnitOption = Annotated[
     str | None,
     typer.Option("--unit", metavar="in|thou|mm", help="Unit of lengths that do not say one."),
 ]
+ColumnMapOption = Annotated[
+    list[str] | None,
+    typer.Option("--map", metavar="HEADER=COLUMN", help="How to read a header, e.g. 'Spiel 3=clearance_3_mm'."),
+]
 ConventionOption = Annotated[
     str | None,
     typer.Option(
@@ -125,10 +129,7 @@ def check(
     sheet: Annotated[
         str | None, typer.Option("--sheet", help="Worksheet; '*' reads every sheet with inspections.")
     ] = None,
-    column_map: Annotated[
-        list[str] | None,
-        typer.Option("--map", metavar="HEADER=COLUMN", help="How to read a header, e.g. 'Spiel 3=clearance_3_mm'."),
-    ] = None,
+    column_map: ColumnMapOption = None,
     decimal_comma: Annotated[bool, typer.Option("--decimal-comma", help="0,013 means 0.013.")] = False,
     report: Annotated[
         Path | None, typer.Option("--report", metavar="DIR", help="Write printable reports to this folder.")
@@ -225,6 +226,7 @@ def diagnose(
     unit: UnitOption = None,
     convention: ConventionOption = None,
     sheet: Annotated[str | None, typer.Option("--sheet", help="Worksheet.")] = None,
+    column_map: ColumnMapOption = None,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -235,6 +237,7 @@ def diagnose(
     with Boundary():
         from mlg_troubleshoot import workflows
         from mlg_troubleshoot.cli import diagnose as command
+        from mlg_troubleshoot.cli.check import columns_by_header
 
         command.run(
             files,
@@ -243,6 +246,7 @@ def diagnose(
                 unit=None if unit is None else _unit(unit),
                 convention=None if convention is None else _convention(convention),
                 sheet=sheet,
+                column_map=columns_by_header(tuple(column_map or ())),
                 cause_files=tuple(causes or ()),
                 permutations=permutations,
                 seed=seed,

@@ -73,7 +73,7 @@ def run(arguments: CheckArguments) -> None:
         unit=arguments.unit,
         convention=arguments.convention,
         sheet=arguments.sheet,
-        column_map=_column_map(arguments.column_map),
+        column_map=columns_by_header(arguments.column_map),
         decimal_comma=arguments.decimal_comma,
         repairs=True if arguments.repairs else None,
         extension=workflows.load_model_extension(arguments.extension, arguments.gear, arguments.causes),
@@ -119,7 +119,24 @@ def _result(arguments: CheckArguments, options: workflows.CheckOptions) -> workf
     return workflows.check_inspection(_from_prompts(arguments, load_gear(arguments.gear)), options)
 
 
-def _column_map(pairs: tuple[str, ...]) -> dict[str, str]:
+def columns_by_header(pairs: Sequence[str]) -> dict[str, str]:
+    """Read what ``--map`` was given.
+
+    Parameters
+    ----------
+    pairs : sequence of str
+        ``HEADER=COLUMN`` each.
+
+    Returns
+    -------
+    dict of str to str
+        Columns by header.
+
+    Raises
+    ------
+    UsageError
+        If one of them is no such pair.
+    """
     mapped = {}
     for pair in pairs:
         header, sign, column = pair.rpartition("=")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -27,6 +28,10 @@ Array = NDArray[np.float64]
 
 LEAST_ROWS = 20
 LEAST_TAILS = 4
+# Share of rows from which data faults are no slips of single cells. [1]
+_MANY_FAULTS = 0.15
+# Measured over predicted displacement: further from 1 than this, or negative, is no misfit. [1]
+_MOST_RATIO = 4.0
 
 
 @dataclass(frozen=True)
@@ -225,8 +230,11 @@ def _without_faults(
     model: LinkageModel, table: DiagnosisTable, where: Discrepancies, explained: Array | None
 ) -> tuple[DiagnosisTable, tuple[DataFault, ...]]:
     """Repair or set aside rows with data faults, and rows whose linkage does not close."""
+    read = len(table)
     table, faults, usable = screen_faults(model, table, explained)
+    _single_slips(faults, read)
     table = table.take(usable & np.isfinite(table.measured_in))
+    _enough(table)
     table = table.take(np.isfinite(build_scene(model, table, where).scene.over_in))
     _enough(table)
     return table, faults
@@ -250,12 +258,14 @@ def _infer(
     moving = np.isfinite(columns).all(axis=0) & (np.abs(columns).max(axis=0) > 0.0)
     candidates = [c for c, keep in zip(candidates, moving, strict=True) if keep]
     columns = columns[:, moving]
+    _comparable(table.measured_in, scene.over_in)
     misfit = table.measured_in - scene.over_in
     rows = Rows(
         scene.over_in,
         table.tails,
         table.gears,
         plain.u_filled_in,
+        plain.u_shared_in,
         plain.u_read_in,
         measured_uncertainty(table),
         plain.drawn_in,
@@ -281,6 +291,38 @@ def _answerable(table: DiagnosisTable) -> DiagnosisTable:
             "Record the clearances of joints 1 to 5 at least, at the same inspection.",
         )
     return table.take(measured & some)
+
+
+def _single_slips(faults: tuple[DataFault, ...], read: int) -> None:
+    """Refuse a table in which so many rows look wrong that it is the table and no slip of the pen."""
+    wrong = len({fault.place for fault in faults})
+    if wrong > max(_MANY_FAULTS * read, 5):
+        column = Counter(fault.column for fault in faults).most_common(1)[0][0]
+        raise InconclusiveDataError(
+            f"{wrong} of {read} rows look wrong, most often in {column}: these are no slips of single cells",
+            "Check the unit and the convention of the clearances, and the unit of the displacements, column by column.",
+        )
+
+
+def _comparable(measured_in: Array, predicted_in: Array) -> None:
+    """Refuse measured displacements that cannot be what the prediction is of: sign, unit, or a gauge that is stuck."""
+    if np.ptp(measured_in) == 0.0:
+        raise InconclusiveDataError(
+            "every measured plunger displacement is the same, which no gauge that moves shows",
+            "Check the gauge and the column; record what was read at each inspection.",
+        )
+    large = predicted_in >= np.median(predicted_in)
+    ratio = float(np.median(measured_in[large] / np.maximum(predicted_in[large], 1e-9)))
+    if 1.0 / _MOST_RATIO < ratio < _MOST_RATIO or not np.any(predicted_in > 0.0):
+        return
+    check = "Check the unit and the convention of the clearances, and that the gauge moves with the plunger."
+    if ratio <= -1.0 / _MOST_RATIO:
+        check = "Check the sign: over-travel is positive."
+    elif ratio >= _MOST_RATIO:
+        check = "Check the unit of the displacements."
+    raise InconclusiveDataError(
+        f"the measured displacements are {ratio:.2g} times the predicted ones: no cause on any list does that", check
+    )
 
 
 def _enough(table: DiagnosisTable) -> None:

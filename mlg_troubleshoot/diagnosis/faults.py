@@ -39,6 +39,12 @@ _LEAST_EVIDENCE = 10.0
 # … or the cell nearly alone, or the row nearly alone with as little as this from the cell.
 _CLEARANCE_ALONE = 6.5
 _ROW_ALONE = 30.0
+# What one gets for supposing a slip in a plunger reading. [1]
+_READING_EVIDENCE = 3.0
+# Readings that repeat each other lie no further apart [in]; no plunger goes further [in]; largest clearance meant [in].
+_AGREE_IN, _FARTHEST_IN, _LARGEST_IN = 0.012, 0.4, 0.03
+# No joint of a gear that still moves has a radial clearance as large as this. [in]
+_NEVER_WORN_IN = 0.0325
 _LEAST_ROW_ALONE = 3.0
 
 
@@ -88,9 +94,9 @@ class _Usual:
         less = size * np.log((clearance + _LEAST_SPREAD_IN) / size)
         return np.asarray(np.where(apart < 0.0, less, apart) / self.spread[at])
 
-    def surprise(self, place: int, joints: Sequence[int], values: Sequence[float]) -> float:
+    def surprise(self, place: int, joints: Sequence[int], values: Array) -> float:
         """How unlikely clearances are in a row, as minus a log-likelihood. [1]"""
-        off = self.off(np.asarray(values), place, joints)
+        off = self.off(values, place, joints)
         return float(0.5 * (_FREEDOM + 1.0) * np.sum(np.log1p(off**2 / _FREEDOM)))
 
 
@@ -296,7 +302,9 @@ def _convincing(row_evidence: float, slip: _Slip) -> bool:
         return True
     if row_evidence >= _ROW_ALONE and cell >= _LEAST_ROW_ALONE:
         return True
-    return cell > _CLEARANCE_ALONE and row_evidence > -1.0 and max(written for _c, written, _r in slip.cells) > 0.02
+    largest = max(written for _c, written, _r in slip.cells)
+    # A joint may be worn as badly as that: then the plunger must speak for a slip, too.
+    return cell > _CLEARANCE_ALONE and row_evidence > (-1.0 if largest > _NEVER_WORN_IN else 1.0) and largest > 0.02
 
 
 def _suffix(k: int) -> str:
@@ -308,64 +316,68 @@ def _reading_index(column: str) -> int:
     return 0 if not middle else int(middle) - 1
 
 
+_TOO_LARGE = (("mm_as_in", 1.0 / MM_PER_IN), ("factor_10", 0.1))
+
+
 def _slips(model: LinkageModel, table: DiagnosisTable, usual: _Usual, place: int, clearance: Array) -> list[_Slip]:
-    written, readings = table.clearance_in[place], table.readings_in[place]
-    seen = readings[np.isfinite(readings)]
+    """Every slip of the pen that a row may hold."""
+    written = table.clearance_in[place]
+    seen = table.readings_in[place][np.isfinite(table.readings_in[place])]
     measured = float(np.median(seen))
-    slips: list[_Slip] = []
-
-    def name(j: int) -> str:
-        return f"clearance_{model.joint_numbers[j]}_in"
-
     known = [int(j) for j in np.flatnonzero(np.isfinite(written))]
-    for j in known:
-        for kind, factor in (("mm_as_in", 1.0 / MM_PER_IN), ("factor_10", 0.1), ("factor_10", 10.0)):
-            right = float(written[j] * factor)
-            if right > 0.03 or written[j] == 0.0:
-                continue
-            new = clearance.copy()
-            new[j] = right
-            evidence = usual.surprise(place, [j], [written[j]]) - usual.surprise(place, [j], [right])
-            slips.append(_Slip(kind, new, measured, ((name(j), float(written[j]), right),), evidence))
+
+    def slip(kind: str, joints: list[int], right: Sequence[float], *, known: bool = True) -> _Slip:
         new = clearance.copy()
-        new[j] = usual.expected[place, j]
-        evidence = usual.surprise(place, [j], [written[j]]) - 1.0
-        slips.append(_Slip("implausible", new, measured, ((name(j), float(written[j]), None),), evidence))
-    for position, a in enumerate(known):
-        for b in known[position + 1 :]:
-            new = clearance.copy()
-            new[a], new[b] = written[b], written[a]
-            pair = [a, b]
-            evidence = usual.surprise(place, pair, written[pair]) - usual.surprise(place, pair, written[pair[::-1]])
-            cells = (
-                (name(a), float(written[a]), float(written[b])),
-                (name(b), float(written[b]), float(written[a])),
-            )
-            slips.append(_Slip("swapped_joints", new, measured, cells, evidence))
-    for k in np.flatnonzero(np.isfinite(readings)):
-        others = np.delete(readings, k)
-        others = others[np.isfinite(others)]
-        for kind, factor in (
-            ("mm_as_in", 1.0 / MM_PER_IN),
-            ("mm_as_in", MM_PER_IN),
-            ("factor_10", 0.1),
-            ("factor_10", 10.0),
-        ):
+        new[joints] = right
+        evidence = usual.surprise(place, joints, written[joints])
+        evidence -= usual.surprise(place, joints, np.asarray(right)) if known else 1.0
+        cells = tuple(
+            (f"clearance_{model.joint_numbers[j]}_in", float(written[j]), float(value) if known else None)
+            for j, value in zip(joints, right, strict=True)
+        )
+        return _Slip(kind, new, measured, cells, evidence)
+
+    slips = [
+        slip(kind, [j], [written[j] * factor])
+        for j in known
+        for kind, factor in (*_TOO_LARGE, ("factor_10", 10.0))
+        if 0.0 < written[j] * factor <= _LARGEST_IN
+    ]
+    slips += [slip("implausible", [j], [usual.expected[place, j]], known=False) for j in known]
+    worn = [j for j in known if written[j] > 0.0]
+    slips += [
+        slip(kind, worn, written[worn] * factor)
+        for kind, factor in _TOO_LARGE
+        if len(worn) > 1 and float(np.max(written[worn])) * factor <= _LARGEST_IN
+    ]
+    slips += [slip("swapped_joints", [a, b], written[[b, a]]) for i, a in enumerate(known) for b in known[i + 1 :]]
+    return slips + _reading_slips(table.readings_in[place], clearance)
+
+
+def _reading_slips(readings: Array, clearance: Array) -> list[_Slip]:
+    """Slips in one plunger reading of a row, or in all of them alike."""
+    slips: list[_Slip] = []
+    present = [int(k) for k in np.flatnonzero(np.isfinite(readings))]
+    seen = readings[present]
+    for k in present:
+        others = readings[[other for other in present if other != k]]
+        column = f"plunger_displacement{_suffix(k)}_in"
+        for kind, factor in (*_TOO_LARGE, ("mm_as_in", MM_PER_IN), ("factor_10", 10.0)):
             right = float(readings[k] * factor)
-            agreed = float(np.mean([*others, right]))
-            column = f"plunger_displacement{_suffix(int(k))}_in"
             spread = float(np.max(np.abs(others - right))) if len(others) else 0.0
-            if spread < 0.012 and abs(right) < 0.4:
-                slips.append(_Slip(kind, clearance.copy(), agreed, ((column, float(readings[k]), right),), 3.0))
+            if spread < _AGREE_IN and abs(right) < _FARTHEST_IN:
+                agreed = float(np.mean([*others, right]))
+                cells = ((column, float(readings[k]), right),)
+                slips.append(_Slip(kind, clearance.copy(), agreed, cells, _READING_EVIDENCE))
         if len(others):
-            column = f"plunger_displacement{_suffix(int(k))}_in"
             wrong = ((column, float(readings[k]), None),)
-            slips.append(_Slip("implausible", clearance.copy(), float(np.mean(others)), wrong, 3.0))
-    for factor, kind in ((1.0 / MM_PER_IN, "mm_as_in"), (0.1, "factor_10")):
-        if len(seen) > 1 and float(np.ptp(seen)) * factor < 0.012:
+            slips.append(_Slip("implausible", clearance.copy(), float(np.mean(others)), wrong, _READING_EVIDENCE))
+    for kind, factor in _TOO_LARGE:
+        if len(seen) > 1 and float(np.ptp(seen)) * factor < _AGREE_IN:
             all_cells = tuple(
-                (f"plunger_displacement{_suffix(int(k))}_in", float(readings[k]), float(readings[k] * factor))
-                for k in np.flatnonzero(np.isfinite(readings))
+                (f"plunger_displacement{_suffix(k)}_in", float(readings[k]), float(readings[k] * factor))
+                for k in present
             )
-            slips.append(_Slip(kind, clearance.copy(), measured * factor, all_cells, 3.0))
+            middle = float(np.median(seen)) * factor
+            slips.append(_Slip(kind, clearance.copy(), middle, all_cells, _READING_EVIDENCE))
     return slips

@@ -41,6 +41,8 @@ HABIT, READ_HABIT = 0.04, 0.04
 HABIT_OF_ONE, HABIT_SPREAD = 0.1, 0.7
 GEAR_SPREAD = 0.5
 _RATIOS = np.geomspace(0.02, 1.0, 24)
+# Common error of a gear's rows, over the scatter of a row, from which it is told from that of single rows. [1]
+_SHARED = 0.2
 # With fewer levels nothing can be told.
 _LEAST_LEVELS = 4
 # Ratios of the scatter between tails to the scatter of a row that are tried.
@@ -59,8 +61,9 @@ class Rows:
         Prediction. [in]
     tails, gears : ndarray of str, shape (n,)
         Tail and single gear of each row.
-    u_filled_in : ndarray, shape (n,)
-        Further standard deviation of a row, by clearances that were not read. [in]
+    u_filled_in, u_shared_in : ndarray, shape (n,)
+        Further standard deviation of a row by clearances that were not read: its own, and common to its gear's rows.
+        [in]
     u_read_in : float
         Standard deviation by the reading of clearances. [in]
     u_measured_in : float
@@ -77,6 +80,7 @@ class Rows:
     tails: NDArray[np.str_]
     gears: NDArray[np.str_]
     u_filled_in: Array
+    u_shared_in: Array
     u_read_in: float
     u_measured_in: float
     drawn_in: Array
@@ -232,7 +236,9 @@ def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> No
     scale = max(robust_scale(centred), least)
     relative = _growth(centred, predicted)
     scale = max(robust_scale(centred / relative), least)
-    relative = np.sqrt(relative**2 + (rows.u_filled_in / scale) ** 2)
+    gears = tail_numbers(rows.gears)
+    shared, own = _shared(rows.u_shared_in / scale, gears)
+    relative = np.sqrt(relative**2 + (rows.u_filled_in / scale) ** 2 + own**2)
     # Rows far out in the tails of the distribution count less, but never as nothing.
     standard = np.minimum(np.abs(centred), _companion(rest, numbers)) / (scale * relative)
     relative = relative * np.maximum(1.0, standard / 3.0)
@@ -248,19 +254,27 @@ def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> No
     habits = (HABIT + read * READ_HABIT) * rows.habits
     gear_ratio = float(np.hypot(GEAR_RATIO, read * READ_GEAR_RATIO))
     ratios = _tail_ratios(rest / (scale * relative), numbers, gear_ratio)
-    loadings = np.hstack([np.column_stack(bias), trends, habits])
-    gears = tail_numbers(rows.gears)
+    loadings = np.hstack([np.column_stack(bias), trends, habits, shared])
     noise = NoiseModel(relative, numbers, gears, loadings, 0.5 * least, gear_ratio, ratios)
     standard = rest / scale
-    own = [HABIT_OF_ONE] * len(rows.readers)
+    each_own = [HABIT_OF_ONE] * len(rows.readers)
     for place, levels in enumerate(rows.readers):
         others = [HABIT_OF_ONE * other for k, other in enumerate(rows.readers) if k != place]
         beside = replace(noise, loadings=np.hstack([loadings, *others]))
-        own[place] = _ratio(beside, levels, standard, HABIT_OF_ONE, HABIT_SPREAD)
-    loadings = np.hstack([loadings, *(ratio * levels for ratio, levels in zip(own, rows.readers, strict=True))])
+        each_own[place] = _ratio(beside, levels, standard, HABIT_OF_ONE, HABIT_SPREAD)
+    loadings = np.hstack([loadings, *(ratio * levels for ratio, levels in zip(each_own, rows.readers, strict=True))])
     alike = replace(noise, loadings=loadings, gear_ratio=0.0)
     each = (gears[:, None] == np.arange(gears.max() + 1)).astype(float)
     return replace(noise, loadings=loadings, gear_ratio=_ratio(alike, each, standard, gear_ratio, GEAR_SPREAD))
+
+
+def _shared(relative: Array, gears: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Loadings of gears whose unread joints make all their rows wrong alike, and what is left to single rows. [1]"""
+    largest = np.zeros(gears.max() + 1)
+    np.maximum.at(largest, gears, relative)
+    large = np.flatnonzero(largest > _SHARED)
+    loadings = np.where(gears[:, None] == large, relative[:, None], 0.0)
+    return loadings, np.where(largest[gears] > _SHARED, 0.0, relative)
 
 
 def _ratio(noise: NoiseModel, levels: Array, rest: Array, expected: float, spread: float) -> float:

@@ -23,7 +23,7 @@ _MOST_SIGMAS = 2.0
 _SHARE_DOUBT = 0.35
 
 
-def likely_clearances(table: DiagnosisTable) -> tuple[Array, Array, Array]:
+def likely_clearances(table: DiagnosisTable) -> tuple[Array, Array, Array, Array]:
     """Most likely clearances behind the readings, and those of joints that were not read.
 
     A gear's joint wears along its own history (`wear`). A reading is drawn towards what that makes expect as far as
@@ -41,12 +41,14 @@ def likely_clearances(table: DiagnosisTable) -> tuple[Array, Array, Array]:
     likely : ndarray, shape (n, n_joints)
         Clearances without gaps. [in]
     u_filled_in : ndarray, shape (n, n_joints)
-        Standard uncertainty of the filled ones, 0 for the measured ones. [in]
+        Standard deviation of the filled ones about the wear of their gear, 0 for the measured ones. [in]
+    u_shared_in : ndarray, shape (n, n_joints)
+        Standard uncertainty of that wear, which all rows of a gear share, 0 for the measured ones. [in]
     u_read_in : ndarray, shape (n, n_joints)
         Standard uncertainty that is left of the measured ones, 0 for the filled ones. [in]
     """
     readings = table.clearance_in
-    likely, spread, left = np.zeros_like(readings), np.zeros_like(readings), np.zeros_like(readings)
+    likely, spread, shared, left = (np.zeros_like(readings) for _ in range(4))
     gears = np.unique(table.gears, return_inverse=True)[1]
     kilo, landed = landings_of(table.quantities.get("gear_landings"), gears)
     for j in range(readings.shape[1]):
@@ -61,9 +63,10 @@ def likely_clearances(table: DiagnosisTable) -> tuple[Array, Array, Array]:
         # A reading is never overruled by more than its own uncertainty makes likely.
         reach = _MOST_SIGMAS * np.sqrt(noise)
         likely[:, j] = np.where(known, np.clip(drawn, read - reach, read + reach), drawn)
-        spread[:, j] = np.where(known, 0.0, np.sqrt(history.scatter_in2 + history.unsure_in2))
+        spread[:, j] = np.where(known, 0.0, np.sqrt(history.scatter_in2))
+        shared[:, j] = np.where(known, 0.0, np.sqrt(history.unsure_in2))
         left[:, j] = np.where(known, np.sqrt(trust * noise + (1.0 - trust) ** 2 * history.unsure_in2), 0.0)
-    return np.maximum(likely, 0.0), spread, left
+    return np.maximum(likely, 0.0), spread, shared, left
 
 
 @dataclass(frozen=True)
@@ -76,8 +79,8 @@ class Prediction:
         Model, rows and plain prediction.
     worst : WorstCase
         Worst directions of each row.
-    u_filled_in : ndarray, shape (n,)
-        Standard uncertainty by clearances that were not read. [in]
+    u_filled_in, u_shared_in : ndarray, shape (n,)
+        Standard uncertainty by clearances that were not read: of each row, and common to a gear's rows. [in]
     u_read_in : float
         Standard uncertainty by the reading of clearances, root mean square over the rows. [in]
     drawn_in : ndarray, shape (n,)
@@ -88,6 +91,7 @@ class Prediction:
     scene: Scene
     worst: WorstCase
     u_filled_in: Array
+    u_shared_in: Array
     u_read_in: float
     drawn_in: Array
 
@@ -112,7 +116,7 @@ def build_scene(model: LinkageModel, table: DiagnosisTable, where: Discrepancies
     Prediction
         The prediction.
     """
-    likely, u_filled, u_read = likely_clearances(table)
+    likely, u_filled, u_shared, u_read = likely_clearances(table)
     as_read = np.where(np.isfinite(table.clearance_in), table.clearance_in, likely)
     drawn = worst_case(model, likely).over_in - worst_case(model, as_read).over_in
     share = _share_of_declared(table.measured_in - worst_case(model, as_read).over_in, drawn)
@@ -126,9 +130,9 @@ def build_scene(model: LinkageModel, table: DiagnosisTable, where: Discrepancies
         contribution[:, j] = worst.over_in - model.displacement(links_from(without, worst.over_directions))
         slopes[:, j] = (model.displacement(links_from(moved, worst.over_directions)) - worst.over_in) / 1e-5
     scene = Scene(model, table, clearance, model.joint_numbers, where, worst.over_in, contribution)
-    filled_in = np.sqrt(np.sum((slopes * u_filled) ** 2, axis=1))
+    filled_in, shared_in = (np.sqrt(np.sum((slopes * u) ** 2, axis=1)) for u in (u_filled, u_shared))
     read_in = share * float(np.sqrt(np.nanmean(np.sum((slopes * u_read) ** 2, axis=1))))
-    return Prediction(scene, worst, filled_in, read_in, np.nan_to_num(-drawn))
+    return Prediction(scene, worst, filled_in, shared_in, read_in, np.nan_to_num(-drawn))
 
 
 def _share_of_declared(misfit: Array, drawn: Array) -> float:

@@ -21,6 +21,8 @@ _LOG_SPREAD = 0.55
 # By how much a row must be nearer to the other side, and nearer than its twin, where few days tell of pairs.
 _SIDE_ALONE = 4.0
 _SIDE_APART = 8.0
+# Two rows no further apart than this are the same inspection twice.
+_SIDE_DIFFER = 2.0
 
 
 def swapped_sides(table: DiagnosisTable) -> list[tuple[int, str, str]]:
@@ -95,8 +97,10 @@ def _pairs(table: DiagnosisTable, rows: NDArray[np.intp], rate: float) -> tuple[
     two = suspects[0]
     others = np.setdiff1d(rows, two)
     near = [_nearness_to_other_side(table, others, int(row), rate) for row in two]
-    # One pair is no habit: then the row itself must lie with the other side.
-    if pairs == 1 and (max(near) < _SIDE_ALONE or max(near) - min(near) < _SIDE_APART):
+    # A gear may be inspected twice a day: then neither row lies with the other side, or both do alike.
+    apart, likely = abs(near[0] - near[1]), max(near)
+    clear = apart >= _SIDE_APART and likely >= (_SIDE_ALONE if pairs == 1 else -_SIDE_ALONE)
+    if not (clear or (pairs > 1 and likely > 0.0 and apart >= _SIDE_DIFFER)):
         return pairs, None
     return pairs, int(two[0] if near[0] > near[1] else two[1])
 

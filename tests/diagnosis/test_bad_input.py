@@ -88,14 +88,43 @@ def test_constant_clearances_are_no_reason_to_fail(gear: Gear, plain: DiagnosisT
     assert diagnose(gear.model, alike, gear.discrepancies, permutations=199).verdict == "NONE"
 
 
-def test_measured_values_that_never_differ_are_no_reason_to_fail(gear: Gear, plain: DiagnosisTable) -> None:
-    stuck = replace(plain, readings_in=np.full_like(plain.readings_in, 0.02))
-    assert diagnose(gear.model, stuck, gear.discrepancies, permutations=99).verdict in {
-        "NONE",
-        "NAMED",
-        "AMBIGUOUS",
-        "UNLISTED",
-    }
+def stuck(table: DiagnosisTable) -> DiagnosisTable:
+    return replace(table, readings_in=np.full_like(table.readings_in, 0.02))
+
+
+def upside_down(table: DiagnosisTable) -> DiagnosisTable:
+    return replace(table, readings_in=-table.readings_in)
+
+
+def plunger_in_millimetres(table: DiagnosisTable) -> DiagnosisTable:
+    return replace(table, readings_in=25.4 * table.readings_in)
+
+
+def clearances_in_millimetres(table: DiagnosisTable) -> DiagnosisTable:
+    return replace(table, clearance_in=25.4 * table.clearance_in)
+
+
+def one_joint_in_millimetres(table: DiagnosisTable) -> DiagnosisTable:
+    values = table.clearance_in.copy()
+    values[:, 2] *= 25.4
+    return replace(table, clearance_in=values)
+
+
+TABLE_IS_WRONG: dict[str, tuple[Spoil, str]] = {
+    "a stuck gauge": (stuck, "Check the gauge"),
+    "signs the other way round": (upside_down, "Check the sign"),
+    "the plunger in millimetres": (plunger_in_millimetres, "Check the unit of the displacements"),
+    "clearances in millimetres": (clearances_in_millimetres, "Check the unit and the convention of the clearances"),
+    "one joint in millimetres": (one_joint_in_millimetres, "Check the unit and the convention of the clearances"),
+}
+
+
+@pytest.mark.parametrize("case", TABLE_IS_WRONG)
+def test_what_is_wrong_with_the_table_is_no_cause(case: str, gear: Gear, plain: DiagnosisTable) -> None:
+    spoil, remedy = TABLE_IS_WRONG[case]
+    with pytest.raises(InconclusiveDataError) as refused:
+        diagnose(gear.model, spoil(plain), gear.discrepancies, permutations=99)
+    assert remedy in refused.value.remedy
 
 
 def test_a_column_with_one_value_known_is_no_reason_to_fail(gear: Gear, plain: DiagnosisTable) -> None:
@@ -188,3 +217,15 @@ def test_the_json_of_a_diagnosis_holds_no_number_that_is_none(tmp_path: Path) ->
     found = run(str(write(tmp_path / "t.csv", rows, "plunger_displacement_in")), "--json", "--permutations", "99")
     assert json.loads(found.stdout)["schema_version"] == 1
     assert not {"NaN", "Infinity"} & set(found.stdout.split())
+
+
+def test_the_same_inspections_again_are_no_further_evidence(tmp_path: Path) -> None:
+    rows = [[*row, 0.02 + 0.001 * k] for k, row in enumerate(inspections(15))]
+    said = run(str(write(tmp_path / "t.csv", [*rows, *rows], "plunger_displacement_in"))).stderr
+    assert "15 usable rows are too few" in said
+
+
+def test_a_header_can_be_named(tmp_path: Path) -> None:
+    rows = [[*row, 0.02 + 0.001 * k] for k, row in enumerate(inspections(5))]
+    file = write(tmp_path / "t.csv", rows, "Weg")
+    assert "5 usable rows" in run(str(file), "--map", "Weg=plunger_displacement_in").stderr

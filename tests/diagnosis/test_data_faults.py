@@ -225,3 +225,24 @@ def test_a_gear_read_twice_on_one_of_two_visits_is_no_swapped_side(gear: Gear) -
     landings[17] = landings[12]
     again = replace(table, quantities={**table.quantities, "gear_landings": landings})
     assert faults(gear, with_side(again, 17, "LH")) == []
+
+
+def test_a_gear_inspected_twice_on_its_day_is_no_swapped_side_where_aircraft_come_in_pairs(gear: Gear) -> None:
+    table = paired(gear, [10.0, 150.0, 300.0])
+    landings = table.quantities["gear_landings"].copy()
+    landings[17] = landings[12]
+    again = replace(table, quantities={**table.quantities, "gear_landings": landings})
+    assert faults(gear, with_side(again, 17, "LH")) == []
+
+
+def test_a_row_in_millimetres_is_found_in_its_clearances(gear: Gear, sound: DiagnosisTable) -> None:
+    values = sound.clearance_in.copy()
+    values[ROW] *= 25.4
+    found = screen_faults(gear.model, replace(sound, clearance_in=values))[1]
+    assert {(f.kind, f.column.split("_")[0]) for f in found} == {("mm_as_in", "clearance")}
+
+
+def test_a_worn_joint_that_moves_the_plunger_is_no_slip(gear: Gear) -> None:
+    values = fleet(gear.model).clearance_in.copy()
+    values[ROW, 6] = 0.024
+    assert faults(gear, fleet(gear.model, clearance_in=values)) == []
