@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from hashlib import sha256
@@ -781,8 +781,7 @@ def diagnose_files(
         raise InconclusiveDataError(f"nothing to diagnose: {why}", "" if first is None else first.remedy)
     # The same inspection again is no further evidence. Rows that share an id and differ were refused.
     once = list({inspection.record_id: inspection for inspection in reversed(valid)}.values())[::-1]
-    again = len(valid) - len(once)
-    notes = (*read.notes, f"{again} rows are inspections that stand there already: used once") if again else read.notes
+    notes = (*read.notes, *_evidence_notes(once, len(valid) - len(once), gear))
     diagnosis = diagnose(
         gear.model,
         table_from_inspections(once, gear),
@@ -800,6 +799,16 @@ def diagnose_files(
             gear, diagnosis.terms, diagnosis.residual_u_in, tuple(hashes.values()), diagnosis.rows_used
         )
     return DiagnoseResult(gear, diagnosis, extension, read.problems, notes, hashes)
+
+
+def _evidence_notes(inspections: Sequence[Inspection], again: int, gear: Gear) -> Iterator[str]:
+    """What a diagnosis cannot use: inspections that stand twice, joints that nobody measured."""
+    if again:
+        yield f"inspections that stand twice are used once: {again} rows less"
+    unread = [n for n in gear.model.joint_numbers if all(i.clearance_in.get(n) is None for i in inspections)]
+    if unread:
+        listed = ", ".join(f"#{n}" for n in unread)
+        yield f"not measured in any row and counted as 0: {listed}; wear there can look like a wrong calibration rate"
 
 
 def write_extension(extension: ModelExtension, file: Path) -> None:

@@ -182,6 +182,9 @@ def show_one(judgement: Judgement, gear: Gear) -> None:
         console.print(Text(f"Both ends of one link act alike ({pairs}): the plunger cannot tell which end is worn."))
     if a.repair_sets:
         console.print(_repair_table(a))
+        parts = sorted({gear.joint(n).new_part.value for s in a.repair_sets for n in s.joints})
+        listed = " to ".join(f"{value:g}" for value in dict.fromkeys((parts[0], parts[-1])))
+        console.print(Text(f"A restored joint counts with the {listed} in radial of a new part."))
     if a.rigging is not None:
         console.print(Text(rigging_sentence(a.rigging)))
     for warning in a.warnings:
@@ -320,6 +323,15 @@ def _urgency(judgement: Judgement) -> tuple[int, float]:
     return (_WORST_FIRST.index(judgement.verdict), float("-inf") if remaining is None else remaining)
 
 
+# Records that a line of the batch names.
+_NAMED = 8
+
+
+def _measured_outside(a: Assessment) -> bool:
+    measured = a.inspection.measured_displacement_in
+    return measured is not None and abs(measured) > a.margin_in
+
+
 def show_batch(result: CheckResult) -> None:
     """Show a batch: how many of each verdict, worst gears first, one line a gear.
 
@@ -333,6 +345,11 @@ def show_batch(result: CheckResult) -> None:
     summary = Text(f"{len(result.judgements)} inspections: ")
     summary.append(" · ".join(f"{counts[v]} {v.value.replace('_', ' ').lower()}" for v in Verdict if counts[v]))
     console.print(summary)
+    measured = [j for j in result.judgements if isinstance(j, Assessment) and _measured_outside(j)]
+    if measured:
+        listed = ", ".join(j.inspection.record_id for j in measured[:_NAMED])
+        more = f" and {len(measured) - _NAMED} more" if len(measured) > _NAMED else ""
+        console.print(Text(f"MEASURED outside their margin, whatever is predicted: {listed}{more}.", style="bold"))
     table = _table(console)
     headings = ["", "verdict", "tail", "side", "record", "worst in", "margin", "chance", "next"]
     shown = [h for h in headings if h != "margin" or console.width >= _WIDE]

@@ -145,7 +145,8 @@ def _assess_one(
     critical_missing: bool,
 ) -> Assessment:
     lower, margin = batch.lower, float(batch.margin_in[i])
-    displacement = float(lower.displacement_in[i])
+    # Adding zero turns a minus zero into zero.
+    displacement = float(lower.displacement_in[i]) + 0.0
     closes = bool(np.isfinite(displacement))
     # A linkage of the ensemble may not close where the reference does: the uncertainty is then unknown.
     known = closes and bool(np.isfinite(u))
@@ -197,7 +198,9 @@ def _assess_one(
         standard_uncertainty_in=u if known else None,
         probability_within_margin=p_lower,
         probability_exceed_random_directions=chance if closes else None,
-        geometry_spread_in=(float(lower.spread_low_in[i]), float(lower.spread_high_in[i])) if known else None,
+        geometry_spread_in=(float(lower.spread_low_in[i]) + 0.0, float(lower.spread_high_in[i]) + 0.0)
+        if known
+        else None,
         budget=budget,
         over_directions_rad=tuple(lower.worst.over_directions[i].tolist()) if closes else (),
         under_directions_rad=tuple(lower.worst.under_directions[i].tolist()) if closes else (),
@@ -206,7 +209,7 @@ def _assess_one(
         headline=_headline(found, displacement, chance, margin, p_lower, findings, inspection.outcome),
         measured_statement=measured_plunger.statement(inspection, margin),
         repair_sets=sets,
-        warnings=_warnings(gear, inspection, findings, closes, over, under, u),
+        warnings=_warnings(gear, inspection, findings, closes, over, under, u, options.extension),
         measuring=measuring,
         rigging=rigging,
         confidence=check_probability(gear, inspection, worst, margin, budget, rng)
@@ -267,8 +270,14 @@ def _warnings(
     over: float,
     under: float,
     u: float,
+    extension: Extension | None,
 ) -> tuple[str, ...]:
     warnings = list(inspection.warnings)
+    lacking = () if extension is None else extension.lacks(inspection)
+    if lacking:
+        warnings.append(
+            f"The extension of the model needs {', '.join(lacking)}, which this inspection lacks: predicted without."
+        )
     warnings += [
         f"Joint #{finding.joint} {finding.name}: {finding.clearance_in:.4f} in radial is above its limit of "
         f"{finding.limit_in:.4f} in ({gear.joint(finding.joint).limit.kind}): reject to the manual."

@@ -159,16 +159,17 @@ def _reading_with_error(found: float, u: float, rng: np.random.Generator, n: int
 def _summary(gear: Gear, drawn: Array, worn: NDArray[np.bool_], weight: Array, not_clearance: float) -> Posterior:
     index = {number: j for j, number in enumerate(gear.joint_numbers)}
     chances = [
-        GroupChance(group, float(weight[worn[:, [index[n] for n in group]].any(axis=1)].sum()))
+        GroupChance(group, min(float(weight[worn[:, [index[n] for n in group]].any(axis=1)].sum()), 1.0))
         for group in groups_of(gear)
     ]
     chances.sort(key=lambda chance: -chance.probability)
     intervals = []
     for number, j in index.items():
         low, median, high = _weighted_quantiles(drawn[:, j], weight)
-        intervals.append(ClearanceInterval(number, low, median, high, float(weight[worn[:, j]].sum())))
+        intervals.append(ClearanceInterval(number, low, median, high, min(float(weight[worn[:, j]].sum()), 1.0)))
     called = tuple(chance.joints for chance in chances if chance.probability > 0.5)
-    none = float(weight[~worn.any(axis=1)].sum())
+    # A sum of weights may pass 1 by rounding.
+    none = min(float(weight[~worn.any(axis=1)].sum()), 1.0)
     effective = float(1.0 / np.sum(weight**2))
     return Posterior(
         tuple(chances),
@@ -195,7 +196,7 @@ def _text(chances: Sequence[GroupChance], called: Sequence[tuple[int, ...]], non
     also = f", then {second} {percent(chances[1].probability)}" if second else ""
     ranked = f"most likely worn {first} ({percent(chances[0].probability)}{also})"
     if not_clearance > 0.8:
-        return f"Something other than joint clearance likely moved the plunger ({percent(not_clearance)}); {ranked}."
+        return f"Something other than joint clearance likely moved the plunger ({percent(not_clearance)})."
     if called:
         return f"The measured displacement points to wear: {ranked}; not clearance at all {percent(not_clearance)}."
     return (

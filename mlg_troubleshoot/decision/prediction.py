@@ -39,6 +39,10 @@ class Extension(Protocol):
         """Return the extension in one sentence."""
         ...
 
+    def lacks(self, inspection: Inspection) -> tuple[str, ...]:
+        """Return the columns that the extension needs and an inspection lacks."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class Prediction:

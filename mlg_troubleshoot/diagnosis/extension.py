@@ -95,6 +95,23 @@ class ModelExtension:
         terms = "; ".join(term.words() for term in self.terms)
         return f"{terms}; fitted to {self.rows} measured rows"
 
+    def lacks(self, inspection: Inspection) -> tuple[str, ...]:
+        """Return the columns that the terms need and an inspection lacks.
+
+        Parameters
+        ----------
+        inspection : Inspection
+            One inspection.
+
+        Returns
+        -------
+        tuple of str
+            Columns; a term does nothing where its column is missing.
+        """
+        known = table_from_inspections([inspection], self.gear).columns
+        needed = dict.fromkeys(name for term in self.terms for name in term.candidate.cause.needs)
+        return tuple(name for name in needed if name not in known)
+
 
 def adjustment_of(
     terms: Sequence[Term],

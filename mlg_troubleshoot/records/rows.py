@@ -64,7 +64,6 @@ _LENGTH_RANGE_IN: dict[Kind, tuple[float, float]] = {
     Kind.MARGIN: (0.0, 0.2),
     Kind.MARGIN_U: (0.0, 0.1),
 }
-_DOWN_LOCK_ALLOWED_IN = (0.01, 0.05)
 _SIGNED = frozenset({Kind.PLUNGER_DOWN_LOCK, Kind.PLUNGER_DISPLACEMENT})
 _NUMBER_RANGE: dict[Kind, tuple[float, float, str, str]] = {
     Kind.LANDINGS: (0.0, 1_000_000.0, "", "landings since overhaul, 0 or more"),
@@ -220,7 +219,7 @@ class RowReader:
         convention = self._read_convention()
         row_unit = self._read_row_unit()
         clearance, entered = self._read_clearances(convention, row_unit, warnings)
-        lengths, readings, floats = self._read_lengths(row_unit, warnings)
+        lengths, readings, floats = self._read_lengths(row_unit)
         numbers: dict[Kind, float] = {}
         for index, kind in self._numbers:
             cell = cells[index]
@@ -541,7 +540,7 @@ class RowReader:
         ).rstrip()
 
     def _read_lengths(
-        self, row_unit: LengthUnit | None, warnings: list[str]
+        self, row_unit: LengthUnit | None
     ) -> tuple[dict[Kind, float], tuple[float, ...], Mapping[int, float]]:
         lengths: dict[Kind, float] = {}
         readings: list[tuple[int, float]] = []
@@ -571,13 +570,6 @@ class RowReader:
                 floats[field.number or 0] = value_in
             else:
                 lengths[kind] = value_in
-        down_lock = lengths.get(Kind.PLUNGER_DOWN_LOCK)
-        if down_lock is not None:
-            low, high = _DOWN_LOCK_ALLOWED_IN
-            if not low - _EPS_IN <= down_lock <= high + _EPS_IN:
-                warnings.append(
-                    f"plunger at Down Lock: {down_lock:.4g} in is outside the allowed {low:g} to {high:g} in"
-                )
         readings.sort()
         return lengths, tuple(value for _, value in readings), floats or _NO_FLOATS
 

@@ -398,6 +398,6 @@ def _iso_day(text: str, expected: str) -> date:
         raise CellFaultError(
             "date_ambiguous",
             expected,
-            "Day and month cannot be told apart. Enter year-month-day, for example 2026-03-04.",
+            "Which number is the day and which the month is not guessed. Enter year-month-day, for example 2026-03-04.",
         )
     raise CellFaultError("date_invalid", expected, "Enter year-month-day, for example 2026-03-04.")

@@ -177,3 +177,10 @@ def test_a_template_that_was_filled_in_reads_back(tmp_path: Path) -> None:
     found = mlg("check", path, "--json").one
     assert found["side"] == "RH"
     assert {f"clearance_{j['joint']}_in": j["clearance_in"] for j in found["joints"]} == clearances
+
+
+def test_no_displacement_is_minus_zero(table: Table) -> None:
+    nothing = {f"clearance_{n}_in": "" for n in range(1, 11)}
+    found = mlg("check", table(row(**nothing, plunger_displacement_in="0")), "--json").out
+    assert '"predicted_displacement_in"' in found
+    assert "-0.0" not in found

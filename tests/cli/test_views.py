@@ -121,3 +121,31 @@ def test_a_line_of_a_batch_ends_with_its_next_action(changes: dict[str, str], sa
 def test_a_failure_within_the_margin_is_not_put_on_the_joints(table: Table) -> None:
     found = mlg("check", table(row(outcome="FAILED")), "--json").one
     assert "check hydraulics, reversing valve, doors" in found["next_action"]["text"]
+
+
+def test_a_batch_says_first_which_gears_were_measured_outside_their_margin(table: Table) -> None:
+    within = row(record_id="R1", plunger_displacement_in="0.01")
+    outside = row(record_id="R2", plunger_displacement_in="-0.045")
+    lines = mlg("check", table(within, outside)).out.splitlines()
+    assert lines[1] == "MEASURED outside their margin, whatever is predicted: R2."
+
+
+def test_a_batch_without_such_a_gear_does_not_speak_of_it(table: Table) -> None:
+    assert "MEASURED" not in mlg("check", table(row(record_id="R1"), row(record_id="R2"))).out
+
+
+@WIDTHS
+def test_a_repair_says_what_a_restored_joint_counts_with(shown: Run, width: int) -> None:
+    assert "A restored joint counts with the 0.0005 in radial of a new part." in shown.out
+
+
+def test_a_plunger_outside_its_down_lock_range_is_said_once(table: Table) -> None:
+    shown = mlg("check", table(row(plunger_down_lock_in="0.06")))
+    assert (shown.out + shown.err).count("Down Lock") == 1
+    assert "Plunger at Down Lock 0.0600 in is outside 0.01 to 0.05 in: check the rigging first." in shown.out
+
+
+def test_no_chance_passes_one_by_rounding(table: Table) -> None:
+    tight = {f"clearance_{n}_in": "0.0005" for n in range(1, 11)}
+    found = mlg("check", table(row(**tight, tail_no="7", plunger_displacement_in="-0.04")), "--json")
+    assert found.json["inspections"][0]["posterior"]["no_joint_worn"] <= 1.0

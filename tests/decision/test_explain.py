@@ -125,3 +125,7 @@ def test_the_posterior_is_in_the_assessment_of_a_measured_gear(judge: Judge) -> 
 def test_the_seed_decides_the_draws(gear: Gear) -> None:
     first, again = (explained(gear, {}, 0.02) for _ in range(2))
     assert first == replace(again)
+
+
+def test_what_clearance_does_not_explain_names_no_joint(gear: Gear) -> None:
+    assert "#" not in explained(gear, every_joint(0.0005), 0.04).text

@@ -123,6 +123,9 @@ class Shifted:
     def adjust(self, inspections: Sequence[Inspection], clearance_in: np.ndarray) -> Adjustment:
         return Adjustment(clearance_in, offset_in=np.full(len(inspections), 0.004))
 
+    def lacks(self, inspection: Inspection) -> tuple[str, ...]:
+        return () if inspection.gauge_id else ("gauge_id",)
+
     def describe(self) -> str:
         return "plunger shifted by 0.004 in"
 
@@ -137,3 +140,13 @@ def test_an_extension_acts_on_every_displacement(judge: Judge) -> None:
     plain, extended = judge(WORN), judge(WORN, AssessOptions(extension=Shifted()))
     for name in ("over_travel_in", "under_travel_in", "predicted_displacement_in", "predicted_upper_in"):
         assert getattr(extended, name) - getattr(plain, name) == pytest.approx(0.004)
+
+
+def test_an_inspection_without_a_column_that_an_extension_needs_says_so(judge: Judge) -> None:
+    said = " ".join(judge(WORN, AssessOptions(extension=Shifted())).warnings)
+    assert "The extension of the model needs gauge_id, which this inspection lacks" in said
+
+
+def test_an_inspection_with_all_that_an_extension_needs_says_nothing(judge: Judge) -> None:
+    found = judge(WORN, AssessOptions(extension=Shifted()), gauge_id="G-1")
+    assert not any("lacks" in warning for warning in found.warnings)
