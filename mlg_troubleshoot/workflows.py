@@ -27,6 +27,7 @@ from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension
+    from mlg_troubleshoot.diagnosis.faults import DataFault
     from mlg_troubleshoot.records import ReadOptions, ReadResult
     from mlg_troubleshoot.reporting import ReportProvenance, WrittenReport
     from mlg_troubleshoot.studies.findings import StudyFindings
@@ -791,7 +792,9 @@ def diagnose_files(
         seed=options.seed,
         progress=progress,
     )
-    diagnosis = replace(diagnosis, rows_read=len(read.rows))
+    by_record = {inspection.record_id: inspection for inspection in once}
+    faults = tuple(_as_written(fault, by_record[fault.record_id]) for fault in diagnosis.faults)
+    diagnosis = replace(diagnosis, rows_read=len(read.rows), faults=faults)
     hashes = {file.name: file.sha256 for file in read.files if file.sha256 is not None}
     extension = None
     if diagnosis.terms:
@@ -799,6 +802,20 @@ def diagnose_files(
             gear, diagnosis.terms, diagnosis.residual_u_in, tuple(hashes.values()), diagnosis.rows_used
         )
     return DiagnoseResult(gear, diagnosis, extension, read.problems, notes, hashes)
+
+
+def _as_written(fault: DataFault, inspection: Inspection) -> DataFault:
+    """A fault in a clearance with the unit and the convention in which it was entered, not as the model has it."""
+    kind, _, rest = fault.column.partition("_")
+    joint = int(rest.split("_")[0]) if kind == "clearance" else 0
+    entered = inspection.entered.get(joint)
+    if entered is None or (entered.unit is LengthUnit.INCH and inspection.convention is ClearanceConvention.RADIAL):
+        return fault
+    suggested = fault.suggested
+    if suggested is not None:
+        suggested = f"{entered.unit.from_inches(float(suggested) * inspection.convention.per_radial):.4g}"
+    column = f"clearance_{joint}_{entered.unit.value}"
+    return replace(fault, column=column, value=entered.text, suggested=suggested)
 
 
 def _evidence_notes(inspections: Sequence[Inspection], again: int, gear: Gear) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from functools import cache
 from pathlib import Path
@@ -122,3 +123,39 @@ def test_nothing_is_found_with_a_cause_more() -> None:
 
 def test_the_example_of_a_cause_stands_in_the_story_as_it_is() -> None:
     assert (FOLDER / "own_cause.py").read_text(encoding="utf-8").rstrip() in TEXT
+
+
+def in_millimetres_across(source: Path, to: Path) -> Path:
+    """The same inspections with clearances in millimetres as bore less pin."""
+    with source.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    joints = range(1, 11)
+    for row in rows:
+        for n in joints:
+            inches = row.pop(f"clearance_{n}_in")
+            row[f"clearance_{n}_mm"] = f"{float(inches) * 50.8:.4f}" if inches else ""
+        row["clearance_convention"] = "DIAMETRAL"
+    with to.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, fieldnames=list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    return to
+
+
+def test_a_fault_is_shown_in_the_unit_and_the_convention_of_its_cell(tmp_path: Path) -> None:
+    file = in_millimetres_across(FOLDER / "measured_pressure.csv", tmp_path / "across.csv")
+    found = diagnose_files([file], DiagnoseOptions(permutations=99)).diagnosis.faults
+    swapped = {(f.column, f.value, f.suggested) for f in found if f.kind == "swapped_joints"}
+    assert swapped == {("clearance_2_mm", "0.7620", "0.0762"), ("clearance_6_mm", "0.0762", "0.762")}
+
+
+def test_a_joint_that_nobody_measured_is_said(tmp_path: Path) -> None:
+    with (FOLDER / "measured_nothing_wrong.csv").open(newline="", encoding="utf-8") as source:
+        rows = [{**row, "clearance_9_in": ""} for row in csv.DictReader(source)]
+    file = tmp_path / "t.csv"
+    with file.open("w", newline="", encoding="utf-8") as out:
+        writer = csv.DictWriter(out, fieldnames=list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    notes = diagnose_files([file], DiagnoseOptions(permutations=99)).notes
+    assert any(note.startswith("not measured in any row and counted as 0: #9") for note in notes)
