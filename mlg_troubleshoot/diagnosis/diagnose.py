@@ -392,7 +392,8 @@ def _report(
         residual_u_in=float(np.std(left)),
         expected_scatter_in=_expected_scatter(model, table, repeatability),
         remainder_p=finding.remainder_p,
-        remainder_is_noise=finding.remainder_p > 0.05 and finding.verdict in {"NONE", "NAMED"},
+        # Where nothing stands out beyond chance, what is left is noise by the same test.
+        remainder_is_noise=finding.verdict == "NONE" or (finding.verdict == "NAMED" and finding.remainder_p > 0.05),
         used=table,
         predicted_in=predicted,
         misfit_in=misfit,

@@ -283,6 +283,8 @@ def _left(d: Diagnosis) -> str:
             f"(p = {d.remainder_p:.2g}).{gauges}"
         )
     looks = "looks like noise" if d.remainder_is_noise else "does not look like noise alone"
+    if d.verdict == "NONE" and d.remainder_p <= NOISE_ABOVE:
+        looks = "is still what chance makes of noise, but more rows would tell better"
     chance = chance_words(d.remainder_p, d.permutations)
     return (
         f"remainder {thou(d.residual_u_in)} thou rms {looks} (p {chance if '≤' in chance else f'= {chance}'}).{gauges}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from html import unescape
 from pathlib import Path
@@ -240,3 +240,16 @@ def test_the_command_s_report_is_written_as_html_and_pdf(tmp_path: Path) -> None
     written = report_of(result, options, tmp_path, "A4")
     assert [path.suffix for path in written] == [".html", ".pdf"]
     assert written[1].read_bytes().startswith(b"%PDF")
+
+
+def test_nothing_found_and_noise_do_not_contradict_each_other(nothing: Made) -> None:
+    left = seven_lines(replace(nothing.diagnosis, remainder_p=0.02))[5].text
+    assert "does not look like noise" not in left
+    assert "more rows would tell better" in left
+
+
+def test_where_nothing_is_found_what_is_left_is_noise(gear: Gear) -> None:
+    found = diagnose(gear.model, fleet(gear.model, rows=20, seed=11), gear.discrepancies, permutations=199)
+    assert found.verdict == "NONE"
+    assert found.remainder_p <= 0.05
+    assert found.remainder_is_noise
