@@ -15,7 +15,7 @@ from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.gear.adjustment import adjusted_worst_case
 from mlg_troubleshoot.gear.gear import Gear
 
-from .conftest import only, scene_of
+from .conftest import fleet, only, scene_of
 
 BY_NAME = {cause.name: cause for cause in CATALOGUE}
 # The names, the columns they need and the allowed sign of the parameter, from the contract and the physics.
@@ -247,6 +247,17 @@ def test_a_rigging_change_concerns_one_aircraft_or_one_of_its_gears(scene: Scene
 def test_a_gear_and_its_aircraft_are_variants_of_one_name(scene: Scene) -> None:
     keys = {c.key for c in RiggingOffset().candidates(scene) if str(c.target).startswith("tail N103")}
     assert keys == {("rigging_offset", "tail N103")}
+
+
+def test_a_gear_whose_worn_joints_were_never_read_has_no_rigging_change(gear: Gear) -> None:
+    table = fleet(gear.model)
+    values = table.clearance_in.copy()
+    blank = table.gears == "N103 LH"
+    values[np.ix_(blank, [1, 2, 3])] = np.nan
+    scene = scene_of(gear.model, replace(table, clearance_in=values), gear.discrepancies)
+    targets = {c.target for c in RiggingOffset().candidates(scene)}
+    assert "tail N103 LH" not in targets
+    assert "tail N103 RH" in targets
 
 
 def test_a_rigging_change_acts_from_its_day_on(scene: Scene) -> None:

@@ -13,6 +13,8 @@ from mlg_troubleshoot.diagnosis.causes.base import Array, Candidate, Cause, Scen
 from mlg_troubleshoot.gear.adjustment import Adjustment
 
 _LEAST_ROWS = 3
+# Where joints that make more than this share of the prediction were never read, their wear may be the offset. [1]
+_MOST_UNREAD = 0.15
 
 
 def _date(scene: Scene, day: float) -> str | None:
@@ -159,6 +161,13 @@ class DateStep(Cause):
         return offset(scene, _from_day_on(scene, candidate.setting), value)
 
 
+def _unread_share(scene: Scene, rows: NDArray[np.bool_]) -> float:
+    """Share of the predicted displacement by joints that were never read in these rows, though in others. [1]"""
+    read = np.isfinite(scene.table.clearance_in)
+    never = ~read[rows].any(axis=0) & read.any(axis=0)
+    return float(np.sum(scene.contribution_in[rows][:, never]) / max(float(np.sum(scene.over_in[rows])), 1e-9))
+
+
 class RiggingOffset(Cause):
     """The plunger rod of one aircraft, or of one of its gears, was re-rigged."""
 
@@ -188,6 +197,8 @@ class RiggingOffset(Cause):
                 if np.unique(gears[tails == tails[gears == v][0]]).size > 1
             ]
         for label, setting, rows in groups:
+            if _unread_share(scene, rows) > _MOST_UNREAD:
+                continue
             yield Candidate(self, label, {**setting, "day": None, "since": None})
             for day in _change_days(days[rows], 1, 12):
                 yield Candidate(self, label, {**setting, "day": day, "since": _date(scene, day)})
