@@ -178,7 +178,8 @@ def _rate(hits: int, n: int) -> dict[str, float | int]:
     z, p = 1.96, hits / n
     centre = (p + z * z / (2 * n)) / (1 + z * z / n)
     half = z * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n)
-    return {"n": n, "rate": p, "low": float(centre - half), "high": float(centre + half)}
+    # At none and at all the interval ends at the rate itself, rounding apart.
+    return {"n": n, "rate": p, "low": min(float(centre - half), p), "high": max(float(centre + half), p)}
 
 
 def summarise(records: list[Record]) -> dict[str, Any]:
