@@ -821,7 +821,7 @@ def _as_written(fault: DataFault, inspection: Inspection) -> DataFault:
 def _evidence_notes(inspections: Sequence[Inspection], again: int, gear: Gear) -> Iterator[str]:
     """What a diagnosis cannot use: inspections that stand twice, joints that nobody measured."""
     if again:
-        yield f"inspections that stand twice are used once: {again} rows less"
+        yield f"inspections that stand twice count once: rows left out: {again}"
     unread = [n for n in gear.model.joint_numbers if all(i.clearance_in.get(n) is None for i in inspections)]
     if unread:
         listed = ", ".join(f"#{n}" for n in unread)

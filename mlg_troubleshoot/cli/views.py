@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from mlg_troubleshoot.cli import output
+from mlg_troubleshoot.decision import measured
 from mlg_troubleshoot.decision.assessment import (
     Action,
     Assessment,
@@ -327,11 +328,6 @@ def _urgency(judgement: Judgement) -> tuple[int, float]:
 _NAMED = 8
 
 
-def _measured_outside(a: Assessment) -> bool:
-    measured = a.inspection.measured_displacement_in
-    return measured is not None and abs(measured) > a.margin_in
-
-
 def show_batch(result: CheckResult) -> None:
     """Show a batch: how many of each verdict, worst gears first, one line a gear.
 
@@ -345,10 +341,11 @@ def show_batch(result: CheckResult) -> None:
     summary = Text(f"{len(result.judgements)} inspections: ")
     summary.append(" · ".join(f"{counts[v]} {v.value.replace('_', ' ').lower()}" for v in Verdict if counts[v]))
     console.print(summary)
-    measured = [j for j in result.judgements if isinstance(j, Assessment) and _measured_outside(j)]
-    if measured:
-        listed = ", ".join(j.inspection.record_id for j in measured[:_NAMED])
-        more = f" and {len(measured) - _NAMED} more" if len(measured) > _NAMED else ""
+    judged = (j for j in result.judgements if isinstance(j, Assessment))
+    found = [j.inspection.record_id for j in judged if measured.outside(j.inspection, j.margin_in)]
+    if found:
+        listed = ", ".join(found[:_NAMED])
+        more = f" and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
         console.print(Text(f"MEASURED outside their margin, whatever is predicted: {listed}{more}.", style="bold"))
     table = _table(console)
     headings = ["", "verdict", "tail", "side", "record", "worst in", "margin", "chance", "next"]

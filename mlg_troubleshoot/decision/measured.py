@@ -30,6 +30,25 @@ def reading_uncertainty(inspection: Inspection) -> tuple[float, str]:
     return DEFAULT_PLUNGER_U_IN / math.sqrt(n), "default"
 
 
+def outside(inspection: Inspection, margin_in: float) -> bool:
+    """Tell whether the plunger was measured outside its margin.
+
+    Parameters
+    ----------
+    inspection : Inspection
+        The inspection.
+    margin_in : float
+        Allowed displacement. [in]
+
+    Returns
+    -------
+    bool
+        False if nothing was measured.
+    """
+    measured = inspection.measured_displacement_in
+    return measured is not None and abs(measured) > margin_in
+
+
 def statement(inspection: Inspection, margin_in: float) -> str | None:
     """Say in its own words what the measured displacement says.
 
@@ -49,7 +68,7 @@ def statement(inspection: Inspection, margin_in: float) -> str | None:
     if measured is None:
         return None
     sense = "beyond" if measured > 0 else "short of"
-    if abs(measured) > margin_in:
+    if outside(inspection, margin_in):
         return (
             f"MEASURED: the plunger stands {abs(measured):.4f} in {sense} mid-position, outside its margin of "
             f"{margin_in:.4f} in. This is a measurement and holds whatever the prediction says."

@@ -43,7 +43,7 @@ _ROW_ALONE = 30.0
 _READING_EVIDENCE = 3.0
 # Readings that repeat each other lie no further apart [in]; no plunger goes further [in]; largest clearance meant [in].
 _AGREE_IN, _FARTHEST_IN, _LARGEST_IN = 0.012, 0.4, 0.03
-# No joint of a gear that still moves has a radial clearance as large as this. [in]
+# Supposed: no joint of a gear that still moves has a radial clearance as large as this, four times its limit. [in]
 _NEVER_WORN_IN = 0.0325
 _LEAST_ROW_ALONE = 3.0
 
@@ -326,13 +326,13 @@ def _slips(model: LinkageModel, table: DiagnosisTable, usual: _Usual, place: int
     measured = float(np.median(seen))
     known = [int(j) for j in np.flatnonzero(np.isfinite(written))]
 
-    def slip(kind: str, joints: list[int], right: Sequence[float], *, known: bool = True) -> _Slip:
+    def slip(kind: str, joints: list[int], right: Sequence[float], *, meant: bool = True) -> _Slip:
         new = clearance.copy()
         new[joints] = right
         evidence = usual.surprise(place, joints, written[joints])
-        evidence -= usual.surprise(place, joints, np.asarray(right)) if known else 1.0
+        evidence -= usual.surprise(place, joints, np.asarray(right)) if meant else 1.0
         cells = tuple(
-            (f"clearance_{model.joint_numbers[j]}_in", float(written[j]), float(value) if known else None)
+            (f"clearance_{model.joint_numbers[j]}_in", float(written[j]), float(value) if meant else None)
             for j, value in zip(joints, right, strict=True)
         )
         return _Slip(kind, new, measured, cells, evidence)
@@ -343,7 +343,7 @@ def _slips(model: LinkageModel, table: DiagnosisTable, usual: _Usual, place: int
         for kind, factor in (*_TOO_LARGE, ("factor_10", 10.0))
         if 0.0 < written[j] * factor <= _LARGEST_IN
     ]
-    slips += [slip("implausible", [j], [usual.expected[place, j]], known=False) for j in known]
+    slips += [slip("implausible", [j], [usual.expected[place, j]], meant=False) for j in known]
     worn = [j for j in known if written[j] > 0.0]
     slips += [
         slip(kind, worn, written[worn] * factor)

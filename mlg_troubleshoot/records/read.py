@@ -133,7 +133,7 @@ def expand(source: Source) -> list[Source]:
             base = Path(path.anchor) if path.is_absolute() else Path()
             pattern = str(path.relative_to(path.anchor)) if path.is_absolute() else str(path)
             return [*sorted(p for p in base.glob(pattern) if p.is_file() and not _is_scratch(p))] or [source]
-    except (OSError, ValueError, NotImplementedError):
+    except (OSError, ValueError, NotImplementedError):  # pathlib raises the last for patterns that it cannot follow
         return [source]
     return [source]
 

@@ -16,6 +16,7 @@ MAX_MEMBERS = 5_000
 _SMALL_MEMBER_BYTES = 1_000_000
 _CHUNK = 1 << 20
 _DECLARATION = re.compile(rb"<!\s*(DOCTYPE|ENTITY)", re.IGNORECASE)
+# What zipfile raises: NotImplementedError for compression that it lacks, RuntimeError for encrypted members.
 _ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError, ValueError, RuntimeError)
 
 _DAMAGED = "Open it in a spreadsheet program, save it again as .xlsx, and read the copy."
