@@ -25,6 +25,7 @@ write_reports            printable reports of a checked table
 diagnose_files           measured against predicted: cause, extension, gain
 write_extension          the extension of a diagnosis, for `load_model_extension`
 load_index_table         precomputed sensitivity and amplification indices of a gear
+run_study                the same computed again, by the design and for the clearances you choose
 schema                   JSON Schema of what a command writes with ``--json``
 =======================  ==============================================================
 
@@ -43,46 +44,36 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
     from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
     from mlg_troubleshoot.schemas import schema
-    from mlg_troubleshoot.studies.table import load_index_table
+    from mlg_troubleshoot.studies.findings import StudyFindings
+    from mlg_troubleshoot.studies.index_table import load_index_table
+    from mlg_troubleshoot.studies.study import StudyOptions
     from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, parse_length
-    from mlg_troubleshoot.workflows import (
-        CheckOptions,
-        CheckResult,
+    from mlg_troubleshoot.workflows.check import CheckOptions, CheckResult, check, check_files, predict, write_reports
+    from mlg_troubleshoot.workflows.diagnose import (
         DiagnoseOptions,
         DiagnoseResult,
-        check,
-        check_files,
         diagnose_files,
         load_model_extension,
-        predict,
         write_extension,
-        write_reports,
     )
+    from mlg_troubleshoot.workflows.study import run_study
 
 _HOME = {
-    "decision.assessment": ("Assessment", "Verdict"),
-    "decision.inspection": ("Inspection", "Outcome", "Side"),
-    "errors": ("TroubleshootError",),
-    "gear.gear": ("Gear",),
-    "gear.gear_file": ("load_gear", "shipped_gears"),
-    "schemas": ("schema",),
-    "studies.table": ("load_index_table",),
-    "units": ("ClearanceConvention", "LengthUnit", "parse_length"),
-    "workflows": (
-        "CheckOptions",
-        "CheckResult",
-        "DiagnoseOptions",
-        "DiagnoseResult",
-        "check",
-        "check_files",
-        "diagnose_files",
-        "load_model_extension",
-        "predict",
-        "write_extension",
-        "write_reports",
-    ),
+    "decision.assessment": "Assessment Verdict",
+    "decision.inspection": "Inspection Outcome Side",
+    "errors": "TroubleshootError",
+    "gear.gear": "Gear",
+    "gear.gear_file": "load_gear shipped_gears",
+    "schemas": "schema",
+    "studies.findings": "StudyFindings",
+    "studies.index_table": "load_index_table",
+    "studies.study": "StudyOptions",
+    "units": "ClearanceConvention LengthUnit parse_length",
+    "workflows.check": "CheckOptions CheckResult check check_files predict write_reports",
+    "workflows.diagnose": "DiagnoseOptions DiagnoseResult diagnose_files load_model_extension write_extension",
+    "workflows.study": "run_study",
 }
-_MODULES = {name: module for module, names in _HOME.items() for name in names}
+_MODULES = {name: module for module, names in _HOME.items() for name in names.split()}
 
 __all__ = [
     "Assessment",
@@ -96,6 +87,8 @@ __all__ = [
     "LengthUnit",
     "Outcome",
     "Side",
+    "StudyFindings",
+    "StudyOptions",
     "TroubleshootError",
     "Verdict",
     "check",
@@ -106,6 +99,7 @@ __all__ = [
     "load_model_extension",
     "parse_length",
     "predict",
+    "run_study",
     "schema",
     "shipped_gears",
     "write_extension",

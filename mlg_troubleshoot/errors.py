@@ -34,20 +34,6 @@ class MechanismError(TroubleshootError):
     """A mechanism that cannot be assembled as it is described."""
 
 
-class InputFileError(TroubleshootError):
-    """A file that cannot be read as an inspection table at all.
-
-    Parameters
-    ----------
-    problem : Problem
-        The same facts as a value, for the list of problems.
-    """
-
-    def __init__(self, problem: Problem) -> None:
-        super().__init__(f"{problem.file}: {problem.value}: expected {problem.expected}", problem.remedy)
-        self.problem = problem
-
-
 class OutputError(TroubleshootError):
     """An output could not be written (exit code 5)."""
 
@@ -60,26 +46,10 @@ class InconclusiveDataError(TroubleshootError):
 class Problem:
     """One thing that is wrong with the input, with its place and its remedy.
 
-    Parameters
-    ----------
-    code : str
-        Stable name of the kind of problem, for example ``clearance_out_of_range``.
-    file : str or None
-        File as the user named it; None for values given on the command line.
-    sheet : str or None
-        Worksheet; None for CSV and for the command line.
-    row : int or None
-        Row in the file, counted from 1 with the header included.
-    column : str or None
-        Column by its header.
-    cell : str or None
-        Cell as a spreadsheet program names it, for example ``F7``.
-    value : str or None
-        The value as found.
-    expected : str
-        What was expected instead.
-    remedy : str
-        What to do.
+    code: stable name of the kind of problem, for example ``clearance_out_of_range``.
+    file: as the user named it; None for values given on the command line.
+    row: counted from 1 with the header included.
+    column, cell: its header, and as a spreadsheet program names it, for example ``F7``.
     """
 
     code: str

@@ -28,65 +28,52 @@ class LengthUnit(StrEnum):
         """How many of this unit make one inch."""
         return {"in": 1.0, "thou": THOU_PER_IN, "mm": MM_PER_IN}[self.value]
 
+    @property
+    def decimals(self) -> int:
+        """Decimals that show a length to about 0.0001 in."""
+        return {"in": 4, "thou": 1, "mm": 3}[self.value]
+
     def to_inches(self, value: float) -> float:
-        """Convert a value in this unit to inches.
-
-        Parameters
-        ----------
-        value : float
-            Length in this unit.
-
-        Returns
-        -------
-        float
-            Length. [in]
-        """
+        """A length in this unit, in inches. [in]"""
         return value / self.per_inch
 
     def from_inches(self, value_in: float) -> float:
-        """Convert inches to this unit.
-
-        Parameters
-        ----------
-        value_in : float
-            Length. [in]
-
-        Returns
-        -------
-        float
-            Length in this unit.
-        """
+        """A length in inches, in this unit."""
         return value_in * self.per_inch
 
     @classmethod
     def parse(cls, text: str) -> LengthUnit:
-        """Read a unit as people write it: ``in``, ``inch``, ``"``, ``thou``, ``mil``, ``mm``.
-
-        Parameters
-        ----------
-        text : str
-            The unit's name or sign.
-
-        Returns
-        -------
-        LengthUnit
-            The unit.
-
-        Raises
-        ------
-        UsageError
-            If the text is not one of the known names.
-        """
-        found = _UNIT_NAMES.get(text.strip().lower().rstrip("."))
+        """Read a unit as people write it: ``in``, ``inch``, ``"``, ``thou``, ``mil``, ``mm``."""
+        found = UNIT_SPELLINGS.get(text.strip().lower().rstrip("."))
         if found is None:
             raise UsageError(f"unit {text!r} is not known", "Give in, thou or mm.")
         return found
 
 
-_UNIT_NAMES: dict[str, LengthUnit] = {
+# The one table of how units are written, in lower case: for values, headers, columns of units and flags.
+UNIT_SPELLINGS: dict[str, LengthUnit] = {
     **dict.fromkeys(("in", "inch", "inches", '"', "″", "”", "''"), LengthUnit.INCH),
     **dict.fromkeys(("thou", "thous", "mil", "mils"), LengthUnit.THOU),
     **dict.fromkeys(("mm", "millimetre", "millimetres", "millimeter", "millimeters"), LengthUnit.MILLIMETRE),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """A slip of entry by a factor, and what makes a value that many times too large or too small."""
+
+    factor: float
+    too_large: str
+    too_small: str
+
+
+# The one table of slips: suggested wherever they would explain a value, never applied.
+SLIPS: dict[str, Slip] = {
+    "unit": Slip(MM_PER_IN, "millimetres read as inches", "inches read as millimetres"),
+    "point": Slip(10.0, "a slipped decimal point", "a slipped decimal point"),
+    "convention": Slip(
+        2.0, "a diametral clearance or total play read as radial", "a radial clearance read as diametral or total play"
+    ),
 }
 
 
@@ -113,23 +100,7 @@ class ClearanceConvention(StrEnum):
 
     @classmethod
     def parse(cls, text: str) -> ClearanceConvention:
-        """Read a convention, upper or lower case, with a space, hyphen or underscore.
-
-        Parameters
-        ----------
-        text : str
-            The convention's name.
-
-        Returns
-        -------
-        ClearanceConvention
-            The convention.
-
-        Raises
-        ------
-        UsageError
-            If the text is not one of the three names.
-        """
+        """Read a convention, upper or lower case, with a space, hyphen or underscore."""
         name = re.sub(r"[\s\-]+", "_", text.strip()).upper()
         try:
             return cls(name)
@@ -142,40 +113,14 @@ class ClearanceConvention(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class WrittenLength:
-    """A length as it was written: the number, its unit if one was written, and the text itself.
-
-    Parameters
-    ----------
-    value : float
-        The number as written.
-    unit : LengthUnit or None
-        The unit written beside it; None if there was none.
-    text : str
-        The text as entered.
-    """
+    """A length as it was written: the number, its unit if one was written, and the text itself."""
 
     value: float
     unit: LengthUnit | None
     text: str
 
     def inches(self, default: LengthUnit | None) -> float:
-        """Return the length, reading a bare number in a default unit.
-
-        Parameters
-        ----------
-        default : LengthUnit or None
-            Unit of a number that was written without one.
-
-        Returns
-        -------
-        float
-            Length. [in]
-
-        Raises
-        ------
-        UsageError
-            If neither the text nor the default says the unit.
-        """
+        """Return the length, reading a bare number in a default unit."""
         unit = self.unit or default
         if unit is None:
             raise UsageError(f"{self.text!r} has no unit", "Write the unit: 0.013in, 13thou or 0.33mm.")
@@ -226,25 +171,30 @@ def parse_length(text: str) -> WrittenLength:
     return WrittenLength(float(match["number"]), unit, text.strip())
 
 
-def parse_signed_length(text: str) -> WrittenLength:
-    """Read a length that may be negative, as a plunger displacement: ``-0.02 in``, ``+41 thou``.
+_NUMBER = r"\b\d*\.\d{2,}\b"
+_SAID = re.compile(
+    rf"(?<!\w)'[^']*'(?!\w)"
+    rf"|(?P<numbers>(?:{_NUMBER}|\b0)(?:\s*(?:to|and|or|…|–|/)\s*[+\u2212-]?{_NUMBER})?)"
+    rf"(?P<gap>[\s\u00a0])in\b(?!\s(?:the|an?|any|each|every|this)\b)"
+)
 
-    Parameters
-    ----------
-    text : str
-        What was typed; a Unicode minus counts as a minus.
 
-    Returns
-    -------
-    WrittenLength
-        The number with its sign, and the unit if one was written.
+def in_unit(sentence: str, unit: LengthUnit) -> str:
+    """Say a sentence of this program, which is written in inches, in the unit that the user reads.
 
-    Raises
-    ------
-    UsageError
-        If the text is not such a length.
+    A length is a number with two decimals or more before ``in``, or two such numbers (``0.01 to 0.02 in``); it keeps
+    its resolution. What stands in quotation marks is somebody's entry and stays as it is.
     """
-    stripped = text.strip()
-    negative = stripped[:1] in {"-", "\u2212"}
-    written = parse_length(stripped[1:] if negative else stripped)
-    return WrittenLength(-written.value if negative else written.value, written.unit, stripped)
+    if unit is LengthUnit.INCH:
+        return sentence
+
+    def converted(number: re.Match[str]) -> str:
+        decimals = max(len(number[0].partition(".")[2]) - 4 + unit.decimals, 0)
+        return f"{unit.from_inches(float(number[0])):.{decimals}f}"
+
+    def said(found: re.Match[str]) -> str:
+        if found["numbers"] is None:
+            return found[0]
+        return re.sub(_NUMBER, converted, found["numbers"]) + found["gap"] + unit.value
+
+    return _SAID.sub(said, sentence)

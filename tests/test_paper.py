@@ -14,11 +14,12 @@ import pytest
 from mlg_troubleshoot.gear.directions import chance_beyond, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import links_from
-from mlg_troubleshoot.geometry.vectors import locate_joint
 from mlg_troubleshoot.studies.amplification import Amplification, amplification
-from mlg_troubleshoot.studies.response import worst_directions
-from mlg_troubleshoot.studies.table import IndexTable
+from mlg_troubleshoot.studies.displacement import worst_directions
+from mlg_troubleshoot.studies.index_table import IndexTable
 from mlg_troubleshoot.studies.tensor import tensor_indices
+
+from .geometry.vectors import locate_joint
 
 FAILURE = np.array([[0, 0, 0.013, 0, 0.007, 0, 0, 0, 0, 0]])
 NUMBERS = tuple(range(1, 11))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from mlg_troubleshoot.cli.app import app
+from mlg_troubleshoot.cli.output import prepare_streams
 
 
 def main() -> None:
-    """Run the console command."""
+    prepare_streams()
     app(prog_name="mlg")
 
 

@@ -10,23 +10,13 @@ from types import TracebackType
 
 import typer
 
-from mlg_troubleshoot.errors import InconclusiveDataError, InputFileError, OutputError, TroubleshootError
+from mlg_troubleshoot.cli.output import abandon_stdout, say
+from mlg_troubleshoot.errors import InconclusiveDataError, OutputError, TroubleshootError
 
 USAGE, NOTHING_JUDGED, OUTPUT, INTERNAL, INTERRUPTED = 2, 3, 5, 70, 130
 _CANNOT_WRITE = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
-
-
-def abandon_stdout() -> None:
-    """Drop what is still to be written to stdout: the reader of the pipe went away, the work goes on."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _settle_stdout() -> None:
-    """Write what is still to be written to stdout, or drop it: the interpreter must not fail on it at the end."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        abandon_stdout()
+# Some releases of typer carry their own click: what it says about usage is found through a name that typer exports.
+_UsageMessage: type[typer.BadParameter] = typer.BadParameter.__mro__[2]
 
 
 class Boundary:
@@ -42,42 +32,52 @@ class Boundary:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if error is None or isinstance(error, (typer.Exit, typer.Abort, SystemExit)):
+        if error is None or isinstance(error, SystemExit):
             return
-        if isinstance(error, KeyboardInterrupt):
+        if isinstance(error, typer.Exit):
+            raise SystemExit(error.exit_code) from None
+        if isinstance(error, (KeyboardInterrupt, typer.Abort)):
             # A prompt that was interrupted has said already how to go on.
-            if type(error) is KeyboardInterrupt:
-                typer.echo("\nInterrupted.", err=True)
-            raise typer.Exit(INTERRUPTED) from None
+            if type(error) in (KeyboardInterrupt, typer.Abort):
+                say("\nInterrupted.")
+            raise SystemExit(INTERRUPTED) from None
         if isinstance(error, BrokenPipeError):
             # Results survive a closed pipe (see output.py); what else was cut short was not finished.
             abandon_stdout()
-            raise typer.Exit(OUTPUT) from None
-        if isinstance(error, OSError) and error.errno in _CANNOT_WRITE:
-            typer.echo(f"Error: {error.filename or 'the output'} cannot be written: {error.strerror}", err=True)
-            typer.echo("What to do: Make room, or write to another place.", err=True)
-            _settle_stdout()
-            raise typer.Exit(OUTPUT) from None
-        if isinstance(error, TroubleshootError):
-            typer.echo(f"Error: {error.message}", err=True)
-            if error.remedy:
-                typer.echo(f"What to do: {error.remedy}", err=True)
-            raise typer.Exit(_code(error)) from None
+            raise SystemExit(OUTPUT) from None
         if isinstance(error, Exception):
-            if os.environ.get("MLG_DEBUG"):
+            code = _explain(error)
+            if code == INTERNAL and os.environ.get("MLG_DEBUG"):
                 traceback.print_exception(kind, error, trace)
-            typer.echo(
-                f"Internal error: {type(error).__name__}: {error}\n"
-                "What to do: this is a defect of the program, not of your input. Run again with MLG_DEBUG=1 and "
-                "send the output to the maintainers.",
-                err=True,
-            )
-            raise typer.Exit(INTERNAL) from None
+            raise SystemExit(code) from None
 
 
-def _code(error: TroubleshootError) -> int:
-    if isinstance(error, OutputError):
+def _explain(error: Exception) -> int:
+    """Say what went wrong and what to do; the exit code is returned."""
+    if isinstance(error, TroubleshootError):
+        say(f"Error: {error.message}" + (f"\nWhat to do: {error.remedy}" if error.remedy else ""))
+        if isinstance(error, OutputError):
+            return OUTPUT
+        return NOTHING_JUDGED if isinstance(error, InconclusiveDataError) else USAGE
+    if isinstance(error, _UsageMessage):
+        say(f"Error: {error.format_message()}\nWhat to do: See the options with --help.")
+        return USAGE
+    if isinstance(error, OSError) and error.errno in _CANNOT_WRITE:
+        say(f"Error: {error.filename or 'the output'} cannot be written: {error.strerror}")
+        say("What to do: Make room, or write to another place.")
+        _settle_stdout()
         return OUTPUT
-    if isinstance(error, (InputFileError, InconclusiveDataError)):
-        return NOTHING_JUDGED
-    return USAGE
+    say(
+        f"Internal error: {type(error).__name__}: {error}\n"
+        "What to do: this is a defect of the program, not of your input. Run again with MLG_DEBUG=1 and "
+        "send the output to the maintainers."
+    )
+    return INTERNAL
+
+
+def _settle_stdout() -> None:
+    """Write what is still to be written to stdout, or drop it: the interpreter must not fail on it at the end."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        abandon_stdout()

@@ -1,395 +1,307 @@
-"""``mlg check``: where the inspections come from, and what is shown of the judgements."""
+"""``mlg check``: clearances in, verdict and ranked joints out."""
 
 from __future__ import annotations
 
-import io
-import json
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from datetime import datetime
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, Annotated, BinaryIO
 
 import typer
 
-from mlg_troubleshoot import workflows
-from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN, EnteredClearance, Inspection, Outcome, Side
-from mlg_troubleshoot.errors import OutputError, UsageError
-from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.units import (
-    ClearanceConvention,
-    LengthUnit,
-    WrittenLength,
-    parse_length,
-    parse_signed_length,
+from mlg_troubleshoot.cli import history, options, output
+from mlg_troubleshoot.cli.options import ReportFormat
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.units import LengthUnit
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.cli.by_hand import Ending, Flags
+    from mlg_troubleshoot.cli.remembered import Settings
+    from mlg_troubleshoot.decision.inspection import Inspection
+    from mlg_troubleshoot.store import Store
+    from mlg_troubleshoot.workflows import check as task
+
+EPILOG = (
+    "Example: [b]mlg check inspections.xlsx --report out[/b] · one gear by hand: [b]mlg check[/b] · "
+    "scripted: [b]mlg check --tail N123 --side LH --convention RADIAL --set 3=0.013in --set 5=0.007in[/b]"
 )
+Files = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="[FILE|-]...", help="Inspection tables (CSV, xlsx, xls, ods), folders, or - for stdin."),
+]
+Values = Annotated[
+    list[str] | None, typer.Option("--set", metavar="JOINT=VALUE", help="One clearance, e.g. 3=0.013in.")
+]
+Tail = Annotated[str | None, typer.Option("--tail", help="Tail number, with --set or the prompts.")]
+Side = Annotated[str | None, typer.Option("--side", metavar="LH|RH", help="Which gear.")]
+RecordId = Annotated[str | None, typer.Option("--record-id", help="Identity of the record.")]
+OutcomeFlag = Annotated[str | None, typer.Option("--outcome", metavar="RETRACTED|FAILED", help="What the gear did.")]
+Measured = Annotated[
+    str | None,
+    typer.Option("--measured", metavar="VALUE", help="Measured plunger displacement at mid-position, e.g. 0.041in."),
+]
+Margin = Annotated[str | None, typer.Option("--margin", metavar="VALUE", help="This gear's own margin, e.g. 0.028in.")]
+Formats = Annotated[
+    list[ReportFormat] | None,
+    typer.Option(
+        "--format", help="Report format, may repeat; default html and pdf. pdf-ua: tagged, for screen readers."
+    ),
+]
+Repairs = Annotated[bool, typer.Option("--repairs", hidden=True, help="Always done.")]
+Extensions = Annotated[
+    list[Path] | None,
+    typer.Option("--extension", metavar="TOML", help="Predict with an extension of the model; may repeat."),
+]
+Annotate = Annotated[
+    Path | None,
+    typer.Option("--annotate", metavar="OUT.xlsx", help="Your workbook with bad cells marked and verdicts added."),
+]
+Csv = Annotated[Path | None, typer.Option("--csv", metavar="OUT.csv", help="Verdicts as a CSV, one line a gear.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on with the last unfinished entry.")]
+Keep = Annotated[bool, typer.Option("--keep", help="Add the inspections to the store; the prompts always do.")]
+Tails = Annotated[
+    str | None,
+    typer.Option("--tails", metavar="same|apart", help="Spellings of a tail that differ in case, blanks or dashes."),
+]
+Detail = Annotated[bool, typer.Option("--detail", help="All joints, repairs, re-rigging and the uncertainty.")]
+Every = Annotated[bool, typer.Option("--all", help="A batch: every inspection, not the latest of each gear.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the Monte Carlo draws of a gear looked at alone.")]
 
 
-@dataclass(frozen=True, slots=True)
-class CheckArguments:
-    """The flags of ``mlg check``, parsed but not judged."""
+def check(
+    files: Files = None,
+    values: Values = None,
+    tail: Tail = None,
+    side: Side = None,
+    record_id: RecordId = None,
+    outcome: OutcomeFlag = None,
+    measured: Measured = None,
+    margin: Margin = None,
+    gear: options.Gear = options.DEFAULT_GEAR,
+    unit: options.Unit = None,
+    convention: options.Convention = None,
+    sheet: options.Sheet = None,
+    column_map: options.ColumnMap = None,
+    decimal_comma: options.DecimalComma = False,
+    report: options.Report = None,
+    formats: Formats = None,
+    page: options.Paper = None,
+    _repairs: Repairs = False,
+    extension: Extensions = None,
+    causes: options.Causes = None,
+    annotate: Annotate = None,
+    csv: Csv = None,
+    resume: Resume = False,
+    keep: Keep = False,
+    store: history.Place = None,
+    tails: Tails = None,
+    detail: Detail = False,
+    every: Every = False,
+    show: options.Show = None,
+    remember: options.Remember = False,
+    seed: Seed = 1,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    _version: options.Version = False,
+) -> None:
+    """Check gears: clearances in, verdict and ranked joints out.
 
-    files: tuple[str, ...]
-    values: tuple[str, ...]
-    tail: str | None
-    side: str | None
-    record_id: str | None
-    outcome: str | None
-    measured: str | None
-    margin: str | None
-    gear: str
-    unit: LengthUnit | None
-    convention: ClearanceConvention | None
-    sheet: str | None
-    column_map: tuple[str, ...]
-    decimal_comma: bool
-    report: Path | None
-    formats: tuple[str, ...]
-    page: str
-    repairs: bool
-    extension: tuple[Path, ...]
-    causes: tuple[Path, ...]
-    annotate: Path | None
-    csv: Path | None
-    resume: bool
-    as_json: bool
-    quiet: bool
-
-
-def run(arguments: CheckArguments) -> None:
-    """Run the command and leave with the exit code of the contract.
-
-    Parameters
-    ----------
-    arguments : CheckArguments
-        The flags.
+    Without FILE on a terminal it asks, joint by joint. Exit codes: 0 every gear within margin · 1 something needs
+    attention · 3 no row could be judged · 2 usage.
     """
-    if arguments.annotate is not None and (len(arguments.files) != 1 or arguments.files[0] == "-"):
+    from mlg_troubleshoot.cli.by_hand import Ending, Flags
+    from mlg_troubleshoot.cli.remembered import settings
+    from mlg_troubleshoot.workflows import check as task
+    from mlg_troubleshoot.workflows.diagnose import load_model_extension
+
+    given = files or []
+    if annotate is not None and (len(given) != 1 or given[0] == "-"):
         raise UsageError("--annotate needs exactly one workbook", "Give one .xlsx FILE.")
-    options = workflows.CheckOptions(
-        gear=arguments.gear,
-        unit=arguments.unit,
-        convention=arguments.convention,
-        sheet=arguments.sheet,
-        column_map=columns_by_header(arguments.column_map),
-        decimal_comma=arguments.decimal_comma,
-        repairs=True if arguments.repairs else None,
-        extension=workflows.load_model_extension(arguments.extension, arguments.gear, arguments.causes),
+    if formats and report is None:
+        output.say("Note: --format is for reports: without --report DIR none is written.")
+    inputs = [*given, *(extension or ()), *(causes or ())]
+    options.keep_inputs(gear, inputs, [("--csv", csv), ("--annotate", annotate)], report)
+    columns = options.columns_by_header(column_map)
+    shown = settings(show, page, columns, keep=remember, quiet=quiet)
+    asked = task.CheckOptions(
+        gear=gear,
+        unit=options.unit_of(unit),
+        convention=options.convention_of(convention),
+        sheet=sheet,
+        column_map=columns,
+        remembered_map=shown.headers,
+        remembered=shown.notes[0] if shown.notes else None,
+        decimal_comma=decimal_comma,
+        seed=seed,
+        extension=load_model_extension(extension or (), gear, causes or ()),
     )
-    result = _result(arguments, options)
-    _show(arguments, result)
-    if arguments.csv is not None:
-        workflows.write_verdicts(result, arguments.csv)
-    if arguments.annotate is not None:
-        _annotate(arguments, arguments.annotate, result)
-    if arguments.report is not None:
-        _write_reports(arguments, options, result)
-    if result.problems and not arguments.as_json and not result.judgements:
-        typer.echo("No row could be judged.", err=True)
+    flags = Flags(tuple(values or ()), tail, side, record_id, outcome, measured, margin, asked.unit, asked.convention)
+    unit = shown.show if show or shown.show is not LengthUnit.INCH else None
+
+    place = _store(store) if keep or not (given or values) else None
+    kept = partial(_keep, asked=asked, place=place, tails=tails, quiet=quiet)
+
+    def publish(result: task.CheckResult, entered_in: LengthUnit = LengthUnit.INCH) -> None:
+        if as_json:
+            from mlg_troubleshoot.reporting.json_form import check_as_json, check_json_pieces
+
+            found = (result.gear, result.judgements, result.problems, result.notes, result.seed)
+            output.write_json(check_json_pieces(*found) if len(result.judgements) > 1 else check_as_json(*found))
+        else:
+            _show(result, unit or entered_in, detail=detail, every=every, quiet=quiet)
+        if csv is not None:
+            task.write_verdicts(result, csv)
+        if annotate is not None:
+            _annotate(Path(given[0]), annotate, result, quiet=quiet)
+        if report is not None:
+            seen = replace(shown, show=unit or entered_in)
+            _write_reports(result, asked, report, formats, seen, place, quiet=quiet)
+
+    def publish_entry(inspection: Inspection, entered_in: LengthUnit) -> Ending:
+        result = task.check_inspection(inspection, asked)
+        publish(result, entered_in)
+        offered = report is None and not as_json
+        seen = replace(shown, show=unit or entered_in)
+        write = partial(_write_reports, result, asked, Path("report"), formats, seen, place, quiet=quiet)
+        return Ending(result, write if offered else None)
+
+    if given or values:
+        result = _result(given, flags, asked, quiet=quiet)
+        publish(result)
+        kept(result)
+    else:
+        result = _ask(flags, asked, publish_entry, kept, resume=resume, place=store)
+    if result.problems and not as_json and not result.judgements:
+        output.say("No row could be judged.")
     raise typer.Exit(result.exit_code)
 
 
-def _result(arguments: CheckArguments, options: workflows.CheckOptions) -> workflows.CheckResult:
-    single = (
-        arguments.values,
-        arguments.tail,
-        arguments.side,
-        arguments.record_id,
-        arguments.outcome,
-        arguments.measured,
-        arguments.margin,
-    )
-    if arguments.files:
-        if any(single):
-            raise UsageError(
-                "--set, --tail, --side, --record-id, --outcome, --measured and --margin describe one gear entered by "
-                "hand, and a FILE was given as well",
-                "Give either a FILE or the values of one gear.",
-            )
-        return _from_files(arguments, options)
-    if arguments.values:
-        return workflows.check_inspection(_from_flags(arguments, load_gear(arguments.gear)), options)
-    if not (sys.stdin.isatty() and sys.stderr.isatty()):
-        raise UsageError(
-            "nothing to check: no FILE was given, and this is not a terminal to ask on",
-            "Pass a FILE, - for standard input, or --set JOINT=VALUE with --tail, --side and --convention.",
-        )
-    return workflows.check_inspection(_from_prompts(arguments, load_gear(arguments.gear)), options)
+def _store(place: str | None) -> Store:
+    from mlg_troubleshoot.store import Store
+
+    return Store(place)
 
 
-def columns_by_header(pairs: Sequence[str]) -> dict[str, str]:
-    """Read what ``--map`` was given.
+def _keep(
+    result: task.CheckResult, asked: task.CheckOptions, place: Store | None, tails: str | None, *, quiet: bool
+) -> None:
+    """Add what was judged to a store, if there is one."""
+    if place is None:
+        return
+    from mlg_troubleshoot.workflows.history import keep
 
-    Parameters
-    ----------
-    pairs : sequence of str
-        ``HEADER=COLUMN`` each.
-
-    Returns
-    -------
-    dict of str to str
-        Columns by header.
-
-    Raises
-    ------
-    UsageError
-        If one of them is no such pair.
-    """
-    mapped = {}
-    for pair in pairs:
-        header, sign, column = pair.rpartition("=")
-        if not sign or not header.strip() or not column.strip():
-            raise UsageError(
-                f"--map {pair!r} is not HEADER=COLUMN", "Write for example --map 'Spiel 3=clearance_3_mm'."
-            )
-        mapped[header.strip()] = column.strip()
-    return mapped
+    if tails not in (None, "same", "apart"):
+        raise UsageError(f"--tails {tails!r} is not same or apart", "Give same (one aircraft) or apart (two).")
+    same_tail = history.ask_tail if history.can_ask() else None
+    added = keep(result, asked, place, same_tail if tails is None else lambda _new, _kept: tails == "same")
+    if not quiet:
+        output.say(f"Kept in {place.place}: {added.new} new records, {added.known} known already.")
 
 
-def _from_files(arguments: CheckArguments, options: workflows.CheckOptions) -> workflows.CheckResult:
-    sources: list[Path | BinaryIO] = []
-    for name in arguments.files:
-        if name == "-":
-            sources.append(io.BytesIO(sys.stdin.buffer.read()))
-        else:
-            sources.append(Path(name))
+def _result(files: Sequence[str], flags: Flags, asked: task.CheckOptions, *, quiet: bool) -> task.CheckResult:
+    from mlg_troubleshoot.cli import by_hand
     from mlg_troubleshoot.cli.progress import stages
+    from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.workflows import check as task
 
-    with stages(quiet=arguments.quiet) as bar:
-        return workflows.check_files(
-            sources,
-            options,
+    if files and flags.describe_a_gear:
+        raise UsageError(
+            "--set, --tail, --side, --record-id, --outcome, --measured and --margin describe one gear entered by "
+            "hand, and a FILE was given as well",
+            "Give either a FILE or the values of one gear.",
+        )
+    if not files:
+        return task.check_inspection(by_hand.from_flags(flags, load_gear(asked.gear)), asked)
+    with stages(quiet=quiet) as bar:
+        return task.check_files(
+            sources_of(files),
+            asked,
             on_read=lambda done, total: bar("Reading", done, total),
             on_judged=lambda done, total: bar("Judging", done, total),
         )
 
 
-def _from_flags(arguments: CheckArguments, gear: Gear) -> Inspection:
-    missing = [
-        flag
-        for flag, value in (
-            ("--tail", arguments.tail),
-            ("--side", arguments.side),
-            ("--convention", arguments.convention),
-        )
-        if value is None
-    ]
-    if missing or arguments.tail is None or arguments.side is None or arguments.convention is None:
+def _ask(
+    flags: Flags,
+    asked: task.CheckOptions,
+    publish: Callable[[Inspection, LengthUnit], Ending],
+    keep: Callable[[task.CheckResult], None],
+    *,
+    resume: bool,
+    place: str | None,
+) -> task.CheckResult:
+    from mlg_troubleshoot.cli import by_hand
+    from mlg_troubleshoot.gear.gear_file import load_gear
+
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
         raise UsageError(
-            f"--set needs {', '.join(missing)}",
-            "Say which gear (--tail N123 --side LH) and what a clearance reading is (--convention RADIAL, DIAMETRAL "
-            "or TOTAL_PLAY): there is no default.",
+            "nothing to check: no FILE was given, and this is not a terminal to ask on",
+            "Pass a FILE, - for standard input, or --set JOINT=VALUE with --tail, --side and --convention.",
         )
-    if not arguments.tail.strip():
-        raise UsageError("--tail is empty", "Give the tail number of the aircraft.")
-    clearances: dict[int, float] = {}
-    entered: dict[int, EnteredClearance] = {}
-    for text in arguments.values:
-        number, radial, reading = _one_value(text, arguments, gear, arguments.convention)
-        if number in clearances:
-            raise UsageError(f"--set gives joint {number} twice", "Give each joint once.")
-        clearances[number], entered[number] = radial, reading
-    return Inspection(
-        record_id=arguments.record_id or f"{arguments.tail}-{_side(arguments.side)}-{datetime.now():%Y%m%dT%H%M%S}",
-        tail_no=arguments.tail,
-        side=_side(arguments.side),
-        convention=arguments.convention,
-        clearance_in=clearances,
-        entered=entered,
-        gauge_u_in=DEFAULT_GAUGE_U_IN / arguments.convention.per_radial,
-        readings_in=_readings(arguments, gear),
-        margin_in=_margin(arguments, gear),
-        outcome=_outcome(arguments.outcome),
-        warnings=tuple(
-            _confirm(gear, number, value) for number, value in clearances.items() if value > gear.confirm_above.value
-        ),
-    )
+    return by_hand.ask(flags, load_gear(asked.gear), publish, keep, resume=resume, place=place)
 
 
-def _confirm(gear: Gear, number: int, value: float) -> str:
-    return (
-        f"Joint #{number}: {value:.4f} in radial is above {gear.confirm_above.value:g} in. "
-        "Check the reading, its unit and its convention."
-    )
+def sources_of(files: Sequence[str]) -> list[Path | BinaryIO]:
+    """Return the tables to read; ``-`` is standard input."""
+    return [Path(name) for name in files]
 
 
-def _one_value(
-    text: str, arguments: CheckArguments, gear: Gear, convention: ClearanceConvention
-) -> tuple[int, float, EnteredClearance]:
-    name, sign, written = text.partition("=")
-    if not sign or not name.strip().lstrip("#").isdecimal():
-        raise UsageError(f"--set {text!r} is not JOINT=VALUE", "Write for example --set 3=0.013in.")
-    number = int(name.strip().lstrip("#"))
-    if number not in gear.joint_numbers:
-        raise UsageError(
-            f"--set {text!r}: {gear.name} has no joint {number}",
-            f"Its joints are {_numbers(gear.joint_numbers)}.",
-        )
-    length, inches = _length(f"--set {text!r}", written, arguments.unit, parse_length)
-    radial = inches / convention.per_radial
-    if radial > gear.hard_limit.value:
-        raise UsageError(
-            f"--set {text!r}: {radial:.4f} in radial is above {gear.hard_limit.value:g} in, which no joint can have",
-            "Check the unit (mm entered as inch is a factor 25.4), the decimal point and the convention.",
-        )
-    unit = length.unit or arguments.unit or LengthUnit.INCH
-    return number, radial, EnteredClearance(length.text, unit)
+def _show(result: task.CheckResult, unit: LengthUnit, *, detail: bool, every: bool, quiet: bool) -> None:
+    from mlg_troubleshoot.cli.views import batch, notes, one_gear
+    from mlg_troubleshoot.workflows import check as task
 
-
-def _numbers(numbers: tuple[int, ...]) -> str:
-    return ", ".join(str(n) for n in numbers)
-
-
-def _side(text: str) -> Side:
-    try:
-        return Side(text.strip().upper())
-    except ValueError:
-        raise UsageError(f"--side {text!r} is not LH or RH", "Give LH or RH.") from None
-
-
-def _outcome(text: str | None) -> Outcome | None:
-    if text is None:
-        return None
-    try:
-        return Outcome(text.strip().upper())
-    except ValueError:
-        raise UsageError(f"--outcome {text!r} is not RETRACTED or FAILED", "Give RETRACTED or FAILED.") from None
-
-
-def _length(
-    option: str, text: str, unit: LengthUnit | None, parse: Callable[[str], WrittenLength]
-) -> tuple[WrittenLength, float]:
-    """Read the length of an option; what is wrong with it is said with the option."""
-    try:
-        length = parse(text)
-        return length, length.inches(unit)
-    except UsageError as error:
-        raise UsageError(f"{option}: {error.message}", error.remedy) from None
-
-
-def _readings(arguments: CheckArguments, gear: Gear) -> tuple[float, ...]:
-    if arguments.measured is None:
-        return ()
-    option = f"--measured {arguments.measured!r}"
-    _written, value = _length(option, arguments.measured, arguments.unit, parse_signed_length)
-    most = workflows.read_options(gear, workflows.CheckOptions()).plunger_hard_max_in
-    if abs(value) > most:
-        raise UsageError(f"{option} is more than {most:g} in, farther than the plunger can go", "Check its unit.")
-    return (value,)
-
-
-def _margin(arguments: CheckArguments, gear: Gear) -> float | None:
-    if arguments.margin is None:
-        return None
-    option = f"--margin {arguments.margin!r}"
-    _written, value = _length(option, arguments.margin, arguments.unit, parse_length)
-    most = workflows.read_options(gear, workflows.CheckOptions()).plunger_hard_max_in
-    if not 0.0 < value <= most:
-        raise UsageError(f"{option} is not above 0 and up to {most:g} in", "Check its unit.")
-    return value
-
-
-def _from_prompts(arguments: CheckArguments, gear: Gear) -> Inspection:
-    from mlg_troubleshoot.cli.prompts import Preset, RichTerminal, SessionStore, ask_inspection
-
-    store = SessionStore()
-    saved = store.latest() if arguments.resume else None
-    if arguments.resume and saved is None:
-        raise UsageError("there is no unfinished entry to resume", "Start a new one: mlg check")
-    preset = Preset(
-        tail_no=arguments.tail,
-        side=None if arguments.side is None else _side(arguments.side),
-        unit=arguments.unit,
-        convention=arguments.convention,
-        record_id=arguments.record_id,
-    )
-    outcome, readings, margin = _outcome(arguments.outcome), _readings(arguments, gear), _margin(arguments, gear)
-    asked = ask_inspection(gear, RichTerminal(), store, preset, saved=saved, advice=_advice(gear))
-    return replace(
-        asked,
-        outcome=asked.outcome or outcome,
-        readings_in=asked.readings_in or readings,
-        margin_in=margin if asked.margin_in is None else asked.margin_in,
-    )
-
-
-def _advice(gear: Gear) -> Callable[[Mapping[int, float], Sequence[int]], str | None]:
-    """Say after each critical joint which one is worth most next, or that one may stop."""
-
-    def advise(measured: Mapping[int, float], left: Sequence[int]) -> str | None:
-        advice = workflows.next_joint(gear, measured)
-        if advice.stop and left:
-            return f"{advice.text} Type done."
-        joint = next((worth.joint for worth in advice.worth if worth.joint in left), None)
-        if joint is None:
-            return None
-        if advice.expected is not None and joint == advice.joint:
-            return f"{advice.text} Type #{joint}, or done."
-        return f"Worth most next: {gear.joint(joint).label} (type #{joint})."
-
-    return advise
-
-
-def _show(arguments: CheckArguments, result: workflows.CheckResult) -> None:
-    if arguments.as_json:
-        from mlg_troubleshoot.cli import output
-        from mlg_troubleshoot.reporting.json_form import check_as_json, check_json_pieces
-
-        found = (result.gear, result.judgements, result.problems, result.notes)
-        if len(result.judgements) > 1:
-            output.write_pieces(check_json_pieces(*found))
-        else:
-            output.write(json.dumps(check_as_json(*found), allow_nan=False, ensure_ascii=False, indent=1))
-        return
-    from mlg_troubleshoot.cli import views
-
-    if not arguments.quiet:
-        views.show_notes(result.notes)
-    views.show_problems(result.problems)
+    if not quiet:
+        notes.show_notes(result.notes)
+    notes.show_problems(result.problems)
+    screen = output.console(unit=unit)
     if len(result.judgements) == 1:
-        views.show_one(result.judgements[0], result.gear)
+        one_gear.show(result.judgements[0], result.gear, screen, detail=detail)
     elif result.judgements:
-        views.show_batch(result)
-        both = workflows.before_and_after(result.judgements)
+        batch.show(result, screen, every=every)
+        both = task.before_and_after(result.judgements)
         if both is not None:
-            views.show_before_and_after(*both)
+            batch.show_before_and_after(*both, screen)
 
 
-def _annotate(arguments: CheckArguments, out: Path, result: workflows.CheckResult) -> None:
+def _annotate(workbook: Path, out: Path, result: task.CheckResult, *, quiet: bool) -> None:
+    from mlg_troubleshoot.workflows import check as task
+
     if result.read is not None and not result.read.layouts:
-        typer.echo(f"{out} was not written: no table was found to annotate.", err=True)
+        output.say(f"{out} was not written: no table was found to annotate.")
         return
-    for loss in workflows.annotate(result, Path(arguments.files[0]), out):
-        typer.echo(f"Note: {loss}.", err=True)
-    if not arguments.quiet:
-        typer.echo(f"Annotated workbook: {out}", err=True)
+    for loss in task.annotate(result, workbook, out):
+        output.say(f"Note: {loss}.")
+    if not quiet:
+        output.say(f"Annotated workbook: {out}")
 
 
-def _write_reports(arguments: CheckArguments, options: workflows.CheckOptions, result: workflows.CheckResult) -> None:
+def _write_reports(
+    result: task.CheckResult,
+    asked: task.CheckOptions,
+    directory: Path,
+    formats: Sequence[ReportFormat] | None,
+    shown: Settings,
+    place: Store | None,
+    *,
+    quiet: bool,
+) -> None:
     from mlg_troubleshoot.cli.progress import stages
+    from mlg_troubleshoot.workflows import check as task
+    from mlg_troubleshoot.workflows.history import seen_before
 
-    if arguments.report is None:
-        return
-    with stages(quiet=arguments.quiet) as bar:
-        written = workflows.write_reports(
+    before = [] if place is None else seen_before(result.judgements, place)
+    wanted = tuple(str(f) for f in formats or (ReportFormat.HTML, ReportFormat.PDF))
+    with stages(quiet=quiet) as bar:
+        written = task.write_reports(
             result,
-            options,
-            arguments.report,
-            arguments.formats,
-            arguments.page,
+            asked,
+            directory,
+            wanted,
+            str(shown.page),
             on_written=lambda done, total: bar("Writing reports", done, total),
+            unit=shown.show,
+            before=before,
         )
-    notes = dict.fromkeys(note for report in written for note in report.notes)
-    for note in notes:
-        typer.echo(f"Note: {note}", err=True)
-    files = [path for report in written for path in report.files]
-    if not files:
-        raise OutputError("no report could be written", "See the notes above.")
-    if not arguments.quiet:
-        if len(files) <= 4:
-            for path in files:
-                typer.echo(f"Report: {path}", err=True)
-        else:
-            typer.echo(f"Reports: {len(files)} files in {arguments.report}, first {files[0].name}", err=True)
+    output.say_written(written, quiet=quiet)

@@ -2,89 +2,117 @@
 
 from __future__ import annotations
 
-import io
-import json
-import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.text import Text
 
-from mlg_troubleshoot import workflows
-from mlg_troubleshoot.cli import output, views
-from mlg_troubleshoot.cli.progress import stages
-from mlg_troubleshoot.diagnosis import Diagnosis
+from mlg_troubleshoot.cli import options, output
+from mlg_troubleshoot.errors import InconclusiveDataError
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.diagnosis import Diagnosis
+    from mlg_troubleshoot.units import LengthUnit
 
 NOTHING_FOUND, SOMETHING_FOUND = 0, 1
+EPILOG = (
+    "Example: [b]mlg diagnose fleet.csv --write-extension EXT.toml[/b], then [b]mlg check FILE --extension EXT.toml[/b]"
+)
+Files = Annotated[
+    list[str], typer.Argument(metavar="FILE...", help="Tables with measured plunger displacements, or -.")
+]
+WriteExtension = Annotated[
+    Path | None, typer.Option("--write-extension", metavar="EXT.toml", help="Keep the extended model.")
+]
+Permutations = Annotated[
+    int, typer.Option("--permutations", min=99, max=99999, help="Data sets drawn with nothing wrong.")
+]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of all randomness.")]
 
 
-def run(
-    files: Sequence[str],
-    options: workflows.DiagnoseOptions,
-    *,
-    write_extension: Path | None,
-    report: Path | None,
-    page: str,
-    as_json: bool,
-    quiet: bool,
+def diagnose(
+    files: Files,
+    write_extension: WriteExtension = None,
+    report: options.Report = None,
+    page: options.Paper = None,
+    causes: options.Causes = None,
+    permutations: Permutations = 999,
+    seed: Seed = 0,
+    gear: options.Gear = options.DEFAULT_GEAR,
+    unit: options.Unit = None,
+    convention: options.Convention = None,
+    sheet: options.Sheet = None,
+    column_map: options.ColumnMap = None,
+    decimal_comma: options.DecimalComma = False,
+    show: options.Show = None,
+    remember: options.Remember = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    _version: options.Version = False,
 ) -> None:
-    """Run the command and leave with the exit code of the contract.
+    """Compare measured with predicted: what is wrong, the cause by name, the extension, the gain.
 
-    Parameters
-    ----------
-    files : sequence of str
-        Tables.
-    options : DiagnoseOptions
-        What the user declared.
-    write_extension : Path or None
-        Where to write the extension.
-    report : Path or None
-        Folder of the report.
-    page : str
-        Paper of the report.
-    as_json : bool
-        Write JSON to stdout.
-    quiet : bool
-        No progress and no notes.
+    Exit codes: 0 nothing found · 1 something found · 3 cannot be concluded from this table · 2 usage.
     """
-    sources: list[Path | BinaryIO] = [
-        io.BytesIO(sys.stdin.buffer.read()) if name == "-" else Path(name) for name in files
-    ]
-    with stages(quiet=quiet) as bar:
-        result = workflows.diagnose_files(
-            sources, options, progress=lambda share: bar("Diagnosing", int(100 * share), 100)
-        )
-    diagnosis = result.diagnosis
-    if as_json:
-        from mlg_troubleshoot.reporting.diagnosis_json import diagnosis_as_json
+    from mlg_troubleshoot.cli.check import sources_of
+    from mlg_troubleshoot.cli.progress import stages
+    from mlg_troubleshoot.cli.remembered import settings
+    from mlg_troubleshoot.cli.views.notes import show_notes, show_problems
+    from mlg_troubleshoot.reporting.json_form import SCHEMA_VERSION, diagnosis_as_json
+    from mlg_troubleshoot.workflows import diagnose as task
 
-        output.write(
-            json.dumps(diagnosis_as_json(diagnosis, result.extension), allow_nan=False, ensure_ascii=False, indent=1)
-        )
+    options.keep_inputs(gear, [*files, *(causes or ())], [("--write-extension", write_extension)], report)
+    columns = options.columns_by_header(column_map)
+    shown = settings(show, page, columns, keep=remember, quiet=quiet)
+    asked = task.DiagnoseOptions(
+        gear=gear,
+        unit=options.unit_of(unit),
+        convention=options.convention_of(convention),
+        sheet=sheet,
+        decimal_comma=decimal_comma,
+        column_map=columns,
+        remembered_map=shown.headers,
+        remembered=shown.notes[0] if shown.notes else None,
+        cause_files=tuple(causes or ()),
+        permutations=permutations,
+        seed=seed,
+    )
+    try:
+        with stages(quiet=quiet) as bar:
+            result = task.diagnose_files(
+                sources_of(files), asked, progress=lambda share: bar("Diagnosing", int(100 * share), 100)
+            )
+    except InconclusiveDataError as error:
+        if as_json:
+            reason = {"reason": error.message, "remedy": error.remedy}
+            output.write_json({"schema_version": SCHEMA_VERSION, "verdict": None, **reason})
+        raise
+    if as_json:
+        output.write_json(diagnosis_as_json(result.diagnosis, result.extension))
     else:
         if not quiet:
-            views.show_notes(result.notes)
-        views.show_problems(result.problems)
-        _show(diagnosis)
-    if write_extension is not None:
-        if result.extension is None:
-            typer.echo(f"No extension written: the verdict is {diagnosis.verdict}, no cause is named alone.", err=True)
-        else:
-            workflows.write_extension(result.extension, write_extension)
-            typer.echo(f"Extension: {write_extension}. Use it: mlg check FILE --extension {write_extension}", err=True)
+            show_notes(result.notes)
+        show_problems(result.problems)
+        _show(result.diagnosis, shown.show)
+    if write_extension is not None and result.extension is None:
+        output.say(
+            f"No extension written: the verdict is {result.diagnosis.verdict}, no cause of the model is named alone."
+        )
+    elif write_extension is not None and result.extension is not None:
+        task.write_extension(result.extension, write_extension)
+        output.say(f"Extension: {write_extension}. Use it: mlg check FILE --extension {write_extension}")
     if report is not None:
-        for path in workflows.write_diagnosis_report(result, options, report, page):
-            typer.echo(f"Report: {path}", err=True)
-    raise typer.Exit(NOTHING_FOUND if diagnosis.verdict == "NONE" and not diagnosis.faults else SOMETHING_FOUND)
+        written = task.write_diagnosis_report(result, asked, report, str(shown.page), unit=shown.show)
+        output.say_written([written], quiet=quiet)
+    nothing = result.diagnosis.verdict == "NONE" and not result.diagnosis.faults
+    raise typer.Exit(NOTHING_FOUND if nothing else SOMETHING_FOUND)
 
 
-def _show(d: Diagnosis) -> None:
+def _show(diagnosis: Diagnosis, unit: LengthUnit) -> None:
     from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
+    from mlg_troubleshoot.units import in_unit
 
-    console = output.console()
-    for line in seven_lines(d):
-        text = Text(f"{line.number} {line.word:<7}", style="bold")
-        text.append(line.text, style="not bold")
-        console.print(text)
+    console = output.console(unit=unit)
+    for line in seven_lines(diagnosis):
+        said = output.text(in_unit(line.text, unit), "not bold")
+        console.print(output.text(f"{line.number} {line.word:<7}", "bold").append_text(said))

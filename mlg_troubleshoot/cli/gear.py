@@ -2,49 +2,49 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from dataclasses import asdict
+from typing import TYPE_CHECKING
 
 import typer
-from rich.table import Table
-from rich.text import Text
 
-from mlg_troubleshoot import workflows
-from mlg_troubleshoot.cli import output
-from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.cli import options, output
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.gear.gear import Gear
 
 
-def show(name: str, *, as_json: bool) -> None:
-    """Show the gear: identity, provenance, joints, coordinates, retraction cycle.
+def show(
+    context: typer.Context,
+    gear: options.Gear = options.DEFAULT_GEAR,
+    as_json: options.Json = False,
+    _version: options.Version = False,
+) -> None:
+    """Show which model is in use: identity, provenance, joints, coordinates, retraction cycle."""
+    from mlg_troubleshoot.gear.gear_file import load_gear
 
-    Parameters
-    ----------
-    name : str
-        Shipped gear or gear file.
-    as_json : bool
-        Write JSON instead.
-    """
-    gear = load_gear(name)
-    if as_json:
-        output.write(json.dumps(_as_json(gear), indent=1))
+    context.obj = gear
+    if context.invoked_subcommand is not None:
         return
+    if as_json:
+        output.write_json(_as_json(load_gear(gear)))
+    else:
+        _show(load_gear(gear))
+
+
+def _show(gear: Gear) -> None:
     console = output.console()
-    console.print(Text(f"{gear.name} ({gear.id})", style="bold"))
-    console.print(Text(f"Geometry: {gear.provenance}. File {gear.path.name}, hash {gear.geometry_sha256[:12]}."))
+    console.print(f"{gear.name} ({gear.id})", style="bold")
+    console.print(f"Geometry: {gear.provenance}. File {gear.path.name}, hash {gear.geometry_sha256[:12]}.")
     kinds = Counter(str(number.kind) for number in gear.numbers)
     listed = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
-    console.print(Text(f"Numbers behind a prediction: {listed}. Linkages in the ensemble: {len(gear.ensemble)}."))
+    console.print(f"Numbers behind a prediction: {listed}. Linkages in the ensemble: {len(gear.ensemble)}.")
     console.print(
-        Text(
-            f"Margin {gear.margin.value:g} in ({gear.margin.kind}) · release stroke {gear.reference.stroke[1]:g} in · "
-            f"calibration rate {gear.model.rate:.5f}"
-        )
+        f"Margin {gear.margin.value:g} in ({gear.margin.kind}) · release stroke {gear.reference.stroke[1]:g} in · "
+        f"calibration rate {gear.model.rate:.5f}"
     )
-    joints = Table(box=None, pad_edge=False, header_style="bold")
-    for heading in ("#", "joint", "where", "limit in", "acts like", "mid-position x, y in"):
-        joints.add_column(heading, justify="right" if heading in {"#", "limit in"} else "left")
+    headings = ("#", "joint", "where", "limit in", "acts like", "mid-position x, y in")
+    joints = output.plain_table(None, *headings, right=("#", "limit in"))
     for joint in gear.joints:
         point = gear.reference.mechanism.point(joint.point)
         alike = ", ".join(f"#{n}" for n in gear.alike[joint.number]) or "-"
@@ -58,13 +58,11 @@ def show(name: str, *, as_json: bool) -> None:
         )
     console.print(joints)
     if gear.cycle is not None:
-        cycle = Table(box=None, pad_edge=False, header_style="bold", title="Reversing valve", title_justify="left")
-        for heading in ("plunger", "oil flow", "stage", "what follows"):
-            cycle.add_column(heading)
+        cycle = output.plain_table(None, "plunger", "oil flow", "stage", "what follows", title="Reversing valve")
         for state in gear.cycle.valve:
             cycle.add_row(state.plunger, state.flow, state.stage, state.result)
         console.print(cycle)
-        console.print(Text(f"{gear.cycle.source}; what it does not state is shown as not stated."))
+        console.print(f"{gear.cycle.source}; what it does not state is shown as not stated.")
 
 
 def _as_json(gear: Gear) -> dict[str, object]:
@@ -99,40 +97,33 @@ def _as_json(gear: Gear) -> dict[str, object]:
     }
 
 
-def verify(name: str, *, as_json: bool) -> None:
-    """Print every printed number beside the computed one; exit 1 if one that should hold does not.
+def verify(context: typer.Context, as_json: options.Json = False, _version: options.Version = False) -> None:
+    """Print every number the paper prints beside what the model gives; exit 1 if one that should hold does not."""
+    from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.workflows import check as task
 
-    Parameters
-    ----------
-    name : str
-        Shipped gear or gear file.
-    as_json : bool
-        Write JSON instead.
-    """
-    gear = load_gear(name)
-    numbers = workflows.verify_gear(name)
+    gear, numbers = load_gear(context.obj), task.verify_gear(context.obj)
     failed = [n for n in numbers if n.should_hold and not n.holds]
     if as_json:
-        output.write(json.dumps({"gear": gear.id, "numbers": [asdict(n) for n in numbers]}, indent=1))
-    else:
-        console = output.console()
-        console.print(Text(f"{gear.name}: geometry {gear.provenance}", style="bold"))
-        table = Table(box=None, pad_edge=False, header_style="bold")
-        table.add_column("what the paper prints (section)")
-        table.add_column("printed", justify="right", max_width=14 if console.width < 100 else 26)
-        table.add_column("model", justify="right")
-        table.add_column("status", no_wrap=True)
-        for n in numbers:
-            mark = "" if n.holds else (": DOES NOT HOLD" if n.should_hold else ", known")
-            style = "bold red" if n in failed else ""
-            table.add_row(
-                f"{n.quantity} ({n.section})",
-                n.printed,
-                f"{n.computed:.4g} {n.unit}".strip(),
-                n.status + mark,
-                style=style,
-            )
-        console.print(table)
-        verdict = "all that should hold hold" if not failed else f"{len(failed)} that should hold do not"
-        console.print(Text(f"{len(numbers)} numbers: {verdict}."))
+        output.write_json({"gear": gear.id, "numbers": [asdict(n) for n in numbers]})
+        raise typer.Exit(1 if failed else 0)
+    console = output.console()
+    console.print(f"{gear.name}: geometry {gear.provenance}", style="bold")
+    table = output.plain_table(None)
+    table.add_column("what the paper prints (section)")
+    table.add_column("printed", justify="right", max_width=14 if console.width < 100 else 26)
+    table.add_column("model", justify="right")
+    table.add_column("status", no_wrap=True)
+    for n in numbers:
+        mark = "" if n.holds else (": DOES NOT HOLD" if n.should_hold else ", known")
+        table.add_row(
+            f"{n.quantity} ({n.section})",
+            n.printed,
+            f"{n.computed:.4g} {n.unit}".strip(),
+            n.status + mark,
+            style="bold red" if n in failed else "",
+        )
+    console.print(table)
+    verdict = "all that should hold do" if not failed else f"{len(failed)} that should hold do not"
+    console.print(f"{len(numbers)} numbers: {verdict}.")
     raise typer.Exit(1 if failed else 0)

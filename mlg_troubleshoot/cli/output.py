@@ -1,70 +1,195 @@
-"""Where results go: stdout, stderr, and what a reader that went away means."""
+"""Where results and messages go: stdout, stderr, what they can show, and what a reader that went away means."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import codecs
+import io
+import json
+import os
+import re
+import sys
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
-import typer
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
+from rich.table import Table
+from rich.text import Text
 
-from mlg_troubleshoot.cli.boundary import abandon_stdout
+from mlg_troubleshoot.errors import OutputError
+from mlg_troubleshoot.units import LengthUnit, in_unit
+from mlg_troubleshoot.visible import visible
 
-# A file or a pipe has no width; reports in text are set for this one.
-_WIDTH_ELSEWHERE = 110
+if TYPE_CHECKING:
+    from mlg_troubleshoot.reporting import WrittenReport
+
+_WIDTH_ELSEWHERE = 80
+WIDE, WIDEST = 100, 120
+_PLAIN = "mlg.plain"
+# A sign and what stands for it, one for one, so that drawings and tables keep their columns.
+_SIGNS = "═=─-━-│|┃|╭+╮+╰+╯+┌+┐+└+┘+├+┤+▲^△A▶>◀<○o■#□.█#▏|✓*✗!·-•*—-–-−-→>←<….’'‘'“\"”\"‹<›>×x±~≤<≥>≈~²2³3μuµu\u00a0 "
+_IN_ASCII = str.maketrans(_SIGNS[::2], _SIGNS[1::2])
 
 
-class ResultConsole(Console):
-    """A console whose closed pipe ends the printing and not the run: reports and exit codes still follow."""
+def to_ascii(text: str) -> str:
+    """Return a text in ASCII with the same number of characters."""
+    return text.translate(_IN_ASCII).encode("ascii", "replace").decode("ascii")
+
+
+def prepare_streams() -> None:
+    """Let stdout and stderr degrade to what they can show; no character ends a run.
+
+    Python turns a C locale into UTF-8 for itself, so for a terminal the locale is asked.
+    """
+    codecs.register_error(_PLAIN, _shown_instead)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            plain = stream.isatty() and not os.environ.get("PYTHONIOENCODING") and not speaks_utf8()
+            stream.reconfigure(encoding="ascii" if plain else None, errors=_PLAIN)
+
+
+def _shown_instead(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return to_ascii(error.object[error.start : error.end]), error.end
+
+
+def speaks_utf8() -> bool:
+    """Tell whether the user's locale is one of UTF-8."""
+    if sys.platform == "win32":
+        return (sys.stderr.encoding or "").lower().startswith("utf")
+    types = os.environ.get("LC_CTYPE", "")
+    if types in ("C.UTF-8", "C.utf8"):
+        # Python's own doing at start-up when the locale is C or unknown.
+        types = ""
+    chosen = os.environ.get("LC_ALL") or types or os.environ.get("LANG", "")
+    return re.search(r"utf-?8", chosen, re.IGNORECASE) is not None
+
+
+def abandon_stdout() -> None:
+    """Drop what is still to be written to stdout: the reader of the pipe went away, the work goes on."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+class DataConsole(Console):
+    """A console that shows data as they are: no markup, nothing in them acts on the terminal.
+
+    A closed pipe ends the printing and not the run: reports and exit codes still follow.
+    """
+
+    unit = LengthUnit.INCH
+
+    def length(self, value_in: float, *, sign: bool = False) -> str:
+        """Write a length as a number in the unit that the user reads."""
+        return f"{self.unit.from_inches(value_in):{'+' if sign else ''}.{self.unit.decimals}f}"
+
+    def sentence(self, said: str, style: str = "") -> None:
+        """Print a sentence of this program, its lengths in the unit that the user reads."""
+        self.print(in_unit(said, self.unit), style=style)
+
+    def print(self, *objects: Any, **how: Any) -> None:
+        """Print; a text is data, made visible before it is measured."""
+        super().print(*(text(each) if isinstance(each, str) else each for each in objects), **how)
 
     def on_broken_pipe(self) -> None:
         """Stop printing."""
         self.quiet = True
         abandon_stdout()
 
-
-def console(*, to_stderr: bool = False) -> Console:
-    """Return a console for stdout or stderr, as wide as the terminal.
-
-    Parameters
-    ----------
-    to_stderr : bool
-        True for messages, False for results.
-
-    Returns
-    -------
-    Console
-        The console.
-    """
-    found = ResultConsole(stderr=to_stderr, highlight=False)
-    if found.is_terminal:
-        return found
-    return ResultConsole(stderr=to_stderr, highlight=False, width=_WIDTH_ELSEWHERE)
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Render; what a cell holds is made visible before it is measured where it is text, and in any case here."""
+        for text, style, control in super().render(renderable, options):
+            yield Segment(text if control else visible(text), style, control)
 
 
-def write(text: str) -> None:
-    """Write a result to stdout as it stands.
+def console(
+    *,
+    to_stderr: bool = False,
+    unit: LengthUnit = LengthUnit.INCH,
+    plain: bool = False,
+    elsewhere: int = _WIDTH_ELSEWHERE,
+) -> DataConsole:
+    """Return a console for stdout or stderr, as wide as the terminal, COLUMNS, or `elsewhere`."""
+    columns = os.environ.get("COLUMNS", "")
+    given = int(columns) if columns.isascii() and columns.isdecimal() and int(columns) else None
+    found = DataConsole(
+        stderr=to_stderr,
+        highlight=False,
+        markup=False,
+        emoji=False,
+        width=given,
+        color_system=None if plain else "auto",
+    )
+    if given is None and not found.is_terminal:
+        found.width = elsewhere
+    found.unit = unit
+    return found
 
-    Parameters
-    ----------
-    text : str
-        The result.
-    """
-    try:
-        typer.echo(text)
-    except BrokenPipeError:
-        abandon_stdout()
+
+def plain_table(
+    console: Console | None, *headings: str, right: Sequence[str] = (), title: str | Text | None = None
+) -> Table:
+    """Return a table without rules, set closer where a console has little room; numbers stand to the right."""
+    gap = 2 if console is None or console.width >= WIDE else 1
+    table = Table(
+        box=None, pad_edge=False, padding=(0, gap, 0, 0), header_style="bold", title=title, title_justify="left"
+    )
+    for heading in headings:
+        table.add_column(heading, justify="right" if heading in right else "left")
+    return table
+
+
+def text(data: str, style: str = "") -> Text:
+    """Return data as a text for the console, made visible before it is measured."""
+    return Text(visible(data), style=style)
+
+
+def word(data: str | None, style: str = "") -> Text:
+    """Return an identity for a heading or a cell: on one line, a question mark where there is none."""
+    return Text("?" if data is None else visible(data, one_line=True), style=style)
+
+
+def say(message: str) -> None:
+    print(visible(message), file=sys.stderr, flush=True)
+
+
+def say_written(written: Iterable[WrittenReport], *, quiet: bool = False) -> None:
+    """Name the reports that were written, and what the user must know about them."""
+    reports = list(written)
+    for note in dict.fromkeys(note for report in reports for note in report.notes):
+        say(f"Note: {note}")
+    files = [path for report in reports for path in report.files]
+    if not files:
+        raise OutputError("no report could be written", "See the notes above.")
+    if not quiet:
+        for path in files if len(files) <= 4 else ():
+            say(f"Report: {path}")
+        if len(files) > 4:
+            say(f"Reports: {len(files)} files in {files[0].parent}, first {files[0].name}")
+
+
+def write(result: str) -> None:
+    write_pieces((result, "\n"))
+
+
+def write_json(result: object) -> None:
+    """Write a result as JSON to stdout, or the pieces of it if it is an iterator."""
+    if isinstance(result, dict):
+        pieces: Iterable[str] = (json.dumps(result, allow_nan=False, ensure_ascii=False, indent=1), "\n")
+    elif isinstance(result, Iterable):
+        pieces = result
+    else:
+        raise TypeError(f"{type(result).__name__} is no JSON object")
+    utf8 = codecs.lookup(sys.stdout.encoding or "ascii").name == "utf-8"
+    beyond = re.compile("[\ud800-\udfff]" if utf8 else "[^\x00-\x7f]")
+    write_pieces(beyond.sub(lambda found: json.dumps(found[0])[1:-1], piece) for piece in pieces)
 
 
 def write_pieces(pieces: Iterable[str]) -> None:
-    """Write a long result to stdout piece by piece; a reader that goes away ends the writing.
-
-    Parameters
-    ----------
-    pieces : iterable of str
-        The result.
-    """
+    """Write a long result to stdout piece by piece; a reader that goes away ends the writing."""
     try:
         for piece in pieces:
-            typer.echo(piece, nl=False)
+            sys.stdout.write(piece)
+        sys.stdout.flush()
     except BrokenPipeError:
         abandon_stdout()

@@ -14,18 +14,7 @@ _WORTH_SHOWING_AFTER_S = 0.5
 
 @contextmanager
 def stages(*, quiet: bool) -> Iterator[Advance]:
-    """Show how far each stage of a run is, once it has run long enough to be worth it.
-
-    Parameters
-    ----------
-    quiet : bool
-        Show nothing.
-
-    Yields
-    ------
-    callable
-        Takes the name of the stage, what is done and the whole, if known.
-    """
+    """Show how far each stage of a run is, once it has run long enough to be worth it."""
     if quiet or not sys.stderr.isatty():
         yield lambda _name, _done, _total: None
         return

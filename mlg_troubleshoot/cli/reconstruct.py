@@ -1,13 +1,16 @@
-"""``mlg gear reconstruct``, its options. Nothing heavy is imported before it runs."""
+"""``mlg gear reconstruct``: what a linkage meets and what stays unknown. Nothing heavy is imported before it runs."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mlg_troubleshoot.cli.boundary import Boundary
+from mlg_troubleshoot.cli import options, output
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.studies.reconstruct import Reconstruction
 
 EPILOG = (
     "Example: [b]mlg gear reconstruct --seed 7 --out new-member.toml[/b] · with your own numbers: "
@@ -18,8 +21,7 @@ EPILOG = (
 def reconstruct(
     context: typer.Context,
     targets: Annotated[
-        Path | None,
-        typer.Option("--targets", metavar="TOML", help="Numbers to meet, else those printed in the paper."),
+        Path | None, typer.Option("--targets", metavar="TOML", help="Numbers to meet, else those printed in the paper.")
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random linkages.")] = 0,
     start: Annotated[
@@ -31,26 +33,52 @@ def reconstruct(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="OUT.toml", help="Write the linkage as a member of an ensemble.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to stdout.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    _version: options.Version = False,
 ) -> None:
     """Search a linkage that meets printed numbers: where the coordinates come from.
 
     Exit codes: 0 found · 1 polished, but not everything is met · 3 nothing found in time.
     """
-    with Boundary():
-        from mlg_troubleshoot.cli import reconstruct_run
+    from mlg_troubleshoot.cli.progress import stages
+    from mlg_troubleshoot.workflows import reconstruct as task
 
-        reconstruct_run.run(
-            reconstruct_run.ReconstructArguments(
-                gear=context.obj or "hawker-800xp",
-                targets=targets,
-                seed=seed,
-                start=start,
-                name=name,
-                minutes=minutes,
-                out=out,
-                as_json=as_json,
-                quiet=quiet,
-            )
+    gear = context.obj or options.DEFAULT_GEAR
+    options.keep_inputs(gear, [targets], [("--out", out)])
+    with stages(quiet=quiet) as advance:
+        found, text = task.reconstruct_linkage(
+            gear, targets=targets, seed=seed, start=start, name=name, minutes=minutes, out=out, progress=advance
         )
+    if as_json:
+        output.write_json(task.reconstruction_values(found, text))
+    else:
+        _show(found, text, show_member=out is None)
+    if out is not None:
+        output.say(f"Linkage written: {out}")
+    raise typer.Exit(0 if found.meets_all else 1)
+
+
+def _show(found: Reconstruction, text: str, *, show_member: bool) -> None:
+    console = output.console(elsewhere=output.WIDEST)
+    table = output.plain_table(None, "target", "printed", "linkage", "accepted", "", "", right=("linkage",))
+    for each in found.met:
+        table.add_row(
+            each.target.quantity,
+            each.target.printed,
+            f"{each.computed:.5g} {each.target.unit}".strip(),
+            each.target.tolerance,
+            "met" if each.holds else "NOT MET",
+            "binds" if each.binds else "slack",
+        )
+    console.print(table)
+    free = found.numbers - found.determined
+    loosest = ", ".join(name for name, _ in found.loosest)
+    console.print(
+        f"{found.numbers} numbers describe the linkage; the binding targets determine {found.determined} "
+        f"directions among them, {free} stay free. Least determined: {loosest}. "
+        f"{found.evaluations} linkages tried, seed {found.seed}."
+    )
+    console.print("This linkage is chosen to meet numbers; it is not measured and not drawing data.")
+    if show_member:
+        output.write("\n" + text)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mlg_troubleshoot.cli.boundary import Boundary
+from mlg_troubleshoot.cli import options
 
 EPILOG = (
     "Example: [b]mlg study[/b] · the paper's design: [b]mlg study --design lhs[/b] · its statements: "
@@ -16,9 +16,7 @@ EPILOG = (
 
 
 def study(
-    gear: Annotated[str, typer.Option("--gear", metavar="NAME|TOML", help="Shipped gear or a gear file.")] = (
-        "hawker-800xp"
-    ),
+    gear: options.Gear = options.DEFAULT_GEAR,
     design: Annotated[
         str,
         typer.Option(
@@ -31,12 +29,10 @@ def study(
     accuracy: Annotated[float, typer.Option("--accuracy", help="Wanted error of every index.")] = 1e-3,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")] = 0,
     directions: Annotated[
-        str,
-        typer.Option("--directions", metavar="worst|over|under|random", help="How the clearances are turned."),
+        str, typer.Option("--directions", metavar="worst|over|under|random", help="How the clearances are turned.")
     ] = "worst",
     fixed: Annotated[
-        str | None,
-        typer.Option("--fixed", metavar="DEG,DEG,…", help="Directions set by a load, one for each joint."),
+        str | None, typer.Option("--fixed", metavar="DEG,DEG,…", help="Directions set by a load, one for each joint.")
     ] = None,
     distribution: Annotated[
         str,
@@ -80,40 +76,35 @@ def study(
         Path | None,
         typer.Option("--report", metavar="DIR", help="Write a printable report with figures, statements and bound."),
     ] = None,
-    page: Annotated[str, typer.Option("--page", metavar="A4|Letter", help="Paper of the report.")] = "A4",
-    as_json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to stdout.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+    page: options.Paper = None,
+    show: options.Show = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    _version: options.Version = False,
 ) -> None:
     """Recompute the sensitivity and amplification indices of every joint."""
-    with Boundary():
-        from mlg_troubleshoot.cli import study_run
+    from mlg_troubleshoot.cli import study_run
+    from mlg_troubleshoot.cli.remembered import settings
 
-        study_run.run(
-            study_run.StudyArguments(
-                gear=gear,
-                design=design,
-                directions=directions,
-                distribution=distribution,
-                fixed_deg=fixed,
-                limit=limit,
-                accuracy=accuracy,
-                seed=seed,
-                most=most,
-                n1=n1,
-                n2=n2,
-                iterations=iterations,
-                workers=workers,
-                state=state,
-                scheduler=scheduler,
-                beyond_margin=beyond_margin,
-                statements=statements,
-                bound=bound,
-                write_table=write_table,
-                as_json=as_json,
-                quiet=quiet,
-                csv=csv,
-                given=given,
-                report=report,
-                page=page,
-            )
-        )
+    shown = settings(show, page, {}, keep=False, quiet=quiet)
+    options.keep_inputs(gear, [given], [("--csv", csv), ("--state", state)], report, writes_table=write_table)
+    with study_run.asked(
+        gear,
+        design,
+        directions,
+        fixed,
+        limit,
+        scheduler,
+        distribution=distribution,
+        accuracy=accuracy,
+        seed=seed,
+        most=most,
+        n1=n1,
+        n2=n2,
+        iterations=iterations,
+        workers=workers,
+        state=state,
+        beyond_margin=beyond_margin,
+    ) as (known, wanted):
+        beside = study_run.Beside(statements, bound, given, report, shown, csv, write_table, as_json, quiet)
+        study_run.run(known, wanted, beside)

@@ -1,30 +1,41 @@
-"""``mlg template``: an empty inspection workbook."""
+"""``mlg template``: an empty inspection workbook, or a form to fill in by hand."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
-from mlg_troubleshoot import workflows
+from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import OutputError, UsageError
 
+File = Annotated[
+    Path, typer.Argument(metavar="FILE.xlsx|FILE.pdf", help="Where to write it: a workbook, or a form to print.")
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace a file that exists.")]
 
-def run(file: Path, gear: str, *, force: bool) -> None:
-    """Write the workbook.
 
-    Parameters
-    ----------
-    file : Path
-        Where to write it.
-    gear : str
-        The gear whose joints it lists.
-    force : bool
-        Replace a file that exists.
-    """
-    if file.suffix.lower() != ".xlsx":
-        raise UsageError(f"{file.name!r} does not end in .xlsx", "Give a name that ends in .xlsx.")
+def template(
+    file: File,
+    gear: options.Gear = options.DEFAULT_GEAR,
+    force: Force = False,
+    page: options.Paper = None,
+    show: options.Show = None,
+    _version: options.Version = False,
+) -> None:
+    """Write an empty inspection workbook that mlg check reads back, or a one-page form (.pdf, .html) for the hand."""
+    from mlg_troubleshoot.cli.remembered import settings
+    from mlg_troubleshoot.workflows import check as task
+
+    if file.suffix.lower() not in (".xlsx", ".pdf", ".html"):
+        raise UsageError(f"{file.name!r} is no workbook and no form", "Give a name that ends in .xlsx, .pdf or .html.")
     if file.exists() and not force:
         raise OutputError(f"{file} exists already", "Give another name, or --force to replace it.")
-    workflows.write_template(file, gear)
-    typer.echo(f"Written: {file}. Fill it in, then: mlg check {file} --report DIR")
+    options.keep_inputs(gear, (), [("the template", file)])
+    shown = settings(show, page, {}, keep=False, quiet=False)
+    task.write_template(file, gear, page=str(shown.page), unit=shown.show)
+    if file.suffix.lower() == ".xlsx":
+        output.write(f"Written: {file}. Fill it in, then: mlg check {file} --report DIR")
+    else:
+        output.write(f"Written: {file}. Print it, fill it in, then enter it: mlg check")

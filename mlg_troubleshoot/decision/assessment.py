@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
+from mlg_troubleshoot.decision.plan import Basis, End, Plan, Step
 
 
 class Verdict(StrEnum):
@@ -29,64 +32,18 @@ class Verdict(StrEnum):
         }[self.value]
 
 
-class Action(StrEnum):
-    """What to do next."""
-
-    MEASURE = "MEASURE"
-    RESTORE = "RESTORE"
-    CONTINUE = "CONTINUE"
-    CORRECT = "CORRECT"
-
-
-@dataclass(frozen=True, slots=True)
-class NextAction:
-    """The one next action.
-
-    Parameters
-    ----------
-    action : Action
-        What to do.
-    joints : tuple of int
-        The joints to do it to, in this order.
-    text : str
-        The action as a sentence.
-    """
-
-    action: Action
-    joints: tuple[int, ...]
-    text: str
-
-
 @dataclass(frozen=True, slots=True)
 class JointFinding:
     """One line of the ranked table.
 
-    Parameters
-    ----------
-    joint : int
-        Number of the joint.
-    name : str
-        Its name.
-    clearance_in : float or None
-        Radial clearance; None if not measured. [in]
-    limit_in : float
-        Its limit. [in]
-    over_limit : bool
-        True if the clearance is above the limit.
-    contribution_in : float or None
-        Plunger amplification × clearance; None if not measured. [in]
-    first_order, total_order : float
-        Sensitivity indices of the precomputed table (Eqs. 1 and 2). [1]
-    plunger_amplification : float
-        A_iP at mid-position in the limit of small clearance (Eq. 8). [1]
-    rank : int
-        Order in which to inspect, from 1.
-    rank_range : tuple of int
-        Best and worst rank of its contribution over the ensemble of geometries.
-    alike : tuple of int
-        Joints at the other end of the same link: plunger data alone cannot tell them apart.
-    allowance_in : float or None
-        How much further this joint alone may wear until the worst case reaches the margin; None if it is
+    clearance_in: radial clearance; None if not measured. [in]
+    contribution_in: plunger amplification × clearance; None if not measured. [in]
+    first_order, total_order: sensitivity indices of the precomputed table (Eqs. 1 and 2). [1]
+    plunger_amplification: A_iP at mid-position in the limit of small clearance (Eq. 8). [1]
+    rank: order in which to inspect, from 1.
+    rank_range: best and worst rank of its contribution over the ensemble of geometries.
+    alike: joints at the other end of the same link: plunger data alone cannot tell them apart.
+    allowance_in: how much further this joint alone may wear until the worst case reaches the margin; None if it is
         not measured or the worst case is beyond the margin already. [in]
     """
 
@@ -109,38 +66,26 @@ class JointFinding:
 class RepairSet:
     """A set of joints which, restored, brings the worst case within the margin.
 
-    Parameters
-    ----------
-    joints : tuple of int
-        Joints to restore.
-    predicted_displacement_in : float
-        Worst-case displacement afterwards. [in]
-    probability_within_margin : float
-        Probability that the bound is within the margin afterwards. [1]
-    access_minutes : float
-        Time to reach them. [min]
+    predicted_displacement_in: worst-case displacement afterwards. [in]
+    probability_within_margin: probability that the bound is within the margin afterwards. [1]
+    access_minutes: time to reach them. [min]
+    minutes: time to open their areas and restore them. [min]
     """
 
     joints: tuple[int, ...]
     predicted_displacement_in: float
     probability_within_margin: float
     access_minutes: float
+    minutes: float
 
 
 @dataclass(frozen=True, slots=True)
 class Rigging:
     """What re-rigging alone would do: the plunger's range shifted to the middle, the clearances left as they are.
 
-    Parameters
-    ----------
-    shift_in : float
-        By how much to shift the plunger. [in]
-    predicted_displacement_in : float
-        Worst case afterwards: half of the range between the worst cases of both senses. [in]
-    probability_within_margin : float
-        Probability that this bound is within the margin. [1]
-    probability_exceed_random_directions : float
-        Chance of leaving the margin afterwards with uniformly random directions. [1]
+    predicted_displacement_in: worst case afterwards: half of the range between the worst cases of both senses. [in]
+    probability_exceed_random_directions: chance of leaving the margin afterwards with uniformly random directions.
+        [1]
     """
 
     shift_in: float
@@ -153,18 +98,10 @@ class Rigging:
 class ReadingWorth:
     """What measuring one joint is worth.
 
-    Parameters
-    ----------
-    joint : int
-        Number of the joint.
-    minutes : float
-        Time to reach it from the state of the inspection, areas that are open already being free. [min]
-    risk_drop : float
-        Expected drop of the decision risk; 0 where this reading alone cannot change the decision. [1]
-    variance_in2 : float
-        Share of the variance of the worst case that the reading removes. [in²]
-    critical : bool
-        True if no gear can be cleared without it.
+    minutes: time to reach it from the state of the inspection, areas that are open already being free. [min]
+    risk_drop: expected drop of the decision risk; 0 where this reading alone cannot change the decision. [1]
+    variance_in2: share of the variance of the worst case that the reading removes. [in²]
+    critical: true if no gear can be cleared without it.
     """
 
     joint: int
@@ -174,18 +111,6 @@ class ReadingWorth:
     critical: bool
 
     def per_minute(self, *, by_risk: bool) -> float:
-        """Worth per minute.
-
-        Parameters
-        ----------
-        by_risk : bool
-            True for the drop in risk, False for the variance.
-
-        Returns
-        -------
-        float
-            Worth. [1/min or in²/min]
-        """
         return (self.risk_drop if by_risk else self.variance_in2) / self.minutes
 
 
@@ -193,22 +118,13 @@ class ReadingWorth:
 class MeasuringAdvice:
     """Which joint to measure next, and whether one may stop.
 
-    Parameters
-    ----------
-    worth : tuple of ReadingWorth
-        The unmeasured joints, best first.
-    stop : bool
-        True if more measuring will not change the verdict.
-    verdict : Verdict
-        The verdict that stands if one may stop, else the verdict so far.
-    expected_within : float
-        Chance that the gear is within its margin, unmeasured joints taken by their distribution. For the advice
-        only: a verdict takes them at their bounds. [1]
-    expected : Verdict or None
-        WITHIN_MARGIN or OUTSIDE_MARGIN where that chance is enough to go on troubleshooting, INCONCLUSIVE where
-        measuring the other joints would hardly settle it, else None.
-    text : str
-        The advice as a sentence.
+    worth: the unmeasured joints, best first.
+    stop: true if more measuring will not change the verdict.
+    verdict: the verdict that stands if one may stop, else the verdict so far.
+    expected_within: chance that the gear is within its margin, unmeasured joints taken by their distribution. For
+        the advice only: a verdict takes them at their bounds. [1]
+    expected: WITHIN_MARGIN or OUTSIDE_MARGIN where that chance is enough to go on troubleshooting, INCONCLUSIVE
+        where measuring the other joints would hardly settle it, else None.
     """
 
     worth: tuple[ReadingWorth, ...]
@@ -228,16 +144,9 @@ class MeasuringAdvice:
 class Confidence:
     """How far the probability of being within the margin can be trusted as a number.
 
-    Parameters
-    ----------
-    analytic : float
-        With the response taken as linear in the errors of the readings. [1]
-    monte_carlo : float
-        With its curvature, by Monte Carlo. [1]
-    standard_error : float
-        Of the Monte Carlo value. [1]
-    draws : int
-        Number of draws.
+    analytic: with the response taken as linear in the errors of the readings. [1]
+    monte_carlo: with its curvature, by Monte Carlo. [1]
+    standard_error: of the Monte Carlo value. [1]
     """
 
     analytic: float
@@ -250,38 +159,39 @@ class Confidence:
 class UncertaintyBudget:
     """Standard uncertainties behind the probability, at the prediction with unmeasured joints at 0.
 
-    Parameters
-    ----------
-    clearances_in : float
-        From the readings of the measured joints. [in]
-    geometry_in : float
-        Spread of the prediction over the ensemble of geometries. [in]
-    model_in : float
-        Of the model itself. [in]
-    margin_in : float
-        Of the margin. [in]
-    model_source : str
-        Where `model_in` comes from: provisional, or the residual scatter of a diagnosis.
+    readings_in: of each measured joint. [in]
+    geometry_in: spread of the prediction over the ensemble of geometries. [in]
+    model_source: where `model_in` comes from: provisional, or the residual scatter of a diagnosis.
     """
 
-    clearances_in: float
+    readings_in: Mapping[int, float]
     geometry_in: float
     model_in: float
     margin_in: float
     model_source: str
 
+    @property
+    def clearances_in(self) -> float:
+        """Of all readings together. [in]"""
+        return math.sqrt(sum(u**2 for u in self.readings_in.values()))
+
+    @property
+    def lines(self) -> tuple[tuple[str, float, float], ...]:
+        """Name, standard uncertainty and share of the combined variance of each part, largest reading first. [in, 1]"""
+        readings = sorted(self.readings_in.items(), key=lambda reading: -reading[1])
+        parts = {
+            **{f"reading of #{joint}": u for joint, u in readings},
+            "geometry, over the ensemble": self.geometry_in,
+            "model": self.model_in,
+            "margin": self.margin_in,
+        }
+        variance = sum(u**2 for u in parts.values()) or 1.0
+        return tuple((name, u, u**2 / variance) for name, u in parts.items())
+
 
 @dataclass(frozen=True, slots=True)
 class GroupChance:
-    """Chance that a joint, or one of two that the plunger cannot tell apart, is worn beyond its limit.
-
-    Parameters
-    ----------
-    joints : tuple of int
-        The joint, or the ends of one link.
-    probability : float
-        Chance that at least one of them is worn. [1]
-    """
+    """Chance that a joint, or one of two that the plunger cannot tell apart, is worn beyond its limit. [1]"""
 
     joints: tuple[int, ...]
     probability: float
@@ -291,14 +201,8 @@ class GroupChance:
 class ClearanceInterval:
     """What is known of one joint's clearance after the readings.
 
-    Parameters
-    ----------
-    joint : int
-        Number of the joint.
-    low_in, median_in, high_in : float
-        Median and ends of the central 90 % interval of the radial clearance. [in]
-    worn : float
-        Chance that it is beyond its limit. [1]
+    low_in, median_in, high_in: median and ends of the central 90 % interval of the radial clearance. [in]
+    worn: chance that it is beyond its limit. [1]
     """
 
     joint: int
@@ -312,22 +216,11 @@ class ClearanceInterval:
 class Posterior:
     """Which joints explain a measured plunger displacement.
 
-    Parameters
-    ----------
-    groups : tuple of GroupChance
-        Groups of joints, most likely worn first.
-    no_joint_worn : float
-        Chance that no joint is worn beyond its limit. [1]
-    not_clearance : float
-        Chance that something other than clearance displaced the plunger. [1]
-    intervals : tuple of ClearanceInterval
-        One for each joint, in the order of the joints' numbers.
-    called_worn : tuple of tuple of int
-        Groups that are more likely worn than not.
-    effective_draws : float
-        Independent draws that the result is worth. [1]
-    text : str
-        The finding as a sentence.
+    groups: groups of joints, most likely worn first.
+    no_joint_worn: chance that no joint is worn beyond its limit. [1]
+    not_clearance: chance that something other than clearance displaced the plunger. [1]
+    called_worn: groups that are more likely worn than not.
+    effective_draws: independent draws that the result is worth. [1]
     """
 
     groups: tuple[GroupChance, ...]
@@ -373,12 +266,19 @@ class Assessment:
         Worst directions, one a joint, for the curve and the schematic; empty where nothing closes. [rad]
     joints : tuple of JointFinding
         Ranked table, in the order of the joints' numbers.
-    next_action : NextAction
-        The one next action.
+    plan : Plan
+        What to do, to an end; its first step is the one next action.
+    basis : Basis
+        Whether the verdict rests on a measured displacement or on the prediction.
+    bound_in : float or None
+        Worst case over all directions, whatever an extension predicts. [in]
+    explained_at_most_in, unexplained_in : float or None
+        What of a measured displacement the joints can explain at most, unmeasured ones at their limit, and what they
+        cannot; None without a reading. [in]
     headline : str
-        The verdict in one or two plain sentences.
+        The verdict in one or two plain sentences, what was measured first.
     measured_statement : str or None
-        What a measured displacement says, in its own words; None if none was measured.
+        What a displacement measured within the margin says; None if none was, or if the headline says it.
     repair_sets : tuple of RepairSet or None
         Repair sets; None if they were not asked for.
     warnings : tuple of str
@@ -409,7 +309,11 @@ class Assessment:
     over_directions_rad: tuple[float, ...]
     under_directions_rad: tuple[float, ...]
     joints: tuple[JointFinding, ...]
-    next_action: NextAction
+    plan: Plan
+    basis: Basis
+    bound_in: float | None
+    explained_at_most_in: float | None
+    unexplained_in: float | None
     headline: str
     measured_statement: str | None
     repair_sets: tuple[RepairSet, ...] | None
@@ -420,6 +324,32 @@ class Assessment:
     posterior: Posterior | None = None
 
     @property
+    def as_loaded(self) -> bool:
+        """True where the prediction is the displacement as loaded: an expectation, with the bound beside it."""
+        return self.predicted_displacement_in != self.bound_in
+
+    @property
+    def chance_wrong(self) -> float | None:
+        """Chance that the predicted worst case is on the other side of the margin than a verdict of this gear says.
+
+        Specific consumer's and producer's risk in the words of JCGM 106; None where no prediction decides. [1]
+        """
+        within = self.probability_within_margin
+        if self.basis is Basis.MEASURED or self.standard_uncertainty_in is None or within is None:
+            return None
+        return {Verdict.WITHIN_MARGIN: 1.0 - within, Verdict.OUTSIDE_MARGIN: within}.get(self.verdict)
+
+    @property
+    def next_action(self) -> Step:
+        """The one next action: the plan's first step."""
+        return self.plan.steps[0]
+
+    @property
+    def end(self) -> End:
+        """Where the plan is expected to end."""
+        return self.plan.end
+
+    @property
     def ranked(self) -> tuple[JointFinding, ...]:
         """The joints in the order in which to inspect them."""
         return tuple(sorted(self.joints, key=lambda finding: finding.rank))
@@ -427,26 +357,24 @@ class Assessment:
 
 @dataclass(frozen=True, slots=True)
 class Rejected:
-    """A row that cannot be judged: verdict INVALID, its numbers absent.
-
-    Parameters
-    ----------
-    row : InvalidRow
-        Identity as far as it could be read.
-    next_action : NextAction
-        What to correct.
-    warnings : tuple of str
-        What the reader noticed.
-    """
+    """A row that cannot be judged: verdict INVALID, its numbers absent."""
 
     row: InvalidRow
-    next_action: NextAction
+    plan: Plan
     warnings: tuple[str, ...]
 
     @property
     def verdict(self) -> Verdict:
-        """Always INVALID."""
         return Verdict.INVALID
+
+    @property
+    def next_action(self) -> Step:
+        """The one next action: the plan's first step."""
+        return self.plan.steps[0]
+
+    @property
+    def end(self) -> End:
+        return self.plan.end
 
 
 Judgement = Assessment | Rejected

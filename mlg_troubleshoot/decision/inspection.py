@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import date
 from enum import StrEnum
@@ -35,15 +35,7 @@ class Approach(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class EnteredClearance:
-    """A clearance reading exactly as it was entered, for the report.
-
-    Parameters
-    ----------
-    text : str
-        The entered text or number.
-    unit : LengthUnit
-        The unit it was read in.
-    """
+    """A clearance reading exactly as it was entered, for the report."""
 
     text: str
     unit: LengthUnit
@@ -53,14 +45,8 @@ class EnteredClearance:
 class RowSource:
     """Where an inspection came from.
 
-    Parameters
-    ----------
-    file : str or None
-        File as the user named it; None for the prompts and the command line.
-    sheet : str or None
-        Worksheet, None for CSV.
-    row : int or None
-        Row in the file, counted from 1 with the header included.
+    file: file as the user named it; None for the prompts and the command line.
+    row: row in the file, counted from 1 with the header included.
     """
 
     file: str | None = None
@@ -79,21 +65,26 @@ class Inspection:
     side : Side
         Which gear.
     convention : ClearanceConvention
-        How the clearances were entered; `clearance_in` is already radial.
+        How the clearances were taken.
     clearance_in : mapping of int to float
-        Radial clearance by joint number; a joint that is not a key was not measured. [in]
+        Clearance by joint number; a joint that is not a key was not measured. Radial, unless it is still to be
+        judged by `check`, which takes clearances without `entered` as readings in the convention. [in]
     entered : mapping of int to EnteredClearance
         The readings as entered.
     gauge_u_in : float
         Standard uncertainty of one radial clearance. [in]
     gauge_u_is_default : bool
         True if the record does not state the uncertainty.
+    gauge_u_by_joint_in : mapping of int to float
+        Standard uncertainty of one radial clearance where a joint's differs from `gauge_u_in`. [in]
     readings_in : tuple of float
         Measured plunger displacements at mid-position, over-travel positive. [in]
     plunger_gauge_u_in : float or None
         Declared repeatability of one plunger reading. [in]
     plunger_down_lock_in : float or None
         Measured plunger position at Down Lock. [in]
+    actuator_extension_in, plunger_position_in : float or None
+        A reading along the stroke: plunger position, zero as at Down Lock, at an extension from Down Lock. [in]
     margin_in : float or None
         This gear's margin as found at rigging. [in]
     margin_u_in : float
@@ -126,9 +117,12 @@ class Inspection:
     entered: Mapping[int, EnteredClearance] = field(default_factory=dict)
     gauge_u_in: float = DEFAULT_GAUGE_U_IN
     gauge_u_is_default: bool = True
+    gauge_u_by_joint_in: Mapping[int, float] = field(default_factory=dict)
     readings_in: tuple[float, ...] = ()
     plunger_gauge_u_in: float | None = None
     plunger_down_lock_in: float | None = None
+    actuator_extension_in: float | None = None
+    plunger_position_in: float | None = None
     margin_in: float | None = None
     margin_u_in: float = 0.0
     outcome: Outcome | None = None
@@ -149,23 +143,21 @@ class Inspection:
         """Mean of the plunger readings, over-travel positive; None if there is none. [in]"""
         return sum(self.readings_in) / len(self.readings_in) if self.readings_in else None
 
+    def gauge_us(self, joints: Iterable[int]) -> list[float]:
+        """Standard uncertainties of the radial clearances of some joints. [in]"""
+        return [self.gauge_u_of(joint) for joint in joints]
+
+    def gauge_u_of(self, joint: int) -> float:
+        """Standard uncertainty of the radial clearance of one joint. [in]"""
+        return self.gauge_u_by_joint_in.get(joint, self.gauge_u_in)
+
 
 @dataclass(frozen=True, slots=True)
 class InvalidRow:
     """A data row that cannot be judged; its problems stand in the list of problems.
 
-    Parameters
-    ----------
-    record_id, tail_no : str or None
-        Identity as far as it could be read.
-    side : Side or None
-        Which gear, if it could be read.
-    correct : tuple of str
-        The columns to correct, in the order of the table.
-    warnings : tuple of str
-        What else the reader noticed about this row, suggestions included.
-    source : RowSource
-        Where it came from.
+    correct: the columns to correct, in the order of the table.
+    warnings: what else the reader noticed about this row, suggestions included.
     """
 
     record_id: str | None

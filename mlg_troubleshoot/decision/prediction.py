@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Protocol
+from dataclasses import dataclass, fields, replace
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.second_order import responses
+from mlg_troubleshoot.decision.wear_levels import normal_cdf
 from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
-from mlg_troubleshoot.gear.directions import WorstCase, chance_beyond
+from mlg_troubleshoot.gear.directions import WorstCase
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 
@@ -20,6 +21,8 @@ Array = NDArray[np.float64]
 
 DIRECTION_SETS = 4096
 DEFAULT_PLUNGER_U_IN = 0.0005
+# The model's standard uncertainty until a diagnosis gives it: the larger of a length and a share of the prediction.
+PROVISIONAL_U_IN, PROVISIONAL_U_SHARE = 0.003, 0.10
 _STEP_IN = 1e-5
 
 
@@ -44,84 +47,59 @@ class Extension(Protocol):
         ...
 
 
+def model_uncertainty(displacement_in: Array, residual_u_in: float | None) -> Array:
+    """Standard uncertainty of the model itself.
+
+    Provisional without a diagnosis: one published failure gives none. [in]
+    """
+    if residual_u_in is not None:
+        return np.full(np.shape(displacement_in), residual_u_in)
+    return np.maximum(PROVISIONAL_U_IN, PROVISIONAL_U_SHARE * np.abs(displacement_in))
+
+
 @dataclass(frozen=True, slots=True)
 class Prediction:
     """Predictions for n gears with one assumption about their unmeasured joints.
 
-    Parameters
-    ----------
-    worst : WorstCase
-        Worst displacements and directions of the reference linkage. [in, rad]
-    spread_low_in, spread_high_in : ndarray, shape (n,)
-        Least and largest prediction over the ensemble. [in]
-    u_clearances_in, u_geometry_in, u_model_in : ndarray, shape (n,)
-        Standard uncertainties. [in]
+    worst: worst displacements and directions of the reference linkage. [in, rad]
+    spread_low_in, spread_high_in: least and largest prediction over the ensemble. [in]
+    u_readings_in: what the uncertainty of each joint's reading adds, (n, joints); 0 where it was not measured. [in]
+    bound_in: worst case over all directions, where `worst` may be the displacement as loaded. [in]
     """
 
     worst: WorstCase
     spread_low_in: Array
     spread_high_in: Array
-    u_clearances_in: Array
+    u_readings_in: Array
     u_geometry_in: Array
     u_model_in: Array
+    bound_in: Array
 
     @property
     def displacement_in(self) -> Array:
         """The larger of the two senses in magnitude; NaN where the linkage does not close. [in]"""
         return self.worst.magnitude_in
 
+    @property
+    def u_clearances_in(self) -> Array:
+        """What the uncertainty of all readings adds. [in]"""
+        total: Array = np.sqrt(np.sum(self.u_readings_in**2, axis=1))
+        return total
+
     def standard_uncertainty(self, margin_u_in: Array) -> Array:
-        """Combined standard uncertainty of the prediction against the margin.
-
-        Parameters
-        ----------
-        margin_u_in : ndarray, shape (n,)
-            Standard uncertainty of the margin. [in]
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Root of the sum of squares. [in]
-        """
+        """Combined standard uncertainty of the prediction against the margin. [in]"""
         parts = (self.u_clearances_in, self.u_geometry_in, self.u_model_in, margin_u_in)
         return np.sqrt(sum(part**2 for part in parts))
 
     def probability_within(self, margin_in: Array, margin_u_in: Array) -> Array:
-        """Probability that the worst-case bound is within the margin.
-
-        Parameters
-        ----------
-        margin_in, margin_u_in : ndarray, shape (n,)
-            Margin and its standard uncertainty. [in]
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Normal probability of D ≤ M; 0 where the linkage does not close. [1]
-        """
+        """Probability that the worst-case bound is within the margin. [1]"""
         u = self.standard_uncertainty(margin_u_in)
         z = (margin_in - self.displacement_in) / u
-        p = np.array([0.5 * math.erfc(-value / math.sqrt(2.0)) for value in z])
-        return np.where(np.isfinite(z), p, 0.0)
+        return np.where(np.isfinite(z), normal_cdf(np.nan_to_num(z)), 0.0)
 
 
 def clearances(inspections: Sequence[Inspection], gear: Gear, unmeasured: Array) -> Array:
-    """Clearance matrix of a batch.
-
-    Parameters
-    ----------
-    inspections : sequence of Inspection
-        The inspections.
-    gear : Gear
-        The gear.
-    unmeasured : ndarray, shape (n_joints,)
-        What stands in for a joint that was not measured; NaN to keep it missing. [in]
-
-    Returns
-    -------
-    ndarray, shape (n, n_joints)
-        Radial clearances. [in]
-    """
+    """Clearance matrix of a batch. [in]"""
     filled = np.tile(np.asarray(unmeasured, float), (len(inspections), 1))
     place = {number: j for j, number in enumerate(gear.joint_numbers)}
     for row, inspection in enumerate(inspections):
@@ -138,41 +116,39 @@ def predict(
     gauge_u_in: Array,
     extension: Extension | None = None,
 ) -> Prediction:
-    """Predict the worst displacement of each gear with its uncertainty.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    inspections : sequence of Inspection
-        The inspections, for an extension's columns.
-    clearance_in : ndarray, shape (n, n_joints)
-        Radial clearances, unmeasured joints filled. [in]
-    measured : ndarray of bool, shape (n, n_joints)
-        Which of them were measured: only these carry uncertainty.
-    gauge_u_in : ndarray, shape (n,)
-        Standard uncertainty of one radial clearance. [in]
-    extension : Extension, optional
-        An extension of the model.
-
-    Returns
-    -------
-    Prediction
-        Displacements and standard uncertainties. [in]
-    """
+    """Predict the worst displacement of each gear with its uncertainty. [in]"""
     adjustment = Adjustment(clearance_in) if extension is None else extension.adjust(inspections, clearance_in)
     worst = adjusted_worst_case(gear.model, adjustment)
-    members = [worst.magnitude_in]
-    members += [adjusted_worst_case(m, adjustment).magnitude_in for m in gear.ensemble_models[1:]]
-    spread = np.array(members)
-    u_geometry = spread.std(axis=0, ddof=1) if len(spread) > 1 else np.zeros(len(clearance_in))
+    spread = np.array([worst.magnitude_in, *_members(gear, adjustment, extension)])
+    # Added along contiguous rows: a gear alone and in a batch must give the same bits.
+    u_geometry = np.ascontiguousarray(spread.T).std(axis=1, ddof=1) if len(spread) > 1 else np.zeros(len(clearance_in))
     slopes = _slopes(gear.model, adjustment, worst)
-    u_clearances = gauge_u_in * np.sqrt(np.sum((slopes * measured) ** 2, axis=1))
-    if extension is None:
-        u_model = np.maximum(0.003, 0.10 * worst.magnitude_in)
-    else:
-        u_model = np.full(len(clearance_in), extension.residual_u_in)
-    return Prediction(worst, spread.min(axis=0), spread.max(axis=0), u_clearances, u_geometry, u_model)
+    each_u = gauge_u_in if gauge_u_in.ndim == 2 else gauge_u_in[:, None]
+    u_readings = np.abs(slopes * measured * each_u)
+    u_model = model_uncertainty(worst.magnitude_in, None if extension is None else extension.residual_u_in)
+    bound = worst.magnitude_in
+    if adjustment.direction_factors is not None:
+        bound = adjusted_worst_case(gear.model, replace(adjustment, direction_factors=None)).magnitude_in
+    return Prediction(worst, spread.min(axis=0), spread.max(axis=0), u_readings, u_geometry, u_model, bound)
+
+
+def _members(gear: Gear, adjustment: Adjustment, extension: Extension | None) -> list[Array]:
+    """Worst case of the other linkages of the ensemble. [in]
+
+    Where clearances are small the expansion gives the directions at once; the displacement in them is exact.
+    """
+    clearance, others = adjustment.clearance_in, gear.ensemble_models[1:]
+    small = np.all(clearance <= gear.confirm_above.value, axis=1) & (extension is None)
+    members, rows = [], np.flatnonzero(~small)
+    for model, response in zip(others, responses(gear)[1:], strict=True):
+        member = np.empty(len(clearance))
+        part = clearance[small]
+        sides = [sense * model.displacement(list(response.worst_links(part, sense).T)) for sense in (1.0, -1.0)]
+        member[small] = np.maximum(*sides)
+        if len(rows):
+            member[rows] = adjusted_worst_case(model, adjustment.take(rows)).magnitude_in
+        members.append(member)
+    return members
 
 
 def _slopes(model: LinkageModel, adjustment: Adjustment, worst: WorstCase) -> Array:
@@ -185,7 +161,8 @@ def _slopes(model: LinkageModel, adjustment: Adjustment, worst: WorstCase) -> Ar
         for step in (_STEP_IN, -_STEP_IN):
             moved = adjustment.clearance_in.copy()
             moved[:, j] += step
-            sides.append(model.displacement(links_from(moved, directions), changed))
+            acting = replace(adjustment, clearance_in=moved).acting_in
+            sides.append(model.displacement(links_from(acting, directions), changed))
         slopes[:, j] = factor * (sides[0] - sides[1]) / (2 * _STEP_IN)
     return slopes
 
@@ -194,94 +171,26 @@ def _slopes(model: LinkageModel, adjustment: Adjustment, worst: WorstCase) -> Ar
 class BatchPrediction:
     """Everything the rule needs for n gears.
 
-    Parameters
-    ----------
-    lower, upper : Prediction
-        With unmeasured joints at 0 and at their limit. [in]
-    clearance_in : ndarray, shape (n, n_joints)
-        Measured radial clearances, NaN where not measured. [in]
-    margin_in, margin_u_in : ndarray, shape (n,)
-        Margin and its standard uncertainty. [in]
-    chance_random : ndarray, shape (n,)
-        Chance of exceeding the margin with uniformly random directions. [1]
+    lower, upper: with unmeasured joints at 0 and at their limit. [in]
+    chance_random: chance of exceeding the margin with uniformly random directions. [1]
     """
 
     lower: Prediction
     upper: Prediction
-    clearance_in: Array
-    margin_in: Array
-    margin_u_in: Array
     chance_random: Array
 
 
-def predict_batch(gear: Gear, inspections: Sequence[Inspection], extension: Extension | None = None) -> BatchPrediction:
-    """Predict a batch with unmeasured joints at 0 and at their limit.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    inspections : sequence of Inspection
-        The inspections; not empty.
-    extension : Extension, optional
-        An extension of the model.
-
-    Returns
-    -------
-    BatchPrediction
-        Both predictions and the chance with random directions. [in, 1]
-    """
-    found = clearances(inspections, gear, np.full(len(gear.joints), np.nan))
-    measured = np.isfinite(found)
-    gauge_u = np.array([i.gauge_u_in for i in inspections])
-    margin = np.array([gear.margin.value if i.margin_in is None else i.margin_in for i in inspections])
-    margin_u = np.array([i.margin_u_in for i in inspections])
-    at_zero = np.where(measured, found, 0.0)
-    lower = predict(gear, inspections, at_zero, measured, gauge_u, extension)
-    open_rows = np.flatnonzero(~measured.all(axis=1))
-    upper = lower
-    if len(open_rows):
-        some = predict(
-            gear,
-            [inspections[int(i)] for i in open_rows],
-            np.where(measured, found, gear.limits_in)[open_rows],
-            measured[open_rows],
-            gauge_u[open_rows],
-            extension,
-        )
-        upper = _with_rows(lower, some, open_rows)
-    adjustment = Adjustment(at_zero) if extension is None else extension.adjust(inspections, at_zero)
-    chance = chance_beyond(
-        gear.model,
-        adjustment.clearance_in,
-        margin,
-        DIRECTION_SETS,
-        adjustment.numbers(gear.model),
-        adjustment.offset_in,
-        adjustment.rate_factor,
-    )
-    return BatchPrediction(lower, upper, found, margin, margin_u, chance)
-
-
-def _with_rows(whole: Prediction, part: Prediction, rows: NDArray[np.intp]) -> Prediction:
+def with_rows(whole: Prediction, part: Prediction, rows: NDArray[np.intp]) -> Prediction:
     def put(a: Array, b: Array) -> Array:
         merged = a.copy()
         merged[rows] = b
         return merged
 
-    w, v = whole.worst, part.worst
-    worst = WorstCase(
-        put(w.over_in, v.over_in),
-        put(w.under_in, v.under_in),
-        put(w.over_directions, v.over_directions),
-        put(w.under_directions, v.under_directions),
-    )
-    return replace(
-        whole,
-        worst=worst,
-        spread_low_in=put(whole.spread_low_in, part.spread_low_in),
-        spread_high_in=put(whole.spread_high_in, part.spread_high_in),
-        u_clearances_in=put(whole.u_clearances_in, part.u_clearances_in),
-        u_geometry_in=put(whole.u_geometry_in, part.u_geometry_in),
-        u_model_in=put(whole.u_model_in, part.u_model_in),
-    )
+    def merged(one: Any, other: Any) -> Any:
+        return replace(one, **{f.name: join(getattr(one, f.name), getattr(other, f.name)) for f in fields(one)})
+
+    def join(a: Any, b: Any) -> Any:
+        return put(a, b) if isinstance(a, np.ndarray) else merged(a, b)
+
+    found: Prediction = merged(whole, part)
+    return found

@@ -1,101 +1,234 @@
-"""Which joints to restore: every subset is tried."""
+"""Which joints to restore: all subsets of all gears as one array, the chosen ones checked by the exact worst case."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.decision.assessment import RepairSet
-from mlg_troubleshoot.decision.inspection import Inspection
-from mlg_troubleshoot.decision.prediction import Extension, clearances, predict
-from mlg_troubleshoot.decision.rule import CONFORMANCE
+from mlg_troubleshoot.decision.case import Cases
+from mlg_troubleshoot.decision.plan import minutes_to_measure, minutes_to_restore
+from mlg_troubleshoot.decision.prediction import Prediction, model_uncertainty, predict
+from mlg_troubleshoot.decision.second_order import Response, responses
+from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.gear.gear import Gear
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 _SHOWN = 5
+_ROWS = 256
+# Standard score of the conformance probability. [1]
+SCORE = NormalDist().inv_cdf(CONFORMANCE)
+# Within this of the conformance limit a subset counts as about sufficient: how far the expansion may be off. [in]
+_ABOUT_IN = 5e-4
+# A reading this far above a new part is one of a part to restore; below, restoring gains nothing. [in]
+_AS_NEW_IN = 1e-4
 
 
-def access_minutes(gear: Gear, joints: Iterable[int]) -> float:
-    """Time to reach a set of joints; opening an area counts once.
+@dataclass(frozen=True, slots=True, eq=False)
+class Subsets:
+    """All subsets of a gear's joints, the quickest to restore first, then the smallest.
 
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    joints : iterable of int
-        Numbers of the joints.
-
-    Returns
-    -------
-    float
-        Time. [min]
+    weights: the same as 0 and 1, for sums. [1]
+    alike: the same number for subsets of equally many joints in equal minutes.
+    pairs: 1 where both joints of a pair are members, the pairs in the order of `upper_triangle`. [1]
     """
-    specs = [gear.joint(number) for number in joints]
-    opened = {spec.area for spec in specs}
-    areas = sum(area.access.value for area in gear.areas if area.name in opened)
-    return areas + sum(spec.access.value for spec in specs)
+
+    members: Mask
+    weights: Array
+    minutes: Array
+    alike: NDArray[np.intp]
+    pairs: Array
+
+    @property
+    def upper_triangle(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Pairs of joints, each joint with itself included."""
+        return np.triu_indices(self.members.shape[1])
 
 
-def repair_sets(
-    gear: Gear, inspection: Inspection, margin_in: float, extension: Extension | None = None
-) -> tuple[RepairSet, ...]:
+@lru_cache(maxsize=4)
+def subsets_of(gear: Gear) -> Subsets:
+    """Enumerate the subsets of a gear's joints in the order of their minutes."""
+    n = len(gear.joints)
+    members = ((np.arange(2**n)[:, None] >> np.arange(n)) & 1).astype(bool)
+    numbers = np.array(gear.joint_numbers)
+    minutes = np.array([minutes_to_restore(gear, [int(k) for k in numbers[row]]) for row in members])
+    order = np.lexsort((members.sum(axis=1), np.round(minutes, 6)))
+    members, minutes = members[order], minutes[order]
+    first, second = np.triu_indices(n)
+    keys = np.column_stack([np.round(minutes, 6), members.sum(axis=1)])
+    alike = np.cumsum(np.r_[0, np.any(np.diff(keys, axis=0) != 0.0, axis=1)])
+    return Subsets(
+        members, members.astype(float), minutes, alike, (members[:, first] & members[:, second]).astype(float)
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Search:
+    """How far each subset, restored, stays inside the conformance limit, for some gears.
+
+    slack_in: margin less worst case less its guard band, unmeasured joints at their limit; −inf for a subset that
+        restores what is new or unmeasured, or leaves a joint over its limit. [in]
+    """
+
+    table: Subsets
+    slack_in: Array
+
+    def quickest(self, relief_in: Array | float = 0.0) -> NDArray[np.intp]:
+        """Place of the quickest sufficient subset if the worst case is less by `relief_in`; −1 if none is."""
+        enough = self.slack_in >= -np.broadcast_to(relief_in, len(self.slack_in))[:, None]
+        return _surest(self.table, self.slack_in, enough)
+
+
+def _surest(table: Subsets, slack_in: Array, among: Mask) -> NDArray[np.intp]:
+    """The quickest of some subsets; of equally many joints in equal minutes the one with most slack; −1 if none."""
+    first, rows = np.argmax(among, axis=1), np.arange(len(among))
+    alike = among & (table.alike[first][:, None] == table.alike)
+    # Rounded: both ends of one link leave the same, and rounding noise must not choose between them.
+    found = np.argmax(np.where(alike, np.round(slack_in, 7), -np.inf), axis=1)
+    return np.where(among[rows, first], found, -1)
+
+
+def removable(cases: Cases) -> Mask:
+    """Joints that can be restored with a gain: measured, and worn beyond a new part."""
+    new = np.array([joint.new_part.value for joint in cases.gear.joints])
+    return cases.measured & (cases.filled(0.0) > new + _AS_NEW_IN)
+
+
+def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
+    """Judge all subsets of all gears by the second-order expansion, anchored at the exact worst case `worst_in`."""
+    table, linkages = subsets_of(cases.gear), responses(cases.gear)
+    new = np.array([joint.new_part.value for joint in cases.gear.joints])
+    worn, now = removable(cases), cases.filled(cases.gear.limits_in)
+    less = np.where(worn, now - new, 0.0)
+    over = cases.over_limit
+    # A subset may hold no joint that gains nothing and must hold every joint over its limit.
+    barred = (~worn).astype(float) @ table.weights.T + over.astype(float) @ (1.0 - table.weights.T) > 0.0
+    # Slopes fall with the clearances that are restored, and with them what the errors of the readings do.
+    readings = (cases.gauge_u_in * cases.measured) ** 2
+    slack = np.empty(barred.shape)
+    for start in range(0, len(cases), _ROWS):
+        part = slice(start, start + _ROWS)
+        some, gone = now[part], less[part]
+        # What bends the ensemble is found with everything restored, and goes with the square of the fall.
+        falls = [(gone * linkage.slopes(some)) @ table.weights.T for linkage in linkages]
+        after = worst_in[part, None] - falls[0] + _bend(linkages[0], table, some, gone)
+        square = (falls[0] / np.maximum(falls[0][:, -1:], 1e-12)) ** 2
+        after += _third_order(cases, some - gone, after[:, -1])[:, None] * square
+        members = []
+        for linkage, fall in zip(linkages, falls, strict=True):
+            whole, least = linkage.magnitude(some), linkage.magnitude(some - gone)
+            members.append(whole[:, None] - fall + (least - whole + fall[:, -1])[:, None] * square)
+        geometry = _variance(members)
+        model = model_uncertainty(after, cases.residual_u_in)
+        gauges = u_clearances_in[part, None] ** 2 - _calmer(linkages[0], table, some, gone, readings[part])
+        u = np.sqrt(np.maximum(gauges, 0.0) + cases.margin_u_in[part, None] ** 2 + geometry + model**2)
+        slack[part] = cases.margin_in[part, None] - after - SCORE * u
+    return Search(table, np.where(barred | ~np.isfinite(slack), -np.inf, slack))
+
+
+def _bend(linkage: Response, table: Subsets, clearance_in: Array, less_in: Array) -> Array:
+    """What the curvature adds to the worst case with each subset restored. [in]"""
+    first, second = table.upper_triangle
+    curved = linkage.worst_curvature[first, second] * np.where(first == second, 0.5, 1.0)
+    bend: Array = linkage.sense(clearance_in)[:, None] * (
+        (less_in[:, first] * less_in[:, second] * curved) @ table.pairs.T
+    )
+    return bend
+
+
+def _third_order(cases: Cases, least_in: Array, expanded_in: Array) -> Array:
+    """What the expansion misses with everything restored. [in]"""
+    if cases.extension is not None:
+        return np.zeros(len(least_in))
+    reference = responses(cases.gear)[0]
+    sense = reference.sense(least_in)
+    links = reference.worst_links(least_in, sense)
+    missed = sense * cases.gear.model.displacement(list(links.T)) - expanded_in
+    return np.where(np.isfinite(missed), missed, 0.0)
+
+
+def _calmer(linkage: Response, table: Subsets, clearance_in: Array, less_in: Array, variance_in2: Array) -> Array:
+    """What restoring each subset takes from the variance that the readings cause, to first order. [in²]"""
+    turned = (variance_in2 * linkage.slopes(clearance_in)) @ linkage.worst_curvature
+    taken: Array = 2.0 * linkage.sense(clearance_in)[:, None] * ((less_in * turned) @ table.weights.T)
+    return taken
+
+
+def _variance(members: Sequence[Array]) -> Array:
+    """Variance over the ensemble, without a copy of all of it. [in²]"""
+    n, total, square = len(members), np.zeros_like(members[0]), np.zeros_like(members[0])
+    for member in members:
+        off = member - members[0]
+        total += off
+        square += off * off
+    variance: Array = np.maximum(square - total * total / n, 0.0) / max(n - 1, 1)
+    return variance
+
+
+def calibrated(cases: Cases, found: Search) -> Search:
+    """The search, shifted so that it is exact for the quickest subset of each gear that is about sufficient."""
+    near = found.quickest(_ABOUT_IN)
+    rows = np.flatnonzero(near > 0)
+    if not len(rows):
+        return found
+    prediction, _ = _restored(cases, rows, near[rows])
+    u = prediction.standard_uncertainty(cases.margin_u_in[rows])
+    exact = cases.margin_in[rows] - prediction.displacement_in - SCORE * u
+    shift = np.zeros(len(cases))
+    shift[rows] = np.where(np.isfinite(exact), exact - found.slack_in[rows, near[rows]], 0.0)
+    return Search(found.table, found.slack_in + shift[:, None])
+
+
+def _restored(cases: Cases, rows: NDArray[np.intp], places: NDArray[np.intp]) -> tuple[Prediction, Array]:
+    """The exact prediction of some gears, each with one subset restored, and its probability."""
+    new = np.array([joint.new_part.value for joint in cases.gear.joints])
+    some = cases.take(rows)
+    now = some.filled(cases.gear.limits_in)
+    after = np.where(subsets_of(cases.gear).members[places], np.minimum(now, new), now)
+    found = predict(cases.gear, some.inspections, after, some.measured, some.gauge_u_in, some.extension)
+    return found, found.probability_within(some.margin_in, some.margin_u_in)
+
+
+def repair_sets(cases: Cases, found: Search, wanted: Mask) -> list[tuple[RepairSet, ...]]:
     """Find the sets of joints which, restored, bring the worst case within the margin.
 
-    All subsets of the measured joints are tried, joints over their limit being in every one. A restored joint
-    has the gear file's new-part clearance. Unmeasured joints stay at 0, as in the prediction, so a set is no
-    better than that assumption. Only sets that contain no smaller sufficient set are returned.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    inspection : Inspection
-        What was measured.
-    margin_in : float
-        Allowed displacement. [in]
-    extension : Extension, optional
-        An extension of the model.
-
-    Returns
-    -------
-    tuple of RepairSet
-        Sufficient sets, least access time first, then fewest joints; empty if no set is sufficient, or if
-        nothing need be restored.
+    Unmeasured joints count with their limit: what holds with them at 0 sends every fifth gear back. Only sets that
+    contain no smaller sufficient set are returned, the quickest first, each checked by the exact worst case.
     """
-    found = clearances([inspection], gear, np.full(len(gear.joints), np.nan))[0]
-    measured = np.flatnonzero(np.isfinite(found))
-    mandatory = np.array([gear.joints[j].is_over_limit(float(found[j])) for j in measured], bool)
-    new = np.array([joint.new_part.value for joint in gear.joints])
-    codes = np.arange(2 ** len(measured))
-    restored = ((codes[:, None] >> np.arange(len(measured))) & 1).astype(bool)
-    restored = restored[np.all(restored[:, mandatory], axis=1)]
-    after = np.tile(np.nan_to_num(found), (len(restored), 1))
-    after[:, measured] = np.where(restored, np.minimum(found[measured], new[measured]), found[measured])
-    n = len(after)
-    prediction = predict(
-        gear,
-        [inspection] * n,
-        after,
-        np.tile(np.isfinite(found), (n, 1)),
-        np.full(n, inspection.gauge_u_in),
-        extension,
-    )
-    p = prediction.probability_within(np.full(n, margin_in), np.full(n, inspection.margin_u_in))
-    numbers = np.array(gear.joint_numbers)[measured]
-    if np.any(p[~restored.any(axis=1)] >= CONFORMANCE):
-        return ()
-    enough = [
-        RepairSet(joints, float(prediction.displacement_in[row]), float(p[row]), access_minutes(gear, joints))
-        for row in np.flatnonzero(p >= CONFORMANCE)
-        for joints in [tuple(int(number) for number in numbers[restored[row]])]
-    ]
-    enough.sort(key=lambda s: (len(s.joints), s.joints))
-    least: list[RepairSet] = []
-    for candidate in enough:
-        if not any(set(kept.joints) <= set(candidate.joints) for kept in least):
-            least.append(candidate)
-    least.sort(key=lambda s: (s.access_minutes, len(s.joints), -s.probability_within_margin))
-    return tuple(least[:_SHOWN])
+    table = subsets_of(cases.gear)
+    chosen = _least(table, found.slack_in[wanted])
+    rows, sets = np.repeat(np.flatnonzero(wanted), [len(c) for c in chosen]), np.concatenate([*chosen, [0]])[:-1]
+    result: list[list[RepairSet]] = [[] for _ in range(len(cases))]
+    if not len(rows):
+        return [tuple(sets) for sets in result]
+    sets = sets.astype(np.intp)
+    prediction, p = _restored(cases, rows, sets)
+    moved, numbers = prediction.displacement_in, np.array(cases.gear.joint_numbers)
+    for k in np.flatnonzero(p >= CONFORMANCE):
+        joints = tuple(numbers[table.members[sets[k]]].tolist())
+        minutes = float(table.minutes[sets[k]])
+        result[rows[k]].append(
+            RepairSet(joints, float(moved[k]), float(p[k]), minutes_to_measure(cases.gear, joints), minutes)
+        )
+    return [tuple(sets) for sets in result]
+
+
+def _least(table: Subsets, slack_in: Array) -> Sequence[NDArray[np.intp]]:
+    """Places of the quickest sufficient subsets of each gear, none within another; none where none is needed."""
+    open_sets = slack_in >= 0.0
+    members = table.weights
+    chosen: list[list[int]] = [[] for _ in range(len(slack_in))]
+    for _ in range(_SHOWN):
+        best = _surest(table, slack_in, open_sets)
+        for row in np.flatnonzero(best > 0):
+            chosen[row].append(int(best[row]))
+        # Whatever holds the set just chosen is longer: it holds as many of its joints as it has.
+        open_sets &= members[best] @ members.T < members[best].sum(axis=1, keepdims=True)
+    return [np.array(places, dtype=np.intp) for places in chosen]

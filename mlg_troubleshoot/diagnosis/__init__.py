@@ -3,6 +3,14 @@
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate, Cause, Scene, load_causes
 from mlg_troubleshoot.diagnosis.diagnose import Diagnosis, NamedCause, diagnose
 from mlg_troubleshoot.diagnosis.extension import ModelExtension, Term, load_extension, save_extension
+from mlg_troubleshoot.diagnosis.simulation import (
+    HeldOutGain,
+    SimulationDiagnosis,
+    Suspect,
+    SuspectFound,
+    Verdict,
+    diagnose_simulation,
+)
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
 
 __all__ = [
@@ -11,11 +19,17 @@ __all__ = [
     "Cause",
     "Diagnosis",
     "DiagnosisTable",
+    "HeldOutGain",
     "ModelExtension",
     "NamedCause",
     "Scene",
+    "SimulationDiagnosis",
+    "Suspect",
+    "SuspectFound",
     "Term",
+    "Verdict",
     "diagnose",
+    "diagnose_simulation",
     "load_causes",
     "load_extension",
     "save_extension",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,9 @@ from mlg_troubleshoot.diagnosis.causes.base import Scene, levels
 
 Array = NDArray[np.float64]
 
+# What the rows of one aircraft, gauge or technician may move with alone.
+WITHIN = ("hydraulic_pressure_psi", "temperature_c", "gear_landings", "predicted")
+_LEAST_OF_TAIL = 6
 _PERIODS_DAYS = (120.0, 150.0, 185.0, 225.0, 275.0, 365.25)
 
 
@@ -18,33 +22,18 @@ _PERIODS_DAYS = (120.0, 150.0, 185.0, 225.0, 275.0, 365.25)
 class Bank:
     """Shapes and the variables that each moves with.
 
-    Parameters
-    ----------
-    columns : ndarray, shape (n, k)
-        Shapes, each of unit root mean square. [1]
-    variables : tuple of tuple of str
-        Names of the columns of the table behind each shape.
+    columns, shape (n, k): shapes, each of unit root mean square. [1]
+    variables: names of the columns of the table behind each shape.
+    smooth, shape (n,): the quantities, each of mean 0 and standard deviation 1. [1]
     """
 
     columns: Array
     variables: tuple[tuple[str, ...], ...]
+    smooth: Mapping[str, Array]
 
 
 def build_bank(scene: Scene, catalogue: Array) -> Bank:
-    """Build the shapes that the table allows and that no candidate of the catalogue already has.
-
-    Parameters
-    ----------
-    scene : Scene
-        Model and rows.
-    catalogue : ndarray, shape (n, n_candidates)
-        Effects of the candidates. [in / unit]
-
-    Returns
-    -------
-    Bank
-        Low-order polynomials of each quantity, seasons, factors and pairwise products.
-    """
+    """Build the shapes that the table allows and that no candidate of the catalogue already has."""
     smooth = _quantities(scene)
     classes = {
         (name, value): (texts == value).astype(float)
@@ -73,7 +62,11 @@ def build_bank(scene: Scene, catalogue: Array) -> Bank:
     for i, key in enumerate(keys):
         shapes += [(classes[key] * main[b], (key[0], b)) for b in names]
         shapes += [(classes[key] * classes[other], (key[0], other[0])) for other in keys[i + 1 :] if other[0] != key[0]]
-    return _distinct(shapes, catalogue)
+    for tail in levels(scene.table.tails, _LEAST_OF_TAIL):
+        one = scene.table.tails == tail
+        alone = [(one * (smooth[n] - np.mean(smooth[n][one])), ("tail_no", n)) for n in WITHIN if n in smooth]
+        shapes += [(shape, v) for shape, v in alone if np.any(shape)]
+    return _distinct(shapes, catalogue, smooth)
 
 
 def _quantities(scene: Scene) -> dict[str, Array]:
@@ -95,7 +88,7 @@ def _quantities(scene: Scene) -> dict[str, Array]:
     return smooth
 
 
-def _distinct(shapes: list[tuple[Array, tuple[str, ...]]], catalogue: Array) -> Bank:
+def _distinct(shapes: list[tuple[Array, tuple[str, ...]]], catalogue: Array, smooth: Mapping[str, Array]) -> Bank:
     """Drop shapes that are constant, or that a candidate of the catalogue has already."""
     kept = [(s / np.sqrt(np.mean(s**2)), v) for s, v in shapes if np.std(s) > 1e-9]
     n = len(catalogue)
@@ -106,4 +99,4 @@ def _distinct(shapes: list[tuple[Array, tuple[str, ...]]], catalogue: Array) -> 
     own = (columns - columns.mean(axis=0)) / np.std(columns, axis=0)
     alike = np.max(np.abs(own.T @ centred) / n, axis=1) if centred.shape[1] else np.zeros(len(kept))
     use = alike < 0.97
-    return Bank(columns[:, use], tuple(v for (_, v), u in zip(kept, use, strict=True) if u))
+    return Bank(columns[:, use], tuple(v for (_, v), u in zip(kept, use, strict=True) if u), smooth)

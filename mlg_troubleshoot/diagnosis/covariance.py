@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,22 +15,14 @@ Array = NDArray[np.float64]
 class NoiseModel:
     """Covariance of the rows: diagonal scatter, common scatter of each tail, bias and slope.
 
-    Parameters
-    ----------
-    relative : ndarray, shape (n,)
-        Standard deviation of each row in units of the common one. [1]
-    tails : ndarray of int, shape (n,)
-        Number of the tail of each row.
-    gears : ndarray of int, shape (n,)
-        Number of the single gear of each row.
-    loadings : ndarray, shape (n, k)
-        Bias, slope and small trends, each at one standard deviation in units of the common one. [1]
-    floor_in : float
-        Scatter that every row has at least. [in]
-    gear_ratio : float
-        Scatter between the gears of one tail over the scatter of a row. [1]
-    tail_ratios : tuple of float
-        Ratios of the scatter between tails to the scatter of a row that are tried. [1]
+    relative, shape (n,): standard deviation of each row in units of the common one. [1]
+    tails, shape (n,): number of the tail of each row.
+    gears, shape (n,): number of the single gear of each row.
+    loadings, shape (n, k): bias, slope and small trends, each at one standard deviation in units of the common one. [1]
+    floor_in: scatter that every row has at least. [in]
+    gear_ratio: scatter between the gears of one tail over the scatter of a row. [1]
+    tail_ratios: ratios of the scatter between tails to the scatter of a row that are tried. [1]
+    scale_in: the common standard deviation as it was estimated. [in]
     """
 
     relative: Array
@@ -40,45 +32,31 @@ class NoiseModel:
     floor_in: float
     gear_ratio: float
     tail_ratios: tuple[float, ...]
+    scale_in: float
     _roots: dict[float, tuple[Array, float]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def floored(self, square: Array) -> Array:
-        """Add what no row can be better than to a residual sum of squares.
-
-        Parameters
-        ----------
-        square : ndarray
-            Residual sums of squares. [in²]
-
-        Returns
-        -------
-        ndarray
-            With the least scatter of every row. [in²]
-        """
+        """Add what no row can be better than to a residual sum of squares."""
         return np.maximum(square, 0.0) + len(self.relative) * self.floor_in**2
 
     def take(self, rows: NDArray[np.bool_]) -> NoiseModel:
-        """Return the noise of some of the rows.
-
-        Parameters
-        ----------
-        rows : ndarray of bool, shape (n,)
-            The rows.
-
-        Returns
-        -------
-        NoiseModel
-            Their noise.
-        """
-        return NoiseModel(
-            self.relative[rows],
-            self.tails[rows],
-            self.gears[rows],
-            self.loadings[rows],
-            self.floor_in,
-            self.gear_ratio,
-            self.tail_ratios,
+        """Return the noise of some of the rows."""
+        return replace(
+            self,
+            relative=self.relative[rows],
+            tails=self.tails[rows],
+            gears=self.gears[rows],
+            loadings=self.loadings[rows],
         )
+
+    def beside(self, effects_in: Array) -> NoiseModel:
+        """Add effects of unknown size, each at one standard deviation."""
+        return replace(self, loadings=np.hstack([self.loadings, effects_in / self.scale_in]))
+
+    def share_of(self, effects_in: Array, data: Array) -> Array:
+        """What effects of unknown size that are part of this covariance most likely explain of data (BLUP). [in]"""
+        product, _log = self.precision_times(data[:, None], self.tail_ratios[-1])
+        return np.asarray(effects_in @ (effects_in.T @ product[:, 0]) / self.scale_in**2)
 
     def factors(self, tail_ratio: float) -> Array:
         """Low-rank part of the covariance, shape (n, k). [1]"""
@@ -89,75 +67,42 @@ class NoiseModel:
         return np.hstack([tail_ratio * indicator, each, self.loadings])
 
     def precision_times(self, columns: Array, tail_ratio: float) -> tuple[Array, float]:
-        """Multiply columns by the inverse covariance (Woodbury).
-
-        Parameters
-        ----------
-        columns : ndarray, shape (n, k)
-            Columns.
-        tail_ratio : float
-            Scatter between tails over scatter of a row. [1]
-
-        Returns
-        -------
-        product : ndarray, shape (n, k)
-            V⁻¹ times the columns, V in units of the common variance.
-        log_determinant : float
-            Logarithm of the determinant of V. [1]
-        """
+        """Multiply columns by the inverse covariance (Woodbury)."""
         root, log_determinant = self._root(tail_ratio)
         return columns / self.relative[:, None] ** 2 - root.T @ (root @ columns), log_determinant
 
     def square(self, data: Array, tail_ratio: float) -> Array:
-        """Squared length of data sets under the inverse covariance.
-
-        Parameters
-        ----------
-        data : ndarray, shape (n, n_sets)
-            Data sets. [in]
-        tail_ratio : float
-            Scatter between tails over scatter of a row. [1]
-
-        Returns
-        -------
-        ndarray, shape (n_sets,)
-            Squared lengths. [in²]
-        """
+        """Squared length of data sets under the inverse covariance."""
         root, _log = self._root(tail_ratio)
         own, common = data / self.relative[:, None], root @ data
         return np.asarray(np.einsum("ij,ij->j", own, own) - np.einsum("ij,ij->j", common, common))
 
     def _root(self, tail_ratio: float) -> tuple[Array, float]:
         """R with V⁻¹ = diag(1 / relative²) − Rᵀ R, and the logarithm of V's determinant."""
-        if tail_ratio not in self._roots:
-            low = self.factors(tail_ratio)
+        if tail_ratio not in self._roots and tail_ratio > 0.0:
+            root, log_determinant = self.tail_root(tail_ratio)
+            self._roots[tail_ratio] = np.vstack([self._root(0.0)[0], root]), log_determinant
+        elif tail_ratio not in self._roots:
+            low = self.factors(0.0)
             scaled = low / self.relative[:, None] ** 2
             lower = np.linalg.cholesky(np.eye(low.shape[1]) + low.T @ scaled)
             log_determinant = 2.0 * float(np.sum(np.log(np.diag(lower))) + np.sum(np.log(self.relative)))
             self._roots[tail_ratio] = solve_triangular(lower, scaled.T, lower=True), log_determinant
         return self._roots[tail_ratio]
 
+    def tail_root(self, tail_ratio: float) -> tuple[Array, float]:
+        """E with V⁻¹ = V₀⁻¹ − Eᵀ E, V₀ without scatter between tails, and the logarithm of V's determinant."""
+        log_determinant = self._root(0.0)[1]
+        if tail_ratio == 0.0:
+            return np.empty((0, len(self.relative))), log_determinant
+        indicator = tail_ratio * (self.tails[:, None] == np.arange(self.tails.max() + 1))
+        scaled, _log = self.precision_times(indicator, 0.0)
+        lower = np.linalg.cholesky(np.eye(indicator.shape[1]) + indicator.T @ scaled)
+        log_determinant += 2.0 * float(np.sum(np.log(np.diag(lower))))
+        return solve_triangular(lower, scaled.T, lower=True), log_determinant
+
     def draw(self, residuals: Array, tail_ratio: float, scale: float, n: int, rng: np.random.Generator) -> Array:
-        """Draw data sets in which nothing is wrong.
-
-        Parameters
-        ----------
-        residuals : ndarray, shape (m,)
-            Standardised residuals to draw from, so that heavy tails stay. [1]
-        tail_ratio : float
-            Scatter between tails over scatter of a row. [1]
-        scale : float
-            Common standard deviation. [in]
-        n : int
-            Number of data sets.
-        rng : numpy.random.Generator
-            Source of randomness.
-
-        Returns
-        -------
-        ndarray, shape (n_rows, n)
-            The data sets. [in]
-        """
+        """Draw data sets in which nothing is wrong."""
         rows = len(self.relative)
         drawn = rng.choice(residuals, size=(rows, n)) * rng.choice([-1.0, 1.0], size=(rows, n))
         low = self.factors(tail_ratio)

@@ -8,21 +8,35 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.diagnosis.bank import build_bank
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
+from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
+from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
 from mlg_troubleshoot.diagnosis.extension import Term
 from mlg_troubleshoot.diagnosis.faults import DataFault, screen_faults
 from mlg_troubleshoot.diagnosis.gain import Gain, measure_gain
-from mlg_troubleshoot.diagnosis.inference import Finding, Inference
-from mlg_troubleshoot.diagnosis.noise import Rows, estimate_repeatability, measured_uncertainty, small_trends
-from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
+from mlg_troubleshoot.diagnosis.inference import Finding, infer
+from mlg_troubleshoot.diagnosis.noise import (
+    EXPECTED_SLOPE,
+    Rows,
+    estimate_repeatability,
+    measured_uncertainty,
+    robust_scale,
+    small_trends,
+)
+from mlg_troubleshoot.diagnosis.scene import Prediction, build_scene, effect_columns
+from mlg_troubleshoot.diagnosis.screen import shrunk
+from mlg_troubleshoot.diagnosis.simulation.result import Verdict
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.errors import InconclusiveDataError
-from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.units import MM_PER_IN
 
 Array = NDArray[np.float64]
 
@@ -32,45 +46,51 @@ LEAST_TAILS = 4
 _MANY_FAULTS = 0.15
 # Measured over predicted displacement: further from 1 than this, or negative, is no misfit. [1]
 _MOST_RATIO = 4.0
+# Mean square left by factors of all joints, over that left by one scale or by a constant, from which they explain; rows
+# further off than so many standard deviations are slips and do not count. Ten factors take 5 % off by chance. [1]
+_CLEARLY_LESS, _SLIP = 0.7, 4.0
 
 
 @dataclass(frozen=True)
-class NamedCause:
-    """A cause that the data name, or cannot rule out.
+class NamedCause(Term):
+    """A cause that the data name, or cannot rule out: a term of the extension with what speaks for it.
 
     Parameters
     ----------
-    candidate : Candidate
-        Cause, target and setting.
-    effect_rms_in : float
-        Root mean square of its effect over the rows. [in]
-    p_value : float or None
-        Chance of as much if nothing is wrong. [1]
-    value : float
-        The fitted parameter. [unit of the cause's parameter]
-    interval : tuple of float
-        95 % interval of the parameter.
+    candidate, value, interval
+        As in a term.
     effect_in : ndarray, shape (n_used,)
         Its effect in each row used. [in]
+    p_value : float or None
+        Chance of as much if nothing is wrong. [1]
+    aliases : tuple of Candidate
+        Causes that these rows cannot tell from it: the class is named, this one as its likeliest member.
     """
 
-    candidate: Candidate
-    effect_rms_in: float
-    p_value: float | None
-    value: float
-    interval: tuple[float, float]
     effect_in: Array
+    p_value: float | None
+    aliases: tuple[Candidate, ...] = ()
+
+    @property
+    def effect_rms_in(self) -> float:
+        """Root mean square of its effect over the rows. [in]"""
+        return float(np.sqrt(np.mean(self.effect_in**2)))
 
     @property
     def parameters(self) -> dict[str, float | str]:
         """The parameters as a person reads them, with the date of a change or the exponent of wear."""
-        shown: dict[str, float | str] = dict(self.candidate.cause.shown(self.value))
         fixed = self.candidate.setting
+        if "factors" in fixed:
+            return {f"factor_{joint}": value for joint, value in fixed["factors"].items()}
+        shown: dict[str, float | str] = dict(self.candidate.cause.shown(self.value))
         return shown | {name: fixed[name] for name in ("since", "wear_exponent") if fixed.get(name) is not None}
 
     @property
     def interval_shown(self) -> dict[str, tuple[float, float]]:
         """Intervals of the parameters as a person reads them."""
+        fixed = self.candidate.setting
+        if "factors" in fixed:
+            return {f"factor_{joint}": (fixed["low"][joint], fixed["high"][joint]) for joint in fixed["factors"]}
         low, high = (self.candidate.cause.shown(v) for v in self.interval)
         return {name: (min(low[name], high[name]), max(low[name], high[name])) for name in low}
 
@@ -81,7 +101,7 @@ class Diagnosis:
 
     Parameters
     ----------
-    verdict : str
+    verdict : Verdict
         NONE, NAMED, AMBIGUOUS or UNLISTED.
     causes : tuple of NamedCause
         Named causes by effect; empty unless NAMED.
@@ -93,10 +113,14 @@ class Diagnosis:
         Causes and the column that each lacks.
     ruled_out : tuple of (str, str or None)
         Rivals that explain clearly less.
-    faults : tuple of DataFault
-        Data faults.
+    faults, corrected : tuple of DataFault
+        Data faults, and clearances that a named convention slip says were meant otherwise.
     rows_read, rows_used : int
         Rows of the table, and rows behind the verdict.
+    unread : tuple of int
+        Joints that no row has a clearance of: they count as worn with landings like the others of their gear.
+    unread_in, unread_u_in : float
+        What they add to the prediction on average, and how far the fleet may lie off that. [in]
     mean_in, rms_in : float
         Misfit before anything is changed. [in]
     repeatability_in : float or None
@@ -127,15 +151,19 @@ class Diagnosis:
         Data sets drawn with nothing wrong.
     """
 
-    verdict: str
+    verdict: Verdict
     causes: tuple[NamedCause, ...]
     also_possible: tuple[NamedCause, ...]
     unlisted_variables: tuple[str, ...]
     not_testable: tuple[tuple[str, str], ...]
     ruled_out: tuple[tuple[str, str | None], ...]
     faults: tuple[DataFault, ...]
+    corrected: tuple[DataFault, ...]
     rows_read: int
     rows_used: int
+    unread: tuple[int, ...]
+    unread_in: float
+    unread_u_in: float
     mean_in: float
     rms_in: float
     repeatability_in: float | None
@@ -160,6 +188,7 @@ def diagnose(
     where: Discrepancies | None = None,
     *,
     own_causes: Sequence[Cause] = (),
+    ensemble: Sequence[LinkageModel] = (),
     permutations: int = 999,
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
@@ -178,6 +207,8 @@ def diagnose(
         Where inside the linkage causes act; without it only causes that need no place are tried.
     own_causes : sequence of Cause
         A user's own causes, beside the catalogue.
+    ensemble : sequence of LinkageModel
+        Other linkages that the true one may be instead, from which the cause `geometry` is made.
     permutations : int
         Data sets drawn with nothing wrong.
     seed : int
@@ -195,24 +226,26 @@ def diagnose(
     InconclusiveDataError
         If the table cannot answer the question at all: what it lacks and what to record next time.
     """
-    where = where or Discrepancies()
-    read = len(table)
-    table = _answerable(table)
-    table, faults = _without_faults(model, table, where, None)
-    catalogue = (*CATALOGUE, *own_causes)
-    testable = [cause for cause in catalogue if set(cause.needs) <= set(table.columns)]
-    blind = [cause for cause in catalogue if cause not in testable]
-    not_testable = tuple((c.name, next(n for n in c.needs if n not in table.columns)) for c in blind)
-    rng = np.random.default_rng(seed)
-    case = _infer(model, table, where, (testable, blind), permutations, rng, progress)
-    if case.finding.fit is not None:
-        # A large effect hides slips of single cells: look again with what is named taken out.
-        explained = case.columns[:, list(case.finding.chosen)] @ case.finding.fit.values
-        again, more = _without_faults(model, table, where, explained)
-        if more:
-            table, faults = again, (*faults, *more)
-            case = _infer(model, table, where, (testable, blind), permutations, rng, progress)
-    return _report(model, table, read, faults, not_testable, case, seed, permutations, rng)
+    # The matrices are small: threads that wait for each other cost several times what they save.
+    with threadpool_limits(1, "blas"):
+        where = where or Discrepancies()
+        read = len(table)
+        table = _answerable(table)
+        plain, faults = _without_faults(model, table, where, None)
+        catalogue = (*CATALOGUE, *own_causes)
+        table = plain.scene.table
+        testable = [cause for cause in catalogue if set(cause.needs) <= set(table.columns)]
+        blind = [cause for cause in catalogue if cause not in testable]
+        not_testable = tuple((c.name, next(n for n in c.needs if n not in table.columns)) for c in blind)
+        rng = np.random.default_rng(seed)
+        case = _infer(plain, (testable, blind), ensemble, permutations, rng, progress)
+        if case.finding.fit is not None:
+            # A large effect hides slips of single cells: look again with what is named taken out.
+            again, more = _without_faults(model, table, where, case.explained)
+            if more:
+                faults = (*faults, *more)
+                case = _infer(again, (testable, blind), ensemble, permutations, rng, progress)
+        return _report(model, case.plain.scene.table, read, faults, not_testable, case, seed, permutations, rng)
 
 
 @dataclass(frozen=True)
@@ -224,41 +257,54 @@ class _Case:
     misfit: Array
     predicted: Array
     finding: Finding
+    plain: Prediction
+    values: Array
+    covariance: Array
+
+    @property
+    def explained(self) -> Array:
+        """What is named does to each row. [in]"""
+        block = self.finding.block
+        held = self.columns[:, list(self.finding.chosen)]
+        return (held if block is None else np.hstack([held, block.columns])) @ self.values
 
 
 def _without_faults(
     model: LinkageModel, table: DiagnosisTable, where: Discrepancies, explained: Array | None
-) -> tuple[DiagnosisTable, tuple[DataFault, ...]]:
-    """Repair or set aside rows with data faults, and rows whose linkage does not close."""
+) -> tuple[Prediction, tuple[DataFault, ...]]:
+    """Predict the rows, those with data faults repaired or set aside, without rows whose linkage does not close."""
     read = len(table)
     table, faults, usable = screen_faults(model, table, explained)
     _single_slips(faults, read)
     table = table.take(usable & np.isfinite(table.measured_in))
     _enough(table)
-    table = table.take(np.isfinite(build_scene(model, table, where).scene.over_in))
-    _enough(table)
-    return table, faults
+    plain = build_scene(model, table, where)
+    closes = np.isfinite(plain.scene.over_in)
+    if not closes.all():
+        table = table.take(closes)
+        _enough(table)
+        plain = build_scene(model, table, where)
+    return plain, faults
 
 
 def _infer(
-    model: LinkageModel,
-    table: DiagnosisTable,
-    where: Discrepancies,
+    plain: Prediction,
     causes: tuple[Sequence[Cause], Sequence[Cause]],
+    ensemble: Sequence[LinkageModel],
     permutations: int,
     rng: np.random.Generator,
     progress: Callable[[float], None] | None,
 ) -> _Case:
-    plain = build_scene(model, table, where)
-    scene = plain.scene
+    scene, table = plain.scene, plain.scene.table
     testable, blind = causes
     candidates = [candidate for cause in testable for candidate in cause.candidates(scene)]
     candidates += [candidate for cause in blind for candidate in cause.stand_ins(scene)]
-    columns = effect_columns(scene, plain.worst, candidates)
+    columns = effect_columns(scene, candidates)
     moving = np.isfinite(columns).all(axis=0) & (np.abs(columns).max(axis=0) > 0.0)
     candidates = [c for c, keep in zip(candidates, moving, strict=True) if keep]
     columns = columns[:, moving]
-    _comparable(table.measured_in, scene.over_in)
+    blocks = [b for cause in testable if isinstance(cause, JointFactors) for b in cause.blocks(scene, ensemble)]
+    _comparable(table.measured_in, scene.over_in, blocks)
     misfit = table.measured_in - scene.over_in
     rows = Rows(
         scene.over_in,
@@ -266,14 +312,22 @@ def _infer(
         table.gears,
         plain.u_filled_in,
         plain.u_shared_in,
+        plain.unread_in,
         plain.u_read_in,
         measured_uncertainty(table),
         plain.drawn_in,
         *small_trends(table),
     )
     bank = build_bank(scene, columns)
-    finding = Inference(misfit, rows, candidates, columns, bank, permutations, rng, progress).run()
-    return _Case(candidates, columns, misfit, scene.over_in, finding)
+    finding = infer(misfit, rows, candidates, columns, bank, blocks, permutations, rng, progress)
+    values, covariance = np.empty(0), np.empty((0, 0))
+    if finding.fit is not None:
+        values, covariance = finding.fit.values, np.diag(finding.fit.errors**2)
+        if finding.block is not None:
+            held, block = columns[:, list(finding.chosen)], finding.block
+            expected = misfit - EXPECTED_SLOPE * scene.over_in
+            values, covariance = shrunk(finding.noise, held, block.columns, block.covariance, expected)
+    return _Case(candidates, columns, misfit, scene.over_in, finding, plain, values, covariance)
 
 
 def _answerable(table: DiagnosisTable) -> DiagnosisTable:
@@ -304,7 +358,7 @@ def _single_slips(faults: tuple[DataFault, ...], read: int) -> None:
         )
 
 
-def _comparable(measured_in: Array, predicted_in: Array) -> None:
+def _comparable(measured_in: Array, predicted_in: Array, blocks: Sequence[Block]) -> None:
     """Refuse measured displacements that cannot be what the prediction is of: sign, unit, or a gauge that is stuck."""
     if np.ptp(measured_in) == 0.0:
         raise InconclusiveDataError(
@@ -315,6 +369,8 @@ def _comparable(measured_in: Array, predicted_in: Array) -> None:
     ratio = float(np.median(measured_in[large] / np.maximum(predicted_in[large], 1e-9)))
     if 1.0 / _MOST_RATIO < ratio < _MOST_RATIO or not np.any(predicted_in > 0.0):
         return
+    if blocks and _explained_by_clearances(measured_in, predicted_in, blocks[0].columns):
+        return
     check = "Check the unit and the convention of the clearances, and that the gauge moves with the plunger."
     if ratio <= -1.0 / _MOST_RATIO:
         check = "Check the sign: over-travel is positive."
@@ -323,6 +379,22 @@ def _comparable(measured_in: Array, predicted_in: Array) -> None:
     raise InconclusiveDataError(
         f"the measured displacements are {ratio:.2g} times the predicted ones: no cause on any list does that", check
     )
+
+
+def _explained_by_clearances(measured_in: Array, predicted_in: Array, contribution_in: Array) -> bool:
+    """Tell whether factors of −1 to 1, joint by joint, explain readings that no one scale of the prediction does.
+
+    Nor one scale with one joint that was written in millimetres.
+    """
+    near = np.ones(len(measured_in), bool)
+    for _ in range(4):
+        factors = lsq_linear(contribution_in[near], measured_in[near], (-1.0, 1.0)).x
+        left = measured_in - contribution_in @ factors
+        near = np.abs(left) <= _SLIP * max(robust_scale(left), 1e-9)
+    in_mm = predicted_in[:, None] - (1.0 - 1.0 / MM_PER_IN) * contribution_in
+    simple, measured = np.column_stack([predicted_in, in_mm])[near], measured_in[near]
+    one = measured[:, None] - simple * (measured @ simple / np.sum(simple**2, axis=0))
+    return bool(np.mean(left[near] ** 2) < _CLEARLY_LESS * min(np.mean(one**2, axis=0).min(), np.var(measured)))
 
 
 def _enough(table: DiagnosisTable) -> None:
@@ -344,10 +416,10 @@ def _enough(table: DiagnosisTable) -> None:
         )
 
 
-def _report(
+def _report(  # noqa: PLR0913 - everything that a diagnosis says
     model: LinkageModel,
     table: DiagnosisTable,
-    read: int,
+    rows_read: int,
     faults: tuple[DataFault, ...],
     not_testable: tuple[tuple[str, str], ...],
     case: _Case,
@@ -355,77 +427,105 @@ def _report(
     permutations: int,
     rng: np.random.Generator,
 ) -> Diagnosis:
-    candidates, columns, misfit = case.candidates, case.columns, case.misfit
-    predicted, finding = case.predicted, case.finding
-    named = _named(candidates, columns, finding)
-    raw = worst_case(model, np.nan_to_num(table.clearance_in)).over_in
+    columns, misfit, finding = case.columns, case.misfit, case.finding
+    named = _named(case)
+    read = np.isfinite(table.clearance_in)
+    seen = np.asarray(read.any(axis=0))
+    latent = np.where(seen, 0.0, case.plain.scene.clearance_in)
+    raw = worst_of_sense(model, np.where(read, table.clearance_in, latent))[0]
     raw_misfit = table.measured_in - raw
-    gain: Gain | None = None
-    terms: tuple[Term, ...] = ()
-    left = misfit
-    if finding.verdict == "NAMED" and finding.fit is not None:
-        held = columns[:, list(finding.chosen)]
-        by_row = any(candidates[k].cause.name == "rigging_offset" for k in finding.chosen)
-        gain = measure_gain(
-            finding.noise, held, misfit, predicted, table.margin_in, table.record_id, table.tails, by_row, rng
-        )
-        left = misfit - held @ finding.fit.values
-        terms = tuple(Term(n.candidate, n.value, n.interval) for n in named)
+    gain = _gain(case, rng) if finding.verdict is Verdict.NAMED and finding.fit is not None else None
+    left = misfit if gain is None else misfit - case.explained
     repeatability, source = estimate_repeatability(table)
     return Diagnosis(
         verdict=finding.verdict,
-        causes=named if finding.verdict == "NAMED" else (),
-        also_possible=(*named, *_rivals(candidates, columns, finding)) if finding.verdict == "AMBIGUOUS" else (),
+        causes=named if finding.verdict is Verdict.NAMED else (),
+        also_possible=(*named, *_rivals(case.candidates, columns, finding))
+        if finding.verdict is Verdict.AMBIGUOUS
+        else (),
         unlisted_variables=finding.variables,
         not_testable=not_testable,
         ruled_out=finding.ruled_out,
         faults=faults,
-        rows_read=read,
+        corrected=_corrected(model, table, named if finding.verdict is Verdict.NAMED else ()),
+        rows_read=rows_read,
         rows_used=len(table),
+        unread=tuple(n for n, some in zip(model.joint_numbers, seen, strict=True) if not some),
+        unread_in=float(np.mean(case.plain.scene.contribution_in[:, ~seen].sum(axis=1))),
+        unread_u_in=float(np.sqrt(np.mean(np.sum(case.plain.unread_in**2, axis=1)))),
         mean_in=float(np.mean(raw_misfit)),
         rms_in=float(np.sqrt(np.mean(raw_misfit**2))),
         repeatability_in=repeatability if np.isfinite(repeatability) else None,
         repeatability_source=source,
         smallest_rms_in=finding.smallest_rms_in,
         gain=gain,
-        terms=terms,
+        terms=() if gain is None else tuple(cause for cause in named if cause.candidate.cause.extends),
         residual_u_in=float(np.std(left)),
         expected_scatter_in=_expected_scatter(model, table, repeatability),
         remainder_p=finding.remainder_p,
         # Where nothing stands out beyond chance, what is left is noise by the same test.
-        remainder_is_noise=finding.verdict == "NONE" or (finding.verdict == "NAMED" and finding.remainder_p > 0.05),
+        remainder_is_noise=finding.verdict is Verdict.NONE
+        or (finding.verdict is Verdict.NAMED and finding.remainder_p > 0.05),
         used=table,
-        predicted_in=predicted,
+        predicted_in=case.predicted,
         misfit_in=misfit,
         seed=seed,
         permutations=permutations,
     )
 
 
-def _named(candidates: Sequence[Candidate], columns: Array, finding: Finding) -> tuple[NamedCause, ...]:
-    if finding.fit is None:
-        return ()
+def _gain(case: _Case, rng: np.random.Generator) -> Gain:
+    """What the extension gains on tails that it was not fitted to, on rows if it is about one tail."""
+    finding, table = case.finding, case.plain.scene.table
+    by_row = any(case.candidates[k].cause.of_one_tail(case.candidates[k]) for k in finding.chosen)
+    held = case.columns[:, list(finding.chosen)]
+    return measure_gain(finding.noise, held, case.misfit, case.predicted, table, by_row, rng, finding.block)
+
+
+def _corrected(model: LinkageModel, table: DiagnosisTable, named: Sequence[NamedCause]) -> tuple[DataFault, ...]:
+    """Each clearance that a named slip of convention concerns: what was entered, and what it is in the analysis."""
+    cells: list[DataFault] = []
+    for candidate in (c.candidate for c in named if isinstance(c.candidate.cause, ConventionSlip)):
+        meant = as_meant(table, candidate.setting).clearance_in
+        for place, j in np.argwhere(np.isfinite(meant) & (meant != table.clearance_in)).tolist():
+            column = f"clearance_{model.joint_numbers[j]}_in"
+            values = (f"{values[place, j]:.4g}" for values in (table.clearance_in, meant))
+            row, record = int(table.row[place]), table.record_id[place]
+            cells.append(DataFault(place, row, record, column, "other_convention", *values))
+    return tuple(cells)
+
+
+def _named(case: _Case) -> tuple[NamedCause, ...]:
+    finding, columns = case.finding, case.columns
     found = []
     p_values = (*finding.p_values, *[None] * len(finding.chosen))
-    for place, k in enumerate(finding.chosen):
-        value, error = float(finding.fit.values[place]), float(finding.fit.errors[place])
-        effect = columns[:, k] * value
+    for place, k in enumerate(finding.chosen if finding.fit is not None else ()):
+        value, error = float(case.values[place]), float(np.sqrt(case.covariance[place, place]))
+        found.append(_cause(case.candidates[k], columns[:, k] * value, p_values[place], value, error))
+    if finding.block is not None:
+        block, k = finding.block, len(finding.chosen)
+        change, covariance = case.values[k:], case.covariance[k:, k:]
         found.append(
-            NamedCause(
-                candidates[k],
-                float(np.sqrt(np.mean(effect**2))),
-                p_values[place],
-                value,
-                (value - 1.96 * error, value + 1.96 * error),
-                effect,
+            _cause(
+                block.candidate(change, covariance), block.columns @ change, finding.block_p, 1.0, 0.0, finding.alias
             )
         )
     return tuple(sorted(found, key=lambda c: -c.effect_rms_in))
 
 
+def _cause(
+    candidate: Candidate, effect: Array, p_value: float | None, value: float, error: float, alias: Block | None = None
+) -> NamedCause:
+    interval = value - 1.96 * error, value + 1.96 * error
+    aliases = () if alias is None else (Candidate(alias.cause),)
+    return NamedCause(candidate, value, interval, effect, p_value, aliases)
+
+
 def _rivals(candidates: Sequence[Candidate], columns: Array, finding: Finding) -> tuple[NamedCause, ...]:
     empty = np.zeros(len(columns))
-    return tuple(NamedCause(candidates[k], 0.0, None, 0.0, (0.0, 0.0), empty) for k in finding.rivals)
+    possible = [candidates[k] for k in finding.rivals]
+    possible += [] if finding.rival is None else [Candidate(finding.rival.cause)]
+    return tuple(NamedCause(candidate, 0.0, (0.0, 0.0), empty, None) for candidate in possible)
 
 
 def _expected_scatter(model: LinkageModel, table: DiagnosisTable, repeatability: float) -> float | None:

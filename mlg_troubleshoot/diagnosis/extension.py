@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
 from numpy.typing import NDArray
 
+from mlg_troubleshoot.datafile import DataTable, read_toml
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE
-from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
+from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
+from mlg_troubleshoot.diagnosis.scene import scene_at
 from mlg_troubleshoot.diagnosis.table import FACTORS, QUANTITIES, DiagnosisTable, table_from_inspections
-from mlg_troubleshoot.errors import GearFileError, OutputError
+from mlg_troubleshoot.errors import GearFileError, TroubleshootError
 from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
-from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Discrepancies, Gear
-from mlg_troubleshoot.gear.model import LinkageModel, links_from
+from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.outputs import write_text
 
 Array = NDArray[np.float64]
 SCHEMA = 1
+# No plunger moves further; a larger scatter would clear nothing and reject nothing. [in]
+MOST_IN = 1.0
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,8 @@ class ModelExtension:
         Hashes of the data that the terms were fitted to.
     rows : int
         Rows that they were fitted to.
+    unread : tuple of int
+        Joints that none of these rows had a clearance of.
     """
 
     gear: Gear
@@ -71,6 +77,7 @@ class ModelExtension:
     residual_u_in: float
     data_sha256: tuple[str, ...]
     rows: int
+    unread: tuple[int, ...] = ()
 
     def adjust(self, inspections: Sequence[Inspection], clearance_in: Array) -> Adjustment:
         """Return what differs from the plain model for these inspections.
@@ -93,7 +100,9 @@ class ModelExtension:
     def describe(self) -> str:
         """Return the extension in one sentence."""
         terms = "; ".join(term.words() for term in self.terms)
-        return f"{terms}; fitted to {self.rows} measured rows"
+        listed = ", ".join(f"#{joint}" for joint in self.unread)
+        unread = f", in which nobody had read {listed}: what was fitted rests on their usual wear" if listed else ""
+        return f"{terms}; fitted to {self.rows} measured rows{unread}"
 
     def lacks(self, inspection: Inspection) -> tuple[str, ...]:
         """Return the columns that the terms need and an inspection lacks.
@@ -120,42 +129,17 @@ def adjustment_of(
     clearance_in: Array,
     where: Discrepancies,
 ) -> Adjustment:
-    """Combine the changes of several terms; a term whose columns a table lacks does nothing there.
-
-    Parameters
-    ----------
-    terms : sequence of Term
-        The terms.
-    model : LinkageModel
-        The linkage.
-    table : DiagnosisTable
-        The rows.
-    clearance_in : ndarray, shape (n, n_joints)
-        Clearances without gaps. [in]
-    where : Discrepancies
-        Where inside the linkage causes act.
-
-    Returns
-    -------
-    Adjustment
-        Clearances scaled in turn, numbers changed, offsets added.
-    """
+    """Combine the changes of several terms; a term whose columns a table lacks does nothing there."""
     clearance = np.asarray(clearance_in, float)
     changed: dict[str, Array] = {}
     scaled: dict[str, Array] = {}
     rate, shift = np.ones(len(clearance)), np.zeros(len(clearance))
+    loaded: Array | None = None
     for term in terms:
         cause = term.candidate.cause
         if not set(cause.needs) <= set(table.columns):
             continue
-        worst = worst_case(model, clearance)
-        contribution = np.empty_like(clearance)
-        for j in range(clearance.shape[1]):
-            without = clearance.copy()
-            without[:, j] = 0.0
-            contribution[:, j] = worst.over_in - model.displacement(links_from(without, worst.over_directions))
-        scene = Scene(model, table, clearance, model.joint_numbers, where, worst.over_in, contribution)
-        own = cause.adjust(scene, term.candidate, term.value)
+        own = cause.adjust(scene_at(model, table, where, clearance), term.candidate, term.value)
         clearance = own.clearance_in
         for name, values in own.changed.items():
             changed[name] = changed.get(name, np.zeros(len(clearance))) + values
@@ -163,7 +147,9 @@ def adjustment_of(
             scaled[name] = scaled.get(name, np.ones(len(clearance))) * values
         rate = rate if own.rate_factor is None else rate * own.rate_factor
         shift = shift if own.offset_in is None else shift + own.offset_in
-    return Adjustment(clearance, changed, scaled, rate, shift)
+        if own.direction_factors is not None:
+            loaded = own.direction_factors if loaded is None else loaded * own.direction_factors
+    return Adjustment(clearance, changed, scaled, rate, shift, loaded)
 
 
 def save_extension(extension: ModelExtension, file: Path) -> None:
@@ -181,49 +167,31 @@ def save_extension(extension: ModelExtension, file: Path) -> None:
     OutputError
         If it cannot be written.
     """
-    lines = [
-        "# Extension of the model by a diagnosis of measured displacements.",
-        f"schema = {SCHEMA}",
-        f"gear = {_toml(extension.gear.id)}",
-        f"geometry_sha256 = {_toml(extension.gear.geometry_sha256)}",
-        f"data_sha256 = [{', '.join(_toml(h) for h in extension.data_sha256)}]",
-        f"rows = {extension.rows}",
-        f"residual_u_in = {extension.residual_u_in!r}",
-    ]
+    terms = []
     for term in extension.terms:
-        cause = term.candidate.cause
-        lines += [
-            "",
-            "[[terms]]",
-            f"# {term.words()}",
-            f"cause = {_toml(cause.name)}",
-            f"parameter = {_toml(cause.parameter)}",
-            f"value = {term.value!r}",
-            f"interval_95 = [{term.interval[0]!r}, {term.interval[1]!r}]",
-        ]
-        if term.candidate.target is not None:
-            lines.append(f"target = {_toml(term.candidate.target)}")
-        setting = {k: v for k, v in term.candidate.setting.items() if v is not None}
-        if setting:
-            lines.append("setting = { " + ", ".join(f"{_toml(k)} = {_toml(v)}" for k, v in setting.items()) + " }")
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"{file} cannot be written: {error.strerror}", "Choose another folder.") from error
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_toml(k)} = {_toml(v)}" for k, v in value.items()) + " }"
-    if isinstance(value, (tuple, list)):
-        return "[" + ", ".join(_toml(v) for v in value) + "]"
-    return repr(value)
+        cause, candidate = term.candidate.cause, term.candidate
+        entry: dict[str, Any] = {
+            "words": term.words(),
+            "cause": cause.name,
+            "parameter": cause.parameter,
+            "value": term.value,
+            "interval_95": list(term.interval),
+        }
+        if candidate.target is not None:
+            entry["target"] = candidate.target
+        setting = {k: v for k, v in candidate.setting.items() if v is not None}
+        terms.append(entry | ({"setting": setting} if setting else {}))
+    whole = {
+        "schema": SCHEMA,
+        "gear": extension.gear.id,
+        "geometry_sha256": extension.gear.geometry_sha256,
+        "data_sha256": list(extension.data_sha256),
+        "rows": extension.rows,
+        "residual_u_in": extension.residual_u_in,
+        "unread_joints": list(extension.unread),
+        "terms": terms,
+    }
+    write_text(file, "# Extension of the model by a diagnosis of measured displacements.\n" + tomli_w.dumps(whole))
 
 
 def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ()) -> ModelExtension:
@@ -250,28 +218,32 @@ def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ())
     """
     terms: list[Term] = []
     hashes: list[str] = []
-    rows, residual = 0, float("nan")
+    rows, residual, unread = 0, float("nan"), set[int]()
+    known = {cause.name: cause for cause in (*CATALOGUE, *own)}
     for file in files:
-        raw = _read(file)
-        if raw["geometry_sha256"] != gear.geometry_sha256:
+        raw = read_toml(file, "Give a file that mlg diagnose wrote.")
+        raw.skip("gear")
+        if raw.whole("schema") != SCHEMA:
+            raise raw.fail("schema", f"{SCHEMA}, as mlg diagnose writes it")
+        if raw.text("geometry_sha256") != gear.geometry_sha256:
             raise GearFileError(
-                f"{file}: this extension was made on another geometry ({str(raw['geometry_sha256'])[:12]} "
+                f"{file}: this extension was made on another geometry ({raw.text('geometry_sha256')[:12]} "
                 f"instead of {gear.geometry_sha256[:12]})",
                 "Diagnose again with this gear, or name the gear that it was made on with --gear.",
             )
-        try:
-            added = [_term(dict(entry), file, own) for entry in raw["terms"]]
-            _try_out(added, gear)
-            hashes += [str(h) for h in raw["data_sha256"]]
-            rows, residual = int(raw["rows"]), float(raw["residual_u_in"])
-        except (KeyError, TypeError, ValueError) as error:
-            raise GearFileError(f"{file}: damaged: {error}", "Give a file as mlg diagnose wrote it.") from error
+        rows, residual = raw.whole("rows", least=1), raw.positive("residual_u_in", most=MOST_IN)
+        unread |= set(raw.wholes("unread_joints"))
+        hashes += raw.texts("data_sha256")
+        added = [_term(entry, known, gear) for entry in raw.tables("terms")]
+        if not added:
+            raise raw.fail("terms", "at least one term")
+        raw.finish()
         terms += added
-    return ModelExtension(gear, tuple(terms), residual, tuple(hashes), rows)
+    return ModelExtension(gear, tuple(terms), residual, tuple(hashes), rows, tuple(sorted(unread)))
 
 
-def _try_out(terms: Sequence[Term], gear: Gear) -> None:
-    """Predict one gear with the terms, so that a number or a setting that they lack is found when they are read."""
+def _tried_out(term: Term, gear: Gear) -> float:
+    """Predict one gear with a term, so that a setting that it lacks is found when it is read. [in]"""
     one = np.zeros(1)
     table = DiagnosisTable(
         clearance_in=np.full((1, len(gear.joint_numbers)), 0.001),
@@ -285,36 +257,41 @@ def _try_out(terms: Sequence[Term], gear: Gear) -> None:
         axial_float_in=np.zeros((1, len(gear.joint_numbers))),
         first_day="2000-01-01",
     )
-    adjusted_worst_case(gear.model, adjustment_of(terms, gear.model, table, table.clearance_in, gear.discrepancies))
+    adjustment = adjustment_of([term], gear.model, table, table.clearance_in, gear.discrepancies)
+    return float(adjusted_worst_case(gear.model, adjustment).magnitude_in[0])
 
 
-def _read(file: Path) -> dict[str, Any]:
+def _term(entry: DataTable, known: Mapping[str, Cause], gear: Gear) -> Term:
+    entry.skip("words", "parameter")
+    name = entry.text("cause")
+    if name not in known:
+        raise entry.fail("cause", "the name of a cause; give the file of your own causes with --causes")
+    setting = _setting(entry.table("setting")) if entry.has("setting") else {}
+    target = entry.text("target") if entry.has("target") else None
+    term = Term(Candidate(known[name], target, setting), entry.number("value"), entry.rising("interval_95"))
+    entry.finish()
     try:
-        raw = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise GearFileError(
-            f"{file}: cannot be read as an extension: {error}", "Give a file that mlg diagnose wrote."
-        ) from error
-    missing = [
-        k for k in ("schema", "geometry_sha256", "data_sha256", "rows", "residual_u_in", "terms") if k not in raw
-    ]
-    if missing or raw["schema"] != SCHEMA:
-        raise GearFileError(
-            f"{file}: not an extension: {', '.join(missing) or 'schema'} missing or unknown",
-            "Give a file that mlg diagnose wrote.",
-        )
-    return raw
+        moved = _tried_out(term, gear)
+    except (KeyError, TypeError, ValueError, TroubleshootError) as error:
+        raise entry.fail("setting", f"what {name} needs of this gear ({error})") from error
+    if not moved <= MOST_IN:
+        raise entry.fail("value", f"a number that leaves the plunger within {MOST_IN:g} in of its place")
+    return term
 
 
-def _term(entry: Mapping[str, Any], file: Path, own: Sequence[Cause]) -> Term:
-    causes = {cause.name: cause for cause in (*CATALOGUE, *own)}
-    name = str(entry.get("cause"))
-    if name not in causes:
-        raise GearFileError(f"{file}: cause {name!r} is not known", "Give the file of your own causes with --causes.")
-    setting = dict(entry.get("setting", {}))
-    if "pair" in setting:
-        setting["pair"] = tuple(setting["pair"])
-    setting.setdefault("day", None)
-    setting.setdefault("since", None)
-    low, high = entry["interval_95"]
-    return Term(Candidate(causes[name], entry.get("target"), setting), float(entry["value"]), (float(low), float(high)))
+def _setting(setting: DataTable) -> dict[str, Any]:
+    """What a cause fixes beside its parameter: texts, numbers, lists of joints, numbers by name."""
+    read: dict[str, Any] = {}
+    for key in setting.names:
+        value = setting.get(key)
+        if isinstance(value, dict):
+            part = setting.table(key)
+            read[key] = {name: part.number(name) for name in part.names}
+        elif isinstance(value, list):
+            read[key] = setting.wholes(key)
+        else:
+            whole = isinstance(value, int)
+            read[key] = (
+                setting.text(key) if isinstance(value, str) else (setting.whole if whole else setting.number)(key)
+            )
+    return read

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.covariance import NoiseModel
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE
-from mlg_troubleshoot.diagnosis.screen import fit
+from mlg_troubleshoot.diagnosis.screen import held_out_part
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 
 Array = NDArray[np.float64]
 
@@ -53,62 +54,27 @@ def measure_gain(
     columns: Array,
     misfit: Array,
     predicted: Array,
-    margin_in: Array,
-    record_id: Sequence[str],
-    groups: NDArray[np.str_],
+    table: DiagnosisTable,
     by_row: bool,
     rng: np.random.Generator,
+    block: Block | None = None,
 ) -> Gain:
     """Cross-validate an extension; rows of one tail are never on both sides.
 
     An extension that concerns one tail cannot be learned from the others: for it single rows are held out.
-
-    Parameters
-    ----------
-    noise : NoiseModel
-        Noise of the rows.
-    columns : ndarray, shape (n, k)
-        Effects of the named causes per unit of their parameters.
-    misfit, predicted : ndarray, shape (n,)
-        Measured less predicted, and predicted. [in]
-    margin_in : ndarray, shape (n,)
-        Margin of each row. [in]
-    record_id : sequence of str
-        Identity of each row.
-    groups : ndarray of str, shape (n,)
-        Tail of each row.
-    by_row : bool
-        Hold out single rows.
-    rng : numpy.random.Generator
-        Source of randomness for the folds and the interval.
-
-    Returns
-    -------
-    Gain
-        Before and after.
     """
-    n = len(misfit)
-    keys = np.arange(n).astype(str) if by_row else groups
+    groups = table.tails
+    keys = np.arange(len(misfit)).astype(str) if by_row else groups
     names = np.unique(keys)
     fold_of = dict(zip(rng.permutation(names).tolist(), np.arange(len(names)) % _FOLDS, strict=True))
     fold = np.array([fold_of[str(key)] for key in keys])
-    correction = np.zeros(n)
-    for k in range(min(_FOLDS, len(names))):
-        train, test = fold != k, fold == k
-        if not test.any() or not train.any():
-            continue
-        part = noise.take(train)
-        used = np.any(columns[train] != 0.0, axis=0)
-        values = np.zeros(columns.shape[1])
-        if used.any():
-            expected = misfit[train] - EXPECTED_SLOPE * predicted[train]
-            values[used] = fit(part, columns[train][:, used], expected).values
-        correction[test] = columns[test] @ values
+    expected = misfit - EXPECTED_SLOPE * predicted
+    correction = held_out_part(noise, columns, expected, fold, block)
     before, after = misfit, misfit - correction
     measured = predicted + misfit
-    outside = np.abs(measured) > margin_in
-    said_before = np.abs(predicted) <= margin_in
-    said_after = np.abs(predicted + correction) <= margin_in
+    outside = np.abs(measured) > table.margin_in
+    said_before = np.abs(predicted) <= table.margin_in
+    said_after = np.abs(predicted + correction) <= table.margin_in
     return Gain(
         rms_before_in=float(np.sqrt(np.mean(before**2))),
         rms_after_in=float(np.sqrt(np.mean(after**2))),
@@ -117,7 +83,7 @@ def measure_gain(
         false_within_after=int(np.sum(said_after & outside)),
         false_outside_before=int(np.sum(~said_before & ~outside)),
         false_outside_after=int(np.sum(~said_after & ~outside)),
-        verdicts_changed=tuple(record_id[int(i)] for i in np.flatnonzero(said_before != said_after)),
+        verdicts_changed=tuple(table.record_id[int(i)] for i in np.flatnonzero(said_before != said_after)),
         held_out_by="row" if by_row else "tail",
     )
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.covariance import NoiseModel
 
 Array = NDArray[np.float64]
@@ -16,12 +18,8 @@ Array = NDArray[np.float64]
 class Gain:
     """Gain in log-likelihood of each candidate over the null, profiled over scale and tail scatter.
 
-    Parameters
-    ----------
-    gain : ndarray, shape (n_candidates, n_sets)
-        Gain in log-likelihood. [1]
-    null : ndarray, shape (n_sets,)
-        Log-likelihood of the null. [1]
+    gain, shape (n_candidates, n_sets): gain in log-likelihood. [1]
+    null, shape (n_sets,): log-likelihood of the null. [1]
     """
 
     gain: Array
@@ -31,98 +29,100 @@ class Gain:
 class Screen:
     """Candidates against data under one noise model; the products are computed once for all data sets.
 
-    Parameters
-    ----------
-    noise : NoiseModel
-        The noise.
-    columns : ndarray, shape (n, n_candidates)
-        Effect of each candidate per unit of its parameter. [in / unit]
-    signs : ndarray, shape (n_candidates,)
-        Sign that the parameter may have: +1, −1, or 0 for both.
-    fixed : ndarray, shape (n, k), optional
-        Columns that are always fitted: causes named already.
+    noise: the noise.
+    columns, shape (n, n_candidates): effect of each candidate per unit of its parameter. [in / unit]
+    signs, shape (n_candidates,): sign that the parameter may have: +1, −1, or 0 for both.
+    fixed, shape (n, k): columns that are always fitted: causes named already.
+    exact, shape (n_candidates,): the only value that a parameter can have, NaN where it is free.
     """
 
-    def __init__(self, noise: NoiseModel, columns: Array, signs: Array, fixed: Array | None = None) -> None:
+    def __init__(
+        self, noise: NoiseModel, columns: Array, signs: Array, fixed: Array | None = None, exact: Array | None = None
+    ) -> None:
         self.noise = noise
         self.columns = columns
         self.signs = signs
-        self.fixed = np.empty((len(columns), 0)) if fixed is None else fixed
-        self._parts = [self._part(ratio) for ratio in noise.tail_ratios]
+        self.exact = np.full(len(signs), np.nan) if exact is None else exact
+        self.length = np.einsum("ij,ij->j", columns, columns)
+        self._weighted = noise.precision_times(columns, 0.0)[0]
+        self._parts = [self._part(ratio, fixed) for ratio in noise.tail_ratios]
 
-    def _part(self, ratio: float) -> tuple[Array, Array, Array, float]:
-        """V⁻¹ X, squared length of each column and projector of the fixed columns at one tail ratio."""
-        product, log_determinant = self.noise.precision_times(np.hstack([self.columns, self.fixed]), ratio)
-        weighted, held = product[:, : self.columns.shape[1]], product[:, self.columns.shape[1] :]
-        if held.shape[1]:
-            inner = np.linalg.pinv(self.fixed.T @ held)
-            weighted = weighted - held @ (inner @ (self.fixed.T @ weighted))
-        square = np.einsum("ij,ij->j", self.columns, weighted)
-        return weighted, square, held, log_determinant
+    def _part(self, ratio: float, fixed: Array | None) -> tuple[Array, Array, Array, float]:
+        """A with V⁻¹ − V⁻¹ F (Fᵀ V⁻¹ F)⁻¹ Fᵀ V⁻¹ = V₀⁻¹ − Aᵀ A, A X, squared length of each column, and log |V|.
 
-    def _base(self, data: Array, index: int) -> tuple[Array, Array]:
-        """Residual sum of squares without candidates, and the products with each of them."""
-        weighted, _square, held, _log = self._parts[index]
-        rest = self.noise.square(data, self.noise.tail_ratios[index])
-        if held.shape[1]:
-            inner = np.linalg.pinv(self.fixed.T @ held)
-            along = held.T @ data
-            rest = rest - np.einsum("ij,ij->j", along, inner @ along)
-        return self.noise.floored(rest), weighted.T @ data
+        V₀ has no scatter between tails; F are the fixed columns. A has few rows, so that a further ratio costs little.
+        """
+        root, log_determinant = self.noise.tail_root(ratio)
+        if fixed is not None and fixed.shape[1]:
+            held, _log = self.noise.precision_times(fixed, ratio)
+            values, vectors = np.linalg.eigh(fixed.T @ held)
+            kept = values > 1e-14 * values[-1]
+            root = np.vstack([root, (held @ (vectors[:, kept] / np.sqrt(values[kept]))).T])
+        along = root @ self.columns
+        square = np.einsum("ij,ij->j", self.columns, self._weighted) - np.einsum("ij,ij->j", along, along)
+        return root, along, square, log_determinant
+
+    def _levels(
+        self, data: Array, which: NDArray[np.intp] | slice = slice(None)
+    ) -> Iterator[tuple[Array, Array, Array, Callable[..., Array]]]:
+        """For each tail ratio: residual sums of squares without candidates, the products and squared lengths of the
+        candidates, and the log-likelihood when something is taken off those sums."""
+        n = len(data)
+        plain, products = self.noise.square(data, 0.0), self._weighted[:, which].T @ data
+        for root, along, square, log_determinant in self._parts:
+            common = root @ data
+            rest = self.noise.floored(plain - np.einsum("ij,ij->j", common, common))
+
+            def likelihood(drop: Array | float = 0.0, rest: Array = rest, log: float = log_determinant) -> Array:
+                return np.asarray(-0.5 * n * np.log(np.maximum(rest - drop, 1e-12 * rest) / n) - 0.5 * log)
+
+            yield rest, products - along[:, which].T @ common, square[which], likelihood
 
     def run(self, data: Array) -> Gain:
-        """Compute the gains for one or many data sets.
-
-        Parameters
-        ----------
-        data : ndarray, shape (n, n_sets)
-            Misfits. [in]
-
-        Returns
-        -------
-        Gain
-            Gains of all candidates in all sets.
-        """
-        n = len(data)
+        """Compute the gains for one or many data sets."""
         best = np.full((self.columns.shape[1], data.shape[1]), -np.inf)
         null = np.full(data.shape[1], -np.inf)
-        for index in range(len(self._parts)):
-            rest, along = self._base(data, index)
-            _weighted, square, _held, log_determinant = self._parts[index]
-            flat = -0.5 * n * np.log(rest / n) - 0.5 * log_determinant
-            null = np.maximum(null, flat)
-            usable = square > 1e-9 * np.einsum("ij,ij->j", self.columns, self.columns)
-            drop = np.where(usable, 1.0, 0.0)[:, None] * along**2 / np.where(usable, square, 1.0)[:, None]
-            allowed = (self.signs[:, None] == 0) | (np.sign(along) == self.signs[:, None])
-            drop = np.where(allowed, drop, 0.0)
-            left = np.maximum(rest - drop, 1e-12 * rest)
-            best = np.maximum(best, -0.5 * n * np.log(left / n) - 0.5 * log_determinant)
+        for _rest, along, square, likelihood in self._levels(data):
+            null = np.maximum(null, likelihood())
+            best = np.maximum(best, likelihood(self._drop(along, square)))
         return Gain(best - null, null)
 
-    def pairs(self, data: Array, pool: Array) -> Array:
-        """Gain in log-likelihood of each candidate together with each of a few partners.
+    def largest(self, data: Array, penalty: Array) -> Array:
+        """Largest gain less its penalty over all candidates, for each of many data sets: what chance makes of it."""
+        kept = np.flatnonzero(np.isfinite(penalty))
+        kept = kept[np.argsort(penalty[kept], kind="stable")]
+        null = np.full(data.shape[1], -np.inf)
+        best = null[None].copy()
+        if not len(kept):
+            return np.asarray(best[0])
+        # Of candidates with the same penalty only the one that explains most counts.
+        values, starts = np.unique(penalty[kept], return_index=True)
+        for _rest, along, square, likelihood in self._levels(data, kept):
+            null = np.maximum(null, likelihood())
+            most = np.maximum.reduceat(self._drop(along, square, kept), starts)
+            best = np.maximum(best, likelihood(most) - values[:, None])
+        return np.asarray(best.max(axis=0) - null)
 
-        Parameters
-        ----------
-        data : ndarray, shape (n,)
-            Misfit. [in]
-        pool : ndarray of int, shape (n_pool,)
-            The partners.
+    def _drop(self, along: Array, square: Array, which: NDArray[np.intp] | slice = slice(None)) -> Array:
+        """What each candidate takes off the residual sum of squares, from its products with the data."""
+        signs, only = self.signs[which], self.exact[which]
+        usable = square > 1e-9 * self.length[which]
+        one = np.flatnonzero(signs)
+        along[one] = np.maximum(along[one] * signs[one, None], 0.0)
+        drop = along * along
+        drop *= np.where(usable, 1.0 / np.where(usable, square, 1.0), 0.0)[:, None]
+        fixed = np.flatnonzero(np.isfinite(only))
+        value = (only * np.where(signs, signs, 1))[fixed, None]
+        drop[fixed] = np.maximum(2.0 * value * along[fixed] - value**2 * square[fixed, None], 0.0)
+        return np.asarray(drop)
 
-        Returns
-        -------
-        ndarray, shape (n_candidates, n_pool)
-            Gain over the null, profiled over scale and tail scatter; −inf where the two are alike, or one of them
-            would have the wrong sign. [1]
-        """
-        n = len(data)
-        best = np.full((self.columns.shape[1], len(pool)), -np.inf)
-        null = -np.inf
-        for index in range(len(self._parts)):
-            rest, along = self._base(data[:, None], index)
-            weighted, square, _held, log_determinant = self._parts[index]
-            null = max(null, float(-0.5 * n * np.log(rest[0] / n) - 0.5 * log_determinant))
-            cross = self.columns.T @ weighted[:, pool]
+    def pairs(self, data: Array, pool: NDArray[np.intp]) -> Array:
+        """Gain in log-likelihood of each candidate together with each of a few partners."""
+        best, null = np.full((self.columns.shape[1], len(pool)), -np.inf), -np.inf
+        levels = zip(self._parts, self._levels(data[:, None]), strict=True)
+        for (_root, low, _square, _log), (_rest, along, square, likelihood) in levels:
+            null = max(null, float(likelihood()[0]))
+            cross = self.columns.T @ self._weighted[:, pool] - low.T @ low[:, pool]
             own = np.maximum(square, 1e-300)
             apart = square[:, None] * own[pool] - cross**2
             clear = apart > 1e-3 * own[:, None] * own[pool]
@@ -132,51 +132,25 @@ class Screen:
             partner = (along[pool, 0] * own[:, None] - cross * along) / apart
             clear &= (self.signs[:, None] == 0) | (np.sign(value) == self.signs[:, None])
             clear &= (self.signs[pool] == 0) | (np.sign(partner) == self.signs[pool])
-            explained = value * along + partner * along[pool, 0]
-            remaining = np.maximum(rest[0] - np.where(clear, explained, 0.0), 1e-12 * rest[0])
-            likelihood = -0.5 * n * np.log(remaining / n) - 0.5 * log_determinant
-            best = np.maximum(best, np.where(clear, likelihood, -np.inf))
+            explained = np.where(clear, value * along + partner * along[pool, 0], 0.0)
+            best = np.maximum(best, np.where(clear, likelihood(explained), -np.inf))
         return np.asarray(best - null)
 
     def tail_ratio(self, data: Array) -> tuple[float, float]:
-        """Most likely scatter between tails and common scale of one data set, candidates left out.
-
-        Parameters
-        ----------
-        data : ndarray, shape (n,)
-            Misfit. [in]
-
-        Returns
-        -------
-        ratio : float
-            Scatter between tails over scatter of a row. [1]
-        scale : float
-            Common standard deviation. [in]
-        """
-        n = len(data)
-        likelihood, scales = [], []
-        for index in range(len(self._parts)):
-            rest, _along = self._base(data[:, None], index)
-            scales.append(float(np.sqrt(rest[0] / n)))
-            likelihood.append(-0.5 * n * np.log(rest[0] / n) - 0.5 * self._parts[index][3])
-        most = int(np.argmax(likelihood))
-        return self.noise.tail_ratios[most], scales[most]
+        """Most likely scatter between tails and common scale of one data set, candidates left out."""
+        found = [(float(likelihood()[0]), float(rest[0])) for rest, _a, _s, likelihood in self._levels(data[:, None])]
+        most = max(range(len(found)), key=lambda k: found[k][0])
+        return self.noise.tail_ratios[most], float(np.sqrt(found[most][1] / len(data)))
 
 
 @dataclass(frozen=True)
 class Fit:
     """Least-squares fit of some columns under the noise model.
 
-    Parameters
-    ----------
-    values : ndarray, shape (k,)
-        Parameters.
-    errors : ndarray, shape (k,)
-        Their standard errors.
-    log_likelihood : float
-        Profiled over scale and tail scatter. [1]
-    tail_ratio, scale : float
-        Scatter between tails over scatter of a row [1], common standard deviation [in].
+    values, shape (k,): parameters.
+    errors, shape (k,): their standard errors.
+    log_likelihood: profiled over scale and tail scatter. [1]
+    tail_ratio, scale: scatter between tails over scatter of a row [1], common standard deviation [in].
     """
 
     values: Array
@@ -186,23 +160,39 @@ class Fit:
     scale: float
 
 
+def shrunk(noise: NoiseModel, free: Array, columns: Array, covariance: Array, data: Array) -> tuple[Array, Array]:
+    """Fit free columns, and columns whose values are known beforehand to a covariance: values, and their covariance."""
+    both = np.hstack([free, columns])
+    scale = noise.scale_in
+    product, _log = noise.precision_times(np.column_stack([both, data]), noise.tail_ratios[-1])
+    inner = both.T @ product[:, :-1] / scale**2
+    k = free.shape[1]
+    inner[k:, k:] += np.linalg.inv(covariance)
+    inverse = np.linalg.pinv(inner)
+    return inverse @ (both.T @ product[:, -1]) / scale**2, np.asarray(inverse, float)
+
+
+def held_out_part(
+    noise: NoiseModel, columns: Array, data: Array, fold: NDArray[np.int64], block: Block | None = None
+) -> Array:
+    """What a model explains of each row that was fitted to the rows of the other folds alone. [in]"""
+    explained = np.zeros(len(data))
+    for k in np.unique(fold):
+        train, test = fold != k, fold == k
+        used = np.any(columns[train] != 0.0, axis=0)
+        held, part = columns[:, used], noise.take(train)
+        if not train.any():
+            continue
+        if block is not None:
+            values, _covariance = shrunk(part, held[train], block.columns[train], block.covariance, data[train])
+            explained[test] = np.hstack([held, block.columns])[test] @ values
+        elif used.any():
+            explained[test] = held[test] @ fit(part, held[train], data[train]).values
+    return explained
+
+
 def fit(noise: NoiseModel, columns: Array, data: Array) -> Fit:
-    """Fit columns to one data set, scale and tail scatter included.
-
-    Parameters
-    ----------
-    noise : NoiseModel
-        The noise.
-    columns : ndarray, shape (n, k)
-        Effects per unit of the parameters.
-    data : ndarray, shape (n,)
-        Misfit. [in]
-
-    Returns
-    -------
-    Fit
-        The most likely fit.
-    """
+    """Fit columns to one data set, scale and tail scatter included."""
     n, k = columns.shape
     best: Fit | None = None
     for ratio in noise.tail_ratios:

@@ -7,13 +7,16 @@ perhaps smaller than declared. All of these are estimated together by expectatio
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+
 Array = NDArray[np.float64]
 
+# Set in 2026 on simulated wear (tests/diagnosis/test_wear.py and the study's tuning seeds); not re-tuned.
 _ROUNDS = 25
 # The split between errors of reading and scatter of wear is left alone until the lines have settled.
 _SETTLED = 3
@@ -30,21 +33,24 @@ _LEAST_READING_IN2 = 1e-12
 # A row further out than this many standard deviations counts less.
 _FAR = 3.0
 
+# A reading is overruled by at most this many standard deviations of its error.
+_MOST_SIGMAS = 2.0
+# Wear of a joint that nobody read over the mean of the read ones: standard deviation between joints of the fleet,
+# between gears, and between inspections of one gear. Supposed, from the read joints of simulated fleets. [1]
+JOINTS_APART, GEARS_APART, ROWS_APART = 0.35, 0.5, 0.4
+# How much of what a gear's read joints are worn beyond the fleet's is to be expected of the others: the variance
+# between gears over that plus a fourth of the variance between the joints of a gear, of the same fleets. [1]
+OWN_GEAR = 0.5
+
 
 @dataclass(frozen=True)
 class WearHistory:
-    """One joint's expected clearance in each row, and the variances about it.
+    """Expected clearance of joints in each row, and the variances about it; 0 where a joint was never read.
 
-    Parameters
-    ----------
-    expected_in : ndarray, shape (n,)
-        Expected clearance. [in]
-    unsure_in2 : ndarray, shape (n,)
-        Variance of the expectation. [in²]
-    scatter_in2 : ndarray, shape (n,)
-        Variance of the true clearance about it. [in²]
-    reading_in2 : ndarray, shape (n,)
-        Variance of a reading about the true clearance. [in²]
+    expected_in, shape (n, ...): expected clearance. [in]
+    unsure_in2, shape (n, ...): variance of the expectation. [in²]
+    scatter_in2, shape (n, ...): variance of the true clearance about it. [in²]
+    reading_in2, shape (n, ...): variance of a reading about the true clearance. [in²]
     """
 
     expected_in: Array
@@ -53,23 +59,59 @@ class WearHistory:
     reading_in2: Array
 
 
-def landings_of(landings: Array | None, gears: NDArray[np.intp]) -> tuple[Array, NDArray[np.bool_]]:
-    """Fill gaps in the landings by the mean of the gear's other inspections, else of the fleet.
+@dataclass(frozen=True)
+class LikelyClearances:
+    """Clearances behind the readings, those that were not read filled, and what is not known of them.
 
-    Parameters
-    ----------
-    landings : ndarray, shape (n,), or None
-        Landings, NaN where unknown.
-    gears : ndarray of int, shape (n,)
-        Number of the gear of each row.
-
-    Returns
-    -------
-    kilo : ndarray, shape (n,)
-        Thousands of landings; 0 if none is known.
-    known : ndarray of bool, shape (n,)
-        Rows that wear may be learned from: those with landings, or all of them if none has any.
+    likely_in, shape (n, n_joints): most likely radial clearances. [in]
+    u_row_in, u_gear_in, u_fleet_in, shape (n, n_joints): standard uncertainty of what was not read: of each row, common
+        to a gear's rows, common to all rows. [in]
+    u_read_in, shape (n, n_joints): standard uncertainty of what was read. [in]
     """
+
+    likely_in: Array
+    u_row_in: Array
+    u_gear_in: Array
+    u_fleet_in: Array
+    u_read_in: Array
+
+
+def likely_clearances(table: DiagnosisTable) -> LikelyClearances:
+    """Estimate the clearances behind the readings, and those that were not read.
+
+    A gear's joint wears along its own history (`wear`). A reading is drawn towards what that makes expect as far as
+    its uncertainty deserves it, judged by how much the readings really scatter (regression calibration). Otherwise
+    the scatter of the readings alone looks like a cause, because a reading that is too large by chance
+    predicts too much. A joint that nobody read is latent: it wears with landings as the read joints do on average,
+    in part as those of its own gear, and how far it lies off that is unknown for the fleet, each gear and each row.
+    """
+    readings = table.clearance_in
+    history, kilo, landed = fleet_history(table)
+    known, noise = np.isfinite(readings), history.reading_in2
+    # What wear is to be expected of an inspection without its landings is not known: its readings stand.
+    both = history.scatter_in2 + noise
+    trust = np.where(landed[:, None] & (both > 0.0), history.scatter_in2 / np.where(both > 0.0, both, 1.0), 1.0)
+    read = np.where(known, readings, history.expected_in)
+    drawn = history.expected_in + trust * (read - history.expected_in)
+    # A reading is never overruled by more than its own uncertainty makes likely.
+    reach = _MOST_SIGMAS * np.sqrt(noise)
+    likely = np.where(known, np.clip(drawn, read - reach, read + reach), drawn)
+    spread = np.where(known, 0.0, np.sqrt(history.scatter_in2))
+    shared = np.where(known, 0.0, np.sqrt(history.unsure_in2))
+    left = np.where(known, np.sqrt(trust * noise + (1.0 - trust) ** 2 * history.unsure_in2), 0.0)
+    common = np.zeros_like(readings)
+    seen = np.isfinite(readings).any(axis=0)
+    if seen.any() and not seen.all():
+        own = np.mean(history.expected_in[:, seen], axis=1)
+        line = np.polyval(np.polyfit(kilo, own, 1 if np.ptp(kilo) > 0.0 else 0), kilo)
+        worn = np.maximum(line + OWN_GEAR * (own - line), 0.0)[:, None]
+        likely[:, ~seen], common[:, ~seen] = worn, JOINTS_APART * worn
+        shared[:, ~seen], spread[:, ~seen] = GEARS_APART * worn, ROWS_APART * worn
+    return LikelyClearances(np.maximum(likely, 0.0), spread, shared, common, left)
+
+
+def landings_of(landings: Array | None, gears: NDArray[np.intp]) -> tuple[Array, NDArray[np.bool_]]:
+    """Fill gaps in the landings by the mean of the gear's other inspections, else of the fleet."""
     if landings is None or not np.isfinite(landings).any():
         return np.zeros(len(gears)), np.ones(len(gears), bool)
     known = np.isfinite(landings)
@@ -79,36 +121,19 @@ def landings_of(landings: Array | None, gears: NDArray[np.intp]) -> tuple[Array,
     return np.where(known, landings, mean[gears]) / 1000.0, known
 
 
-def joint_history(
-    reading_in: Array, gears: NDArray[np.intp], kilo: Array, landed: NDArray[np.bool_], u_in: Array
-) -> WearHistory | None:
-    """Expect one joint's clearance in each row, readings rounded to the steps that they show.
-
-    Parameters
-    ----------
-    reading_in : ndarray, shape (n,)
-        Readings of the joint, NaN where it was not read. [in]
-    gears : ndarray of int, shape (n,)
-        Number of the gear of each row, from 0.
-    kilo : ndarray, shape (n,)
-        Thousands of landings.
-    landed : ndarray of bool, shape (n,)
-        Rows that wear may be learned from.
-    u_in : ndarray, shape (n,)
-        Declared standard deviation of a reading. [in]
-
-    Returns
-    -------
-    WearHistory or None
-        Expectation and variances; None where no wear was ever read.
-    """
-    known = np.isfinite(reading_in)
-    if not np.any(reading_in[known] > 0.0):
-        return None
-    rounded = _resolution(reading_in[known]) ** 2 / 12.0
-    told = np.where(landed, reading_in, np.nan) if np.any(known & landed) else reading_in
-    history = wear_history(told, gears, kilo, u_in**2 + rounded)
-    return replace(history, reading_in2=np.maximum(history.reading_in2, rounded))
+def fleet_history(table: DiagnosisTable) -> tuple[WearHistory, Array, NDArray[np.bool_]]:
+    """Expect every joint in each row, readings rounded to the steps they show; the landings, and which are known."""
+    readings, gears = table.clearance_in, np.unique(table.gears, return_inverse=True)[1]
+    kilo, landed = landings_of(table.quantities.get("gear_landings"), gears)
+    worn = np.flatnonzero(np.nan_to_num(readings).max(axis=0) > 0.0)
+    rounded = np.array([_resolution(column[np.isfinite(column)]) for column in readings[:, worn].T]) ** 2 / 12.0
+    told = np.where(landed[:, None], readings, np.nan)[:, worn]
+    told = np.where(np.isfinite(told).any(axis=0), told, readings[:, worn])
+    own = wear_history(told, gears, kilo, table.gauge_u_in[:, None] ** 2 + rounded)
+    parts = (own.expected_in, own.unsure_in2, own.scatter_in2, np.maximum(own.reading_in2, rounded))
+    every = np.zeros((len(parts), *readings.shape))
+    every[:, :, worn] = parts
+    return WearHistory(*every), kilo, landed
 
 
 def _resolution(values: Array) -> float:
@@ -122,92 +147,87 @@ def _resolution(values: Array) -> float:
 
 
 def wear_history(reading_in: Array, gears: NDArray[np.intp], kilo: Array, reading_in2: Array) -> WearHistory:
-    """Expect one joint's clearance in each row from what was read of its gear and of the fleet.
+    """Expect joints in each row from what was read of them, of its gear and of the fleet; each joint on its own.
 
-    Parameters
-    ----------
-    reading_in : ndarray, shape (n,)
-        Readings of the joint, NaN where it was not read. [in]
-    gears : ndarray of int, shape (n,)
-        Number of the gear of each row, from 0.
-    kilo : ndarray, shape (n,)
-        Thousands of landings.
-    reading_in2 : ndarray, shape (n,)
-        Declared variance of a reading. [in²]
-
-    Returns
-    -------
-    WearHistory
-        Expectation and variances.
+    reading_in, shape (n,) or (n, n_joints): readings, NaN where there is none. [in]
+    gears, kilo, shape (n,): gear of each row, and its landings in thousands.
+    reading_in2: variance of each reading as declared, of the same shape. [in²]
     """
-    known = np.isfinite(reading_in)
-    gear, x, y = gears[known], kilo[known], reading_in[known]
-    declared = np.maximum(reading_in2[known], _LEAST_READING_IN2)
-    many = np.bincount(gear, minlength=gears.max() + 1)[gear] >= 3
-    fleet, spread = _fleet(x, y)
-    least = max(_LEAST_LEVEL * float(np.mean(y)), _TIGHT_IN)
-    least_spread = 1e-6 * spread
+    shape, count = reading_in.shape, int(gears.max()) + 1
+    # Joints run along the last axis; a row that lacks a joint has no weight in it.
+    y = reading_in.reshape(len(gears), -1)
+    known, x = np.isfinite(y), kilo[:, None]
+    y, here = np.where(known, y, 0.0), known.astype(float)
+    declared = np.maximum(reading_in2.reshape(y.shape), _LEAST_READING_IN2)
+    by_gear = (np.arange(count)[:, None] == gears).astype(float)
+    # Gears of which a joint was never read say nothing about the fleet.
+    read = by_gear @ here
+    many = known & (read[gears] >= 3)
+    mean = y.sum(axis=0) / here.sum(axis=0)
+    fleet, spread = _fleet(x, y, here)
+    least, least_spread = np.maximum(_LEAST_LEVEL * mean, _TIGHT_IN), 1e-6 * spread
     level = np.maximum(fleet[0] + fleet[1] * x, least)
-    scatter, share, far = _SCATTER**2, 1.0, np.ones(len(y))
-    lines, unsure = np.empty((0, 2)), np.empty((0, 2, 2))
-    # Gears of which this joint was never read say nothing about the fleet.
-    seen = np.unique(gear)
+    scatter, share, far = np.full(y.shape[1], _SCATTER**2), np.ones(y.shape[1]), np.ones(y.shape)
+    seen = (read > 0.0) / (read > 0.0).sum(axis=0)
+    told = many.sum(axis=0) >= _LEAST_ROWS
+    lines = unsure = np.empty(0)
     for step in range(_ROUNDS):
         variance = share * declared + scatter * level**2
-        lines, unsure = _lines(gear, gears.max() + 1, x, y, far / variance, fleet, spread)
-        fleet = lines[seen].mean(axis=0)
-        apart = lines[seen] - fleet
-        spread = (unsure[seen].sum(axis=0) + apart.T @ apart) / len(seen) + least_spread
-        fitted = lines[gear, 0] + lines[gear, 1] * x
-        square = (y - fitted) ** 2 + _variance(unsure, gear, x)
+        lines, unsure = _lines(by_gear, x, y, here * far / variance, fleet, spread)
+        fleet = np.sum(seen * lines, axis=1)
+        a, b = lines - fleet[:, None]
+        spread = np.sum(seen * (unsure + np.array([a * a, a * b, b * b])), axis=1) + least_spread
+        fitted = lines[0][gears] + lines[1][gears] * x
+        square = (y - fitted) ** 2 + _variance(unsure, gears, x)
         far = np.minimum(1.0, _FAR * np.sqrt(variance / np.maximum(square, 1e-30)))
         square = square * far**2
-        if many.sum() >= _LEAST_ROWS:
-            worn = scatter * level[many] ** 2
-            read = share * declared[many]
-            part = worn / (worn + read)
-            scatter = float(np.mean((part**2 * square[many] + part * read) / level[many] ** 2))
-            if step >= _SETTLED:
-                error = np.mean(((1.0 - part) ** 2 * square[many] + (1.0 - part) * worn) / declared[many])
-                share = min(float(error), 1.0)
+        worn, error = scatter * level**2, share * declared
+        part, size = worn / (worn + error), np.maximum(many.sum(axis=0), 1)
+        larger = np.sum(many * (part**2 * square + part * error) / level**2, axis=0) / size
+        better = np.sum(many * ((1.0 - part) ** 2 * square + (1.0 - part) * worn) / declared, axis=0) / size
+        scatter = np.where(told, larger, scatter)
+        if step >= _SETTLED:
+            share = np.where(told, np.minimum(better, 1.0), share)
         level = np.maximum(fitted, least)
-    expected = lines[gears, 0] + lines[gears, 1] * kilo
-    return WearHistory(
+    expected = lines[0][gears] + lines[1][gears] * x
+    found = (
         np.maximum(expected, 0.0),
-        _variance(unsure, gears, kilo),
+        _variance(unsure, gears, x),
         scatter * np.maximum(expected, least) ** 2,
-        share * reading_in2,
+        share * reading_in2.reshape(y.shape),
     )
+    return WearHistory(*(values.reshape(shape) for values in found))
 
 
-def _fleet(x: Array, y: Array) -> tuple[Array, Array]:
-    """Line through all readings, and how widely levels and rates of single gears may lie about it."""
-    sloped = np.ptp(x) > 0.0
-    line = np.polyfit(x, y, 1)[::-1] if sloped else np.array([np.mean(y), 0.0])
-    rest = max(float(np.var(y - line[0] - line[1] * x)), 1e-12)
-    return line, np.diag([rest, rest / float(np.var(x)) if sloped else 1e-30])
+def _fleet(x: Array, y: Array, here: Array) -> tuple[Array, Array]:
+    """Line through all readings, (2, n_joints), and how widely levels and rates of single gears may lie about it."""
+    size = here.sum(axis=0)
+    mean_x, mean_y = (here * x).sum(axis=0) / size, (here * y).sum(axis=0) / size
+    off = here * (x - mean_x)
+    apart = np.sum(off * off, axis=0)
+    sloped = np.where(here > 0.0, np.abs(off), 0.0).max(axis=0) > 0.0
+    rate = np.where(sloped, np.sum(off * y, axis=0) / np.where(sloped, apart, 1.0), 0.0)
+    left = here * (y - mean_y - rate * (x - mean_x))
+    rest = np.maximum(np.sum(left**2, axis=0) / size, 1e-12)
+    rates = np.where(sloped, rest * size / np.where(sloped, apart, 1.0), 1e-30)
+    return np.array([mean_y - rate * mean_x, rate]), np.array([rest, np.zeros_like(rest), rates])
 
 
-def _lines(
-    gear: NDArray[np.intp], count: int, x: Array, y: Array, weight: Array, fleet: Array, spread: Array
-) -> tuple[Array, Array]:
-    """Level and rate of each gear drawn to the fleet's, (count, 2), and their covariances, (count, 2, 2)."""
-
-    def total(values: Array) -> Array:
-        return np.bincount(gear, weight * values, minlength=count).astype(float)
-
-    prior = np.linalg.inv(spread)
-    precision = np.empty((count, 2, 2))
-    precision[:, 0, 0] = total(np.ones_like(x)) + prior[0, 0]
-    precision[:, 0, 1] = precision[:, 1, 0] = total(x) + prior[0, 1]
-    precision[:, 1, 1] = total(x * x) + prior[1, 1]
-    unsure = np.linalg.inv(precision)
-    right = np.column_stack([total(y), total(x * y)]) + prior @ fleet
-    lines: Array = np.einsum("gij,gj->gi", unsure, right)
-    return lines, np.asarray(unsure, float)
+def _lines(by_gear: Array, x: Array, y: Array, weight: Array, fleet: Array, spread: Array) -> tuple[Array, Array]:
+    """Level and rate of each gear drawn to the fleet's, (2, n_gears, n_joints), and their covariances (aa, ab, bb)."""
+    p = np.array([spread[2], -spread[1], spread[0]]) / (spread[0] * spread[2] - spread[1] ** 2)
+    j = weight.shape[1]
+    sums = by_gear @ np.hstack([weight, weight * x, weight * x * x, weight * y, weight * x * y])
+    w, wx, wxx, wy, wxy = sums.reshape(len(by_gear), 5, j).swapaxes(0, 1)
+    aa, ab, bb = w + p[0], wx + p[1], wxx + p[2]
+    right = wy + p[0] * fleet[0] + p[1] * fleet[1], wxy + p[1] * fleet[0] + p[2] * fleet[1]
+    det = aa * bb - ab * ab
+    unsure = np.array([bb, -ab, aa]) / det
+    lines = np.array([unsure[0] * right[0] + unsure[1] * right[1], unsure[1] * right[0] + unsure[2] * right[1]])
+    return lines, unsure
 
 
-def _variance(unsure: Array, gear: NDArray[np.intp], x: Array) -> Array:
+def _variance(unsure: Array, gears: NDArray[np.intp], x: Array) -> Array:
     """Variance of each row's expectation by its gear's level and rate. [in²]"""
-    own = unsure[gear]
-    return np.asarray(own[:, 0, 0] + 2.0 * x * own[:, 0, 1] + x * x * own[:, 1, 1])
+    own = unsure[:, gears]
+    return np.asarray(own[0] + 2.0 * x * own[1] + x * x * own[2])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.gear.directions import WorstCase, worst_case
-from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.gear.model import LinkageModel, links_from
 
 Array = NDArray[np.float64]
 
@@ -18,18 +18,13 @@ Array = NDArray[np.float64]
 class Adjustment:
     """What differs from the plain model for each of n gears.
 
-    Parameters
-    ----------
-    clearance_in : ndarray, shape (n, n_joints)
-        Radial clearances that act. [in]
-    changed : mapping of str to ndarray of shape (n,)
-        Change of numbers of the linkage, added to the nominal ones, by name. [in, rad or 1]
-    scaled : mapping of str to ndarray of shape (n,)
-        Factors on numbers of the linkage, by name. [1]
-    rate_factor : ndarray, shape (n,)
-        Factor on the calibration rate. [1]
-    offset_in : ndarray, shape (n,)
-        Displacement that comes on top, whatever the clearances. [in]
+    clearance_in, shape (n, n_joints): radial clearances that act. [in]
+    changed, shape (n,): change of numbers of the linkage, added to the nominal ones, by name. [in, rad or 1]
+    scaled, shape (n,): factors on numbers of the linkage, by name. [1]
+    rate_factor, shape (n,): factor on the calibration rate. [1]
+    offset_in, shape (n,): displacement that comes on top, whatever the clearances. [in]
+    direction_factors, shape (n_joints,): share of each clearance that acts along its worst direction where loads rest
+        the pin elsewhere, −1 to 1: the prediction is then the displacement as loaded, an expectation and no bound. [1]
     """
 
     clearance_in: Array
@@ -37,19 +32,17 @@ class Adjustment:
     scaled: Mapping[str, Array] = field(default_factory=dict)
     rate_factor: Array | None = None
     offset_in: Array | None = None
+    direction_factors: Array | None = None
+
+    @property
+    def acting_in(self) -> Array:
+        """Clearances along their worst directions, negative where a pin rests on the other side. [in]"""
+        return self.clearance_in if self.direction_factors is None else self.clearance_in * self.direction_factors
 
     def numbers(self, model: LinkageModel) -> dict[str, Array]:
         """Return the changed numbers of one linkage.
 
-        Parameters
-        ----------
-        model : LinkageModel
-            The linkage.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n,)
-            New values by name. [in, rad or 1]
+        Returns, shape (n,): new values by name. [in, rad or 1]
         """
         nominal = dict(zip(model.kernel.parameter_names, model.kernel.parameters.tolist(), strict=True))
         names = [*self.changed, *(name for name in self.scaled if name not in self.changed)]
@@ -58,24 +51,24 @@ class Adjustment:
             for name in names
         }
 
+    def take(self, rows: NDArray[np.intp]) -> Adjustment:
+        """Some of the gears."""
+        return Adjustment(
+            self.clearance_in[rows],
+            {name: np.asarray(values)[rows] for name, values in self.changed.items()},
+            {name: np.asarray(values)[rows] for name, values in self.scaled.items()},
+            None if self.rate_factor is None else self.rate_factor[rows],
+            None if self.offset_in is None else self.offset_in[rows],
+        )
+
 
 def adjusted_worst_case(model: LinkageModel, adjustment: Adjustment) -> WorstCase:
-    """Worst displacement of each gear with its adjustment.
-
-    Parameters
-    ----------
-    model : LinkageModel
-        The calibrated linkage.
-    adjustment : Adjustment
-        The clearances that act and what else differs.
-
-    Returns
-    -------
-    WorstCase
-        Displacements, rate and offset included, and directions. [in]
-    """
+    """Worst displacement of each gear with its adjustment; with direction factors the one as loaded, twice."""
     plain = worst_case(model, adjustment.clearance_in, adjustment.numbers(model))
     over, under = plain.over_in, plain.under_in
+    if adjustment.direction_factors is not None:
+        links = links_from(adjustment.acting_in, plain.over_directions)
+        over = under = model.displacement(links, adjustment.numbers(model))
     if adjustment.rate_factor is not None:
         over, under = over * adjustment.rate_factor, under * adjustment.rate_factor
     if adjustment.offset_in is not None:

@@ -11,14 +11,9 @@ NOT_STATED = "not stated"
 class Stage:
     """One of the four stages of the cycle.
 
-    Parameters
-    ----------
-    name : str
-        Down Lock, Moving Up, Moving Down or Up Lock.
-    meaning : str
-        What happens in it.
-    plunger : str
-        Position of the reversing-valve plunger: in, mid or out.
+    name: Down Lock, Moving Up, Moving Down or Up Lock.
+    meaning: what happens in it.
+    plunger: position of the reversing-valve plunger: in, mid or out.
     """
 
     name: str
@@ -30,16 +25,10 @@ class Stage:
 class ValveState:
     """One combination of plunger position and oil flow.
 
-    Parameters
-    ----------
-    plunger : str
-        in, mid or out.
-    flow : str
-        Direction in which the oil moves: retracting or extending.
-    stage : str
-        Stage of the cycle in which the combination occurs.
-    result : str
-        What the source says follows, or "not stated".
+    plunger: in, mid or out.
+    flow: direction in which the oil moves: retracting or extending.
+    stage: stage of the cycle in which the combination occurs.
+    result: what the source says follows, or "not stated".
     """
 
     plunger: str
@@ -52,20 +41,11 @@ class ValveState:
 class RetractionCycle:
     """Stages, valve combinations and what a misplaced plunger means.
 
-    Parameters
-    ----------
-    stages : tuple of Stage
-        The four stages.
-    release : tuple of str
-        Steps of the release of the Down Lock, in order.
-    retraction_order, extension_order : tuple of str
-        Order of doors and gear.
-    valve : tuple of ValveState
-        The six combinations of three positions and two flow directions.
-    beyond, short, within : str
-        What a plunger beyond, short of and at mid-position means.
-    source : str
-        Where all this stands.
+    release: steps of the release of the Down Lock, in order.
+    retraction_order, extension_order: order of doors and gear.
+    valve: the six combinations of three positions and two flow directions.
+    beyond, short, within: what a plunger beyond, short of and at mid-position means.
+    source: where all this stands.
     """
 
     stages: tuple[Stage, ...]
@@ -79,20 +59,7 @@ class RetractionCycle:
     source: str
 
     def symptom(self, displacement_in: float, margin_in: float) -> str:
-        """Say what a plunger at this displacement means, in the source's terms.
-
-        Parameters
-        ----------
-        displacement_in : float
-            Displacement from mid-position, over-travel positive. [in]
-        margin_in : float
-            Allowed displacement. [in]
-
-        Returns
-        -------
-        str
-            The sentence for within, beyond or short.
-        """
+        """Say what a plunger at this displacement means, in the source's terms."""
         if abs(displacement_in) <= margin_in:
             return self.within
         return self.beyond if displacement_in > 0 else self.short

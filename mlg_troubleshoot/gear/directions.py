@@ -32,13 +32,9 @@ _IN_CACHE = 4096
 class WorstCase:
     """Worst displacement of each gear in both senses, with the directions that give it.
 
-    Parameters
-    ----------
-    over_in, under_in : ndarray, shape (n,)
-        Signed displacement in the worst directions for over-travel and under-travel; NaN where the linkage
-        does not close. [in]
-    over_directions, under_directions : ndarray, shape (n, n_joints)
-        Directions of the virtual links. [rad]
+    over_in, under_in, shape (n,): signed displacement in the worst directions for over-travel and under-travel; NaN
+      where the linkage does not close. [in]
+    over_directions, under_directions, shape (n, n_joints): directions of the virtual links. [rad]
     """
 
     over_in: Array
@@ -64,30 +60,26 @@ def worst_case(model: LinkageModel, clearance_in: Array, changed: Mapping[str, A
     Along one joint's circle the displacement is a smooth periodic function: it is sampled at eight angles,
     and the maximum of the trigonometric polynomial through them is taken.
 
-    Parameters
-    ----------
-    model : LinkageModel
-        The calibrated linkage.
-    clearance_in : ndarray, shape (n, n_joints)
-        Radial clearances. [in]
-    changed : mapping of str to ndarray of shape (n,), optional
-        Numbers of the linkage that differ from the nominal ones, row by row.
-
-    Returns
-    -------
-    WorstCase
-        Displacements and directions of both senses.
+    clearance_in, shape (n, n_joints): radial clearances. [in]
+    changed, shape (n,): numbers of the linkage that differ from the nominal ones, row by row.
     """
+    over, over_directions = worst_of_sense(model, clearance_in, 1.0, changed)
+    under, under_directions = worst_of_sense(model, clearance_in, -1.0, changed)
+    return WorstCase(over, under, over_directions, under_directions)
+
+
+def worst_of_sense(
+    model: LinkageModel, clearance_in: Array, sense: float = 1.0, changed: Mapping[str, Array] | None = None
+) -> tuple[Array, Array]:
+    """Find the worst displacement of one sense, over-travel if 1 and under-travel if −1, and its directions."""
     clearance = np.atleast_2d(np.asarray(clearance_in, float))
     n, joints = clearance.shape
-    over, under = np.empty(n), np.empty(n)
-    angles = np.empty((2, n, joints))
+    moved, angles = np.empty(n), np.empty((n, joints))
     for start in range(0, n, _ROWS):
         rows = slice(start, min(start + _ROWS, n))
         part = {name: np.asarray(value)[rows] for name, value in (changed or {}).items()}
-        over[rows], angles[0, rows] = _sequential(model, clearance[rows], 1.0, part)
-        under[rows], angles[1, rows] = _sequential(model, clearance[rows], -1.0, part)
-    return WorstCase(over, under, angles[0], angles[1])
+        moved[rows], angles[rows] = _sequential(model, clearance[rows], sense, part)
+    return moved, angles
 
 
 def _sequential(
@@ -110,15 +102,8 @@ def _sequential(
 def _argmax_on_circle(sampled: Array) -> Array:
     """Angle of the maximum of the trigonometric polynomials through samples at eight equal angles.
 
-    Parameters
-    ----------
-    sampled : ndarray, shape (8, n)
-        Samples. [in]
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Angles. [rad]
+    sampled, shape (8, n): samples. [in]
+    Returns, shape (n,): angles. [rad]
     """
     angle: Array = _ANGLES[np.argmax(sampled, axis=0)]
     real, imaginary = _harmonics(np.nan_to_num(sampled))
@@ -145,17 +130,9 @@ def _harmonics(sampled: Array) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
 def random_directions(n_joints: int, n: int) -> Array:
     """Uniform directions for all joints, spread evenly by a rank-1 lattice: the same set at every call.
 
-    Parameters
-    ----------
-    n_joints : int
-        Number of joints.
-    n : int
-        Number of sets of directions.
-
-    Returns
-    -------
-    ndarray, shape (n, n_joints)
-        Directions. [rad]
+    n_joints: number of joints.
+    n: number of sets of directions.
+    Returns, shape (n, n_joints): directions. [rad]
     """
     # Powers of the generalised golden ratio of the dimension: badly approximable together, hence even.
     root = 1.5
@@ -177,28 +154,14 @@ def chance_beyond(
 ) -> Array:
     """Chance that the plunger leaves its margin when every clearance takes a uniformly random direction.
 
-    Parameters
-    ----------
-    model : LinkageModel
-        The calibrated linkage.
-    clearance_in : ndarray, shape (n_gears, n_joints)
-        Radial clearances. [in]
-    margin_in : ndarray, shape (n_gears,)
-        Margin of each gear. [in]
-    n : int
-        Sets of directions to try.
-    changed : mapping of str to ndarray of shape (n_gears,), optional
-        Numbers of the linkage that differ from the nominal ones, row by row.
-    offset_in : ndarray, shape (n_gears,), optional
-        Displacement that comes on top, whatever the directions. [in]
-    rate_factor : ndarray, shape (n_gears,), optional
-        Factor on the calibration rate. [1]
-
-    Returns
-    -------
-    ndarray, shape (n_gears,)
-        Share of the sets of directions that exceed the margin, a position that does not close counted as
-        exceeding it. [1]
+    clearance_in, shape (n_gears, n_joints): radial clearances. [in]
+    margin_in, shape (n_gears,): margin of each gear. [in]
+    n: sets of directions to try.
+    changed, shape (n_gears,): numbers of the linkage that differ from the nominal ones, row by row.
+    offset_in, shape (n_gears,): displacement that comes on top, whatever the directions. [in]
+    rate_factor, shape (n_gears,): factor on the calibration rate. [1]
+    Returns, shape (n_gears,): share of the sets of directions that exceed the margin, a position that does not
+      close counted as exceeding it. [1]
     """
     clearance = np.atleast_2d(np.asarray(clearance_in, float))
     turns = random_directions(clearance.shape[1], n)

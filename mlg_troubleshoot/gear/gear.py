@@ -19,14 +19,9 @@ from mlg_troubleshoot.geometry.mechanism import Mechanism
 class Linkage:
     """One set of numbers for the gear's linkage.
 
-    Parameters
-    ----------
-    name : str
-        ``A`` for the reference of the shipped gear, ``B`` … for its ensemble.
-    mechanism : Mechanism
-        Coordinates and steps.
-    stroke : tuple of float
-        Input at Down Lock and at mid-position. [in]
+    name: ``A`` for the reference of the shipped gear, ``B`` … for its ensemble.
+    mechanism: coordinates and steps.
+    stroke: input at Down Lock and at mid-position. [in]
     """
 
     name: str
@@ -38,12 +33,8 @@ class Linkage:
 class Area:
     """A part of the gear that must be opened to reach its joints.
 
-    Parameters
-    ----------
-    name, description : str
-        Its name and what opening it means.
-    access : Sourced
-        Time to open and close it, once for all joints in it. [min]
+    name, description: its name and what opening it means.
+    access: time to open and close it, once for all joints in it. [min]
     """
 
     name: str
@@ -55,12 +46,8 @@ class Area:
 class TiltedLink:
     """A link whose projected length shrinks when end float lets it tilt.
 
-    Parameters
-    ----------
-    length : str
-        The model's number.
-    floats : tuple of int
-        Joints whose end floats tilt it: both ends of a link, or the pivot of a lever.
+    length: the model's number.
+    floats: joints whose end floats tilt it: both ends of a link, or the pivot of a lever.
     """
 
     length: str
@@ -71,18 +58,11 @@ class TiltedLink:
 class Discrepancies:
     """Where inside the linkage physical causes outside the plain model act.
 
-    Parameters
-    ----------
-    elastic : tuple of str
-        Lengths that hydraulic load stretches.
-    wear_shift : str or None
-        The number that wear of a part outside the joints shifts.
-    contact : tuple of tuple of int
-        Pairs of neighbouring joints.
-    tilt : tuple of TiltedLink
-        Links that end float tilts.
-    bearing_span_in : float
-        Length over which end float tilts a link, nominal. [in]
+    elastic: lengths that hydraulic load stretches.
+    wear_shift: the number that wear of a part outside the joints shifts.
+    contact: pairs of neighbouring joints.
+    tilt: links that end float tilts.
+    bearing_span_in: length over which end float tilts a link, nominal. [in]
     """
 
     elastic: tuple[str, ...] = ()
@@ -110,6 +90,11 @@ class Gear:
         Areas to open.
     calibration : Calibration
         Down Lock displacement and travel. [in]
+    plunger_reading : Sourced
+        Time to read the plunger displacement at mid-position. [min]
+    horizon, accepted_chance : Sourced
+        How far forecasts look ahead, and the chance of being over a limit or outside the margin at which the next
+        inspection is due. [landings, 1]
     margin : Sourced
         Allowed displacement of the plunger from mid-position. [in]
     bearing_span : Sourced
@@ -130,6 +115,8 @@ class Gear:
         The gear file.
     indices_file : Path
         The precomputed sensitivity table that goes with it.
+    files : tuple of Path
+        Every file that describes the gear, also one that is not written yet.
     """
 
     id: str
@@ -139,6 +126,9 @@ class Gear:
     ensemble: tuple[Linkage, ...]
     joints: tuple[JointSpec, ...]
     areas: tuple[Area, ...]
+    plunger_reading: Sourced
+    horizon: Sourced
+    accepted_chance: Sourced
     calibration: Calibration
     margin: Sourced
     bearing_span: Sourced
@@ -152,6 +142,7 @@ class Gear:
     ensemble_sha256: str
     path: Path
     indices_file: Path
+    files: tuple[Path, ...]
 
     def __hash__(self) -> int:
         # Its parts are many: what is cached for a gear must not cost a walk through all of them.

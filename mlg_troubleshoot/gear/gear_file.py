@@ -1,10 +1,9 @@
-"""Gear files: a gear type as TOML, with a source for every number."""
+"""Gear files: a gear type as TOML, with a source for every number. A gear file is data: nothing in it is run."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
 from copy import deepcopy
 from functools import lru_cache
 from importlib.resources import files
@@ -13,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from mlg_troubleshoot.datafile import DataTable, read_toml
 from mlg_troubleshoot.errors import GearFileError, UsageError
 from mlg_troubleshoot.gear.cycle import RetractionCycle, Stage, ValveState
 from mlg_troubleshoot.gear.gear import Area, Discrepancies, Gear, Linkage, TiltedLink
 from mlg_troubleshoot.gear.joints import JointSpec
 from mlg_troubleshoot.gear.model import Calibration
 from mlg_troubleshoot.gear.sources import Source, Sourced, SourceKind
-from mlg_troubleshoot.gear.toml_table import TomlTable
 from mlg_troubleshoot.geometry.mechanism import (
     Crank,
     Dyad,
@@ -35,6 +34,11 @@ from mlg_troubleshoot.geometry.mechanism import (
 from mlg_troubleshoot.geometry.program import write_program
 
 DEFAULT_GEAR = "hawker-800xp"
+# Nothing of a landing gear is longer, and no angle needs more than two turns; far beyond, formulas overflow.
+_LENGTH, _ANGLE = {"least": -1e4, "most": 1e4}, {"least": -720.0, "most": 720.0}
+_LARGEST = {"in": 1e4, "min": 1e5, "landings": 1e6, "1": 0.5}
+# What a gear file need not state, and what stands for it.
+_UNSTATED = {"restore_min": 120.0, "read_min": 12.0, "horizon_landings": 20_000.0, "accepted_chance": 0.05}
 _GEOMETRY_KEYS = ("input", "planes", "points", "steps", "output", "calibration")
 
 
@@ -77,7 +81,7 @@ def load_gear(name_or_path: str | Path = DEFAULT_GEAR) -> Gear:
     if text in shipped_gears():
         return _shipped(text)
     path = Path(text)
-    if not path.is_file():
+    if not path.exists():
         raise UsageError(
             f"there is no gear {text!r}",
             f"Give one of {', '.join(shipped_gears())}, or the path of a gear file.",
@@ -91,30 +95,34 @@ def _shipped(name: str) -> Gear:
 
 
 def _read(path: Path) -> Gear:
-    raw = _parse(path)
-    table = TomlTable(raw, path)
+    table = read_toml(path)
     if table.whole("schema") != 1:
         raise table.fail("schema", "1")
     sources = _sources(table.table("sources"))
     numbers = _Numbers(sources)
-    reference = _linkage(raw, path, "A", numbers)
-    ensemble_name = table.text("ensemble", "")
+    reference = _linkage(table, "A", numbers)
     members: dict[str, dict[str, Any]] = {}
     ensemble_path = path
-    if ensemble_name:
-        ensemble_path = path.with_name(ensemble_name)
-        members = _members(raw, ensemble_path)
-    calibration, down_lock_range = _calibration(raw, path, numbers)
+    if table.has("ensemble"):
+        ensemble_path = table.sibling("ensemble", "")
+        members = _members(table.values, ensemble_path)
+    calibration, down_lock_range = _calibration(table, numbers)
     entry = table.table("entry")
     table.skip(*_GEOMETRY_KEYS)
+    (plunger_reading,) = _not_needed(table, "plunger", numbers, read_min="min")
+    horizon, accepted = _not_needed(table, "forecast", numbers, horizon_landings="landings", accepted_chance="1")
+    indices_file = table.sibling("indices", f"{path.stem}-indices.json")
     gear = Gear(
-        id=table.text("id"),
-        name=table.text("name"),
+        id=table.name("id"),
+        name=table.name("name"),
         provenance=table.text("provenance"),
         reference=reference,
-        ensemble=(reference, *(_linkage(m, ensemble_path, n, None) for n, m in members.items())),
+        ensemble=(reference, *(_linkage(DataTable(m, ensemble_path), n, None) for n, m in members.items())),
         joints=tuple(_joint(t, numbers) for t in table.tables("joints")),
         areas=tuple(_area(t, numbers) for t in table.tables("areas")),
+        plunger_reading=plunger_reading,
+        horizon=horizon,
+        accepted_chance=accepted,
         calibration=calibration,
         margin=numbers.only(table.table("margin"), "in"),
         bearing_span=numbers.only(table.table("bearing_span"), "in"),
@@ -124,24 +132,16 @@ def _read(path: Path) -> Gear:
         discrepancies=_discrepancies(table, reference.mechanism, numbers),
         cycle=_cycle(table.table("cycle")) if table.has("cycle") else None,
         numbers=tuple(numbers.found),
-        geometry_sha256=_sha256({k: raw.get(k) for k in _GEOMETRY_KEYS}),
+        geometry_sha256=_sha256({k: table.values.get(k) for k in _GEOMETRY_KEYS}),
         ensemble_sha256=_sha256({n: {k: m.get(k) for k in _GEOMETRY_KEYS} for n, m in members.items()}),
         path=path,
-        indices_file=path.with_name(table.text("indices", f"{path.stem}-indices.json")),
+        indices_file=indices_file,
+        files=tuple(dict.fromkeys((path, ensemble_path, indices_file, path.with_name(f"{path.stem}-targets.toml")))),
     )
     entry.finish()
     table.finish()
     _check_joints(gear, path)
     return gear
-
-
-def _parse(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise GearFileError(f"{path}: there is no such file", "Put it beside the gear file that names it.") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise GearFileError(f"{path}: cannot be read as TOML: {error}", "Correct the file and run again.") from error
 
 
 def _sha256(value: Any) -> str:
@@ -155,7 +155,7 @@ class _Numbers:
         self.sources = sources
         self.found: list[Sourced] = []
 
-    def source(self, table: TomlTable, key: str = "source") -> Source:
+    def source(self, table: DataTable, key: str = "source") -> Source:
         name = table.text(key)
         if name not in self.sources:
             raise table.fail(key, f"one of the sources {', '.join(self.sources)}")
@@ -167,19 +167,28 @@ class _Numbers:
         return number
 
     def read(
-        self, table: TomlTable, key: str, unit: str, source_key: str = "source", *, or_zero: bool = False
+        self, table: DataTable, key: str, unit: str, source_key: str = "source", *, or_zero: bool = False
     ) -> Sourced:
         """Read a number that cannot be negative."""
-        return self.add(table.positive(key, or_zero=or_zero), unit, self.source(table, source_key))
+        number = table.positive(key, or_zero=or_zero, most=_LARGEST[unit])
+        return self.add(number, unit, self.source(table, source_key))
 
-    def only(self, table: TomlTable, unit: str) -> Sourced:
+    def or_assumed(self, table: DataTable, key: str, unit: str = "min", source_key: str = "source") -> Sourced:
+        """Read a number that a gear file need not state: it is then assumed, and says so."""
+        if table.has(key):
+            return self.read(table, key, unit, source_key)
+        shown = f"{_UNSTATED[key]:g}{'' if unit == '1' else f' {unit}'}"
+        text = f"Not stated in the gear file: {shown} is assumed by the authors of this tool."
+        return self.add(_UNSTATED[key], unit, Source("unstated", SourceKind.ASSUMED, text))
+
+    def only(self, table: DataTable, unit: str) -> Sourced:
         """Read a table that holds one value and its source, and nothing else."""
         number = self.read(table, "value", unit)
         table.finish()
         return number
 
 
-def _sources(table: TomlTable) -> dict[str, Source]:
+def _sources(table: DataTable) -> dict[str, Source]:
     sources = {}
     for name in table.names:
         entry = table.table(name)
@@ -191,11 +200,10 @@ def _sources(table: TomlTable) -> dict[str, Source]:
     return sources
 
 
-def _linkage(raw: dict[str, Any], path: Path, name: str, numbers: _Numbers | None) -> Linkage:
+def _linkage(table: DataTable, name: str, numbers: _Numbers | None) -> Linkage:
     """Read the mechanism; numbers of the reference are remembered with their sources."""
-    table = TomlTable(raw, path)
 
-    def sourced(entry: TomlTable, *values: tuple[float, str]) -> None:
+    def sourced(entry: DataTable, *values: tuple[float, str]) -> None:
         if numbers is not None:
             source = numbers.source(entry)
             for value, unit in values:
@@ -204,32 +212,34 @@ def _linkage(raw: dict[str, Any], path: Path, name: str, numbers: _Numbers | Non
             entry.text("source")
 
     drive = table.table("input")
-    stroke, reference = drive.pair("range"), drive.number("reference")
+    stroke, reference = drive.pair("range", **_LENGTH), drive.number("reference", **_LENGTH)
+    if stroke[0] == stroke[1]:
+        raise drive.fail("range", "two different numbers")
     drive.text("name")
     sourced(drive, (stroke[0], "in"), (stroke[1], "in"), (reference, "in"))
     drive.finish()
     planes = []
     for entry in table.tables("planes"):
         if entry.has("parent"):
-            direction, dihedral = entry.number("hinge_direction_deg"), entry.number("dihedral_deg")
+            direction, dihedral = entry.number("hinge_direction_deg", **_ANGLE), entry.number("dihedral_deg", **_ANGLE)
             planes.append(
                 Plane(
-                    entry.text("name"),
-                    entry.text("parent"),
-                    entry.text("hinge_point"),
+                    entry.name("name"),
+                    entry.name("parent"),
+                    entry.name("hinge_point"),
                     float(np.radians(direction)),
                     float(np.radians(dihedral)),
                 )
             )
             sourced(entry, (direction, "deg"), (dihedral, "deg"))
         else:
-            planes.append(Plane(entry.text("name")))
+            planes.append(Plane(entry.name("name")))
         entry.finish()
     points = []
     for entry in table.tables("points"):
-        x, y = entry.pair("at")
-        link = entry.whole("virtual_link") if entry.has("virtual_link") else None
-        points.append(Point(entry.text("name"), entry.text("plane"), x, y, entry.flag("fixed"), link))
+        x, y = entry.pair("at", **_LENGTH)
+        link = entry.whole("virtual_link", least=1, most=999) if entry.has("virtual_link") else None
+        points.append(Point(entry.name("name"), entry.name("plane"), x, y, entry.flag("fixed"), link))
         sourced(entry, (x, "in"), (y, "in"))
         entry.finish()
     steps = []
@@ -242,30 +252,33 @@ def _linkage(raw: dict[str, Any], path: Path, name: str, numbers: _Numbers | Non
     kind = read.text("kind")
     if kind not in ("position", "angle"):
         raise read.fail("kind", "position or angle")
-    output = Output("position" if kind == "position" else "angle", read.text("joint"), read.text("pivot", ""))
+    pivot = read.name("pivot") if read.has("pivot") else ""
+    output = Output("position" if kind == "position" else "angle", read.name("joint"), pivot)
     read.finish()
     mechanism = Mechanism(tuple(planes), tuple(points), tuple(steps), output, reference)
     return Linkage(name, mechanism, stroke)
 
 
-def _step(t: TomlTable) -> Step:
-    joint, links = t.text("joint"), t.wholes("virtual_links")
+def _step(t: DataTable) -> Step:
+    joint, links = t.name("joint"), t.wholes("virtual_links")
+    if not all(1 <= link <= 999 for link in links):
+        raise t.fail("virtual_links", "whole numbers from 1 to 999")
     match t.text("type"):
         case "crank":
-            return Crank(joint, t.text("pivot"), links)
+            return Crank(joint, t.name("pivot"), links)
         case "dyad":
-            return Dyad(joint, t.text("upstream"), t.text("downstream"), _sign(t), links, t.flag("driven"))
+            return Dyad(joint, t.name("upstream"), t.name("downstream"), _sign(t), links, t.flag("driven"))
         case "lever":
-            return Lever(joint, t.text("pivot"), t.text("follows"), links)
+            return Lever(joint, t.name("pivot"), t.name("follows"), links)
         case "slot":
-            return Slot(joint, t.text("pivot"), t.text("pin"), links)
+            return Slot(joint, t.name("pivot"), t.name("pin"), links)
         case "slider":
-            return Slider(joint, t.text("upstream"), float(np.radians(t.number("axis_deg"))), _sign(t), links)
+            return Slider(joint, t.name("upstream"), float(np.radians(t.number("axis_deg", **_ANGLE))), _sign(t), links)
         case _:
             raise t.fail("type", "crank, dyad, lever, slot or slider")
 
 
-def _sign(table: TomlTable) -> float:
+def _sign(table: DataTable) -> float:
     sign = table.number("sign")
     if sign not in (1.0, -1.0):
         raise table.fail("sign", "+1 or -1")
@@ -274,7 +287,7 @@ def _sign(table: TomlTable) -> float:
 
 def _members(raw: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:
     """Each member of the ensemble as a full description: the reference with its own numbers in place."""
-    table = TomlTable(_parse(path), path)
+    table = read_toml(path)
     table.text("source")
     members = table.table("members")
     full = {}
@@ -300,50 +313,58 @@ def _members(raw: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:
     return full
 
 
-def _entry(entries: list[dict[str, Any]], key: str, value: str, table: TomlTable) -> dict[str, Any]:
+def _entry(entries: list[dict[str, Any]], key: str, value: str, table: DataTable) -> dict[str, Any]:
     for entry in entries:
         if entry.get(key) == value:
             return entry
     raise table.fail(value, f"a {key} of the gear file")
 
 
-def _calibration(raw: dict[str, Any], path: Path, numbers: _Numbers) -> tuple[Calibration, tuple[float, float]]:
-    table = TomlTable(raw, path)
+def _calibration(table: DataTable, numbers: _Numbers) -> tuple[Calibration, tuple[float, float]]:
     if not table.has("calibration"):
         return Calibration(), (-np.inf, np.inf)
     entry = table.table("calibration")
-    down_lock = numbers.add(entry.number("down_lock"), "in", numbers.source(entry))
+    down_lock = numbers.add(entry.number("down_lock", **_LENGTH), "in", numbers.source(entry))
     found = Calibration(down_lock.value, numbers.read(entry, "travel", "in").value)
-    allowed = entry.pair("down_lock_range")
+    allowed = entry.rising("down_lock_range", **_LENGTH)
     for end in allowed:
         numbers.add(end, "in", numbers.source(entry))
     entry.finish()
     return found, allowed
 
 
-def _joint(t: TomlTable, numbers: _Numbers) -> JointSpec:
+def _joint(t: DataTable, numbers: _Numbers) -> JointSpec:
     joint = JointSpec(
-        number=t.whole("number"),
-        point=t.text("point", str(t.whole("number"))),
-        name=t.text("name"),
+        number=t.whole("number", least=1, most=999),
+        point=t.name("point", str(t.whole("number"))),
+        name=t.name("name"),
         location=t.text("location"),
         limit=numbers.read(t, "limit", "in", "limit_source"),
         new_part=numbers.read(t, "new_part", "in", "new_part_source", or_zero=True),
         access=numbers.read(t, "access_min", "min", "access_source"),
-        area=t.text("area"),
+        restore=numbers.or_assumed(t, "restore_min", source_key="restore_source"),
+        area=t.name("area"),
         critical=t.flag("critical"),
     )
     t.finish()
     return joint
 
 
-def _area(t: TomlTable, numbers: _Numbers) -> Area:
-    area = Area(t.text("name"), t.text("description"), numbers.read(t, "access_min", "min", or_zero=True))
+def _not_needed(table: DataTable, name: str, numbers: _Numbers, **units: str) -> list[Sourced]:
+    """Read a table of numbers that a gear file need not have."""
+    entry = table.table(name) if table.has(name) else DataTable({}, Path())
+    read = [numbers.or_assumed(entry, key, unit) for key, unit in units.items()]
+    entry.finish()
+    return read
+
+
+def _area(t: DataTable, numbers: _Numbers) -> Area:
+    area = Area(t.name("name"), t.text("description"), numbers.read(t, "access_min", "min", or_zero=True))
     t.finish()
     return area
 
 
-def _discrepancies(table: TomlTable, mechanism: Mechanism, numbers: _Numbers) -> Discrepancies:
+def _discrepancies(table: DataTable, mechanism: Mechanism, numbers: _Numbers) -> Discrepancies:
     span = table.table("bearing_span").number("value")
     if not table.has("diagnosis"):
         return Discrepancies(bearing_span_in=span)
@@ -365,7 +386,7 @@ def _discrepancies(table: TomlTable, mechanism: Mechanism, numbers: _Numbers) ->
     return found
 
 
-def _cycle(t: TomlTable) -> RetractionCycle:
+def _cycle(t: DataTable) -> RetractionCycle:
     cycle = RetractionCycle(
         stages=tuple(Stage(s.text("name"), s.text("meaning"), s.text("plunger")) for s in t.tables("stages")),
         release=t.texts("release"),

@@ -8,7 +8,7 @@ from enum import IntEnum
 from mlg_troubleshoot.gear.sources import Sourced
 
 # 0.1905 mm is 0.0075000000000000006 in to a computer: no gauge reads a difference of 1e-9 in.
-_ROUNDING_IN = 1e-9
+ROUNDING_IN = 1e-9
 
 
 class Joint(IntEnum):
@@ -34,24 +34,15 @@ class Joint(IntEnum):
 class JointSpec:
     """A joint as the gear file describes it.
 
-    Parameters
-    ----------
-    number : int
-        Its number, which is also the number of its virtual link.
-    point : str
-        The mechanism's point.
-    name, location : str
-        What it is called and where a technician finds it.
-    limit : Sourced
-        Largest radial clearance that the manual allows. [in]
-    new_part : Sourced
-        Radial clearance after the joint is restored. [in]
-    access : Sourced
-        Time to reach and measure this joint once its area is open. [min]
-    area : str
-        Area that must be opened for it; opening counts once for all joints of the area.
-    critical : bool
-        True for a joint without whose measurement nothing can be cleared (joints 1 to 5 of the paper).
+    number: its number, which is also the number of its virtual link.
+    point: the mechanism's point.
+    name, location: what it is called and where a technician finds it.
+    limit: largest radial clearance that the manual allows. [in]
+    new_part: radial clearance after the joint is restored. [in]
+    access: time to reach and measure this joint once its area is open. [min]
+    restore: time to restore it once its area is open. [min]
+    area: area that must be opened for it; opening counts once for all joints of the area.
+    critical: true for a joint without whose measurement nothing can be cleared (joints 1 to 5 of the paper).
     """
 
     number: int
@@ -61,23 +52,13 @@ class JointSpec:
     limit: Sourced
     new_part: Sourced
     access: Sourced
+    restore: Sourced
     area: str
     critical: bool
 
     def is_over_limit(self, clearance_in: float) -> bool:
-        """Tell whether a clearance is above the limit, beyond the rounding of a conversion from another unit.
-
-        Parameters
-        ----------
-        clearance_in : float
-            Radial clearance. [in]
-
-        Returns
-        -------
-        bool
-            True if it is above the limit; a clearance at the limit, in whatever unit it was read, is not.
-        """
-        return clearance_in > self.limit.value + _ROUNDING_IN
+        """Tell whether a clearance is above the limit, beyond the rounding of a conversion from another unit."""
+        return clearance_in > self.limit.value + ROUNDING_IN
 
     @property
     def label(self) -> str:

@@ -20,12 +20,8 @@ Array = NDArray[np.float64]
 class Calibration:
     """Numbers that tie the linkage to the technical order (section 4.2).
 
-    Parameters
-    ----------
-    down_lock_in : float
-        Plunger displacement at Down Lock. [in]
-    travel_in : float or None
-        Travel from the least displacement to mid-position; None leaves the rate at 1. [in]
+    down_lock_in: plunger displacement at Down Lock. [in]
+    travel_in: travel from the least displacement to mid-position; None leaves the rate at 1. [in]
     """
 
     down_lock_in: float = 0.0
@@ -35,28 +31,12 @@ class Calibration:
 class LinkageModel:
     """One calibrated linkage, ready to be solved for batches of clearances.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-        The linkage, given at mid-position.
-    stroke : tuple of float
-        Input at Down Lock and at mid-position, the release stroke. [in]
-    calibration : Calibration
-        What the plunger does without clearance.
-
-    Attributes
-    ----------
-    kernel : Kernel
-        The solver.
-    rate : float
-        Calibration rate k of P(s) = P(0) + k (p(s) − p(0)); its sign makes over-travel positive. [1]
-    stroke : tuple of float
-        The release stroke. [in]
-
-    Raises
-    ------
-    MechanismError
-        If the linkage does not close over the whole stroke without clearance.
+    mechanism: the linkage, given at mid-position.
+    stroke: input at Down Lock and at mid-position, the release stroke. [in]
+    calibration: what the plunger does without clearance.
+    rate: calibration rate k of P(s) = P(0) + k (p(s) − p(0)); its sign makes over-travel positive. [1]
+    stroke: the release stroke. [in]
+    Raises `MechanismError` if the linkage does not close over the whole stroke without clearance.
     """
 
     def __init__(self, mechanism: Mechanism, stroke: tuple[float, float], calibration: Calibration) -> None:
@@ -92,20 +72,8 @@ class LinkageModel:
     def numbers(self, changed: Mapping[str, Any] | None) -> Sequence[Any] | None:
         """Return the linkage's numbers with some of them changed, for the kernel.
 
-        Parameters
-        ----------
-        changed : mapping of str to array_like or None
-            New values by parameter name; arrays broadcast with the virtual links.
-
-        Returns
-        -------
-        sequence or None
-            All numbers in the kernel's order; None if nothing is changed.
-
-        Raises
-        ------
-        KeyError
-            If the linkage has no number of that name.
+        changed: new values by parameter name; arrays broadcast with the virtual links.
+        Raises `KeyError` if the linkage has no number of that name.
         """
         if not changed:
             return None
@@ -117,19 +85,10 @@ class LinkageModel:
     def displacement(self, links: Sequence[Any], changed: Mapping[str, Any] | None = None, stroke: Any = None) -> Array:
         """Displacement of the plunger by clearances, measured from the same linkage without them.
 
-        Parameters
-        ----------
-        links : sequence of array_like, length 2 × number of joints
-            Components of each virtual link. [in]
-        changed : mapping of str to array_like, optional
-            Numbers of the linkage that differ from the nominal ones.
-        stroke : array_like, optional
-            Actuator extension, else mid-position. [in]
-
-        Returns
-        -------
-        ndarray
-            Displacement, over-travel positive; NaN where the linkage does not close. [in]
+        links: components of each virtual link. [in]
+        changed: numbers of the linkage that differ from the nominal ones.
+        stroke: actuator extension, else mid-position. [in]
+        Returns: displacement, over-travel positive; NaN where the linkage does not close. [in]
         """
         at = self.stroke[1] if stroke is None else stroke
         zero = self._mid if stroke is None else self.kernel.output(at, self.kernel.no_clearance())
@@ -138,17 +97,9 @@ class LinkageModel:
     def plunger(self, stroke: Any, links: Sequence[Any] | None = None) -> Array:
         """Plunger position over the release stroke (Fig. 12): P(s) = P(0) + k (p(s) − p(0)).
 
-        Parameters
-        ----------
-        stroke : array_like
-            Actuator extension from Down Lock. [in]
-        links : sequence of array_like, optional
-            Components of each virtual link, else no clearance. [in]
-
-        Returns
-        -------
-        ndarray
-            Position; NaN where the linkage does not close. [in]
+        stroke: actuator extension from Down Lock. [in]
+        links: components of each virtual link, else no clearance. [in]
+        Returns: position; NaN where the linkage does not close. [in]
         """
         links = self.kernel.no_clearance() if links is None else links
         moved = self.kernel.output(stroke, links) - self._down_lock
@@ -157,15 +108,8 @@ class LinkageModel:
     def plunger_amplification(self, step_in: float = 1e-5) -> Array:
         """Plunger amplification index A_iP of each joint at mid-position (Eq. 8) in the limit of small clearance.
 
-        Parameters
-        ----------
-        step_in : float
-            Step of the central differences. [in]
-
-        Returns
-        -------
-        ndarray, shape (n_joints,)
-            Largest plunger displacement per unit of clearance over all directions. [1]
+        step_in: step of the central differences. [in]
+        Returns, shape (n_joints,): largest plunger displacement per unit of clearance over all directions. [1]
         """
         n = 2 * len(self.joint_numbers)
         steps = np.vstack([np.eye(n), -np.eye(n)]) * step_in
@@ -177,17 +121,9 @@ class LinkageModel:
 def links_from(clearance_in: Array, directions: Array) -> list[Array]:
     """Components of virtual links from their lengths and directions.
 
-    Parameters
-    ----------
-    clearance_in : ndarray, shape (..., n_joints)
-        Lengths. [in]
-    directions : ndarray, shape (..., n_joints)
-        Directions in the plane of each joint. [rad]
-
-    Returns
-    -------
-    list of ndarray
-        x and y of each joint in turn, each of the broadcast shape. [in]
+    clearance_in, shape (..., n_joints): lengths. [in]
+    directions, shape (..., n_joints): directions in the plane of each joint. [rad]
+    Returns: x and y of each joint in turn, each of the broadcast shape. [in]
     """
     x, y = clearance_in * np.cos(directions), clearance_in * np.sin(directions)
     return [part[..., j] for j in range(x.shape[-1]) for part in (x, y)]

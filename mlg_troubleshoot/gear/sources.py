@@ -20,14 +20,9 @@ class SourceKind(StrEnum):
 class Source:
     """A source that numbers of a gear file refer to by name.
 
-    Parameters
-    ----------
-    name : str
-        Name within the gear file.
-    kind : SourceKind
-        What kind of source.
-    text : str
-        The source in words: document, section, how it was obtained.
+    name: name within the gear file.
+    kind: what kind of source.
+    text: the source in words: document, section, how it was obtained.
     """
 
     name: str
@@ -39,16 +34,8 @@ class Source:
 class Sourced:
     """A number with its unit and its source.
 
-    Parameters
-    ----------
-    value : float
-        The number.
-    unit : str
-        Its unit.
-    kind : SourceKind
-        What kind of source.
-    source : str
-        The source in words.
+    kind: what kind of source.
+    source: the source in words.
     """
 
     value: float

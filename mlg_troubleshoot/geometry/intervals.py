@@ -63,10 +63,7 @@ def _along(slopes: Pair, offsets: Pair) -> Pair:
 class Box:
     """Ranges of all variables, for many boxes at once.
 
-    Parameters
-    ----------
-    low, high : ndarray, shape (n_variables, n_boxes)
-        Ranges. [in or rad]
+    low, high, shape (n_variables, n_boxes): ranges. [in or rad]
     """
 
     low: Array
@@ -82,13 +79,6 @@ class Box:
         return _out(self.low - self.middle, self.high - self.middle)
 
     def variables(self) -> list[Range]:
-        """Return the variables, to run formulas on.
-
-        Returns
-        -------
-        list of Range
-            One for each variable.
-        """
         count, boxes = self.low.shape
         offsets, middle = self.offsets(), self.middle
         flat = np.zeros((count, count, boxes))
@@ -106,20 +96,12 @@ class Box:
 class Range:
     """Enclosures of a quantity and of its derivatives over boxes of the variables.
 
-    Parameters
-    ----------
-    value : pair of ndarray, shape (n_boxes,)
-        Bounds of the value. [unit of the quantity]
-    slope : pair of ndarray, shape (n_variables, n_boxes)
-        Bounds of the gradient. [unit of the quantity / in]
-    bend : pair of ndarray, shape (n_variables, n_variables, n_boxes)
-        Bounds of the second derivatives. [unit of the quantity / in²]
-    at_middle : pair of ndarray, shape (n_boxes,)
-        Bounds of the value in the middle of the box. [unit of the quantity]
-    slope_at_middle : pair of ndarray, shape (n_variables, n_boxes)
-        Bounds of the gradient there. [unit of the quantity / in]
-    offsets : pair of ndarray, shape (n_variables, n_boxes)
-        Ranges of the variables about the middle. [in]
+    value, shape (n_boxes,): bounds of the value. [unit of the quantity]
+    slope, shape (n_variables, n_boxes): bounds of the gradient. [unit of the quantity / in]
+    bend, shape (n_variables, n_variables, n_boxes): bounds of the second derivatives. [unit of the quantity / in²]
+    at_middle, shape (n_boxes,): bounds of the value in the middle of the box. [unit of the quantity]
+    slope_at_middle, shape (n_variables, n_boxes): bounds of the gradient there. [unit of the quantity / in]
+    offsets, shape (n_variables, n_boxes): ranges of the variables about the middle. [in]
     """
 
     __slots__ = ("at_middle", "bend", "offsets", "slope", "slope_at_middle", "value")
@@ -134,6 +116,10 @@ class Range:
         self.slope_at_middle = slope_at_middle
         self.offsets = offsets
 
+    def _each(self, function: Callable[[Pair], Pair]) -> Range:
+        value, slope, bend, middle, turned = (function(getattr(self, name)) for name in _ENCLOSED)
+        return Range(value, slope, bend, middle, turned, self.offsets)
+
     def _narrowed(self) -> Range:
         self.slope = _common(self.slope, _plus(self.slope_at_middle, _along(self.bend, self.offsets)))
         self.value = _common(self.value, _plus(self.at_middle, _along(self.slope, self.offsets)))
@@ -141,14 +127,10 @@ class Range:
 
     def __add__(self, other: Any) -> Range:
         if isinstance(other, Range):
-            return Range(
-                _plus(self.value, other.value),
-                _plus(self.slope, other.slope),
-                _plus(self.bend, other.bend),
-                _plus(self.at_middle, other.at_middle),
-                _plus(self.slope_at_middle, other.slope_at_middle),
-                self.offsets,
-            )._narrowed()
+            value, slope, bend, middle, turned = (
+                _plus(getattr(self, name), getattr(other, name)) for name in _ENCLOSED
+            )
+            return Range(value, slope, bend, middle, turned, self.offsets)._narrowed()
         return Range(
             _out(self.value[0] + other, self.value[1] + other),
             self.slope,
@@ -161,14 +143,7 @@ class Range:
     __radd__ = __add__
 
     def __neg__(self) -> Range:
-        return Range(
-            _negated(self.value),
-            _negated(self.slope),
-            _negated(self.bend),
-            _negated(self.at_middle),
-            _negated(self.slope_at_middle),
-            self.offsets,
-        )
+        return self._each(_negated)
 
     def __sub__(self, other: Any) -> Range:
         return self.__add__(-other)
@@ -190,21 +165,11 @@ class Range:
                 _plus(_times(self.slope, other.value), _times(other.slope, self.value)),
                 bend,
                 _times(self.at_middle, other.at_middle),
-                _plus(
-                    _times(self.slope_at_middle, other.at_middle),
-                    _times(other.slope_at_middle, self.at_middle),
-                ),
+                _plus(_times(self.slope_at_middle, other.at_middle), _times(other.slope_at_middle, self.at_middle)),
                 self.offsets,
             )._narrowed()
         number = (np.asarray(other), np.asarray(other))
-        return Range(
-            _times(self.value, number),
-            _times(self.slope, number),
-            _times(self.bend, number),
-            _times(self.at_middle, number),
-            _times(self.slope_at_middle, number),
-            self.offsets,
-        )
+        return self._each(lambda bounds: _times(bounds, number))
 
     __rmul__ = __mul__
 
@@ -223,12 +188,7 @@ class Range:
         middle, middle_rate, _ = function(self.at_middle)
         bend = _plus(_times(self.bend, rate), _times(_outer(self.slope, self.slope), curvature))
         return Range(
-            value,
-            _times(self.slope, rate),
-            bend,
-            middle,
-            _times(self.slope_at_middle, middle_rate),
-            self.offsets,
+            value, _times(self.slope, rate), bend, middle, _times(self.slope_at_middle, middle_rate), self.offsets
         )._narrowed()
 
     def _square(self) -> Range:
@@ -239,14 +199,13 @@ class Range:
         return self._through(_root)
 
     def cos(self) -> Range:
-        """Cosine."""
         return self._through(_cos)
 
     def sin(self) -> Range:
-        """Sine."""
         return self._through(_sin)
 
 
+_ENCLOSED = ("value", "slope", "bend", "at_middle", "slope_at_middle")
 Joint = tuple[Any, Any]
 
 
@@ -255,20 +214,6 @@ def narrowed_by_links(joint: Joint, start: Joint, end: Joint, square: Any, area:
 
     The derivatives of the explicit formulas are enclosed far too widely where terms cancel; those of the two
     equations of length, |C − A|² = square and |C − B|² constant, are not.
-
-    Parameters
-    ----------
-    joint, start, end : tuple of Range or float
-        Coordinates of the joint C and of the other ends A and B. [in]
-    square : Range or float
-        Square of the first link's length in the plane. [in²]
-    area : Range or float
-        Cross product of the links A-C and B-C. [in²]
-
-    Returns
-    -------
-    tuple of Range or float
-        The joint, narrowed; unchanged if it does not vary. [in]
     """
     ranges = [part for part in joint if isinstance(part, Range)]
     if len(ranges) < 2:
@@ -411,15 +356,8 @@ def _sine(x: Pair) -> Pair:
 def cosine_range(low: Array, high: Array) -> Pair:
     """Range of the cosine over ranges of angles.
 
-    Parameters
-    ----------
-    low, high : ndarray
-        Ranges. [rad]
-
-    Returns
-    -------
-    low, high : ndarray
-        Bounds of the cosine. [1]
+    low, high: ranges. [rad]
+    Returns low, high: bounds of the cosine. [1]
     """
     # The margins cover the rounding of shifted angles and of the library's cosine.
     slack = 1e-15 + 4.0 * np.spacing(np.maximum(np.abs(low), np.abs(high)))

@@ -19,43 +19,20 @@ from mlg_troubleshoot.geometry.mechanism import Mechanism
 from mlg_troubleshoot.geometry.program import Program, write_program
 
 Array = NDArray[Any]
-_NUMPY = {
-    "sqrt": np.sqrt,
-    "cos": np.cos,
-    "sin": np.sin,
-    "arctan2": np.arctan2,
-    "narrowed_by_links": narrowed_by_links,
-}
+_NUMPY = {"sqrt": np.sqrt, "cos": np.cos, "sin": np.sin, "arctan2": np.arctan2, "narrowed_by_links": narrowed_by_links}
 CHUNK = 4096
 
 
 def numba_is_installed() -> bool:
-    """Tell whether the compiled kernel can be used (extra ``fast``).
-
-    Returns
-    -------
-    bool
-        True if numba can be imported.
-    """
+    """Tell whether the compiled kernel can be used (extra ``fast``)."""
     return importlib.util.find_spec("numba") is not None
 
 
 class Kernel:
     """A mechanism that can be solved for many virtual links at once.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-        The mechanism.
-
-    Attributes
-    ----------
-    mechanism : Mechanism
-        The mechanism.
-    parameters : ndarray, shape (n_parameters,)
-        Its numbers, in the order of `parameter_names`. [in, rad or 1]
-    parameter_names : tuple of str
-        Their names: ``length.3-5``, ``point.E.x`` …
+    parameters, shape (n_parameters,): its numbers, in the order of `parameter_names`. [in, rad or 1]
+    parameter_names: their names: ``length.3-5``, ``point.E.x`` …
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -63,30 +40,13 @@ class Kernel:
         program = write_program(mechanism)
         self._program = program
         self.parameter_names = tuple(program.parameters)
-        self.parameters = np.array(list(program.parameters.values()))
+        self.parameters = np.array(list(program.parameters.values()), float)
         self.parameters.flags.writeable = False
         self._output = _function(program, (program.output,))
         self._loop: Callable[..., None] | None = None
         self._joints: Callable[..., tuple[Any, ...]] | None = None
 
     def parameter_index(self, name: str) -> int:
-        """Return the place of a parameter.
-
-        Parameters
-        ----------
-        name : str
-            Name of the parameter.
-
-        Returns
-        -------
-        int
-            Its index in `parameters`.
-
-        Raises
-        ------
-        KeyError
-            If the mechanism has no such number.
-        """
         try:
             return self.parameter_names.index(name)
         except ValueError:
@@ -97,39 +57,18 @@ class Kernel:
     ) -> Array:
         """Solve the mechanism and read its output.
 
-        Parameters
-        ----------
-        position : array_like
-            Input of the mechanism. [in or rad]
-        links : sequence of array_like, length 2 × number of virtual links
-            Components x, y of each virtual link in turn; all must broadcast with each other. [in]
-        parameters : sequence of array_like, optional
-            Numbers of the mechanism in place of its own, each a number or an array that broadcasts. [in, rad or 1]
-
-        Returns
-        -------
-        ndarray
-            Output; NaN where the mechanism does not close. [in or rad]
+        position: input of the mechanism. [in or rad]
+        links: components x, y of each virtual link in turn; all must broadcast with each other. [in]
+        parameters: numbers of the mechanism in place of its own, each a number or an array that broadcasts. [in,
+          rad or 1]
+        Returns: output; NaN where the mechanism does not close. [in or rad]
         """
         with np.errstate(invalid="ignore", divide="ignore"):
             numbers = self.parameters.tolist() if parameters is None else parameters
             return np.asarray(self._output(position, links, numbers)[0])
 
     def enclose(self, position: Any, links: Sequence[Any]) -> Any:
-        """Run the formulas on ranges; every joint on two links is narrowed by what the links allow.
-
-        Parameters
-        ----------
-        position : Range or float
-            Input of the mechanism. [in or rad]
-        links : sequence of Range or float, length 2 × number of virtual links
-            Components of each virtual link. [in]
-
-        Returns
-        -------
-        Range or float
-            Enclosure of the output. [in or rad]
-        """
+        """Run the formulas on ranges; every joint on two links is narrowed by what the links allow."""
         return _enclosing(self._program)(position, links, self.parameters.tolist())[0]
 
     def positions(
@@ -137,15 +76,7 @@ class Kernel:
     ) -> dict[str, tuple[Array, Array]]:
         """Coordinates of every point, each in its own plane.
 
-        Parameters
-        ----------
-        position, links, parameters
-            As for :meth:`output`.
-
-        Returns
-        -------
-        dict of str to tuple of ndarray
-            x and y of each point; a joint with a virtual link is given at its downstream link. [in]
+        Returns: x and y of each point; a joint with a virtual link is given at its downstream link. [in]
         """
         names = self._program.joints
         wanted = tuple(dict.fromkeys(n for pair in names.values() for n in pair))
@@ -157,13 +88,7 @@ class Kernel:
         return {joint: (np.asarray(values[x]), np.asarray(values[y])) for joint, (x, y) in names.items()}
 
     def no_clearance(self) -> list[float]:
-        """Return virtual links of zero length.
-
-        Returns
-        -------
-        list of float
-            Zeros, for `links` of :meth:`output`. [in]
-        """
+        """Return virtual links of zero length."""
         return [0.0] * (2 * len(self.mechanism.virtual_links))
 
     def batch(
@@ -177,23 +102,9 @@ class Kernel:
     ) -> Array:
         """Output for a large batch of clearances in fixed directions, as fast as this machine allows.
 
-        Parameters
-        ----------
-        position : float
-            Input of the mechanism. [in or rad]
-        clearance_in : ndarray, shape (n_virtual_links, n)
-            Lengths of the virtual links, one row a joint. [in]
-        directions : ndarray, shape (n_virtual_links,)
-            Their directions. [rad]
-        compiled : bool
-            Use numba (it must be installed); else numpy.
-        out : ndarray, shape (n,), optional
-            Where to write the result. [in or rad]
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Output; NaN where the mechanism does not close. [in or rad]
+        clearance_in, shape (n_virtual_links, n): lengths of the virtual links, one row a joint. [in]
+        out, shape (n,): where to write the result. [in or rad]
+        Returns, shape (n,): output; NaN where the mechanism does not close. [in or rad]
         """
         clearance = np.ascontiguousarray(clearance_in, float)
         result = np.empty(clearance.shape[1]) if out is None else out
@@ -212,7 +123,7 @@ class Kernel:
                 result[start : start + CHUNK] = self._output(position, links, numbers)[0]
         return result
 
-    def _layout(self) -> tuple[int, tuple[int, ...], str]:
+    def _layout(self) -> tuple[int, int, str]:
         return len(self.parameters), self._program.virtual_links, self._program.output
 
 
@@ -252,17 +163,17 @@ def _build(body: str, inputs: tuple[str, ...], results: tuple[str, ...]) -> Call
 
 
 @lru_cache(maxsize=16)
-def _compiled_loop(body: str, layout: tuple[int, tuple[int, ...], str]) -> Callable[..., None]:
+def _compiled_loop(body: str, layout: tuple[int, int, str]) -> Callable[..., None]:
     import numba
 
     n_parameters, links, result = layout
     lines = ["def loop(s, clearance, unit, numbers, out):"]
     lines += [f"    p{i} = numbers[{i}]" for i in range(n_parameters)]
-    lines += [f"    u{axis}{n} = unit[{j}, {i}]" for j, n in enumerate(links) for i, axis in enumerate("xy")]
+    lines += [f"    u{axis}{j} = unit[{j}, {i}]" for j in range(links) for i, axis in enumerate("xy")]
     lines.append("    for i in range(out.shape[0]):")
-    for j, n in enumerate(links):
-        lines += [f"        c{n} = clearance[{j}, i]"]
-        lines += [f"        v{axis}{n} = c{n} * u{axis}{n}" for axis in "xy"]
+    for j in range(links):
+        lines += [f"        c{j} = clearance[{j}, i]"]
+        lines += [f"        v{axis}{j} = c{j} * u{axis}{j}" for axis in "xy"]
     lines += ["    " + line for line in body.splitlines()]
     lines.append(f"        out[i] = {result}")
     namespace: dict[str, Any] = dict(_NUMPY)

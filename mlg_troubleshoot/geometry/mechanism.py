@@ -8,13 +8,13 @@ This module knows no aircraft; a joint's clearance is a *virtual link* with a nu
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mlg_troubleshoot.datafile import LONGEST_NAME, is_name
 from mlg_troubleshoot.errors import MechanismError
-from mlg_troubleshoot.geometry.vectors import rotation
 
 Vector = NDArray[np.float64]
 
@@ -23,18 +23,10 @@ Vector = NDArray[np.float64]
 class Plane:
     """A plane in which joints move.
 
-    Parameters
-    ----------
-    name : str
-        Its name.
-    parent : str or None
-        The plane it is hinged to; None for the base plane, whose axes are x and y.
-    hinge_point : str
-        Point of the parent plane, its reference position being this plane's origin.
-    hinge_direction : float
-        Direction of the hinge line in the parent plane, this plane's first axis. [rad]
-    dihedral : float
-        Angle by which this plane is turned about the hinge line out of its parent. [rad]
+    parent: the plane it is hinged to; None for the base plane, whose axes are x and y.
+    hinge_point: point of the parent plane, its reference position being this plane's origin.
+    hinge_direction: direction of the hinge line in the parent plane, this plane's first axis. [rad]
+    dihedral: angle by which this plane is turned about the hinge line out of its parent. [rad]
     """
 
     name: str
@@ -48,18 +40,10 @@ class Plane:
 class Point:
     """A joint or a fixed pivot at the reference position.
 
-    Parameters
-    ----------
-    name : str
-        Its name.
-    plane : str
-        The plane it moves in.
-    x, y : float
-        Coordinates in that plane. [in]
-    fixed : bool
-        True for a pivot fixed to the aircraft.
-    virtual_link : int or None
-        Number of the virtual link that displaces this fixed pivot (A* of Fig. 8a).
+    plane: the plane it moves in.
+    x, y: coordinates in that plane. [in]
+    fixed: true for a pivot fixed to the aircraft.
+    virtual_link: number of the virtual link that displaces this fixed pivot (A* of Fig. 8a).
     """
 
     name: str
@@ -72,15 +56,7 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Crank:
-    """The driven crank: its angle is the input.
-
-    Parameters
-    ----------
-    joint, pivot : str
-        The joint located and the fixed pivot it turns about.
-    virtual_links : tuple of int
-        Virtual links that displace the crank.
-    """
+    """The driven crank: its angle is the input."""
 
     joint: str
     pivot: str
@@ -91,18 +67,10 @@ class Crank:
 class Dyad:
     """Two links that meet in a joint: the triangle A, B, C of section 3.1.
 
-    Parameters
-    ----------
-    joint : str
-        The joint located.
-    upstream, downstream : str
-        The joints at the other ends; the downstream one is a fixed pivot or located before.
-    sign : float
-        +1 if the joint lies to the left of the line from upstream to downstream, else −1. [1]
-    virtual_links : tuple of int
-        Virtual links at the two ends of the upstream link: both displace it in parallel (A**, Fig. 8b).
-    driven : bool
-        True if the upstream link is the actuator whose length is the input.
+    upstream, downstream: the joints at the other ends; the downstream one is a fixed pivot or located before.
+    sign: +1 if the joint lies to the left of the line from upstream to downstream, else −1. [1]
+    virtual_links: virtual links at the two ends of the upstream link: both displace it in parallel (A**, Fig. 8b).
+    driven: true if the upstream link is the actuator whose length is the input.
     """
 
     joint: str
@@ -117,12 +85,8 @@ class Dyad:
 class Lever:
     """A rigid link of three joints, the middle one fixed (Fig. 9c): one joint follows another.
 
-    Parameters
-    ----------
-    joint, pivot, follows : str
-        The joint located, the fixed pivot, and the joint of the same lever that is already located.
-    virtual_links : tuple of int
-        Virtual links that displace the joint.
+    joint, pivot, follows: the joint located, the fixed pivot, and the joint of the same lever that is already
+      located.
     """
 
     joint: str
@@ -135,12 +99,7 @@ class Lever:
 class Slot:
     """A lever that a pin turns in a radial slot: the pin sets the lever's direction only.
 
-    Parameters
-    ----------
-    joint, pivot, pin : str
-        The joint on the lever's other arm, the fixed pivot, and the pin.
-    virtual_links : tuple of int
-        Virtual links that displace the pin in the slot.
+    joint, pivot, pin: the joint on the lever's other arm, the fixed pivot, and the pin.
     """
 
     joint: str
@@ -153,16 +112,8 @@ class Slot:
 class Slider:
     """A link whose far end slides on an axis.
 
-    Parameters
-    ----------
-    joint, upstream : str
-        The sliding joint and the joint at the other end of its link.
-    axis : float
-        Direction of the axis in the joint's plane; the axis passes through the joint's reference position. [rad]
-    sign : float
-        +1 if the joint lies ahead, along the axis, of the foot of the upstream joint, else −1. [1]
-    virtual_links : tuple of int
-        Virtual links at the two ends of the link.
+    axis: direction of the axis in the joint's plane; the axis passes through the joint's reference position. [rad]
+    sign: +1 if the joint lies ahead, along the axis, of the foot of the upstream joint, else −1. [1]
     """
 
     joint: str
@@ -179,14 +130,8 @@ Step = Crank | Dyad | Lever | Slot | Slider
 class Output:
     """What the mechanism is for.
 
-    Parameters
-    ----------
-    kind : {'position', 'angle'}
-        Position of a slider along its axis from its reference [in], or direction of a joint from a pivot [rad].
-    joint : str
-        The joint.
-    pivot : str
-        The pivot, for an angle.
+    kind: position of a slider along its axis from its reference [in], or direction of a joint from a pivot [rad].
+    pivot: the pivot, for an angle.
     """
 
     kind: Literal["position", "angle"]
@@ -198,29 +143,12 @@ class Output:
 class Mechanism:
     """Planes, points and steps of one mechanism at its reference position.
 
-    Parameters
-    ----------
-    planes : tuple of Plane
-        Planes, parents first.
-    points : tuple of Point
-        Every joint and fixed pivot.
-    steps : tuple
-        Steps in the order of the mechanism, from the input to the output.
-    output : Output
-        What is read.
-    reference_input : float
-        Input at which the points are given. [in or rad]
-
-    Attributes
-    ----------
-    virtual_links : tuple of int
-        Numbers of all virtual links, in order.
-
-    Raises
-    ------
-    MechanismError
-        If a plane, point, step or the output refers to what is not there, a point is located never or twice,
-        or a virtual link is used twice.
+    planes: planes, parents first.
+    steps: steps in the order of the mechanism, from the input to the output.
+    reference_input: input at which the points are given. [in or rad]
+    virtual_links: numbers of all virtual links, in order.
+    Raises `MechanismError` if a plane, point, step or the output refers to what is not there, a point is located
+      never or twice, or a virtual link is used twice.
     """
 
     planes: tuple[Plane, ...]
@@ -229,6 +157,8 @@ class Mechanism:
     output: Output
     reference_input: float
     virtual_links: tuple[int, ...] = field(init=False)
+    _frames: dict[str, tuple[Vector, Vector]] = field(init=False, repr=False, compare=False, default_factory=dict)
+    _places: dict[str, Vector] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         names = [point.name for point in self.points]
@@ -253,6 +183,12 @@ class Mechanism:
         object.__setattr__(self, "virtual_links", tuple(sorted(used)))
 
     def _check_planes_and_points(self, names: list[str]) -> None:
+        for name in (*names, *(plane.name for plane in self.planes)):
+            if not is_name(name):
+                raise MechanismError(
+                    f"{name[:60]!r} cannot be the name of a part.",
+                    f"Give names of 1 to {LONGEST_NAME} printable characters.",
+                )
         planes: set[str] = set()
         for plane in self.planes:
             if plane.parent is not None:
@@ -280,50 +216,26 @@ class Mechanism:
             raise MechanismError(f"The output is an angle about {self.output.pivot!r}, which no step locates.")
 
     def point(self, name: str) -> Point:
-        """Return the point of that name.
-
-        Parameters
-        ----------
-        name : str
-            Name of a joint or pivot.
-
-        Returns
-        -------
-        Point
-            The point at its reference position.
-        """
         return next(point for point in self.points if point.name == name)
 
     def step(self, joint: str) -> Step | None:
-        """Return the step that locates a joint, or None for a fixed pivot.
-
-        Parameters
-        ----------
-        joint : str
-            Name of the joint.
-
-        Returns
-        -------
-        Step or None
-            Its step.
-        """
         return next((step for step in self.steps if step.joint == joint), None)
 
     def frame(self, plane: str) -> tuple[Vector, Vector]:
         """Origin and axes of a plane in space.
 
-        Parameters
-        ----------
-        plane : str
-            Name of the plane.
+        A plane is turned about its hinge line, which lies in its parent: Rodrigues' bracket of Eq. 6 maps what is
+        normal to the axis to cos δ of itself and sin δ of the third direction. Coordinates and angles may be arrays,
+        for a batch of linkages; their axes then come first.
 
-        Returns
-        -------
-        origin : ndarray, shape (3,)
-            Origin. [in]
-        axes : ndarray, shape (3, 3)
-            Rows are the two axes in the plane and its normal. [1]
+        Returns origin, shape (..., 3): origin. [in]
+        Returns axes, shape (..., 3, 3): rows are the two axes in the plane and its normal. [1]
         """
+        if plane not in self._frames:
+            self._frames[plane] = self._frame(plane)
+        return self._frames[plane]
+
+    def _frame(self, plane: str) -> tuple[Vector, Vector]:
         found = next(p for p in self.planes if p.name == plane)
         if found.parent is None:
             return np.zeros(3), np.eye(3)
@@ -331,29 +243,39 @@ class Mechanism:
         hinge = self.point(found.hinge_point)
         if hinge.plane != found.parent:
             raise MechanismError(f"Plane {plane!r} is hinged at {hinge.name!r}, which is not in {found.parent!r}.")
-        first = np.cos(found.hinge_direction) * axes[0] + np.sin(found.hinge_direction) * axes[1]
-        flat = -np.sin(found.hinge_direction) * axes[0] + np.cos(found.hinge_direction) * axes[1]
-        second = rotation(first, found.dihedral) @ flat
-        new = np.vstack([first, second, np.cross(first, second)])
-        return origin + hinge.x * axes[0] + hinge.y * axes[1], new
+        x, y, normal = axes[..., 0, :], axes[..., 1, :], axes[..., 2, :]
+        cosine, sine = _column(np.cos(found.hinge_direction)), _column(np.sin(found.hinge_direction))
+        turned, tilted = _column(np.cos(found.dihedral)), _column(np.sin(found.dihedral))
+        first, flat = cosine * x + sine * y, cosine * y - sine * x
+        new = np.broadcast_arrays(first, turned * flat + tilted * normal, turned * normal - tilted * flat)
+        return origin + _column(hinge.x) * x + _column(hinge.y) * y, np.stack(new, axis=-2)
 
     def reference_in_space(self, name: str) -> Vector:
-        """Reference position of a point in space.
+        """Reference position of a point in the frame of the base plane, shape (..., 3). [in]"""
+        if name not in self._places:
+            point = self.point(name)
+            origin, axes = self.frame(point.plane)
+            self._places[name] = origin + _column(point.x) * axes[..., 0, :] + _column(point.y) * axes[..., 1, :]
+        return self._places[name]
 
-        Parameters
-        ----------
-        name : str
-            Name of the point.
+    def seen_in_plane(self, plane: str, start: str, end: str) -> tuple[Any, Any]:
+        """Vector from one reference position to another, along the two axes of a plane. [in]"""
+        _, axes = self.frame(plane)
+        across = self.reference_in_space(end) - self.reference_in_space(start)
+        return (across * axes[..., 0, :]).sum(axis=-1), (across * axes[..., 1, :]).sum(axis=-1)
 
-        Returns
-        -------
-        ndarray, shape (3,)
-            Coordinates in the frame of the base plane. [in]
-        """
-        point = self.point(name)
-        origin, axes = self.frame(point.plane)
-        place: Vector = origin + point.x * axes[0] + point.y * axes[1]
-        return place
+    def side(self, step: Dyad | Slider) -> Any:
+        """How far the coordinates put a joint to the side that its branch sign names: the sign is that of this."""
+        plane = self.point(step.joint).plane
+        arm = self.seen_in_plane(plane, step.upstream, step.joint)
+        if isinstance(step, Slider):
+            return np.cos(step.axis) * arm[0] + np.sin(step.axis) * arm[1]
+        base = self.seen_in_plane(plane, step.upstream, step.downstream)
+        return base[0] * arm[1] - base[1] * arm[0]
+
+
+def _column(value: Any) -> Vector:
+    return np.asarray(value)[..., None]
 
 
 def _needs(step: Step) -> tuple[str, ...]:

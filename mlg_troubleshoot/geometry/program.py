@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -20,14 +21,9 @@ from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, S
 class Closure:
     """A joint on two links: what its formulas solve, for whoever can use it directly.
 
-    Parameters
-    ----------
-    joint, start, end : tuple of str
-        Names of the coordinates of the joint and of the links' other ends.
-    square : str
-        Square of the first link's length in the plane; the second link's is constant.
-    area : str
-        Cross product of the two links, from their ends to the joint.
+    joint, start, end: names of the coordinates of the joint and of the links' other ends.
+    square: square of the first link's length in the plane; the second link's is constant.
+    area: cross product of the two links, from their ends to the joint.
     """
 
     joint: tuple[str, str]
@@ -41,52 +37,28 @@ class Closure:
 class Program:
     """Formulas that locate every joint of a mechanism, in order, and its numbers by name.
 
-    Parameters
-    ----------
-    parameters : dict of str to float
-        Every number of the mechanism by name: ``point.E.x``, ``length.3-5``, ``sign.5`` … [in, rad or 1]
-    lines : tuple of tuple of str
-        Assignments (name, expression); each name is assigned once.
-    joints : dict of str to tuple of str
-        Names of the two coordinates of each point, in its plane.
-    output : str
-        Name of the output.
-    virtual_links : tuple of int
-        Virtual links, each the two inputs ``vx{n}`` and ``vy{n}``. [in]
-    closures : tuple of Closure
-        Joints on two links, in order.
+    parameters: every number of the mechanism by name: ``point.E.x``, ``length.3-5``, ``sign.5`` … [in, rad or 1]
+      Names of a mechanism stand here and nowhere in the formulas: whatever they are, they are never run.
+    lines: assignments (name, expression); each name is assigned once.
+    joints: names of the two coordinates of each point, in its plane.
+    virtual_links: how many virtual links there are, each the two inputs ``vx{i}`` and ``vy{i}`` by its place. [in]
     """
 
-    parameters: dict[str, float]
+    parameters: dict[str, Any]
     lines: tuple[tuple[str, str], ...]
     joints: dict[str, tuple[str, str]]
     output: str
-    virtual_links: tuple[int, ...]
+    virtual_links: int
     closures: tuple[Closure, ...] = ()
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names that the formulas take, beside ``s``: virtual links, then parameters."""
-        links = [f"v{axis}{n}" for n in self.virtual_links for axis in "xy"]
+        links = [f"v{axis}{i}" for i in range(self.virtual_links) for axis in "xy"]
         return (*links, *(f"p{i}" for i in range(len(self.parameters))))
 
     def source(self, results: tuple[str, ...], indent: str = "    ", *, release: bool = True) -> str:
-        """Write the formulas that the given results need, as Python source.
-
-        Parameters
-        ----------
-        results : tuple of str
-            Names to keep.
-        indent : str
-            Indentation of each line.
-        release : bool
-            Delete each intermediate after its last use, so that arrays are reused while in the cache.
-
-        Returns
-        -------
-        str
-            The source, without a function header or a return.
-        """
+        """Write the formulas that the given results need, as Python source."""
         needed = set(results)
         kept: list[tuple[str, str, set[str]]] = []
         for name, expression in reversed(self.lines):
@@ -114,14 +86,15 @@ class _Writer:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
-        self.parameters: dict[str, float] = {}
+        self.parameters: dict[str, Any] = {}
         self.lines: list[tuple[str, str]] = []
         self.joints: dict[str, tuple[str, str]] = {}
         self.closures: list[Closure] = []
+        self.positions: dict[str, str] = {}
 
-    def parameter(self, name: str, value: float) -> str:
-        if name not in self.parameters:
-            self.parameters[name] = float(value)
+    def parameter(self, name: str, value: Any) -> str:
+        if not np.array_equal(self.parameters.setdefault(name, value), value, equal_nan=True):
+            raise MechanismError(f"Two numbers of the mechanism are called {name!r}.", "Give its points other names.")
         return f"p{list(self.parameters).index(name)}"
 
     def let(self, expression: str) -> str:
@@ -133,9 +106,10 @@ class _Writer:
         if not links:
             return place
         x, y = place
+        places = [self.mechanism.virtual_links.index(n) for n in links]
         return (
-            self.let(" + ".join([x, *(f"vx{n}" for n in links)])),
-            self.let(" + ".join([y, *(f"vy{n}" for n in links)])),
+            self.let(" + ".join([x, *(f"vx{i}" for i in places)])),
+            self.let(" + ".join([y, *(f"vy{i}" for i in places)])),
         )
 
     def seen_from(self, name: str, plane: str) -> tuple[tuple[str, str], str | None]:
@@ -146,13 +120,13 @@ class _Writer:
             return (x, y), None
         origin, axes = self.mechanism.frame(plane)
         from_origin, from_axes = self.mechanism.frame(point.plane)
-        constant = axes @ (from_origin - origin)
-        slopes = axes @ from_axes[:2].T
+        constant = np.einsum("...ij,...j->...i", axes, from_origin - origin)
+        slopes = np.einsum("...ij,...kj->...ik", axes, from_axes[..., :2, :])
         seen = []
         for i, axis in enumerate("uvh"):
             c0, cx, cy = (
                 self.parameter(f"transfer.{point.plane}.{plane}.{axis}{part}", value)
-                for part, value in zip("0xy", (constant[i], slopes[i, 0], slopes[i, 1]), strict=True)
+                for part, value in zip("0xy", (constant[..., i], slopes[..., i, 0], slopes[..., i, 1]), strict=True)
             )
             seen.append(self.let(f"{c0} + {cx} * {x} + {cy} * {y}"))
         return (seen[0], seen[1]), seen[2]
@@ -163,56 +137,29 @@ class _Writer:
             if self.mechanism.point(name).plane != plane:
                 raise MechanismError(f"Step {step.joint!r}: {name!r} is not in the plane {plane!r}.")
 
-    def distance(self, a: str, b: str) -> float:
-        value = float(np.linalg.norm(self.mechanism.reference_in_space(a) - self.mechanism.reference_in_space(b)))
-        if value == 0.0:
+    def distance(self, a: str, b: str) -> Any:
+        between = self.mechanism.reference_in_space(a) - self.mechanism.reference_in_space(b)
+        value = np.sqrt((between * between).sum(axis=-1))
+        if np.any(value == 0.0):
             raise MechanismError(f"The link {a}-{b} has no length.")
         return value
 
-    def length(self, a: str, b: str) -> tuple[str, float]:
-        value = self.distance(a, b)
-        return self.parameter(f"length.{a}-{b}", value), value
+    def length(self, a: str, b: str) -> str:
+        return self.parameter(f"length.{a}-{b}", self.distance(a, b))
 
-    def in_plane(self, plane: str, start: str, end: str) -> tuple[float, float]:
-        """Vector from one reference position to another, seen in a plane."""
-        _, axes = self.mechanism.frame(plane)
-        across = self.mechanism.reference_in_space(end) - self.mechanism.reference_in_space(start)
-        return float(across @ axes[0]), float(across @ axes[1])
-
-    def same_side(self, step: Dyad | Slider, offset: float) -> None:
+    def same_side(self, step: Dyad | Slider) -> None:
         """Refuse a branch sign that would put the joint elsewhere than its coordinates do."""
-        if offset * step.sign < 0.0:
+        if np.any(self.mechanism.side(step) * step.sign < 0.0):
             raise MechanismError(
                 f"Step {step.joint!r} has the sign {step.sign:+.0f}, but its coordinates lie on the other side."
             )
 
 
 def write_program(mechanism: Mechanism) -> Program:
-    """Write a mechanism out as straight-line formulas.
-
-    Parameters
-    ----------
-    mechanism : Mechanism
-        The mechanism.
-
-    Returns
-    -------
-    Program
-        Its formulas and numbers.
-
-    Raises
-    ------
-    MechanismError
-        If a step mixes planes that it cannot mix, a link has no length, or a branch sign contradicts the
-        coordinates.
-    """
     w = _Writer(mechanism)
     for point in mechanism.points:
         if point.fixed:
-            place = (
-                w.parameter(f"point.{point.name}.x", point.x),
-                w.parameter(f"point.{point.name}.y", point.y),
-            )
+            place = (w.parameter(f"point.{point.name}.x", point.x), w.parameter(f"point.{point.name}.y", point.y))
             links = () if point.virtual_link is None else (point.virtual_link,)
             w.joints[point.name] = w.shifted(place, links)
     for step in mechanism.steps:
@@ -228,7 +175,7 @@ def write_program(mechanism: Mechanism) -> Program:
             case Slider():
                 _slider(w, step)
     output = _output(w)
-    return Program(w.parameters, tuple(w.lines), w.joints, output, mechanism.virtual_links, tuple(w.closures))
+    return Program(w.parameters, tuple(w.lines), w.joints, output, len(mechanism.virtual_links), tuple(w.closures))
 
 
 def _travel(w: _Writer) -> str:
@@ -238,7 +185,7 @@ def _travel(w: _Writer) -> str:
 def _crank(w: _Writer, step: Crank) -> None:
     w.same_plane(step, step.pivot)
     joint, pivot = w.mechanism.point(step.joint), w.mechanism.point(step.pivot)
-    length, _ = w.length(step.pivot, step.joint)
+    length = w.length(step.pivot, step.joint)
     start = w.parameter(f"crank.{step.joint}.angle", np.arctan2(joint.y - pivot.y, joint.x - pivot.x))
     angle = w.let(f"{start} + {_travel(w)}")
     x, y = w.joints[step.pivot]
@@ -248,11 +195,10 @@ def _crank(w: _Writer, step: Crank) -> None:
 
 def _dyad(w: _Writer, step: Dyad) -> None:
     w.same_plane(step, step.downstream)
-    first, _ = w.length(step.upstream, step.joint)
-    second, _ = w.length(step.joint, step.downstream)
+    first = w.length(step.upstream, step.joint)
+    second = w.length(step.joint, step.downstream)
     plane = w.mechanism.point(step.joint).plane
-    base, arm = w.in_plane(plane, step.upstream, step.downstream), w.in_plane(plane, step.upstream, step.joint)
-    w.same_side(step, base[0] * arm[1] - base[1] * arm[0])
+    w.same_side(step)
     sign = w.parameter(f"sign.{step.joint}", step.sign)
     seen, height = w.seen_from(step.upstream, plane)
     ax, ay = w.shifted(seen, step.virtual_links)
@@ -285,15 +231,12 @@ def _lever(w: _Writer, step: Lever) -> None:
     w.same_plane(step, step.pivot, step.follows)
     joint, pivot, led = (w.mechanism.point(n) for n in (step.joint, step.pivot, step.follows))
     w.distance(step.pivot, step.follows)
-    ratio = complex(joint.x - pivot.x, joint.y - pivot.y) / complex(led.x - pivot.x, led.y - pivot.y)
+    ratio = ((joint.x - pivot.x) + 1j * (joint.y - pivot.y)) / ((led.x - pivot.x) + 1j * (led.y - pivot.y))
     along = w.parameter(f"lever.{step.joint}.along", ratio.real)
     across = w.parameter(f"lever.{step.joint}.across", ratio.imag)
     (px, py), (fx, fy) = w.joints[step.pivot], w.joints[step.follows]
     dx, dy = w.let(f"{fx} - {px}"), w.let(f"{fy} - {py}")
-    place = (
-        w.let(f"{px} + {along} * {dx} - {across} * {dy}"),
-        w.let(f"{py} + {along} * {dy} + {across} * {dx}"),
-    )
+    place = (w.let(f"{px} + {along} * {dx} - {across} * {dy}"), w.let(f"{py} + {along} * {dy} + {across} * {dx}"))
     w.joints[step.joint] = w.shifted(place, step.virtual_links)
 
 
@@ -301,8 +244,8 @@ def _slot(w: _Writer, step: Slot) -> None:
     w.same_plane(step, step.pivot, step.pin)
     joint, pivot, pin = (w.mechanism.point(n) for n in (step.joint, step.pivot, step.pin))
     w.distance(step.pivot, step.pin)
-    to_pin = complex(pin.x - pivot.x, pin.y - pivot.y)
-    arm = complex(joint.x - pivot.x, joint.y - pivot.y) / (to_pin / abs(to_pin))
+    to_pin = (pin.x - pivot.x) + 1j * (pin.y - pivot.y)
+    arm = ((joint.x - pivot.x) + 1j * (joint.y - pivot.y)) / (to_pin / abs(to_pin))
     along = w.parameter(f"arm.{step.joint}.along", arm.real)
     across = w.parameter(f"arm.{step.joint}.across", arm.imag)
     px, py = w.joints[step.pivot]
@@ -317,9 +260,8 @@ def _slot(w: _Writer, step: Slot) -> None:
 
 def _slider(w: _Writer, step: Slider) -> None:
     joint = w.mechanism.point(step.joint)
-    length, _ = w.length(step.upstream, step.joint)
-    arm = w.in_plane(joint.plane, step.upstream, step.joint)
-    w.same_side(step, np.cos(step.axis) * arm[0] + np.sin(step.axis) * arm[1])
+    length = w.length(step.upstream, step.joint)
+    w.same_side(step)
     sign = w.parameter(f"sign.{step.joint}", step.sign)
     axis = w.parameter(f"slider.{step.joint}.axis", step.axis)
     ox = w.parameter(f"slider.{step.joint}.x", joint.x)
@@ -332,7 +274,7 @@ def _slider(w: _Writer, step: Slider) -> None:
     square = w.let(f"{length} * {length}" + (f" - {height} * {height}" if height else ""))
     position = w.let(f"{c} * {dx} + {s} * {dy} + {sign} * sqrt({square} - {across} * {across})")
     w.joints[step.joint] = (w.let(f"{ox} + {c} * {position}"), w.let(f"{oy} + {s} * {position}"))
-    w.lines.append((f"position_{step.joint}", position))
+    w.positions[step.joint] = position
 
 
 def _output(w: _Writer) -> str:
@@ -340,6 +282,6 @@ def _output(w: _Writer) -> str:
     if output.kind == "position":
         if not isinstance(w.mechanism.step(output.joint), Slider):
             raise MechanismError(f"The output is the position of {output.joint!r}, which is not a slider.")
-        return f"position_{output.joint}"
+        return w.positions[output.joint]
     (jx, jy), (px, py) = w.joints[output.joint], w.joints[output.pivot]
     return w.let(f"arctan2({jy} - {py}, {jx} - {px})")

@@ -6,7 +6,7 @@ The modules that need openpyxl are loaded when a workbook is written, not when a
 from __future__ import annotations
 
 from mlg_troubleshoot.records.annotate import annotate_workbook
-from mlg_troubleshoot.records.export import write_csv
+from mlg_troubleshoot.records.gate import admit, judge_again, judge_length
 from mlg_troubleshoot.records.model import ColumnReading, FileRead, ReadOptions, ReadResult, SheetLayout
 from mlg_troubleshoot.records.read import expand, read_inspections, read_many
 from mlg_troubleshoot.records.template import write_template
@@ -17,10 +17,12 @@ __all__ = [
     "ReadOptions",
     "ReadResult",
     "SheetLayout",
+    "admit",
     "annotate_workbook",
     "expand",
+    "judge_again",
+    "judge_length",
     "read_inspections",
     "read_many",
-    "write_csv",
     "write_template",
 ]

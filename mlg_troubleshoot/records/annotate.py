@@ -3,90 +3,97 @@
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
-from zipfile import BadZipFile, ZipFile
+from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile
 
 from mlg_troubleshoot.decision.inspection import RowSource
 from mlg_troubleshoot.errors import OutputError, Problem, UsageError
-from mlg_troubleshoot.records.cachedvalues import restore_results
-from mlg_troubleshoot.records.cells import column_letters
-from mlg_troubleshoot.records.columns import Kind
-from mlg_troubleshoot.records.export import write_bytes
+from mlg_troubleshoot.outputs import write_bytes
+from mlg_troubleshoot.records.cells import column_letters, writable
+from mlg_troubleshoot.records.columns import Field, Kind
 from mlg_troubleshoot.records.model import FileRefusedError, ReadResult, SheetLayout
-from mlg_troubleshoot.records.xlsx import XlsxFile
+from mlg_troubleshoot.units import LengthUnit
 
 if TYPE_CHECKING:
+    from openpyxl import Workbook
     from openpyxl.cell import Cell, MergedCell
     from openpyxl.worksheet.worksheet import Worksheet
 
 _BAD_FILL = "FFFFB3B3"
 _HEADER_FILL = "FFD9E2EC"
+_OVER_FILL = "FFFFD08A"
+_VERDICT_FILLS = {"WITHIN_MARGIN": "FFC9E7CB", "OUTSIDE_MARGIN": "FFF4A3A0", "INVALID": "FFF4A3A0"}
+_UNDECIDED_FILL = "FFFFEB9C"
 _AUTHOR = "mlg check"
+# Widths of columns, and what fits on a line of the widest: its letters are narrower than digits. [characters]
+_TEXT_WIDTH, _NUMBER_WIDTH, _LONG_WIDTH, _ON_A_LINE = 17, 11, 52, 58
+# At which the verdicts fit on the width of a landscape page. [%]
+_LANDSCAPE_SCALE = 55
 
 VerdictColumns = Mapping[RowSource, Mapping[str, str | float | None]]
+OverLimit = Mapping[RowSource, Mapping[int, float]]
 
 
 def annotate_workbook(
-    source: str | Path, out: str | Path, result: ReadResult, verdicts: VerdictColumns, *, name: str | None = None
+    source: str | Path,
+    out: str | Path,
+    result: ReadResult,
+    verdicts: VerdictColumns,
+    over_limit: OverLimit = MappingProxyType({}),
+    *,
+    name: str | None = None,
 ) -> tuple[str, ...]:
-    """Write a copy of a workbook with bad cells marked and verdict columns behind the table.
+    """Write a copy of a workbook with bad cells and joints over their limit marked, and verdict columns.
 
-    Parameters
-    ----------
-    source : str or Path
-        The workbook that was read, .xlsx or .xlsm.
-    out : str or Path
-        File to write; it appears whole or not at all. Macros are kept if it ends in .xlsm.
-    result : ReadResult
-        What was read from it.
-    verdicts : mapping of RowSource to mapping
-        New columns by header, for each row.
-    name : str, optional
-        What `result` calls the file; the path as given if left out.
-
-    Returns
-    -------
-    tuple of str
-        What the copy could not take over, such as pictures and drawn shapes, in plain words; empty if nothing.
-
-    Raises
-    ------
-    UsageError
-        If the source is no .xlsx or .xlsm workbook, or is the file to write.
-    OutputError
-        If the copy cannot be written.
+    ``over_limit`` gives for a row its joints over their limit, each with that limit. [in]
     """
-    label = name if name is not None else str(source)
+    label = writable(name if name is not None else str(source))
     data = _load(source, out)
     from openpyxl import load_workbook
+    from openpyxl.writer.excel import ExcelWriter
 
-    keep_macros = Path(out).suffix.lower() == ".xlsm"
+    from mlg_troubleshoot.records.cachedvalues import restore_results
+
+    buffer = io.BytesIO()
     try:
-        book = load_workbook(io.BytesIO(data), keep_vba=keep_macros, rich_text=True)
+        # What the library drops is said below, in the user's words.
+        with warnings.catch_warnings(), ZipFile(buffer, "w", ZIP_DEFLATED) as package:
+            warnings.simplefilter("ignore")
+            macros = Path(out).suffix.lower() == ".xlsm"
+            book = load_workbook(io.BytesIO(data), keep_vba=macros, rich_text=True)
+            _annotate(book, label, result, verdicts, over_limit)
+            ExcelWriter(book, package).save()
     except (BadZipFile, KeyError, ValueError, TypeError, AttributeError, IndexError, SyntaxError, OSError) as error:
         raise OutputError(
             f"{source} cannot be copied ({type(error).__name__}): a part of it is not understood",
             "Open it in a spreadsheet program, save it again as .xlsx, and annotate the copy.",
         ) from None
-    for layout in result.layouts:
-        if layout.file == label and layout.sheet in book.sheetnames:
-            sheet = book[layout.sheet]
-            free = _free_column(sheet, layout)
-            for problem in result.problems:
-                if problem.file == label and problem.sheet == layout.sheet:
-                    _mark(sheet, layout, problem)
-            own = {s: v for s, v in verdicts.items() if s.file == label and s.sheet == layout.sheet}
-            if layout.kind == "form":
-                _beside_form(sheet, layout, free, own)
-            else:
-                _behind_table(sheet, layout, free, own)
-    buffer = io.BytesIO()
-    book.save(buffer)
     written = restore_results(data, buffer.getvalue())
     write_bytes(out, written)
     return _not_taken_over(data, written)
+
+
+def _annotate(book: Workbook, label: str, result: ReadResult, verdicts: VerdictColumns, over_limit: OverLimit) -> None:
+    for layout in result.layouts:
+        if layout.file != label or layout.sheet not in book.sheetnames:
+            continue
+        sheet = book[layout.sheet]
+        free = _free_column(sheet, layout)
+        for problem in result.problems:
+            if problem.file == label and problem.sheet == layout.sheet:
+                _mark(sheet, layout, problem)
+        own = {s: v for s, v in verdicts.items() if s.file == label and s.sheet == layout.sheet}
+        if layout.kind != "long":
+            _mark_over_limit(sheet, layout, {s: over_limit[s] for s in own if s in over_limit})
+        if layout.kind == "form":
+            _beside_form(sheet, layout, free, own)
+        else:
+            _behind_table(sheet, layout, free, own)
+            _print_well(sheet, layout, free)
 
 
 # Parts that the library may drop in silence: their folder, and what a user calls them.
@@ -126,6 +133,8 @@ def _shapes(archive: ZipFile) -> int:
 
 
 def _load(source: str | Path, out: str | Path) -> bytes:
+    from mlg_troubleshoot.records.xlsx import XlsxFile
+
     path = Path(source)
     if Path(out).resolve() == path.resolve():
         raise UsageError(f"{out} is the workbook itself", "Name another file for the annotated copy.")
@@ -153,8 +162,6 @@ def _free_column(sheet: Worksheet, layout: SheetLayout) -> int:
 
 def _mark(sheet: Worksheet, layout: SheetLayout, problem: Problem) -> None:
     from openpyxl.cell import MergedCell
-    from openpyxl.comments import Comment
-    from openpyxl.styles import PatternFill
 
     place = problem.cell
     if place is None:
@@ -166,11 +173,35 @@ def _mark(sheet: Worksheet, layout: SheetLayout, problem: Problem) -> None:
         if anchor is None:
             return
         cell = sheet.cell(anchor.min_row, anchor.min_col)
-    cell.fill = PatternFill("solid", fgColor=_BAD_FILL)
-    text = f"{_AUTHOR}: found {problem.value or 'nothing'}; expected {problem.expected}. {problem.remedy}"
-    before = cell.comment
-    comment = Comment(f"{before.text}\n{text}" if before is not None else text, _AUTHOR, height=160, width=360)
-    cell.comment = comment
+    said = f"found {problem.value or 'nothing'}; expected {problem.expected}. {problem.remedy}"
+    _fill(cell, _BAD_FILL, said)
+
+
+def _fill(cell: Cell | MergedCell, colour: str, said: str = "") -> None:
+    """Colour a cell and add to its comment."""
+    from openpyxl.comments import Comment
+    from openpyxl.styles import PatternFill
+
+    cell.fill = PatternFill("solid", fgColor=colour)
+    if said:
+        before = f"{cell.comment.text}\n" if cell.comment is not None else ""
+        cell.comment = Comment(f"{before}{_AUTHOR}: {said}", _AUTHOR, height=160, width=360)
+
+
+def _mark_over_limit(sheet: Worksheet, layout: SheetLayout, over_limit: OverLimit) -> None:
+    """Mark the clearances of a wide table or a form that are over their limit."""
+    from openpyxl.cell import Cell as OrdinaryCell
+
+    for source, limits in over_limit.items():
+        for joint, limit_in in limits.items():
+            names = {Field(Kind.CLEARANCE, joint, unit).name for unit in (None, *LengthUnit)}
+            read = next((column for column in layout.columns if column.read_as in names), None)
+            row = source.row if read is None else read.row or source.row
+            if read is None or row is None:
+                continue
+            cell = sheet.cell(row, read.index + 1)
+            if isinstance(cell, OrdinaryCell):
+                _fill(cell, _OVER_FILL, f"over the limit of joint {joint}, {limit_in:.4f} in radial.")
 
 
 def _put(cell: Cell | MergedCell, value: str | float | None) -> None:
@@ -191,17 +222,45 @@ def _headers(own: VerdictColumns) -> list[str]:
 
 
 def _behind_table(sheet: Worksheet, layout: SheetLayout, free: int, own: VerdictColumns) -> None:
-    from openpyxl.styles import Alignment, Font, PatternFill
+    from openpyxl.styles import Alignment, Font
 
-    for offset, header in enumerate(_headers(own)):
-        cell = sheet.cell(layout.header_row, free + offset)
+    sheet.row_dimensions[layout.header_row].height = None
+    for column, header in enumerate(_headers(own), free):
+        cell = sheet.cell(layout.header_row, column)
         _put(cell, header)
-        cell.font = Font(bold=True)
-        cell.fill = PatternFill("solid", fgColor=_HEADER_FILL)
+        cell.font = Font(name="Calibri", bold=True)
+        _fill(cell, _HEADER_FILL)
         cell.alignment = Alignment(wrap_text=True, vertical="center")
-        for source, values in own.items():
-            if source.row is not None and values.get(header) is not None:
-                _put(sheet.cell(source.row, free + offset), values[header])
+        found = {s.row: v[header] for s, v in own.items() if s.row is not None and v.get(header) is not None}
+        longest = max((len(v) for v in found.values() if isinstance(v, str)), default=0)
+        width = _NUMBER_WIDTH if not longest else _TEXT_WIDTH if longest < 2 * _TEXT_WIDTH else _LONG_WIDTH
+        sheet.column_dimensions[column_letters(column - 1)].width = width
+        for row, value in found.items():
+            written = sheet.cell(row, column)
+            _put(written, value)
+            written.number_format = "General" if isinstance(value, str) else "0.0000"
+            written.alignment = Alignment(wrap_text=width == _LONG_WIDTH)
+            if width == _LONG_WIDTH and sheet.row_dimensions[row].height is None:
+                sheet.row_dimensions[row].height = 15.0 * -(-len(str(value)) // _ON_A_LINE)
+            if header == "verdict":
+                _fill(written, _VERDICT_FILLS.get(str(value), _UNDECIDED_FILL))
+    longest = max((len(header) for header in _headers(own)), default=0)
+    sheet.row_dimensions[layout.header_row].height = 15.0 * -(-longest // (_NUMBER_WIDTH - 2))
+
+
+def _print_well(sheet: Worksheet, layout: SheetLayout, free: int) -> None:
+    """Put the verdicts on pages of their own behind the readings, where the user has not set up his pages himself."""
+    from openpyxl.worksheet.pagebreak import Break
+
+    pages = sheet.sheet_properties.pageSetUpPr
+    if sheet.print_area or sheet.print_title_rows or sheet.col_breaks.brk or (pages is not None and pages.fitToPage):
+        return
+    sheet.page_setup.orientation, sheet.page_setup.scale = "landscape", _LANDSCAPE_SCALE
+    sheet.print_title_rows = f"{layout.header_row}:{layout.header_row}"
+    named = [layout.index_of(kind.value) for kind in (Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE)]
+    last = max((index for index in named if index is not None and index < len(named)), default=0)
+    sheet.print_title_cols = f"A:{column_letters(last)}"
+    sheet.col_breaks.append(Break(id=free - 1))
 
 
 def _beside_form(sheet: Worksheet, layout: SheetLayout, free: int, own: VerdictColumns) -> None:
@@ -211,6 +270,6 @@ def _beside_form(sheet: Worksheet, layout: SheetLayout, free: int, own: VerdictC
         for offset, (header, value) in enumerate(values.items()):
             label = sheet.cell(layout.header_row + offset, free)
             _put(label, header)
-            label.font = Font(bold=True)
+            label.font = Font(name="Calibri", bold=True)
             if value is not None:
                 _put(sheet.cell(layout.header_row + offset, free + 1), value)

@@ -27,16 +27,7 @@ class OddKind(StrEnum):
 class OddCell:
     """A cell that is neither blank nor text nor a plain number.
 
-    Parameters
-    ----------
-    kind : OddKind
-        What it is.
-    text : str
-        What a spreadsheet program shows.
-    day : datetime.date, optional
-        The day, if it is a date that the calendar knows.
-    number : float, optional
-        The stored number, if there is one.
+    day: the day, if it is a date that the calendar knows.
     """
 
     kind: OddKind
@@ -49,18 +40,6 @@ Cell = str | float | OddCell | None
 
 
 def column_letters(index: int) -> str:
-    """Return the letters of a column.
-
-    Parameters
-    ----------
-    index : int
-        Column, counted from 0.
-
-    Returns
-    -------
-    str
-        ``A`` for 0, ``AA`` for 26.
-    """
     letters = ""
     index += 1
     while index:
@@ -73,54 +52,12 @@ LETTERS: tuple[str, ...] = tuple(column_letters(i) for i in range(MAX_COLUMNS))
 COLUMN_INDEX: dict[str, int] = {name: i for i, name in enumerate(LETTERS)}
 
 
-def column_index(letters: str) -> int:
-    """Return the index of a column from its letters.
-
-    Parameters
-    ----------
-    letters : str
-        One or more letters, upper or lower case.
-
-    Returns
-    -------
-    int
-        Column, counted from 0.
-    """
-    index = 0
-    for letter in letters.upper():
-        index = index * 26 + ord(letter) - 64
-    return index - 1
-
-
 def show_number(value: float) -> str:
-    """Return a number as a spreadsheet program shows it when the column is wide enough.
-
-    Parameters
-    ----------
-    value : float
-        The stored number.
-
-    Returns
-    -------
-    str
-        At most 15 significant digits, an integer without a point.
-    """
+    """Return a number as a spreadsheet program shows it when the column is wide enough."""
     return f"{value:.15g}"
 
 
 def show(cell: Cell) -> str:
-    """Return a cell as text, as found.
-
-    Parameters
-    ----------
-    cell : str, float, OddCell or None
-        The cell.
-
-    Returns
-    -------
-    str
-        Its text; empty for a blank cell.
-    """
     if cell is None:
         return ""
     if isinstance(cell, str):
@@ -131,26 +68,23 @@ def show(cell: Cell) -> str:
 
 
 def quote(cell: Cell, limit: int = 300) -> str:
-    """Return a cell as text for a message: not endless, and without characters that steer a terminal.
-
-    Parameters
-    ----------
-    cell : str, float, OddCell or None
-        The cell.
-    limit : int, optional
-        Number of characters after which it is cut.
-
-    Returns
-    -------
-    str
-        Its text.
-    """
+    """Return a cell as text for a message: not endless, and without characters that steer a terminal."""
     text = show(cell)
     if len(text) > limit:
         text = text[:limit] + "…"
-    return _STEERING.sub(lambda match: f"\\x{ord(match[0]):02x}", text)
+    return writable(_STEERING.sub(_visible, text))
 
 
+def writable(text: str) -> str:
+    """Return a text with the characters made visible that neither XML nor UTF-8 can carry."""
+    return UNWRITABLE.sub(_visible, text)
+
+
+def _visible(match: re.Match[str]) -> str:
+    return f"\\x{ord(match[0]):02x}"
+
+
+UNWRITABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 _STEERING = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]")
 _ELAPSED = re.compile(r"\[[hms]+\]", re.IGNORECASE)
 _NOT_CODE = re.compile(r'"[^"]*"|\\.|_.|\*.|\[[^\]]*\]', re.DOTALL)
@@ -158,20 +92,7 @@ _BUILTIN_DATES = frozenset((*range(14, 23), *range(27, 37), *range(45, 48), *ran
 
 
 def is_date_format(format_id: int, code: str | None) -> bool:
-    """Tell whether a number format shows a number as a date or a time.
-
-    Parameters
-    ----------
-    format_id : int
-        Number of the format; below 164 it is built in.
-    code : str or None
-        The format's code, if the file states it.
-
-    Returns
-    -------
-    bool
-        True for a date or a time.
-    """
+    """Tell whether a number format shows a number as a date or a time."""
     if code is None:
         return format_id in _BUILTIN_DATES
     if _ELAPSED.search(code):
@@ -184,36 +105,11 @@ def is_date_format(format_id: int, code: str | None) -> bool:
 
 
 def padding_width(code: str | None) -> int:
-    """Return how many digits a format such as ``000`` fills up with zeros.
-
-    Parameters
-    ----------
-    code : str or None
-        The format's code.
-
-    Returns
-    -------
-    int
-        Number of digits; 0 if the format does not pad.
-    """
+    """Return how many digits a format such as ``000`` fills up with zeros."""
     return len(code) if code is not None and len(code) > 1 and set(code) == {"0"} else 0
 
 
 def date_cell(serial: float, *, epoch_1904: bool) -> OddCell:
-    """Return the cell of a number that is shown as a date.
-
-    Parameters
-    ----------
-    serial : float
-        Days since the start of the file's calendar.
-    epoch_1904 : bool
-        True if the file counts from 1904-01-01, as old Macintosh workbooks do.
-
-    Returns
-    -------
-    OddCell
-        A date, without a day if the number lies outside the calendar.
-    """
     # 25569 is 1970-01-01 in the 1900 system, 24107 in the 1904 system.
     days = serial - (24107 if epoch_1904 else 25569)
     whole = int(days // 1) if abs(days) < 4e6 else None
@@ -228,18 +124,7 @@ def date_cell(serial: float, *, epoch_1904: bool) -> OddCell:
 
 
 def iso_date_cell(text: str) -> OddCell:
-    """Return the cell of a date that the file stores as ISO 8601 text.
-
-    Parameters
-    ----------
-    text : str
-        For example ``2026-03-04T00:00:00``.
-
-    Returns
-    -------
-    OddCell
-        A date, without a day if the text is not one.
-    """
+    """Return the cell of a date that the file stores as ISO 8601 text."""
     try:
         return OddCell(OddKind.DATE, text[:10], datetime.fromisoformat(text).date())
     except ValueError:

@@ -22,6 +22,8 @@ class Kind(StrEnum):
     GAUGE_U = "gauge_u"
     PLUNGER_GAUGE_U = "plunger_gauge_u"
     PLUNGER_DOWN_LOCK = "plunger_down_lock"
+    ACTUATOR_EXTENSION = "actuator_extension"
+    PLUNGER_POSITION = "plunger_position"
     PLUNGER_DISPLACEMENT = "plunger_displacement"
     MARGIN = "margin"
     MARGIN_U = "margin_u"
@@ -46,34 +48,26 @@ LENGTHS = frozenset(
         Kind.GAUGE_U,
         Kind.PLUNGER_GAUGE_U,
         Kind.PLUNGER_DOWN_LOCK,
+        Kind.ACTUATOR_EXTENSION,
+        Kind.PLUNGER_POSITION,
         Kind.PLUNGER_DISPLACEMENT,
         Kind.MARGIN,
         Kind.MARGIN_U,
     }
 )
 PER_JOINT = frozenset({Kind.CLEARANCE, Kind.AXIAL_FLOAT})
-REQUIRED = (Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE)
+NUMBERED = PER_JOINT | {Kind.GAUGE_U, Kind.PLUNGER_DISPLACEMENT}
+REQUIRED = (Kind.TAIL_NO, Kind.SIDE)
+IDENTITY = (Kind.RECORD_ID, *REQUIRED)
 # A mistake in one of these changes a verdict, so the whole row is not judged.
 VERDICT_BEARING = frozenset(
-    {*REQUIRED, Kind.CONVENTION, Kind.UNIT, Kind.JOINT, Kind.CLEARANCE, Kind.MARGIN, Kind.MARGIN_U}
+    {*IDENTITY, Kind.CONVENTION, Kind.UNIT, Kind.JOINT, Kind.CLEARANCE, Kind.MARGIN, Kind.MARGIN_U}
 )
 CARRIED = (Kind.WORK_ORDER, Kind.MANUAL_REF, Kind.MANUAL_REV, Kind.REMARKS)
 
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A column that the program understands.
-
-    Parameters
-    ----------
-    kind : Kind
-        What it holds.
-    number : int or None
-        Joint number, or which repeat of a plunger reading.
-    unit : LengthUnit or None
-        Unit of a length, if the header states it.
-    """
-
     kind: Kind
     number: int | None = None
     unit: LengthUnit | None = None
@@ -94,7 +88,7 @@ class Field:
         words = self.kind.value.replace("_", " ")
         if self.kind is Kind.PLUNGER_DISPLACEMENT and self.number not in (None, 1):
             words += f" {self.number}"
-        elif self.kind in PER_JOINT and self.number is not None:
+        elif self.number is not None and self.kind is not Kind.PLUNGER_DISPLACEMENT:
             words += f" #{self.number}"
         return words[:1].upper() + words[1:]
 

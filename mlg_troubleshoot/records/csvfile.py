@@ -13,32 +13,22 @@ from mlg_troubleshoot.records.cells import MAX_COLUMNS, MAX_ROWS, Cell
 from mlg_troubleshoot.records.model import FileRefusedError
 from mlg_troubleshoot.records.source import MergedRange, NumberedRow, SheetFacts
 
+# A quoted field may be as long as a line; the module's own limit would make it a fault.
+csv.field_size_limit(1_000_000)
 _DELIMITERS = (",", ";", "\t", "|")
 _SEP_LINE = re.compile(r'\s*"?sep=(.)"?\s*(?:\r\n|\r|\n)', re.IGNORECASE)
 _CONTROL = re.compile(r"[\x01-\x08\x0b\x0e-\x1f]")
 _MAX_FIELD_LINES = 50
+_MAX_BYTES = 25_000_000
+_MAX_LINES = 500_000
+_MAX_LINE_CHARACTERS = 1_000_000
+_MAX_FIELDS = 20_000
+# How many characters may be joined in the search for the ends of quoted fields before every open quote is a stray one.
+_QUOTE_BUDGET = 20_000_000
 
 
 def decode(data: bytes) -> tuple[str, list[str]]:
-    """Decode a text file: UTF-8, UTF-16 or Windows-1252.
-
-    Parameters
-    ----------
-    data : bytes
-        The file.
-
-    Returns
-    -------
-    text : str
-        Its text, without a byte order mark.
-    notes : list of str
-        The encoding, if it is not plain UTF-8.
-
-    Raises
-    ------
-    FileRefusedError
-        If it is not text.
-    """
+    """Decode a text file: UTF-8, UTF-16 or Windows-1252."""
     if data.startswith(codecs.BOM_UTF8):
         data = data[3:]
     elif data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
@@ -64,8 +54,17 @@ def _strictly(data: bytes, encoding: str) -> str:
         raise not_text() from None
 
 
+def _too_large(what: str, row: int | None = None) -> FileRefusedError:
+    return FileRefusedError(
+        "file_too_large",
+        what,
+        f"at most {MAX_ROWS} rows, {MAX_COLUMNS} columns and {_MAX_LINE_CHARACTERS} characters a line",
+        "Read the inspection table alone, or split the file.",
+        row=row,
+    )
+
+
 def not_text() -> FileRefusedError:
-    """Return the refusal of a file that is no text at all."""
     return FileRefusedError(
         "not_a_table",
         "the file is neither text nor a spreadsheet",
@@ -75,16 +74,6 @@ def not_text() -> FileRefusedError:
 
 
 class CsvSheet:
-    """The one table of a CSV file.
-
-    Parameters
-    ----------
-    text : str
-        The decoded file.
-    delimiter : str
-        What separates the fields.
-    """
-
     name: str | None = None
     hidden = False
 
@@ -92,47 +81,34 @@ class CsvSheet:
         self._text = text
         self._delimiter = delimiter
         self.facts = SheetFacts()
+        self._budget = _QUOTE_BUDGET
 
     def merged(self) -> Sequence[MergedRange]:
         """Return nothing: CSV has no merged cells."""
         return ()
 
     def rows(self) -> Iterator[NumberedRow]:
-        """Read the rows that are not blank, with their numbers counted from 1.
-
-        Yields
-        ------
-        tuple
-            Number and fields of the next row.
-
-        Raises
-        ------
-        FileRefusedError
-            If the table is far too large.
-        """
+        """Read the rows that are not blank, with their numbers counted from 1."""
         for number, fields in enumerate(self._records(), 1):
             cells: list[Cell] = [field if field and not field.isspace() else None for field in fields]
             if not any(cells):
                 continue
             if number > MAX_ROWS or (len(cells) > MAX_COLUMNS and any(cells[MAX_COLUMNS:])):
-                raise FileRefusedError(
-                    "file_too_large",
-                    f"row {number} has {len(cells)} fields",
-                    f"at most {MAX_ROWS} rows and {MAX_COLUMNS} columns",
-                    "Read the inspection table alone, or split the file.",
-                    row=number,
-                )
+                raise _too_large(f"row {number} has {len(cells)} fields", number)
             yield number, cells
 
     def _records(self) -> Iterator[list[str]]:
         """Split the lines into fields; a quoted field may go on over several lines."""
-        lines = deque(io.StringIO(self._text, newline=""))
+        text = self._text
+        lines = deque((text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text).split("\n"))
         delimiter = self._delimiter
         usual = 0
         number = 0
         while lines:
-            line = lines.popleft().rstrip("\r\n")
+            line = lines.popleft()
             number += 1
+            if len(line) > _MAX_LINE_CHARACTERS or line.count(delimiter) > _MAX_FIELDS:
+                raise _too_large(f"line {number} has {len(line)} characters and {line.count(delimiter)} separators")
             if '"' not in line:
                 fields = line.split(delimiter) if line else []
             else:
@@ -148,8 +124,11 @@ class CsvSheet:
             return fields
         record = line
         for more in range(min(_MAX_FIELD_LINES, len(lines))):
-            record += "\n" + lines[more].rstrip("\r\n")
-            fields = self._parse(record)
+            record += "\n" + lines[more]
+            self._budget -= len(record)
+            if self._budget < 0 or len(record) > _MAX_LINE_CHARACTERS:
+                break
+            fields = self._parse(record) if '"' in lines[more] else None
             if fields is not None and usual in (0, len(fields)):
                 for _ in range(more + 1):
                     lines.popleft()
@@ -187,25 +166,14 @@ def _zero_character(row: int) -> FileRefusedError:
 
 
 class CsvFile:
-    """A CSV file.
-
-    Parameters
-    ----------
-    data : bytes
-        The file.
-    header_score : callable
-        Tells how many columns of a row are understood as a header; the separator that makes most sense of the
-        first rows is taken.
-
-    Raises
-    ------
-    FileRefusedError
-        If it is not text.
-    """
-
     kind = "csv"
 
     def __init__(self, data: bytes, header_score: Callable[[Sequence[Cell]], int]) -> None:
+        if len(data) > _MAX_BYTES:
+            raise _too_large(f"a text of {len(data) / 1e6:.0f} MB")
+        lines = data.count(b"\n") or data.count(b"\r")
+        if lines > _MAX_LINES:
+            raise _too_large(f"{lines} lines")
         text, notes = decode(data)
         self.notes: list[str] = notes
         head = text[:65536]

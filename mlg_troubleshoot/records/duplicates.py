@@ -13,36 +13,20 @@ from mlg_troubleshoot.records.model import SheetLayout
 
 
 def settle_duplicates(
-    rows: list[Inspection | InvalidRow],
-    layouts: Sequence[SheetLayout],
-    invalid_content: Mapping[RowSource, int],
+    rows: list[Inspection | InvalidRow], layouts: Sequence[SheetLayout], invalid_content: Mapping[RowSource, int]
 ) -> list[Problem]:
-    """Warn of rows that are the same inspection again, and refuse rows that share an id and differ.
-
-    Parameters
-    ----------
-    rows : list of Inspection or InvalidRow
-        The rows; changed in place.
-    layouts : sequence of SheetLayout
-        Where the tables are, for the cells of the ids.
-    invalid_content : mapping of RowSource to int
-        A hash of the cells of the rows that cannot be judged anyway.
-
-    Returns
-    -------
-    list of Problem
-        One entry for each row that was refused.
-    """
-    first: dict[str, int] = {}
-    groups: dict[str, list[int]] = {}
+    """Warn of rows that are the same inspection again, and refuse rows that share an id and differ."""
+    first: dict[tuple[str | None, str], int] = {}
+    groups: dict[tuple[str | None, str], list[int]] = {}
     for place, row in enumerate(rows):
         if row.record_id is None:
             continue
-        earlier = first.setdefault(row.record_id, place)
+        key = (row.source.file, row.record_id)
+        earlier = first.setdefault(key, place)
         if earlier != place:
-            groups.setdefault(row.record_id, [earlier]).append(place)
+            groups.setdefault(key, [earlier]).append(place)
     problems: list[Problem] = []
-    for record_id, places in groups.items():
+    for (_, record_id), places in groups.items():
         found = [rows[place] for place in places]
         bare = [_content(row, invalid_content) for row in found]
         if all(b is not None and b == bare[0] for b in bare):
@@ -82,27 +66,14 @@ def _column(source: RowSource, layouts: Sequence[SheetLayout]) -> tuple[str, str
 def _problem(record_id: str, source: RowSource, others: list[str], layouts: Sequence[SheetLayout]) -> Problem:
     header, cell = _column(source, layouts)
     shown = ", ".join(others[:3]) + (f" and {len(others) - 3} more" if len(others) > 3 else "")
-    return Problem(
-        "record_id_duplicate",
-        source.file,
-        source.sheet,
-        source.row,
-        header,
-        cell,
-        record_id,
-        f"a record id that no other inspection has; {shown} has it too",
-        "Keep the right row, or give each inspection its own record id.",
-    )
+    expected = f"a record id that no other inspection of the file has; {shown} has it too"
+    remedy = "Keep the right row, or give each inspection its own record id."
+    place = source.file, source.sheet, source.row, header, cell
+    return Problem("record_id_duplicate", *place, record_id, expected, remedy)
 
 
 def _refused(row: Inspection | InvalidRow, layouts: Sequence[SheetLayout]) -> InvalidRow:
     header, _ = _column(row.source, layouts)
     correct = row.correct if isinstance(row, InvalidRow) else ()
-    return InvalidRow(
-        row.record_id,
-        row.tail_no,
-        row.side,
-        (header, *(c for c in correct if c != header)),
-        row.warnings,
-        row.source,
-    )
+    columns = (header, *(c for c in correct if c != header))
+    return InvalidRow(row.record_id, row.tail_no, row.side, columns, row.warnings, row.source)

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import Cell, column_letters
-from mlg_troubleshoot.records.columns import REQUIRED, Kind
+from mlg_troubleshoot.records.columns import IDENTITY, Kind
 from mlg_troubleshoot.records.headers import Standing, recognise
 from mlg_troubleshoot.records.layout import ColumnReader
-from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout
+from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout, TableInHand
 from mlg_troubleshoot.records.rows import RowReader
 from mlg_troubleshoot.records.source import NumberedRow
 from mlg_troubleshoot.records.tables import Collected
@@ -21,34 +21,13 @@ _DECLARATIONS = frozenset({Kind.UNIT, Kind.CONVENTION})
 
 
 class Form:
-    """A sheet that is laid out as a form.
-
-    Parameters
-    ----------
-    lines : sequence of tuple
-        Row, label and value of each line.
-    label_column, value_column : int
-        Where they stand, counted from 0.
-    """
-
     def __init__(self, lines: Sequence[tuple[int, str, Cell]], label_column: int, value_column: int) -> None:
         self.lines = tuple(lines)
         self.label_column = label_column
         self.value_column = value_column
 
     def is_untouched(self, options: ReadOptions) -> bool:
-        """Tell whether nothing has been filled in yet.
-
-        Parameters
-        ----------
-        options : ReadOptions
-            The gear's joints.
-
-        Returns
-        -------
-        bool
-            True if no line but the unit and the convention holds a value.
-        """
+        """Tell whether nothing has been filled in yet."""
         for _, label, value in self.lines:
             if value is None:
                 continue
@@ -59,20 +38,6 @@ class Form:
 
 
 def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
-    """Look for a form in the rows of a sheet.
-
-    Parameters
-    ----------
-    rows : sequence of tuple
-        Its first rows.
-    options : ReadOptions
-        The gear's joints and the mapped headers.
-
-    Returns
-    -------
-    Form or None
-        The form; None if the sheet is none.
-    """
     known: Counter[int] = Counter()
     kinds: dict[int, set[Kind]] = {}
     for _, cells in rows:
@@ -86,7 +51,7 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
     if not known:
         return None
     column, count = known.most_common(1)[0]
-    if count < 3 or not kinds[column] & {*REQUIRED} or Kind.CLEARANCE not in kinds[column]:
+    if count < 3 or not kinds[column] & {*IDENTITY} or Kind.CLEARANCE not in kinds[column]:
         return None
     ours = any(cell == FORM_TITLE for _, cells in rows[:2] for cell in cells[:1])
     value_column = column + 1
@@ -111,22 +76,6 @@ def _is_line(label: str, options: ReadOptions) -> bool:
 
 
 def read_form(form: Form, options: ReadOptions, *, file: str | None, sheet: str | None) -> Collected:
-    """Read one form as one inspection.
-
-    Parameters
-    ----------
-    form : Form
-        The form.
-    options : ReadOptions
-        What the caller declared.
-    file, sheet : str or None
-        Where it is.
-
-    Returns
-    -------
-    Collected
-        Its row, problems and notes.
-    """
     out = Collected()
     letters, values = column_letters(form.label_column), column_letters(form.value_column)
     labels = [label for _, label, _ in form.lines]
@@ -134,45 +83,16 @@ def read_form(form: Form, options: ReadOptions, *, file: str | None, sheet: str 
     value_places = [(row, f"{values}{row}") for row, _, _ in form.lines]
     columns = ColumnReader(options, file, sheet).place(labels, form.lines[0][0], places=label_places)
     out.problems += columns.problems
-    out.notes += columns.notes
+    out.notes += columns.notes()
     row_problems: list[Problem] = []
-    reader = RowReader(
-        columns.placed,
-        options,
-        file=file,
-        sheet=sheet,
-        decimal_comma=options.decimal_comma,
-        report=row_problems.append,
-        header_row=form.lines[0][0],
-    )
-    start = next(
-        (
-            row
-            for (row, _, _), p in zip(form.lines, columns.placed, strict=True)
-            if p.field is not None and p.field.kind is Kind.RECORD_ID
-        ),
-        form.lines[0][0],
-    )
+    reader = RowReader(columns.placed, TableInHand(options, file, sheet, row_problems.append, options.decimal_comma))
+    named = list(zip((row for row, _, _ in form.lines), columns.placed, strict=True))
+    ids = [row for row, p in named if p.field is not None and p.field.kind is Kind.RECORD_ID]
+    start = ids[0] if ids else form.lines[0][0]
     out.rows.append(reader.read(start, [value for _, _, value in form.lines], value_places))
     out.invalid_content[out.rows[0].source] = hash(tuple(value for _, _, value in form.lines))
     out.problems += row_problems
-    out.layouts.append(
-        SheetLayout(
-            file,
-            sheet,
-            "form",
-            form.lines[0][0],
-            form.lines[-1][0],
-            form.value_column + 1,
-            tuple(
-                ColumnReading(
-                    form.value_column,
-                    p.header,
-                    p.field.name if p.field is not None and not p.refused else None,
-                    row,
-                )
-                for (row, _, _), p in zip(form.lines, columns.placed, strict=True)
-            ),
-        )
-    )
+    read = tuple(ColumnReading(form.value_column, p.header, p.read_as, row) for row, p in named)
+    ends = form.lines[0][0], form.lines[-1][0]
+    out.layouts.append(SheetLayout(file, sheet, "form", *ends, form.value_column + 1, read))
     return out

@@ -12,13 +12,11 @@ from functools import lru_cache
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.joints import Joint
-from mlg_troubleshoot.records.columns import LENGTHS, PER_JOINT, VERDICT_BEARING, Field, Kind
-from mlg_troubleshoot.units import LengthUnit
+from mlg_troubleshoot.records.columns import LENGTHS, NUMBERED, PER_JOINT, VERDICT_BEARING, Field, Kind
+from mlg_troubleshoot.units import UNIT_SPELLINGS, LengthUnit
 
 
 class Standing(StrEnum):
-    """How sure the reading of a header is."""
-
     CANONICAL = "canonical"
     UNDERSTOOD = "understood"
     DOUBTFUL = "doubtful"
@@ -27,22 +25,6 @@ class Standing(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Recognition:
-    """What a header was read as.
-
-    Parameters
-    ----------
-    standing : Standing
-        How sure that is.
-    field : Field or None
-        The column, if it is understood.
-    reason : str
-        Why it is doubtful.
-    nearest : str or None
-        The canonical column that it may mean.
-    code : str
-        Kind of problem, if it is doubtful.
-    """
-
     standing: Standing
     field: Field | None = None
     reason: str = ""
@@ -52,15 +34,6 @@ class Recognition:
 
 UNKNOWN = Recognition(Standing.UNKNOWN)
 
-_UNIT_WORDS: dict[str, LengthUnit] = {
-    word: unit
-    for unit, words in (
-        (LengthUnit.INCH, ("in", "inch", "inches", '"', "''")),
-        (LengthUnit.THOU, ("thou", "thous", "mil", "mils")),
-        (LengthUnit.MILLIMETRE, ("mm", "millimetre", "millimetres", "millimeter", "millimeters")),
-    )
-    for word in words
-}
 _FOREIGN_UNITS = frozenset(
     ("cm", "um", "μm", "µm", "micron", "microns", "m", "ft", "foot", "feet", "dm", "nm", "cms", "metre", "meter")
 )
@@ -81,21 +54,28 @@ _OTHER_MATTER = frozenset(
 _ALIASES: dict[str, Kind] = {
     alias: kind
     for kind, aliases in (
-        (Kind.RECORD_ID, "record|record no|record nr|record number|inspection id|inspection no|inspection number"),
+        (
+            Kind.RECORD_ID,
+            "id|insp no|insp id|record|record no|record nr|record number|inspection id|inspection no|inspection number",
+        ),
         (
             Kind.TAIL_NO,
+            "aircraft|aircraft no|aircraft number|aircraft reg|reg|reg no|registration no|"
             "tail|tail number|tail nr|tail #|a c reg|a c registration|a c tail no|aircraft tail|aircraft tail no|"
             "aircraft registration|registration",
         ),
-        (Kind.SIDE, "gear side|lh rh|side lh rh|gear side lh rh"),
+        (Kind.SIDE, "posn|position|gear position|gear posn|l r|gear side|lh rh|side lh rh|gear side lh rh"),
         (Kind.CONVENTION, "convention|clearance type convention|convention of the clearances"),
         (Kind.UNIT, "units|length unit|clearance unit|unit of the clearances|unit of the lengths"),
         (Kind.JOINT, "joint no|joint nr|joint number|jt|jt no|joint #"),
-        (Kind.DATE, "date|date of inspection"),
-        (Kind.LANDINGS, "landings|landings since overhaul|gear landings since overhaul"),
+        (Kind.DATE, "insp date|inspected on|date inspected|date measured|date|date of inspection"),
+        (Kind.LANDINGS, "ldgs|landings since o h|landings|landings since overhaul|gear landings since overhaul"),
         (Kind.APPROACH, "approach direction"),
-        (Kind.GAUGE_ID, "gauge|gauge no|gauge number|gauge set"),
-        (Kind.TECHNICIAN_ID, "technician|technician no|technician number|measured by"),
+        (Kind.GAUGE_ID, "gauge id no|gauge s n|gauge|gauge no|gauge number|gauge set"),
+        (
+            Kind.TECHNICIAN_ID,
+            "tech|mechanic|inspector|inspected by|technician|technician no|technician number|measured by",
+        ),
         (Kind.WORK_ORDER, "wo|work order no|work order number|w o"),
         (Kind.MANUAL_REF, "manual reference"),
         (Kind.MANUAL_REV, "manual revision"),
@@ -125,55 +105,26 @@ _DASHES = re.compile(r"[\u2010-\u2015\u2212]")
 
 
 def tidy(header: str) -> str:
-    """Return a header in one spelling: lower case, plain dashes and blanks, no colon or asterisk at the end.
-
-    Parameters
-    ----------
-    header : str
-        The header as found.
-
-    Returns
-    -------
-    str
-        The header for comparison.
-    """
+    """Return a header in one spelling: lower case, plain dashes and blanks, no colon or asterisk at the end."""
     text = unicodedata.normalize("NFKC", header.replace("″", '"').replace("”", '"').replace("“", '"'))
     text = _DASHES.sub("-", text).replace("\u200b", "").replace("\ufeff", "")
     return re.sub(r"\s+", " ", text).strip().rstrip(":*").strip().casefold()
 
 
 def parse_canonical(name: str, joint_numbers: tuple[int, ...]) -> Field | None:
-    """Read a canonical column name.
-
-    Parameters
-    ----------
-    name : str
-        For example ``clearance_3_in``; the unit may be missing.
-    joint_numbers : tuple of int
-        The gear's joints.
-
-    Returns
-    -------
-    Field or None
-        The column; None if the name is not canonical.
-    """
     match = _CANONICAL.fullmatch(name)
     if match is None or match["kind"] not in _KINDS:
         return None
     kind = _KINDS[match["kind"]]
     number = int(match["number"]) if match["number"] else None
     unit = LengthUnit(match["unit"]) if match["unit"] else None
-    if (unit is not None and kind not in LENGTHS) or (number is not None and not _may_be_numbered(kind)):
+    if (unit is not None and kind not in LENGTHS) or (number is not None and kind not in NUMBERED):
         return None
-    if kind in PER_JOINT and number is not None and number not in joint_numbers:
+    if kind is not Kind.PLUNGER_DISPLACEMENT and number is not None and number not in joint_numbers:
         return None
     if kind is Kind.PLUNGER_DISPLACEMENT and number is None:
         number = 1
     return Field(kind, number, unit)
-
-
-def _may_be_numbered(kind: Kind) -> bool:
-    return kind in PER_JOINT or kind is Kind.PLUNGER_DISPLACEMENT
 
 
 @lru_cache(maxsize=4096)
@@ -216,8 +167,8 @@ def _units_in(bracketed: list[str]) -> tuple[set[LengthUnit], list[str], list[st
     odd: list[str] = []
     for part in bracketed:
         for word in re.split(r"[\s,;/]+", part.rstrip(".")):
-            if word in _UNIT_WORDS:
-                units.add(_UNIT_WORDS[word])
+            if word in UNIT_SPELLINGS:
+                units.add(UNIT_SPELLINGS[word])
             elif word in _FOREIGN_UNITS:
                 foreign.append(word)
             elif word:
@@ -226,14 +177,14 @@ def _units_in(bracketed: list[str]) -> tuple[set[LengthUnit], list[str], list[st
 
 
 def _trailing_unit(words: list[str]) -> tuple[list[str], LengthUnit | None]:
-    if len(words) > 1 and words[-1] in _UNIT_WORDS:
+    if len(words) > 1 and words[-1] in UNIT_SPELLINGS:
         rest = words[:-1]
         if len(rest) > 1 and rest[-1] == "in":  # "Joint 3 in mm"
             rest = rest[:-1]
-        return rest, _UNIT_WORDS[words[-1]]
+        return rest, UNIT_SPELLINGS[words[-1]]
     for i in range(len(words) - 2):  # "Clearance in mm, joint 3"
-        if words[i] == "in" and words[i + 1] in _UNIT_WORDS:
-            return words[:i] + words[i + 2 :], _UNIT_WORDS[words[i + 1]]
+        if words[i] == "in" and words[i + 1] in UNIT_SPELLINGS:
+            return words[:i] + words[i + 2 :], UNIT_SPELLINGS[words[i + 1]]
     return words, None
 
 
@@ -321,8 +272,7 @@ def _numbered(  # noqa: PLR0911 - each return is one reason to doubt
     nearest = f"{kind.value}_{number}"
     if number not in joint_numbers:
         close = difflib.get_close_matches(nearest, [f"{kind.value}_{n}" for n in joint_numbers], 2, 0.0)
-        known = f"{min(joint_numbers)} to {max(joint_numbers)}"
-        return _doubt(f"this gear has no joint {number}: its joints are {known}", " or ".join(close), "joint_unknown")
+        return _doubt(no_joint(number, joint_numbers), " or ".join(close), "joint_unknown")
     if everything & _CONVENTION_WORDS:
         return _doubt("a convention in the header is not read; it has its own column", nearest)
     allowed = _CLEARANCE_WORDS | _JOINT_WORDS | _FILLERS | (_FLOAT_WORDS if is_float else frozenset())
@@ -332,6 +282,10 @@ def _numbered(  # noqa: PLR0911 - each return is one reason to doubt
     if after and not is_float and set(after) <= _CLEARANCE_WORDS:
         after = []
     return _check_name(kind, number, after, names)
+
+
+def no_joint(number: object, joint_numbers: tuple[int, ...]) -> str:
+    return f"this gear has no joint {number}: its joints are {min(joint_numbers)} to {max(joint_numbers)}"
 
 
 def _check_name(kind: Kind, number: int, after: list[str], names: tuple[tuple[int, str], ...]) -> Recognition:
@@ -362,22 +316,6 @@ _REFERENCE_NAMES: tuple[tuple[int, str], ...] = tuple(
 
 
 def recognise(header: str, joint_numbers: tuple[int, ...], joint_names: Mapping[int, str]) -> Recognition:
-    """Read one header.
-
-    Parameters
-    ----------
-    header : str
-        The header as found.
-    joint_numbers : tuple of int
-        The gear's joints.
-    joint_names : mapping of int to str
-        Their names; empty takes the reference gear's.
-
-    Returns
-    -------
-    Recognition
-        The column, or why it is doubtful, or unknown.
-    """
     names = dict(_REFERENCE_NAMES)
     for number, name in joint_names.items():
         names[number] = f"{name} {names.get(number, '')}" if number in joint_numbers else name
@@ -385,20 +323,7 @@ def recognise(header: str, joint_numbers: tuple[int, ...], joint_names: Mapping[
 
 
 def near_miss(header: str, joint_numbers: tuple[int, ...]) -> Recognition:
-    """Look for the canonical column that an unknown header is a slip of the pen away from.
-
-    Parameters
-    ----------
-    header : str
-        A header that was not recognised.
-    joint_numbers : tuple of int
-        The gear's joints.
-
-    Returns
-    -------
-    Recognition
-        Doubtful if the column it resembles bears on a verdict, else unknown with the nearest name.
-    """
+    """Look for the canonical column that an unknown header is a slip of the pen away from."""
     snake = re.sub(r"[\s\-]+", "_", tidy(header))
     bare = re.sub(r"_(in|thou|mm)$", "", snake)
     candidates = [k.value for k in Kind if k not in PER_JOINT and k not in (Kind.UNIT, Kind.SIDE, Kind.JOINT)]
@@ -414,25 +339,6 @@ def near_miss(header: str, joint_numbers: tuple[int, ...]) -> Recognition:
 
 
 def parse_target(name: str, joint_numbers: tuple[int, ...]) -> Field | None:
-    """Read the target of a column mapping.
-
-    Parameters
-    ----------
-    name : str
-        A canonical column, or ``carry``.
-    joint_numbers : tuple of int
-        The gear's joints.
-
-    Returns
-    -------
-    Field or None
-        The column; None for ``carry``.
-
-    Raises
-    ------
-    UsageError
-        If the name is not a column.
-    """
     text = re.sub(r"[\s\-]+", "_", tidy(name))
     if text == "carry":
         return None

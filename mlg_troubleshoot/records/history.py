@@ -6,20 +6,17 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Side
-from mlg_troubleshoot.units import MM_PER_IN
+from mlg_troubleshoot.units import SLIPS
 
 # Rows of a gear before and after that a row is compared with: enough for a median, few enough to follow the wear.
 _NEIGHBOURS = 3
 _FEWEST = 2
 _FIT_IN = 0.0008
 _CLEARLY_OFF = 3.0
-_SCALES: tuple[tuple[float, str], ...] = (
-    (MM_PER_IN, "millimetres read as inches (factor 25.4)"),
-    (1.0 / MM_PER_IN, "inches read as millimetres (factor 25.4)"),
-    (10.0, "a slipped decimal point (factor 10)"),
-    (0.1, "a slipped decimal point (factor 10)"),
-    (2.0, "a diametral clearance or total play read as radial (factor 2)"),
-    (0.5, "a radial clearance read as diametral or total play (factor 2)"),
+_SCALES: tuple[tuple[float, str], ...] = tuple(
+    (factor, f"{words} (factor {slip.factor:g})")
+    for slip in SLIPS.values()
+    for factor, words in ((slip.factor, slip.too_large), (1.0 / slip.factor, slip.too_small))
 )
 
 Gear = tuple[str, Side]
@@ -27,18 +24,7 @@ Clearances = Mapping[int, float]
 
 
 def history_warnings(rows: Sequence[Inspection | InvalidRow]) -> dict[int, tuple[str, ...]]:
-    """Suggest slips for rows that do not fit the gear's other inspections.
-
-    Parameters
-    ----------
-    rows : sequence of Inspection or InvalidRow
-        All rows.
-
-    Returns
-    -------
-    dict of int to tuple of str
-        Warnings by place in `rows`; nothing is changed by them.
-    """
+    """Suggest slips for rows that do not fit the gear's other inspections."""
     gears: dict[Gear, list[int]] = {}
     for place, row in enumerate(rows):
         if isinstance(row, Inspection) and row.clearance_in:

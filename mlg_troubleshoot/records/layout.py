@@ -8,13 +8,13 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from mlg_troubleshoot.errors import Problem
-from mlg_troubleshoot.records.cells import Cell, column_letters, show
-from mlg_troubleshoot.records.columns import PER_JOINT, REQUIRED, Field, Kind
+from mlg_troubleshoot.records.cells import Cell, column_letters, show, writable
+from mlg_troubleshoot.records.columns import IDENTITY, LENGTHS, PER_JOINT, REQUIRED, Field, Kind
 from mlg_troubleshoot.records.headers import Recognition, Standing, near_miss, parse_target, recognise, tidy
 from mlg_troubleshoot.records.model import ReadOptions
 from mlg_troubleshoot.records.rows import PlacedField
 from mlg_troubleshoot.records.source import MergedRange, NumberedRow
-from mlg_troubleshoot.units import LengthUnit
+from mlg_troubleshoot.units import UNIT_SPELLINGS, LengthUnit
 
 HEADER_SEARCH_ROWS = 20
 
@@ -23,18 +23,10 @@ HEADER_SEARCH_ROWS = 20
 class Header:
     """A header as found.
 
-    Parameters
-    ----------
-    row : int
-        Its row (the lower one of two), counted from 1.
-    texts : tuple of str
-        Header of each column.
-    width : int
-        Number of fields in the header row, trailing blanks included.
-    rows_used : tuple of int
-        The rows that belong to it: one, or two where the header has two rows or a row of units below.
-    units : tuple of LengthUnit or None
-        Unit of each column from a row of units; empty if there is none.
+    row: its row (the lower one of two), counted from 1.
+    width: number of fields in the header row, trailing blanks included.
+    rows_used: the rows that belong to it: one, or two where the header has two rows or a row of units below.
+    units: unit of each column from a row of units; empty if there is none.
     """
 
     row: int
@@ -48,22 +40,25 @@ class Header:
 class Columns:
     """The columns of a table, with what was wrong with its header.
 
-    Parameters
-    ----------
-    placed : list of PlacedField
-        The columns.
-    problems : list of Problem
-        What is wrong with the header, each once.
-    notes : list of str
-        How headers that are not canonical were read.
-    is_long : bool
-        True if one row is one joint's reading.
+    mapped, carried: headers that are not canonical with what they were read as; headers of what is only carried.
+    ids_made: True if there is no column of record ids.
+    is_long: True if one row is one joint's reading.
     """
 
     placed: list[PlacedField]
     problems: list[Problem] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    mapped: list[str] = field(default_factory=list)
+    carried: list[str] = field(default_factory=list)
+    ids_made: bool = False
     is_long: bool = False
+
+    def notes(self) -> list[str]:
+        """Say how the headers were read, all in one note, and what is only carried, in another."""
+        read = ["each header was read as: " + ", ".join(self.mapped)] if self.mapped else []
+        if self.ids_made:
+            read.append("there is no record_id: each inspection is named after the file, its row and its content")
+        carried = "not used, only carried to the report: " + ", ".join(self.carried)
+        return ["; ".join(read), carried] if self.carried else read and ["; ".join(read)]
 
 
 def _mapped(text: str, index: int, options: ReadOptions) -> bool:
@@ -71,20 +66,7 @@ def _mapped(text: str, index: int, options: ReadOptions) -> bool:
 
 
 def header_score(cells: Sequence[Cell], options: ReadOptions) -> int:
-    """Tell how much a row looks like a header.
-
-    Parameters
-    ----------
-    cells : sequence of Cell
-        The row.
-    options : ReadOptions
-        Joints and mapped headers.
-
-    Returns
-    -------
-    int
-        Number of different columns understood; 0 if the row is no header of inspections.
-    """
+    """Tell how much a row looks like a header."""
     known: set[tuple[Kind, int | None]] = set()
     doubtful = 0
     for index, cell in enumerate(cells):
@@ -98,7 +80,7 @@ def header_score(cells: Sequence[Cell], options: ReadOptions) -> int:
             elif found.standing is Standing.DOUBTFUL:
                 doubtful += 1
     kinds = {kind for kind, _ in known}
-    core = len(kinds & {*REQUIRED}) + (1 if Kind.CLEARANCE in kinds else 0) + (1 if doubtful else 0)
+    core = len(kinds & {*IDENTITY}) + (1 if Kind.CLEARANCE in kinds else 0) + (1 if doubtful else 0)
     # A table of clearances alone is a table, too: what it lacks is then named column by column.
     clearances = sum(1 for kind, number in known if kind is Kind.CLEARANCE and number is not None)
     if clearances < 2 and (core < 2 or len(known) + doubtful < 3):
@@ -109,22 +91,6 @@ def header_score(cells: Sequence[Cell], options: ReadOptions) -> int:
 def find_header(
     rows: Sequence[NumberedRow], options: ReadOptions, merged: Callable[[], Sequence[MergedRange]]
 ) -> Header | None:
-    """Search the first rows of a sheet for the header.
-
-    Parameters
-    ----------
-    rows : sequence of tuple
-        The first rows that are not blank.
-    options : ReadOptions
-        Joints and mapped headers.
-    merged : callable
-        Returns the merged ranges, asked for only where they may matter.
-
-    Returns
-    -------
-    Header or None
-        The header; None if no row of the first 20 is one.
-    """
     near = [(number, cells) for number, cells in rows if number <= HEADER_SEARCH_ROWS]
     best: tuple[int, int] | None = None
     for place, (_, cells) in enumerate(near):
@@ -140,21 +106,18 @@ def find_header(
     header = Header(number, tuple(_text(c) for c in cells), len(cells), (number,))
     if best[1] + 1 < len(near):
         below, units = near[best[1] + 1]
-        found = _unit_row(header, units) if below == number + 1 else None
+        found = _unit_row(header, units, options) if below == number + 1 else None
         if found is not None:
             return replace(header, units=found, row=below, rows_used=(number, below))
     return header
 
 
 def _text(cell: Cell) -> str:
-    return " ".join(show(cell).split())
+    return writable(" ".join(show(cell).split()))
 
 
 def _two_row_header(
-    near: Sequence[NumberedRow],
-    options: ReadOptions,
-    merged: Callable[[], Sequence[MergedRange]],
-    single: int,
+    near: Sequence[NumberedRow], options: ReadOptions, merged: Callable[[], Sequence[MergedRange]], single: int
 ) -> Header | None:
     """Join a header of two rows, where merged cells say which columns the upper one covers."""
     ranges: Sequence[MergedRange] | None = None
@@ -196,45 +159,31 @@ def _joined(
     return [f"{top} {bottom}".strip() for top, bottom in zip(covering, lower_texts, strict=True)]
 
 
-def _unit_row(header: Header, cells: Sequence[Cell]) -> tuple[LengthUnit | None, ...] | None:
+def _unit_row(header: Header, cells: Sequence[Cell], options: ReadOptions) -> tuple[LengthUnit | None, ...] | None:
     """Read a row of units below the header; None if it is something else."""
     words = [_text(c).strip("()[]").lower() for c in cells]
-    if not any(words) or any(
-        w not in ("", "in", "inch", "mm", "thou", "mil", '"', "-", "psi", "°c", "c") for w in words
-    ):
+    if not any(words) or any(w not in UNIT_SPELLINGS and w not in ("", "-", "psi", "°c", "c") for w in words):
         return None
-    units: list[LengthUnit | None] = []
-    for word in words[: len(header.texts)]:
-        try:
-            units.append(LengthUnit(_UNIT_ROW_WORDS.get(word, word)))
-        except ValueError:
-            units.append(None)
+    for text, word in zip(header.texts, words, strict=False):
+        known = recognise(text, options.joint_numbers, options.joint_names).field if word in UNIT_SPELLINGS else None
+        if known is not None and known.kind not in LENGTHS:
+            return None
+    units = [UNIT_SPELLINGS.get(word) for word in words[: len(header.texts)]]
     return tuple(units) if any(units) else None
 
 
-_UNIT_ROW_WORDS = {"inch": "in", '"': "in", "mil": "thou"}
-
-
 class ColumnReader:
-    """Reads the headers of one table or form.
-
-    Parameters
-    ----------
-    options : ReadOptions
-        What the caller declared.
-    file, sheet : str or None
-        Where the table is.
-    """
-
-    def __init__(self, options: ReadOptions, file: str | None, sheet: str | None) -> None:
+    def __init__(self, options: ReadOptions, file: str | None, sheet: str | None, *, by_hand: bool = False) -> None:
         self._options = options
+        # True if the program named the columns: then none can be renamed or mapped.
+        self._by_hand = by_hand
         self._file = file
         self._sheet = sheet
 
     def _recognise(self, text: str, index: int) -> tuple[Recognition, bool]:
         """Read one header; True if the caller mapped it."""
         options = self._options
-        for key, target in options.column_map.items():
+        for key, target in {**options.remembered_map, **options.column_map}.items():
             if tidy(key) == tidy(text) or key == column_letters(index):
                 found = parse_target(target, options.joint_numbers)
                 return Recognition(Standing.UNDERSTOOD if found else Standing.UNKNOWN, found), True
@@ -251,24 +200,6 @@ class ColumnReader:
         units: Sequence[LengthUnit | None] = (),
         places: Sequence[tuple[int, str]] | None = None,
     ) -> Columns:
-        """Read all headers of a table.
-
-        Parameters
-        ----------
-        headers : sequence of str
-            The headers.
-        row : int
-            Their row, counted from 1.
-        units : sequence of LengthUnit or None, optional
-            Units from a row of units.
-        places : sequence of tuple, optional
-            Row and cell of each label, where they do not stand in one row.
-
-        Returns
-        -------
-        Columns
-            The columns.
-        """
         columns = Columns([])
         readings: list[tuple[Recognition, bool]] = []
         for index, text in enumerate(headers):
@@ -296,27 +227,17 @@ class ColumnReader:
         return known if known.unit is not None else replace(known, unit=unit)
 
     def _note(self, columns: Columns, placed: PlacedField, found: Recognition, mapped: bool, *, in_form: bool) -> None:
-        where = f"cell {placed.header_cell}" if in_form else f"column {column_letters(placed.index)}"
         if placed.field is None:
             hint = ""
             if found.nearest and not mapped:
-                hint = f'; if it means {found.nearest}, pass --map "{placed.header}={found.nearest}"'
-            columns.notes.append(f'{where} "{placed.header}" is not used, only carried to the report{hint}')
+                hint = f' (if it means {found.nearest}, pass --map "{placed.header}={found.nearest}")'
+            columns.carried.append(f'"{placed.header}"{hint}')
         elif mapped or (placed.header != placed.field.label if in_form else placed.header != placed.field.name):
-            columns.notes.append(f'{where} "{placed.header}" read as {placed.field.name}')
+            columns.mapped.append(f'"{placed.header}" {placed.field.name}')
 
     def _problem(self, code: str, placed: PlacedField, expected: str, remedy: str) -> Problem:
-        return Problem(
-            code,
-            self._file,
-            self._sheet,
-            placed.header_row,
-            placed.header,
-            placed.header_cell,
-            placed.header,
-            expected,
-            remedy,
-        )
+        where = placed.header_row, placed.header, placed.header_cell
+        return Problem(code, self._file, self._sheet, *where, placed.header, expected, remedy)
 
     def _doubtful(self, placed: PlacedField, found: Recognition) -> Problem:
         target = found.nearest or "clearance_3_in"
@@ -326,8 +247,8 @@ class ColumnReader:
                 found.code,
                 placed,
                 f"a joint from {low} to {high}",
-                f"{found.reason[:1].upper()}{found.reason[1:]}. The nearest names are {target}. Correct the header, or "
-                f'pass --map "{placed.header}=COLUMN".',
+                f"{found.reason[:1].upper()}{found.reason[1:]}."
+                + ("" if self._by_hand else f' The nearest names are {target}: pass --map "{placed.header}=COLUMN".'),
             )
         return self._problem(
             found.code,
@@ -368,6 +289,13 @@ class ColumnReader:
             first = seen.setdefault(placed.field.quantity, placed)
             if first is placed:
                 continue
+            plain = [p for p in (first, placed) if tidy(p.header).replace(" ", "_") == placed.field.name]
+            if placed.field.kind not in LENGTHS and len(plain) == 1:
+                # The column that bears the name is meant; the other one is another matter, such as the aircraft's type.
+                other = placed if plain[0] is first else first
+                columns.placed[other.index] = replace(other, field=None)
+                seen[placed.field.quantity] = plain[0]
+                continue
             columns.placed[first.index] = replace(columns.placed[first.index], refused=True)
             self._refuse(
                 columns,
@@ -383,6 +311,10 @@ class ColumnReader:
         missing: list[tuple[str, str]] = [
             (kind.value, f"a column {kind.value}") for kind in REQUIRED if kind not in fields
         ]
+        if Kind.RECORD_ID not in fields and columns.is_long:
+            missing.insert(0, ("record_id", "a column record_id, by which the rows of one inspection are gathered"))
+        elif Kind.RECORD_ID not in fields:
+            columns.ids_made = True
         clearance_refused = any(p.refused for p in columns.placed)
         if Kind.CLEARANCE not in fields and not clearance_refused:
             missing.append(("clearance_1_in", "at least one clearance column, such as clearance_3_in"))
@@ -390,35 +322,15 @@ class ColumnReader:
             close = difflib.get_close_matches(name, [tidy(h).replace(" ", "_") for h in unknown], 1, 0.6)
             hint = next((h for h in unknown if close and tidy(h).replace(" ", "_") == close[0]), None)
             like = f' If "{hint}" is meant, pass --map "{hint}={name}".' if hint else ""
-            columns.problems.append(
-                Problem(
-                    "column_missing",
-                    self._file,
-                    self._sheet,
-                    row,
-                    name,
-                    None,
-                    None,
-                    expected,
-                    f"Add the column, or name the one that is meant with --map.{like}",
-                )
-            )
+            remedy = f"Add the column, or name the one that is meant with --map.{like}"
+            place = self._file, self._sheet, row, name, None
+            columns.problems.append(Problem("column_missing", *place, None, expected, remedy))
 
     def _unused_map(self, columns: Columns, row: int) -> None:
         for key in self._options.column_map:
             used = any(tidy(key) == tidy(p.header) or key == column_letters(p.index) for p in columns.placed)
             if not used:
                 headers = ", ".join(p.header for p in columns.placed if p.header)
-                columns.problems.append(
-                    Problem(
-                        "map_header_unknown",
-                        self._file,
-                        self._sheet,
-                        row,
-                        key,
-                        None,
-                        key,
-                        f"one of the headers of the table: {headers[:200]}",
-                        "Correct the header named in --map.",
-                    )
-                )
+                place, expected = (self._file, self._sheet, row), f"one of the headers of the table: {headers[:200]}"
+                remedy = "Correct the header named in --map."
+                columns.problems.append(Problem("map_header_unknown", *place, key, None, key, expected, remedy))

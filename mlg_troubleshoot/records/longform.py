@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
-from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import Cell, OddCell, column_letters, quote, show
 from mlg_troubleshoot.records.columns import PER_JOINT, Field, Kind
 from mlg_troubleshoot.records.headers import tidy
-from mlg_troubleshoot.records.model import ReadOptions
+from mlg_troubleshoot.records.model import TableInHand
 from mlg_troubleshoot.records.rows import PlacedField, RowReader
 from mlg_troubleshoot.records.values import plain_text
 
@@ -20,8 +19,6 @@ _JOINT_TEXT = re.compile(r"(?:joint|jt|j)?\W*(?:no|nr|number|#)?\W*0?(\d{1,3})",
 
 @dataclass(slots=True)
 class _Group:
-    """The rows of one record."""
-
     row: int
     cells: list[Cell]
     places: list[tuple[int, str]]
@@ -30,38 +27,11 @@ class _Group:
 
 
 class LongReader:
-    """Gathers the rows of a long table and reads each record as one row of a wide one.
+    """Gathers the rows of a long table and reads each record as one row of a wide one."""
 
-    Parameters
-    ----------
-    placed : sequence of PlacedField
-        The columns.
-    options : ReadOptions
-        What the caller declared.
-    file, sheet : str or None
-        Where the table is.
-    decimal_comma : bool
-        True if the table writes ``0,013`` for 0.013.
-    report : callable
-        Takes each problem.
-    header_row : int
-        Row of the header.
-    """
-
-    def __init__(
-        self,
-        placed: Sequence[PlacedField],
-        options: ReadOptions,
-        file: str | None,
-        sheet: str | None,
-        decimal_comma: bool,
-        report: Callable[[Problem], None],
-        header_row: int,
-    ) -> None:
-        self._options = options
-        self._file = file
-        self._sheet = sheet
-        self._report = report
+    def __init__(self, placed: Sequence[PlacedField], table: TableInHand) -> None:
+        options = table.options
+        self._table = table
         self._placed = list(placed)
         self._record = self._find(Kind.RECORD_ID)
         self._joint = self._find(Kind.JOINT)
@@ -78,36 +48,15 @@ class LongReader:
                 unit = p.field.unit if p.field is not None else None
                 wide.append(replace(p, index=len(wide), field=Field(kind, joint, unit), header_cell=p.header_cell))
         self._width = len(wide)
-        self._names = self._joint_names(options.joint_names)
+        self._names = {tidy(name): number for number, name in options.joint_names.items()}
         self._groups: dict[str, _Group] = {}
         self._loose: list[_Group] = []
-        self._reader = RowReader(
-            wide,
-            options,
-            file=file,
-            sheet=sheet,
-            decimal_comma=decimal_comma,
-            report=report,
-            header_row=header_row,
-        )
+        self._reader = RowReader(wide, table)
 
     def _find(self, kind: Kind) -> PlacedField | None:
         return next((p for p in self._placed if p.field is not None and p.field.kind is kind and not p.refused), None)
 
-    @staticmethod
-    def _joint_names(names: Mapping[int, str]) -> dict[str, int]:
-        return {tidy(name): number for number, name in names.items()}
-
     def add(self, row: int, cells: Sequence[Cell]) -> None:
-        """Take one row.
-
-        Parameters
-        ----------
-        row : int
-            Row in the file, counted from 1.
-        cells : sequence of Cell
-            Its cells.
-        """
         width = len(self._placed)
         filled = [*cells[:width], *[None] * (width - len(cells))]
         record = filled[self._record.index] if self._record is not None else None
@@ -164,14 +113,14 @@ class LongReader:
             return
         joint = self._joint_number(cell)
         if joint is None:
-            low, high = min(self._options.joint_numbers), max(self._options.joint_numbers)
+            joints = self._table.options.joint_numbers
             self._fault(
                 group,
                 self._joint,
                 row,
                 cell,
                 "joint_unknown" if cell is not None else "joint_missing",
-                f"a joint number from {low} to {high}",
+                f"a joint number from {min(joints)} to {max(joints)}",
                 "Enter the joint's number.",
             )
             return
@@ -204,42 +153,24 @@ class LongReader:
             text = tidy(plain_text(cell))
             match = _JOINT_TEXT.fullmatch(text)
             number = int(match[1]) if match is not None else self._names.get(text)
-        return number if number in self._options.joint_numbers else None
+        return number if number in self._table.options.joint_numbers else None
 
     def _fault(
         self, group: _Group, p: PlacedField, row: int, cell: Cell, code: str, expected: str, remedy: str
     ) -> None:
         if p.header not in group.bad:
             group.bad.append(p.header)
-        self._report(
-            Problem(
-                code,
-                self._file,
-                self._sheet,
-                row,
-                p.header,
-                f"{column_letters(p.index)}{row}",
-                None if cell is None else quote(cell),
-                expected,
-                remedy,
-            )
-        )
+        found = None if cell is None else quote(cell)
+        self._table.tell(code, found, expected, remedy, row, p.header, f"{column_letters(p.index)}{row}")
 
     def finish(self) -> list[Inspection | InvalidRow]:
-        """Read the records that were gathered.
-
-        Returns
-        -------
-        list of Inspection or InvalidRow
-            One entry for each record, at the row where it begins.
-        """
         done: list[Inspection | InvalidRow] = []
         for group in [*self._groups.values(), *self._loose]:
             read = self._reader.read(group.row, group.cells, group.places)
             warnings = (*read.warnings, *group.warnings)
             if group.bad:
                 correct = (*group.bad, *(read.correct if isinstance(read, InvalidRow) else ()))
-                source = RowSource(self._file, self._sheet, group.row)
+                source = RowSource(self._table.file, self._table.sheet, group.row)
                 done.append(
                     InvalidRow(read.record_id, read.tail_no, read.side, tuple(dict.fromkeys(correct)), warnings, source)
                 )

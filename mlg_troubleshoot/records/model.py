@@ -3,70 +3,97 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from typing import Any
 
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 Progress = Callable[[int, int | None], None]
 
 
-@dataclass(frozen=True, slots=True)
-class ReadOptions:
-    """What the caller declares about the tables that are read.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TableOptions:
+    """What the user declares about tables.
 
-    Parameters
-    ----------
-    unit : LengthUnit or None
-        Unit of the lengths whose column and cell do not say one.
-    convention : ClearanceConvention or None
-        Convention of the rows that do not say one.
-    sheet : str or None
-        Worksheet to read; ``*`` reads every sheet that holds inspections; None takes the only one.
-    column_map : mapping of str to str
-        Column by header (or by letter), for headers that are not understood: ``{"Spiel 3": "clearance_3_mm"}``;
+    unit, convention: of the lengths, and of the rows, that do not say one.
+    sheet: worksheet to read; ``*`` reads every sheet that holds inspections; None takes the only one.
+    column_map: column by header (or by letter), for headers that are not understood: ``{"Spiel 3": "clearance_3_mm"}``;
         the target ``carry`` lets a column travel to the report unread.
-    decimal_comma : bool
-        True if ``0,013`` means 0.013.
-    joint_numbers : tuple of int
-        The gear's joints.
-    joint_names : mapping of int to str
-        Names of the gear's joints, by which a header's number is checked; empty takes the reference gear's.
-    clearance_hard_max_in : float
-        A radial clearance above this is refused. [in]
-    clearance_confirm_above_in : float
-        A radial clearance above this is accepted with a warning. [in]
-    plunger_hard_max_in : float
-        A measured plunger displacement beyond this, either way, is refused. [in]
+    remembered_map: the same as remembered from another table: a header that is not there is no problem.
+    decimal_comma: true if ``0,013`` means 0.013.
     """
 
     unit: LengthUnit | None = None
     convention: ClearanceConvention | None = None
     sheet: str | None = None
     column_map: Mapping[str, str] = field(default_factory=dict)
+    remembered_map: Mapping[str, str] = field(default_factory=dict)
     decimal_comma: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadOptions(TableOptions):
+    """What is declared about tables, and what the gear says of the values in them.
+
+    joint_names: names of the gear's joints, by which a header's number is checked; empty takes the reference gear's.
+    clearance_hard_max_in, clearance_confirm_above_in: a radial clearance above the one is refused, above the other
+        accepted with a warning. [in]
+    plunger_hard_max_in: a measured plunger displacement beyond this, either way, is refused. [in]
+    """
+
     joint_numbers: tuple[int, ...] = tuple(range(1, 11))
     joint_names: Mapping[int, str] = field(default_factory=dict)
     clearance_hard_max_in: float = 0.050
     clearance_confirm_above_in: float = 0.015
     plunger_hard_max_in: float = 0.5
 
+    @classmethod
+    def of(cls, gear: Gear, tables: TableOptions | None = None, **declared: Any) -> ReadOptions:
+        """Return the options by which values of a gear are judged."""
+        told = {} if tables is None else {each.name: getattr(tables, each.name) for each in fields(TableOptions)}
+        return cls(
+            **told,
+            **declared,
+            joint_numbers=gear.joint_numbers,
+            joint_names={joint.number: joint.name for joint in gear.joints},
+            clearance_hard_max_in=gear.hard_limit.value,
+            clearance_confirm_above_in=gear.confirm_above.value,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class TableInHand:
+    """The table or form that is being read: how, where it stands, and who is told of its problems."""
+
+    options: ReadOptions
+    file: str | None
+    sheet: str | None
+    report: Callable[[Problem], None]
+    decimal_comma: bool
+
+    def tell(
+        self,
+        code: str,
+        value: str | None,
+        expected: str,
+        remedy: str,
+        row: int | None = None,
+        column: str | None = None,
+        cell: str | None = None,
+    ) -> None:
+        self.report(Problem(code, self.file, self.sheet, row, column, cell, value, expected, remedy))
+
 
 @dataclass(frozen=True, slots=True)
 class ColumnReading:
     """How one column (or one line of a form) was read.
 
-    Parameters
-    ----------
-    index : int
-        Column, counted from 0.
-    header : str
-        Its header as found.
-    read_as : str or None
-        Canonical column; None for a column that is only carried.
-    row : int or None
-        Row of the value in a form; None in a table.
+    index: column, counted from 0.
+    read_as: canonical column; None for a column that is only carried.
+    row: of the value in a form; None in a table.
     """
 
     index: int
@@ -79,22 +106,7 @@ class ColumnReading:
 class SheetLayout:
     """Where the parts of a table were found.
 
-    Parameters
-    ----------
-    file : str or None
-        File as the user named it.
-    sheet : str or None
-        Worksheet, None for CSV.
-    kind : str
-        ``wide``, ``long`` or ``form``.
-    header_row : int
-        Row of the header (its lower row if it has two), counted from 1.
-    last_row : int
-        Last row that was read.
-    width : int
-        Number of columns in use.
-    columns : tuple of ColumnReading
-        The columns.
+    header_row, last_row: the lower row of the header, and the last that was read, counted from 1.
     """
 
     file: str | None
@@ -112,20 +124,6 @@ class SheetLayout:
 
 @dataclass(frozen=True, slots=True)
 class FileRead:
-    """A file that was opened, for the report.
-
-    Parameters
-    ----------
-    name : str
-        File as the user named it.
-    kind : str
-        ``csv``, ``xlsx``, ``xlsm``, ``xls`` or ``ods``; ``unreadable`` if nothing could be read.
-    sha256 : str or None
-        Hash of its bytes.
-    rows : int
-        Data rows read.
-    """
-
     name: str
     kind: str
     sha256: str | None
@@ -134,21 +132,7 @@ class FileRead:
 
 @dataclass(frozen=True, slots=True)
 class ReadResult:
-    """Everything that came out of one or more files: no row is lost.
-
-    Parameters
-    ----------
-    rows : tuple of Inspection or InvalidRow
-        One entry for each data row, in the order of the files.
-    problems : tuple of Problem
-        Errors only, each once.
-    notes : tuple of str
-        What was noticed and decided while reading.
-    layouts : tuple of SheetLayout
-        Where the tables were found.
-    files : tuple of FileRead
-        The files.
-    """
+    """Everything that came out of one or more files, in their order: no row is lost, each problem stands once."""
 
     rows: tuple[Inspection | InvalidRow, ...]
     problems: tuple[Problem, ...]
@@ -158,39 +142,15 @@ class ReadResult:
 
     @property
     def inspections(self) -> tuple[Inspection, ...]:
-        """The rows that can be judged."""
         return tuple(row for row in self.rows if isinstance(row, Inspection))
 
     @property
     def invalid(self) -> tuple[InvalidRow, ...]:
-        """The rows that cannot be judged."""
         return tuple(row for row in self.rows if isinstance(row, InvalidRow))
-
-    def layout_of(self, source: RowSource) -> SheetLayout | None:
-        """Return the layout of the table that a row came from; None for a row from elsewhere."""
-        return next((lay for lay in self.layouts if (lay.file, lay.sheet) == (source.file, source.sheet)), None)
 
 
 class FileRefusedError(Exception):
-    """A file or a sheet that cannot be read as a table; caught inside this package and made a `Problem`.
-
-    Parameters
-    ----------
-    code : str
-        Stable name of the kind of problem.
-    found : str
-        What was found, in plain words.
-    expected : str
-        What was expected instead.
-    remedy : str
-        What to do.
-    sheet : str, optional
-        Worksheet.
-    row : int, optional
-        Row, counted from 1.
-    cell : str, optional
-        Cell, for example ``XFD1048576``.
-    """
+    """A file or a sheet that cannot be read as a table; caught inside this package and made a `Problem`."""
 
     def __init__(
         self,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import stat
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -11,6 +13,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.records.cells import writable
 from mlg_troubleshoot.records.csvfile import CsvFile
 from mlg_troubleshoot.records.duplicates import settle_duplicates
 from mlg_troubleshoot.records.forms import Form, find_form, read_form
@@ -21,7 +24,7 @@ from mlg_troubleshoot.records.sniff import sniff
 from mlg_troubleshoot.records.source import NumberedRow, Sheet, Workbook
 from mlg_troubleshoot.records.tables import Collected, read_table
 
-MAX_FILE_BYTES = 200_000_000
+MAX_FILE_BYTES = 50_000_000
 STDIN_NAME = "-"
 _PEEKED_ROWS = 120
 _INSTRUCTIONS = "instructions"
@@ -57,71 +60,16 @@ class _Ticker:
 def read_inspections(
     source: Source, options: ReadOptions, *, name: str | None = None, progress: Progress | None = None
 ) -> ReadResult:
-    """Read the inspections of one file.
-
-    Parameters
-    ----------
-    source : str, Path or binary file
-        A CSV file, a workbook, or an open binary stream of either; ``-`` is standard input.
-    options : ReadOptions
-        What the caller declares about it.
-    name : str, optional
-        What the messages call it; the path as given if left out.
-    progress : callable, optional
-        Called with the number of rows read so far and the total, if it is known.
-
-    Returns
-    -------
-    ReadResult
-        Every data row once, every error once. A file that cannot be read at all is a problem, too.
-
-    Raises
-    ------
-    UsageError
-        If a mapped column does not exist.
-    """
     return _finish([_read_file(source, options, name, _Ticker(progress))])
 
 
 def read_many(sources: Iterable[Source], options: ReadOptions, *, progress: Progress | None = None) -> ReadResult:
-    """Read the inspections of several files, folders and patterns as one batch.
-
-    Parameters
-    ----------
-    sources : iterable of str, Path or binary file
-        Files; a folder stands for the tables in it, a pattern such as ``fleet/*.xlsx`` for what it matches.
-    options : ReadOptions
-        What the caller declares about them.
-    progress : callable, optional
-        Called with the number of rows read so far and the total, if it is known.
-
-    Returns
-    -------
-    ReadResult
-        The rows of all files in their order. A file that cannot be read is a problem and the others still work.
-
-    Raises
-    ------
-    UsageError
-        If a mapped column does not exist.
-    """
+    """Read the inspections of several files, folders and patterns as one batch."""
     ticker = _Ticker(progress)
     return _finish([_read_file(item, options, None, ticker) for source in sources for item in expand(source)])
 
 
 def expand(source: Source) -> list[Source]:
-    """Return the files that a path stands for.
-
-    Parameters
-    ----------
-    source : str, Path or binary file
-        A file, a folder or a pattern.
-
-    Returns
-    -------
-    list
-        The files, in the order of their names; the path itself if there is nothing to expand.
-    """
     if not isinstance(source, str | Path) or str(source) == STDIN_NAME:
         return [source]
     path = Path(source)
@@ -145,21 +93,19 @@ def _is_scratch(path: Path) -> bool:
 
 @dataclass(slots=True)
 class _FileResult:
-    """What one file gave."""
-
     file: FileRead
     found: Collected
 
 
 def _read_file(source: Source, options: ReadOptions, name: str | None, ticker: _Ticker) -> _FileResult:
-    label = name or (str(source) if isinstance(source, str | Path) else STDIN_NAME)
+    label = writable(name or (str(source) if isinstance(source, str | Path) else STDIN_NAME))
     digest: str | None = None
     kind = "unreadable"
     found = Collected()
     try:
-        data = _load(source)
+        data = load_bytes(source)
         digest = hashlib.sha256(data).hexdigest()
-        book = _open(data, label, options)
+        book = open_book(data, label, options)
         del data
         kind = book.kind
         if kind != Path(label).suffix.lower().removeprefix(".") and Path(label).suffix.lower() in _SUFFIXES - {
@@ -178,13 +124,13 @@ def _read_file(source: Source, options: ReadOptions, name: str | None, ticker: _
     return _FileResult(FileRead(label, kind, digest, len(found.rows)), found)
 
 
-def _load(source: Source) -> bytes:
+def load_bytes(source: Source) -> bytes:
+    """The bytes of a file, at most so many; one that cannot be read is refused."""
     try:
         if isinstance(source, str | Path) and str(source) == STDIN_NAME:
             data = sys.stdin.buffer.read(MAX_FILE_BYTES + 1)
         elif isinstance(source, str | Path):
-            with Path(source).open("rb") as file:
-                data = file.read(MAX_FILE_BYTES + 1)
+            data = _regular_file(source)
         else:
             data = source.read(MAX_FILE_BYTES + 1)
     except FileNotFoundError:
@@ -213,7 +159,25 @@ def _load(source: Source) -> bytes:
     return data
 
 
-def _open(data: bytes, label: str, options: ReadOptions) -> Workbook:
+def _regular_file(source: str | Path) -> bytes:
+    """Read a file, never a pipe or a device that may not end."""
+    # Opened without waiting: a pipe that nobody writes to would hang before it can be told.
+    handle = os.open(source, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    with os.fdopen(handle, "rb") as file:
+        if stat.S_ISDIR(os.fstat(handle).st_mode):
+            raise IsADirectoryError
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise FileRefusedError(
+                "file_kind",
+                "a pipe or a device",
+                "a regular file",
+                "Save the table as a file, or pass it by - (stdin).",
+            )
+        return file.read(MAX_FILE_BYTES + 1)
+
+
+def open_book(data: bytes, label: str, options: ReadOptions) -> Workbook:
+    """Open a table of any kind by its content."""
     kind = sniff(data, label)
     if kind == "text":
         return CsvFile(data, lambda cells: header_score(cells, options))
@@ -236,8 +200,8 @@ def _candidate(sheet: Sheet, options: ReadOptions) -> _Candidate:
     header: Header | None = None
     form: Form | None = None
     if not _is_instructions(peeked):
-        form = find_form(peeked, options)
-        header = None if form is not None else find_header(peeked, options, sheet.merged)
+        header = find_header(peeked, options, sheet.merged)
+        form = None if header is not None else find_form(peeked, options)
     has_rows = header is not None and any(number > header.row for number, _ in peeked)
     return _Candidate(sheet, chain(peeked, rows), header, form, has_rows)
 
@@ -256,13 +220,7 @@ def _read_book(book: Workbook, options: ReadOptions, label: str, ticker: _Ticker
             ticker(1)
         elif candidate.header is not None:
             part = read_table(
-                sheet,
-                candidate.header,
-                candidate.rows,
-                options,
-                file=label,
-                delimiter=book.delimiter,
-                tick=ticker,
+                sheet, candidate.header, candidate.rows, options, file=label, delimiter=book.delimiter, tick=ticker
             )
         else:
             raise _no_header(candidate)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+import zlib
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import PurePath
 from types import MappingProxyType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from mlg_troubleshoot.decision.inspection import (
     DEFAULT_GAUGE_U_IN,
@@ -17,12 +21,12 @@ from mlg_troubleshoot.decision.inspection import (
     RowSource,
     Side,
 )
-from mlg_troubleshoot.errors import Problem
-from mlg_troubleshoot.records.cells import Cell, OddCell, OddKind, column_letters, quote, show
+from mlg_troubleshoot.records.cells import Cell, OddCell, OddKind, column_letters, quote, show, writable
 from mlg_troubleshoot.records.columns import CARRIED, LENGTHS, VERDICT_BEARING, Field, Kind
-from mlg_troubleshoot.records.model import FileRefusedError, ReadOptions
+from mlg_troubleshoot.records.model import FileRefusedError, TableInHand
 from mlg_troubleshoot.records.slips import scale_slip
 from mlg_troubleshoot.records.values import (
+    NOT_MEASURED,
     CellFaultError,
     plain_text,
     read_choice,
@@ -31,7 +35,7 @@ from mlg_troubleshoot.records.values import (
     read_number,
     read_text,
 )
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from mlg_troubleshoot.units import UNIT_SPELLINGS, ClearanceConvention, LengthUnit
 
 _T = TypeVar("_T")
 
@@ -39,9 +43,10 @@ _EPS_IN = 1e-9
 _CACHE_LIMIT = 20_000
 _NO_FLOATS: Mapping[int, float] = MappingProxyType({})
 
-_SIDE_HINTS = {
-    **dict.fromkeys(("l", "left", "lhs", "left hand", "left-hand", "port", "lh side"), "LH"),
-    **dict.fromkeys(("r", "right", "rhs", "right hand", "right-hand", "starboard", "rh side"), "RH"),
+_SIDES = {
+    **dict.fromkeys(("l", "lh", "lhs", "left", "lefthand", "port", "lhmlg", "leftmlg", "mlgl", "mlglh"), Side.LH),
+    **dict.fromkeys(("r", "rh", "rhs", "right", "righthand", "starboard", "stbd", "rhmlg", "rightmlg"), Side.RH),
+    **dict.fromkeys(("mlgr", "mlgrh"), Side.RH),
 }
 _OUTCOME_HINTS = {
     **dict.fromkeys(("retracts", "ok", "good", "pass", "passed"), "RETRACTED"),
@@ -53,7 +58,6 @@ _CONVENTION_HINTS = {
     **dict.fromkeys(("dia", "diameter", "diametrical"), "DIAMETRAL"),
     **dict.fromkeys(("play", "total", "tir", "dial"), "TOTAL_PLAY"),
 }
-_UNIT_HINTS = {"cm": "mm", "mil": "thou", "inches": "in"}
 
 # Largest magnitude that can be meant, in inches; beyond it the unit or the point is wrong.
 _LENGTH_RANGE_IN: dict[Kind, tuple[float, float]] = {
@@ -61,37 +65,34 @@ _LENGTH_RANGE_IN: dict[Kind, tuple[float, float]] = {
     Kind.GAUGE_U: (0.0, 0.02),
     Kind.PLUNGER_GAUGE_U: (0.0, 0.05),
     Kind.PLUNGER_DOWN_LOCK: (-0.2, 0.2),
+    Kind.ACTUATOR_EXTENSION: (0.0, 5.0),
+    Kind.PLUNGER_POSITION: (-2.0, 2.0),
     Kind.MARGIN: (0.0, 0.2),
     Kind.MARGIN_U: (0.0, 0.1),
 }
-_SIGNED = frozenset({Kind.PLUNGER_DOWN_LOCK, Kind.PLUNGER_DISPLACEMENT})
-_NUMBER_RANGE: dict[Kind, tuple[float, float, str, str]] = {
-    Kind.LANDINGS: (0.0, 1_000_000.0, "", "landings since overhaul, 0 or more"),
-    Kind.TEMPERATURE: (-60.0, 60.0, "C", "a temperature from -60 to 60 degrees Celsius"),
-    Kind.PRESSURE: (0.0, 4000.0, "psi", "a pressure from 0 to 4000 psi"),
+_NEVER_BLANK = (VERDICT_BEARING - {Kind.CLEARANCE}) | {*CARRIED, Kind.GAUGE_ID, Kind.TECHNICIAN_ID}
+_SIGNED = frozenset({Kind.PLUNGER_DOWN_LOCK, Kind.PLUNGER_POSITION, Kind.PLUNGER_DISPLACEMENT})
+# What else a row may say, read cell by cell; the flag says whether a comma is the decimal mark.
+_OTHERS: dict[Kind, Callable[[str | float | OddCell, bool], object]] = {
+    Kind.LANDINGS: lambda cell, comma: read_number(
+        cell, 0.0, 1e6, decimal_comma=comma, expected="landings since overhaul, 0 or more"
+    ),
+    Kind.TEMPERATURE: lambda cell, comma: read_number(
+        cell, -60.0, 60.0, decimal_comma=comma, expected="a temperature from -60 to 60 degrees Celsius", suffix="C"
+    ),
+    Kind.PRESSURE: lambda cell, comma: read_number(
+        cell, 0.0, 4000.0, decimal_comma=comma, expected="a pressure from 0 to 4000 psi", suffix="psi"
+    ),
+    Kind.DATE: lambda cell, _: read_date(cell),
+    Kind.APPROACH: lambda cell, _: read_choice(cell, Approach, "approach_unknown", _APPROACH_HINTS),
+    Kind.OUTCOME: lambda cell, _: read_choice(cell, Outcome, "outcome_unknown", _OUTCOME_HINTS),
+    Kind.GAUGE_ID: lambda cell, _: read_text(cell, "a gauge id (text)", required=True),
+    Kind.TECHNICIAN_ID: lambda cell, _: read_text(cell, "a technician id (text)", required=True),
 }
 
 
 @dataclass(frozen=True, slots=True)
 class PlacedField:
-    """A column of this table.
-
-    Parameters
-    ----------
-    index : int
-        Its place in the row, counted from 0.
-    header : str
-        Its header as found.
-    field : Field or None
-        What it holds; None for a column that is only carried.
-    refused : bool
-        True if its header was refused: a row with something in it cannot be judged.
-    header_cell : str or None
-        Cell of the header.
-    header_row : int or None
-        Row of the header.
-    """
-
     index: int
     header: str
     field: Field | None
@@ -99,51 +100,23 @@ class PlacedField:
     header_cell: str | None = None
     header_row: int | None = None
 
+    @property
+    def read_as(self) -> str | None:
+        """Canonical column; None if it is refused or only carried."""
+        return None if self.field is None or self.refused else self.field.name
+
 
 class RowReader:
-    """Reads the rows of one table.
-
-    Parameters
-    ----------
-    placed : sequence of PlacedField
-        The columns.
-    options : ReadOptions
-        What the caller declared.
-    file, sheet : str or None
-        Where the table is.
-    decimal_comma : bool
-        True if the table writes ``0,013`` for 0.013.
-    report : callable
-        Takes each problem.
-    header_row : int
-        Row of the header.
-    """
-
-    def __init__(
-        self,
-        placed: Sequence[PlacedField],
-        options: ReadOptions,
-        *,
-        file: str | None,
-        sheet: str | None,
-        decimal_comma: bool,
-        report: Callable[[Problem], None],
-        header_row: int,
-    ) -> None:
+    def __init__(self, placed: Sequence[PlacedField], table: TableInHand) -> None:
+        self._table = table
+        self._options = table.options
+        self._comma = table.decimal_comma
         self._placed = {p.index: p for p in placed}
-        self._width = max((p.index for p in placed), default=-1) + 1
-        self._options = options
-        self._file = file
-        self._sheet = sheet
-        self._comma = decimal_comma
-        self._report = report
-        self._header_row = header_row
+        self._width = max(self._placed, default=-1) + 1
         good = [(p.index, p.field) for p in placed if p.field is not None and not p.refused]
         self._refused = [p.index for p in placed if p.refused]
-        self._ids = {kind: self._only(good, kind) for kind in (Kind.RECORD_ID, Kind.TAIL_NO)}
-        self._side = self._only(good, Kind.SIDE)
-        self._convention = self._only(good, Kind.CONVENTION)
-        self._unit = self._only(good, Kind.UNIT)
+        self._at = {field.kind: index for index, field in reversed(good)}
+        self._makes_ids = all(p.field is None or p.field.kind is not Kind.RECORD_ID for p in placed)
         self._clearances = sorted(
             (field.number or 0, index, field.unit) for index, field in good if field.kind is Kind.CLEARANCE
         )
@@ -152,12 +125,10 @@ class RowReader:
         ]
         # The readings of a fleet repeat: what was understood once is not taken apart again.
         self._known_lengths: dict[tuple[int, LengthUnit | None, Cell], float] = {}
-        self._numbers = [(index, field.kind) for index, field in good if field.kind in _NUMBER_RANGE]
-        self._date = self._only(good, Kind.DATE)
-        self._approach = self._only(good, Kind.APPROACH)
-        self._outcome = self._only(good, Kind.OUTCOME)
-        self._gauge = self._only(good, Kind.GAUGE_ID)
-        self._technician = self._only(good, Kind.TECHNICIAN_ID)
+        self._others = [(index, field.kind) for index, field in good if field.kind in _OTHERS]
+        # In these cells a word says that nothing was measured; a margin or an identity is never left out by a word.
+        self._blankable = [index for index, field in good if field.kind not in _NEVER_BLANK]
+        self.not_measured: Counter[str] = Counter()
         self._carried = [(index, field.kind.value) for index, field in good if field.kind in CARRIED]
         self._unknown = self._unknown_names(placed)
         self._cache: dict[
@@ -169,10 +140,6 @@ class RowReader:
         self._cells: Sequence[Cell] = ()
         self._bad: set[int] = set()
         self._faults: list[tuple[int, CellFaultError]] = []
-
-    @staticmethod
-    def _only(good: Sequence[tuple[int, Field]], kind: Kind) -> int | None:
-        return next((index for index, field in good if field.kind is kind), None)
 
     @staticmethod
     def _unknown_names(placed: Sequence[PlacedField]) -> list[tuple[int, str]]:
@@ -190,59 +157,23 @@ class RowReader:
     def read(
         self, row: int, cells: Sequence[Cell], places: Sequence[tuple[int, str]] | None = None
     ) -> Inspection | InvalidRow:
-        """Read one row; every bad cell is reported once.
-
-        Parameters
-        ----------
-        row : int
-            Row in the file, counted from 1.
-        cells : sequence of Cell
-            Its cells; missing ones at the end are blank.
-        places : sequence of tuple, optional
-            Row and cell of each value, where they do not stand in one row.
-
-        Returns
-        -------
-        Inspection or InvalidRow
-            The row as read.
-        """
-        if len(cells) < self._width:
-            cells = [*cells, *[None] * (self._width - len(cells))]
-        self._row, self._places, self._cells = row, places, cells
-        self._bad = {index for index in self._refused if cells[index] is not None}
-        self._faults = []
+        """Read one row; every bad cell is reported once."""
+        self._begin(row, cells, places)
         warnings: list[str] = []
 
-        record_id = self._identity(Kind.RECORD_ID, "a record id (unique text)")
+        record_id = self._made_id() if self._makes_ids else self._identity(Kind.RECORD_ID, "a record id (unique text)")
         tail_no = self._identity(Kind.TAIL_NO, "a tail number (text)")
         side = self._read_side()
         convention = self._read_convention()
         row_unit = self._read_row_unit()
         clearance, entered = self._read_clearances(convention, row_unit, warnings)
-        lengths, readings, floats = self._read_lengths(row_unit)
-        numbers: dict[Kind, float] = {}
-        for index, kind in self._numbers:
-            cell = cells[index]
-            if cell is not None:
-                low, high, suffix, expected = _NUMBER_RANGE[kind]
-                try:
-                    numbers[kind] = read_number(
-                        cell, low, high, decimal_comma=self._comma, expected=expected, suffix=suffix
-                    )
-                except CellFaultError as fault:
-                    self._faults.append((index, fault))
-        day = self._optional(self._date, read_date)
-        approach = self._optional(
-            self._approach, lambda c: read_choice(c, Approach, "approach_unknown", _APPROACH_HINTS)
-        )
-        outcome = self._optional(self._outcome, lambda c: read_choice(c, Outcome, "outcome_unknown", _OUTCOME_HINTS))
-        gauge_id = self._optional(self._gauge, lambda c: read_text(c, "a gauge id (text)", required=True))
-        technician = self._optional(self._technician, lambda c: read_text(c, "a technician id (text)", required=True))
+        lengths, readings, floats, gauge_us = self._read_lengths(row_unit)
+        others = self._read_others()
         carried = self._read_carried()
 
         for place, found in sorted(self._faults, key=lambda fault: fault[0]):
             self._tell(place, found)
-        source = RowSource(self._file, self._sheet, row)
+        source = RowSource(self._table.file, self._table.sheet, row)
         if self._bad or record_id is None or tail_no is None or side is None or convention is None:
             return InvalidRow(record_id, tail_no, side, self._correct(), tuple(warnings), source)
         if self._clearances and not clearance:
@@ -251,7 +182,9 @@ class RowReader:
             warnings.append(
                 "every clearance is 0: a zero is read as measured; leave a joint blank if it was not measured"
             )
-        gauge_u = lengths.get(Kind.GAUGE_U)
+        gauge_u = lengths.pop(Kind.GAUGE_U, None)
+        # Columns bear the names of the fields that they fill.
+        others.update({f"{kind.value}_in": value for kind, value in lengths.items()})
         return Inspection(
             record_id=record_id,
             tail_no=tail_no,
@@ -261,142 +194,105 @@ class RowReader:
             entered=entered,
             gauge_u_in=DEFAULT_GAUGE_U_IN if gauge_u is None else gauge_u / convention.per_radial,
             gauge_u_is_default=gauge_u is None,
+            gauge_u_by_joint_in=self._own_uncertainties(gauge_us, clearance, convention, warnings),
             readings_in=readings,
-            plunger_gauge_u_in=lengths.get(Kind.PLUNGER_GAUGE_U),
-            plunger_down_lock_in=lengths.get(Kind.PLUNGER_DOWN_LOCK),
-            margin_in=lengths.get(Kind.MARGIN),
-            margin_u_in=lengths.get(Kind.MARGIN_U, 0.0),
-            outcome=outcome,
-            inspection_date=day,
-            gear_landings=numbers.get(Kind.LANDINGS),
-            temperature_c=numbers.get(Kind.TEMPERATURE),
-            hydraulic_pressure_psi=numbers.get(Kind.PRESSURE),
-            approach=approach,
-            gauge_id=gauge_id,
-            technician_id=technician,
             axial_float_in=floats,
             carried=carried,
             warnings=tuple(warnings),
             source=source,
+            **others,
         )
 
     def ragged(self, row: int, cells: Sequence[Cell], expected: int) -> InvalidRow:
-        """Refuse a row that does not have as many fields as the header.
-
-        Parameters
-        ----------
-        row : int
-            Row in the file, counted from 1.
-        cells : sequence of Cell
-            Its fields.
-        expected : int
-            Number of fields in the header.
-
-        Returns
-        -------
-        InvalidRow
-            The row, with its problem reported.
-        """
-        found = quote(",".join(show(c) for c in cells), 80)
+        """Refuse a row that does not have as many fields as the header."""
         comma = len(cells) > expected and any(isinstance(c, str) and c.strip() == "0" for c in cells)
-        self._report(
-            Problem(
-                "row_field_count",
-                self._file,
-                self._sheet,
-                row,
-                None,
-                None,
-                f"{len(cells)} fields: {found}",
-                f"{expected} fields, as in the header",
-                "A decimal comma in a comma-separated file splits a number in two: write 0.013, or separate the "
-                "columns by semicolons."
-                if comma
-                else "Check the separators and the quotation marks of this row.",
-            )
+        remedy = (
+            "A decimal comma in a comma-separated file splits a number in two: write 0.013, or separate the columns by "
+            "semicolons."
+            if comma
+            else "Check the separators and the quotation marks of this row."
         )
-        index = self._ids[Kind.RECORD_ID]
-        first = cells[0] if index == 0 and cells else None
+        first = cells[0] if self._at.get(Kind.RECORD_ID) == 0 and cells else None
         record_id = plain_text(first) or None if isinstance(first, str) else None
-        return InvalidRow(record_id, None, None, ("row",), (), RowSource(self._file, self._sheet, row))
+        told = ("row_field_count", f"{len(cells)} fields", f"{expected} fields, as in the header", remedy)
+        return self._refused_row(row, cells, record_id, *told)
 
-    def faulty(self, row: int, cells: Sequence[Cell], reason: FileRefusedError) -> InvalidRow:
-        """Refuse a row that could not be taken apart.
+    def faulty(self, row: int, cells: Sequence[Cell], why: FileRefusedError) -> InvalidRow:
+        """Refuse a row that could not be taken apart."""
+        return self._refused_row(row, cells, None, why.code, why.found, why.expected, why.remedy)
 
-        Parameters
-        ----------
-        row : int
-            Row in the file, counted from 1.
-        cells : sequence of Cell
-            Its fields as far as they could be told apart.
-        reason : FileRefusedError
-            Why.
+    def _refused_row(
+        self, row: int, cells: Sequence[Cell], record_id: str | None, code: str, found: str, expected: str, remedy: str
+    ) -> InvalidRow:
+        shown = quote(",".join(show(c) for c in cells), 80)
+        self._table.tell(code, f"{found}: {shown}", expected, remedy, row)
+        return InvalidRow(record_id, None, None, ("row",), (), RowSource(self._table.file, self._table.sheet, row))
 
-        Returns
-        -------
-        InvalidRow
-            The row, with its problem reported.
-        """
-        found = quote(",".join(show(c) for c in cells), 80)
-        self._report(
-            Problem(
-                reason.code,
-                self._file,
-                self._sheet,
-                row,
-                None,
-                None,
-                f"{reason.found}: {found}",
-                reason.expected,
-                reason.remedy,
-            )
-        )
-        return InvalidRow(None, None, None, ("row",), (), RowSource(self._file, self._sheet, row))
+    def _begin(self, row: int, cells: Sequence[Cell], places: Sequence[tuple[int, str]] | None) -> None:
+        """Take up a row: fill it to the width of the header, and leave out what was not measured."""
+        cells = [*cells, *[None] * (self._width - len(cells))]
+        for index in self._blankable:
+            cell = cells[index]
+            if cell.__class__ is str and cell.strip().casefold() in NOT_MEASURED:
+                self.not_measured[cell.strip()] += 1
+                cells[index] = None
+        self._row, self._places, self._cells = row, places, cells
+        self._bad = {index for index in self._refused if cells[index] is not None}
+        self._faults = []
+
+    def _read_others(self) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for index, kind in self._others:
+            cell = self._cells[index]
+            if cell is not None:
+                try:
+                    found[kind.value] = _OTHERS[kind](cell, self._comma)
+                except CellFaultError as fault:
+                    self._faults.append((index, fault))
+        return found
+
+    def _required(self, index: int | None, read: Callable[[Cell], _T]) -> _T | None:
+        """Read what a row cannot be judged without."""
+        try:
+            return None if index is None else read(self._cells[index])
+        except CellFaultError as fault:
+            self._fault(index or 0, fault)
+            return None
 
     def _identity(self, kind: Kind, expected: str) -> str | None:
-        index = self._ids[kind]
-        if index is None:
-            return None
-        cell = self._cells[index]
-        if cell.__class__ is str and cell.isprintable() and cell.isascii():
-            return cell.strip()
-        try:
+        def read(cell: Cell) -> str:
+            if isinstance(cell, str) and cell.isprintable() and cell.isascii():
+                return cell.strip()
             if cell is None:
                 raise CellFaultError(f"{kind.value}_missing", expected, "Enter it; a row without it cannot be used.")
             return read_text(cell, expected, required=True)
-        except CellFaultError as fault:
-            self._fault(index, fault)
-            return None
+
+        return self._required(self._at.get(kind), read)
+
+    def _made_id(self) -> str:
+        content = zlib.crc32("\x1f".join(map(show, self._cells)).encode("utf-8", "replace"))
+        name = PurePath(self._table.file or "-").stem
+        return f"{'stdin' if name == '-' else name}-{self._row}-{content:08x}"
 
     def _read_side(self) -> Side | None:
-        index = self._side
-        if index is None:
-            return None
-        cell = self._cells[index]
-        if cell == "LH":
-            return Side.LH
-        if cell == "RH":
-            return Side.RH
-        try:
+        def read(cell: Cell) -> Side:
             if cell is None:
                 raise CellFaultError("side_missing", "LH or RH", "Enter LH or RH; there is no default.")
-            return read_choice(cell, Side, "side_unknown", _SIDE_HINTS)
-        except CellFaultError as fault:
-            self._fault(index, fault)
-            return None
+            bare = cell.lower().removesuffix("side").removesuffix("gear") if isinstance(cell, str) else ""
+            return _SIDES.get(re.sub(r"[^a-z]", "", bare)) or read_choice(cell, Side, "side_unknown", {})
+
+        return self._required(self._at.get(Kind.SIDE), read)
 
     def _read_convention(self) -> ClearanceConvention | None:
-        index = self._convention
+        index = self._at.get(Kind.CONVENTION)
         cell = None if index is None else self._cells[index]
         if cell is None or index is None:
             if self._options.convention is None:
                 self._report_missing_convention(index, "RADIAL, DIAMETRAL or TOTAL_PLAY")
             return self._options.convention
-        try:
-            return read_choice(cell, ClearanceConvention, "convention_unknown", _CONVENTION_HINTS)
-        except CellFaultError as fault:
-            self._fault(index, fault)
-            return None
+        return self._required(
+            index, lambda _: read_choice(cell, ClearanceConvention, "convention_unknown", _CONVENTION_HINTS)
+        )
 
     def _report_missing_convention(self, index: int | None, expected: str) -> None:
         remedy = (
@@ -408,36 +304,22 @@ class RowReader:
             self._fault(index, fault)
             return
         self._bad.add(-1)
-        self._report(
-            Problem(
-                fault.code,
-                self._file,
-                self._sheet,
-                self._row,
-                Kind.CONVENTION.value,
-                None,
-                None,
-                fault.expected,
-                fault.remedy,
-            )
-        )
+        self._table.tell(fault.code, None, expected, remedy, self._row, Kind.CONVENTION.value)
 
     def _read_row_unit(self) -> LengthUnit | None:
-        default = self._options.unit
-        if self._unit is None or self._cells[self._unit] is None:
+        default, index = self._options.unit, self._at.get(Kind.UNIT)
+        if index is None or self._cells[index] is None:
             return default
-        cell = self._cells[self._unit]
+        cell = self._cells[index]
         try:
             if isinstance(cell, str):
-                known = LengthUnit.__members__.values()
-                text = plain_text(cell).lower()
-                for unit in known:
-                    if text == unit.value or text in _UNIT_SPELLINGS[unit]:
-                        self._check_headers_agree(unit)
-                        return unit
+                unit = UNIT_SPELLINGS.get(plain_text(cell).lower())
+                if unit is not None:
+                    self._check_headers_agree(unit)
+                    return unit
             raise CellFaultError("unit_unknown", "in, thou or mm", "Enter in, thou or mm.")
         except CellFaultError as fault:
-            self._fault(self._unit, fault)
+            self._fault(index, fault)
             return default
 
     def _check_headers_agree(self, unit: LengthUnit) -> None:
@@ -541,10 +423,11 @@ class RowReader:
 
     def _read_lengths(
         self, row_unit: LengthUnit | None
-    ) -> tuple[dict[Kind, float], tuple[float, ...], Mapping[int, float]]:
+    ) -> tuple[dict[Kind, float], tuple[float, ...], Mapping[int, float], dict[int, float]]:
         lengths: dict[Kind, float] = {}
         readings: list[tuple[int, float]] = []
         floats: dict[int, float] = {}
+        gauge_us: dict[int, float] = {}
         known = self._known_lengths
         for index, field in self._lengths:
             cell = self._cells[index]
@@ -566,12 +449,27 @@ class RowReader:
                 known[index, row_unit, cell] = value_in
             if kind is Kind.PLUNGER_DISPLACEMENT:
                 readings.append((field.number or 1, value_in))
+            elif kind is Kind.GAUGE_U and field.number is not None:
+                gauge_us[field.number] = value_in
             elif kind is Kind.AXIAL_FLOAT:
                 floats[field.number or 0] = value_in
             else:
                 lengths[kind] = value_in
         readings.sort()
-        return lengths, tuple(value for _, value in readings), floats or _NO_FLOATS
+        return lengths, tuple(value for _, value in readings), floats or _NO_FLOATS, gauge_us
+
+    @staticmethod
+    def _own_uncertainties(
+        gauge_us: Mapping[int, float],
+        clearance: Mapping[int, float],
+        convention: ClearanceConvention,
+        warnings: list[str],
+    ) -> Mapping[int, float]:
+        """Return the uncertainties of single joints as radial ones; one without a reading is noted and left out."""
+        idle = [f"#{joint}" for joint in gauge_us if joint not in clearance]
+        if idle:
+            warnings.append(f"gauge uncertainty of joint {', '.join(idle)} is not used: the joint has no reading")
+        return {joint: u / convention.per_radial for joint, u in gauge_us.items() if joint in clearance}
 
     def _one_length(self, cell: str | float | OddCell, field: Field, row_unit: LengthUnit | None) -> float:
         most = self._options.plunger_hard_max_in
@@ -580,26 +478,15 @@ class RowReader:
         what = field.kind.value.replace("_", " ")
         expected = f"{what} from {unit.from_inches(low):.4g} to {unit.from_inches(high):.4g} {unit.value}"
         value_in, found, _ = self._length(cell, field.unit, row_unit, signed=field.kind in _SIGNED, expected=expected)
-        if not low - _EPS_IN <= value_in <= high + _EPS_IN or (field.kind is Kind.MARGIN and value_in <= 0.0):
-            if field.kind is Kind.MARGIN:
-                expected = f"a margin above 0 and up to {unit.from_inches(high):.4g} {unit.value}"
+        above_zero = field.kind is Kind.MARGIN or (field.kind is Kind.GAUGE_U and field.number is not None)
+        if not low - _EPS_IN <= value_in <= high + _EPS_IN or (above_zero and value_in <= 0.0):
+            if above_zero:
+                expected = f"a {what} above 0 and up to {unit.from_inches(high):.4g} {unit.value}"
             slip = scale_slip(abs(value_in), found, ClearanceConvention.RADIAL, high, halves=False)
             raise CellFaultError(
                 f"{field.kind.value}_out_of_range", expected, slip or "Check the unit and the decimal point."
             )
         return value_in + 0.0
-
-    def _optional(self, index: int | None, read: Callable[[str | float | OddCell], _T]) -> _T | None:
-        if index is None:
-            return None
-        cell = self._cells[index]
-        if cell is None:
-            return None
-        try:
-            return read(cell)
-        except CellFaultError as fault:
-            self._faults.append((index, fault))
-            return None
 
     def _read_carried(self) -> dict[str, str]:
         carried: dict[str, str] = {}
@@ -617,7 +504,7 @@ class RowReader:
         for index, name in self._unknown:
             cell = self._cells[index]
             if cell is not None:
-                carried[name] = cell if isinstance(cell, str) else show(cell)
+                carried[name] = writable(show(cell))
         return carried
 
     def _fault(self, index: int, fault: CellFaultError) -> None:
@@ -631,50 +518,21 @@ class RowReader:
             if placed.header_cell in self._without_unit:
                 return
             self._without_unit.add(placed.header_cell)
-            self._report(
-                Problem(
-                    fault.code,
-                    self._file,
-                    self._sheet,
-                    placed.header_row,
-                    placed.header,
-                    placed.header_cell,
-                    placed.header,
-                    "a header with its unit: _in, _thou or _mm",
-                    fault.remedy,
-                )
-            )
+            where = placed.header_row, placed.header, placed.header_cell
+            self._table.tell(fault.code, placed.header, "a unit: in, thou or mm", fault.remedy, *where)
             return
         row, cell = (self._row, f"{column_letters(index)}{self._row}") if self._places is None else self._places[index]
         raw = self._cells[index]
-        self._report(
-            Problem(
-                fault.code,
-                self._file,
-                self._sheet,
-                row,
-                placed.header,
-                cell,
-                None if raw is None else quote(raw),
-                fault.expected,
-                fault.remedy,
-            )
-        )
+        found = None if raw is None else quote(raw)
+        self._table.tell(fault.code, found, fault.expected, fault.remedy, row, placed.header, cell)
 
     def _correct(self) -> tuple[str, ...]:
         """Return the columns to correct, in the order of the table; missing columns stand last."""
         named = [self._placed[index].header for index in sorted(self._bad) if index >= 0]
         for kind in (Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE):
-            present = self._side if kind is Kind.SIDE else self._ids[kind]
-            if present is None and kind.value not in named:
+            made = kind is Kind.RECORD_ID and self._makes_ids
+            if kind not in self._at and kind.value not in named and not made:
                 named.append(kind.value)
         if -1 in self._bad:
             named.append(Kind.CONVENTION.value)
         return tuple(named)
-
-
-_UNIT_SPELLINGS: dict[LengthUnit, tuple[str, ...]] = {
-    LengthUnit.INCH: ("inch", "inches", '"'),
-    LengthUnit.THOU: ("thous", "mil", "mils"),
-    LengthUnit.MILLIMETRE: ("millimetre", "millimetres", "millimeter", "millimeters"),
-}

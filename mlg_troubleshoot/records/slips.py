@@ -2,39 +2,15 @@
 
 from __future__ import annotations
 
-from mlg_troubleshoot.units import MM_PER_IN, THOU_PER_IN, ClearanceConvention, LengthUnit
+from mlg_troubleshoot.units import MM_PER_IN, SLIPS, THOU_PER_IN, ClearanceConvention, LengthUnit
 
 _SMALLEST_IN = 0.0001
 
 
 def scale_slip(
-    value_in: float,
-    unit: LengthUnit,
-    convention: ClearanceConvention,
-    plausible_max_in: float,
-    *,
-    halves: bool = True,
+    value_in: float, unit: LengthUnit, convention: ClearanceConvention, plausible_max_in: float, *, halves: bool = True
 ) -> str:
-    """Name the slip of unit, decimal point or convention that would bring a value into the usual range.
-
-    Parameters
-    ----------
-    value_in : float
-        Radial clearance, or another length, as it was understood. [in]
-    unit : LengthUnit
-        Unit it was read in.
-    convention : ClearanceConvention
-        Convention it was read in.
-    plausible_max_in : float
-        Largest value that is usual. [in]
-    halves : bool, optional
-        False for a length that has no convention.
-
-    Returns
-    -------
-    str
-        The suggestion in plain words; empty if no slip explains the value.
-    """
+    """Name the slip of unit, decimal point or convention that would bring a value into the usual range."""
     entered = unit.from_inches(value_in * convention.per_radial)
     found: list[str] = []
     if unit is LengthUnit.INCH and entered >= 1.0 and _usual(value_in / THOU_PER_IN, plausible_max_in):
@@ -50,10 +26,15 @@ def scale_slip(
     ):
         inches = entered / THOU_PER_IN
         found.append(f"{entered:.4g} thou would be {inches * MM_PER_IN:.4g} mm: was it read in thou?")
-    if halves and convention is ClearanceConvention.RADIAL and _usual(value_in / 2.0, plausible_max_in):
+    if (
+        halves
+        and convention is ClearanceConvention.RADIAL
+        and _usual(value_in / SLIPS["convention"].factor, plausible_max_in)
+    ):
         found.append("Is it a diametral clearance or total play (factor 2)? Then say so in clearance_convention.")
-    if _usual(value_in / 10.0, plausible_max_in):
-        found.append(f"Has the decimal point slipped (factor 10)? It would be {entered / 10.0:.4g} {unit.value}.")
+    ten = SLIPS["point"].factor
+    if _usual(value_in / ten, plausible_max_in):
+        found.append(f"Has the decimal point slipped (factor {ten:g})? It would be {entered / ten:.4g} {unit.value}.")
     return " ".join(found)
 
 

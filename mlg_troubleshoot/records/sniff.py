@@ -6,7 +6,6 @@ from pathlib import PurePath
 
 from mlg_troubleshoot.records.model import FileRefusedError
 
-ZIP_MAGIC = b"PK"
 OLE_MAGIC = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _WORKBOOK_NAMES = frozenset((".xlsx", ".xlsm", ".xls", ".ods", ".xlsb", ".xltx", ".xltm"))
 _OTHERS: tuple[tuple[bytes, str], ...] = (
@@ -25,25 +24,6 @@ _OTHERS: tuple[tuple[bytes, str], ...] = (
 
 
 def sniff(data: bytes, name: str) -> str:
-    """Tell what kind of file it is.
-
-    Parameters
-    ----------
-    data : bytes
-        The file.
-    name : str
-        Its name, for a text that stands under a workbook's name.
-
-    Returns
-    -------
-    str
-        ``zip``, ``ole`` or ``text``.
-
-    Raises
-    ------
-    FileRefusedError
-        If it is empty or something else.
-    """
     if not data.strip(b" \t\r\n\0\xef\xbb\xbf"):
         raise FileRefusedError(
             "file_empty",
@@ -77,8 +57,5 @@ def sniff(data: bytes, name: str) -> str:
 
 def _refused(what: str) -> FileRefusedError:
     return FileRefusedError(
-        "file_kind",
-        what,
-        "an .xlsx workbook or a CSV file",
-        "Save the table as .xlsx or as CSV (UTF-8) and read that.",
+        "file_kind", what, "an .xlsx workbook or a CSV file", "Save the table as .xlsx or as CSV (UTF-8) and read that."
     )

@@ -18,16 +18,10 @@ MergedRange = tuple[int, int, int, int]
 class SheetFacts:
     """What was noticed beside the values while the rows were read; it fills up as they come.
 
-    Parameters
-    ----------
-    hidden_rows : set of int
-        Rows with something in them that are hidden or filtered out, counted from 1.
-    hidden_columns : list of tuple of int
-        First and last column of each hidden block, counted from 0.
-    formulas : Counter
-        Number of formula results by column, counted from 0.
-    faulty : dict of int to FileRefusedError
-        Rows that cannot be read although the file can, with the reason.
+    hidden_rows: rows with something in them that are hidden or filtered out, counted from 1.
+    hidden_columns: first and last column of each hidden block, counted from 0.
+    formulas: number of formula results by column, counted from 0.
+    faulty: rows that cannot be read although the file can, with the reason.
     """
 
     hidden_rows: set[int] = field(default_factory=set)
@@ -37,8 +31,6 @@ class SheetFacts:
 
 
 class Sheet(Protocol):
-    """One table of cells."""
-
     @property
     def name(self) -> str | None:
         """Name of the worksheet, None for CSV."""

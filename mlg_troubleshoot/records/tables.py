@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
 from mlg_troubleshoot.errors import Problem
-from mlg_troubleshoot.records.cells import Cell, column_letters
-from mlg_troubleshoot.records.columns import CARRIED
+from mlg_troubleshoot.records.cells import Cell, column_letters, quote
+from mlg_troubleshoot.records.columns import CARRIED, Kind
 from mlg_troubleshoot.records.layout import ColumnReader, Columns, Header
 from mlg_troubleshoot.records.longform import LongReader
-from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout
+from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout, TableInHand
 from mlg_troubleshoot.records.rows import RowReader
 from mlg_troubleshoot.records.source import NumberedRow, Sheet
 
@@ -22,18 +23,7 @@ _PROGRESS_ROWS = 500
 class Collected:
     """What the sheets of one file gave.
 
-    Parameters
-    ----------
-    rows : list of Inspection or InvalidRow
-        The data rows.
-    problems : list of Problem
-        The errors.
-    notes : list of str
-        The notes.
-    layouts : list of SheetLayout
-        Where the tables are.
-    invalid_content : dict of RowSource to int
-        A hash of the cells of each row that cannot be judged, to tell a repeated row from another one.
+    invalid_content: a hash of the cells of each row that cannot be judged, to tell a repeated row from another one.
     """
 
     rows: list[Inspection | InvalidRow] = field(default_factory=list)
@@ -53,110 +43,127 @@ def read_table(
     delimiter: str | None,
     tick: Callable[[int], None],
 ) -> Collected:
-    """Read a table with one header.
-
-    Parameters
-    ----------
-    sheet : Sheet
-        The sheet.
-    header : Header
-        Its header.
-    rows : iterator of tuple
-        All its rows, from the first.
-    options : ReadOptions
-        What the caller declared.
-    file : str or None
-        File as the user named it.
-    delimiter : str or None
-        Separator of a CSV file.
-    tick : callable
-        Called with a number of rows that were read.
-
-    Returns
-    -------
-    Collected
-        Rows, problems and notes.
-    """
     out = Collected()
     columns = ColumnReader(options, file, sheet.name).place(header.texts, header.row, units=header.units)
     _spare_carried(columns)
     out.problems += columns.problems
-    if header.row > 1:
-        used = " and ".join(str(n) for n in header.rows_used)
-        out.notes.append(
-            f"the header stands in row {used}" if len(header.rows_used) == 1 else f"the header stands in rows {used}"
-        )
-    out.notes += columns.notes
-    row_problems: list[Problem] = []
     comma = options.decimal_comma or delimiter == ";"
-    reader = RowReader(
-        columns.placed,
-        options,
-        file=file,
-        sheet=sheet.name,
-        decimal_comma=comma,
-        report=row_problems.append,
-        header_row=header.row,
-    )
-    long = (
-        LongReader(columns.placed, options, file, sheet.name, comma, row_problems.append, header.row)
-        if columns.is_long
-        else None
-    )
-    last = header.row
-    repeated = 0
+    in_hand = TableInHand(options, file, sheet.name, out.problems.append, comma)
+    table = _Table(sheet, header, columns, in_hand, delimiter, out)
     pending = 0
-    width = header.width
-    is_header = _header_test(header)
-    faulty = sheet.facts.faulty
-    collect = out.rows.append
     for number, cells in rows:
-        if number <= header.row:
-            continue
-        if is_header(cells):
-            repeated += 1
-            continue
-        last = number
-        pending += 1
-        if pending == _PROGRESS_ROWS:
-            tick(pending)
-            pending = 0
-        if delimiter is not None and len(cells) != width and (len(cells) < width or any(cells[width:])):
-            collect(reader.ragged(number, cells, width))
-        elif number in faulty:
-            collect(reader.faulty(number, cells, faulty[number]))
-        elif long is not None:
-            long.add(number, cells)
+        if number > header.row:
+            table.take(number, cells)
+            pending += 1
+            if pending == _PROGRESS_ROWS:
+                tick(pending)
+                pending = 0
+    tick(pending)
+    table.finish()
+    placed = (header.row > 1) * [f"the header stands in row {' and '.join(map(str, header.rows_used))}"]
+    said = columns.notes()
+    first = [*placed, *(said[:1] if not columns.carried or len(said) > 1 else [])]
+    out.notes += ["; ".join(first)] if first else []
+    out.notes += said[-1:] if columns.carried else []
+    about = [*table.notes(), *_hidden_notes(sheet, columns, header.row)]
+    out.notes += ["; ".join(about)] if about else []
+    kind = "long" if columns.is_long else "wide"
+    read = tuple(ColumnReading(p.index, p.header, p.read_as) for p in columns.placed)
+    out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, table.last, len(header.texts), read))
+    return out
+
+
+# First words of rows that people write below or between inspections.
+_NO_INSPECTION = re.compile(
+    r"""(?:(?:grand|sub)?\W?totals?|sums?|averages?|avg|mean|median|max(?:imum)?|min(?:imum)?|std|count|limits?
+      |sign(?:ed|ature)?s?|checked|approved|inspect(?:ed|or)|prepared|certified|verified|stamp|date|name
+      |end|notes?|remarks?|legend|key|page|nil|no\ further)(?![^\s:.,'\u2019_/(\-])""",
+    re.VERBOSE | re.IGNORECASE,
+)
+_RULE = re.compile(r"[-=_*.\s]{3,}")
+
+
+class _Table:
+    """The rows of one table: inspections, and what stands between them."""
+
+    def __init__(
+        self, sheet: Sheet, header: Header, columns: Columns, table: TableInHand, delimiter: str | None, out: Collected
+    ) -> None:
+        self._reader = RowReader(columns.placed, table)
+        self._long = LongReader(columns.placed, table) if columns.is_long else None
+        self._faulty = sheet.facts.faulty
+        self._is_header = _header_test(header)
+        self._width = header.width if delimiter is not None else None
+        self._out = out
+        self._repeated = 0
+        self._aside: list[str] = []
+        kinds = {p.index: p.field.kind for p in columns.placed if p.field is not None}
+        self._telling = [
+            [i for i, kind in kinds.items() if kind is k] for k in (Kind.TAIL_NO, Kind.SIDE, Kind.CLEARANCE)
+        ]
+        self.last = header.row
+
+    def take(self, number: int, cells: Sequence[Cell]) -> None:
+        if self._is_header(cells):
+            self._repeated += 1
+            return
+        self.last = number
+        if self._stands_aside(number, cells):
+            return
+        width, collect = self._width, self._out.rows.append
+        if width is not None and len(cells) != width and (len(cells) < width or any(cells[width:])):
+            collect(self._reader.ragged(number, cells, width))
+        elif number in self._faulty:
+            collect(self._reader.faulty(number, cells, self._faulty[number]))
+        elif self._long is not None:
+            self._long.add(number, cells)
         else:
-            read = reader.read(number, cells)
+            read = self._reader.read(number, cells)
             collect(read)
             if read.__class__ is InvalidRow:
-                out.invalid_content[read.source] = hash(tuple(cells))
-    tick(pending)
-    if long is not None:
-        out.rows = _in_order([*out.rows, *long.finish()])
-        out.notes.append("long layout: one row is one joint's reading; rows with one record id are one inspection")
-    if repeated:
-        out.notes.append(
-            f"{repeated} repeated header rows were skipped" if repeated > 1 else "a repeated header row was skipped"
-        )
-    out.problems += row_problems
-    out.notes += _hidden_notes(sheet, columns, header.row)
-    out.layouts.append(
-        SheetLayout(
-            file,
-            sheet.name,
-            "long" if columns.is_long else "wide",
-            header.row,
-            last,
-            len(header.texts),
-            tuple(
-                ColumnReading(p.index, p.header, p.field.name if p.field is not None and not p.refused else None)
-                for p in columns.placed
-            ),
-        )
-    )
-    return out
+                self._out.invalid_content[read.source] = hash(tuple(cells))
+
+    def _stands_aside(self, number: int, cells: Sequence[Cell]) -> bool:
+        """Tell a row of totals, signatures and the like: it says so first, and lacks what makes an inspection."""
+        place = next((i for i, cell in enumerate(cells) if cell is not None), None)
+        first = None if place is None else cells[place]
+        if not isinstance(first, str):
+            return False
+        ruled = all(cell is None or (isinstance(cell, str) and _RULE.fullmatch(cell)) for cell in cells)
+        if not ruled and _NO_INSPECTION.match(first.strip()) is None:
+            return False
+        filled = [any(i != place and i < len(cells) and cells[i] is not None for i in kind) for kind in self._telling]
+        if sum(filled) > 1 and not ruled:
+            return False
+        self._aside.append(f"row {number} {quote(first, 40)!r}")
+        return True
+
+    def finish(self) -> None:
+        """Read what could be read only with all rows at hand."""
+        if self._long is not None:
+            self._out.rows[:] = sorted([*self._out.rows, *self._long.finish()], key=lambda row: row.source.row or 0)
+
+    def notes(self) -> list[str]:
+        """Say what was made of the rows."""
+        notes = []
+        if self._long is not None:
+            notes.append("long layout: one row is one joint's reading; rows with one record id are one inspection")
+        if self._repeated:
+            notes.append(
+                f"{self._repeated} repeated header rows were skipped"
+                if self._repeated > 1
+                else "a repeated header row was skipped"
+            )
+        if self._aside:
+            count = f"{len(self._aside)} rows are" if len(self._aside) > 1 else "1 row is"
+            shown = ", ".join(self._aside[:5]) + (", …" if len(self._aside) > 5 else "")
+            notes.append(f"{count} no inspection and set aside: {shown}")
+        words = self._reader.not_measured
+        if words:
+            shown = ", ".join(repr(word) for word in list(words)[:4])
+            cells = sum(words.values())
+            notes.append(f"{cells} {'cells' if cells > 1 else 'cell'} with {shown} read as not measured")
+        return notes
 
 
 def _header_test(header: Header) -> Callable[[Sequence[Cell]], bool]:
@@ -168,10 +175,6 @@ def _header_test(header: Header) -> Callable[[Sequence[Cell]], bool]:
         return len(cells) > first and cells[first] == texts[first] and tuple(cells) == texts[: len(cells)]
 
     return is_header
-
-
-def _in_order(rows: list[Inspection | InvalidRow]) -> list[Inspection | InvalidRow]:
-    return sorted(rows, key=lambda row: row.source.row or 0)
 
 
 def _spare_carried(columns: Columns) -> None:

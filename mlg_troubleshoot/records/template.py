@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.records.cells import column_letters
 from mlg_troubleshoot.records.columns import LENGTHS, Field, Kind
-from mlg_troubleshoot.records.export import write_bytes
 from mlg_troubleshoot.records.forms import FORM_TITLE
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 JointLine = tuple[int, str, str]
 
 _ROWS = 500
+_FONT = "Calibri"
+_LINE_PT = 15.0
 _HEADER_FILL = "FFD9E2EC"
 _REQUIRED_FILL = "FFFFE9A8"
 _TEXT_KINDS = frozenset(
@@ -98,22 +100,7 @@ _INSTRUCTIONS = (
 
 
 def write_template(path: str | Path, joints: Sequence[JointLine], *, unit: LengthUnit = LengthUnit.INCH) -> None:
-    """Write the empty inspection workbook.
-
-    Parameters
-    ----------
-    path : str or Path
-        File to write; it appears whole or not at all.
-    joints : sequence of tuple
-        Number, name and location of each joint.
-    unit : LengthUnit, optional
-        Unit of the columns of the sheet Inspections.
-
-    Raises
-    ------
-    OutputError
-        If the file cannot be written.
-    """
+    """Write the empty inspection workbook."""
     from openpyxl import Workbook
 
     book = Workbook()
@@ -173,21 +160,27 @@ def _instructions(book: Workbook, joints: Sequence[JointLine]) -> None:
 
     sheet = book.worksheets[0]
     sheet.title = "Instructions"
-    sheet.column_dimensions["A"].width = 110
+    sheet.column_dimensions["A"].width = 74
     # One cell a line: labels beside values would look like a form.
     lines = [*_INSTRUCTIONS, *(f"  #{number} {name}: {place}" for number, name, place in joints)]
     for row, line in enumerate(lines, 1):
         cell = sheet.cell(row, 1, line)
         cell.data_type = "s"
         cell.alignment = Alignment(wrap_text=True, vertical="top")
-    sheet["A1"].font = Font(bold=True, size=14)
-    _page(sheet, landscape=False)
+        _as_high_as(sheet, row, line, 83)
+    sheet["A1"].font = Font(name=_FONT, bold=True, size=14)
+    sheet.row_dimensions[1].height = 24
+    _fit_to_width(sheet)
 
 
-def _page(sheet: Worksheet, *, landscape: bool) -> None:
+def _as_high_as(sheet: Worksheet, row: int, text: str, on_a_line: int) -> None:
+    """Give a row the height of its longest text: not every program finds it itself."""
+    sheet.row_dimensions[row].height = _LINE_PT * max(1, -(-len(text) // on_a_line))
+
+
+def _fit_to_width(sheet: Worksheet) -> None:
     from openpyxl.worksheet.properties import PageSetupProperties
 
-    sheet.page_setup.orientation = "landscape" if landscape else "portrait"
     sheet.page_setup.paperSize = 9
     sheet.page_setup.fitToWidth = 1
     sheet.page_setup.fitToHeight = 0
@@ -202,18 +195,20 @@ def _comment(text: str) -> Comment:
 
 def _table(book: Workbook, joints: Sequence[JointLine], unit: LengthUnit) -> None:
     from openpyxl.styles import Alignment, Border, Font, PatternFill, Side
+    from openpyxl.worksheet.pagebreak import Break
 
     sheet = book.create_sheet("Inspections")
     line = Side(style="thin", color="FF9AA5B1")
-    for index, field in enumerate(_fields(joints, unit)):
+    fields = _fields(joints, unit)
+    for index, field in enumerate(fields):
         letters = column_letters(index)
         cell = sheet.cell(1, index + 1, field.name)
-        cell.font = Font(bold=True)
+        cell.font = Font(name=_FONT, bold=True)
         cell.fill = PatternFill("solid", fgColor=_REQUIRED_FILL if field.kind in _MUST else _HEADER_FILL)
         cell.alignment = Alignment(wrap_text=True, vertical="center", horizontal="center")
         cell.border = Border(bottom=line, right=line)
         cell.comment = _comment(_explain(field, joints))
-        sheet.column_dimensions[letters].width = 30 if field.kind is Kind.REMARKS else 14
+        sheet.column_dimensions[letters].width = 30 if field.kind is Kind.REMARKS else 13
         number_format = _number_format(field.kind)
         for row in range(2, _ROWS + 2):
             if number_format is not None:
@@ -221,8 +216,11 @@ def _table(book: Workbook, joints: Sequence[JointLine], unit: LengthUnit) -> Non
         _validate(sheet, field.kind, f"{letters}2:{letters}{_ROWS + 1}")
     sheet.row_dimensions[1].height = 45
     sheet.freeze_panes = "D2"
-    sheet.print_title_rows = "1:1"
-    _page(sheet, landscape=True)
+    # On paper: which gear on every page, and its clearances together on the first.
+    sheet.print_title_rows, sheet.print_title_cols = "1:1", "A:C"
+    sheet.page_setup.paperSize, sheet.page_setup.orientation, sheet.page_setup.scale = 9, "landscape", 53
+    for after in (Kind.CLEARANCE, Kind.MARGIN_U, Kind.REMARKS):
+        sheet.col_breaks.append(Break(id=max(i for i, field in enumerate(fields, 1) if field.kind is after)))
 
 
 def _number_format(kind: Kind) -> str | None:
@@ -255,9 +253,9 @@ def _form(book: Workbook, joints: Sequence[JointLine]) -> None:
 
     sheet = book.create_sheet("Form")
     sheet["A1"] = FORM_TITLE
-    sheet["A1"].font = Font(bold=True, size=14)
+    sheet["A1"].font = Font(name=_FONT, bold=True, size=14)
     sheet["A2"] = "One sheet is one inspection. Yellow lines must be filled in; blank means not measured."
-    for letters, width in (("A", 34), ("B", 22), ("C", 62)):
+    for letters, width in (("A", 28), ("B", 24), ("C", 66)):
         sheet.column_dimensions[letters].width = width
     fields = _fields(joints, None)
     fields.insert(4, Field(Kind.UNIT))
@@ -269,14 +267,15 @@ def _form(book: Workbook, joints: Sequence[JointLine]) -> None:
         value.fill = PatternFill("solid", fgColor=_REQUIRED_FILL if must else "FFFFFFFF")
         value.border = Border(left=line, right=line, top=line, bottom=line)
         value.number_format = _number_format(field.kind) or "General"
-        value.alignment = Alignment(horizontal="left")
-        label.font = Font(bold=must)
+        value.alignment = label.alignment = Alignment(horizontal="left", vertical="top")
+        label.font = Font(name=_FONT, bold=must)
         hint.value = _explain(field, joints)
         hint.data_type = "s"
         hint.alignment = Alignment(wrap_text=True, vertical="top")
-        hint.font = Font(size=8, color="FF52606D")
+        hint.font = Font(name=_FONT, size=9, color="FF52606D")
+        _as_high_as(sheet, row, hint.value, 94)
         _validate(sheet, field.kind, f"B{row}")
         row += 1
     sheet.freeze_panes = "B4"
     sheet.print_title_rows = "1:2"
-    _page(sheet, landscape=False)
+    _fit_to_width(sheet)

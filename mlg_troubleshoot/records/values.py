@@ -9,22 +9,12 @@ from enum import StrEnum
 from typing import TypeVar, cast
 
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.records.cells import OddCell, OddKind, show_number
+from mlg_troubleshoot.records.cells import UNWRITABLE, OddCell, OddKind, show_number
 from mlg_troubleshoot.units import LengthUnit, parse_length
 
 
 class CellFaultError(Exception):
-    """A cell that does not hold what its column needs; caught by the row reader and made a `Problem`.
-
-    Parameters
-    ----------
-    code : str
-        Stable name of the kind of fault.
-    expected : str
-        What was expected instead.
-    remedy : str
-        What to do.
-    """
+    """A cell that does not hold what its column needs; caught by the row reader and made a `Problem`."""
 
     def __init__(self, code: str, expected: str, remedy: str) -> None:
         super().__init__(code)
@@ -41,25 +31,33 @@ _PLAIN = re.compile(r"[+\-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+\-]?\d+)?", re.ASCII
 _NOT_FINITE = re.compile(r"[+\-]?\s*(nan|inf|infinity|1\.#\w+)", re.IGNORECASE)
 _INVISIBLE = {ord(c): None for c in "\u200b\u200c\u200d\u2060\ufeff"}
 
+# What people write where nothing was measured; the error value #N/A is none of them.
+NOT_MEASURED = frozenset(
+    (
+        "n/a",
+        "na",
+        "n.a.",
+        "-",
+        "--",
+        "\u2010",
+        "\u2011",
+        "\u2012",
+        "\u2013",
+        "\u2014",
+        "\u2212",
+        "nm",
+        "n/m",
+        "n.m.",
+        "nil",
+    )
+).union(("none", "not measured", "not taken", "not done", "not applicable", "not accessible"))
+
 _E = TypeVar("_E", bound=StrEnum)
 _CHOICES: dict[type[StrEnum], dict[str, StrEnum]] = {}
 
 
 def odd_cell_fault(cell: OddCell, expected: str) -> CellFaultError:
-    """Return the fault of a cell that holds an error, a date, a truth value or nothing that was computed.
-
-    Parameters
-    ----------
-    cell : OddCell
-        The cell.
-    expected : str
-        What the column holds.
-
-    Returns
-    -------
-    CellFaultError
-        The fault, to be raised.
-    """
+    """Return the fault of a cell that holds an error, a date, a truth value or nothing that was computed."""
     if cell.kind is OddKind.ERROR:
         return CellFaultError(
             "cell_error",
@@ -91,41 +89,12 @@ def plain_text(text: str) -> str:
 def read_length(
     cell: str | float | OddCell, unit: LengthUnit | None, *, signed: bool, decimal_comma: bool, expected: str
 ) -> tuple[float, LengthUnit, str]:
-    """Read a length.
-
-    Parameters
-    ----------
-    cell : str, float or OddCell
-        The cell, not blank.
-    unit : LengthUnit or None
-        Unit that the column states.
-    signed : bool
-        True if a length below zero makes sense.
-    decimal_comma : bool
-        True if ``0,013`` means 0.013.
-    expected : str
-        What the column holds, for the message.
-
-    Returns
-    -------
-    value_in : float
-        The length. [in]
-    unit : LengthUnit
-        The unit it was read in.
-    text : str
-        The text as entered.
-
-    Raises
-    ------
-    CellFaultError
-        If the cell is not a length or its unit is not known; a missing unit has the code ``unit_missing``.
-    """
     if isinstance(cell, float):
         text = show_number(cell)
         value, written = cell, None
     elif isinstance(cell, str):
         text = plain_text(cell)
-        value, written = _written_length(text, decimal_comma, expected)
+        value, written = _written_length(text, decimal_comma, expected, unit)
     elif cell.kind is OddKind.PADDED and cell.number is not None:
         text, value, written = cell.text, cell.number, None
     else:
@@ -136,7 +105,7 @@ def read_length(
         raise CellFaultError(
             "length_negative",
             expected,
-            "It cannot be less than zero. Enter the value as measured, or empty the cell if it was not measured.",
+            "It cannot be less than zero. Enter the value as measured, or leave it blank if it was not measured.",
         )
     if written is not None and unit is not None and written is not unit:
         same = f"{unit.from_inches(written.to_inches(value)):.6g}"
@@ -151,16 +120,19 @@ def read_length(
         raise CellFaultError(
             "unit_missing",
             f"{expected} with its unit",
-            "Neither the header nor the cell says the unit. Put it in the header (_in, _thou or _mm) or pass --unit.",
+            "Nothing says the unit. Write it with the value (0.013 in, 13 thou, 0.33 mm) or in the header (_in, _thou, "
+            "_mm), or pass --unit.",
         )
     return found.to_inches(value), found, text
 
 
 def _not_finite(expected: str) -> CellFaultError:
-    return CellFaultError("not_finite", expected, "Enter a number, or empty the cell if it was not measured.")
+    return CellFaultError("not_finite", expected, "Enter a number, or leave it blank if it was not measured.")
 
 
-def _written_length(text: str, decimal_comma: bool, expected: str) -> tuple[float, LengthUnit | None]:
+def _written_length(
+    text: str, decimal_comma: bool, expected: str, unit: LengthUnit | None
+) -> tuple[float, LengthUnit | None]:
     if _NOT_FINITE.fullmatch(text):
         raise _not_finite(expected)
     sign = _SIGNED.match(text)
@@ -169,13 +141,16 @@ def _written_length(text: str, decimal_comma: bool, expected: str) -> tuple[floa
         body = body.replace(",", ".")
     try:
         written = parse_length(body)
-    except UsageError as error:
-        raise _length_fault(text, body, error, expected) from None
+    except UsageError:
+        raise _length_fault(text, body, expected, unit) from None
     negative = sign is not None and sign[1] != "+"
     return (-written.value if negative else written.value), written.unit
 
 
-def _length_fault(text: str, body: str, error: UsageError, expected: str) -> CellFaultError:
+_EXAMPLES = {LengthUnit.INCH: "0.013", LengthUnit.THOU: "13", LengthUnit.MILLIMETRE: "0.33"}
+
+
+def _length_fault(text: str, body: str, expected: str, unit: LengthUnit | None) -> CellFaultError:
     if _COMMA_NUMBER.fullmatch(body):
         return CellFaultError(
             "decimal_comma",
@@ -186,41 +161,16 @@ def _length_fault(text: str, body: str, error: UsageError, expected: str) -> Cel
         return CellFaultError(
             "fraction", expected, "Fractions are not read. Enter a decimal number, for example 0.125."
         )
+    # A unit beside the number is refused where the header states another: the example is in the header's.
+    example = f"{_EXAMPLES[unit]} ({unit.value})" if unit is not None else "0.013 in, 13 thou or 0.33 mm"
     return CellFaultError(
-        "not_a_length",
-        expected,
-        f"{error.remedy} Leave the cell empty if it was not measured.",
+        "not_a_length", expected, f"Enter a number, for example {example}, or leave it blank if it was not measured."
     )
 
 
 def read_number(
     cell: str | float | OddCell, low: float, high: float, *, decimal_comma: bool, expected: str, suffix: str = ""
 ) -> float:
-    """Read a plain number within a range.
-
-    Parameters
-    ----------
-    cell : str, float or OddCell
-        The cell, not blank.
-    low, high : float
-        Range, ends included.
-    decimal_comma : bool
-        True if ``0,5`` means 0.5.
-    expected : str
-        What the column holds, for the message.
-    suffix : str, optional
-        A unit that may stand behind the number, for example ``psi``.
-
-    Returns
-    -------
-    float
-        The number.
-
-    Raises
-    ------
-    CellFaultError
-        If the cell is not a number in that range.
-    """
     if isinstance(cell, OddCell):
         if cell.kind is not OddKind.PADDED or cell.number is None:
             raise odd_cell_fault(cell, expected)
@@ -233,7 +183,7 @@ def read_number(
         raise _not_finite(expected)
     if not low <= value <= high:
         raise CellFaultError(
-            "out_of_range", expected, "Check the number and the unit; empty the cell if it is not known."
+            "out_of_range", expected, "Check the number and the unit, or leave it blank if it is not known."
         )
     return value
 
@@ -262,34 +212,18 @@ def _written_number(text: str, decimal_comma: bool, expected: str, suffix: str) 
     if _NOT_FINITE.fullmatch(text):
         raise _not_finite(expected)
     if not _PLAIN.fullmatch(text):
-        raise CellFaultError("not_a_number", expected, "Enter a plain number, or empty the cell if it is not known.")
+        raise CellFaultError("not_a_number", expected, "Enter a plain number, or leave it blank if it is not known.")
     return float(text)
 
 
 def read_text(cell: str | float | OddCell, expected: str, *, required: bool = False) -> str:
-    """Read an identifier or another text; numbers keep the digits they show.
-
-    Parameters
-    ----------
-    cell : str, float or OddCell
-        The cell, not blank.
-    expected : str
-        What the column holds, for the message.
-    required : bool, optional
-        True for an identity, in which a line break or another control character is refused.
-
-    Returns
-    -------
-    str
-        The text.
-
-    Raises
-    ------
-    CellFaultError
-        If the cell holds an error, a date, a truth value, or a number whose digits are lost.
-    """
+    """Read an identifier or another text; numbers keep the digits they show."""
     if isinstance(cell, str):
         text = plain_text(cell)
+        if UNWRITABLE.search(text):
+            raise CellFaultError(
+                "text_unwritable", expected, "It holds a character that no file can carry. Enter the text again."
+            )
         if required and any(ord(c) < 32 or 127 <= ord(c) < 160 for c in text):
             raise CellFaultError(
                 "text_control_character", expected, "It holds a line break or an invisible character. Enter it again."
@@ -309,29 +243,7 @@ def read_text(cell: str | float | OddCell, expected: str, *, required: bool = Fa
 
 
 def read_choice(cell: str | float | OddCell, choices: type[_E], code: str, hints: dict[str, str]) -> _E:
-    """Read one of a few words, in upper or lower case.
-
-    Parameters
-    ----------
-    cell : str, float or OddCell
-        The cell, not blank.
-    choices : type of StrEnum
-        The words.
-    code : str
-        Kind of the fault if it is none of them.
-    hints : dict of str to str
-        What other spellings may mean, to be suggested.
-
-    Returns
-    -------
-    StrEnum
-        The word.
-
-    Raises
-    ------
-    CellFaultError
-        If it is none of them.
-    """
+    """Read one of a few words, in upper or lower case."""
     known = _CHOICES.get(choices)
     if known is None:
         known = _CHOICES[choices] = {str(choice): choice for choice in choices}
@@ -352,24 +264,8 @@ def read_choice(cell: str | float | OddCell, choices: type[_E], code: str, hints
 
 
 def read_date(cell: str | float | OddCell) -> date:
-    """Read a day: ISO 8601 text, or a cell that is formatted as a date.
-
-    Parameters
-    ----------
-    cell : str, float or OddCell
-        The cell, not blank.
-
-    Returns
-    -------
-    datetime.date
-        The day.
-
-    Raises
-    ------
-    CellFaultError
-        If the day would have to be guessed.
-    """
-    expected = "a date as 2026-03-04 (year-month-day)"
+    """Read a day: ISO 8601 text, a text with the month as a word, or a cell that is formatted as a date."""
+    expected = "a date as 2026-03-04 (year-month-day) or 4 Mar 2026"
     if isinstance(cell, float):
         raise CellFaultError(
             "date_serial",
@@ -387,11 +283,31 @@ def read_date(cell: str | float | OddCell) -> date:
     return day
 
 
+_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+_MONTH = (
+    r"jan(?:uary)?|feb(?:ruary)?|mar(?:ch)?|apr(?:il)?|may|june?|july?|aug(?:ust)?|sept?(?:ember)?|oct(?:ober)?"
+    r"|nov(?:ember)?|dec(?:ember)?"
+)
+_WORDED_DAY = re.compile(
+    rf"(?:(?P<day>\d{{1,2}})[\s.\-/]*(?P<month>{_MONTH})|(?P<first>{_MONTH})[\s.\-/]*(?P<second>\d{{1,2}}),?\s)"
+    r"[\s.,\-/]*(?P<year>\d{4}|\d{2})",
+    re.IGNORECASE | re.ASCII,
+)
+
+
 def _iso_day(text: str, expected: str) -> date:
     match = re.fullmatch(r"(\d{4}-\d{2}-\d{2})(?:[T ]\d{2}:\d{2}(?::\d{2}(?:\.\d+)?)?(?:Z|[+\-]\d{2}:?\d{2})?)?", text)
     if match is not None:
         try:
             return date.fromisoformat(match[1])
+        except ValueError:
+            raise CellFaultError("date_invalid", expected, "There is no such day in the calendar.") from None
+    worded = _WORDED_DAY.fullmatch(text)
+    if worded is not None:
+        year = int(worded["year"])
+        try:
+            month = _MONTHS.index((worded["month"] or worded["first"])[:3].lower()) + 1
+            return date(year + (2000 if year < 100 else 0), month, int(worded["day"] or worded["second"]))
         except ValueError:
             raise CellFaultError("date_invalid", expected, "There is no such day in the calendar.") from None
     if re.fullmatch(r"\d{1,4}[./\-]\d{1,2}[./\-]\d{1,4}", text):

@@ -7,52 +7,49 @@ import re
 import zipfile
 import zlib
 from collections.abc import Iterator
+from contextlib import contextmanager
+from xml.etree.ElementTree import ParseError
 
+from mlg_troubleshoot.records.cells import LETTERS, MAX_COLUMNS, MAX_ROWS, column_letters
 from mlg_troubleshoot.records.model import FileRefusedError
 
 MAX_EXPANDED_BYTES = 200_000_000
 MAX_RATIO = 100
 MAX_MEMBERS = 5_000
 _SMALL_MEMBER_BYTES = 1_000_000
-_CHUNK = 1 << 20
-_DECLARATION = re.compile(rb"<!\s*(DOCTYPE|ENTITY)", re.IGNORECASE)
+_CHUNK = 1 << 16
+_HEAD_BYTES = 1 << 16
+_BEFORE_ROOT = re.compile(rb"(?:\xef\xbb\xbf|\xff\xfe|\xfe\xff)?(?:\s++|<\?.*?\?>|<!--.*?-->)*+", re.DOTALL)
+# A tree is kept until a row or a text is complete, and an empty shell of each until the end of its part.
+MAX_OPEN_BYTES = 2_000_000
+MAX_ITEMS = 1 << 20
 # What zipfile raises: NotImplementedError for compression that it lacks, RuntimeError for encrypted members.
 _ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError, ValueError, RuntimeError)
+# What openpyxl and the parser of XML raise on damaged parts: a part or an attribute that is missing, a wrong kind of
+# element or value, an index outside the texts, XML that is not well-formed or in no known encoding.
+_PARSER_ERRORS = (AttributeError, LookupError, OSError, OverflowError, ParseError, TypeError, ValueError)
+
 
 _DAMAGED = "Open it in a spreadsheet program, save it again as .xlsx, and read the copy."
 
 
 def damaged(what: str) -> FileRefusedError:
-    """Return the refusal of a workbook that is cut off or damaged.
-
-    Parameters
-    ----------
-    what : str
-        What is wrong, in plain words.
-
-    Returns
-    -------
-    FileRefusedError
-        The refusal, to be raised.
-    """
     return FileRefusedError(
         "file_damaged", f"the workbook is cut off or damaged ({what})", "a whole workbook", _DAMAGED
     )
 
 
+@contextmanager
+def damage(what: str) -> Iterator[None]:
+    """Turn what a foreign parser raises into a refusal: the one place where that happens."""
+    try:
+        yield
+    except _PARSER_ERRORS:
+        raise damaged(what) from None
+
+
 class GuardedZip:
-    """A packed workbook, checked before anything in it is parsed.
-
-    Parameters
-    ----------
-    data : bytes
-        The file.
-
-    Raises
-    ------
-    FileRefusedError
-        If it is broken, encrypted, would expand too far, or declares entities.
-    """
+    """A packed workbook, checked before anything in it is parsed."""
 
     def __init__(self, data: bytes) -> None:
         try:
@@ -61,122 +58,126 @@ class GuardedZip:
         except _ZIP_ERRORS:
             raise damaged("its list of parts cannot be read") from None
         if len(members) > MAX_MEMBERS:
-            raise _too_large(f"{len(members)} parts in one workbook")
+            raise too_large(f"{len(members)} parts in one workbook")
         self._members: dict[str, zipfile.ZipInfo] = {}
         for member in members:
             self._members.setdefault(member.filename.replace("\\", "/").lstrip("/").lower(), member)
         if any(member.flag_bits & 1 for member in members):
-            raise FileRefusedError(
-                "password_protected",
-                "the file is password protected",
-                "a workbook without a password",
-                "Save a copy without the password and read the copy.",
-            )
+            raise password_protected()
         if sum(member.file_size for member in members) > MAX_EXPANDED_BYTES:
-            raise _too_large(f"{sum(m.file_size for m in members) / 1e6:.0f} MB when unpacked")
+            raise too_large(f"{sum(m.file_size for m in members) / 1e6:.0f} MB when unpacked")
         for member in members:
             if member.file_size > max(_SMALL_MEMBER_BYTES, MAX_RATIO * member.compress_size):
-                raise _too_large(
+                raise too_large(
                     f"{member.filename} unpacks to {member.file_size / max(member.compress_size, 1):.0f} times its size"
                 )
         self._refuse_declarations()
 
     def _refuse_declarations(self) -> None:
         for name in self._members:
-            if name.endswith((".xml", ".rels", ".vml")):
-                # A declaration stands before the first element; UTF-16 is searched without its zero bytes.
-                head = self.head(name).replace(b"\0", b"")
-                if _DECLARATION.search(head):
-                    raise FileRefusedError(
-                        "xml_declaration",
-                        f"{name} declares a document type or entities, which no spreadsheet program writes",
-                        "a workbook as a spreadsheet program writes it",
-                        _DAMAGED,
-                    )
+            # A declaration stands before the first element; UTF-16 is read without its zero bytes.
+            head = self._head(name).replace(b"\0", b"")
+            before = _BEFORE_ROOT.match(head)
+            rest = head[before.end() if before is not None else 0 :]
+            if rest.startswith((b"<!", b"<?")) or (not rest and len(head) >= _HEAD_BYTES // 2):
+                raise FileRefusedError(
+                    "xml_declaration",
+                    f"{name} declares a document type or entities, which no spreadsheet program writes",
+                    "a workbook as a spreadsheet program writes it",
+                    _DAMAGED,
+                )
 
     @property
     def names(self) -> frozenset[str]:
         """Names of the parts, in lower case, with plain slashes."""
         return frozenset(self._members)
 
-    def head(self, name: str, size: int = 65536) -> bytes:
-        """Return the start of a part.
-
-        Parameters
-        ----------
-        name : str
-            Part.
-        size : int, optional
-            Number of bytes at most.
-
-        Returns
-        -------
-        bytes
-            Its first bytes.
-        """
+    def _head(self, name: str) -> bytes:
         try:
             with self._zip.open(self._members[name]) as part:
-                return part.read(size)
+                return part.read(_HEAD_BYTES)
         except _ZIP_ERRORS:
             raise damaged(f"{name} cannot be unpacked") from None
 
+    def size(self, name: str) -> int:
+        """Return how many bytes a part claims to unpack to."""
+        return self._member(name).file_size
+
+    def _member(self, name: str) -> zipfile.ZipInfo:
+        member = self._members.get(name.lower())
+        if member is None:
+            raise damaged(f"{name} is missing")
+        return member
+
     def read(self, name: str) -> bytes:
-        """Return a whole part.
-
-        Parameters
-        ----------
-        name : str
-            Part, in lower case.
-
-        Returns
-        -------
-        bytes
-            Its bytes.
-
-        Raises
-        ------
-        FileRefusedError
-            If it is missing, broken or larger than it claims.
-        """
         return b"".join(self.chunks(name))
 
     def chunks(self, name: str) -> Iterator[bytes]:
-        """Unpack a part piece by piece.
-
-        Parameters
-        ----------
-        name : str
-            Part, in lower case.
-
-        Yields
-        ------
-        bytes
-            The next piece.
-
-        Raises
-        ------
-        FileRefusedError
-            If it is missing, broken or larger than it claims.
-        """
-        member = self._members.get(name)
-        if member is None:
-            raise damaged(f"{name} is missing")
+        """Unpack a part piece by piece."""
+        member = self._member(name)
         total = 0
         try:
             with self._zip.open(member) as part:
                 while piece := part.read(_CHUNK):
                     total += len(piece)
                     if total > MAX_EXPANDED_BYTES:
-                        raise _too_large(f"{name} unpacks to more than it claims")
+                        raise too_large(f"{name} unpacks to more than it claims")
                     yield piece
         except _ZIP_ERRORS:
             raise damaged(f"{name} cannot be unpacked") from None
 
 
-def _too_large(what: str) -> FileRefusedError:
+class Stream:
+    """A part as a file, refused before what is kept of it until a row or a text ends becomes too much."""
+
+    def __init__(self, archive: GuardedZip, part: str) -> None:
+        self._part = part
+        self._chunks = archive.chunks(part)
+        self._open = self._items = 0
+
+    def read(self, _size: int = -1) -> bytes:
+        piece = next(self._chunks, b"")
+        self._open += len(piece)
+        if self._open > MAX_OPEN_BYTES:
+            raise too_large(f"one row or text of {self._part} is longer than {MAX_OPEN_BYTES // 1_000_000} MB")
+        return piece
+
+    def end_item(self) -> None:
+        """Count a complete row or text."""
+        self._open = 0
+        self._items += 1
+        if self._items > MAX_ITEMS:
+            raise too_large(f"{self._part} holds more than {MAX_ITEMS} rows or texts")
+
+
+def too_large(what: str) -> FileRefusedError:
     return FileRefusedError(
         "file_too_large",
         f"the workbook is far too large or packed to look small: {what}",
         f"at most {MAX_EXPANDED_BYTES // 1_000_000} MB unpacked and {MAX_RATIO} times the packed size",
         "Copy the inspection table alone into a new workbook and read that.",
+    )
+
+
+def password_protected() -> FileRefusedError:
+    """Return the refusal of a workbook that cannot be opened without its password."""
+    return FileRefusedError(
+        "password_protected",
+        "the file is password protected",
+        "a workbook without a password",
+        "Save a copy without the password and read the copy.",
+    )
+
+
+def outside_limits(sheet: str | None, column: int, row: int) -> FileRefusedError:
+    """Return the refusal of a sheet with something in a cell (its column counted from 0) that no table reaches."""
+    cell = f"{column_letters(column)}{row}"
+    return FileRefusedError(
+        "cell_outside_limits",
+        f"something stands in cell {cell}",
+        f"nothing beyond column {LETTERS[-1]} ({MAX_COLUMNS} columns) and row {MAX_ROWS}",
+        "Delete what stands far outside the table, or copy the table into a new workbook.",
+        sheet=sheet,
+        row=row,
+        cell=cell,
     )

@@ -1,4 +1,4 @@
-"""Child process that turns HTML into PDF; it imports the PDF engine and the standard library only.
+"""Child process that turns HTML into PDF, and what it does to the PDF; it imports the two PDF libraries only.
 
 It is started by its path (see :mod:`~mlg_troubleshoot.reporting.pdf`), reads jobs from standard input and
 answers each on standard output: a line of JSON, then the bytes it announces.
@@ -9,17 +9,19 @@ from __future__ import annotations
 import io
 import json
 import sys
+from collections.abc import Mapping
 from typing import Any, BinaryIO
+from urllib.parse import unquote
+
+from pypdf import PdfReader, PdfWriter
+from pypdf.errors import PyPdfError
+from pypdf.generic import ArrayObject, BooleanObject, DictionaryObject, Fit, NameObject, NumberObject, TextStringObject
+
+_HERE = "https://report.invalid/"
 
 
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:
-    """Answer jobs until the input ends.
-
-    Parameters
-    ----------
-    requests, answers : binary file
-        Pipes from and to the parent.
-    """
+    """Answer jobs until the input ends."""
     import plutoprint
 
     class Refuse(plutoprint.ResourceFetcher):
@@ -35,19 +37,78 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
             book = plutoprint.Book(getattr(plutoprint, f"PAGE_SIZE_{job['page'].upper()}"))
             book.custom_resource_fetcher = Refuse()
             # Links within the document become named destinations only where the document has an address.
-            book.load_html(html, base_url="https://report.invalid/")
-            # Loading forgets what was set before; a date that is not given is today's, and the bytes differ.
-            book.set_metadata(plutoprint.PDF_METADATA_CREATION_DATE, job["created"])
-            book.set_metadata(plutoprint.PDF_METADATA_MODIFICATION_DATE, job["created"])
+            book.load_html(html, base_url=_HERE)
             stream = io.BytesIO()
             book.write_to_pdf_stream(stream)
-        except (plutoprint.Error, OSError, ValueError) as error:
-            answer, pdf = {"error": f"{type(error).__name__}: {error}", "length": 0}, b""
+            pdf, boxes = finished(stream.getvalue(), job["sections"], job["title"], job["created"])
+        except (plutoprint.Error, PyPdfError, OSError, ValueError) as error:
+            answer, pdf = {"error": str(error) or type(error).__name__, "length": 0}, b""
         else:
-            pdf = stream.getvalue()
-            answer = {"error": None, "length": len(pdf)}
+            answer = {"error": None, "length": len(pdf), "boxes": boxes}
         answers.write(json.dumps(answer).encode("ascii") + b"\n" + pdf)
         answers.flush()
+
+
+def finished(pdf: bytes, sections: Mapping[str, str], title: str, created: str) -> tuple[bytes, bool]:
+    """Give a PDF its title, language, dates and a bookmark for each section (anchor to heading).
+
+    Also tell whether it shows the box that stands for a character that no font has. The dates are those given, so
+    that the same document always has the same bytes.
+    """
+    writer = PdfWriter(clone_from=io.BytesIO(pdf))
+    boxes = check_fonts(writer)
+    for annotation in (each.get_object() for page in writer.pages for each in page.get("/Annots", ())):
+        address = str(annotation.get("/A", {}).get("/URI", ""))
+        if address.startswith(_HERE):
+            # A link to a file beside this one, which a reader of the PDF opens there.
+            annotation[NameObject("/A")] = DictionaryObject(
+                {
+                    NameObject("/S"): NameObject("/GoToR"),
+                    NameObject("/F"): TextStringObject(unquote(address.removeprefix(_HERE))),
+                    NameObject("/D"): ArrayObject([NumberObject(0), NameObject("/Fit")]),
+                }
+            )
+    places = writer.named_destinations
+    for anchor, heading in sections.items():
+        place = places[anchor]
+        page = writer.get_destination_page_number(place)
+        writer.add_outline_item(title=heading, page_number=page, fit=Fit.xyz(left=0, top=place.top))
+    root = writer.root_object
+    root[NameObject("/Lang")] = TextStringObject("en")
+    root[NameObject("/ViewerPreferences")] = DictionaryObject({NameObject("/DisplayDocTitle"): BooleanObject(True)})
+    if sections:
+        writer.page_mode = "/UseOutlines"
+    writer.metadata = {
+        "/Title": title,
+        "/Creator": "mlg-troubleshoot",
+        "/Producer": "PlutoBook, cairo",
+        "/CreationDate": created,
+        "/ModDate": created,
+    }
+    made = io.BytesIO()
+    writer.write(made)
+    return made.getvalue(), boxes
+
+
+def check_fonts(document: PdfReader | PdfWriter) -> bool:
+    """Refuse a PDF that does not carry its fonts: without any, the engine writes blank pages and reports success.
+
+    Return whether a font draws the box that stands for a missing character (U+FFFD in its map to text).
+    """
+    fonts = {
+        str(font.get("/BaseFont")): font
+        for page in document.pages
+        for font in (each.get_object() for each in page.get("/Resources", {}).get("/Font", {}).values())
+    }
+    if not fonts:
+        raise ValueError("it drew no text: no font is embedded")
+    boxes = False
+    for name, font in fonts.items():
+        drawn = font["/DescendantFonts"][0].get_object() if "/DescendantFonts" in font else font
+        if not {"/FontFile", "/FontFile2", "/FontFile3"} & set(drawn.get("/FontDescriptor", {})):
+            raise ValueError(f"the font {name.lstrip('/')} is not embedded in the PDF")
+        boxes = boxes or ("/ToUnicode" in font and b"<fffd>" in font["/ToUnicode"].get_data().lower())
+    return boxes
 
 
 if __name__ == "__main__":

@@ -7,28 +7,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
+from urllib.parse import quote
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_context
+from jinja2.runtime import Context
 from markupsafe import Markup
 
-from mlg_troubleshoot.reporting.glyphs import breakable, font_faces, visible
+from mlg_troubleshoot.reporting import formats
+from mlg_troubleshoot.reporting.glyphs import breakable, font_faces
 from mlg_troubleshoot.reporting.resources import templates_folder
+from mlg_troubleshoot.visible import visible
 
 
 @dataclass(frozen=True, slots=True)
 class Document:
     """A document to be made from a template that extends ``base.html.j2``.
 
-    Parameters
-    ----------
-    template : str
-        Name of the template.
-    context : mapping of str to object
-        What it shows; at least the keys of :class:`~mlg_troubleshoot.reporting.context.DocumentContext`.
-    stem : str
-        File name without its ending.
-    landscape : bool
-        True for wide tables.
+    context: what it shows; at least what :func:`~mlg_troubleshoot.reporting.common.head` returns.
+    landscape: True for wide tables.
     """
 
     template: str
@@ -39,13 +35,7 @@ class Document:
 
 @cache
 def environment() -> Environment:
-    """Return the template environment: everything is escaped, a missing value is an error.
-
-    Returns
-    -------
-    Environment
-        The environment.
-    """
+    """Return the template environment: everything is escaped, a missing value is an error."""
     made = Environment(
         loader=FileSystemLoader(templates_folder()),
         autoescape=True,
@@ -56,8 +46,36 @@ def environment() -> Environment:
         finalize=_readable,
         auto_reload=False,
     )
-    made.filters["css_string"] = css_string
+    made.filters.update(
+        css_string=css_string,
+        address=address,
+        length=_length,
+        bare=_bare,
+        said=_said,
+        number=formats.number,
+        percent=formats.percent,
+        joints=formats.joint_list,
+        several=formats.several,
+        short=formats.short,
+        minutes=formats.minutes,
+    )
     return made
+
+
+@pass_context
+def _length(context: Context, value_in: float | None, signed: bool = False, fine: int = 0) -> str:
+    """A length with its unit, in the document's; a list is counted by ``count``."""
+    return str(context["lengths"].full(value_in, signed, fine))
+
+
+@pass_context
+def _bare(context: Context, value_in: float | None, signed: bool = False, fine: int = 0) -> str:
+    return str(context["lengths"].bare(value_in, signed, fine))
+
+
+@pass_context
+def _said(context: Context, sentence: str) -> str:
+    return str(context["lengths"].said(sentence))
 
 
 def _readable(value: Any) -> Any:
@@ -65,19 +83,13 @@ def _readable(value: Any) -> Any:
     return value if isinstance(value, Markup) or not isinstance(value, str) else breakable(visible(value))
 
 
+def address(file_name: str) -> Markup:
+    """Write the name of a file beside the document as a link's address, which nothing may be added to."""
+    return Markup(quote(file_name, safe=""))
+
+
 def css_string(text: str) -> Markup:
-    """Write a text as a CSS string that can end neither itself nor the style element.
-
-    Parameters
-    ----------
-    text : str
-        Any text.
-
-    Returns
-    -------
-    Markup
-        The string with its quotes.
-    """
+    """Write a text as a CSS string that can end neither itself nor the style element."""
 
     def coded(match: re.Match[str]) -> str:
         return f"\\{ord(match[0]):x} "
@@ -91,24 +103,6 @@ def _stylesheet() -> str:
 
 
 def render(document: Document, page: str, *, for_pdf: bool = False, glyph_note: str = "") -> str:
-    """Render a document.
-
-    Parameters
-    ----------
-    document : Document
-        Template and context.
-    page : str
-        Paper it is printed on: ``A4`` or ``Letter``.
-    for_pdf : bool
-        True to put the fonts inside and to link the headings for the bookmarks.
-    glyph_note : str
-        What to say about characters that the fonts lack.
-
-    Returns
-    -------
-    str
-        The HTML.
-    """
     return (
         environment()
         .get_template(document.template)

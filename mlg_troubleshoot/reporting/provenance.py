@@ -2,31 +2,24 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import UTC, datetime
+from importlib.metadata import version
+
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.gear import Gear
 
 
 @dataclass(frozen=True, slots=True)
 class ReportProvenance:
     """Program, inputs and moment behind a report.
 
-    Parameters
-    ----------
-    program_version : str
-        Version of this program.
-    created : datetime.datetime
-        Moment of the report, given by the caller: the same input and the same moment give the same bytes.
-    geometry_sha256 : str
-        Hash of the geometry that predicted.
-    input_sha256 : mapping of str to str
-        Hash of the bytes of each input file by its name; empty for prompts and the command line.
-    indices_sha256 : str or None
-        Hash of the precomputed sensitivity table.
-    seed : int or None
-        Seed of whatever was drawn at random; None if nothing was.
-    extension : str or None
-        The extension of the model in words, with its hash, if one is in use.
+    created: moment of the report, given by the caller: the same input and the same moment give the same bytes.
+    input_sha256: hash of the bytes of each input file by its name; empty for prompts and the command line.
+    seed: seed of whatever was drawn at random; None if nothing was.
+    remembered: remembered settings that shaped the report, and the file that they come from.
     """
 
     program_version: str
@@ -36,3 +29,37 @@ class ReportProvenance:
     indices_sha256: str | None = None
     seed: int | None = None
     extension: str | None = None
+    remembered: str | None = None
+
+
+def provenance_of(
+    gear: Gear,
+    input_sha256: Mapping[str, str],
+    *,
+    seed: int | None = None,
+    extension: str | None = None,
+    remembered: str | None = None,
+) -> ReportProvenance:
+    return ReportProvenance(
+        version("mlg-troubleshoot"),
+        moment_of_report(),
+        gear.geometry_sha256,
+        dict(input_sha256),
+        None,
+        seed,
+        extension,
+        remembered,
+    )
+
+
+def moment_of_report() -> datetime:
+    """Return the present moment, or the one of ``SOURCE_DATE_EPOCH`` where a report must be the same bytes again."""
+    given = os.environ.get("SOURCE_DATE_EPOCH")
+    if given is None:
+        return datetime.now(UTC).astimezone()
+    try:
+        return datetime.fromtimestamp(int(given), UTC)
+    except (ValueError, OverflowError, OSError):
+        raise UsageError(
+            f"SOURCE_DATE_EPOCH is {given!r}", "Set it to seconds since 1970-01-01 UTC, or leave it out."
+        ) from None

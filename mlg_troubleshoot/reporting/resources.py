@@ -13,18 +13,6 @@ FONT_FILES = {"normal": "fonts/DejaVuSans.ttf", "bold": "fonts/DejaVuSans-Bold.t
 
 @cache
 def templates_folder() -> Path:
-    """Return the folder of the report templates.
-
-    Returns
-    -------
-    Path
-        ``mlg_troubleshoot/templates`` of an installed wheel, else ``templates`` beside the package.
-
-    Raises
-    ------
-    OutputError
-        If neither holds the base template.
-    """
     package = Path(str(files("mlg_troubleshoot")))
     candidates = (package / "templates", package.parent / "templates")
     for folder in candidates:

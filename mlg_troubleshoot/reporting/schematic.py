@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from itertools import combinations
+from typing import Any, Literal
 
 import numpy as np
 from markupsafe import Markup
@@ -14,8 +15,8 @@ from numpy.typing import NDArray
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot
-from mlg_troubleshoot.reporting.figures import INK, PALE, PAPER, RULE, SOFT, Canvas, text_width
-from mlg_troubleshoot.reporting.formats import inches, number
+from mlg_troubleshoot.reporting.figures import INK, PALE, PAPER, RULE, SOFT, Anchor, Canvas, Place, text_width
+from mlg_troubleshoot.reporting.formats import Lengths
 
 JointState = Literal["over", "fine", "missing"]
 
@@ -24,12 +25,8 @@ JointState = Literal["over", "fine", "missing"]
 class Schematic:
     """The linkage drawn in its planes, all at one scale.
 
-    Parameters
-    ----------
-    panels : tuple of tuple of (str, Markup, float)
-        Name of each plane, its drawing and the drawing's width [canvas units].
-    exaggeration : int or None
-        How many times larger than life the virtual links are drawn; None if there are none.
+    panels: name of each plane, its drawing and the drawing's width [canvas units].
+    exaggeration: how many times larger than life the virtual links are drawn; None if there are none.
     """
 
     panels: tuple[tuple[str, Markup, float], ...]
@@ -51,47 +48,82 @@ _COSINES, _SINES = np.cos(_TURNS), np.sin(_TURNS)
 _RINGS = np.array([0.0, 5.0, 10.0, 16.0, 24.0, 34.0, 46.0])
 
 Array = NDArray[np.float64]
-Place = tuple[float, float]
 Box = tuple[float, float, float, float]
 Segment = tuple[Place, Place]
 _At = Callable[[str], Place]
 
 
-def schematic(gear: Gear, assessment: Assessment, width: float = 690.0) -> Schematic:
-    """Draw the linkage at mid-position, its joints numbered in place and their clearances exaggerated.
+def schematic(gear: Gear, assessment: Assessment, lengths: Lengths | None = None, width: float = 690.0) -> Schematic:
+    """Draw the linkage at mid-position, its joints numbered in place and their clearances exaggerated."""
+    over = (assessment.over_travel_in or 0.0) >= -(assessment.under_travel_in or 0.0)
+    directions = assessment.over_directions_rad if over else assessment.under_directions_rad
+    return _drawn(gear, assessment.joints, directions, lengths or Lengths(), width)
 
-    Parameters
-    ----------
-    gear : Gear
-        The gear; its reference linkage is drawn.
-    assessment : Assessment
-        The decision, whose governing worst directions are drawn.
-    width : float
-        Width of all panels together. [canvas units]
 
-    Returns
-    -------
-    Schematic
-        The drawings and the scale of the virtual links.
-    """
-    mechanism = gear.reference.mechanism
-    drawings = [d for d in (_PlaneDrawing(gear, plane.name) for plane in mechanism.planes) if d.points]
+def blank_schematic(gear: Gear, width: float = 690.0) -> Schematic:
+    """Draw the linkage with its joints numbered and named, none of them measured yet."""
+    nothing = tuple(
+        JointFinding(j.number, j.name, None, j.limit.value, False, None, 0.0, 0.0, 0.0, j.number, (1, 1), ())
+        for j in gear.joints
+    )
+    return _drawn(gear, nothing, (), Lengths(), width)
+
+
+def _drawn(
+    gear: Gear, findings: Sequence[JointFinding], directions: Sequence[float], lengths: Lengths, width: float
+) -> Schematic:
+    drawings = [d for d in (_PlaneDrawing(gear, plane.name) for plane in gear.reference.mechanism.planes) if d.points]
     gap, side = 6.0, 74.0
     free = width - gap * (len(drawings) - 1) - 2 * side * len(drawings)
     scale = free / sum(d.extent()[2] - d.extent()[0] for d in drawings)
-    findings = {finding.joint: finding for finding in assessment.joints}
-    largest = max([0.0, *(f.clearance_in or 0.0 for f in findings.values())])
-    over = (assessment.over_travel_in or 0.0) >= -(assessment.under_travel_in or 0.0)
-    directions = assessment.over_directions_rad if over else assessment.under_directions_rad
+    largest = max([0.0, *(f.clearance_in or 0.0 for f in findings)])
     exaggeration = None
     if largest > 0.0 and directions:
         exaggeration = min(_LARGEST_EXAGGERATION, _one_digit(_LONGEST_ARROW / (largest * scale)))
     height = max(d.extent()[3] - d.extent()[1] for d in drawings) * scale + _ABOVE + _BELOW
-    panels = []
-    for drawing in drawings:
-        angle = dict(zip(gear.joint_numbers, directions, strict=True)) if exaggeration else {}
-        panels.append(drawing.draw(scale, side, height, findings, angle, exaggeration or 0))
-    return Schematic(tuple(panels), exaggeration)
+    shown = _Shown(
+        {finding.joint: finding for finding in findings},
+        dict(zip(gear.joint_numbers, directions, strict=True)) if exaggeration else {},
+        exaggeration or 0,
+        lengths,
+    )
+    return Schematic(tuple(drawing.draw(scale, side, height, shown) for drawing in drawings), exaggeration)
+
+
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    """What is shown at the joints: findings, directions of their clearances and how these are drawn."""
+
+    findings: dict[int, JointFinding]
+    angles: dict[int, float]
+    exaggeration: int
+    lengths: Lengths
+
+    def mark(self, joint: int) -> JointState:
+        return joint_state(self.findings[joint])
+
+    def state(self, joint: int) -> str:
+        finding = self.findings[joint]
+        if finding.clearance_in is None:
+            return "not measured"
+        return f"{self.lengths.full(finding.clearance_in)}{' over its limit' if finding.over_limit else ''}"
+
+    def arrow(self, joint: int, place: Place, scale: float) -> Segment | None:
+        """The joint's clearance as an arrow from the edge of its marker; None if it would be too short to see."""
+        length = (self.findings[joint].clearance_in or 0.0) * scale * self.exaggeration
+        if joint not in self.angles or length <= _SHORTEST_ARROW:
+            return None
+        c, s = math.cos(self.angles[joint]), -math.sin(self.angles[joint])
+        start = (place[0] + _MARKER * c, place[1] + _MARKER * s)
+        return start, (start[0] + length * c, start[1] + length * s)
+
+    def label(self, joint: int, name: str, *, strong: bool) -> list[_Line]:
+        finding = self.findings[joint]
+        lines = [_Line(part, 8.5, False) for part in ([name] if strong else _two_lines(name))]
+        if finding.clearance_in is not None:
+            mark = " OVER LIMIT" if strong else " OVER" if finding.over_limit else ""
+            lines.append(_Line(self.lengths.bare(finding.clearance_in) + mark, 10.5 if strong else 9.5, True))
+        return lines
 
 
 def _one_digit(value: float) -> int:
@@ -148,22 +180,15 @@ class _PlaneDrawing:
         xs, ys = zip(*self.points.values(), strict=True)
         return min(xs), min(ys), max(xs), max(ys)
 
-    def draw(
-        self,
-        scale: float,
-        side: float,
-        height: float,
-        findings: dict[int, JointFinding],
-        angles: dict[int, float],
-        exaggeration: int,
-    ) -> tuple[str, Markup, float]:
+    def draw(self, scale: float, side: float, height: float, shown: _Shown) -> tuple[str, Markup, float]:
+        """Draw the plane: links and supports, then joints with their clearances, then their names."""
         x0, y0, x1, y1 = self.extent()
         width = (x1 - x0) * scale + 2 * side
         name = self.plane.replace("_", " ") + " plane"
-        shown = ", ".join(
-            f"joint {j.number} {_state(findings[j.number])}" for j in self.gear.joints if j.point in self.points
+        said = ", ".join(
+            f"joint {j.number} {shown.state(j.number)}" for j in self.gear.joints if j.point in self.points
         )
-        canvas = Canvas(width, height, f"Linkage schematic, {name}", shown)
+        canvas = Canvas(width, height, f"Linkage schematic, {name}", said)
         lift = (height - _ABOVE - _BELOW - (y1 - y0) * scale) / 2
 
         def at(point: str) -> Place:
@@ -172,42 +197,60 @@ class _PlaneDrawing:
 
         canvas.text(2, 11, name, size=10.5, bold=True, colour=SOFT)
         segments = self._links(canvas, at)
-        for point in self.points:
-            if self.mechanism.point(point).fixed and point not in self.cut:
-                _ground(canvas, *at(point))
+        boxes = self._obstacles(at)
+        self._plain_points(canvas, at)
+        markers = self._apart(at)
         here = [j for j in self.gear.joints if self._home(j.point)]
-        numbered = {j.point for j in self.gear.joints if j.point in self.points}
-        for point in self.points:
-            if point not in numbered and point not in self.cut:
-                canvas.marker("circle", *at(point), 3.0)
         for joint in self.gear.joints:
             if joint.point in self.points and not self._home(joint.point):
-                _joint_marker(canvas, *at(joint.point), joint.number, findings[joint.number], faded=True)
-        boxes = self._obstacles(at)
+                _mark(canvas, *markers[joint.number], str(joint.number), shown.mark(joint.number), faded=True)
         for joint in here:
-            clearance = findings[joint.number].clearance_in or 0.0
-            length = clearance * scale * exaggeration
-            x, y = at(joint.point)
-            if joint.number in angles and length > _SHORTEST_ARROW:
-                c, s = math.cos(angles[joint.number]), -math.sin(angles[joint.number])
-                start = (x + _MARKER * c, y + _MARKER * s)
-                end = (start[0] + length * c, start[1] + length * s)
-                _arrow(canvas, start, end)
-                segments.append((start, end))
-                boxes.append(
-                    (min(start[0], end[0]), min(start[1], end[1]), max(start[0], end[0]), max(start[1], end[1]))
-                )
-            _joint_marker(canvas, x, y, joint.number, findings[joint.number])
-        framed = sum(findings[j.number].over_limit for j in here) <= _MOST_FRAMES
-        for joint in sorted(here, key=lambda j: not findings[j.number].over_limit):
-            finding = findings[joint.number]
-            strong = finding.over_limit and framed
-            lines = [_Line(part, 8.5, False) for part in ([joint.name] if strong else _two_lines(joint.name))]
-            if finding.clearance_in is not None:
-                mark = " OVER LIMIT" if strong else " OVER" if finding.over_limit else ""
-                lines.append(_Line(number(finding.clearance_in, 4) + mark, 10.5 if strong else 9.5, True))
-            _callout(canvas, at(joint.point), lines, boxes, segments, strong)
+            arrow = shown.arrow(joint.number, at(joint.point), scale)
+            if arrow is not None:
+                _arrow(canvas, *arrow)
+                segments.append(arrow)
+                boxes.append(_around(*arrow))
+            if markers[joint.number] != at(joint.point):
+                canvas.line(*at(joint.point), *markers[joint.number], colour=SOFT, width=1.2)
+                canvas.marker("circle", *at(joint.point), 2.5)
+                x, y = markers[joint.number]
+                boxes.append((x - 11.0, y - 11.0, x + 11.0, y + 11.0))
+            _mark(canvas, *markers[joint.number], str(joint.number), shown.mark(joint.number))
+        framed = sum(shown.findings[j.number].over_limit for j in here) <= _MOST_FRAMES
+        for joint in sorted(here, key=lambda j: not shown.findings[j.number].over_limit):
+            strong = framed and shown.findings[joint.number].over_limit
+            lines = shown.label(joint.number, joint.name, strong=strong)
+            _callout(canvas, markers[joint.number], lines, boxes, segments, strong)
         return name, canvas.svg("figure panel"), width
+
+    def _plain_points(self, canvas: Canvas, at: _At) -> None:
+        """Draw supports, and points that are no joint."""
+        numbered = {j.point for j in self.gear.joints if j.point in self.points}
+        for point in self.points:
+            if point not in self.cut:
+                if self.mechanism.point(point).fixed:
+                    _ground(canvas, *at(point))
+                if point not in numbered:
+                    canvas.marker("circle", *at(point), 3.0)
+
+    def _apart(self, at: _At) -> dict[int, Place]:
+        """Places of the joints' markers: at the joints, or beside them where two would overlap."""
+        places = {j.number: at(j.point) for j in self.gear.joints if j.point in self.points}
+        least = 2.0 * _MARKER + 2.0
+        for _ in range(30):
+            moved = False
+            for one, other in combinations(sorted(places), 2):
+                (x0, y0), (x1, y1) = places[one], places[other]
+                away = math.hypot(x1 - x0, y1 - y0)
+                if away < least - 1e-6:
+                    ux, uy = _unit((x0, y0), (x1, y1)) if away > 1e-6 else (1.0, 0.0)
+                    push = (least - away) / 2
+                    places[one] = (x0 - push * ux, y0 - push * uy)
+                    places[other] = (x1 + push * ux, y1 + push * uy)
+                    moved = True
+            if not moved:
+                break
+        return places
 
     def _obstacles(self, at: _At) -> list[Box]:
         """Boxes of what labels must not cover: markers, supports, the slot, actuator and plunger with their names."""
@@ -216,8 +259,10 @@ class _PlaneDrawing:
         for point in self.points:
             x, y = at(point)
             fixed = self.mechanism.point(point).fixed and point not in self.cut
-            reach = 24.0 if point in pins or fixed else _MARKER
-            boxes.append((x - 13.0 if fixed else x - 11.0, y - 11.0, x + 13.0 if fixed else x + 11.0, y + reach))
+            reach = 27.0 if point in pins or fixed else _MARKER
+            half = 15.0 if fixed else 11.0
+            # A support hidden by a label would be missed most: it counts three times.
+            boxes += [(x - half, y - 11.0, x + half, y + reach)] * (3 if fixed else 1)
         for step in self.steps:
             x, y = at(step.joint)
             if isinstance(step, Slider):
@@ -273,10 +318,8 @@ class _PlaneDrawing:
         return any(isinstance(s, Lever) and s.pivot == pivot and joint in (s.follows, s.joint) for s in self.steps)
 
 
-def _state(finding: JointFinding) -> str:
-    if finding.clearance_in is None:
-        return "not measured"
-    return f"{inches(finding.clearance_in)}{' over its limit' if finding.over_limit else ''}"
+def _around(a: Place, b: Place) -> Box:
+    return min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]), max(a[1], b[1])
 
 
 def _bar(canvas: Canvas, a: Place, b: Place) -> None:
@@ -301,19 +344,11 @@ def _actuator(canvas: Canvas, far: Place, joint: Place) -> None:
         x, y = far[0] + 3 * k * ux, far[1] + 3 * k * uy
         canvas.line(x - 10 * uy - 3 * ux, y + 10 * ux - 3 * uy, x + 10 * uy + 3 * ux, y - 10 * ux + 3 * uy)
     outside = -1.0 if neck[0] < canvas.width / 2 else 1.0
-    canvas.text(
-        neck[0] + 12 * outside,
-        neck[1] + 16,
-        "actuator",
-        size=9,
-        bold=True,
-        colour=SOFT,
-        anchor="end" if outside < 0 else "start",
-    )
+    anchor: Anchor = "end" if outside < 0 else "start"
+    canvas.text(neck[0] + 12 * outside, neck[1] + 16, "actuator", size=9, bold=True, colour=SOFT, anchor=anchor)
 
 
 def _slot(canvas: Canvas, pivot: Place, pin: Place) -> None:
-    """A radial slot around the pin."""
     ux, uy = _unit(pivot, pin)
     a, b = (pin[0] - 13 * ux, pin[1] - 13 * uy), (pin[0] + 9 * ux, pin[1] + 9 * uy)
     canvas.line(*a, *b, width=25, cap="round", colour=INK)
@@ -339,10 +374,6 @@ def _ground(canvas: Canvas, x: float, y: float) -> None:
         canvas.line(x + 5 * k + 1, y + 19, x + 5 * k - 3, y + 24)
 
 
-def _joint_marker(canvas: Canvas, x: float, y: float, joint: int, finding: JointFinding, faded: bool = False) -> None:
-    _mark(canvas, x, y, str(joint), joint_state(finding), faded)
-
-
 def joint_state(finding: JointFinding) -> JointState:
     """Return whether a joint is over its limit, within it, or not measured."""
     if finding.clearance_in is None:
@@ -350,44 +381,23 @@ def joint_state(finding: JointFinding) -> JointState:
     return "over" if finding.over_limit else "fine"
 
 
-def _mark(canvas: Canvas, x: float, y: float, text: str, state: str, faded: bool) -> None:
+def _mark(canvas: Canvas, x: float, y: float, text: str, state: str, faded: bool = False) -> None:
     size = _MARKER
     if state == "over":
         canvas.rectangle(x - size, y - size, 2 * size, 2 * size, fill=SOFT if faded else INK, edge=PAPER)
         canvas.text(x, y + 4, text, bold=True, colour=PAPER, anchor="middle")
         return
-    missing = state == "missing"
-    canvas.add(
-        "circle",
-        cx=float(x),
-        cy=float(y),
-        r=size,
-        fill=PAPER,
-        stroke=SOFT if missing or faded else INK,
-        stroke_width=1.3 if missing or faded else 2.2,
-        stroke_dasharray="3 2.2" if missing else None,
-    )
-    canvas.text(x, y + 4, text, bold=not missing, colour=SOFT if missing or faded else INK, anchor="middle")
+    missing, pale = state == "missing", state == "missing" or faded
+    colour, dash = SOFT if pale else INK, "3 2.2" if missing else None
+    outline: dict[str, Any] = {"stroke": colour, "stroke_width": 1.3 if pale else 2.2, "stroke_dasharray": dash}
+    canvas.add("circle", cx=x, cy=y, r=size, fill=PAPER, **outline)
+    canvas.text(x, y + 4, text, bold=not missing, colour=colour, anchor="middle")
 
 
 def joint_mark(text: str, state: JointState) -> Markup:
-    """Draw the mark of a joint as the schematic has it, for tables and the legend.
-
-    Parameters
-    ----------
-    text : str
-        Number of the joint.
-    state : {'over', 'fine', 'missing'}
-        Over its limit, within it, or not measured.
-
-    Returns
-    -------
-    Markup
-        The mark.
-    """
     words = {"over": "over its limit", "fine": "within its limit", "missing": "not measured"}[state]
     canvas = Canvas(22, 22, f"joint {text}, {words}" if text else words)
-    _mark(canvas, 11, 11, text, state, faded=False)
+    _mark(canvas, 11, 11, text, state)
     return canvas.svg("mark")
 
 
@@ -403,8 +413,6 @@ def _arrow(canvas: Canvas, start: Place, end: Place) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Line:
-    """A line of a label."""
-
     text: str
     size: float
     bold: bool

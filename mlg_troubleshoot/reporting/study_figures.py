@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.figures import INK, PALE, RULE, SOFT, Axis, Bar, Canvas, Plot, Series, draw_bar
-from mlg_troubleshoot.reporting.formats import number
-from mlg_troubleshoot.studies.statements import Outcome
+from mlg_troubleshoot.reporting.formats import Lengths, number
 
 Array = NDArray[np.float64]
 Style = Literal["solid", "mid", "open"]
@@ -24,35 +23,10 @@ _GAP = 7.0
 _TOP = 20.0
 _LABEL_WIDTH = 30.0
 
-OUTCOME_COLOUR = {
-    Outcome.HOLDS: "#1d6b2a",
-    Outcome.READING: "#8a4b00",
-    Outcome.SOME: "#8a4b00",
-    Outcome.FAILS: "#a3131a",
-}
-OUTCOME_SHAPE = {
-    Outcome.HOLDS: "circle with check mark",
-    Outcome.READING: "circle, half filled",
-    Outcome.SOME: "circle, half filled",
-    Outcome.FAILS: "crossed circle",
-}
-
 
 @dataclass(frozen=True, slots=True)
 class BarSeries:
-    """One kind of bar in a chart of groups.
-
-    Parameters
-    ----------
-    label : str
-        Its name in the legend.
-    values : ndarray, shape (n_groups,)
-        Lengths of its bars; NaN draws none. [1]
-    style : {'solid', 'mid', 'open'}
-        Black, grey or outlined.
-    spread : ndarray, shape (n_groups, 2), or None
-        Ends of an interval of each bar. [1]
-    """
+    """One kind of bar in a chart of groups: NaN draws none, a spread is an interval of each bar, shape (n, 2). [1]"""
 
     label: str
     values: Array
@@ -63,29 +37,12 @@ class BarSeries:
 def grouped_bars(
     labels: Sequence[str], series: Sequence[BarSeries], title: str, description: str, width: float = 430.0
 ) -> Markup:
-    """Draw horizontal bars in groups: a group for each label, in it a bar of each series with its value.
-
-    Parameters
-    ----------
-    labels : sequence of str
-        Names of the groups.
-    series : sequence of BarSeries
-        The bars, from top to bottom in each group.
-    title, description : str
-        What the figure is and what it shows.
-    width : float
-        Width. [canvas units]
-
-    Returns
-    -------
-    Markup
-        The figure.
-    """
+    """Draw horizontal bars in groups: a group for each label, in it a bar of each series with its value."""
     row = _BAR_HEIGHT * len(series) + _GAP
     canvas = Canvas(width, _TOP + row * len(labels) + 2, title, description)
     x = _LABEL_WIDTH
     for one in series:
-        draw_bar(canvas, Bar("", 1.0, "", style=one.style), x, 3, 9, 18)
+        draw_bar(canvas, Bar(1.0, style=one.style), x, 3, 9, 18)
         canvas.text(x + 23, 11.5, one.label, size=9.5)
         x += 36 + 5.6 * len(one.label)
     ends = [one.values for one in series] + [one.spread for one in series if one.spread is not None]
@@ -100,33 +57,20 @@ def grouped_bars(
                 continue
             low, high = (None, None) if one.spread is None else (float(v) for v in one.spread[i])
             y = top + _BAR_HEIGHT * k
-            bar = Bar("", max(value, 0.0), "", low, high, one.style)
+            bar = Bar(max(value, 0.0), low, high, one.style)
             end = draw_bar(canvas, bar, _LABEL_WIDTH, y + 0.5, _BAR_HEIGHT - 1.5, per_value)
             canvas.text(end + 4, y + 7.2, number(value, 4), size=8)
     canvas.line(_LABEL_WIDTH, _TOP - 2, _LABEL_WIDTH, canvas.height, colour=SOFT)
     return canvas.svg()
 
 
-def release_curve(gear: Gear, width: float = 430.0, height: float = 262.0) -> Markup:
-    """Draw the plunger over the release of the Down Lock (Fig. 12), on the reference and on the other linkages.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    width, height : float
-        Size. [canvas units]
-
-    Returns
-    -------
-    Markup
-        The figure.
-    """
+def release_curve(gear: Gear, lengths: Lengths, width: float = 430.0, height: float = 262.0) -> Markup:
+    """Draw the plunger over the release of the Down Lock (Fig. 12), on the reference and on the other linkages."""
     share = np.linspace(0.0, 1.0, _POINTS)
     curves = []
     for model in gear.ensemble_models:
         start, end = model.stroke
-        curves.append(model.plunger(start + share * (end - start)))
+        curves.append(model.plunger(start + share * (end - start)) * lengths.unit.per_inch)
     x = tuple(share.tolist())
     others = [Series("other linkages", x, tuple(c.tolist()), colour=RULE, width=1.0) for c in curves[1:]]
     reference = Series(f"linkage {gear.reference.name}", x, tuple(curves[0].tolist()), width=2.4)
@@ -137,48 +81,21 @@ def release_curve(gear: Gear, width: float = 430.0, height: float = 262.0) -> Ma
         "Plunger position against the share of the release stroke, on the reference linkage and on the others; "
         "the margin around mid-position is marked",
     )
-    mid, margin = float(curves[0][-1]), gear.margin.value
+    mid, margin = float(curves[0][-1]), gear.margin.value * lengths.unit.per_inch
     values = [float(v) for curve in curves for v in (curve.min(), curve.max())]
     plot = Plot(
         canvas,
-        Axis("share of the release stroke", 0.0, 1.13),
-        Axis.around("plunger position, in", [*values, mid + margin], 0.05),
+        Axis("share of the release stroke", 0.0, 1.16),
+        Axis.around(f"plunger position, {lengths.unit}", [*values, mid + margin], 0.05),
+        top=22,
     )
     plot.draw_axes()
     for one in (*others, reference):
-        plot.draw(one, joined=True)
+        plot.draw(one)
     px, high = plot.at(1.0, mid + margin)
     _, low = plot.at(1.0, mid - margin)
     canvas.rectangle(px, high, 7, low - high, fill=PALE, edge=INK, edge_width=1.2)
-    for i, text in enumerate(("margin", f"±{number(margin, 3)}")):
+    for i, text in enumerate(("margin", f"±{lengths.bare(gear.margin.value)}")):
         canvas.text(px + 11, (high + low) / 2 + 1 + 10 * i, text, size=9)
-    legend = [reference, others[0]] if others else [reference]
-    plot.draw_legend(legend, plot.area[0] + 12, plot.area[1] + 10, joined=True)
+    plot.draw_legend([reference, others[0]] if others else [reference], plot.area[0], 8)
     return canvas.svg()
-
-
-def outcome_sign(outcome: Outcome) -> Markup:
-    """Draw the shape that goes with what became of a statement.
-
-    Parameters
-    ----------
-    outcome : Outcome
-        What became of it.
-
-    Returns
-    -------
-    Markup
-        The sign.
-    """
-    canvas = Canvas(60, 60, f"Sign: {OUTCOME_SHAPE[outcome]}")
-    colour = OUTCOME_COLOUR[outcome]
-    canvas.add("circle", cx=30.0, cy=30.0, r=26.0, fill="#ffffff", stroke=colour, stroke_width=5.0)
-    match outcome:
-        case Outcome.HOLDS:
-            canvas.polyline([(17, 31), (26, 41), (44, 19)], colour=colour, width=6.0)
-        case Outcome.READING | Outcome.SOME:
-            canvas.add("path", d="M 30 4 A 26 26 0 0 0 30 56 Z", fill=colour)
-        case Outcome.FAILS:
-            canvas.line(12, 12, 48, 48, colour=colour, width=5)
-            canvas.line(12, 48, 48, 12, colour=colour, width=5)
-    return canvas.svg("mark")

@@ -32,22 +32,13 @@ _STEP_IN = 1e-5
 class Amplification:
     """Stage-wise and plunger amplification indices of one linkage.
 
-    Parameters
-    ----------
-    joints : tuple of int
-        Numbers of the joints.
-    stroke : ndarray, shape (n_strokes,)
-        Actuator extension from Down Lock to mid-position. [in]
-    stage : ndarray, shape (n_joints, n_strokes)
-        Stage-wise index A_i,i+1 over the release. [1]
-    handed_on : ndarray, shape (n_joints, n_strokes)
-        Product of the indices of all later stages, as the chain from the stage's end to the output. [1]
-    onward_of_maxima : ndarray, shape (n_joints,)
-        The same product, each factor at its own maximum over the release. [1]
-    beta : float
-        β of Eq. 9: what follows the last joint, here the calibration rate k. [1]
-    exact : ndarray, shape (n_joints,)
-        Plunger amplification index at mid-position from the exact gradient. [1]
+    stroke, shape (n_strokes,): actuator extension from Down Lock to mid-position. [in]
+    stage, shape (n_joints, n_strokes): stage-wise index A_i,i+1 over the release. [1]
+    handed_on, shape (n_joints, n_strokes): product of the indices of all later stages, as the chain from the
+      stage's end to the output. [1]
+    onward_of_maxima, shape (n_joints,): the same product, each factor at its own maximum over the release. [1]
+    beta: β of Eq. 9: what follows the last joint, here the calibration rate k. [1]
+    exact, shape (n_joints,): plunger amplification index at mid-position from the exact gradient. [1]
     """
 
     joints: tuple[int, ...]
@@ -81,17 +72,9 @@ class Amplification:
     def shares(self, plunger: Array, limits_in: Array) -> Array:
         """Share of each joint in the variance of the linearised displacement: Fig. 13b's index.
 
-        Parameters
-        ----------
-        plunger : ndarray, shape (n_joints,)
-            Plunger amplification indices: local, of maxima, or exact. [1]
-        limits_in : ndarray, shape (n_joints,)
-            Largest clearance of each joint, each uniformly distributed from 0. [in]
-
-        Returns
-        -------
-        ndarray, shape (n_joints,)
-            Shares, 1 in total. [1]
+        plunger, shape (n_joints,): plunger amplification indices: local, of maxima, or exact. [1]
+        limits_in, shape (n_joints,): largest clearance of each joint, each uniformly distributed from 0. [in]
+        Returns, shape (n_joints,): shares, 1 in total. [1]
         """
         squares = (plunger * limits_in) ** 2
         return np.asarray(squares / squares.sum())
@@ -100,19 +83,7 @@ class Amplification:
 def amplification(gear: Gear, model: LinkageModel | None = None, n_strokes: int = STROKES) -> Amplification:
     """Compute the amplification indices of a linkage over its release stroke.
 
-    Parameters
-    ----------
-    gear : Gear
-        The gear, for its joints.
-    model : LinkageModel, optional
-        Another linkage of the same gear, else the reference.
-    n_strokes : int
-        Positions over the release stroke.
-
-    Returns
-    -------
-    Amplification
-        Indices by Eq. 10 over the release, their products by Eq. 9, and the exact gradient.
+    model: another linkage of the same gear, else the reference.
     """
     linkage = gear.model if model is None else model
     chain = _Chain(linkage, {joint.number: joint.point for joint in gear.joints}, n_strokes)
@@ -137,34 +108,14 @@ def amplification(gear: Gear, model: LinkageModel | None = None, n_strokes: int 
 def max_amplification_index(gear: Gear, model: LinkageModel | None = None) -> Array:
     """Largest stage-wise amplification index of each joint over the release (section 4.3).
 
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    model : LinkageModel, optional
-        Another linkage of the same gear, else the reference.
-
-    Returns
-    -------
-    ndarray, shape (n_joints,)
-        Indices: 0.84 and 1.488 for joints 1 and 2 of the shipped gear. [1]
+    model: another linkage of the same gear, else the reference.
+    Returns, shape (n_joints,): indices: 0.84 and 1.488 for joints 1 and 2 of the shipped gear. [1]
     """
     return amplification(gear, model).max_stage
 
 
 def csc(first: Array, second: Array) -> Array:
-    """Cosecant of the angle between two links.
-
-    Parameters
-    ----------
-    first, second : ndarray, shape (..., 2) or (..., 3)
-        Vectors along the links. [in]
-
-    Returns
-    -------
-    ndarray, shape (...)
-        csc θ ≥ 1. [1]
-    """
+    """Cosecant of the angle between two links, at least 1, shape (...). [1]"""
     lengths = np.linalg.norm(first, axis=-1) * np.linalg.norm(second, axis=-1)
     cosine = np.sum(first * second, axis=-1) / lengths
     return np.asarray(1.0 / np.sqrt(1.0 - cosine**2))

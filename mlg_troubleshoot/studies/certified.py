@@ -30,20 +30,10 @@ _MOST_BOXES = 4000
 class CertifiedBound:
     """The largest displacement in one sense, enclosed.
 
-    Parameters
-    ----------
-    sense : float
-        +1 for over-travel, −1 for under-travel. [1]
-    found_in : float
-        Largest displacement found, in this sense: it is reached. [in]
-    bound_in : float
-        No directions and no position give more; infinite if that could not be shown. [in]
-    directions : ndarray, shape (n_joints,)
-        Directions that reach `found_in`. [rad]
-    stroke_in : float
-        Actuator extension where they do. [in]
-    boxes : int
-        Ranges of directions and stroke examined.
+    found_in: largest displacement found, in this sense: it is reached. [in]
+    bound_in: no directions and no position give more; infinite if that could not be shown. [in]
+    stroke_in: actuator extension where they do. [in]
+    boxes: ranges of directions and stroke examined.
     """
 
     sense: float
@@ -69,25 +59,8 @@ def certified_bound(
 ) -> CertifiedBound:
     """Enclose the largest displacement over all directions and the whole release stroke.
 
-    Parameters
-    ----------
-    model : LinkageModel
-        The calibrated linkage.
-    clearance_in : ndarray, shape (n_joints,)
-        Largest clearance of each joint. [in]
-    sense : float
-        +1 for over-travel, −1 for under-travel. [1]
-    gap_in : float
-        Wanted difference of bound and best found. [in]
-    mid_only : bool
-        Only at mid-position, else over the whole stroke.
-    most_boxes : int
-        Boxes to give up after.
-
-    Returns
-    -------
-    CertifiedBound
-        The enclosure; its bound is infinite if the linkage may fail to close somewhere.
+    gap_in: wanted difference of bound and best found. [in]
+    mid_only: only at mid-position, else over the whole stroke.
     """
     search = _Search(model, np.asarray(clearance_in, float), sense, mid_only)
     waiting = search.start()

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from mlg_troubleshoot.studies.indices import Indices, failed_note, interval, without_numbers
-from mlg_troubleshoot.studies.response import Response
+from mlg_troubleshoot.studies.displacement import Response
+from mlg_troubleshoot.studies.indices import Indices, failed_note, without_numbers
 
 Array = NDArray[np.float64]
 
@@ -33,18 +33,9 @@ _CORNER_MISS = 0.1
 class ChaosFit:
     """A polynomial of the unit cube with orthonormal terms.
 
-    Parameters
-    ----------
-    exponents : ndarray of int, shape (n_terms, n)
-        Degrees of each term in each variable, the constant first.
-    coefficients : ndarray, shape (n_terms,)
-        Coefficients. [unit of the response]
-    residual : float
-        Mean square of the held-out residuals over the variance. [1]
-    corner_miss : float
-        Largest residual at corners of the range over the standard deviation. [1]
-    trained_on : int
-        Points of the fit.
+    exponents, shape (n_terms, n): degrees of each term in each variable, the constant first.
+    residual: mean square of the held-out residuals over the variance. [1]
+    corner_miss: largest residual at corners of the range over the standard deviation. [1]
     """
 
     exponents: NDArray[np.int64]
@@ -55,22 +46,10 @@ class ChaosFit:
 
     @property
     def variance(self) -> float:
-        """Variance of the polynomial."""
         return float(np.sum(self.coefficients[1:] ** 2))
 
     def closed(self, group: tuple[int, ...]) -> float:
-        """Closed index of a group: what it explains alone, interactions within it included.
-
-        Parameters
-        ----------
-        group : tuple of int
-            Places of the variables.
-
-        Returns
-        -------
-        float
-            Share of the variance. [1]
-        """
+        """Closed index of a group: what it explains alone, interactions within it included."""
         outside = np.delete(self.exponents, list(group), axis=1).sum(axis=1)
         squares = self.coefficients[1:] ** 2
         return float(squares[outside[1:] == 0].sum() / self.variance)
@@ -78,15 +57,8 @@ class ChaosFit:
     def index_error(self, accuracy_of: Array) -> Array:
         """Error of indices from what the polynomial leaves out.
 
-        Parameters
-        ----------
-        accuracy_of : ndarray, shape (n,)
-            The indices. [1]
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Bound of the omitted share, and twice the effect of its aliasing on the coefficients. [1]
+        Returns, shape (n,): bound of the omitted share, and twice the effect of its aliasing on the coefficients.
+          [1]
         """
         level = np.clip(accuracy_of, self.residual, 1.0)
         free = max(self.trained_on - len(self.coefficients), 1)
@@ -96,30 +68,7 @@ class ChaosFit:
 def chaos_indices(
     response: Response, n: int, rng: Generator, seed: int, accuracy: float = 1e-3, most: int = 2048
 ) -> tuple[Indices, ChaosFit | None]:
-    """Compute indices by polynomial chaos, with as few evaluations as the accuracy needs.
-
-    Parameters
-    ----------
-    response : callable
-        Unit cube, shape (n_points, n), to values, shape (n_points,).
-    n : int
-        Number of variables.
-    rng : Generator
-        Source of the points.
-    seed : int
-        Its seed, for the result.
-    accuracy : float
-        Wanted error of every index. [1]
-    most : int
-        Evaluations to stop at.
-
-    Returns
-    -------
-    indices : Indices
-        The indices, with the note "not smooth" and NaN if the polynomial cannot be trusted.
-    fit : ChaosFit or None
-        The polynomial, if it can be trusted.
-    """
+    """Compute indices by polynomial chaos, with as few evaluations as the accuracy needs."""
     corners = np.concatenate([np.zeros((1, n)), np.ones((1, n)), rng.integers(0, 2, (_CORNERS - 2, n))])
     held = _latin(rng, _HELD_OUT, n)
     checks = np.concatenate([held, corners])
@@ -201,38 +150,13 @@ def _indices(fit: ChaosFit, design: str, seed: int, used: int, mean: float) -> I
     pairs = present[order == 2].astype(float)
     second = pairs.T @ (squares[order == 2][:, None] * pairs) / variance
     np.fill_diagonal(second, 0.0)
-    return Indices(
-        design,
-        seed,
-        first,
-        interval(first, fit.index_error(first)),
-        total,
-        interval(total, fit.index_error(total)),
-        mean,
-        variance,
-        used,
-        0,
-        "",
-        second,
-    )
+    estimates = (first, fit.index_error(first)), (total, fit.index_error(total))
+    return Indices.around(design, seed, *estimates, mean, variance, used, 0, "", second)
 
 
 @lru_cache(maxsize=64)
 def total_degree(n: int, degree: int) -> NDArray[np.int64]:
-    """Exponents of all polynomials up to a total degree, the constant first.
-
-    Parameters
-    ----------
-    n : int
-        Number of variables.
-    degree : int
-        Largest total degree.
-
-    Returns
-    -------
-    ndarray of int, shape (n_terms, n)
-        Exponents. [1]
-    """
+    """Exponents of all polynomials up to a total degree, shape (n_terms, n), the constant first. [1]"""
     rows = []
     for total in range(degree + 1):
         for chosen in combinations_with_replacement(range(n), total):
@@ -246,20 +170,7 @@ def total_degree(n: int, degree: int) -> NDArray[np.int64]:
 
 
 def legendre_terms(unit: Array, exponents: NDArray[np.int64]) -> Array:
-    """Orthonormal Legendre polynomials of the unit cube.
-
-    Parameters
-    ----------
-    unit : ndarray, shape (n_points, n)
-        Points of the unit cube. [1]
-    exponents : ndarray of int, shape (n_terms, n)
-        Degrees of each term.
-
-    Returns
-    -------
-    ndarray, shape (n_points, n_terms)
-        Values of the terms. [1]
-    """
+    """Orthonormal Legendre polynomials at points of the unit cube, shape (n_points, n_terms). [1]"""
     x = 2.0 * unit - 1.0
     degree = int(exponents.max(initial=0))
     count, n = unit.shape

@@ -8,18 +8,7 @@ from numpy.random import Generator
 
 
 def seeded(rng: Generator) -> dict[str, Any]:
-    """Return the keyword that hands a generator to scipy: it was called seed before scipy 1.15.
-
-    Parameters
-    ----------
-    rng : Generator
-        The generator.
-
-    Returns
-    -------
-    dict
-        One keyword argument.
-    """
+    """Return the keyword that hands a generator to scipy: it was called seed before scipy 1.15."""
     from scipy import __version__
 
     recent = tuple(int(part) for part in __version__.split(".")[:2]) >= (1, 15)

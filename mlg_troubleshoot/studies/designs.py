@@ -32,12 +32,9 @@ _FULL = 7
 class Replicated:
     """Levels and points of a replicated design.
 
-    Parameters
-    ----------
-    points : ndarray, shape (n1, n_rows, n)
-        Points of the unit cube, replicate by replicate. [1]
-    places : ndarray of int, shape (n1, n_rows, n)
-        Group of each row for each variable: rows of one group share the variable's value (Fig. 5a). [1]
+    points, shape (n1, n_rows, n): points of the unit cube, replicate by replicate. [1]
+    places, shape (n1, n_rows, n): group of each row for each variable: rows of one group share the variable's value
+      (Fig. 5a). [1]
     """
 
     points: Array
@@ -53,23 +50,10 @@ def central_composite(n: int, count: int | None = None) -> Array:
     on. (With all ten at their limits a joint in mid-range would go with high values of the others, which
     adds 0.004 to every first-order index.)
 
-    Parameters
-    ----------
-    n : int
-        Number of variables, 2 to 10.
-    count : int, optional
-        Points wanted: the corners and 0, n or 2 n axial points; one centre point may be added. Else the
-        corners and n axial points.
-
-    Returns
-    -------
-    ndarray, shape (count, n)
-        Points of the unit cube. [1]
-
-    Raises
-    ------
-    UsageError
-        If there is no such design.
+    count: points wanted: the corners and 0, n or 2 n axial points; one centre point may be added. Else the corners
+      and n axial points.
+    Returns, shape (count, n): points of the unit cube. [1]
+    Raises `UsageError` if there is no such design.
     """
     if not 2 <= n <= max(_FRACTIONS):
         raise UsageError(f"a central composite design in {n} variables", f"It has 2 to {max(_FRACTIONS)}.")
@@ -111,39 +95,14 @@ def _corners(n: int) -> Array:
 def replicated_levels(n: int, n1: int, n2: int, rng: Generator) -> NDArray[np.int64]:
     """Levels of a modified Latin hypercube: every level once in every replicate.
 
-    Parameters
-    ----------
-    n : int
-        Number of variables.
-    n1, n2 : int
-        Replicates, and levels in each.
-    rng : Generator
-        Source of the permutations.
-
-    Returns
-    -------
-    ndarray of int, shape (n1, n2, n)
-        Levels from 0. [1]
+    Returns, shape (n1, n2, n): levels from 0. [1]
     """
     levels = np.tile(np.arange(n2, dtype=np.int64), (n1, n, 1))
     return np.ascontiguousarray(rng.permuted(levels, axis=2).transpose(0, 2, 1))
 
 
 def middle_of_level(levels: NDArray[np.int64], n2: int) -> Array:
-    """Point of the unit interval in the middle of a level.
-
-    Parameters
-    ----------
-    levels : ndarray of int
-        Levels from 0. [1]
-    n2 : int
-        Number of levels.
-
-    Returns
-    -------
-    ndarray
-        Points. [1]
-    """
+    """Point of the unit interval in the middle of a level. [1]"""
     return np.asarray((levels + 0.5) / n2)
 
 
@@ -153,21 +112,7 @@ def first_order_design(n: int, n1: int, n2: int, ccd: Array | None, rng: Generat
     Every replicate holds all composite points. Points that share a joint's clearance are put in its groups
     in an order of their own in every replicate, so that the others vary within a group.
 
-    Parameters
-    ----------
-    n : int
-        Number of variables.
-    n1, n2 : int
-        Replicates, and Latin hypercube levels in each (0 for composite points only).
-    ccd : ndarray, shape (n_ccd, n), or None
-        Composite points added to every replicate. [1]
-    rng : Generator
-        Source of the order.
-
-    Returns
-    -------
-    Replicated
-        Points and groups.
+    ccd, shape (n_ccd, n): composite points added to every replicate. [1]
     """
     levels = replicated_levels(n, n1, n2, rng)
     points, places = middle_of_level(levels, max(n2, 1)), levels

@@ -23,16 +23,8 @@ _FEWEST = 20
 class GivenDataIndices:
     """First-order indices of observed data.
 
-    Parameters
-    ----------
-    first_order : ndarray, shape (n_joints,)
-        Indices; NaN for a joint with fewer than 20 rows or no variation. [1]
-    interval : ndarray, shape (n_joints, 2)
-        95 % intervals by resampling rows. [1]
-    rows : ndarray of int, shape (n_joints,)
-        Rows used for each joint.
-    classes : ndarray of int, shape (n_joints,)
-        Classes of each joint's clearance.
+    first_order, shape (n_joints,): indices; NaN for a joint with fewer than 20 rows or no variation. [1]
+    interval, shape (n_joints, 2): 95 % intervals by resampling rows. [1]
     """
 
     first_order: Array
@@ -46,26 +38,9 @@ def given_data_indices(
 ) -> GivenDataIndices:
     """Estimate first-order indices from inspections.
 
-    Parameters
-    ----------
-    clearance_in : ndarray, shape (n_rows, n_joints)
-        Measured clearances, NaN where not measured. [in]
-    displacement_in : ndarray, shape (n_rows,)
-        Measured plunger displacements, NaN where not measured. [in]
-    rng : Generator
-        Source of the resamples.
-    resamples : int
-        Resamples of the rows for the intervals.
-
-    Returns
-    -------
-    GivenDataIndices
-        The indices.
-
-    Raises
-    ------
-    InconclusiveDataError
-        If fewer than 20 rows have a displacement.
+    clearance_in, shape (n_rows, n_joints): measured clearances, NaN where not measured. [in]
+    displacement_in, shape (n_rows,): measured plunger displacements, NaN where not measured. [in]
+    Raises `InconclusiveDataError` if fewer than 20 rows have a displacement.
     """
     measured = np.isfinite(displacement_in)
     if np.count_nonzero(measured) < _FEWEST:

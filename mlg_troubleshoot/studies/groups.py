@@ -19,14 +19,8 @@ class Shares(Protocol):
 class GroupIndices:
     """Indices of one group of joints.
 
-    Parameters
-    ----------
-    joints : tuple of int
-        Numbers of the joints.
-    closed : float
-        What the group explains alone, interactions within it included. [1]
-    total : float
-        What the group takes part in. [1]
+    closed: what the group explains alone, interactions within it included. [1]
+    total: what the group takes part in. [1]
     """
 
     joints: tuple[int, ...]
@@ -35,43 +29,11 @@ class GroupIndices:
 
 
 def link_groups(gear: Gear) -> tuple[tuple[int, ...], ...]:
-    """Group the joints at both ends of one link: the plunger cannot tell them apart.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-
-    Returns
-    -------
-    tuple of tuple of int
-        Numbers of the joints, group by group; a joint alone is a group.
-    """
-    groups: list[tuple[int, ...]] = []
-    for number in gear.joint_numbers:
-        group = tuple(sorted((number, *gear.alike[number])))
-        if group not in groups:
-            groups.append(group)
-    return tuple(groups)
+    """Group the joints at both ends of one link: the plunger cannot tell them apart."""
+    return tuple(dict.fromkeys(tuple(sorted((number, *gear.alike[number]))) for number in gear.joint_numbers))
 
 
 def group_indices(gear: Gear, shares: Shares, groups: tuple[tuple[int, ...], ...]) -> tuple[GroupIndices, ...]:
-    """Compute indices of groups from a tensor or a polynomial.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    shares : TensorIndices or ChaosFit
-        Where the shares come from.
-    groups : tuple of tuple of int
-        Numbers of the joints, group by group.
-
-    Returns
-    -------
-    tuple of GroupIndices
-        One entry a group.
-    """
     numbers = gear.joint_numbers
     found = []
     for group in groups:

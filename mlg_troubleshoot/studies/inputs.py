@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
-from mlg_troubleshoot.studies.response import Response
+from mlg_troubleshoot.studies.displacement import Response
 
 Array = NDArray[np.float64]
 
@@ -36,17 +36,10 @@ DISTRIBUTIONS = tuple(_QUANTILES)
 class Inputs:
     """Independent clearances on [0, limit], all of one kind of distribution.
 
-    Parameters
-    ----------
-    limits_in : ndarray, shape (n_joints,)
-        Upper ends. [in]
-    distribution : str
-        uniform (the paper's), falling or rising (triangular, most likely at 0 or at the limit), half-normal.
-
-    Raises
-    ------
-    UsageError
-        If the distribution is unknown or a limit is not a positive number.
+    limits_in, shape (n_joints,): upper ends. [in]
+    distribution: uniform (the paper's), falling or rising (triangular, most likely at 0 or at the limit), half-
+      normal.
+    Raises `UsageError` if the distribution is unknown or a limit is not a positive number.
     """
 
     limits_in: Array
@@ -64,34 +57,10 @@ class Inputs:
         object.__setattr__(self, "limits_in", limits)
 
     def at(self, unit: Array) -> Array:
-        """Clearances at points of the unit cube.
-
-        Parameters
-        ----------
-        unit : ndarray, shape (n, n_joints)
-            Probabilities. [1]
-
-        Returns
-        -------
-        ndarray, shape (n, n_joints)
-            Clearances. [in]
-        """
+        """Clearances at probabilities, points of the unit cube, shape (n, n_joints). [in]"""
         return np.asarray(_QUANTILES[self.distribution](unit) * self.limits_in)
 
     def on_unit_cube(self, response: Response) -> Response:
-        """Return the response as a function of the unit cube.
-
-        Parameters
-        ----------
-        response : callable
-            Clearances, shape (n, n_joints), to values, shape (n,).
-
-        Returns
-        -------
-        callable
-            Probabilities, shape (n, n_joints), to values, shape (n,).
-        """
-
         def on_cube(unit: Array) -> Array:
             return response(self.at(unit))
 
@@ -99,21 +68,7 @@ class Inputs:
 
 
 def with_random_directions(model: LinkageModel, inputs: Inputs) -> Response:
-    """Displacement when every clearance takes a uniformly random direction (as Zhu and Ting do).
-
-    Parameters
-    ----------
-    model : LinkageModel
-        The calibrated linkage.
-    inputs : Inputs
-        Distributions of the clearances.
-
-    Returns
-    -------
-    callable
-        Unit cube, shape (n, 2 × n_joints): probabilities of the clearances, then directions in turns;
-        to the signed displacement, shape (n,). [in]
-    """
+    """Displacement when every clearance takes a uniformly random direction (as Zhu and Ting do)."""
     n = len(inputs.limits_in)
 
     def on_cube(unit: Array) -> Array:
@@ -123,36 +78,12 @@ def with_random_directions(model: LinkageModel, inputs: Inputs) -> Response:
 
 
 def joint_groups(n_joints: int) -> tuple[tuple[int, ...], ...]:
-    """Group each joint's clearance with its direction, for :func:`with_random_directions`.
-
-    Parameters
-    ----------
-    n_joints : int
-        Number of joints.
-
-    Returns
-    -------
-    tuple of tuple of int
-        Places of the variables of each joint.
-    """
+    """Group each joint's clearance with its direction, for :func:`with_random_directions`."""
     return tuple((j, n_joints + j) for j in range(n_joints))
 
 
 def beyond_margin(response: Response, margin_in: float) -> Response:
-    """Turn a displacement into 1 where it exceeds the margin or the linkage does not close, else 0.
-
-    Parameters
-    ----------
-    response : callable
-        Any variables to displacements. [in]
-    margin_in : float
-        Allowed displacement. [in]
-
-    Returns
-    -------
-    callable
-        The same variables to 0 or 1.
-    """
+    """Turn a displacement into 1 where it exceeds the margin or the linkage does not close, else 0."""
 
     def exceeds(variables: Array) -> Array:
         return np.asarray(~(np.abs(response(variables)) <= margin_in), dtype=float)

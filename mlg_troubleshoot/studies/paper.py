@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.studies.designs import central_composite, first_order_design
-from mlg_troubleshoot.studies.response import Response
+from mlg_troubleshoot.studies.displacement import Response
 
 Array = NDArray[np.float64]
 
@@ -24,16 +24,9 @@ Array = NDArray[np.float64]
 class PaperDesign:
     """A replicated design of section 4.3.
 
-    Parameters
-    ----------
-    name : str
-        lhs, lhs+ccd or ccd.
-    n1 : int
-        Repetitions at each level.
-    n2 : int
-        Latin hypercube levels.
-    n_ccd : int
-        Composite points.
+    n1: repetitions at each level.
+    n2: latin hypercube levels.
+    n_ccd: composite points.
     """
 
     name: str
@@ -54,20 +47,9 @@ ITERATIONS = 10
 class ReplicatedIndices:
     """First-order indices of a replicated design, averaged over iterations.
 
-    Parameters
-    ----------
-    design : PaperDesign
-        The design.
-    seed : int
-        Its seed.
-    plain, corrected : ndarray, shape (n,)
-        Mean index over the iterations, as the paper has it and freed of its bias. [1]
-    scatter : ndarray, shape (n,)
-        Standard deviation of one iteration's index. [1]
-    iterations : int
-        Iterations that were completed.
-    evaluations, failed : int
-        Solutions of the linkage, and those that did not close: one makes its iteration NaN.
+    plain, corrected, shape (n,): mean index over the iterations, as the paper has it and freed of its bias. [1]
+    scatter, shape (n,): standard deviation of one iteration's index. [1]
+    evaluations, failed: solutions of the linkage, and those that did not close: one makes its iteration NaN.
     """
 
     design: PaperDesign
@@ -88,17 +70,7 @@ class ReplicatedIndices:
 def bias_corrected(plain: Array, n1: int) -> Array:
     """Free a plain replicated-design index of its bias (1 − S)/n1.
 
-    Parameters
-    ----------
-    plain : ndarray
-        Variance of group means over the whole variance. [1]
-    n1 : int
-        Samples in a group.
-
-    Returns
-    -------
-    ndarray
-        Corrected index. [1]
+    n1: samples in a group.
     """
     return np.asarray((plain - 1.0 / n1) / (1.0 - 1.0 / n1))
 
@@ -113,31 +85,10 @@ def replicated_first_order(
 ) -> ReplicatedIndices:
     """Estimate first-order indices (Eq. 1) with a replicated design.
 
-    Parameters
-    ----------
-    response : callable
-        Unit cube, shape (n_points, n), to values, shape (n_points,).
-    n : int
-        Number of variables.
-    design : PaperDesign
-        The design.
-    seed : int
-        Seed; every iteration has a stream of its own.
-    iterations : int
-        Iterations to average.
-    progress : callable, optional
-        Called with the iterations done and their number; a KeyboardInterrupt in it ends the study with
-        what is done.
-
-    Returns
-    -------
-    ReplicatedIndices
-        The indices.
-
-    Raises
-    ------
-    UsageError
-        If the design has fewer than two repetitions or no points.
+    response: unit cube, shape (n_points, n), to values, shape (n_points,).
+    progress: called with the iterations done and their number; a KeyboardInterrupt in it ends the study with what
+      is done.
+    Raises `UsageError` if the design has fewer than two repetitions or no points.
     """
     if design.n1 < 2 or design.n2 + design.n_ccd < 2:
         raise UsageError(

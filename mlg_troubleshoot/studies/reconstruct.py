@@ -9,7 +9,7 @@ the first that meets everything is taken. What the targets leave free is reporte
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from time import monotonic
 
 import numpy as np
@@ -17,8 +17,9 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.errors import InconclusiveDataError, MechanismError, UsageError
+from mlg_troubleshoot.gear.design import DesignSpace
 from mlg_troubleshoot.gear.gear import Gear, Linkage
-from mlg_troubleshoot.geometry.mechanism import Dyad, Mechanism, Slider, Step
+from mlg_troubleshoot.geometry.mechanism import Dyad
 from mlg_troubleshoot.studies.targets import Target
 from mlg_troubleshoot.studies.verification import Facts
 
@@ -30,6 +31,7 @@ _INSIDE = 0.02
 _DECIMALS = 4
 _WAVE = 150
 _POLISHED = 4
+_DAMPINGS = 12
 _SMALL_LENGTH_IN, _LARGE_IN = 0.4, 22.0
 
 
@@ -37,16 +39,8 @@ _SMALL_LENGTH_IN, _LARGE_IN = 0.4, 22.0
 class Met:
     """One target on a reconstructed linkage.
 
-    Parameters
-    ----------
-    target : Target
-        The target.
-    computed : float
-        What the linkage gives. [the target's unit]
-    holds : bool
-        True if it is accepted.
-    binds : bool
-        True if it determines the linkage: a printed value, or a limit that the linkage lies at.
+    holds: true if it is accepted.
+    binds: true if it determines the linkage: a printed value, or a limit that the linkage lies at.
     """
 
     target: Target
@@ -59,22 +53,10 @@ class Met:
 class Reconstruction:
     """A linkage that was searched for.
 
-    Parameters
-    ----------
-    linkage : Linkage
-        The linkage, its coordinates rounded to 1e-4 in.
-    met : tuple of Met
-        Every target with its number.
-    numbers : int
-        Free numbers of the linkage: coordinates, angles, stroke.
-    determined : int
-        Directions in the space of these numbers that the binding targets determine.
-    loosest : tuple of tuple of (str, float)
-        Numbers that can change most while every target stays met to first order, with their part. [1]
-    evaluations : int
-        Linkages that were tried.
-    seed : int
-        Seed of the search.
+    linkage: the linkage, its coordinates rounded to 1e-4 in.
+    numbers: free numbers of the linkage: coordinates, angles, stroke.
+    determined: directions in the space of these numbers that the binding targets determine.
+    loosest: numbers that can change most while every target stays met to first order, with their part. [1]
     """
 
     linkage: Linkage
@@ -87,7 +69,6 @@ class Reconstruction:
 
     @property
     def meets_all(self) -> bool:
-        """True if every target is met."""
         return all(each.holds for each in self.met)
 
 
@@ -100,37 +81,7 @@ def reconstruct(
     minutes: float = 15.0,
     told: Told | None = None,
 ) -> Reconstruction:
-    """Search a linkage of the gear's topology that meets targets.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear: topology, joints, limits, calibration.
-    targets : tuple of Target
-        Printed numbers; those with ``search`` count.
-    rng : Generator
-        Source of random linkages.
-    seed : int
-        Its seed, for the result.
-    start : Linkage, optional
-        A linkage to polish, else random ones.
-    minutes : float
-        Time to give up after.
-    told : callable, optional
-        Called with the stage, linkages tried and None.
-
-    Returns
-    -------
-    Reconstruction
-        The best linkage found; it may not meet everything if it was polished from a start.
-
-    Raises
-    ------
-    UsageError
-        If no target is to be searched.
-    InconclusiveDataError
-        If no random linkage met the targets in time.
-    """
+    """Search a linkage of the gear's topology that meets targets."""
     wanted = tuple(target for target in targets if target.search)
     if not wanted:
         raise UsageError("no target has search = true", "Mark the numbers that a linkage must meet.")
@@ -138,7 +89,7 @@ def reconstruct(
     if start is not None:
         return search.report(search.polished(search.space.vector(start), 60), seed)
     while monotonic() < search.until:
-        drawn = [search.space.random(rng) for _ in range(_WAVE)]
+        drawn = [random_vector(search.space, rng) for _ in range(_WAVE)]
         order = np.argsort([search.loss(vector) for vector in drawn])
         for place in order[:_POLISHED]:
             found = search.polished(drawn[int(place)], 45)
@@ -154,84 +105,22 @@ def reconstruct(
     )
 
 
-class _Space:
-    """The free numbers of a mechanism as one vector."""
-
-    def __init__(self, gear: Gear) -> None:
-        self.gear = gear
-        mechanism = gear.reference.mechanism
-        # One pivot stays: moving everything together changes nothing.
-        held = next((p.name for p in mechanism.points if p.fixed and p.virtual_link is not None), "")
-        self.points = tuple(p.name for p in mechanism.points if p.name != held)
-        self.planes = tuple(p.name for p in mechanism.planes if p.parent is not None)
-        self.sliders = tuple(s.joint for s in mechanism.steps if isinstance(s, Slider))
-        self.names = (
-            *(f"{p}.{axis}" for p in self.points for axis in "xy"),
-            *(f"{p}.{angle}" for p in self.planes for angle in ("hinge direction", "dihedral")),
-            *(f"axis of {s}" for s in self.sliders),
-            "stroke",
-        )
-
-    def vector(self, linkage: Linkage) -> Array:
-        m = linkage.mechanism
-        values = [v for name in self.points for v in (m.point(name).x, m.point(name).y)]
-        values += [v for p in m.planes if p.parent is not None for v in (p.hinge_direction, p.dihedral)]
-        values += [s.axis for s in m.steps if isinstance(s, Slider)]
-        return np.array([*values, linkage.stroke[1] - linkage.stroke[0]])
-
-    def random(self, rng: Generator) -> Array:
-        reach = 7.0
-        values = rng.uniform(-reach, reach, 2 * len(self.points))
-        angles = [v for _ in self.planes for v in (rng.uniform(-np.pi, np.pi), rng.uniform(0.0, 1.0))]
-        axes = rng.uniform(-np.pi, np.pi, len(self.sliders))
-        vector = np.array([*values, *angles, *axes, rng.uniform(0.5, 1.1)])
-        # The actuator's far end is remote.
-        driven = next((s for s in self.gear.reference.mechanism.steps if isinstance(s, Dyad) and s.driven), None)
-        if driven is not None and driven.upstream in self.points:
-            i = 2 * self.points.index(driven.upstream)
-            turn, length = rng.uniform(-np.pi, np.pi), rng.uniform(10.0, 18.0)
-            vector[i : i + 2] = length * np.cos(turn), length * np.sin(turn)
-        return vector
-
-    def linkage(self, vector: Array, name: str = "N") -> Linkage:
-        given = self.gear.reference
-        low = given.stroke[0]
-        values = iter(vector.tolist())
-        places = {p: (next(values), next(values)) for p in self.points}
-        turned = {p: (next(values), next(values)) for p in self.planes}
-        axes = {s: next(values) for s in self.sliders}
-        stroke = next(values)
-        points = tuple(
-            replace(p, x=places[p.name][0], y=places[p.name][1]) if p.name in places else p
-            for p in given.mechanism.points
-        )
-        planes = tuple(
-            replace(p, hinge_direction=turned[p.name][0], dihedral=turned[p.name][1]) if p.name in turned else p
-            for p in given.mechanism.planes
-        )
-        steps = tuple(replace(s, axis=axes[s.joint]) if isinstance(s, Slider) else s for s in given.mechanism.steps)
-        mechanism = Mechanism(planes, points, steps, given.mechanism.output, low + stroke)
-        return Linkage(name, _signed(mechanism), (low, low + stroke))
-
-
-def _signed(mechanism: Mechanism) -> Mechanism:
-    """Set every branch sign as the coordinates have it."""
-    steps: list[Step] = []
-    for step in mechanism.steps:
-        if isinstance(step, Dyad):
-            _, axes = mechanism.frame(mechanism.point(step.joint).plane)
-            start = mechanism.reference_in_space(step.upstream)
-            base = axes[:2] @ (mechanism.reference_in_space(step.downstream) - start)
-            arm = axes[:2] @ (mechanism.reference_in_space(step.joint) - start)
-            steps.append(replace(step, sign=1.0 if base[0] * arm[1] - base[1] * arm[0] >= 0.0 else -1.0))
-        elif isinstance(step, Slider):
-            _, axes = mechanism.frame(mechanism.point(step.joint).plane)
-            link = axes[:2] @ (mechanism.reference_in_space(step.joint) - mechanism.reference_in_space(step.upstream))
-            ahead = link @ np.array([np.cos(step.axis), np.sin(step.axis)])
-            steps.append(replace(step, sign=1.0 if ahead >= 0.0 else -1.0))
-        else:
-            steps.append(step)
-    return replace(mechanism, steps=tuple(steps))
+def random_vector(space: DesignSpace, rng: Generator) -> Array:
+    """A linkage as nobody would build it, to start a search from: its driven link's far end is remote."""
+    vector = rng.uniform(-7.0, 7.0, len(space.names))
+    for i, name in enumerate(space.names):
+        if name.endswith((".direction", ".axis")):
+            vector[i] = rng.uniform(-np.pi, np.pi)
+        elif name.endswith(".dihedral"):
+            vector[i] = rng.uniform(0.0, 1.0)
+        elif name == "extension":
+            vector[i] = rng.uniform(0.5, 1.1)
+    driven = next((s for s in space.mechanism.steps if isinstance(s, Dyad) and s.driven), None)
+    if driven is not None and f"{driven.upstream}.x" in space.names:
+        i = space.names.index(f"{driven.upstream}.x")
+        turn, length = rng.uniform(-np.pi, np.pi), rng.uniform(10.0, 18.0)
+        vector[i : i + 2] = length * np.cos(turn), length * np.sin(turn)
+    return vector
 
 
 class _Search:
@@ -240,7 +129,7 @@ class _Search:
     def __init__(self, gear: Gear, targets: tuple[Target, ...], until: float, told: Told | None) -> None:
         self.gear = gear
         self.targets = targets
-        self.space = _Space(gear)
+        self.space = DesignSpace(gear.reference)
         self.until = until
         self.told = told
         self.tried = 0
@@ -293,7 +182,7 @@ class _Search:
                 break
             slopes = self._slopes(vector, value)
             improved = False
-            for _ in range(6):
+            for _ in range(_DAMPINGS):
                 gram = slopes.T @ slopes
                 step = -np.linalg.solve(gram + damping * np.eye(len(vector)), slopes.T @ value)
                 step *= min(1.0, 1.5 / float(np.abs(step).max()))
@@ -364,38 +253,3 @@ def _binds(target: Target, computed: float) -> bool:
         return True
     bound = target.low if np.isfinite(target.low) else target.high
     return abs(computed - bound) <= 2.5 * _INSIDE * max(abs(bound), 0.05)
-
-
-def member_toml(linkage: Linkage, name: str) -> str:
-    """Write a linkage as a member of an ensemble file.
-
-    Parameters
-    ----------
-    linkage : Linkage
-        The linkage.
-    name : str
-        Its name in the ensemble.
-
-    Returns
-    -------
-    str
-        A ``[members.NAME]`` table, to be appended to the gear's ensemble file.
-    """
-    m = linkage.mechanism
-    lines = [f"[members.{name}]", f"range = [{linkage.stroke[0]!r}, {linkage.stroke[1]!r}]"]
-    lines.append(f"reference = {m.reference_input!r}")
-    for plane in m.planes:
-        if plane.parent is not None:
-            lines += ["", f"[members.{name}.planes.{plane.name}]"]
-            lines.append(f"hinge_direction_deg = {float(np.degrees(plane.hinge_direction))!r}")
-            lines.append(f"dihedral_deg = {float(np.degrees(plane.dihedral))!r}")
-    lines += ["", f"[members.{name}.points]"]
-    lines += [f'"{p.name}" = [{p.x!r}, {p.y!r}]' for p in m.points]
-    lines += ["", f"[members.{name}.steps]"]
-    for step in m.steps:
-        if isinstance(step, Dyad):
-            lines.append(f'"{step.joint}" = {{ sign = {step.sign:+.0f} }}')
-        elif isinstance(step, Slider):
-            axis = float(np.degrees(step.axis))
-            lines.append(f'"{step.joint}" = {{ sign = {step.sign:+.0f}, axis_deg = {axis!r} }}')
-    return "\n".join(lines) + "\n"

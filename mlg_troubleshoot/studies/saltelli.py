@@ -14,8 +14,8 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.studies.compat import seeded
-from mlg_troubleshoot.studies.indices import Indices, failed_note, interval, student_half, without_numbers
-from mlg_troubleshoot.studies.response import Response
+from mlg_troubleshoot.studies.displacement import Response
+from mlg_troubleshoot.studies.indices import Indices, failed_note, student_half, without_numbers
 
 Array = NDArray[np.float64]
 SCRAMBLES = 8
@@ -23,7 +23,7 @@ _ROWS = 1 << 14
 _FIRST_POWER = 8
 
 
-def saltelli_indices(
+def saltelli_indices(  # noqa: PLR0913 - what is asked, where it stops, what a first attempt by another route hands on
     response: Response,
     n: int,
     rng: Generator,
@@ -35,36 +35,7 @@ def saltelli_indices(
     note: str = "",
     used: int = 0,
 ) -> Indices:
-    """Compute indices with more and more points until every interval is as narrow as wanted.
-
-    Parameters
-    ----------
-    response : callable
-        Unit cube, shape (n_points, n), to values, shape (n_points,).
-    n : int
-        Number of variables.
-    rng : Generator
-        Source of the scrambles.
-    seed : int
-        Its seed, for the result.
-    accuracy : float
-        Wanted half width of every 95 % interval. [1]
-    most : int
-        Evaluations to stop at.
-    groups : tuple of tuple of int, optional
-        Variables that count as one, else each alone; indices are then closed and total ones of groups.
-    progress : callable, optional
-        Called with the evaluations done and the largest half width so far.
-    note : str
-        Put in front of the result's own note.
-    used : int
-        Evaluations spent before, counted in the result.
-
-    Returns
-    -------
-    Indices
-        One entry a group. If `most` was reached first, the note says so.
-    """
+    """Compute indices with more and more points until every interval is as narrow as wanted."""
     sets = tuple((i,) for i in range(n)) if groups is None else groups
     children = rng.spawn(SCRAMBLES)
     power = _FIRST_POWER
@@ -115,8 +86,6 @@ class _Stream:
 
 
 class _Sums:
-    """Running sums of one scramble."""
-
     def __init__(self, n: int) -> None:
         self.count = 0
         self.failed = 0
@@ -161,19 +130,9 @@ def _pooled(sums: list[_Sums], design: str, seed: int, used: int, note: str) -> 
         )
     first = np.array([each.partial / each.count / v for each, v in zip(sums, variance, strict=True)])
     total = np.array([each.total_partial / each.count / v for each, v in zip(sums, variance, strict=True)])
-    return Indices(
-        design,
-        seed,
-        first.mean(axis=0),
-        interval(first.mean(axis=0), student_half(first.std(axis=0, ddof=1), len(sums))),
-        total.mean(axis=0),
-        interval(total.mean(axis=0), student_half(total.std(axis=0, ddof=1), len(sums))),
-        float(moments[:, 0].mean()),
-        float(variance.mean()),
-        used,
-        0,
-        note,
-    )
+    estimates = [(x.mean(axis=0), student_half(x.std(axis=0, ddof=1), len(sums))) for x in (first, total)]
+    mean = float(moments[:, 0].mean())
+    return Indices.around(design, seed, estimates[0], estimates[1], mean, float(variance.mean()), used, 0, note)
 
 
 def fast_indices(
@@ -185,18 +144,7 @@ def fast_indices(
     most: int = 1 << 24,
     progress: Callable[[int, float], None] | None = None,
 ) -> Indices:
-    """Compute indices by polynomial chaos, or by sampling where the response is not smooth.
-
-    Parameters
-    ----------
-    response, n, rng, seed, accuracy, most, progress
-        As for :func:`saltelli_indices`.
-
-    Returns
-    -------
-    Indices
-        The indices; the note says if the fast route was refused, and the evaluations include its own.
-    """
+    """Compute indices by polynomial chaos, or by sampling where the response is not smooth."""
     from mlg_troubleshoot.studies.chaos import chaos_indices
 
     found, fit = chaos_indices(response, n, rng, seed, accuracy, most=min(2048, most))

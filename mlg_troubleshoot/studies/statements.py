@@ -13,8 +13,6 @@ from mlg_troubleshoot.studies.verification import Facts
 
 
 class Outcome(StrEnum):
-    """What became of a statement."""
-
     HOLDS = "holds"
     READING = "holds only under a reading"
     SOME = "holds on some linkages"
@@ -25,16 +23,7 @@ class Outcome(StrEnum):
 class Evidence:
     """One computed number that bears on a statement, on every linkage.
 
-    Parameters
-    ----------
-    quantity, accepted, unit : str
-        What it is, what is accepted and its unit.
-    values : tuple of float
-        The number on each linkage, the reference first. [unit]
-    holds : tuple of bool
-        Where it is accepted.
-    why : str
-        What explains it.
+    values: the number on each linkage, the reference first. [unit]
     """
 
     quantity: str
@@ -49,18 +38,7 @@ class Evidence:
 class Statement:
     """A statement of the source and what the linkages say to it.
 
-    Parameters
-    ----------
-    claim : str
-        The statement, in short.
-    section : str
-        Where it stands.
-    outcome : Outcome
-        What became of it.
-    linkages : tuple of str
-        Names of the linkages, the reference first.
-    evidence : tuple of Evidence
-        The numbers; several if the statement has parts or readings.
+    evidence: the numbers; several if the statement has parts or readings.
     """
 
     claim: str
@@ -85,29 +63,13 @@ class Statement:
 
     @property
     def paragraph(self) -> str:
-        """The statement with its numbers, as a terminal prints it."""
         return f"{self.claim} (section {self.section}): {self.outcome}. {self.numbers}"
 
 
 def check_statements(
     gear: Gear, targets: Path | None = None, progress: Callable[[int, int], None] | None = None
 ) -> tuple[Statement, ...]:
-    """Check every statement of a targets file on the reference and the whole ensemble.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    targets : Path, optional
-        Targets file, else the one beside the gear file.
-    progress : callable, optional
-        Called with the linkages done and their number.
-
-    Returns
-    -------
-    tuple of Statement
-        Statements in the order of the file.
-    """
+    """Check every statement of a targets file on the reference and the whole ensemble."""
     entries = load_targets(targets_file(gear) if targets is None else targets)
     columns: list[list[float]] = []
     for model in gear.ensemble_models:
@@ -123,24 +85,14 @@ def check_statements(
     found = []
     for claim, places in by_claim.items():
         evidence = tuple(_evidence(entries[i], [column[i] for column in columns]) for i in places)
-        readings = {entries[i].reading for i in places}
-        found.append(
-            Statement(
-                claim, entries[places[0]].section, _outcome(evidence, by_reading=len(readings) > 1), names, evidence
-            )
-        )
+        outcome = _outcome(evidence, by_reading=len({entries[i].reading for i in places}) > 1)
+        found.append(Statement(claim, entries[places[0]].section, outcome, names, evidence))
     return tuple(found)
 
 
 def _evidence(target: Target, values: list[float]) -> Evidence:
-    return Evidence(
-        target.quantity,
-        target.tolerance,
-        target.unit,
-        tuple(values),
-        tuple(target.holds(value) for value in values),
-        target.why,
-    )
+    holds = tuple(target.holds(value) for value in values)
+    return Evidence(target.quantity, target.tolerance, target.unit, tuple(values), holds, target.why)
 
 
 def _outcome(evidence: tuple[Evidence, ...], *, by_reading: bool) -> Outcome:

@@ -16,12 +16,12 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.studies.amplification import Amplification, amplification
 from mlg_troubleshoot.studies.chaos import chaos_indices
+from mlg_troubleshoot.studies.displacement import HeldDirections, Response, worst_directions, worst_sense
 from mlg_troubleshoot.studies.groups import GroupIndices, group_indices, link_groups
-from mlg_troubleshoot.studies.indices import Indices, interval, student_half
+from mlg_troubleshoot.studies.index_table import IndexTable, JointIndices, rank_ranges, ranks
+from mlg_troubleshoot.studies.indices import Indices, student_half
 from mlg_troubleshoot.studies.inputs import Inputs, beyond_margin, joint_groups, with_random_directions
-from mlg_troubleshoot.studies.response import HeldDirections, Response, worst_directions, worst_sense
 from mlg_troubleshoot.studies.saltelli import fast_indices, saltelli_indices
-from mlg_troubleshoot.studies.table import IndexTable, JointIndices, rank_ranges, ranks
 from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
 
 if TYPE_CHECKING:
@@ -29,11 +29,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, int, int | None], None]
+Stages = Callable[[str], Callable[[int, int | None], None]]
 
 
 class Design(StrEnum):
-    """How a study chooses its points."""
-
     FAST = "fast"
     SAMPLED = "sampled"
     TENSOR = "tensor"
@@ -43,8 +42,6 @@ class Design(StrEnum):
 
 
 class Directions(StrEnum):
-    """How a study turns the virtual links."""
-
     WORST = "worst"
     OVER = "over"
     UNDER = "under"
@@ -118,20 +115,12 @@ class StudyOptions:
 class StudyResult:
     """What a study found.
 
-    Parameters
-    ----------
-    table : IndexTable
-        Indices of every joint with their spread over the ensemble.
-    indices : Indices
-        The same of the reference, with moments and notes.
-    plain : ndarray, shape (n_joints,), or None
-        First-order indices of a paper design before its bias is removed. [1]
-    groups : tuple of GroupIndices
-        Both ends of each link as one; empty if the design cannot tell.
-    growth : Amplification
-        Amplification indices of the reference.
-    finished : bool
-        False if it was interrupted: the table holds what was done.
+    table: indices of every joint with their spread over the ensemble.
+    indices: the same of the reference, with moments and notes.
+    plain, shape (n_joints,): first-order indices of a paper design before its bias is removed. [1]
+    groups: both ends of each link as one; empty if the design cannot tell.
+    growth: amplification indices of the reference.
+    finished: false if it was interrupted: the table holds what was done.
     """
 
     table: IndexTable
@@ -153,27 +142,7 @@ class _Run:
 
 
 def run_study(gear: Gear, options: StudyOptions, progress: Progress | None = None) -> StudyResult:
-    """Run a study of a gear: its reference by the chosen design, its ensemble by the fast route.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    options : StudyOptions
-        What is asked for.
-    progress : callable, optional
-        Called with the stage's name, what is done and the whole.
-
-    Returns
-    -------
-    StudyResult
-        The result; after Ctrl-C, what was done.
-
-    Raises
-    ------
-    UsageError
-        If the options do not go together.
-    """
+    """Run a study of a gear: its reference by the chosen design, its ensemble by the fast route."""
     if not options.accuracy > 0.0:
         raise UsageError(f"accuracy {options.accuracy}", "Give a positive number, for example 0.001.")
     inputs = Inputs(gear.limits_in if options.limits_in is None else options.limits_in, options.distribution)
@@ -199,7 +168,8 @@ def run_study(gear: Gear, options: StudyOptions, progress: Progress | None = Non
         total.append(found.total_order)
         evaluations, failed = evaluations + found.evaluations, failed + found.failed
     growth = amplification(gear)
-    table = _table(gear, inputs, options, run.indices, growth, np.array(first), np.array(total), evaluations, failed)
+    orders = np.array([first, total])
+    table = _table(gear, inputs, options, run.indices, growth, orders, (evaluations, failed))
     return StudyResult(table, run.indices, run.plain, run.groups, growth, finished)
 
 
@@ -241,9 +211,7 @@ def _on_linkage(gear: Gear, model: LinkageModel, inputs: Inputs, options: StudyO
     return fast_indices(cube, n, _stream(options, k), options.seed, options.accuracy, most)
 
 
-def _reference(
-    gear: Gear, inputs: Inputs, options: StudyOptions, told: Callable[[str], Callable[[int, int | None], None]]
-) -> _Run:
+def _reference(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _Run:
     cube, n = _response(gear, gear.model, inputs, options)
     if options.design in (Design.LHS, Design.LHS_CCD, Design.CCD):
         if options.directions is Directions.RANDOM:
@@ -254,17 +222,8 @@ def _reference(
     if options.directions is Directions.RANDOM:
         sets = joint_groups(len(inputs.limits_in))
         advance = told("samples")
-        found = saltelli_indices(
-            cube,
-            n,
-            _stream(options, 0),
-            options.seed,
-            options.accuracy,
-            options.most,
-            sets,
-            lambda done, _width: advance(done, None),
-        )
-        return _Run(found)
+        sampling = _stream(options, 0), options.seed, options.accuracy, options.most
+        return _Run(saltelli_indices(cube, n, *sampling, sets, lambda done, _width: advance(done, None)))
     if options.design is Design.TENSOR:
         tensor, coarse = tensor_indices(cube, np.ones(n)), tensor_indices(cube, np.ones(n), order=2)
         groups = group_indices(gear, tensor, link_groups(gear))
@@ -277,47 +236,23 @@ def _reference(
         note, extra = indices.note, indices.evaluations
     else:
         note, extra = "", 0
-    sampled = saltelli_indices(
-        cube,
-        n,
-        _stream(options, 0),
-        options.seed,
-        options.accuracy,
-        options.most,
-        None,
-        lambda done, _width: advance(done, None),
-        note,
-        used=extra,
-    )
-    return _Run(sampled)
+    more = _stream(options, 0), options.seed, options.accuracy, options.most
+    return _Run(saltelli_indices(cube, n, *more, None, lambda done, _width: advance(done, None), note, used=extra))
 
 
 def _of_tensor(tensor: TensorIndices, coarse: TensorIndices | None, seed: int) -> Indices:
     wide = np.zeros_like(tensor.first_order)
     first = wide if coarse is None else np.abs(tensor.first_order - coarse.first_order)
     total = wide if coarse is None else np.abs(tensor.total_order - coarse.total_order)
-    return Indices(
-        f"tensor of {len(tensor.weights)} Gauss points a joint",
-        seed,
-        tensor.first_order,
-        interval(tensor.first_order, first),
-        tensor.total_order,
-        interval(tensor.total_order, total),
-        tensor.mean,
-        tensor.variance,
-        tensor.evaluations + (0 if coarse is None else coarse.evaluations),
-        tensor.failed,
-        "intervals are the difference to two Gauss points a joint" if coarse is not None else "",
-    )
+    design = f"tensor of {len(tensor.weights)} Gauss points a joint"
+    note = "intervals are the difference to two Gauss points a joint" if coarse is not None else ""
+    evaluations = tensor.evaluations + (0 if coarse is None else coarse.evaluations)
+    estimates = (tensor.first_order, first), (tensor.total_order, total)
+    moments = tensor.mean, tensor.variance
+    return Indices.around(design, seed, *estimates, *moments, evaluations, tensor.failed, note)
 
 
-def _paper(
-    gear: Gear,
-    cube: Response,
-    inputs: Inputs,
-    options: StudyOptions,
-    told: Callable[[str], Callable[[int, int | None], None]],
-) -> _Run:
+def _paper(gear: Gear, cube: Response, inputs: Inputs, options: StudyOptions, told: Stages) -> _Run:
     """Run the paper's design for the first order and, for ``lhs``, its study of the total order."""
     from mlg_troubleshoot.studies.blocks import block_study, total_order_study
     from mlg_troubleshoot.studies.paper import ITERATIONS, PAPER_DESIGNS, replicated_first_order
@@ -333,7 +268,7 @@ def _paper(
     note = f"first order corrected for the bias (1 - S)/{n1}"
     if options.design is Design.LHS and finished and not options.beyond_margin:
         response = _held(gear.model, inputs, options)
-        study = block_study(response, inputs, gear.geometry_sha256, options.seed, n1, n2, iterations)
+        study = block_study(response, inputs, gear.geometry_sha256, options.seed, (n1, n2, iterations))
         totals = total_order_study(study, options.workers, options.state, options.scheduler, told("total order"))
         total, spread = totals.total_order, student_half(totals.scatter, totals.iterations)
         evaluations, failed = evaluations + totals.evaluations, failed + totals.failed
@@ -343,19 +278,8 @@ def _paper(
     if not finished:
         note += "; interrupted, averages of what was done"
     name = f"{design.name}: n1 = {n1}, n2 = {n2}, nCCD = {design.n_ccd}, mean of {found.iterations} iterations"
-    indices = Indices(
-        name,
-        options.seed,
-        found.corrected,
-        interval(found.corrected, half),
-        total,
-        interval(total, spread),
-        np.nan,
-        np.nan,
-        evaluations,
-        failed,
-        note,
-    )
+    estimates = (found.corrected, half), (total, spread)
+    indices = Indices.around(name, options.seed, *estimates, np.nan, np.nan, evaluations, failed, note)
     return _Run(indices, plain=found.plain, finished=finished)
 
 
@@ -374,22 +298,7 @@ def _sized(paper: PaperDesign, n: int, options: StudyOptions) -> PaperDesign:
 def compare_designs(
     gear: Gear, options: StudyOptions, progress: Progress | None = None
 ) -> tuple[ReplicatedIndices, ...]:
-    """Estimate the first-order indices of the reference with each design of the paper (Fig. 13c).
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    options : StudyOptions
-        Clearances, directions, seed and size; its own design does not matter.
-    progress : callable, optional
-        Called with the stage's name, what is done and the whole.
-
-    Returns
-    -------
-    tuple of ReplicatedIndices
-        One a design: lhs, lhs+ccd, ccd. Empty with random directions, which the paper's designs do not have.
-    """
+    """Estimate the first-order indices of the reference with each design of the paper (Fig. 13c)."""
     from mlg_troubleshoot.studies.paper import ITERATIONS, PAPER_DESIGNS, replicated_first_order
 
     if options.directions is Directions.RANDOM:
@@ -411,11 +320,11 @@ def _table(
     options: StudyOptions,
     reference: Indices,
     growth: Amplification,
-    first: Array,
-    total: Array,
-    evaluations: int,
-    failed: int,
+    orders: Array,
+    counts: tuple[int, int],
 ) -> IndexTable:
+    first, total = orders
+    evaluations, failed = counts
     places, spans = ranks(first[0]), rank_ranges(first)
     joints = []
     for i, joint in enumerate(gear.joints):
@@ -450,23 +359,3 @@ def _table(
 
 def _pair(ends: Array) -> tuple[float, float]:
     return float(ends[0]), float(ends[1])
-
-
-def exact_table(gear: Gear, seed: int = 0) -> IndexTable:
-    """Compute the table of a gear with a tensor of Gauss points, exact to the fifth degree.
-
-    The intervals are the difference to a tensor of two points a joint, which is far wider than the error.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    seed : int
-        Kept in the table; the tensor draws nothing.
-
-    Returns
-    -------
-    IndexTable
-        The table.
-    """
-    return run_study(gear, StudyOptions(design=Design.TENSOR, seed=seed)).table

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.studies.response import Response
+from mlg_troubleshoot.studies.displacement import Response
 
 Array = NDArray[np.float64]
 _MOST_POINTS = 2_000_000
@@ -23,18 +23,7 @@ _ROWS = 1 << 16
 class TensorIndices:
     """First- and total-order indices from a tensor of points.
 
-    Parameters
-    ----------
-    first_order, total_order : ndarray, shape (n,)
-        Indices, fractions of the variance. [1]
-    mean, variance : float
-        Moments of the response. [its unit, its unit squared]
-    evaluations, failed : int
-        Number of points, and of those that gave no number; one failure makes all indices NaN.
-    values : ndarray, shape (m,) * n
-        The response on the tensor.
-    weights : ndarray, shape (m,)
-        Weights along each axis. [1]
+    evaluations, failed: number of points, and of those that gave no number; one failure makes all indices NaN.
     """
 
     first_order: Array
@@ -47,18 +36,7 @@ class TensorIndices:
     weights: Array
 
     def closed(self, group: tuple[int, ...]) -> float:
-        """Share of the variance that a group of variables explains alone, interactions within it included.
-
-        Parameters
-        ----------
-        group : tuple of int
-            Places of the variables.
-
-        Returns
-        -------
-        float
-            Closed index of the group. [1]
-        """
+        """Share of the variance that a group of variables explains alone, interactions within it included."""
         partial = _averaged(self.values, self.weights, set(group))
         return float(_variance(partial, self.weights) / self.variance)
 
@@ -68,26 +46,8 @@ def tensor_indices(
 ) -> TensorIndices:
     """Compute indices of a response to independent uniform variables on [0, limit].
 
-    Parameters
-    ----------
-    response : callable
-        Variables, shape (n_points, n), to values, shape (n_points,).
-    limits : ndarray, shape (n,)
-        Upper end of each variable. [its unit]
-    order : int
-        Gauss points a variable.
-    nodes : tuple of two ndarrays, shape (m,), optional
-        Other points in [0, 1] and their weights, for example the ends of the range.
-
-    Returns
-    -------
-    TensorIndices
-        The indices.
-
-    Raises
-    ------
-    UsageError
-        If the tensor would have more than two million points.
+    nodes, shape (m,): other points in [0, 1] and their weights, for example the ends of the range.
+    Raises `UsageError` if the tensor would have more than two million points.
     """
     n = len(limits)
     if nodes is None:

@@ -15,7 +15,7 @@ from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.studies.amplification import STROKES, Amplification, amplification
-from mlg_troubleshoot.studies.response import HeldDirections, worst_directions
+from mlg_troubleshoot.studies.displacement import HeldDirections, worst_directions
 from mlg_troubleshoot.studies.targets import Target, load_targets, targets_file
 from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
 
@@ -29,26 +29,9 @@ _CORNERS = (np.array([0.0, 1.0]), np.array([0.5, 0.5]))
 class VerifiedNumber:
     """One printed number beside the computed one.
 
-    Parameters
-    ----------
-    quantity : str
-        What it is, in words.
-    section : str
-        Section of the paper.
-    printed : str
-        As the paper prints it.
-    computed : float
-        What the model gives. [unit]
-    unit : str
-        Its unit; empty for a pure number.
-    tolerance : str
-        What is accepted.
-    status : str
-        fitted, calibrated, reproduced or not reproduced, as it turned out.
-    holds : bool
-        True if the computed number is accepted.
-    should_hold : bool
-        False if it is known not to hold.
+    status: fitted, calibrated, reproduced or not reproduced, as it turned out.
+    holds: true if the computed number is accepted.
+    should_hold: false if it is known not to hold.
     """
 
     quantity: str
@@ -63,25 +46,7 @@ class VerifiedNumber:
 
 
 def verify(gear: Gear, targets: Path | None = None) -> tuple[VerifiedNumber, ...]:
-    """Compare every printed number with what the gear's reference linkage gives.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    targets : Path, optional
-        Targets file, else the one beside the gear file.
-
-    Returns
-    -------
-    tuple of VerifiedNumber
-        One entry a target, in the order of the file.
-
-    Raises
-    ------
-    GearFileError
-        If the targets file is missing, not valid or asks for an unknown measure.
-    """
+    """Compare every printed number with what the gear's reference linkage gives."""
     path = targets_file(gear) if targets is None else targets
     facts = Facts(gear, gear.model)
     rows = []
@@ -89,33 +54,16 @@ def verify(gear: Gear, targets: Path | None = None) -> tuple[VerifiedNumber, ...
         computed = facts.measure(target)
         holds = target.holds(computed)
         kind = "reproduced" if target.kind == "not reproduced" else target.kind
-        rows.append(
-            VerifiedNumber(
-                target.quantity,
-                target.section,
-                target.printed,
-                computed,
-                target.unit,
-                target.tolerance,
-                kind if holds else "not reproduced",
-                holds,
-                target.expected,
-            )
-        )
+        printed, accepted = (target.quantity, target.section, target.printed), (target.unit, target.tolerance)
+        status = kind if holds else "not reproduced"
+        rows.append(VerifiedNumber(*printed, computed, *accepted, status, holds, target.expected))
     return tuple(rows)
 
 
 class Facts:
     """What a linkage gives for the measures of a targets file; each is computed once.
 
-    Parameters
-    ----------
-    gear : Gear
-        The gear, for joints, limits and calibration.
-    model : LinkageModel
-        The linkage.
-    quick : bool
-        With fewer positions and points: good to 1e-4, for a search.
+    quick: with fewer positions and points: good to 1e-4, for a search.
     """
 
     def __init__(self, gear: Gear, model: LinkageModel, *, quick: bool = False) -> None:
@@ -125,23 +73,6 @@ class Facts:
         self.limits = np.asarray(gear.limits_in, float)
 
     def measure(self, target: Target) -> float:
-        """Compute the number that a target speaks of.
-
-        Parameters
-        ----------
-        target : Target
-            The target.
-
-        Returns
-        -------
-        float
-            The number. [the target's unit]
-
-        Raises
-        ------
-        GearFileError
-            If the measure or a joint is unknown.
-        """
         if target.measure not in _MEASURES:
             raise GearFileError(
                 f"target {target.quantity!r}: measure {target.measure!r} is not known",
@@ -172,7 +103,6 @@ class Facts:
 
     @cached_property
     def growth(self) -> Amplification:
-        """Amplification indices over the release."""
         return amplification(self.gear, self.model, _QUICK_CURVE if self.quick else STROKES)
 
     @cached_property
@@ -182,36 +112,11 @@ class Facts:
         return stroke, self.model.plunger(stroke)
 
     def of(self, values: Array, joints: tuple[int, ...]) -> Array:
-        """Pick the values of some joints.
-
-        Parameters
-        ----------
-        values : ndarray, shape (n_joints,)
-            A value a joint.
-        joints : tuple of int
-            Numbers of the joints, empty for all.
-
-        Returns
-        -------
-        ndarray
-            Their values.
-        """
+        """Pick the values of some joints; of all if none is named."""
         numbers = self.gear.joint_numbers
         return np.asarray(values[[numbers.index(j) for j in joints or numbers]])
 
     def others(self, joints: tuple[int, ...]) -> tuple[int, ...]:
-        """Return the joints that are not among the given ones.
-
-        Parameters
-        ----------
-        joints : tuple of int
-            Numbers of joints.
-
-        Returns
-        -------
-        tuple of int
-            The other joints of the gear.
-        """
         return tuple(j for j in self.gear.joint_numbers if j not in joints)
 
 
@@ -221,18 +126,6 @@ _REDUCE: dict[str, Callable[[Array], float]] = {"min": np.min, "max": np.max, "s
 def _worst_displacement(facts: Facts, target: Target) -> float:
     clearance = np.array([[target.clearance_in.get(j, 0.0) for j in facts.gear.joint_numbers]])
     return float(worst_case(facts.model, clearance).magnitude_in[0])
-
-
-def _max_index(facts: Facts, target: Target) -> float:
-    return _REDUCE[target.over](facts.of(facts.growth.max_stage, target.joints))
-
-
-def _first_order(facts: Facts, target: Target) -> float:
-    return _REDUCE[target.over](facts.of(facts.indices.first_order, target.joints))
-
-
-def _down_lock(facts: Facts, _: Target) -> float:
-    return float(facts.model.plunger(facts.model.stroke[0]))
 
 
 def _travel(facts: Facts, _: Target) -> float:
@@ -288,20 +181,16 @@ def _interaction_order(facts: Facts, target: Target) -> float:
     return float(facts.of(_interaction(facts), near).min() - facts.of(_interaction(facts), far).max())
 
 
-def _interaction_size(facts: Facts, target: Target) -> float:
-    return float(facts.of(_interaction(facts), target.joints).max())
-
-
 _MEASURES: dict[str, Callable[[Facts, Target], float]] = {
     "worst_displacement": _worst_displacement,
-    "max_amplification_index": _max_index,
-    "first_order": _first_order,
-    "down_lock": _down_lock,
+    "max_amplification_index": lambda f, t: _REDUCE[t.over](f.of(f.growth.max_stage, t.joints)),
+    "first_order": lambda f, t: _REDUCE[t.over](f.of(f.indices.first_order, t.joints)),
+    "down_lock": lambda f, _: float(f.model.plunger(f.model.stroke[0])),
     "travel": _travel,
     "least_curvature": _least_curvature,
     "end_rate": _end_rate,
     "sharpening": _sharpening,
     "amplification_excess": _amplification_excess,
     "interaction_order": _interaction_order,
-    "interaction_size": _interaction_size,
+    "interaction_size": lambda f, t: float(f.of(_interaction(f), t.joints).max()),
 }

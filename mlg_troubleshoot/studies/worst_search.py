@@ -26,20 +26,9 @@ Array = NDArray[np.float64]
 class WorstSearch:
     """The worst displacement of one sense by three routes.
 
-    Parameters
-    ----------
-    sense : float
-        +1 for over-travel, −1 for under-travel. [1]
-    seed : int
-        Seed of the search.
-    sequential_in : float
-        By the paper's rule, joint by joint at mid-position. [in]
-    searched_in : float
-        By differential evolution over all directions and the stroke. [in]
-    evaluations : int
-        Solutions of the linkage that the search took.
-    proved : CertifiedBound
-        What none can exceed.
+    sequential_in: by the paper's rule, joint by joint at mid-position. [in]
+    searched_in: by differential evolution over all directions and the stroke. [in]
+    proved: what none can exceed.
     """
 
     sense: float
@@ -53,28 +42,7 @@ class WorstSearch:
 def search_worst(
     model: LinkageModel, clearance_in: Array, sense: float, rng: Generator, seed: int, generations: int = 300
 ) -> WorstSearch:
-    """Find the worst displacement by the sequential rule, by differential evolution and by proof.
-
-    Parameters
-    ----------
-    model : LinkageModel
-        The calibrated linkage.
-    clearance_in : ndarray, shape (n_joints,)
-        Clearances. [in]
-    sense : float
-        +1 for over-travel, −1 for under-travel. [1]
-    rng : Generator
-        Source of the search.
-    seed : int
-        Its seed, for the result.
-    generations : int
-        Generations of the search.
-
-    Returns
-    -------
-    WorstSearch
-        The three results.
-    """
+    """Find the worst displacement by the sequential rule, by differential evolution and by proof."""
     clearance = np.asarray(clearance_in, float)
     worst = worst_case(model, clearance[None])
     sequential = float((worst.over_in if sense > 0.0 else -worst.under_in)[0])
@@ -100,15 +68,9 @@ def _evolved(
         moved = sense * model.displacement(links, None, points[-1])
         return np.where(np.isfinite(moved), -moved, 1e3)
 
-    options: dict[str, Any] = {
-        "popsize": 12,
-        "maxiter": generations,
-        "tol": 1e-10,
-        "atol": 1e-12,
-        "polish": False,
-        "vectorized": True,
-        "updating": "deferred",
-        **seeded(rng),
-    }
-    found = differential_evolution(lost, bounds, **options)
+    # The population moves as one: a generation is a batch.
+    found = differential_evolution(
+        lost, bounds, popsize=12, maxiter=generations, tol=1e-10, atol=1e-12, polish=False, vectorized=True,
+        updating="deferred", **seeded(rng),
+    )  # fmt: skip
     return -float(found.fun), count

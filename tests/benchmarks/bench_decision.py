@@ -12,7 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -21,18 +21,20 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from mlg_troubleshoot.decision.assess import AssessOptions, assess
+from mlg_troubleshoot.decision import repair
 from mlg_troubleshoot.decision.assessment import RepairSet, Verdict
-from mlg_troubleshoot.decision.explain import explain
+from mlg_troubleshoot.decision.case import Cases, predict_batch
 from mlg_troubleshoot.decision.inspection import Inspection, Side
-from mlg_troubleshoot.decision.measuring import access_of_one_more, outlook, worth_of_readings
+from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.decision.likely_worn import explain
+from mlg_troubleshoot.decision.next_joint import outlook
+from mlg_troubleshoot.decision.plan import minutes_to_measure
 from mlg_troubleshoot.decision.prediction import predict
-from mlg_troubleshoot.decision.repair import repair_sets
-from mlg_troubleshoot.decision.response import responses
-from mlg_troubleshoot.decision.rule import verdict
+from mlg_troubleshoot.decision.second_order import responses
+from mlg_troubleshoot.decision.verdict_rule import verdict
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.studies.table import load_index_table
+from mlg_troubleshoot.studies.index_table import load_index_table
 from mlg_troubleshoot.units import ClearanceConvention
 from tests.benchmarks import worn_gears
 
@@ -40,6 +42,14 @@ Array = NDArray[np.float64]
 
 MARGIN_IN = 0.03
 PAPER_ORDER = (2, 3, 4, 5, 1, 6, 7, 8, 9, 10)
+
+
+def repair_sets(gear: Gear, of: Inspection, margin_in: float = 0.03) -> tuple[RepairSet, ...]:
+    """Repair sets of one gear."""
+    cases = Cases.of(gear, [replace(of, margin_in=margin_in)])
+    upper = predict_batch(cases).upper
+    found = repair.calibrated(cases, repair.search(cases, upper.displacement_in, upper.u_clearances_in))
+    return repair.repair_sets(cases, found, np.array([True]))[0]
 
 
 def show(what: str, found: str, target: str, *, met: bool) -> None:
@@ -198,7 +208,7 @@ def fixed_order(_gear: Gear, _read: Array, measured: NDArray[np.bool_]) -> int:
 def by_worth(gear: Gear, read: Array, measured: NDArray[np.bool_]) -> int:
     """The next joint by what its reading is worth per minute."""
     so_far = inspection({j + 1: float(read[j]) for j in np.flatnonzero(measured)})
-    return worth_of_readings(gear, so_far, MARGIN_IN)[0].joint
+    return outlook(gear, so_far, MARGIN_IN).worth[0].joint
 
 
 def measure(gear: Gear, read: Array, order: Order, stop: str) -> Tally:
@@ -212,7 +222,7 @@ def measure(gear: Gear, read: Array, order: Order, stop: str) -> Tally:
         for row in going:
             joint = order(gear, read[row], measured[row])
             taken = [int(j) + 1 for j in np.flatnonzero(measured[row])]
-            minutes[row] += access_of_one_more(gear, joint, taken)
+            minutes[row] += minutes_to_measure(gear, [joint], frozenset(gear.joint(n).area for n in taken))
             measured[row, joint - 1] = True
         now = _verdicts(gear, read[going], measured[going])
         for row, found in zip(going, now, strict=True):
@@ -329,7 +339,7 @@ def speed() -> None:
     gear = load_gear()
     table = load_index_table(gear)
     rows = {1: 0.002, 2: 0.004, 3: 0.013, 5: 0.007, 6: 0.001}
-    options = AssessOptions(repairs=True, allowances=True, advice=True)
+    options = AssessOptions(advice=True)
     times = []
     for _ in range(4):
         start = time.perf_counter()

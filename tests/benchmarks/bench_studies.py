@@ -29,8 +29,8 @@ from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.geometry.kernel import Kernel, numba_is_installed
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Mechanism, Output, Plane, Point, Slider
 from mlg_troubleshoot.studies.chaos import chaos_indices
+from mlg_troubleshoot.studies.displacement import HeldDirections, worst_directions
 from mlg_troubleshoot.studies.inputs import Inputs
-from mlg_troubleshoot.studies.response import HeldDirections, nominal_response
 from mlg_troubleshoot.studies.tensor import tensor_indices
 
 Array = NDArray[np.float64]
@@ -345,7 +345,8 @@ def main() -> int:
     parser.add_argument("--full", action="store_true", help="also the paper-size total-order study")
     full = parser.parse_args().full
     warnings.simplefilter("ignore")
-    response = nominal_response(load_gear())
+    gear = load_gear()
+    response = worst_directions(gear.model, gear.limits_in)
     lines = paper_study(response) if full else []
     lines = [*forward(response), *indices(response), *lines]
     for line in lines:

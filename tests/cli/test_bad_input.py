@@ -123,23 +123,23 @@ def test_a_problem_is_one_line_of_a_file_however_long_it_is(table: Table) -> Non
 def test_an_invalid_row_carries_no_number(table: Table) -> None:
     found = mlg("check", table(row(side="")), "--json").one
     numbers = {key: value for key, value in found.items() if key.endswith("_in") or key.startswith("probability")}
-    assert len(numbers) == 11
+    assert len(numbers) == 14
     assert set(numbers.values()) == {None}
 
 
 @pytest.mark.parametrize(
     ("value", "said"),
     [
-        ("3=worn", "'worn' is not a length"),
-        ("3=-0.001in", "is negative"),
-        ("3=nan", "'nan' is not a length"),
-        ("3=0,013in", "decimal comma"),
-        ("3=0.33in", "above 0.05 in"),
-        ("3=1/64in", "fraction"),
+        ("3=worn", "for example 0.013 in, 13 thou"),
+        ("3=-0.001in", "less than zero"),
+        ("3=nan", "Enter a number"),
+        ("3=0,013in", "decimal point"),
+        ("3=0.33in", "a clearance from 0 to 0.05 in"),
+        ("3=1/64in", "Fractions"),
         ("3", "is not JOINT=VALUE"),
         ("x=0.001in", "is not JOINT=VALUE"),
         ("11=0.001in", "has no joint 11"),
-        ("3=", "is not a length"),
+        ("3=", "is not JOINT=VALUE"),
     ],
 )
 def test_a_bad_value_on_the_command_line_is_refused_with_its_option(value: str, said: str) -> None:
@@ -152,19 +152,19 @@ def test_a_joint_given_twice_is_refused() -> None:
 
 def test_an_empty_tail_number_is_refused() -> None:
     found = mlg("check", "--tail", " ", "--side", "LH", "--convention", "RADIAL", "--set", "3=0.001in")
-    refused(found, 2, "--tail is empty")
+    refused(found, 2, "--tail", "a tail number (text)")
 
 
 @pytest.mark.parametrize(
     ("option", "value", "said"),
     [
-        ("--side", "LEFT", "LH or RH"),
+        ("--side", "BOTH", "LH or RH"),
         ("--convention", "RADIUS", "RADIAL"),
         ("--unit", "furlong", "in, thou or mm"),
         ("--outcome", "STUCK", "RETRACTED or FAILED"),
-        ("--measured", "0.041", "has no unit"),
-        ("--measured", "4in", "farther than the plunger can go"),
-        ("--margin", "0in", "not above 0"),
+        ("--measured", "0.041", "says the unit"),
+        ("--measured", "4in", "plunger displacement from -0.5 to 0.5 in"),
+        ("--margin", "0in", "a margin above 0"),
         ("--gear", "a380", "there is no gear 'a380'"),
     ],
 )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mlg_troubleshoot import workflows
+from mlg_troubleshoot.workflows import check as task
 from tests.cli.conftest import FAILURE, FLEET, Run, Table, mlg, row
 
 
@@ -92,7 +92,7 @@ def broken(*_arguments: object, **_options: object) -> None:
 
 
 def test_a_defect_of_the_program_exits_70_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(workflows, "check_files", broken)
+    monkeypatch.setattr(task, "check_files", broken)
     found = mlg("check", FAILURE)
     assert (found.code, found.out) == (70, "")
     assert "Internal error: ZeroDivisionError: a defect" in found.err
@@ -100,7 +100,7 @@ def test_a_defect_of_the_program_exits_70_and_says_so(monkeypatch: pytest.Monkey
 
 
 def test_a_defect_shows_its_traceback_when_asked_to(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(workflows, "check_files", broken)
+    monkeypatch.setattr(task, "check_files", broken)
     monkeypatch.setenv("MLG_DEBUG", "1")
     assert "Traceback" in mlg("check", FAILURE).err
 
@@ -110,7 +110,7 @@ def interrupted(*_arguments: object, **_options: object) -> None:
 
 
 def test_an_interrupt_exits_130(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(workflows, "check_files", interrupted)
+    monkeypatch.setattr(task, "check_files", interrupted)
     found = mlg("check", FAILURE)
     assert (found.code, found.err.strip()) == (130, "Interrupted.")
 

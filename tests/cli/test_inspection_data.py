@@ -5,11 +5,7 @@ from __future__ import annotations
 import csv
 import fnmatch
 import re
-from pathlib import Path
 
-import pytest
-
-from tests import readme_examples
 from tests.cli.conftest import DATA, FLEET, Run
 
 NOTE = (DATA / "README.md").read_text(encoding="utf-8")
@@ -24,13 +20,6 @@ def test_every_file_is_named_in_the_note() -> None:
 def test_every_file_that_is_named_in_the_note_exists() -> None:
     named = re.findall(r"`([\w*]+\.\w+)`", NOTE.partition("\n**")[0])
     assert [pattern for pattern in named if not list(DATA.glob(pattern))] == []
-
-
-@pytest.mark.parametrize(
-    "session", [s for _m, s in readme_examples.sessions(NOTE)], ids=lambda session: session.commands[0]
-)
-def test_the_session_of_the_note_is_true(session: readme_examples.Session, tmp_path: Path) -> None:
-    assert readme_examples.run(session.commands, tmp_path).written() == session.written()
 
 
 def fleet_rows() -> list[dict[str, str]]:

@@ -83,11 +83,11 @@ def test_a_header_can_be_mapped(table: Table) -> None:
     assert joints[2]["clearance_in"] == pytest.approx(0.33 / 25.4)
 
 
-def test_repair_sets_of_a_batch_are_computed_on_demand_only(table: Table) -> None:
+def test_every_gear_of_a_batch_has_its_repair_sets(table: Table) -> None:
     path = table(row(clearance_3_in="0.013"), row(record_id="R2"))
-    assert [i["repair_sets"] for i in mlg("check", path, "--json").json["inspections"]] == [None, None]
-    asked = mlg("check", path, "--json", "--repairs").json["inspections"]
-    assert asked[0]["repair_sets"][0]["joints"] == [3]
+    worn, sound = mlg("check", path, "--json").json["inspections"]
+    assert worn["repair_sets"][0]["joints"] == [3]
+    assert sound["repair_sets"] == []
 
 
 def test_the_csv_has_one_line_for_each_row_in_its_order(tmp_path: Path) -> None:

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from mlg_troubleshoot.decision.assess import AssessOptions, assess
 from mlg_troubleshoot.decision.assessment import Assessment
 from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.studies.table import IndexTable
+from mlg_troubleshoot.studies.index_table import IndexTable
 from mlg_troubleshoot.units import ClearanceConvention
 
 Judge = Callable[..., Assessment]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from datetime import date
 from pathlib import Path
 
-from mlg_troubleshoot import workflows
 from mlg_troubleshoot.decision.inspection import Side
+from mlg_troubleshoot.workflows.check import before_and_after
 from tests.cli.conftest import mlg
 from tests.decision.conftest import Judge, every_joint
 
@@ -42,17 +42,17 @@ def test_the_dates_decide_which_is_before(judge: Judge) -> None:
     late, early = (
         judge(every_joint(0.001), inspection_date=date(2024, 1, day), record_id=f"day {day}") for day in (9, 2)
     )
-    assert workflows.before_and_after((late, early)) == (early, late)
+    assert before_and_after((late, early)) == (early, late)
 
 
 def test_without_dates_the_order_of_the_table_counts(judge: Judge) -> None:
     first, second = judge(WORN, record_id="A"), judge(every_joint(0.001), record_id="B")
-    assert workflows.before_and_after((first, second)) == (first, second)
+    assert before_and_after((first, second)) == (first, second)
 
 
 def test_left_and_right_gear_are_not_compared(judge: Judge) -> None:
-    assert workflows.before_and_after((judge(WORN), judge(WORN, side=Side.RH))) is None
+    assert before_and_after((judge(WORN), judge(WORN, side=Side.RH))) is None
 
 
 def test_three_records_are_not_compared(judge: Judge) -> None:
-    assert workflows.before_and_after((judge(WORN),) * 3) is None
+    assert before_and_after((judge(WORN),) * 3) is None

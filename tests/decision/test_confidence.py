@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.decision.assess import AssessOptions
-from mlg_troubleshoot.decision.wording import confidence_words, rigging_sentence
+from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.decision.sentences import confidence_words, rigging_sentence
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
-from tests.decision.conftest import Judge, every_joint
+from mlg_troubleshoot.reporting.json_form import check_as_json
+from mlg_troubleshoot.studies.index_table import IndexTable
+from tests.decision.conftest import Judge, every_joint, inspected
 
 ADVICE = AssessOptions(advice=True)
-REPAIRS = AssessOptions(repairs=True)
+REPAIRS = AssessOptions(advice=True)
 
 
 @pytest.mark.parametrize("clearance_in", [0.0, 0.0014, 0.0016, 0.002, 0.0025, 0.003, 0.004])
@@ -51,6 +53,18 @@ def test_a_worse_gauge_is_in_the_monte_carlo_value(judge: Judge) -> None:
     assert coarse.monte_carlo < fine.monte_carlo - 0.02
 
 
+def test_the_own_uncertainty_of_a_joint_is_in_the_monte_carlo_value(
+    gear: Gear, table: IndexTable, judge: Judge
+) -> None:
+    read = inspected(every_joint(0.0015), gauge_u_by_joint_in={5: 0.004})
+    (own,) = assess([read], gear, table, ADVICE)
+    checked, plain = own.confidence, judge(every_joint(0.0015), ADVICE).confidence
+    assert checked is not None
+    assert plain is not None
+    assert checked.monte_carlo < plain.monte_carlo - 0.02
+    assert abs(checked.monte_carlo - checked.analytic) < 0.01
+
+
 def test_the_error_stands_beside_the_probability(judge: Judge) -> None:
     assert "±" in confidence_words(judge(every_joint(0.002), ADVICE).confidence)
     assert confidence_words(None) == ""
@@ -79,3 +93,13 @@ def test_the_sentence_on_re_rigging_says_that_the_joints_stay_worn(judge: Judge)
     found = judge({3: 0.013, 5: 0.007}, REPAIRS).rigging
     assert found is not None
     assert rigging_sentence(found).endswith("the joints stay worn.")
+
+
+def test_the_seed_decides_the_draws_and_stands_in_the_json(gear: Gear, table: IndexTable) -> None:
+    one, again, other = (
+        assess([inspected(every_joint(0.002), gauge_u_in=0.002)], gear, table, AssessOptions(advice=True, seed=seed))[0]
+        for seed in (4, 4, 5)
+    )
+    assert one == again
+    assert one != other
+    assert check_as_json(gear, [one], [], [], 4)["seed"] == 4

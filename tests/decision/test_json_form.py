@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from mlg_troubleshoot.decision.assess import AssessOptions, assess
 from mlg_troubleshoot.decision.inspection import InvalidRow, Side
+from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.json_form import check_as_json
-from mlg_troubleshoot.studies.table import IndexTable
+from mlg_troubleshoot.studies.index_table import IndexTable
 from tests.decision.conftest import Judge, every_joint
 
 INSPECTION = {
@@ -28,7 +28,7 @@ PROBLEM = Problem("negative", "a.csv", None, 2, "clearance_3_in", "F2", "-1", "0
 @pytest.fixture
 def form(gear: Gear, table: IndexTable, judge: Judge) -> dict:
     rejected = assess([InvalidRow("R2", None, Side.RH, ("tail_no",), ("noticed",))], gear, table)
-    judged = judge({3: 0.013, 5: 0.007}, AssessOptions(repairs=True), readings_in=(0.041,))
+    judged = judge({3: 0.013, 5: 0.007}, AssessOptions(), readings_in=(0.041,))
     return check_as_json(gear, [judged, *rejected], [PROBLEM], ["a note"])
 
 
@@ -57,13 +57,15 @@ def test_every_joint_has_every_key_of_the_contract(form: dict, row: int) -> None
     assert all(joint.keys() >= JOINT for joint in joints)
 
 
-def test_the_next_action_has_its_three_keys(form: dict) -> None:
-    assert all(row["next_action"].keys() == {"action", "joints", "text"} for row in form["inspections"])
+def test_a_step_has_its_five_keys(form: dict) -> None:
+    keys = {"action", "joints", "minutes", "gauge_u_needed_in", "text"}
+    assert all(step.keys() == keys for row in form["inspections"] for step in row["plan"])
 
 
-def test_a_repair_set_has_its_four_keys(form: dict) -> None:
-    keys = {"joints", "predicted_displacement_in", "probability_within_margin", "access_minutes"}
-    assert form["inspections"][0]["repair_sets"][0].keys() == keys
+def test_a_repair_set_has_its_five_keys(gear: Gear, judge: Judge) -> None:
+    keys = {"joints", "predicted_displacement_in", "probability_within_margin", "access_minutes", "minutes"}
+    (row,) = check_as_json(gear, [judge(every_joint(0.004))], [], [])["inspections"]
+    assert row["repair_sets"][0].keys() == keys
 
 
 def test_the_numbers_of_an_invalid_row_are_null(form: dict) -> None:
@@ -77,10 +79,6 @@ def test_the_identity_of_an_invalid_row_is_given_as_far_as_it_could_be_read(form
     row = form["inspections"][1]
     assert (row["record_id"], row["tail_no"], row["side"]) == ("R2", None, "RH")
     assert row["warnings"] == ["noticed"]
-
-
-def test_repair_sets_are_null_where_they_were_not_asked_for(gear: Gear, judge: Judge) -> None:
-    assert check_as_json(gear, [judge(every_joint(0.005))], [], [])["inspections"][0]["repair_sets"] is None
 
 
 def test_a_clearance_that_was_not_measured_is_null_and_one_measured_as_zero_is_zero(gear: Gear, judge: Judge) -> None:
@@ -106,6 +104,6 @@ def test_what_was_not_asked_for_is_null(form: dict) -> None:
 def test_with_advice_the_posterior_names_groups_and_intervals(gear: Gear, judge: Judge) -> None:
     judged = judge({3: 0.013, 5: 0.007}, AssessOptions(advice=True), readings_in=(0.041,))
     (row,) = check_as_json(gear, [judged], [], [])["inspections"]
-    assert row["posterior"]["groups"][0]["joints"] == (3, 5)
+    assert row["posterior"]["groups"][0]["joints"] == [3, 5]
     assert [interval["joint"] for interval in row["posterior"]["intervals"]] == list(range(1, 11))
     assert row["measuring"]["stop"] is True

@@ -7,9 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.decision.assess import AssessOptions
-from mlg_troubleshoot.decision.assessment import MeasuringAdvice, Verdict
-from mlg_troubleshoot.decision.belief import (
+from mlg_troubleshoot.decision.assessment import Assessment, MeasuringAdvice, Verdict
+from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.decision.next_joint import (
+    COST_OF_WRONG_WITHIN,
+    advise,
+    decision_risk,
+    enough,
+    outlook,
+)
+from mlg_troubleshoot.decision.plan import minutes_to_measure
+from mlg_troubleshoot.decision.prediction import predict
+from mlg_troubleshoot.decision.second_order import expand, responses
+from mlg_troubleshoot.decision.wear_levels import (
     level_likelihood,
     level_weights,
     moments,
@@ -18,20 +28,10 @@ from mlg_troubleshoot.decision.belief import (
     tabled_normal_cdf,
     uncertainty_parts,
 )
-from mlg_troubleshoot.decision.measuring import (
-    COST_OF_WRONG_WITHIN,
-    access_of_one_more,
-    advise,
-    decision_risk,
-    enough,
-    outlook,
-    worth_of_readings,
-)
-from mlg_troubleshoot.decision.prediction import predict
-from mlg_troubleshoot.decision.response import expand, responses
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import links_from
+from mlg_troubleshoot.studies.index_table import IndexTable
 from tests.decision.conftest import Judge, every_joint, inspected
 
 MARGIN_IN = 0.03
@@ -132,18 +132,18 @@ def test_the_normal_distribution_has_its_known_values() -> None:
 
 
 def test_an_area_that_is_open_costs_no_minutes_again(gear: Gear) -> None:
-    assert access_of_one_more(gear, 5, ()) == 23
-    assert access_of_one_more(gear, 5, (3,)) == 8
-    assert access_of_one_more(gear, 6, (3,)) == 26
+    assert minutes_to_measure(gear, [5]) == 23
+    assert minutes_to_measure(gear, [5], frozenset({gear.joint(3).area})) == 8
+    assert minutes_to_measure(gear, [6], frozenset({gear.joint(3).area})) == 26
 
 
 def test_missing_critical_joints_stand_before_all_others(gear: Gear) -> None:
-    worth = worth_of_readings(gear, inspected({3: 0.001, 9: 0.001}), MARGIN_IN)
+    worth = outlook(gear, inspected({3: 0.001, 9: 0.001}), MARGIN_IN).worth
     assert {w.joint for w in worth[:4]} == {1, 2, 4, 5}
 
 
 def test_the_next_joint_is_worth_most_per_minute_of_access(gear: Gear) -> None:
-    worth = [w for w in worth_of_readings(gear, inspected({9: 0.0005}), MARGIN_IN) if w.critical]
+    worth = [w for w in outlook(gear, inspected({9: 0.0005}), MARGIN_IN).worth if w.critical]
     assert worth[0].risk_drop > 0.0
     assert worth[0].risk_drop / worth[0].minutes == max(w.risk_drop / w.minutes for w in worth)
     # The variance alone would choose another joint.
@@ -152,27 +152,27 @@ def test_the_next_joint_is_worth_most_per_minute_of_access(gear: Gear) -> None:
 
 def test_a_reading_that_is_worth_more_may_still_come_later_because_of_its_access(gear: Gear) -> None:
     critical = dict.fromkeys(range(1, 6), 0.0015)
-    worth = {w.joint: w for w in worth_of_readings(gear, inspected(critical), MARGIN_IN)}
+    worth = {w.joint: w for w in outlook(gear, inspected(critical), MARGIN_IN).worth}
     assert worth[8].risk_drop > worth[6].risk_drop
     assert list(worth).index(6) < list(worth).index(8)
 
 
 def test_where_no_single_reading_has_a_value_the_variance_per_minute_decides(gear: Gear) -> None:
     # Two badly worn ends: no single reading can make WITHIN the better answer again.
-    worth = [w for w in worth_of_readings(gear, inspected({3: 0.0074, 5: 0.0074}), MARGIN_IN) if w.critical]
+    worth = [w for w in outlook(gear, inspected({3: 0.0074, 5: 0.0074}), MARGIN_IN).worth if w.critical]
     assert {w.risk_drop for w in worth} == {0.0}
     assert worth[0].variance_in2 / worth[0].minutes == max(w.variance_in2 / w.minutes for w in worth)
 
 
 def test_both_ends_of_one_link_are_worth_the_same(gear: Gear) -> None:
-    worth = {w.joint: w for w in worth_of_readings(gear, inspected({1: 0.001, 2: 0.001}), MARGIN_IN)}
+    worth = {w.joint: w for w in outlook(gear, inspected({1: 0.001, 2: 0.001}), MARGIN_IN).worth}
     assert worth[3].risk_drop == pytest.approx(worth[5].risk_drop, rel=1e-3)
     assert worth[9].variance_in2 == pytest.approx(worth[10].variance_in2, rel=1e-3)
 
 
 def test_a_reading_is_never_worth_less_than_nothing(gear: Gear) -> None:
     for measured in ({}, {2: 0.002}, {2: 0.007, 4: 0.006}):
-        assert min(w.risk_drop for w in worth_of_readings(gear, inspected(measured), MARGIN_IN)) >= 0.0
+        assert min(w.risk_drop for w in outlook(gear, inspected(measured), MARGIN_IN).worth) >= 0.0
 
 
 def test_outside_already_one_may_stop(gear: Gear) -> None:
@@ -267,11 +267,6 @@ def test_an_inconclusive_gear_that_precision_may_settle_is_told_so(gear: Gear) -
     assert "may still settle it" in found.text
 
 
-def test_the_next_action_is_the_joint_that_is_worth_most(judge: Judge, gear: Gear) -> None:
-    measured = {3: 0.001, 5: 0.001}
-    assert judge(measured).next_action.joints == (advised(gear, measured).joint,)
-
-
 def test_the_advice_is_the_same_at_every_call(gear: Gear) -> None:
     assert advised(gear, {3: 0.002}) == advised(gear, {3: 0.002})
 
@@ -283,6 +278,19 @@ def test_with_advice_the_next_action_is_the_same(judge: Judge) -> None:
 
 def test_a_critical_joint_is_next_even_where_another_would_tell_more(gear: Gear) -> None:
     joints = tuple(replace(joint, critical=joint.number == 9) for joint in gear.joints)
-    worth = worth_of_readings(replace(gear, joints=joints), inspected({}), MARGIN_IN)
+    worth = outlook(replace(gear, joints=joints), inspected({}), MARGIN_IN).worth
     assert worth[0].joint == 9
     assert worth[0].variance_in2 / worth[0].minutes < worth[1].variance_in2 / worth[1].minutes
+
+
+def test_the_advice_knows_the_own_uncertainty_of_a_joint(gear: Gear, table: IndexTable) -> None:
+    read = inspected(every_joint(0.0015), gauge_u_by_joint_in={5: 0.004})
+    (judged,) = assess([read], gear, table)
+    assert isinstance(judged, Assessment)
+    assert advise(gear, read, MARGIN_IN).expected_within == pytest.approx(judged.probability_within_margin, abs=1e-12)
+
+
+def test_a_coarse_reading_leaves_more_levels_of_displacement_open(gear: Gear) -> None:
+    measured = {3: 0.004, 5: 0.004}
+    fine, coarse = (outlook(gear, inspected(measured, gauge_u_by_joint_in={5: u}), MARGIN_IN) for u in (0.0005, 0.01))
+    assert abs(coarse.within - 0.5) < abs(fine.within - 0.5)

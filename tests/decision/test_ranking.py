@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from mlg_troubleshoot.decision.ranking import ensemble_amplification, rank_joints
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.studies.table import IndexTable
+from mlg_troubleshoot.studies.index_table import IndexTable
 from tests.decision.conftest import Judge, every_joint
 
 
@@ -102,6 +103,6 @@ def test_the_ensemble_has_one_row_a_linkage_and_the_reference_first(gear: Gear) 
 
 
 def test_the_table_agrees_with_the_model_it_was_computed_from(gear: Gear, table: IndexTable) -> None:
-    findings = rank_joints(gear, table, {})
+    (findings,) = rank_joints(gear, table, np.full((1, 10), np.nan))
     exact = gear.model.plunger_amplification()
     assert [f.plunger_amplification for f in findings] == pytest.approx(exact.tolist(), rel=1e-8)

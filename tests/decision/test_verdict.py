@@ -11,14 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import norm, qmc
 
-from mlg_troubleshoot.decision.assess import assess
 from mlg_troubleshoot.decision.assessment import Assessment, Rejected, Verdict
 from mlg_troubleshoot.decision.inspection import InvalidRow, Outcome, Side
+from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.prediction import predict
-from mlg_troubleshoot.decision.rule import verdict, zone
+from mlg_troubleshoot.decision.verdict_rule import verdict, zone
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.json_form import check_as_json
-from mlg_troubleshoot.studies.table import IndexTable
+from mlg_troubleshoot.studies.index_table import IndexTable
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from tests.decision.conftest import Judge, every_joint, inspected
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mlg_troubleshoot.decision.wording import percent
+from mlg_troubleshoot.decision.sentences import percent
 
 
 @pytest.mark.parametrize(

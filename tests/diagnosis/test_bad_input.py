@@ -186,9 +186,11 @@ def test_the_command_says_why_and_what_to_do(case: str, tmp_path: Path) -> None:
     assert "Traceback" not in said
 
 
-def test_nothing_stands_on_stdout_where_nothing_is_concluded(tmp_path: Path) -> None:
-    rows, columns, _why = COMMANDS["five rows"]
-    assert run(str(write(tmp_path / "t.csv", rows, *columns)), "--json").stdout == ""
+def test_json_gives_the_reason_where_nothing_is_concluded(tmp_path: Path) -> None:
+    rows, columns, why = COMMANDS["five rows"]
+    said = json.loads(run(str(write(tmp_path / "t.csv", rows, *columns)), "--json").stdout)
+    assert said["verdict"] is None
+    assert why in said["reason"]
 
 
 def test_a_file_that_is_not_there_leaves_with_a_message(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from mlg_troubleshoot.diagnosis import CATALOGUE, Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes import JointContact, OutOfPlaneTilt, RiggingOffset
-from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
+from mlg_troubleshoot.diagnosis.scene import effect_columns
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.gear.adjustment import adjusted_worst_case
 from mlg_troubleshoot.gear.gear import Gear
@@ -34,8 +34,19 @@ NEEDS = {
     "calibration_rate": (),
     "approach_hysteresis": ("approach",),
     "joint_contact": (),
+    "convention_slip": (),
+    "load_directions": (),
+    "geometry": (),
 }
-ONE_SIGN = {"out_of_plane_tilt": 1, "direction_not_worst_case": -1, "oval_wear": 1, "joint_contact": 1}
+# What a fleet with nothing wrong has candidates of: no group in doubt, and factors of all joints are fitted together.
+SINGLE = [name for name in NEEDS if name not in {"convention_slip", "load_directions", "geometry"}]
+ONE_SIGN = {
+    "out_of_plane_tilt": 1,
+    "direction_not_worst_case": -1,
+    "oval_wear": 1,
+    "joint_contact": 1,
+    "convention_slip": 1,
+}
 
 
 def first(cause: Cause, scene: Scene) -> Candidate:
@@ -62,18 +73,18 @@ def test_a_cause_speaks_to_a_technician(name: str) -> None:
     assert min(map(len, (cause.sentence, cause.inspect, cause.separates))) > 15
 
 
-@pytest.mark.parametrize("name", NEEDS)
+@pytest.mark.parametrize("name", SINGLE)
 def test_a_cause_of_size_zero_changes_nothing(name: str, gear: Gear, scene: Scene) -> None:
     cause = BY_NAME[name]
     adjustment = cause.adjust(scene, first(cause, scene), 0.0)
     assert adjusted_worst_case(gear.model, adjustment).over_in == pytest.approx(scene.over_in, abs=1e-12)
 
 
-@pytest.mark.parametrize("name", NEEDS)
+@pytest.mark.parametrize("name", SINGLE)
 def test_the_column_of_a_cause_is_the_slope_of_the_true_worst_case(name: str, gear: Gear, scene: Scene) -> None:
-    cause, worst = BY_NAME[name], build_scene(gear.model, scene.table, gear.discrepancies).worst
+    cause = BY_NAME[name]
     candidate = first(cause, scene)
-    column = effect_columns(scene, worst, [candidate])[:, 0]
+    column = effect_columns(scene, [candidate])[:, 0]
     step = 1e-3 * cause.trial
     moved = adjusted_worst_case(gear.model, cause.adjust(scene, candidate, step)).over_in
     slope = (moved - scene.over_in) / step

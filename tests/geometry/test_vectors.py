@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from mlg_troubleshoot.geometry.kernel import Kernel
 from mlg_troubleshoot.geometry.mechanism import Dyad, Mechanism, Output, Plane, Point
-from mlg_troubleshoot.geometry.vectors import angle_from_sides, locate_joint, rotation, skew
+
+from .vectors import angle_from_sides, locate_joint, rotation, skew
 
 coordinate = st.floats(-10, 10)
 vector = st.tuples(coordinate, coordinate, coordinate).map(np.array)

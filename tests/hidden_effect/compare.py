@@ -90,7 +90,7 @@ def _diagnosed(table: DiagnosisTable, train: np.ndarray, test: np.ndarray) -> np
     plain = build_scene(gear.model, unseen, gear.discrepancies)
     clearance = plain.scene.clearance_in
     terms = adjustment_of(found.terms, gear.model, unseen, clearance, gear.discrepancies)
-    return effect(plain.scene, plain.worst, terms)
+    return effect(plain.scene, terms)
 
 
 def run(seed: int) -> dict[str, Any]:

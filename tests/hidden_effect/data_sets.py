@@ -31,6 +31,10 @@ DATA_SETS: dict[str, tuple[FleetSpec, int]] = {
         ),
         41_002,
     ),
+    "measured_far_below": (
+        FleetSpec(kind="single", effects=(EffectSpec("load_directions", parameters={"spread_deg": 90.0}),)),
+        41_005,
+    ),
     "measured_nothing_wrong": (FleetSpec(), 41_003),
     "measured_frozen_grease": (FleetSpec(), 41_004),
 }
@@ -97,8 +101,8 @@ def main(arguments: Sequence[str]) -> int:
         if name == "measured_frozen_grease":
             drag(fleet.table)
         write_csv(fleet, folder / f"{name}.csv")
-        if name == "measured_pressure":
-            write_columns(later_rows(fleet, seed + 1000), folder / "measured_pressure_later.csv")
+        if name in {"measured_pressure", "measured_far_below"}:
+            write_columns(later_rows(fleet, seed + 1000), folder / f"{name}_later.csv")
     return 0
 
 

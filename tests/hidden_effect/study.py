@@ -12,7 +12,7 @@ import json
 import os
 import time
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -88,7 +88,9 @@ def run(task: Task) -> Record:
     gear = load_gear()
     start = time.process_time()
     try:
-        found: Diagnosis | None = diagnose(gear.model, table, gear.discrepancies, permutations=PERMUTATIONS)
+        found: Diagnosis | None = diagnose(
+            gear.model, table, gear.discrepancies, ensemble=gear.ensemble_models[1:], permutations=PERMUTATIONS
+        )
     except InconclusiveDataError:
         found = None
     seconds = time.process_time() - start
@@ -179,7 +181,7 @@ def _rate(hits: int, n: int) -> dict[str, float | int]:
     centre = (p + z * z / (2 * n)) / (1 + z * z / n)
     half = z * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n)
     # At none and at all the interval ends at the rate itself, rounding apart.
-    return {"n": n, "rate": p, "low": min(float(centre - half), p), "high": max(float(centre + half), p)}
+    return {"n": n, "rate": p, "low": max(min(float(centre - half), p), 0.0), "high": max(float(centre + half), p)}
 
 
 def summarise(records: list[Record]) -> dict[str, Any]:
@@ -290,16 +292,29 @@ def study(plan: dict[str, int], workers: int, first_seed: int = FIRST_SEED, kept
     The groups are mixed, so that a part of the plan is as good a sample as the whole. With a file to keep the
     records in, a run that was stopped goes on where it was.
     """
-    listed = list(tasks(plan, first_seed))
-    work = [listed[int(k)] for k in np.random.default_rng(first_seed).permutation(len(listed))]
+    records = mapped(run, [(task["seed"], task) for task in tasks(plan, first_seed)], workers, kept)
+    return {
+        "fleets": len(records),
+        "first_seed": first_seed,
+        "permutations": PERMUTATIONS,
+        "plan": plan,
+        **summarise(records),
+    }
+
+
+def mapped(
+    one: Callable[[Any], Record], listed: list[tuple[int, Any]], workers: int, kept: Path | None = None
+) -> list[Record]:
+    """Run tasks, each with its seed, mixed on several processes; with a file a run that was stopped goes on."""
+    work = [listed[int(k)] for k in np.random.default_rng(listed[0][0]).permutation(len(listed))]
     records: list[Record] = []
     if kept is not None and kept.exists():
         records = [json.loads(line) for line in kept.read_text(encoding="utf-8").splitlines()]
         done_seeds = {record["seed"] for record in records}
-        work = [task for task in work if task["seed"] not in done_seeds]
+        work = [task for task in work if task[0] not in done_seeds]
     start, before = time.monotonic(), len(records)
     with ProcessPoolExecutor(workers) as pool:
-        for record in pool.map(run, work, chunksize=4):
+        for record in pool.map(one, [task for _seed, task in work], chunksize=4):
             records.append(record)
             if kept is not None:
                 with kept.open("a", encoding="utf-8") as file:
@@ -308,13 +323,7 @@ def study(plan: dict[str, int], workers: int, first_seed: int = FIRST_SEED, kept
             if done % 100 == 0:
                 left = (time.monotonic() - start) / done * (len(work) - done) / 60
                 print(f"{len(records)} of {before + len(work)} fleets, about {left:.0f} min left", flush=True)
-    return {
-        "fleets": len(records),
-        "first_seed": first_seed,
-        "permutations": PERMUTATIONS,
-        "plan": plan,
-        **summarise(records),
-    }
+    return records
 
 
 def show(result: dict[str, Any]) -> None:
@@ -371,13 +380,18 @@ AIMS: dict[str, str] = {
 }
 
 
+HEAD = ("| quantity | aim | measured | 95 % interval | fleets |", "|---|---|---|---|---|")
+
+
+def rate_line(name: str, aim: str, rate: Mapping[str, Any]) -> str:
+    """A row of a table of rates, each with its interval."""
+    band = f"{100 * rate['low']:.1f}–{100 * rate['high']:.1f} %"
+    return f"| {name} | {aim} | {100 * rate['rate']:.1f} % | {band} | {rate['n']} |"
+
+
 def markdown(result: dict[str, Any]) -> str:
     """Return the README's table of a result."""
-    lines = ["| quantity | aim | measured | 95 % interval | fleets |", "|---|---|---|---|---|"]
-    for name, aim in AIMS.items():
-        rate = result["targets"][name]
-        band = f"{100 * rate['low']:.1f}–{100 * rate['high']:.1f} %"
-        lines.append(f"| {name} | {aim} | {100 * rate['rate']:.1f} % | {band} | {rate['n']} |")
+    lines = [*HEAD, *(rate_line(name, aim, result["targets"][name]) for name, aim in AIMS.items())]
     share = result["gain_share_of_true_term"]
     gain = f"median {100 * share['median']:.0f} %; ≥ 90 % in {100 * share['at_least_0.9']:.0f} %"
     lines.append(

@@ -216,7 +216,7 @@ def test_a_seed_reproduces_the_fleet(kind: str) -> None:
 
 
 @pytest.mark.parametrize("cause", [*CATALOGUE, *OFF_CATALOGUE])
-@pytest.mark.parametrize("strength", [5.0, 10.0, 25.0])
+@pytest.mark.parametrize("strength", [10.0, *(pytest.param(s, marks=pytest.mark.slow) for s in (5.0, 25.0))])
 def test_the_requested_strength_is_reached(cause: str, strength: float) -> None:
     kind = "single" if cause in CATALOGUE else "off_catalogue"
     label = draw_fleet(100 + int(strength), kind, cause=cause, strength=strength).label

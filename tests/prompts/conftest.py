@@ -22,4 +22,4 @@ def flow(gear: Gear) -> Flow:
 
 @pytest.fixture
 def store(tmp_path: Path) -> SessionStore:
-    return SessionStore(tmp_path / "state")
+    return SessionStore(tmp_path / "store.sqlite")

@@ -5,18 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterable
 from datetime import datetime
 
-from mlg_troubleshoot.cli.prompts import EntryInterruptedError, Line, Preset, SessionStore, ask_inspection
+from mlg_troubleshoot.cli.prompts import Answers, EntryInterruptedError, Line, SessionStore, ask_inspection
 from mlg_troubleshoot.cli.prompts.flow import Effect, Flow, State, Turn
-from mlg_troubleshoot.cli.prompts.lines import without_tones
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 NOON = datetime(2026, 3, 4, 12, 0, 0)
-NOTHING = Preset()
-RADIAL_INCHES = Preset("N123AB", Side.LH, LengthUnit.INCH, ClearanceConvention.RADIAL)
-PLAY_INCHES = Preset("N123AB", Side.LH, LengthUnit.INCH, ClearanceConvention.TOTAL_PLAY)
-PLAY_MM = Preset("N123AB", Side.LH, LengthUnit.MILLIMETRE, ClearanceConvention.TOTAL_PLAY)
+NOTHING = Answers()
+RADIAL_INCHES = Answers("N123AB", Side.LH, LengthUnit.INCH, ClearanceConvention.RADIAL)
+PLAY_INCHES = Answers("N123AB", Side.LH, LengthUnit.INCH, ClearanceConvention.TOTAL_PLAY)
+PLAY_MM = Answers("N123AB", Side.LH, LengthUnit.MILLIMETRE, ClearanceConvention.TOTAL_PLAY)
+
+
+def text_of(lines: Iterable[Line]) -> str:
+    return "\n".join(each.text for each in lines)
 
 
 class ScriptedTerminal:
@@ -31,7 +34,7 @@ class ScriptedTerminal:
         self.keystrokes = 0
 
     def say(self, lines: Iterable[Line]) -> None:
-        self.screen += without_tones(lines) + "\n"
+        self.screen += text_of(lines) + "\n"
 
     def ask(self, prompt: str) -> str:
         self.screen += prompt
@@ -43,15 +46,21 @@ class ScriptedTerminal:
         return text
 
 
-def inspect(gear: Gear, store: SessionStore, typed: Iterable[str], preset: Preset = NOTHING, **more) -> Inspection:
+# Enter at the optional answers and at the four lines of the sign-off page.
+ENTERS = [""] * 5
+
+
+def inspect(gear: Gear, store: SessionStore, typed: Iterable[str], preset: Answers = NOTHING, **more) -> Inspection:
     terminal = ScriptedTerminal(typed)
     try:
-        return ask_inspection(gear, terminal, store, preset, now=lambda: NOON, **more)
+        entry = ask_inspection(gear, terminal, store, preset, now=lambda: NOON, **more)
     except EntryInterruptedError:
         raise AssertionError(f"more was asked:\n{terminal.screen}") from None
+    store.finish(entry.session)
+    return entry.inspection
 
 
-def play(flow: Flow, typed: Iterable[str], preset: Preset = RADIAL_INCHES) -> Turn:
+def play(flow: Flow, typed: Iterable[str], preset: Answers = RADIAL_INCHES) -> Turn:
     """Answer the questions of a flow from its beginning; the last turn is returned."""
     turn = flow.begin(preset)
     for text in typed:
@@ -61,9 +70,9 @@ def play(flow: Flow, typed: Iterable[str], preset: Preset = RADIAL_INCHES) -> Tu
 
 
 def said(turn: Turn) -> str:
-    return without_tones(turn.lines)
+    return text_of(turn.lines)
 
 
 def shown(flow: Flow, state: State, width: int = 80) -> str:
     page = flow.page(state, width)
-    return without_tones(page.lines) + "\n" + page.prompt
+    return text_of(page.lines) + "\n" + page.prompt

@@ -3,35 +3,38 @@
 from __future__ import annotations
 
 import json
-import os
-import stat
+import shutil
+import sqlite3
 from dataclasses import replace
 from pathlib import Path
+from time import monotonic
 
 import pytest
 
+from mlg_troubleshoot.cli import by_hand
 from mlg_troubleshoot.cli.prompts import (
+    Answers,
     EntryInterruptedError,
-    Preset,
     Session,
     SessionFileError,
     SessionStore,
     ask_inspection,
 )
 from mlg_troubleshoot.cli.prompts.flow import Flow
-from mlg_troubleshoot.cli.prompts.store import state_folder
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.store import Draft, Drafts, Store, StoreError
 from mlg_troubleshoot.units import LengthUnit
-from tests.prompts.scripted import NOON, NOTHING, PLAY_INCHES, RADIAL_INCHES, ScriptedTerminal, inspect, play
+from mlg_troubleshoot.workflows.check import CheckOptions, CheckResult, check_inspection
+from tests.prompts.scripted import ENTERS, NOON, NOTHING, PLAY_INCHES, RADIAL_INCHES, ScriptedTerminal, inspect, play
 
 TEN = [".004"] * 10
 HEADING = ["N123AB", "l", "i", "r"]
 
 
 def interrupted(
-    gear: Gear, store: SessionStore, typed: list[str], preset: Preset = NOTHING, **more
+    gear: Gear, store: SessionStore, typed: list[str], preset: Answers = NOTHING, **more
 ) -> tuple[ScriptedTerminal, EntryInterruptedError]:
     terminal = ScriptedTerminal(typed, more.pop("end", EOFError))
     with pytest.raises(EntryInterruptedError) as caught:
@@ -39,8 +42,13 @@ def interrupted(
     return terminal, caught.value
 
 
-def files(store: SessionStore) -> list[Path]:
-    return sorted(store.folder.iterdir()) if store.folder.exists() else []
+def drafts(store: SessionStore) -> list[Draft]:
+    return Drafts(Store(store.place)).newest_first()
+
+
+def put_raw(store: SessionStore, content: str) -> None:
+    """Put a draft into the store past everything that judges it."""
+    assert Drafts(Store(store.place)).save(Draft("bad", store.owner, "another", False, content), ())
 
 
 def latest(store: SessionStore) -> Session:
@@ -61,43 +69,59 @@ def test_every_answer_is_on_disk_before_the_next_question(gear: Gear, store: Ses
             counts.append(0 if session is None else len(session.answers.joints))
             return super().ask(prompt)
 
-    ask_inspection(gear, Watching([*HEADING, *TEN, "", ""]), store, NOTHING)
-    assert counts == [0, 0, 0, 0, *range(11), 10]
+    ask_inspection(gear, Watching([*HEADING, *TEN, *ENTERS, ""]), store, NOTHING)
+    assert counts == [0, 0, 0, 0, *range(10), *[10] * 6]
 
 
-def test_only_the_owner_can_read_a_session(gear: Gear, store: SessionStore) -> None:
-    interrupted(gear, store, HEADING)
-    assert stat.S_IMODE(files(store)[0].stat().st_mode) == 0o600
-    assert stat.S_IMODE(store.folder.stat().st_mode) == 0o700
+def test_what_another_user_of_the_store_has_not_finished_is_not_offered(gear: Gear, store: SessionStore) -> None:
+    interrupted(gear, replace(store, owner="anna"), [*HEADING, ".004"])
+    assert replace(store, owner="ben").latest() is None
+    assert latest(replace(store, owner="anna")).answers.radial_in == {1: 0.004}
 
 
-def test_one_session_is_one_file(gear: Gear, store: SessionStore) -> None:
+def test_one_session_is_one_draft(gear: Gear, store: SessionStore) -> None:
     interrupted(gear, store, [*HEADING, *TEN])
-    assert len(files(store)) == 1
+    assert len(drafts(store)) == 1
 
 
-def test_a_save_that_fails_leaves_the_file_before_it(
-    gear: Gear, store: SessionStore, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_draft_is_no_record_and_in_no_chain(gear: Gear, store: SessionStore) -> None:
+    interrupted(gear, store, [*HEADING, *TEN])
+    assert (Store(store.place).all(), Store(store.place).verify()) == ([], (0, None))
+
+
+def test_a_save_that_fails_leaves_what_was_saved_before_it(gear: Gear, store: SessionStore) -> None:
     interrupted(gear, store, [*HEADING, ".004"])
     before = latest(store)
-
-    def full(_handle: int) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OutputError, match="No space left on device"):
+    with sqlite3.connect(store.place) as raw:
+        raw.execute("CREATE TRIGGER full BEFORE INSERT ON mlg_drafts BEGIN SELECT RAISE(ABORT, 'disk is full'); END")
+    with pytest.raises(OutputError, match=r"answers cannot be saved: .*disk is full"):
         store.save(replace(before, complete=True))
     assert store.latest() == before
-    assert len(files(store)) == 1
+
+
+def test_an_answer_does_not_wait_long_for_another_writer(gear: Gear, store: SessionStore) -> None:
+    interrupted(gear, store, [*HEADING, ".004"])
+    with Store(store.place).transaction(writing=True):
+        start = monotonic()
+        with pytest.raises(OutputError, match="answers cannot be saved"):
+            store.save(latest(store))
+    assert monotonic() - start < 20.0
+
+
+def test_drafts_are_kept_in_a_store_that_was_made_without_them(gear: Gear, store: SessionStore) -> None:
+    shutil.copy(Path(__file__).parents[1] / "store" / "data" / "version-1.sqlite", store.place)
+    records = Store(store.place).all()
+    interrupted(gear, store, [*HEADING, ".004"])
+    assert len(drafts(store)) == 1
+    assert Store(store.place).all() == records
 
 
 def test_a_session_reads_back_as_it_was_saved(gear: Gear, store: SessionStore) -> None:
     typed = [".0205", "y", "s", "0.33 mm", "b", "b", "b", "b", "b", "t", "n", "done", "f p -.041 in m .028 in"]
     answers = play(Flow(gear), typed).state.answers
     session = Session("one", gear.id, NOON, answers)
-    store.save(session)
-    assert store.load("one") == session
+    saved = store.save(session)
+    assert store.load("one") == saved == replace(session, writer=store.run)
 
 
 # Stopping.
@@ -121,7 +145,7 @@ def test_a_stop_is_a_keyboard_interrupt() -> None:
 
 def test_a_stop_before_the_first_answer_saves_nothing(gear: Gear, store: SessionStore) -> None:
     terminal, stopped = interrupted(gear, store, [])
-    assert (stopped.session_id, files(store)) == (None, [])
+    assert (stopped.session_id, drafts(store)) == (None, [])
     assert "Nothing was saved." in terminal.screen
 
 
@@ -137,29 +161,31 @@ def test_a_resumed_inspection_goes_on_at_the_first_open_joint(gear: Gear, store:
 
 def test_a_resumed_inspection_equals_an_uninterrupted_one(gear: Gear, store: SessionStore, tmp_path: Path) -> None:
     interrupted(gear, store, [*HEADING, ".0205", "y", "s", "4 thou"])
-    resumed = inspect(gear, store, [*TEN[:7], "f", "", ""], saved=latest(store))
+    resumed = inspect(gear, store, [*TEN[:7], "f", *ENTERS, ""], saved=latest(store))
     straight = inspect(
-        gear, SessionStore(tmp_path / "other"), [*HEADING, ".0205", "y", "s", "4 thou", *TEN[:7], "f", "", ""]
+        gear,
+        SessionStore(tmp_path / "other.sqlite"),
+        [*HEADING, ".0205", "y", "s", "4 thou", *TEN[:7], "f", *ENTERS, ""],
     )
     assert resumed == straight
 
 
-def test_a_resumed_inspection_stays_one_file(gear: Gear, store: SessionStore) -> None:
+def test_a_resumed_inspection_stays_one_draft(gear: Gear, store: SessionStore) -> None:
     interrupted(gear, store, [*HEADING, ".004"])
     interrupted(gear, store, [".005"], saved=latest(store))
-    assert len(files(store)) == 1
+    assert len(drafts(store)) == 1
 
 
 def test_an_unfinished_inspection_of_the_same_gear_is_offered_at_the_start(gear: Gear, store: SessionStore) -> None:
     interrupted(gear, store, [*HEADING, ".004"])
-    found = inspect(gear, store, ["n123ab", "l", "y", *TEN[:9], "", ""])
+    found = inspect(gear, store, ["n123ab", "l", "y", *TEN[:9], *ENTERS, ""])
     assert (found.tail_no, len(found.clearance_in)) == ("N123AB", 10)
 
 
-def test_an_accepted_offer_leaves_one_file(gear: Gear, store: SessionStore) -> None:
+def test_an_accepted_offer_leaves_one_draft(gear: Gear, store: SessionStore) -> None:
     interrupted(gear, store, [*HEADING, ".004"])
     interrupted(gear, store, ["N123AB", "l", "y", ".005"])
-    assert len(files(store)) == 1
+    assert len(drafts(store)) == 1
     assert len(latest(store).answers.joints) == 2
 
 
@@ -174,40 +200,39 @@ def test_a_declined_offer_is_not_made_again(gear: Gear, store: SessionStore) -> 
 def test_an_inspection_of_another_gear_is_not_offered(gear: Gear, store: SessionStore, heading: list[str]) -> None:
     interrupted(gear, store, [*HEADING, ".004"])
     terminal, _ = interrupted(gear, store, heading)
-    assert "unfinished" not in terminal.screen
+    assert "is unfinished" not in terminal.screen
 
 
 def test_an_inspection_of_another_gear_type_is_not_offered(gear: Gear, store: SessionStore) -> None:
     interrupted(replace(gear, id="other"), store, [*HEADING, ".004"])
     terminal, _ = interrupted(gear, store, ["N123AB", "l"])
-    assert "unfinished" not in terminal.screen
+    assert "is unfinished" not in terminal.screen
 
 
 def test_a_computed_inspection_is_not_unfinished(gear: Gear, store: SessionStore) -> None:
-    inspect(gear, store, [*HEADING, *TEN, "", ""])
+    inspect(gear, store, [*HEADING, *TEN, *ENTERS, ""])
     assert store.latest() is None
-    assert store.unfinished(gear.id, "N123AB", Side.LH) == (None, ())
+    assert store.unfinished(gear.id) == ((), ())
 
 
 def test_a_computed_inspection_can_still_be_loaded_by_name(gear: Gear, store: SessionStore) -> None:
-    inspect(gear, store, [*HEADING, *TEN, "", ""])
-    session = store.load(files(store)[0].stem)
-    assert len(inspect(gear, store, ["", ""], saved=session).clearance_in) == 10
+    inspect(gear, store, [*HEADING, *TEN, *ENTERS, ""])
+    session = store.load(drafts(store)[0].id)
+    assert len(inspect(gear, store, [*ENTERS, ""], saved=session).clearance_in) == 10
 
 
 def test_a_computed_inspection_that_is_taken_up_again_is_unfinished_again(gear: Gear, store: SessionStore) -> None:
-    inspect(gear, store, [*HEADING, *TEN, "", ""])
-    session = store.load(files(store)[0].stem)
+    inspect(gear, store, [*HEADING, *TEN, *ENTERS, ""])
+    session = store.load(drafts(store)[0].id)
     interrupted(gear, store, ["b", ".005"], saved=session)
     assert latest(store).answers.radial_in[10] == 0.005
 
 
 def test_the_latest_session_is_the_one_saved_last(gear: Gear, store: SessionStore) -> None:
-    for name in ("one", "two"):
-        store.save(Session(name, gear.id, NOON, play(Flow(gear), []).state.answers))
-    os.utime(store.folder / "one.json", ns=(10**18, 2 * 10**18))
-    os.utime(store.folder / "two.json", ns=(10**18, 10**18))
-    assert latest(store).id == "one"
+    one, two = (store.save(Session(name, gear.id, NOON, play(Flow(gear), []).state.answers)) for name in ("one", "two"))
+    assert latest(store) == two
+    store.save(one)
+    assert latest(store) == one
 
 
 def finish(gear: Gear, store: SessionStore, count: int) -> None:
@@ -218,7 +243,7 @@ def finish(gear: Gear, store: SessionStore, count: int) -> None:
 
 def test_only_the_last_twenty_computed_inspections_are_kept(gear: Gear, store: SessionStore) -> None:
     finish(gear, store, 23)
-    assert {path.stem for path in files(store)} == {f"s{n}" for n in range(3, 23)}
+    assert {draft.id for draft in drafts(store)} == {f"s{n}" for n in range(3, 23)}
 
 
 def test_pruning_never_takes_an_unfinished_inspection(gear: Gear, store: SessionStore) -> None:
@@ -237,7 +262,7 @@ def test_pruning_never_takes_an_unfinished_inspection(gear: Gear, store: Session
     ],
 )
 def test_a_flag_that_contradicts_the_saved_inspection_is_refused(
-    gear: Gear, store: SessionStore, preset: Preset
+    gear: Gear, store: SessionStore, preset: Answers
 ) -> None:
     interrupted(gear, store, [*HEADING, ".004"])
     with pytest.raises(UsageError, match="the saved inspection has"):
@@ -257,7 +282,6 @@ _GOOD = {
     "id": "bad",
     "gear": "hawker-800xp",
     "started": "2026-03-04T12:00:00",
-    "complete": False,
     "record_id": None,
     "tail_no": "N123AB",
     "side": "LH",
@@ -271,25 +295,25 @@ _GOOD = {
 
 
 def test_the_undamaged_example_is_read(store: SessionStore) -> None:
-    store.folder.mkdir()
-    (store.folder / "bad.json").write_text(json.dumps(_GOOD))
+    put(store)
     assert store.load("bad").answers.radial_in == {1: 0.004}
 
 
 @pytest.mark.parametrize(
     "content",
     [
-        b"",
-        b"{",
-        b"\xff\xfe\x00",
-        b"[]",
-        b"{}",
-        b"null",
-        b"[" * 100_000,
+        "",
+        "{",
+        "\x01",
+        "[]",
+        "{}",
+        "null",
+        "[" * 100_000,
+        json.dumps({**_GOOD, "record_id": "x" * 2_000_000}),
         *(
-            json.dumps({**_GOOD, **change}).encode()
+            json.dumps({**_GOOD, **change})
             for change in (
-                {"schema_version": 2},
+                {"schema_version": 0},
                 {"id": "other"},
                 {"started": "yesterday"},
                 {"started": 5},
@@ -303,27 +327,102 @@ def test_the_undamaged_example_is_read(store: SessionStore) -> None:
                 {"joints": 3},
                 {"tail_no": 7},
                 {"tail_no": "N1\x1b[31m"},
-                {"plunger_in": "0.04"},
-                {"outcome": "EXPLODED"},
+                {"plunger_in": "wide"},
+                {"schema_version": 2, "more": {"verdict": "WITHIN_MARGIN"}},
+                {"schema_version": 2, "more": {"margin": 0.03}},
             )
         ),
     ],
 )
-def test_a_damaged_file_is_named_with_what_to_do(store: SessionStore, content: bytes) -> None:
-    store.folder.mkdir()
-    path = store.folder / "bad.json"
-    path.write_bytes(content)
-    with pytest.raises(SessionFileError, match=r"bad\.json: this saved inspection is damaged") as caught:
+def test_a_damaged_draft_is_said_with_what_to_do_and_is_not_in_the_way_again(store: SessionStore, content: str) -> None:
+    put_raw(store, content)
+    with pytest.raises(SessionFileError, match=r"saved inspection bad is damaged") as caught:
         store.latest()
-    assert caught.value.remedy == "Delete the file and begin again."
+    assert caught.value.remedy.endswith("begin again with mlg check.")
+    assert store.latest() is None
+    assert drafts(store)[0].content == content[:1_000_000] * (len(content) <= 1_000_000)
 
 
-def test_a_damaged_file_does_not_stop_a_new_inspection(gear: Gear, store: SessionStore) -> None:
-    store.folder.mkdir()
-    (store.folder / "bad.json").write_text("{")
-    terminal = ScriptedTerminal([*HEADING, *TEN, "", ""])
-    assert len(ask_inspection(gear, terminal, store, NOTHING).clearance_in) == 10
+def test_a_damaged_draft_does_not_stop_a_new_inspection(gear: Gear, store: SessionStore) -> None:
+    put_raw(store, "{")
+    terminal = ScriptedTerminal([*HEADING, *TEN, *ENTERS, ""])
+    assert len(ask_inspection(gear, terminal, store, NOTHING).inspection.clearance_in) == 10
     assert terminal.screen.count("is damaged") == 1
+
+
+def put(store: SessionStore, **changes: object) -> None:
+    put_raw(store, json.dumps({**_GOOD, **changes}))
+
+
+@pytest.mark.parametrize("value", [float("inf"), float("nan"), 4.0])
+@pytest.mark.parametrize("column", ["plunger_in", "margin_in"])
+def test_a_saved_length_that_cannot_be_is_not_taken_up_again(
+    gear: Gear, store: SessionStore, column: str, value: float
+) -> None:
+    put(store, **{column: value})
+    terminal, _ = interrupted(gear, store, ["q"], saved=store.load("bad"))
+    assert "left out" in terminal.screen
+    assert latest(store).answers.more == {}
+
+
+def test_a_saved_clearance_that_cannot_be_is_asked_again(gear: Gear, store: SessionStore) -> None:
+    put(store, joints={"1": {"text": "0.4", "unit": None, "confirmed": True}})
+    terminal, _ = interrupted(gear, store, ["q"], saved=store.load("bad"))
+    assert "asked again" in terminal.screen
+    assert "joint 1 of 10" in terminal.screen
+
+
+def test_what_an_older_version_saved_is_still_read(store: SessionStore) -> None:
+    put(store, plunger_in=0.041, outcome="FAILED")
+    assert store.load("bad").answers.more == {"outcome": "FAILED", "plunger_displacement": "0.041 in"}
+
+
+def test_what_a_newer_version_saved_is_kept_and_said_to_be_readable_there(store: SessionStore) -> None:
+    put(store, schema_version=3, program="9.1.0", joints="unknown to this one")
+    before = drafts(store)
+    with pytest.raises(SessionFileError, match=r"was saved by mlg 9\.1\.0") as caught:
+        store.latest()
+    assert "It is kept: go on with it in mlg 9.1.0 or later" in caught.value.remedy
+    assert "amaged" not in caught.value.message
+    assert drafts(store) == before
+
+
+def test_two_windows_on_one_entry_keep_the_answers_of_both(gear: Gear, store: SessionStore) -> None:
+    interrupted(gear, store, [*HEADING, ".001"])
+    other = SessionStore(store.place)
+    saved = latest(store)
+
+    class Meanwhile(ScriptedTerminal):
+        def ask(self, prompt: str) -> str:
+            if not self.keystrokes:
+                interrupted(gear, other, [".007"], saved=saved)
+            return super().ask(prompt)
+
+    terminal = Meanwhile([".002", ".003"])
+    with pytest.raises(EntryInterruptedError):
+        ask_inspection(gear, terminal, SessionStore(store.place), NOTHING, saved=saved)
+    assert "another window has gone on with" in terminal.screen
+    kept = {tuple(store.load(draft.id).answers.radial_in.values()) for draft in drafts(store)}
+    assert kept == {(0.001, 0.007), (0.001, 0.002, 0.003)}
+
+
+def test_an_entry_stays_open_until_its_result_was_shown(gear: Gear, store: SessionStore) -> None:
+    terminal = ScriptedTerminal([*HEADING, *TEN, *ENTERS, ""])
+    entry = ask_inspection(gear, terminal, store, NOTHING, now=lambda: NOON)
+    assert latest(store).answers == entry.session.answers
+
+
+def test_a_finished_entry_is_corrected_from_its_review(gear: Gear, store: SessionStore) -> None:
+    terminal = ScriptedTerminal([*HEADING, *TEN, *ENTERS, ""])
+    entry = ask_inspection(gear, terminal, store, NOTHING, now=lambda: NOON)
+    found = inspect(gear, store, ["3", ".005", ""], saved=entry.session, correct=True)
+    assert (found.clearance_in[3], found.record_id) == (0.005, entry.inspection.record_id)
+
+
+def test_an_unfinished_entry_is_mentioned_at_the_next_start(gear: Gear, store: SessionStore) -> None:
+    interrupted(gear, store, [*HEADING, ".001"])
+    terminal, _ = interrupted(gear, store, ["N9"])
+    assert "Unfinished: N123AB LH, begun 2026-03-04 12:00. Go on with it:  mlg check --resume" in terminal.screen
 
 
 def test_there_is_no_session_of_an_unknown_name(store: SessionStore) -> None:
@@ -331,40 +430,44 @@ def test_there_is_no_session_of_an_unknown_name(store: SessionStore) -> None:
         store.load("nothing")
 
 
-@pytest.mark.parametrize("name", ["../secret", "/etc/passwd", ""])
-def test_a_session_name_is_no_path(store: SessionStore, name: str) -> None:
-    with pytest.raises(SessionFileError, match="is not the name of a saved inspection"):
-        store.load(name)
-
-
-def test_without_a_folder_there_is_no_latest_session(store: SessionStore) -> None:
+def test_without_a_store_there_is_no_latest_session_and_none_is_made(store: SessionStore) -> None:
     assert store.latest() is None
+    assert not Path(store.place).exists()
 
 
-def test_a_folder_that_cannot_be_written_is_said_once_and_the_inspection_goes_on(gear: Gear, tmp_path: Path) -> None:
+def test_a_store_that_cannot_be_written_is_said_once_and_the_inspection_goes_on(gear: Gear, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    terminal = ScriptedTerminal([*HEADING, *TEN, "", ""])
-    found = ask_inspection(gear, terminal, SessionStore(tmp_path / "file" / "state"), NOTHING)
-    assert len(found.clearance_in) == 10
+    terminal = ScriptedTerminal([*HEADING, *TEN, *ENTERS, ""])
+    found = ask_inspection(gear, terminal, SessionStore(tmp_path / "file" / "store.sqlite"), NOTHING)
+    assert len(found.inspection.clearance_in) == 10
     assert terminal.screen.count("answers cannot be saved") == 1
 
 
 def test_a_stop_does_not_promise_a_resume_that_cannot_be(gear: Gear, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    terminal, stopped = interrupted(gear, SessionStore(tmp_path / "file" / "state"), [*HEADING, ".004"])
+    terminal, stopped = interrupted(gear, SessionStore(tmp_path / "file" / "store.sqlite"), [*HEADING, ".004"])
     assert stopped.session_id is None
     assert "--resume" not in terminal.screen
     assert "could not be saved" in terminal.screen
 
 
-# The place.
+def test_an_entry_whose_result_could_not_be_kept_stays_unfinished(
+    gear: Gear, store: SessionStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    terminal = ScriptedTerminal([*HEADING, *TEN, *ENTERS, ""])
+    monkeypatch.setattr("mlg_troubleshoot.cli.prompts.RichTerminal", lambda: terminal)
 
+    def refused(_result: CheckResult) -> None:
+        raise StoreError("kept already with other content", "Give it its own record_id.")
 
-def test_sessions_live_in_the_state_folder_of_the_desktop_standard() -> None:
-    assert state_folder({"XDG_STATE_HOME": "/var/s"}) == Path("/var/s/mlg-troubleshoot")
-
-
-@pytest.mark.parametrize("variable", [{}, {"XDG_STATE_HOME": ""}, {"XDG_STATE_HOME": "relative"}])
-def test_else_they_live_below_the_home_folder(variable: dict[str, str]) -> None:
-    folder = state_folder({"HOME": "/home/anna", **variable})
-    assert folder == Path("/home/anna/.local/state/mlg-troubleshoot")
+    asked = CheckOptions()
+    with pytest.raises(StoreError):
+        by_hand.ask(
+            by_hand.Flags((), *[None] * 8),
+            gear,
+            lambda inspection, _unit: by_hand.Ending(check_inspection(inspection, asked), None),
+            refused,
+            resume=False,
+            place=str(store.place),
+        )
+    assert len(latest(store).answers.joints) == 10

@@ -12,8 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from mlg_troubleshoot.cli.output import speaks_utf8
 from mlg_troubleshoot.cli.prompts.lines import line
-from mlg_troubleshoot.cli.prompts.terminal import RichTerminal, speaks_utf8
+from mlg_troubleshoot.cli.prompts.terminal import RichTerminal
+from tests.prompts.scripted import ENTERS
 
 pexpect = pytest.importorskip("pexpect")
 
@@ -25,12 +27,14 @@ pytestmark = [
 _ROOT = Path(__file__).parents[2]
 _RUNNER = """
 import sys
-from mlg_troubleshoot.cli.prompts import Preset, RichTerminal, SessionStore, ask_inspection
+from mlg_troubleshoot.cli.output import prepare_streams
+from mlg_troubleshoot.cli.prompts import Answers, RichTerminal, SessionStore, ask_inspection
 from mlg_troubleshoot.gear.gear_file import load_gear
+prepare_streams()
 store = SessionStore()
 saved = store.latest() if "--resume" in sys.argv else None
 try:
-    found = ask_inspection(load_gear(), RichTerminal(), store, Preset(), saved=saved)
+    found = ask_inspection(load_gear(), RichTerminal(), store, Answers(), saved=saved).inspection
 except KeyboardInterrupt:
     sys.exit(130)
 print("RESULT", found.tail_no, found.side.value, {n: round(c, 6) for n, c in found.clearance_in.items()})
@@ -100,19 +104,21 @@ def without_colour(text: str) -> str:
 
 def test_ten_joints_are_typed_and_the_result_comes_out(start: Start) -> None:
     child = start()
-    type_lines(child, *_HEADING, *[".004"] * 10, "", "")
+    type_lines(child, *_HEADING, *[".004"] * 10, *ENTERS, "")
     child.expect_exact("RESULT N123AB LH {1: 0.004, 2: 0.004, 3: 0.004,")
     assert exit_code(child) == 0
 
 
 def test_back_skip_and_a_wrong_value_work_as_typed(start: Start) -> None:
     child = start()
-    seen = type_lines(child, *_HEADING, ".004", "b", ".005", "s", "0,013", "", "0.33", ".0205", "y", "done", "", "")
+    seen = type_lines(
+        child, *_HEADING, ".004", "b", ".005", "s", "0,013", "", "0.33", ".0205", "y", "done", *ENTERS, ""
+    )
     child.expect_exact("RESULT N123AB LH {1: 0.005, 3: 0.0205}")
     text = " ".join(without_colour(seen).split())
-    assert "Write it with a point: 0.013" in text
+    assert "enter 0.013" in text
     assert "Enter alone enters nothing" in text
-    assert "0.33 mm? That is 0.0130 in." in text
+    assert "0.33 mm would be 0.01299 in" in text
     assert "yes, it is really 0.0205 in = 0.521 mm radial" in text
 
 
@@ -125,7 +131,7 @@ def test_ctrl_c_saves_and_resume_goes_on(start: Start) -> None:
     assert exit_code(child) == 130
     child = start("--resume")
     child.expect_exact("joint 3 of 10")
-    type_lines(child, ".006", "done", "", "")
+    type_lines(child, ".006", "done", *ENTERS, "")
     child.expect_exact("RESULT N123AB LH {1: 0.004, 2: 0.005, 3: 0.006}")
 
 
@@ -148,14 +154,64 @@ def test_a_killed_terminal_loses_no_answer(start: Start) -> None:
     child.expect_exact("joint 3 of 10")
 
 
+@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGHUP], ids=["kill", "hang-up"])
+@pytest.mark.parametrize(
+    ("typed", "kept"),
+    [
+        ((".004", "s"), "1 of 10 joints measured, 1 said to be not measured"),
+        ((".004", ".0205"), "1 of 10 joints measured"),
+        ((".004", "done", "f p .041"), "outcome FAILED"),
+        ((".004", "done", "", "A. Smith", "WO-7"), "A. Smith"),
+        ((".004", "done", *ENTERS[:4], "2026-03-01"), "2026-03-01"),
+    ],
+    ids=["joint", "confirmation", "optional answers", "sign-off", "review"],
+)
+def test_no_question_loses_an_answer(start: Start, end: int, typed: tuple[str, ...], kept: str) -> None:
+    child = start()
+    type_lines(child, *_HEADING, *typed)
+    child.expect_exact(_PROMPT)
+    child.kill(end)
+    child.expect(pexpect.EOF)
+    child = start("--resume")
+    seen = type_lines(child, *["done"] * ("done" not in typed), *ENTERS, "q")
+    assert kept in " ".join(without_colour(seen).split())
+
+
+# Every question in turn: ten joints, the optional answers, and who measured with what on which day.
+EVERY = (*(f".00{10 + n}" for n in range(10)), "f p .041", "", "A. Smith", "WO-7", "G-12", "2026-03-01")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGHUP], ids=["kill", "hang-up"])
+@pytest.mark.parametrize("place", range(1, len(EVERY) + 1))
+def test_every_question_can_be_the_last_one_before_a_break(start: Start, end: int, place: int) -> None:
+    child = start()
+    type_lines(child, *_HEADING, *EVERY[:place])
+    child.expect_exact(_PROMPT)
+    child.kill(end)
+    child.expect(pexpect.EOF)
+    child = start("--resume")
+    # Answers on the last two pages are shown again: Enter keeps them.
+    again = [""] * max(place - 11, 0)
+    seen = " ".join(without_colour(type_lines(child, *again, *EVERY[place:], "q")).split())
+    for kept in (f"{min(place, 10)} of 10 joints measured", "outcome FAILED", "A. Smith", "WO-7", "G-12", "2026-03-01"):
+        assert kept in seen
+
+
 def test_a_typing_slip_is_taken_back_with_the_backspace_key(start: Start) -> None:
     child = start()
-    type_lines(child, *_HEADING, ".009\x7f4", "done", "", "")
+    type_lines(child, *_HEADING, ".009\x7f4", "done", *ENTERS, "")
     child.expect_exact("RESULT N123AB LH {1: 0.004}")
 
 
-def test_an_arrow_key_is_refused(start: Start) -> None:
+def test_the_arrow_keys_move_in_what_was_typed(start: Start) -> None:
     child = start()
+    type_lines(child, *_HEADING, ".04\x1b[D0", "done", *ENTERS, "")
+    child.expect_exact("RESULT N123AB LH {1: 0.004}")
+
+
+def test_without_line_editing_an_arrow_key_is_refused(start: Start, tmp_path: Path) -> None:
+    child = start(stdout=tmp_path / "out.txt")
     type_lines(child, *_HEADING, "0.13\x1b[D0")
     child.expect_exact("perhaps an arrow")
 
@@ -175,9 +231,11 @@ def test_a_resized_terminal_gets_lines_that_fit(start: Start) -> None:
     child.expect_exact(_PROMPT)
     child.setwinsize(24, columns)
     child.sendline(".004")
+    # The line editor may draw its prompt again for the new size before the answer is read.
+    child.expect_exact("joint 2 of 10")
+    shown = child.before + child.after
     child.expect_exact(_PROMPT)
-    rows = without_colour(child.before).splitlines()
-    assert any("joint 2 of 10" in row for row in rows)
+    rows = without_colour(shown + child.before).splitlines()
     assert max(map(len, rows)) <= columns
 
 
@@ -188,7 +246,7 @@ def test_a_resize_while_typing_loses_nothing(start: Start) -> None:
     child.send(".00")
     child.setwinsize(30, 100)
     child.sendline("4")
-    type_lines(child, "done", "", "")
+    type_lines(child, "done", *ENTERS, "")
     child.expect_exact("RESULT N123AB LH {1: 0.004}")
 
 
@@ -205,7 +263,7 @@ def test_without_colour_there_is_no_escape_at_all(start: Start, variable: dict[s
 
 @pytest.mark.parametrize("locale", [{"LANG": "C"}, {"LC_ALL": "C"}, {"LANG": "xx.ISO-8859-1"}])
 def test_without_utf8_everything_is_ascii(start: Start, locale: dict[str, str]) -> None:
-    seen = type_lines(start(**locale), *_HEADING, ".008", "?", "s", "done", "?", "", "?", "q")
+    seen = type_lines(start(**locale), *_HEADING, ".008", "?", "s", "done", "?", *ENTERS, "?", "q")
     assert "[1]======(2)" in without_colour(seen)
     assert seen.isascii()
 
@@ -223,19 +281,22 @@ def test_a_tail_number_in_other_letters_survives_a_terminal_without_utf8(start: 
 def test_standard_output_holds_the_result_only(start: Start, tmp_path: Path) -> None:
     out = tmp_path / "out.txt"
     child = start(stdout=out)
-    type_lines(child, *_HEADING, ".004", "done", "", "")
+    type_lines(child, *_HEADING, ".004", "done", *ENTERS, "")
     assert exit_code(child) == 0
     assert out.read_text() == "RESULT N123AB LH {1: 0.004}\n"
 
 
 def test_no_line_is_wider_than_the_terminal(start: Start) -> None:
-    seen = type_lines(start(), *_HEADING, "?", ".013", *[".004"] * 9, "?", "f p -.041 m .028", "", "?", "q")
+    seen = type_lines(start(), *_HEADING, "?", ".013", *[".004"] * 9, "?", "f p -.041 m .028", *ENTERS, "?", "q")
     assert max(map(len, without_colour(seen).splitlines())) <= 80
 
 
-def test_control_characters_never_reach_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    RichTerminal({"LANG": "C.UTF-8", "NO_COLOR": "1"}).say((line("N1\x1b[31m\x07"),))
-    assert capsys.readouterr().err == " N1?[31m?\n"
+def test_control_characters_never_reach_the_terminal(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NO_COLOR", "1")
+    RichTerminal().say((line("N1\x1b[31m\x07"),))
+    assert capsys.readouterr().err == " N1‹U+001B›[31m‹U+0007›\n"
 
 
 @pytest.mark.parametrize(
@@ -254,5 +315,11 @@ def test_control_characters_never_reach_the_terminal(capsys: pytest.CaptureFixtu
         ({"LANG": "en_US.UTF-8", "LC_CTYPE": "POSIX"}, False),
     ],
 )
-def test_the_locale_says_whether_utf8_is_spoken(environment: dict[str, str], spoken: bool) -> None:
-    assert speaks_utf8(environment) is spoken
+def test_the_locale_says_whether_utf8_is_spoken(
+    environment: dict[str, str], spoken: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("LANG", "LC_CTYPE", "LC_ALL"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    assert speaks_utf8() is spoken

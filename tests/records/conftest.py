@@ -114,7 +114,8 @@ def package() -> Callable[..., bytes]:
         if strings is not None:
             relations += f'<Relationship Id="rId3" Type="{_REL}/sharedStrings" Target="/xl/sharedStrings.xml"/>'
         content: dict[str, bytes | str] = {
-            "[Content_Types].xml": f'<Types xmlns="{_PACKAGE}content-types"/>',
+            "[Content_Types].xml": f'<Types xmlns="{_PACKAGE}content-types"><Override PartName="/xl/workbook.xml" '
+            'ContentType="application/vnd.openxmlformats-officedocument.spreadsheetml.sheet.main+xml"/></Types>',
             "_rels/.rels": f'<Relationships xmlns="{_PACKAGE}relationships"><Relationship Id="rId1" '
             f'Type="{_REL}/officeDocument" Target="xl/workbook.xml"/></Relationships>',
             "xl/workbook.xml": f'<workbook xmlns="{_MAIN}" xmlns:r="{_REL}">{book_pr}<sheets>'

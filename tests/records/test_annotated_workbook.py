@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import datetime
+import io
+import zipfile
 
 import openpyxl
 import pytest
@@ -13,7 +15,8 @@ from openpyxl.styles import Font, PatternFill
 from openpyxl.worksheet.datavalidation import DataValidation
 
 from mlg_troubleshoot.errors import OutputError, UsageError
-from mlg_troubleshoot.records import ReadOptions, annotate_workbook, read_inspections, write_csv
+from mlg_troubleshoot.outputs import write_csv
+from mlg_troubleshoot.records import ReadOptions, annotate_workbook, read_inspections
 
 HEADER = ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in", "inspection_date")
 ROWS = [
@@ -82,6 +85,50 @@ def test_verdict_columns_stand_behind_the_table(annotated):
     assert [c.value for c in sheet["I"]] == ["predicted_in", 0.0472, None, None]
 
 
+def fills(sheet, column):
+    return [cell.fill.fgColor.rgb for cell in sheet[column]][1:]
+
+
+def test_a_verdict_can_be_told_by_its_colour(tmp_path, xlsx):
+    source, out = tmp_path / "in.xlsx", tmp_path / "out.xlsx"
+    source.write_bytes(xlsx([HEADER, *[(f"R{n}", *ROWS[0][1:]) for n in range(3)]]))
+    result = read_inspections(source, ReadOptions())
+    said = ("WITHIN_MARGIN", "INCONCLUSIVE", "OUTSIDE_MARGIN")
+    annotate_workbook(source, out, result, {r.source: {"verdict": v} for r, v in zip(result.rows, said, strict=True)})
+    assert len(set(fills(openpyxl.load_workbook(out)["Inspections"], "H"))) == 3
+
+
+def test_a_joint_over_its_limit_is_marked_with_the_limit(tmp_path, xlsx):
+    source, out = tmp_path / "in.xlsx", tmp_path / "out.xlsx"
+    source.write_bytes(xlsx([HEADER, ROWS[0]]))
+    result = read_inspections(source, ReadOptions())
+    of = result.rows[0].source
+    annotate_workbook(source, out, result, {of: {"verdict": "OUTSIDE_MARGIN"}}, {of: {3: 0.0075}})
+    sheet = openpyxl.load_workbook(out)["Inspections"]
+    assert fills(sheet, "E") != fills(sheet, "F")
+    assert "over the limit of joint 3, 0.0075 in radial" in sheet["E2"].comment.text
+
+
+def test_on_paper_the_verdicts_begin_a_page_with_the_record_beside_them(annotated):
+    sheet = annotated["Inspections"]
+    assert [brk.id for brk in sheet.col_breaks.brk] == [7]
+    assert (sheet.print_title_cols, sheet.print_title_rows) == ("$A:$C", "$1:$1")
+
+
+def test_pages_that_the_user_has_set_up_stay_as_they_are(tmp_path, xlsx):
+    source, out = tmp_path / "in.xlsx", tmp_path / "out.xlsx"
+
+    def set_up(book):
+        book.worksheets[0].print_title_rows = "1:1"
+        book.worksheets[0].page_setup.orientation = "portrait"
+
+    source.write_bytes(xlsx([HEADER, ROWS[0]], set_up))
+    result = read_inspections(source, ReadOptions())
+    annotate_workbook(source, out, result, {r.source: {"verdict": "x"} for r in result.rows})
+    sheet = openpyxl.load_workbook(out)["Inspections"]
+    assert (sheet.page_setup.orientation, len(sheet.col_breaks.brk)) == ("portrait", 0)
+
+
 def test_everything_else_is_as_it_was(annotated, book):
     before, after = openpyxl.load_workbook(book), annotated
     assert before.sheetnames == after.sheetnames
@@ -100,7 +147,7 @@ def test_everything_else_is_as_it_was(annotated, book):
         assert old.freeze_panes == new.freeze_panes
         assert old.auto_filter.ref == new.auto_filter.ref
         assert {k: d.width for k, d in old.column_dimensions.items()} == {
-            k: d.width for k, d in new.column_dimensions.items()
+            k: d.width for k, d in new.column_dimensions.items() if k < "H"
         }
         assert [k for k, d in old.row_dimensions.items() if d.hidden] == [
             k for k, d in new.row_dimensions.items() if d.hidden
@@ -136,8 +183,6 @@ def test_a_problem_of_a_header_is_marked_at_the_header(tmp_path, xlsx):
 
 
 def test_macros_are_kept_in_a_macro_workbook(tmp_path, xlsx):
-    import zipfile
-
     source, out = tmp_path / "in.xlsm", tmp_path / "out.xlsm"
     source.write_bytes(xlsx([HEADER, *ROWS]))
     with zipfile.ZipFile(source, "a") as archive:
@@ -177,7 +222,23 @@ def test_a_csv_file_cannot_be_annotated(tmp_path):
 
 def test_a_copy_that_cannot_be_written_is_an_output_error(book, tmp_path):
     with pytest.raises(OutputError):
-        annotate_workbook(book, tmp_path / "none" / "o.xlsx", read_inspections(book, ReadOptions()), {})
+        annotate_workbook(book, book / "o.xlsx", read_inspections(book, ReadOptions()), {})
+
+
+def test_a_workbook_that_the_library_cannot_write_again_is_an_output_error(book, tmp_path):
+    hidden = openpyxl.load_workbook(book)
+    for sheet in hidden:
+        sheet.sheet_state = "veryHidden"
+    parts = io.BytesIO()
+    hidden.worksheets[0].sheet_state = "visible"
+    hidden.save(parts)
+    with zipfile.ZipFile(parts) as visible, zipfile.ZipFile(tmp_path / "hidden.xlsx", "w") as file:
+        for name in visible.namelist():
+            file.writestr(name, visible.read(name).replace(b'state="visible"', b'state="hidden"'))
+    source = tmp_path / "hidden.xlsx"
+    with pytest.raises(OutputError, match="cannot be copied"):
+        annotate_workbook(source, tmp_path / "o.xlsx", read_inspections(source, ReadOptions()), {})
+    assert not (tmp_path / "o.xlsx").exists()
 
 
 def test_csv_export_keeps_numbers_exact_and_blanks_blank(tmp_path):
@@ -186,14 +247,7 @@ def test_csv_export_keeps_numbers_exact_and_blanks_blank(tmp_path):
         assert list(csv.reader(file)) == [["a", "b", "c", "d"], ["x", "0.30000000000000004", "", "3"]]
 
 
-def test_csv_export_cannot_be_written_is_an_output_error(tmp_path):
-    with pytest.raises(OutputError, match="cannot be written"):
-        write_csv(tmp_path / "none" / "o.csv", ["a"], [])
-
-
 def test_what_the_copy_cannot_take_over_is_said(book, tmp_path):
-    import zipfile
-
     assert annotate_workbook(book, tmp_path / "a.xlsx", read_inspections(book, ReadOptions()), {}) == ()
     with zipfile.ZipFile(book, "a") as archive:
         archive.writestr("xl/media/image1.png", b"picture")

@@ -18,7 +18,7 @@ import pytest
 
 from mlg_troubleshoot.records.cells import LETTERS
 from mlg_troubleshoot.reporting.json_form import check_as_json, check_json_pieces
-from mlg_troubleshoot.workflows import CheckOptions, check_files
+from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 from tests.cli.conftest import mlg
 
 needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="needs a terminal of POSIX")
@@ -35,14 +35,14 @@ COLUMNS = (
         "remarks",
     ),
 )
-ROWS = 2000
+ROWS = 500
 SHARE = 0.03
 # What people leave in a cell, by column; a row with a bad cell of the second group can still be judged.
 SPOILING = {
     "tail_no": (None, "#N/A"),
-    "side": ("left", None, "XX", 5, "#REF!"),
+    "side": ("both", None, "XX", 5, "#REF!"),
     "clearance_convention": ("CLEAR", None, 3),
-    "clearance": (-0.001, 0.33, 9, "0,013", "n/a", "1/8", "0.3 mm", "−0.002", "nan", "-", "?", "#DIV/0!"),
+    "clearance": (-0.001, 0.33, 9, "0,013", "n/a?", "1/8", "0.3 mm", "−0.002", "nan", "~", "?", "#DIV/0!"),
     "margin_in": (-0.03, "x", 0.7),
 }
 HARMLESS = {
@@ -67,7 +67,7 @@ def kind_of(column: str) -> str:
 
 
 def make_fleet(seed: int) -> Fleet:
-    """Draw 2,000 sound rows and spoil 3 % of the cells that can be bad."""
+    """Draw sound rows and spoil 3 % of the cells that can be bad."""
     rng = random.Random(seed)
     fleet = Fleet([list(COLUMNS)])
     for n in range(ROWS):
@@ -160,7 +160,7 @@ WRITERS = {"openpyxl": by_openpyxl, "XML by hand": by_hand}
 
 @pytest.fixture(scope="module", params=WRITERS)
 def checked(request, tmp_path_factory):
-    """Check a workbook of 2,000 rows, 3 % of its cells bad, through the command."""
+    """Check a workbook, 3 % of its cells bad, through the command."""
     fleet = make_fleet(seed=5)
     path = tmp_path_factory.mktemp("fleet") / "fleet.xlsx"
     path.write_bytes(WRITERS[request.param](fleet))
@@ -232,7 +232,7 @@ def mixed(tmp_path):
         HEADER,
         sound("GOOD"),
         sound("WORN", **{f"clearance_{n}_in": 0.007 for n in range(1, 11)}),
-        sound("BAD", side="left", clearance_3_in="n/a"),
+        sound("BAD", side="both", clearance_3_in="n/a?"),
         sound("OVER", clearance_10_in=0.012),
     ]
     return workbook(tmp_path / "mixed.xlsx", ("Inspections", rows))
@@ -256,13 +256,13 @@ def test_the_worst_gear_stands_first_and_every_gear_on_one_line(mixed):
 
 
 def test_joints_over_their_limit_are_counted_over_the_batch(mixed):
-    assert "Joints over their limit: #10 on 1 inspections." in mlg("check", mixed).out
+    assert "Joints over their limit: #10 on 1 of these." in mlg("check", mixed).out
 
 
 def test_each_problem_is_told_with_place_value_and_remedy(mixed):
     said = mlg("check", mixed).err
     assert "2 problems in the input:" in said
-    for words in ("cell C4", "'left'", "Enter LH if that is meant", "cell G4", "'n/a'"):
+    for words in ("cell C4", "'both'", "Enter LH or RH", "cell G4", "'n/a?'"):
         assert words in said
 
 
@@ -277,11 +277,11 @@ def test_the_csv_says_the_same_as_the_json(mixed, tmp_path):
         assert line["predicted_displacement_in"] == ("" if number is None else repr(number))
 
 
-def test_the_annotated_workbook_marks_exactly_the_bad_cells(mixed, tmp_path):
+def test_the_annotated_workbook_marks_exactly_the_bad_cells_and_the_joints_over_their_limit(mixed, tmp_path):
     out = tmp_path / "out.xlsx"
     mlg("check", mixed, "--annotate", out)
     sheet = openpyxl.load_workbook(out).worksheets[0]
-    assert [cell.coordinate for row in sheet.iter_rows() for cell in row if cell.comment] == ["C4", "G4"]
+    assert [cell.coordinate for row in sheet.iter_rows() for cell in row if cell.comment] == ["C4", "G4", "N5"]
 
 
 def test_the_annotated_workbook_has_a_verdict_for_every_row(mixed, tmp_path):
@@ -313,7 +313,7 @@ def test_a_workbook_that_was_refused_is_not_annotated_and_leaves_with_nothing_ju
 def test_a_workbook_that_cannot_be_copied_is_an_output_error_and_the_results_still_come(mixed, tmp_path):
     with zipfile.ZipFile(mixed) as old:
         parts = {name: old.read(name) for name in old.namelist()}
-    parts["[Content_Types].xml"] = f'<Types xmlns="{PACKAGE}/content-types"/>'.encode()
+    parts["xl/styles.xml"] = parts["xl/styles.xml"].replace(b"<font>", b'<font><color rgb="cornflower"/>', 1)
     with zipfile.ZipFile(mixed, "w") as new:
         for name, data in parts.items():
             new.writestr(name, data)
@@ -475,8 +475,8 @@ def test_problems_stand_in_a_table_on_a_terminal(mixed):
     lines = [line.rstrip() for line in in_a_terminal("check", mixed, columns=120).splitlines()]
     heading = next(n for n, line in enumerate(lines) if line.split()[:3] == ["cell", "column", "found"])
     in_table = [line.split()[:3] for line in lines[heading + 1 : heading + 4]]
-    assert ["C4", "side", "left"] in in_table
-    assert ["G4", "clearance_3_in", "n/a"] in in_table
+    assert ["C4", "side", "both"] in in_table
+    assert ["G4", "clearance_3_in", "n/a?"] in in_table
 
 
 @needs_posix
@@ -485,23 +485,13 @@ def test_a_gear_is_one_line_however_many_joints_are_worn(tmp_path):
     (tmp_path / "t.csv").write_text(as_csv([*HEADER, "outcome"], worn, sound("GOOD", outcome=None)))
     lines = in_a_terminal("check", tmp_path / "t.csv").splitlines()
     at = next(n for n, line in enumerate(lines) if "WORN" in line)
-    assert "restore" in lines[at]
+    assert "read the plunger" in lines[at]
     assert "GOOD" in lines[at + 1]
 
 
 @needs_posix
-def test_a_long_batch_shows_how_far_it_is(tmp_path):
-    rows = [sound(f"R{n}", clearance_3_in=0.001 + n * 1e-6) for n in range(2500)]
-    (tmp_path / "t.csv").write_text(as_csv(HEADER, *rows))
-    shown = in_a_terminal("check", tmp_path / "t.csv")
-    assert "Judging" in shown
-    assert "/2500" in shown
-    assert "2500 inspections: 2500 within margin" in shown
-
-
-@needs_posix
 def test_quiet_shows_no_progress(tmp_path):
-    rows = [sound(f"R{n}", clearance_3_in=0.001 + n * 1e-6) for n in range(2500)]
+    rows = [sound(f"R{n}", clearance_3_in=0.001 + n * 1e-6) for n in range(600)]
     (tmp_path / "t.csv").write_text(as_csv(HEADER, *rows))
     assert "Judging" not in in_a_terminal("check", tmp_path / "t.csv", "--quiet")
 

@@ -9,7 +9,7 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.errors import OutputError
-from mlg_troubleshoot.records import ReadOptions, read_inspections, write_template
+from mlg_troubleshoot.records import ReadOptions, annotate_workbook, read_inspections, write_template
 from mlg_troubleshoot.units import LengthUnit
 
 JOINTS = [(n, f"name {n}", f"place {n}") for n in range(1, 11)]
@@ -101,6 +101,17 @@ def test_a_filled_in_form_reads_back(template):
     assert row.source.sheet == "Form"
 
 
+def test_a_joint_over_its_limit_is_marked_in_its_line_of_the_form(template, tmp_path):
+    book = openpyxl.load_workbook(template)
+    fill_form(book["Form"], FILLED)
+    book.save(template)
+    result, out = read_inspections(template, ReadOptions()), tmp_path / "out.xlsx"
+    of = result.rows[0].source
+    annotate_workbook(template, out, result, {of: {"verdict": "OUTSIDE_MARGIN"}}, {of: {3: 0.0075}})
+    marked = [c for c in openpyxl.load_workbook(out)["Form"]["B"] if c.comment and "over the limit" in c.comment.text]
+    assert [cell.value for cell in marked] == [FILLED["Clearance #3"]]
+
+
 def test_many_copies_of_the_form_are_many_inspections_and_an_untouched_one_is_none(template):
     book = openpyxl.load_workbook(template)
     for number in range(3):
@@ -166,7 +177,7 @@ def test_a_form_of_another_maker_is_read_and_its_labels_shown(read):
     result = read(buffer.getvalue(), "f.xlsx")
     assert not result.problems
     assert result.rows[0].clearance_in == {3: 0.013, 5: 0.007}
-    assert any('cell B6 "Joint 3 (in):" read as clearance_3_in' in note for note in result.notes)
+    assert any('"Joint 3 (in):" clearance_3_in' in note for note in result.notes)
 
 
 def test_the_template_has_lists_of_choices_and_explains_each_column(template):
@@ -176,6 +187,27 @@ def test_the_template_has_lists_of_choices_and_explains_each_column(template):
     assert all(cell.comment is not None for cell in sheet[1])
     assert "place 3" in next(c.comment.text for c in sheet[1] if c.value == "clearance_3_in")
     assert sheet.freeze_panes == "D2"
+
+
+def test_on_paper_the_clearances_of_the_template_stand_together_on_the_first_page(template):
+    sheet = openpyxl.load_workbook(template)["Inspections"]
+    headers = [cell.value for cell in sheet[1]]
+    first = min(brk.id for brk in sheet.col_breaks.brk)
+    assert headers[first - 1 : first + 1] == [f"clearance_{JOINTS[-1][0]}_in", "inspection_date"]
+
+
+@pytest.mark.parametrize("name", ["Instructions", "Form"])
+def test_every_line_of_the_template_is_as_high_as_its_text(template, name):
+    sheet = openpyxl.load_workbook(template)[name]
+    low = [
+        cell.coordinate
+        for row in sheet.iter_rows(min_row=4)
+        for cell in row
+        if isinstance(cell.value, str)
+        and len(cell.value) > 1.5 * sheet.column_dimensions[cell.column_letter].width
+        and (sheet.row_dimensions[cell.row].height or 0) < 30
+    ]
+    assert low == []
 
 
 def test_identities_of_the_template_are_text_cells(template):
@@ -190,6 +222,6 @@ def test_the_template_holds_no_formula(template):
 
 
 def test_a_template_that_cannot_be_written_is_an_output_error(tmp_path):
-    with pytest.raises(OutputError, match="missing"):
-        write_template(tmp_path / "missing" / "t.xlsx", JOINTS)
-    assert not list(tmp_path.iterdir())
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match="cannot be written"):
+        write_template(tmp_path / "file" / "t.xlsx", JOINTS)

@@ -6,7 +6,6 @@ import io
 
 import pytest
 
-from mlg_troubleshoot.decision.inspection import InvalidRow
 from mlg_troubleshoot.records import ReadOptions, read_inspections, read_many
 
 HEADER = "record_id,tail_no,side,clearance_convention,clearance_3_in\n"
@@ -57,11 +56,11 @@ def test_problems_and_rows_name_their_file(folder):
     assert [row.source.file for row in result.rows] == [str(folder / n) for n in ("a.csv", "b.csv", "b.csv")]
 
 
-def test_an_id_that_two_files_use_differently_is_an_error_in_both(folder):
+def test_ids_are_unique_within_a_file_only(folder):
     (folder / "a.csv").write_text(HEADER + "B1,N2,RH,RADIAL,0.001\n")
     result = read_many([folder / "a.csv", folder / "b.csv"], ReadOptions())
-    assert [p.code for p in result.problems].count("record_id_duplicate") == 2
-    assert all(isinstance(row, InvalidRow) for row in result.rows)
+    assert not [p for p in result.problems if p.code == "record_id_duplicate"]
+    assert result.rows[0].clearance_in == {3: 0.001}
 
 
 def test_a_stream_of_a_workbook_or_of_csv_is_told_by_its_bytes(xlsx):

@@ -5,11 +5,14 @@ from __future__ import annotations
 import datetime
 import io
 import random
+import zipfile
 
 import python_calamine
 
 from mlg_troubleshoot.records.cells import OddCell
 from mlg_troubleshoot.records.xlsx import XlsxFile
+
+MAIN = 'xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"'
 
 
 def ours(data):
@@ -88,7 +91,7 @@ def test_a_sheet_with_prefixed_elements_is_read(package):
 
 def test_a_shared_text_in_pieces_is_joined_without_its_pronunciation(package):
     strings = (
-        "<sst><si><t>first_x0041_</t></si><si><r><t>漢</t></r><r><rPr/><t>字</t></r>"
+        f"<sst {MAIN}><si><t>first_x0041_</t></si><si><r><t>漢</t></r><r><rPr/><t>字</t></r>"
         "<rPh sb='0' eb='1'><t>かんじ</t></rPh></si><si><t/></si></sst>"
     )
     cells = "".join(f'<c r="{c}1" t="s"><v>{n}</v></c>' for c, n in (("A", 1), ("B", 0), ("C", 2), ("D", 1)))
@@ -96,13 +99,15 @@ def test_a_shared_text_in_pieces_is_joined_without_its_pronunciation(package):
 
 
 def test_a_shared_text_that_does_not_exist_makes_the_workbook_damaged(package, read):
-    data = package('<row r="1"><c r="A1" t="s"><v>7</v></c></row>', strings="<sst><si><t>a</t></si></sst>")
+    data = package('<row r="1"><c r="A1" t="s"><v>7</v></c></row>', strings=f"<sst {MAIN}><si><t>a</t></si></sst>")
     assert [p.code for p in read(data, "t.xlsx").problems] == ["file_damaged"]
 
 
 def test_a_sheet_in_utf_16_is_read(package):
     xml = (
-        '<?xml version="1.0" encoding="UTF-16"?><worksheet><sheetData><row r="1"><c r="A1" t="inlineStr">'
+        '<?xml version="1.0" encoding="UTF-16"?>'
+        f"<worksheet {MAIN}>"
+        '<sheetData><row r="1"><c r="A1" t="inlineStr">'
         "<is><t>ü</t></is></c></row></sheetData></worksheet>"
     )
     assert ours(package(sheet_xml=xml.encode("utf-16"))) == {1: ["ü"]}
@@ -123,3 +128,25 @@ def test_rows_split_between_pieces_of_the_archive_are_whole(package):
     found = ours(package(rows))
     assert len(found) == 30000
     assert found[30000] == ["x" * 90 + "ü30000"]
+
+
+def test_a_workbook_saved_as_strict_open_xml_is_read(xlsx):
+    usual = "http://schemas.openxmlformats.org/"
+    names = (
+        ("spreadsheetml/2006/main", "spreadsheetml/main"),
+        ("officeDocument/2006/relationships", "officeDocument/relationships"),
+    )
+    rows = [["a", 0.5, datetime.date(2026, 3, 4)]]
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(xlsx(rows))) as old, zipfile.ZipFile(buffer, "w") as new:
+        for name in old.namelist():
+            text = old.read(name).decode()
+            for known, strict in names:
+                text = text.replace(usual + known, "http://purl.oclc.org/ooxml/" + strict)
+            new.writestr(name, text)
+    assert ours(buffer.getvalue()) == {1: ["a", 0.5, datetime.date(2026, 3, 4)]}
+
+
+def test_a_style_that_the_library_does_not_know_leaves_the_cells_as_they_are(package):
+    styles = f'<styleSheet {MAIN}><fonts><font><color rgb="cornflower"/></font></fonts></styleSheet>'
+    assert ours(package('<row r="1"><c r="A1"><v>1</v></c></row>', styles=styles)) == {1: [1.0]}

@@ -388,7 +388,8 @@ def test_26_a_number_formatted_as_a_date_is_a_date(read, xlsx, number_format):
 
 @pytest.mark.parametrize(("flag", "serial"), [("0", 46085), ("1", 44623), ("true", 44623)])
 def test_26_a_date_of_either_system_is_the_same_day(read, package, flag, serial):
-    styles = '<styleSheet><cellXfs><xf numFmtId="0"/><xf numFmtId="14"/></cellXfs></styleSheet>'
+    main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+    styles = f'<styleSheet xmlns="{main}"><cellXfs><xf numFmtId="0"/><xf numFmtId="14"/></cellXfs></styleSheet>'
     data = _rows_with('<c r="E2"><v>0.013</v></c>' + f'<c r="G2" s="1"><v>{serial}</v></c>')
     data = data.replace("</row>", '<c r="G1" t="inlineStr"><is><t>inspection_date</t></is></c></row>', 1)
     result = read(package(data, styles=styles, book_pr=f'<workbookPr date1904="{flag}"/>'), "t.xlsx")
@@ -652,6 +653,11 @@ def test_38_a_document_type_in_utf_16_is_refused(read, package):
     assert only(read(package(sheet_xml=xml), "t.xlsx")).code == "xml_declaration"
 
 
+def test_38_a_document_type_behind_a_long_comment_is_refused(read, package):
+    prolog = f'<?xml version="1.0"?><!-- {"a" * 70_000} --><!DOCTYPE x [<!ENTITY a "0.013">]>'
+    assert only(read(package(prolog=prolog), "t.xlsx")).code == "xml_declaration"
+
+
 @pytest.mark.parametrize("reference", ["A1:XFD1048576", "A1", "A1:B1", "nonsense"])
 def test_39_a_lying_dimension_is_ignored(read, package, reference):
     assert clearances(read(package(before=f'<dimension ref="{reference}"/>'), "t.xlsx")) == {3: 0.013, 5: 0.007}
@@ -698,7 +704,8 @@ def test_42_files_written_by_libreoffice_are_read(read, samples, name):
         ("G4", "date_serial"),
     ]
     assert any("hidden sheets were not read: 'Old'" in note for note in result.notes)
-    assert any("1 hidden or filtered row" in note for note in result.notes)
+    (told,) = (note for note in result.notes if "1 hidden or filtered row" in note)
+    assert told.endswith("column E (1), F (3), H (2)")
 
 
 @pytest.mark.parametrize(
@@ -728,6 +735,23 @@ def test_43_a_truncated_workbook_is_named_as_cut_off(read, xlsx, keep):
     assert "cut off" in problem.value
 
 
+@pytest.mark.parametrize(
+    ("part", "content_type", "words"),
+    [
+        (
+            "word/document.xml",
+            "application/vnd.openxmlformats-officedocument.wordprocessingml.document.main+xml",
+            "text",
+        ),
+        ("xl/workbook.bin", "application/vnd.ms-excel.sheet.binary.macroEnabled.main", "xlsb"),
+    ],
+)
+def test_43_a_package_of_another_program_is_named_in_plain_words(read, package, part, content_type, words):
+    types = f'<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Override PartName="/{part}" '
+    data = package(parts={part: b"\x83", "[Content_Types].xml": f'{types}ContentType="{content_type}"/></Types>'})
+    assert (only(read(data, "t.xlsx")).code, words in only(read(data, "t.xlsx")).value) == ("file_kind", True)
+
+
 def test_43_a_pdf_named_csv_is_named_as_a_pdf(read):
     assert "PDF" in only(read(b"%PDF-1.4\n%\xe2\xe3", "t.csv")).value
 
@@ -738,7 +762,7 @@ def test_43_bytes_that_are_no_text_are_refused(read):
 
 @pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", " =cmd|' /C calc'!A0", "＝1+1"])
 def test_44_an_exported_text_is_no_formula(tmp_path, text):
-    from mlg_troubleshoot.records import write_csv
+    from mlg_troubleshoot.outputs import write_csv
 
     write_csv(tmp_path / "out.csv", ["remarks", "n"], [[text, -0.5]])
     lines = (tmp_path / "out.csv").read_text().splitlines()
@@ -756,3 +780,91 @@ def test_44_a_text_in_an_annotated_workbook_is_no_formula(tmp_path, read, xlsx):
     sheet = openpyxl.load_workbook(out)["Inspections"]
     assert (sheet["G1"].value, sheet["G1"].data_type) == ("=verdict", "s")
     assert (sheet["G2"].value, sheet["G2"].data_type) == ("=1+1", "s")
+
+
+@pytest.mark.parametrize("text", ["N/A", "n/a", "-", "\u2014", "NM", "nil", "not measured", "none", " Not Measured "])
+def test_46_a_word_for_not_measured_is_a_joint_without_a_reading(read, xlsx, text):
+    def change(book):
+        book.worksheets[0]["E2"] = text
+
+    result = read(xlsx(change=change), "t.xlsx")
+    assert not result.problems
+    assert result.rows[0].clearance_in == {5: 0.007}
+    assert any("1 cell with" in note and "not measured" in note for note in result.notes)
+
+
+@pytest.mark.parametrize("column", ["margin_in", "tail_no", "side"])
+def test_46_no_word_leaves_out_a_margin_or_an_identity(read, table, column):
+    cells = dict(zip(HEADER, GOOD, strict=True)) | {column: "-"}
+    result = read(table(tuple(cells), [tuple(cells.values())]))
+    assert result.problems or result.rows[0].tail_no == "-"
+
+
+@pytest.mark.parametrize(
+    ("header", "column"),
+    [
+        ("Aircraft", "tail_no"),
+        ("A/C Reg", "tail_no"),
+        ("Posn", "side"),
+        ("Position", "side"),
+        ("Jt 3 clr (thou)", "clearance_3_thou"),
+        ("Insp Date", "inspection_date"),
+    ],
+)
+def test_47_the_usual_headers_are_read_with_one_note_for_all(read, table, header, column):
+    good = dict(zip(HEADER, GOOD, strict=True)) | {"inspection_date": "2026-03-04", "Jt 7 clr (thou)": 2}
+    renamed = {
+        (header if name == column or (column.startswith(name[:11]) and name[:11] == "clearance_3") else name): v
+        for name, v in good.items()
+    }
+    result = read(table(tuple(renamed), [tuple(renamed.values())]))
+    assert not result.problems
+    (note,) = result.notes
+    assert f'"{header}" {column}' in note
+    assert "clearance_7_thou" in note
+
+
+def test_47_a_column_with_the_plain_name_goes_before_an_alias(read, table):
+    result = read(table((*HEADER, "Aircraft", "Position"), [(*GOOD, "Hawker 800XP", "hangar 3")]))
+    assert not result.problems
+    assert (result.rows[0].tail_no, result.rows[0].side) == ("N100AB", "LH")
+    assert result.rows[0].carried == {"Aircraft": "Hawker 800XP", "Position": "hangar 3"}
+
+
+@pytest.mark.parametrize(
+    "text", ["14-Jan-25", "14 Jan 2025", "14 January 2025", "Jan 14, 2025", "14.jan.2025", "14Jan2025"]
+)
+def test_49_a_date_with_the_month_as_a_word_is_read(read, table, text):
+    rows = [(*GOOD, f'"{text}"')]
+    assert str(read(table((*HEADER, "inspection_date"), rows)).rows[0].inspection_date) == "2025-01-14"
+
+
+@pytest.mark.parametrize("text", ["31 Feb 2025", "14 Jon 2025", "Jan 2025"])
+def test_49_a_day_that_is_not_in_the_calendar_is_refused(read, table, text):
+    assert only(read(table((*HEADER, "inspection_date"), [(*GOOD, text)]))).code == "date_invalid"
+
+
+@pytest.mark.parametrize(
+    "word", ["Total", "TOTALS:", "Average", "Signed: J. Smith", "end of list", "Checked by", "Subtotal N1"]
+)
+def test_50_a_row_of_totals_or_a_signature_is_set_aside(read, table, word):
+    rows = [GOOD, (word, None, None, None, 0.02, 0.03), ("R2", *GOOD[1:])]
+    result = read(table(rows=rows))
+    assert [row.source.row for row in result.rows] == [2, 4]
+    assert not result.problems
+    assert any(f"1 row is no inspection and set aside: row 3 {word!r}" in note for note in result.notes)
+
+
+def test_50_a_row_of_a_gear_is_no_totals_row_however_its_record_is_called(read, table):
+    result = read(table(rows=[GOOD, ("Page 7", *GOOD[1:4], None, None)]))
+    assert [row.record_id for row in result.rows] == ["R1", "Page 7"]
+
+
+def test_50_any_other_row_without_a_tail_stays_an_error(read, table):
+    assert len(read(table(rows=[GOOD, ("R2", None, None, None, 0.02, 0.03)])).problems) == 3
+
+
+def test_51_record_ids_that_look_like_joints_leave_a_table_a_table(read, table):
+    ids = ["#1", "#2", "#3", '"J1,J2"', "J4"]
+    result = read(table(rows=[(record, *GOOD[1:]) for record in ids]))
+    assert [row.record_id for row in result.inspections] == ["#1", "#2", "#3", "J1,J2", "J4"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from html import unescape
@@ -13,12 +13,14 @@ from typing import Any
 
 import pytest
 
-from mlg_troubleshoot.decision.assess import AssessOptions, assess
-from mlg_troubleshoot.decision.assessment import Action, Assessment, NextAction, Rejected
+from mlg_troubleshoot.decision.assessment import Assessment, Rejected
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, InvalidRow, Outcome, RowSource, Side
+from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.decision.planner import correct
+from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting import ReportProvenance, write_inspection_report
-from mlg_troubleshoot.studies.table import IndexTable
+from mlg_troubleshoot.reporting import ReportProvenance, WrittenReport, inspection_document, publish
+from mlg_troubleshoot.studies.index_table import IndexTable
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 FAILURE = {3: 0.013, 5: 0.007}
@@ -52,7 +54,7 @@ def judge(gear: Gear, table: IndexTable) -> Judge:
     """Judge one inspection, repair sets and allowances included."""
 
     def judged(clearance_in: Mapping[int, float], **changes: Any) -> Assessment:
-        options = AssessOptions(repairs=True, allowances=True)
+        options = AssessOptions(advice=True)
         (found,) = assess([inspection(clearance_in, **changes)], gear, table, options)
         assert isinstance(found, Assessment)
         return found
@@ -76,7 +78,23 @@ def provenance(gear: Gear) -> ReportProvenance:
 def rejected() -> Rejected:
     """A row whose side is missing."""
     row = InvalidRow("R-9", "N77X", None, ("side",), ("Column 'foo' is not known.",), RowSource("fleet.csv", None, 7))
-    return Rejected(row, NextAction(Action.CORRECT, (), "Do not use. Correct: side."), ())
+    return Rejected(row, correct(row), ())
+
+
+def write_inspection_report(
+    judgement: Assessment | Rejected,
+    gear: Gear,
+    folder: Path,
+    *,
+    provenance: ReportProvenance,
+    formats: Sequence[str] = ("html", "pdf"),
+    page: str = "A4",
+    problems: Iterable[Problem] = (),
+    unit: LengthUnit = LengthUnit.INCH,
+) -> WrittenReport:
+    """Write the report of one inspection."""
+    document = inspection_document(judgement, gear, provenance, problems, unit)
+    return publish(document, folder, formats=formats, page=page, created=provenance.created)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Sequence
+from datetime import date
 from pathlib import Path
 
 import pytest
@@ -12,10 +13,26 @@ import pytest
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
 from mlg_troubleshoot.errors import OutputError, Problem
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting import ReportProvenance, write_batch_report, write_reports
+from mlg_troubleshoot.reporting import ReportProvenance, WrittenReport, batch_document, publish, write_reports
+from mlg_troubleshoot.reporting.inspection_report import latest_of_each_gear
 
 from .conftest import FAILURE, SOUND, WORN, Judge, readable
 from .test_pdf import opened
+
+
+def write_batch_report(
+    judgements: Sequence[Judgement],
+    problems: Sequence[Problem],
+    gear: Gear,
+    folder: Path,
+    *,
+    provenance: ReportProvenance,
+    formats: Sequence[str] = ("html", "pdf"),
+    notes: Sequence[str] = (),
+) -> WrittenReport:
+    document = batch_document(judgements, problems, gear, provenance, notes)
+    return publish(document, folder, formats=formats, page="A4", created=provenance.created)
+
 
 PROBLEM = Problem("side", "fleet.csv", None, 7, "side", "C7", "LEFT", "LH or RH", "Write LH or RH.")
 
@@ -44,7 +61,9 @@ def summary(
 
 def records(html: str) -> list[str]:
     return re.findall(
-        r'<th scope="row"><bdi>.*?</bdi></th><td class="strong">..?</td><td>(?:<a[^>]*>)?<bdi>(.*?)</bdi>', html
+        r'<th scope="row"><bdi>.*?</bdi></th><td class="strong">..?</td><td class="one-line">[-–\d]*</td>'
+        r"<td>(?:<a[^>]*>)?<bdi>(.*?)</bdi>",
+        html,
     )
 
 
@@ -54,7 +73,7 @@ def test_each_verdict_is_counted_once(batch: Sequence[Judgement], summary: tuple
 
 
 def test_each_verdict_is_counted_under_its_name(summary: tuple[str, bytes]) -> None:
-    assert re.search(r"2</span><span>OUTSIDE MARGIN", summary[0])
+    assert re.search(r"3</span><span>OUTSIDE MARGIN", summary[0])
 
 
 def test_every_gear_has_one_line(summary: tuple[str, bytes]) -> None:
@@ -117,6 +136,68 @@ def test_the_summary_links_the_reports(
     links = re.findall(r'href="([^"#]+)"', first.html.read_text(encoding="utf-8"))
     assert len(links) == len(batch)
     assert all((tmp_path / link).is_file() for link in links)
+
+
+def test_a_link_to_a_long_name_leads_there(
+    judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path
+) -> None:
+    long = [judge(SOUND, tail_no="N" * 40, record_id=f"{n}" * 40) for n in range(2)]
+    first = write_reports(long, [], gear, tmp_path, provenance=provenance, formats=("html",))[0]
+    assert first.html is not None
+    links = re.findall(r'href="([^"#]+)"', first.html.read_text(encoding="utf-8"))
+    assert all(len(link) > 64 and (tmp_path / link).is_file() for link in links)
+    assert len(links) == 2
+
+
+@pytest.fixture(scope="module")
+def twice(judge: Judge) -> list[Judgement]:
+    """One gear inspected three times, the latest of them not last in the table, and another one once."""
+    days = {"spring": date(2024, 3, 1), "autumn": date(2024, 9, 2), "summer": date(2024, 6, 3)}
+    one = [judge(FAILURE, record_id=name, inspection_date=day, tail_no="N2") for name, day in days.items()]
+    return [*one, judge(SOUND, record_id="other", tail_no="N1")]
+
+
+def test_each_gear_has_one_line_with_its_latest_inspection(twice: list[Judgement]) -> None:
+    latest, earlier = latest_of_each_gear(twice)
+    named = [[j.inspection.record_id for j in (twice[i] for i in places)] for places in (latest, earlier)]
+    assert named == [["autumn", "other"], ["spring", "summer"]]
+
+
+def test_a_gear_that_cannot_be_cleared_has_no_probability_that_would_clear_it(
+    judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path
+) -> None:
+    open_joints = [judge({3: 0.001}, outcome=None, record_id=name, tail_no=name) for name in ("one", "two")]
+    written = write_batch_report(open_joints, [], gear, tmp_path, provenance=provenance, formats=("html",))
+    assert written.html is not None
+    text = readable(written.html.read_text(encoding="utf-8"))
+    assert "INCOMPLETE" in text
+    assert "99.9" not in text
+
+
+def test_earlier_inspections_have_a_table_of_their_own(
+    twice: list[Judgement], gear: Gear, provenance: ReportProvenance, tmp_path: Path
+) -> None:
+    written = write_batch_report(twice, [], gear, tmp_path, provenance=provenance, formats=("html",))
+    assert written.html is not None
+    text = readable(written.html.read_text(encoding="utf-8"))
+    first, second = text[text.index("Latest inspection of each gear") :].split("Earlier inspections of the same gears")
+    assert "2024-09-02 autumn" in first
+    assert "2024-03-01 spring" in second
+
+
+def test_a_link_in_the_pdf_opens_the_pdf_beside_it(
+    twice: list[Judgement], gear: Gear, provenance: ReportProvenance, tmp_path: Path
+) -> None:
+    written = write_reports(twice, [], gear, tmp_path, provenance=provenance, formats=("pdf",))
+    assert written[0].pdf is not None
+    actions = [
+        note.get_object()["/A"]
+        for page in opened(written[0].pdf.read_bytes()).pages
+        for note in page.get("/Annots", ())
+        if "/A" in note.get_object()
+    ]
+    files = {action["/F"] for action in actions if action["/S"] == "/GoToR"}
+    assert files == {report.pdf.name for report in written[1:] if report.pdf}
 
 
 def test_inspections_of_the_same_identity_do_not_overwrite_each_other(

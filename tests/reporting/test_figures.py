@@ -11,41 +11,33 @@ from hypothesis import strategies as st
 
 from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting.figures import (
-    Axis,
-    Band,
-    Bar,
-    Canvas,
-    Plot,
-    Series,
-    bar_chart,
-    line_plot,
-    nice_ticks,
-    scatter_plot,
-)
-from mlg_troubleshoot.reporting.inspection_figures import margin_gauge, verdict_sign
+from mlg_troubleshoot.reporting.figures import Axis, Bar, Canvas, Plot, Series, draw_bar, nice_ticks
+from mlg_troubleshoot.reporting.formats import Lengths
+from mlg_troubleshoot.reporting.inspection_figures import margin_gauge, plunger_curve
 from mlg_troubleshoot.reporting.schematic import schematic
+from mlg_troubleshoot.reporting.signs import SIGNS, sign
+from mlg_troubleshoot.units import LengthUnit
 
 from .conftest import FAILURE, SOUND, WORN, Judge
 
-LINE = Series("one & <two>", (0.0, 1.0, 2.0), (1.0, float("nan"), 3.0), marker="circle")
+INCHES = Lengths()
 
 
 def rectangles(svg: str) -> list[dict[str, str]]:
     return [element.attrib for element in ET.fromstring(svg).iter() if element.tag.endswith("rect")]
 
 
-@pytest.mark.parametrize(
-    "svg",
-    [
-        bar_chart([Bar("a<b", 1.0, "1")], "Bars & more"),
-        line_plot([LINE], Axis("x", 0, 2), Axis("y", 0, 3), "Lines", band=Band("margin", 1, 2)),
-        scatter_plot([LINE], Axis("x", 0, 2), Axis("y", 0, 3), "Points", diagonal=True),
-        *(verdict_sign(verdict) for verdict in Verdict),
-    ],
-)
-def test_a_figure_is_well_formed(svg: str) -> None:
-    assert ET.fromstring(svg).get("role") == "img"
+@pytest.mark.parametrize("of", SIGNS)
+def test_a_sign_is_well_formed(of: str) -> None:
+    assert ET.fromstring(sign(of)).get("role") == "img"
+
+
+def test_every_verdict_has_its_own_shape() -> None:
+    assert len({SIGNS[verdict.value][0] for verdict in Verdict}) == len(Verdict)
+
+
+def test_every_verdict_of_a_diagnosis_has_its_own_shape() -> None:
+    assert len({SIGNS[verdict][0] for verdict in ("NAMED", "AMBIGUOUS", "UNLISTED", "NONE")}) == 4
 
 
 def test_text_in_a_figure_is_escaped() -> None:
@@ -54,18 +46,30 @@ def test_text_in_a_figure_is_escaped() -> None:
     assert "<script>" not in canvas.svg()
 
 
+def test_what_would_reorder_the_text_of_a_figure_is_shown_as_its_code() -> None:
+    canvas = Canvas(10, 10, "a\u202eb")
+    canvas.text(0, 0, "N1\u202d2")
+    assert not {"\u202e", "\u202d"} & set(canvas.svg())
+    assert "N1‹U+202D›2" in canvas.svg()
+
+
 def test_bars_are_as_long_as_their_values() -> None:
-    widths = [float(r["width"]) for r in rectangles(bar_chart([Bar("a", 1.0, "1"), Bar("b", 3.0, "3")], "t"))]
-    assert widths[1] == pytest.approx(3 * widths[0], rel=0.01)
+    canvas = Canvas(100, 40, "t")
+    ends = [draw_bar(canvas, Bar(value), 10, 0, 8, 20.0) for value in (1.0, 3.0)]
+    assert ends == [30.0, 70.0]
 
 
 def test_a_missing_bar_draws_none() -> None:
-    assert rectangles(bar_chart([Bar("a", 1.0, "1"), Bar("b", None, "not measured")], "t"))[1:] == []
+    canvas = Canvas(100, 40, "t")
+    draw_bar(canvas, Bar(None), 10, 0, 8, 20.0)
+    assert rectangles(canvas.svg()) == []
 
 
 def test_a_gap_in_a_series_breaks_its_line() -> None:
+    canvas = Canvas(100, 80, "t")
     gap = Series("gap", (0.0, 1.0, 2.0, 3.0, 4.0), (1.0, 1.0, float("nan"), 1.0, 1.0))
-    assert line_plot([gap], Axis("x", 0, 4), Axis("y", 0, 2), "t").count("<polyline") == 2
+    Plot(canvas, Axis("x", 0, 4), Axis("y", 0, 2)).draw(gap)
+    assert canvas.svg().count("<polyline") == 2
 
 
 def test_a_plot_puts_the_ends_of_its_axes_on_its_frame() -> None:
@@ -88,15 +92,16 @@ def test_ticks_lie_within_their_axis(low: float, span: float) -> None:
 
 
 def test_the_gauge_shows_the_worst_case_of_both_senses(judge: Judge) -> None:
-    assert ">−0.0429 / +0.0472</text>" in str(margin_gauge(judge(FAILURE)))
+    assert ">−0.0429 / +0.0472</text>" in str(margin_gauge(judge(FAILURE), INCHES))
 
 
 def test_the_margin_of_the_gauge_is_drawn_to_the_scale_of_the_worst_case(judge: Judge) -> None:
     judged = judge(FAILURE)
     lines = re.findall(
-        r'<line x1="([\d.]+)" y1="([\d.]+)" x2="([\d.]+)" y2="([\d.]+)"[^>]*stroke-width="4"', str(margin_gauge(judged))
+        r'<line x1="([\d.]+)" y1="([\d.]+)" x2="([\d.]+)" y2="([\d.]+)"[^>]*stroke-width="4"',
+        str(margin_gauge(judged, INCHES)),
     )
-    margin = rectangles(str(margin_gauge(judged)))[0]
+    margin = rectangles(str(margin_gauge(judged, INCHES)))[0]
     assert judged.over_travel_in is not None
     assert judged.under_travel_in is not None
     drawn = float(lines[0][2]) - float(lines[0][0])
@@ -105,7 +110,7 @@ def test_the_margin_of_the_gauge_is_drawn_to_the_scale_of_the_worst_case(judge: 
 
 
 def test_there_is_no_gauge_where_the_linkage_does_not_close(judge: Judge) -> None:
-    assert margin_gauge(judge(dict.fromkeys(range(1, 11), 0.0465))) is None
+    assert margin_gauge(judge(dict.fromkeys(range(1, 11), 0.0465)), INCHES) is None
 
 
 def arrow_lengths(gear: Gear, judge: Judge, clearance: dict[int, float]) -> list[float]:
@@ -143,3 +148,51 @@ def test_no_label_of_the_schematic_lies_outside_it(gear: Gear, judge: Judge) -> 
         for x, y in re.findall(r'<text x="([-\d.]+)" y="([-\d.]+)"', str(svg)):
             assert 0 <= float(x) <= width
             assert 0 <= float(y) <= height
+
+
+def curves(svg: str) -> list[list[tuple[float, float]]]:
+    """Points of the lines of a plot."""
+    return [
+        [(float(x), float(y)) for x, y in (pair.split(",") for pair in points.split())]
+        for points in re.findall(r'<polyline points="([^"]*)"', svg)
+    ]
+
+
+def test_the_plunger_is_drawn_as_its_displacement_from_nominal(gear: Gear, judge: Judge) -> None:
+    judged = judge(FAILURE)
+    svg = str(plunger_curve(gear, judged))
+    over, under = curves(svg)
+    zero = next(float(y) for y in re.findall(r'<line x1="[\d.]+" y1="([\d.]+)"[^>]*stroke-width="1.2"', svg))
+    assert judged.over_travel_in is not None
+    assert judged.under_travel_in is not None
+    assert (zero - over[-1][1]) / (zero - under[-1][1]) == pytest.approx(
+        judged.over_travel_in / judged.under_travel_in, rel=0.02
+    )
+
+
+def triangles(svg: str) -> int:
+    return len(re.findall(r"<polygon points=\"(?:[-\d.]+,[-\d.]+ ?){3}\"", svg))
+
+
+def test_readings_along_the_stroke_stand_in_the_plunger_s_figure(gear: Gear, judge: Judge) -> None:
+    without = str(plunger_curve(gear, judge(FAILURE)))
+    along = judge(FAILURE, actuator_extension_in=0.3, plunger_position_in=0.2, readings_in=(0.041,))
+    assert (triangles(without), triangles(str(plunger_curve(gear, along)))) == (0, 3)
+
+
+def test_a_figure_in_thou_says_so(gear: Gear, judge: Judge) -> None:
+    svg = str(plunger_curve(gear, judge(FAILURE), Lengths(LengthUnit.THOU)))
+    assert "displacement from nominal, thou" in svg
+    assert ">+47.2</text>" in svg
+
+
+def test_markers_of_joints_do_not_overlap(gear: Gear, judge: Judge) -> None:
+    for _, svg, _ in schematic(gear, judge(WORN)).panels:
+        places = [
+            (float(x), float(y))
+            for x, y, _ in re.findall(
+                r'<text x="([\d.]+)" y="([\d.]+)"[^>]*text-anchor="middle">(\d+)</text>', str(svg)
+            )
+        ]
+        for i, (x, y) in enumerate(places):
+            assert all((x - a) ** 2 + (y - b) ** 2 > 19.0**2 for a, b in places[:i])

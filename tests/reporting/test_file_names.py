@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mlg_troubleshoot.errors import OutputError, UsageError
-from mlg_troubleshoot.reporting.publish import safe_stem, write_file
+from mlg_troubleshoot.outputs import write_bytes
+from mlg_troubleshoot.reporting.publish import safe_stem
 
 from .conftest import FAILURE, Judge, Made
 
@@ -48,7 +49,7 @@ def test_the_name_can_be_read() -> None:
 def test_a_file_is_written_completely_or_not_at_all(tmp_path: Path) -> None:
     (tmp_path / "report.html").mkdir()
     with pytest.raises(OutputError):
-        write_file(tmp_path / "report.html", b"text")
+        write_bytes(tmp_path / "report.html", b"text")
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
 
 

@@ -10,8 +10,9 @@ import pytest
 
 from mlg_troubleshoot.decision.assessment import Rejected
 from mlg_troubleshoot.errors import Problem
-from mlg_troubleshoot.reporting.glyphs import breakable, visible
+from mlg_troubleshoot.reporting.glyphs import breakable
 from mlg_troubleshoot.reporting.html import css_string
+from mlg_troubleshoot.visible import visible
 
 from .conftest import FAILURE, Judge, Made, readable
 from .test_pdf import opened, text_of
@@ -96,6 +97,25 @@ def test_a_control_character_is_shown_as_its_code() -> None:
 )
 def test_ordinary_writing_is_left_alone(text: str) -> None:
     assert visible(text) == text
+
+
+@pytest.mark.parametrize("text", ["a\tb", "a\nb", "a\rb"])
+def test_a_text_on_one_line_has_no_line_end(text: str) -> None:
+    assert visible(text, one_line=True) == f"a‹U+{ord(text[1]):04X}›b"
+
+
+@pytest.mark.parametrize(
+    "text", ["\x1b[31mred", "\x1b]8;;x\x07y", "\x9b2J", "\u2067a\u2069", "\ud800", "a\u2028b", "\u200ea"]
+)
+def test_what_acts_on_a_reader_is_shown_as_a_code(text: str) -> None:
+    assert visible(text).isprintable()
+    assert visible(text).count("‹") == sum(not c.isprintable() for c in text)
+
+
+def test_markup_of_a_terminal_is_text(judge: Judge, make: Callable[..., Made]) -> None:
+    made = make(judge(FAILURE, record_id="[link=http://x]R[/link]", tail_no="N1\x1b]0;t\x07"), formats=("html",))
+    assert "[link=http://x]R[/link]" in made.text
+    assert "N1‹U+001B›]0;t‹U+0007›" in made.text
 
 
 def test_a_css_string_cannot_be_left() -> None:

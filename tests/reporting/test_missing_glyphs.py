@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
-from unittest.mock import Mock
 
 import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting import ReportProvenance, write_inspection_report
+from mlg_troubleshoot.reporting import ReportProvenance
+from mlg_troubleshoot.reporting.engine import check_fonts
 from mlg_troubleshoot.reporting.glyphs import font_coverage, missing_characters, spell_out
-from mlg_troubleshoot.reporting.pdf import PdfEngine, has_missing_glyphs
+from mlg_troubleshoot.reporting.pdf import PdfEngine
 
-from .conftest import FAILURE, Judge, Made
-from .test_pdf import NOW, page_of, text_of
+from .conftest import FAILURE, Judge, Made, write_inspection_report
+from .test_pdf import NOW, opened, page_of, text_of
 
 
 def test_hangul_is_missing_from_the_fonts() -> None:
@@ -43,9 +42,8 @@ def test_an_ideograph_is_spelled_by_its_code() -> None:
 @pytest.fixture
 def without_other_fonts(monkeypatch: pytest.MonkeyPatch) -> None:
     """As on a computer that has no font for them: the PDF shows boxes."""
-    monkeypatch.setattr(
-        sys.modules["mlg_troubleshoot.reporting.publish"], "has_missing_glyphs", Mock(return_value=True)
-    )
+    convert = PdfEngine.convert
+    monkeypatch.setattr(PdfEngine, "convert", lambda *given: (convert(*given)[0], True))
 
 
 @pytest.mark.usefixtures("without_other_fonts")
@@ -72,11 +70,11 @@ def test_the_html_keeps_the_name_as_entered(judge: Judge, make: Callable[..., Ma
 def test_a_box_in_the_pdf_is_noticed() -> None:
     # A private-use character that no font has.
     with PdfEngine() as engine:
-        assert has_missing_glyphs(engine.convert(page_of("<p>a \U000f1234</p>"), "A4", NOW))
+        assert engine.convert(page_of("<p>a \U000f1234</p>"), "A4", NOW)[1]
 
 
 def test_ordinary_text_has_no_box(failure: Made) -> None:
-    assert not has_missing_glyphs(failure.pdf)
+    assert not check_fonts(opened(failure.pdf))
 
 
 def test_ordinary_text_gives_no_note(judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path) -> None:

@@ -13,11 +13,11 @@ import pypdf
 import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting import ReportProvenance, WrittenReport, write_inspection_report
+from mlg_troubleshoot.reporting import ReportProvenance, WrittenReport
 from mlg_troubleshoot.reporting.pdf import PdfError
 from mlg_troubleshoot.reporting.tagged import make_tagged_pdf
 
-from .conftest import FAILURE, Judge
+from .conftest import FAILURE, Judge, write_inspection_report
 
 Write = Callable[..., WrittenReport]
 
@@ -44,6 +44,10 @@ def test_without_the_engine_the_html_is_there(write: Write, without_engine: None
     assert found.tagged is None
     assert found.html is not None
     assert found.html.is_file()
+
+
+def test_without_the_engine_there_is_a_pdf_all_the_same(write: Write, without_engine: None) -> None:
+    assert write("pdf-ua").pdf is not None
 
 
 def test_without_the_engine_a_note_says_what_to_install(write: Write, without_engine: None) -> None:

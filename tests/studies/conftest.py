@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.studies.displacement import HeldDirections, Response, worst_directions
 from mlg_troubleshoot.studies.inputs import Inputs
-from mlg_troubleshoot.studies.response import HeldDirections, Response, nominal_response
 from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ class Oracle:
 @pytest.fixture(scope="session")
 def response(gear: Gear) -> HeldDirections:
     """The reference linkage in its worst directions."""
-    return nominal_response(gear)
+    return worst_directions(gear.model, gear.limits_in)
 
 
 @pytest.fixture(scope="session")

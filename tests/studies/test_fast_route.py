@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.studies.chaos import chaos_indices, legendre_terms, total_degree
+from mlg_troubleshoot.studies.displacement import Response
 from mlg_troubleshoot.studies.inputs import beyond_margin
-from mlg_troubleshoot.studies.response import Response
 from mlg_troubleshoot.studies.saltelli import fast_indices
 from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
 

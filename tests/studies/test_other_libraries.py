@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.studies.response import Response
+from mlg_troubleshoot.studies.displacement import Response
 from mlg_troubleshoot.studies.tensor import TensorIndices
 
 

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.errors import InconclusiveDataError, UsageError
+from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.studies.displacement import HeldDirections
 from mlg_troubleshoot.studies.given_data import given_data_indices
 from mlg_troubleshoot.studies.groups import group_indices, link_groups
 from mlg_troubleshoot.studies.inputs import DISTRIBUTIONS, Inputs, beyond_margin
-from mlg_troubleshoot.studies.response import HeldDirections, worst_per_sample
 from mlg_troubleshoot.studies.statements import Outcome, Statement, check_statements
 from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
 
@@ -65,7 +66,7 @@ def test_directions_found_anew_for_every_sample_change_the_displacement_by_less_
     gear: Gear, response: HeldDirections
 ) -> None:
     clearance = gear.limits_in * np.random.default_rng(0).random((500, 10))
-    anew = worst_per_sample(gear.model)(clearance)
+    anew = worst_case(gear.model, clearance).magnitude_in
     assert np.abs(anew - response(clearance)).max() < 1e-5
 
 

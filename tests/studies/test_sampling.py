@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.studies.displacement import Response
 from mlg_troubleshoot.studies.inputs import Inputs, joint_groups, with_random_directions
-from mlg_troubleshoot.studies.response import Response
 from mlg_troubleshoot.studies.saltelli import fast_indices, saltelli_indices
 from mlg_troubleshoot.studies.tensor import TensorIndices
 

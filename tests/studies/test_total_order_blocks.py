@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +11,14 @@ import pytest
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.studies.blocks import BlockStudy, block_study, compute_block, total_order_study
+from mlg_troubleshoot.studies.displacement import HeldDirections
 from mlg_troubleshoot.studies.inputs import Inputs
-from mlg_troubleshoot.studies.response import HeldDirections
 from mlg_troubleshoot.studies.tensor import TensorIndices
 
 
 @pytest.fixture
 def study(gear: Gear, response: HeldDirections) -> BlockStudy:
-    return block_study(response, Inputs(gear.limits_in), gear.geometry_sha256, 5, n1=8, n2=120, iterations=2)
+    return block_study(response, Inputs(gear.limits_in), gear.geometry_sha256, 5, (8, 120, 2))
 
 
 def test_the_papers_study_has_a_thousand_million_solutions(gear: Gear, response: HeldDirections) -> None:
@@ -26,7 +27,7 @@ def test_the_papers_study_has_a_thousand_million_solutions(gear: Gear, response:
 
 
 def test_total_order_indices_are_the_exact_ones(gear: Gear, response: HeldDirections, exact: TensorIndices) -> None:
-    study = block_study(response, Inputs(gear.limits_in), gear.geometry_sha256, 0, n1=20, n2=300, iterations=3)
+    study = block_study(response, Inputs(gear.limits_in), gear.geometry_sha256, 0, (20, 300, 3))
     found = total_order_study(study)
     assert found.total_order == pytest.approx(exact.total_order, abs=0.01)
     assert found.evaluations == study.evaluations
@@ -70,7 +71,7 @@ def test_a_state_file_of_another_study_is_refused(
 ) -> None:
     state = tmp_path / "state.jsonl"
     total_order_study(study, state=state)
-    other = block_study(response, Inputs(gear.limits_in), gear.geometry_sha256, 6, n1=8, n2=120, iterations=2)
+    other = block_study(response, Inputs(gear.limits_in), gear.geometry_sha256, 6, (8, 120, 2))
     with pytest.raises(UsageError, match="another study"):
         total_order_study(other, state=state)
 
@@ -81,7 +82,7 @@ def test_two_workers_give_the_same_bits_as_one(study: BlockStudy) -> None:
 
 def test_solutions_that_do_not_close_are_counted(gear: Gear, response: HeldDirections) -> None:
     wide = Inputs(np.full(10, 0.08))
-    found = total_order_study(block_study(response, wide, gear.geometry_sha256, 0, n1=10, n2=60, iterations=1))
+    found = total_order_study(block_study(response, wide, gear.geometry_sha256, 0, (10, 60, 1)))
     assert found.failed > 0
     assert np.any(np.isnan(found.total_order))
     assert "do not close" in found.note
@@ -103,3 +104,15 @@ def test_a_dask_cluster_of_two_processes_gives_the_same_bits(study: BlockStudy) 
         assert len(client.scheduler_info()["workers"]) == 2
         found = total_order_study(study, scheduler=client)
     assert np.array_equal(found.total_order, total_order_study(study).total_order)
+
+
+@pytest.mark.parametrize("line", ["nonsense\n", "[]\n", "[[0, 0], [1]]\n", '{"block": 1}\n'])
+def test_a_damaged_state_file_is_refused_and_not_an_error_of_the_program(
+    study: BlockStudy, tmp_path: Path, line: str
+) -> None:
+    state = tmp_path / "state.jsonl"
+    small = replace(study, n2=2, iterations=1)
+    total_order_study(small, state=state)
+    state.write_text(state.read_text() + line)
+    with pytest.raises(UsageError, match="damaged"):
+        total_order_study(small, state=state)

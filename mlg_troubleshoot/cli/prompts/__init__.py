@@ -1,7 +1,7 @@
 """The questions of ``mlg check`` on a terminal: one inspection, joint by joint."""
 
-from mlg_troubleshoot.cli.prompts.answers import Answers, Preset
-from mlg_troubleshoot.cli.prompts.ask import EntryInterruptedError, ask_inspection
+from mlg_troubleshoot.cli.prompts.answers import Answers
+from mlg_troubleshoot.cli.prompts.ask import Entry, EntryInterruptedError, ask_inspection
 from mlg_troubleshoot.cli.prompts.flow import Advice
 from mlg_troubleshoot.cli.prompts.lines import Line, Tone
 from mlg_troubleshoot.cli.prompts.store import Session, SessionFileError, SessionStore
@@ -10,9 +10,9 @@ from mlg_troubleshoot.cli.prompts.terminal import RichTerminal, Terminal
 __all__ = [
     "Advice",
     "Answers",
+    "Entry",
     "EntryInterruptedError",
     "Line",
-    "Preset",
     "RichTerminal",
     "Session",
     "SessionFileError",

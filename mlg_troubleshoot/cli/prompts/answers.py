@@ -1,4 +1,4 @@
-"""What has been answered so far, and how a clearance that was typed is judged."""
+"""What has been answered so far, as the row of a table that the one gate judges."""
 
 from __future__ import annotations
 
@@ -7,27 +7,22 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from types import MappingProxyType
 
-from mlg_troubleshoot.decision.inspection import Outcome, Side
+from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, WrittenLength, parse_length
 
 # Typed values are decimal, limits are binary: a value on a limit is within it.
 _EPS_IN = 1e-9
-_SMALLEST_SLIP_IN = 0.0001
+# Columns that an entry may have beside its heading and its clearances, in the order in which they are shown.
+LENGTHS = ("plunger_displacement", "margin")
+SIGN_OFF = ("technician_id", "work_order", "gauge_id", "inspection_date")
+MORE = ("outcome", *LENGTHS, *SIGN_OFF)
 
 
 @dataclass(frozen=True, slots=True)
 class JointAnswer:
-    """The answer for one joint.
-
-    Parameters
-    ----------
-    written : WrittenLength or None
-        The clearance as typed; None for a joint that was not measured.
-    confirmed : bool
-        True if a value far beyond the limit was confirmed.
-    """
+    """The answer for one joint; `written` is None where it was not measured, `confirmed` that it was asked again."""
 
     written: WrittenLength | None
     confirmed: bool = False
@@ -38,29 +33,7 @@ NOT_MEASURED = JointAnswer(None)
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """All answers of one inspection; None or a missing joint is still to be asked.
-
-    Parameters
-    ----------
-    tail_no : str or None
-        Tail number.
-    side : Side or None
-        Which gear.
-    unit : LengthUnit or None
-        Unit of a number that is typed without one.
-    convention : ClearanceConvention or None
-        What the readings are readings of.
-    record_id : str or None
-        Identity of the record, if a flag gave it.
-    joints : mapping of int to JointAnswer
-        Answers by joint number.
-    plunger_in : float or None
-        Measured displacement of the plunger at mid-position, over-travel positive. [in]
-    margin_in : float or None
-        This gear's own margin. [in]
-    outcome : Outcome or None
-        What the gear did.
-    """
+    """All answers of one inspection; None or a missing joint is still to be asked, `more` is optional, by column."""
 
     tail_no: str | None = None
     side: Side | None = None
@@ -68,40 +41,29 @@ class Answers:
     convention: ClearanceConvention | None = None
     record_id: str | None = None
     joints: Mapping[int, JointAnswer] = field(default_factory=lambda: MappingProxyType({}))
-    plunger_in: float | None = None
-    margin_in: float | None = None
-    outcome: Outcome | None = None
+    more: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def with_joint(self, number: int, answer: JointAnswer) -> Answers:
-        """Return the answers with one joint answered.
-
-        Parameters
-        ----------
-        number : int
-            Number of the joint.
-        answer : JointAnswer
-            Its answer.
-
-        Returns
-        -------
-        Answers
-            The new answers.
-        """
         return replace(self, joints=MappingProxyType({**self.joints, number: answer}))
 
+    def with_more(self, **columns: str | None) -> Answers:
+        """Return the answers with optional columns set, or taken away where they are None."""
+        merged: dict[str, str | None] = {**self.more, **columns}
+        kept = {name: merged[name] for name in MORE if merged.get(name)}
+        return replace(self, more=MappingProxyType({name: text for name, text in kept.items() if text is not None}))
+
+    def beside(self, given: Answers) -> Answers:
+        """Return the answers with what is missing filled from flags; only the record id is taken from these first."""
+        return replace(
+            self,
+            tail_no=self.tail_no or given.tail_no,
+            side=self.side or given.side,
+            unit=self.unit or given.unit,
+            convention=self.convention or given.convention,
+            record_id=given.record_id or self.record_id,
+        ).with_more(**{**given.more, **self.more})
+
     def reading(self, number: int) -> Reading | None:
-        """Return the reading of a joint.
-
-        Parameters
-        ----------
-        number : int
-            Number of the joint.
-
-        Returns
-        -------
-        Reading or None
-            The reading; None if it was not measured, or cannot be read yet for want of unit or convention.
-        """
         answer = self.joints.get(number)
         if answer is None or answer.written is None or self.convention is None:
             return None
@@ -114,20 +76,30 @@ class Answers:
         readings = {number: self.reading(number) for number in sorted(self.joints)}
         return {number: reading.radial_in for number, reading in readings.items() if reading is not None}
 
+    def inspection(self, gear: Gear, record_id: str) -> Inspection:
+        """Let the gate judge the whole row; `UsageError` if it is refused."""
+        from mlg_troubleshoot.records import ReadOptions, admit
+
+        values: dict[str, object] = {
+            "record_id": self.record_id or record_id,
+            "tail_no": self.tail_no,
+            "side": self.side,
+            "clearance_convention": self.convention,
+            **self.more,
+        }
+        for number in gear.joint_numbers:
+            reading = self.reading(number)
+            if reading is not None:
+                values[f"clearance_{number}_{reading.unit}"] = reading.written.text
+        read = admit(values, ReadOptions.of(gear))
+        confirmed = [f"#{n}" for n, answer in sorted(self.joints.items()) if answer.confirmed]
+        said = f"asked again and confirmed: {', '.join(confirmed)}"
+        return replace(read, warnings=(*read.warnings, said)) if confirmed else read
+
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """A clearance as typed, with the unit and the convention it is read in.
-
-    Parameters
-    ----------
-    written : WrittenLength
-        The number as typed.
-    unit : LengthUnit
-        Its unit, written or chosen.
-    convention : ClearanceConvention
-        What it is a reading of.
-    """
+    """A clearance as typed, with the unit and the convention it is read in."""
 
     written: WrittenLength
     unit: LengthUnit
@@ -145,138 +117,44 @@ class Reading:
 
 
 class Judgement(StrEnum):
-    """What to do with a reading."""
-
     ACCEPT = "accept"
     CONFIRM = "confirm"
     REFUSE = "refuse"
 
 
-def judge(reading: Reading, gear: Gear) -> Judgement:
-    """Say whether a reading is taken, asked again or refused.
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What the gate says of a reading: what to do, in which words, and the number if it is one."""
 
-    Parameters
-    ----------
-    reading : Reading
-        The reading.
-    gear : Gear
-        The gear, which states the two limits of entry.
+    judgement: Judgement
+    said: str = ""
+    written: WrittenLength | None = None
 
-    Returns
-    -------
-    Judgement
-        REFUSE beyond the hard limit, CONFIRM above the value to be confirmed, else ACCEPT.
-    """
-    if not reading.radial_in <= gear.hard_limit.value + _EPS_IN:
-        return Judgement.REFUSE
-    if reading.radial_in > gear.confirm_above.value + _EPS_IN:
-        return Judgement.CONFIRM
-    return Judgement.ACCEPT
+
+def judge(typed: str, number: int, unit: LengthUnit, convention: ClearanceConvention, gear: Gear) -> Judged:
+    """Let the gate that judges the cells of tables say whether a reading is taken, asked again or refused."""
+    from mlg_troubleshoot.records import ReadOptions, judge_length
+
+    options = ReadOptions.of(gear, unit=unit, convention=convention)
+    read, problems = judge_length(f"clearance_{number}", typed, options)
+    if problems or not isinstance(read, Inspection):
+        return Judged(Judgement.REFUSE, " ".join(f"expected {p.expected}. {p.remedy}" for p in problems))
+    if number not in read.entered:
+        return Judged(Judgement.ACCEPT)
+    written = parse_length(read.entered[number].text)
+    return Judged(Judgement.CONFIRM if read.warnings else Judgement.ACCEPT, " ".join(read.warnings), written)
+
+
+def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> Inspection:
+    """Let the gate judge one optional answer; `UsageError` if it is refused."""
+    from mlg_troubleshoot.records import ReadOptions, judge_length
+
+    options = ReadOptions.of(gear, unit=unit or LengthUnit.INCH, convention=ClearanceConvention.RADIAL)
+    read, problems = judge_length(column, typed, options)
+    if problems or not isinstance(read, Inspection):
+        raise UsageError(f"{typed!r} is not taken: expected {problems[0].expected}", problems[0].remedy)
+    return read
 
 
 def over_limit(reading: Reading, gear: Gear, number: int) -> bool:
-    """Tell whether a reading is over its joint's limit.
-
-    Parameters
-    ----------
-    reading : Reading
-        The reading.
-    gear : Gear
-        The gear.
-    number : int
-        Number of the joint.
-
-    Returns
-    -------
-    bool
-        True if the radial clearance is larger than the limit.
-    """
     return reading.radial_in > gear.joint(number).limit.value + _EPS_IN
-
-
-def likely_slips(reading: Reading, gear: Gear) -> tuple[str, ...]:
-    """Name the slips that would make a usual value of an unusual one; nothing is applied.
-
-    Parameters
-    ----------
-    reading : Reading
-        A reading that is refused or asked again.
-    gear : Gear
-        The gear.
-
-    Returns
-    -------
-    tuple of str
-        Suggestions in plain words: another unit, half the value, the decimal point.
-    """
-    value, usual_in = reading.written.value, gear.confirm_above.value
-
-    def usual(radial_in: float) -> bool:
-        return _SMALLEST_SLIP_IN <= radial_in <= usual_in + _EPS_IN
-
-    found = []
-    if reading.written.unit is None:
-        for unit in (LengthUnit.THOU, LengthUnit.MILLIMETRE):
-            other = replace(reading, unit=unit)
-            smaller = other.radial_in < reading.radial_in and (unit is LengthUnit.MILLIMETRE or value >= 1.0)
-            if smaller and usual(other.radial_in):
-                found.append(f"{value:g} {unit.value}? That is {other.as_read_in:.4f} in. Then type the unit.")
-    if reading.convention is ClearanceConvention.RADIAL and usual(reading.radial_in / 2):
-        found.append("A dial reading or bore minus pin? Then half of it is the radial clearance.")
-    if not found and usual(reading.radial_in / 10):
-        found.append(f"The decimal point? {value / 10:g} {reading.unit.value} would be a usual value.")
-    return tuple(found)
-
-
-@dataclass(frozen=True, slots=True)
-class Preset:
-    """What flags already gave; it is not asked again, and `b` still reaches it.
-
-    Parameters
-    ----------
-    tail_no : str or None
-        Tail number.
-    side : Side or None
-        Which gear.
-    unit : LengthUnit or None
-        Unit of numbers without one.
-    convention : ClearanceConvention or None
-        What the readings are readings of.
-    record_id : str or None
-        Identity of the record.
-    values : mapping of int to str
-        Clearances as written, by joint number.
-    """
-
-    tail_no: str | None = None
-    side: Side | None = None
-    unit: LengthUnit | None = None
-    convention: ClearanceConvention | None = None
-    record_id: str | None = None
-    values: Mapping[int, str] = field(default_factory=lambda: MappingProxyType({}))
-
-    def joints(self, gear: Gear) -> dict[int, JointAnswer]:
-        """Read the clearances.
-
-        Parameters
-        ----------
-        gear : Gear
-            The gear.
-
-        Returns
-        -------
-        dict of int to JointAnswer
-            Answers by joint number.
-
-        Raises
-        ------
-        UsageError
-            If the gear has no such joint, or a value is not a length.
-        """
-        found = {}
-        for number, text in self.values.items():
-            if number not in gear.joint_numbers:
-                known = ", ".join(map(str, gear.joint_numbers))
-                raise UsageError(f"there is no joint {number}", f"The joints of this gear are {known}.")
-            found[number] = JointAnswer(parse_length(text))
-        return found

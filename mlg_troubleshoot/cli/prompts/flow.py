@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from datetime import date
 from enum import StrEnum
 from types import MappingProxyType
 from typing import TypeVar
@@ -12,30 +13,32 @@ from typing import TypeVar
 from mlg_troubleshoot.cli.prompts import pages
 from mlg_troubleshoot.cli.prompts.answers import (
     NOT_MEASURED,
+    SIGN_OFF,
     Answers,
     JointAnswer,
+    Judged,
     Judgement,
-    Preset,
     Reading,
     judge,
+    judge_more,
 )
 from mlg_troubleshoot.cli.prompts.lines import Line, Tone, line
-from mlg_troubleshoot.cli.prompts.more import read_more
+from mlg_troubleshoot.cli.prompts.more import plunger_in, read_more
 from mlg_troubleshoot.cli.prompts.pages import Page
 from mlg_troubleshoot.cli.prompts.store import Session
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, WrittenLength, parse_length
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, WrittenLength
 
 _T = TypeVar("_T")
-Advice = Callable[[Mapping[int, float], tuple[int, ...]], str | None]
+# Radial clearances by joint [in] and the joints still to be asked, to a sentence and the joint that it names.
+Advice = Callable[[Mapping[int, float], tuple[int, ...]], tuple[str, int | None] | None]
 FindSaved = Callable[[str, Side], Session | None]
 
 
 class Ask(StrEnum):
-    """The kinds of question."""
-
     TAIL = "tail"
     SIDE = "side"
     UNIT = "unit"
@@ -45,41 +48,38 @@ class Ask(StrEnum):
     JOINT = "joint"
     CONFIRM = "confirm"
     MORE = "more"
+    CONFIRM_MORE = "confirm more"
+    DETAIL = "detail"
     REVIEW = "review"
 
 
 _HEADING = (Ask.TAIL, Ask.SIDE, Ask.UNIT, Ask.CONVENTION)
+Place = tuple[Ask, int | str | None]
 
 
 @dataclass(frozen=True, slots=True)
 class State:
     """Where the conversation stands.
 
-    Parameters
-    ----------
-    ask : Ask
-        The kind of question.
-    answers : Answers
-        Answers so far.
-    joint : int or None
-        The joint that is asked for.
-    pending : WrittenLength or None
-        A value that waits for a confirmation.
-    saved : Session or None
-        An unfinished inspection that is offered.
-    old_unit : LengthUnit or None
-        The unit before it was changed.
-    from_review : bool
-        True if the answer leads back to the review.
+    `at` is the joint or the column that is asked for, `pending` what waits for a confirmation, `saved` an unfinished
+    inspection that is offered, `suggested` the joint that Enter takes, and `trail` where one came from.
     """
 
     ask: Ask
     answers: Answers
-    joint: int | None = None
-    pending: WrittenLength | None = None
+    at: int | str | None = None
+    pending: WrittenLength | Answers | None = None
     saved: Session | None = None
     old_unit: LengthUnit | None = None
     from_review: bool = False
+    suggested: int | None = None
+    trail: tuple[Place, ...] = ()
+
+    @property
+    def joint(self) -> int:
+        if not isinstance(self.at, int):
+            raise TypeError("this question is not for a joint")
+        return self.at
 
 
 class Effect(StrEnum):
@@ -94,19 +94,7 @@ class Effect(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """What follows from an answer.
-
-    Parameters
-    ----------
-    state : State
-        The next question.
-    lines : tuple of Line
-        What to say before it.
-    effect : Effect
-        What else to do.
-    session : Session or None
-        The session to resume or to put away.
-    """
+    """What follows from an answer: the next question, what to say before it, and what else to do."""
 
     state: State
     lines: tuple[Line, ...] = ()
@@ -115,26 +103,17 @@ class Turn:
 
 
 _WORDS = {"b": "b", "back": "b", "?": "?", "help": "?", "q": "q", "quit": "q"}
+_YES, _NO = ("y", "yes"), ("n", "no")
 
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """The course of one inspection.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    find_saved : callable, optional
-        Looks for an unfinished inspection of a tail and side.
-    advice : callable, optional
-        Called after each critical joint with the radial clearances [in] by joint and the joints that are
-        still to be asked; what it returns is shown.
-    """
+    """The course of one inspection; `find_saved` looks for an unfinished one, `advice` names the joint worth most."""
 
     gear: Gear
     find_saved: FindSaved | None = None
     advice: Advice | None = None
+    today: date | None = None
 
     @property
     def order(self) -> tuple[int, ...]:
@@ -143,107 +122,29 @@ class Flow:
         return tuple(joint.number for joint in joints)
 
     def open_joints(self, answers: Answers) -> tuple[int, ...]:
-        """Return the joints still to be asked, in order.
-
-        Parameters
-        ----------
-        answers : Answers
-            Answers so far.
-
-        Returns
-        -------
-        tuple of int
-            Their numbers.
-        """
+        """Return the joints still to be asked, in order."""
         return tuple(number for number in self.order if number not in answers.joints)
 
-    def begin(self, preset: Preset) -> Turn:
-        """Begin an inspection.
+    def begin(self, given: Answers) -> Turn:
+        """Begin an inspection with what flags already gave; `b` still reaches it."""
+        return self._offer_or_go_on(given)
 
-        Parameters
-        ----------
-        preset : Preset
-            What flags gave.
-
-        Returns
-        -------
-        Turn
-            The first question.
-
-        Raises
-        ------
-        UsageError
-            If a flag's clearance cannot be read.
-        """
-        answers = Answers(
-            tail_no=preset.tail_no,
-            side=preset.side,
-            unit=preset.unit,
-            convention=preset.convention,
-            record_id=preset.record_id,
-            joints=MappingProxyType(preset.joints(self.gear)),
-        )
-        return self._offer_or_go_on(answers)
-
-    def resume(self, saved: Session, preset: Preset) -> Turn:
-        """Go on with an unfinished inspection.
-
-        Parameters
-        ----------
-        saved : Session
-            The inspection.
-        preset : Preset
-            What flags gave; it must not contradict what is saved.
-
-        Returns
-        -------
-        Turn
-            The first open question.
-
-        Raises
-        ------
-        UsageError
-            If the inspection belongs to another gear, or a flag contradicts it.
-        """
+    def resume(self, saved: Session, given: Answers) -> Turn:
         answers = saved.answers
         if saved.gear_id != self.gear.id or not set(answers.joints) <= set(self.gear.joint_numbers):
             raise UsageError(
                 f"the saved inspection is one of gear {saved.gear_id!r}, not of {self.gear.id!r}",
                 "Give that gear with --gear, or begin a new inspection.",
             )
-        against = _contradictions(answers, preset)
+        against = _contradictions(answers, given)
         if against:
             raise UsageError(
                 f"the saved inspection has {against}", "Resume without that flag, or begin a new inspection."
             )
-        answers = replace(
-            answers,
-            tail_no=answers.tail_no or preset.tail_no,
-            side=answers.side or preset.side,
-            unit=answers.unit or preset.unit,
-            convention=answers.convention or preset.convention,
-            record_id=preset.record_id or answers.record_id,
-            joints=MappingProxyType({**answers.joints, **preset.joints(self.gear)}),
-        )
-        told = [line((f"Resumed: {pages.identity(answers)}, ", Tone.GOOD), self._heading(answers))]
-        turn = self._go_on(answers)
-        return replace(turn, lines=(*told, *turn.lines))
+        answers = answers.beside(given)
+        return self._go_on(answers, told=self._resumed(answers))
 
     def page(self, state: State, width: int) -> Page:
-        """Return the question of a state as it is shown.
-
-        Parameters
-        ----------
-        state : State
-            The state.
-        width : int
-            Width of the terminal. [columns]
-
-        Returns
-        -------
-        Page
-            The question.
-        """
         answers = state.answers
         shown: dict[Ask, Callable[[], Page]] = {
             Ask.TAIL: lambda: pages.tail_page(answers),
@@ -252,30 +153,16 @@ class Flow:
             Ask.CONVENTION: lambda: pages.convention_page(answers),
             Ask.OFFER: lambda: pages.offer_page(_known(state.saved), self.gear),
             Ask.REREAD: lambda: pages.reread_page(answers, _known(state.old_unit)),
-            Ask.JOINT: lambda: pages.joint_page(self.gear, answers, self.order, _known(state.joint), width),
-            Ask.CONFIRM: lambda: pages.confirm_page(
-                self.gear, self._reading(answers, _known(state.pending)), _known(state.joint)
-            ),
+            Ask.JOINT: lambda: pages.joint_page(self.gear, answers, self.order, state.joint, width, state.suggested),
+            Ask.CONFIRM: lambda: pages.confirm_page(self.gear, self._pending(state), state.joint, answers.unit),
             Ask.MORE: lambda: pages.more_page(answers, self.gear, width),
+            Ask.CONFIRM_MORE: lambda: pages.confirm_more_page(self._most_in, answers.unit),
+            Ask.DETAIL: lambda: pages.detail_page(answers, str(state.at), self.today),
             Ask.REVIEW: lambda: pages.review_page(self.gear, answers, width),
         }
         return shown[state.ask]()
 
     def answer(self, state: State, text: str) -> Turn:
-        """Take an answer.
-
-        Parameters
-        ----------
-        state : State
-            The question it answers.
-        text : str
-            What was typed.
-
-        Returns
-        -------
-        Turn
-            What follows.
-        """
         typed = text.strip()
         if not typed.isprintable() or "\ufffd" in typed:
             return _again(state, "A key that does nothing here, perhaps an arrow. Type the line again.")
@@ -296,13 +183,18 @@ class Flow:
             Ask.JOINT: self._joint,
             Ask.CONFIRM: self._confirm,
             Ask.MORE: self._more,
+            Ask.CONFIRM_MORE: self._confirm_more,
+            Ask.DETAIL: self._detail,
             Ask.REVIEW: self._review,
         }
-        return taken[state.ask](state, typed)
+        turn = taken[state.ask](state, typed)
+        here, passing = (state.ask, state.at), (Ask.OFFER, Ask.REREAD, Ask.CONFIRM, Ask.CONFIRM_MORE)
+        moved = (turn.state.ask, turn.state.at) != here and state.ask not in passing
+        return replace(turn, state=replace(turn.state, trail=(*state.trail, here) if moved else state.trail))
 
     def _help(self, state: State) -> tuple[Line, ...]:
         if state.ask in (Ask.JOINT, Ask.CONFIRM):
-            return pages.joint_help(self.gear, state.answers, _known(state.joint))
+            return pages.joint_help(self.gear, state.answers, state.joint)
         shown = {
             Ask.TAIL: pages.TAIL_HELP,
             Ask.SIDE: pages.SIDE_HELP,
@@ -311,6 +203,8 @@ class Flow:
             Ask.OFFER: pages.OFFER_HELP,
             Ask.REREAD: pages.REREAD_HELP,
             Ask.MORE: pages.MORE_HELP,
+            Ask.CONFIRM_MORE: pages.MORE_HELP,
+            Ask.DETAIL: pages.DETAIL_HELP,
             Ask.REVIEW: pages.REVIEW_HELP,
         }
         return shown[state.ask]
@@ -335,30 +229,21 @@ class Flow:
     def _unit(self, state: State, typed: str) -> Turn:
         answers = state.answers
         short = {"i": LengthUnit.INCH, "t": LengthUnit.THOU, "m": LengthUnit.MILLIMETRE}
-        unit = short.get(typed.lower())
-        if not typed:
-            unit = answers.unit
-        elif unit is None:
-            try:
-                unit = LengthUnit.parse(typed)
-            except UsageError:
-                unit = None
+        unit = _chosen(typed, short, LengthUnit.parse, answers.unit)
         if unit is None:
             return _again(state, _not_taken(typed, "Type i for inch, t for thou or m for millimetre."))
         changed = replace(answers, unit=unit)
         bare = any(a.written is not None and a.written.unit is None for a in answers.joints.values())
         if answers.unit not in (None, unit) and bare:
-            return Turn(
-                State(Ask.REREAD, changed, old_unit=answers.unit, from_review=state.from_review),
-            )
+            return Turn(State(Ask.REREAD, changed, old_unit=answers.unit, from_review=state.from_review))
         return self._go_on(changed, state.from_review)
 
     def _reread(self, state: State, typed: str) -> Turn:
         old = _known(state.old_unit)
         answers = state.answers
-        if typed.lower() in ("y", "yes"):
+        if typed.lower() in _YES:
             return self._go_on(_unconfirmed(answers), state.from_review)
-        if typed.lower() in ("n", "no"):
+        if typed.lower() in _NO:
             kept = {
                 number: replace(a, written=replace(a.written, unit=a.written.unit or old)) if a.written else a
                 for number, a in answers.joints.items()
@@ -369,14 +254,7 @@ class Flow:
     def _convention(self, state: State, typed: str) -> Turn:
         answers = state.answers
         short = {c.value[0].lower(): c for c in ClearanceConvention}
-        convention = short.get(typed.lower())
-        if not typed:
-            convention = answers.convention
-        elif convention is None:
-            try:
-                convention = ClearanceConvention.parse(typed)
-            except UsageError:
-                convention = None
+        convention = _chosen(typed, short, ClearanceConvention.parse, answers.convention)
         if convention is None:
             return _again(state, _not_taken(typed, "Type r, d or t; ? explains them."))
         if convention is answers.convention:
@@ -385,29 +263,21 @@ class Flow:
         if answers.convention is not None and answers.radial_in:
             name = pages.CONVENTION_NAMES[convention]
             told = (line((f"The readings stay as typed and are now read as {name}.", Tone.WARN)),)
-        turn = self._go_on(_unconfirmed(replace(answers, convention=convention)), state.from_review)
-        return replace(turn, lines=(*told, *turn.lines))
+        return self._go_on(_unconfirmed(replace(answers, convention=convention)), state.from_review, told)
 
     def _offer(self, state: State, typed: str) -> Turn:
         saved = _known(state.saved)
-        if typed.lower() in ("y", "yes"):
-            told = line((f"Resumed: {pages.identity(saved.answers)}, ", Tone.GOOD), self._heading(saved.answers))
-            given = state.answers
-            answers = replace(
-                saved.answers,
-                unit=saved.answers.unit or given.unit,
-                convention=saved.answers.convention or given.convention,
-                record_id=given.record_id or saved.answers.record_id,
-                joints=MappingProxyType({**saved.answers.joints, **given.joints}),
-            )
-            turn = self._go_on(answers)
-            return replace(turn, lines=(told, *turn.lines), effect=Effect.RESUME, session=saved)
-        if typed.lower() in ("n", "no"):
+        if typed.lower() in _YES:
+            turn = self._go_on(saved.answers.beside(state.answers), told=self._resumed(saved.answers))
+            return replace(turn, effect=Effect.RESUME, session=saved)
+        if typed.lower() in _NO:
             return replace(self._go_on(state.answers), effect=Effect.PUT_AWAY, session=saved)
         return _again(state, _not_taken(typed, "Type y to go on with it or n to begin a new one."))
 
     def _joint(self, state: State, typed: str) -> Turn:
-        number, answers = _known(state.joint), state.answers
+        number, answers = state.joint, state.answers
+        if not typed and number not in answers.joints and state.suggested not in (None, number):
+            typed = f"#{state.suggested}"
         jump = re.fullmatch(r"#\s*(\d{1,4})", typed)
         if jump is not None:
             return self._jump(state, int(jump[1]))
@@ -424,23 +294,24 @@ class Flow:
     def _confirm(self, state: State, typed: str) -> Turn:
         if not typed:
             return _again(state, "Enter alone does not confirm it. Type y, or the value again.")
-        if typed.lower() in ("y", "yes"):
-            return self._answered(state, _known(state.joint), JointAnswer(_known(state.pending), confirmed=True))
-        if typed.lower() in ("n", "no"):
+        if typed.lower() in _YES:
+            return self._answered(state, state.joint, JointAnswer(self._pending(state).written, confirmed=True))
+        if typed.lower() in _NO:
             return self._back(state)
         return self._joint(state, typed)
 
     def _value(self, state: State, number: int, typed: str) -> Turn:
-        try:
-            written = parse_length(typed)
-        except UsageError as error:
-            return _again(state, f"{error.message}. {error.remedy}")
-        reading = self._reading(state.answers, written)
-        same = state.pending is not None and self._reading(state.answers, state.pending).radial_in == reading.radial_in
-        match judge(reading, self.gear):
-            case Judgement.REFUSE:
-                back = replace(state, ask=Ask.JOINT, pending=None)
-                return Turn(back, pages.refusal_lines(reading, self.gear, number))
+        answers = state.answers
+        judged = judge(typed, number, _known(answers.unit), _known(answers.convention), self.gear)
+        if judged.judgement is Judgement.REFUSE:
+            back = replace(state, ask=Ask.JOINT, pending=None)
+            return Turn(back, pages.refusal_lines(typed, number, judged.said))
+        if judged.written is None:
+            return self._answered(state, number, NOT_MEASURED)
+        written = judged.written
+        reading = self._reading(answers, written)
+        same = state.pending is not None and self._pending(state).radial_in == reading.radial_in
+        match judged.judgement:
             case Judgement.CONFIRM if not same:
                 return Turn(replace(state, ask=Ask.CONFIRM, pending=written))
             case Judgement.CONFIRM:
@@ -452,11 +323,13 @@ class Flow:
         answers = state.answers.with_joint(number, answer)
         told = list(pages.echo_lines(self.gear, answers, number))
         still_open = self.open_joints(answers)
+        turn = self._go_on(answers, state.from_review)
+        advised = None
         if self.advice is not None and still_open and self.gear.joint(number).critical:
             advised = self.advice(answers.radial_in, still_open)
-            if advised:
-                told.append(line(("→ ", Tone.STRONG), advised))
-        turn = self._go_on(answers, state.from_review)
+        if advised is not None:
+            told.append(line(("→ ", Tone.STRONG), advised[0]))
+            turn = replace(turn, state=replace(turn.state, suggested=advised[1]))
         return replace(turn, lines=(*told, *turn.lines))
 
     def _done(self, state: State) -> Turn:
@@ -465,22 +338,56 @@ class Flow:
         answers = replace(answers, joints=MappingProxyType({**answers.joints, **dict.fromkeys(rest, NOT_MEASURED)}))
         names = ", ".join(f"#{number}" for number in rest)
         told = (line((f"– {names}  not measured", Tone.WARN)),) if rest else ()
-        turn = self._go_on(answers, state.from_review)
-        return replace(turn, lines=(*told, *turn.lines))
+        return self._go_on(answers, state.from_review, told)
 
     def _jump(self, state: State, number: int) -> Turn:
         if number not in self.gear.joint_numbers:
             return _again(state, f"There is no joint #{number}. The joints are {self._joint_names()}.")
-        return Turn(State(Ask.JOINT, state.answers, joint=number, from_review=state.from_review))
+        return Turn(State(Ask.JOINT, state.answers, number, from_review=state.from_review))
 
     def _more(self, state: State, typed: str) -> Turn:
         if typed.lower() in ("", "s"):
-            return Turn(State(Ask.REVIEW, state.answers))
+            return Turn(State(Ask.DETAIL, state.answers, SIGN_OFF[0]))
         try:
-            answers, told = read_more(state.answers, typed)
+            answers, told = read_more(state.answers, typed, self.gear)
         except UsageError as error:
             return _again(state, f"{error.message}. {error.remedy}")
-        return Turn(replace(state, answers=answers), told)
+        stands = plunger_in(answers, self.gear)
+        new = answers.more.get("plunger_displacement") != state.answers.more.get("plunger_displacement")
+        if new and stands is not None and abs(stands) > self._most_in:
+            return Turn(replace(state, ask=Ask.CONFIRM_MORE, pending=answers), told)
+        return Turn(replace(state, ask=Ask.MORE, answers=answers, pending=None), told)
+
+    def _confirm_more(self, state: State, typed: str) -> Turn:
+        if typed.lower() in _YES and isinstance(state.pending, Answers):
+            return Turn(State(Ask.MORE, state.pending))
+        if typed.lower() in _NO:
+            return self._back(state)
+        if not typed:
+            return _again(state, "Enter alone does not confirm it. Type y, n, or p with the displacement again.")
+        return self._more(state, typed)
+
+    @property
+    def _most_in(self) -> float:
+        """How far all joints at their limits could push the plunger: what is farther is asked again. [in]"""
+        return float(worst_case(self.gear.model, self.gear.limits_in[None]).magnitude_in[0])
+
+    def _detail(self, state: State, typed: str) -> Turn:
+        column, answers = str(state.at), state.answers
+        if not typed and column == "inspection_date" and column not in answers.more and self.today is not None:
+            typed = self.today.isoformat()
+        if typed.lower() == "x":
+            answers = answers.with_more(**{column: None})
+        elif typed:
+            try:
+                judge_more(column, typed, answers.unit, self.gear)
+            except UsageError as error:
+                return _again(state, f"{error.message}. {error.remedy}")
+            answers = answers.with_more(**{column: typed})
+        after = SIGN_OFF.index(column) + 1
+        if after == len(SIGN_OFF) or state.from_review:
+            return Turn(State(Ask.REVIEW, answers))
+        return Turn(State(Ask.DETAIL, answers, SIGN_OFF[after]))
 
     def _review(self, state: State, typed: str) -> Turn:
         answers = state.answers
@@ -491,6 +398,8 @@ class Flow:
         asked = next((ask for ask in _HEADING if ask.value == typed.lower()), None)
         if asked is not None:
             return Turn(State(asked, answers, from_review=True))
+        if typed.lower() in pages.DETAILS:
+            return Turn(State(Ask.DETAIL, answers, pages.DETAILS[typed.lower()], from_review=True))
         number = re.fullmatch(r"#?\s*(\d{1,4})", typed)
         if number is not None:
             return self._jump(replace(state, from_review=True), int(number[1]))
@@ -504,29 +413,39 @@ class Flow:
             if saved is not None and not _contradictions(saved.answers, answers):
                 return Turn(State(Ask.OFFER, answers, saved=saved))
             if saved is not None:
-                turn = self._go_on(answers)
                 told = line(("An unfinished inspection is not offered: ", Tone.WARN), self._heading(saved.answers))
-                return replace(turn, lines=(told, *turn.lines))
+                return self._go_on(answers, told=(told,))
         return self._go_on(answers, from_review)
 
-    def _go_on(self, answers: Answers, from_review: bool = False) -> Turn:
+    def _resumed(self, answers: Answers) -> tuple[Line, ...]:
+        return (line((f"Resumed: {pages.identity(answers)}, ", Tone.GOOD), self._heading(answers)),)
+
+    def _go_on(self, answers: Answers, from_review: bool = False, told: tuple[Line, ...] = ()) -> Turn:
         """Go to the first open question; readings that have become impossible are open again."""
-        answers, told = self._settled(answers)
+        answers, settled = self._settled(answers)
+        told = (*told, *settled)
         given = (answers.tail_no, answers.side, answers.unit, answers.convention)
         for ask, value in zip(_HEADING, given, strict=True):
             if value is None:
                 return Turn(State(ask, answers), told)
         still_open = self.open_joints(answers)
         if still_open:
-            return Turn(State(Ask.JOINT, answers, joint=still_open[0], from_review=from_review), told)
+            return Turn(State(Ask.JOINT, answers, still_open[0], from_review=from_review), told)
         return Turn(State(Ask.REVIEW if from_review else Ask.MORE, answers), told)
 
     def _settled(self, answers: Answers) -> tuple[Answers, tuple[Line, ...]]:
         kept: dict[int, JointAnswer] = {}
         told: list[Line] = []
+        for column, text in answers.more.items():
+            try:
+                judge_more(column, text, answers.unit, self.gear)
+            except UsageError as error:
+                answers = answers.with_more(**{column: None})
+                told.append(line((f"{column.replace('_', ' ')}: {error.message}: left out.", Tone.WARN)))
         for number, answer in answers.joints.items():
             reading = answers.reading(number)
-            judgement = Judgement.ACCEPT if reading is None else judge(reading, self.gear)
+            judged = self._judged(number, reading)
+            judgement = judged.judgement
             if (
                 reading is None
                 or judgement is Judgement.ACCEPT
@@ -535,7 +454,7 @@ class Flow:
                 kept[number] = answer
                 continue
             if judgement is Judgement.REFUSE:
-                told.extend(pages.refusal_lines(reading, self.gear, number))
+                told.extend(pages.refusal_lines(reading.written.text, number, judged.said))
             told.append(
                 line(
                     (f"#{number}  {reading.written.text} is {reading.radial_in:.4g} in radial: asked again.", Tone.WARN)
@@ -543,31 +462,46 @@ class Flow:
             )
         return replace(answers, joints=MappingProxyType(kept)), tuple(told)
 
+    def _judged(self, number: int, reading: Reading | None) -> Judged:
+        if reading is None:
+            return Judged(Judgement.ACCEPT)
+        return judge(reading.written.text, number, reading.unit, reading.convention, self.gear)
+
     def _back(self, state: State) -> Turn:
-        if state.ask is Ask.CONFIRM:
-            return Turn(replace(state, ask=Ask.JOINT, pending=None))
+        if state.ask in (Ask.CONFIRM, Ask.CONFIRM_MORE):
+            return Turn(replace(state, ask=Ask.JOINT if state.ask is Ask.CONFIRM else Ask.MORE, pending=None))
         if state.ask is Ask.REREAD:
             answers = replace(state.answers, unit=state.old_unit)
-            return Turn(State(Ask.UNIT, answers, from_review=state.from_review))
+            return Turn(State(Ask.UNIT, answers, from_review=state.from_review, trail=state.trail))
         if state.ask is Ask.OFFER:
             return Turn(State(Ask.SIDE, state.answers))
-        if state.from_review:
-            return Turn(State(Ask.REVIEW, state.answers))
-        course: list[tuple[Ask, int | None]] = [(ask, None) for ask in _HEADING]
+        if state.trail:
+            ask, at = state.trail[-1]
+            inside = state.from_review and ask is not Ask.REVIEW
+            return Turn(State(ask, state.answers, at, from_review=inside, trail=state.trail[:-1]))
+        course: list[Place] = [(ask, None) for ask in _HEADING]
         course += [(Ask.JOINT, number) for number in self.order]
-        course += [(Ask.MORE, None), (Ask.REVIEW, None)]
-        at = course.index((state.ask, state.joint))
-        if at == 0:
+        course += [(Ask.MORE, None), *((Ask.DETAIL, column) for column in SIGN_OFF), (Ask.REVIEW, None)]
+        place = course.index((state.ask, state.at))
+        if place == 0:
             return _again(state, "This is the first question.")
-        ask, joint = course[at - 1]
-        return Turn(State(ask, state.answers, joint=joint))
+        ask, at = course[place - 1]
+        return Turn(State(ask, state.answers, at))
 
     def _reading(self, answers: Answers, written: WrittenLength) -> Reading:
         unit, convention = _known(answers.unit), _known(answers.convention)
         return Reading(written, written.unit or unit, convention)
 
+    def _pending(self, state: State) -> Reading:
+        if not isinstance(state.pending, WrittenLength):
+            raise TypeError("no clearance waits for a confirmation")
+        return self._reading(state.answers, state.pending)
+
     def _heading(self, answers: Answers) -> str:
-        parts = [f"{len(answers.joints)} of {len(self.order)} joints"]
+        skipped = len(answers.joints) - len(answers.radial_in)
+        parts = [f"{len(answers.radial_in)} of {len(self.order)} joints measured"]
+        if skipped:
+            parts.append(f"{skipped} said to be not measured")
         if answers.unit is not None:
             parts.append(f"in {pages.UNIT_NAMES[answers.unit]}")
         if answers.convention is not None:
@@ -579,13 +513,12 @@ class Flow:
 
 
 def _known(value: _T | None) -> _T:
-    """Return a value that this state always has."""
     if value is None:
         raise ValueError("the state lacks what its question needs")
     return value
 
 
-def _contradictions(saved: Answers, given: Answers | Preset) -> str:
+def _contradictions(saved: Answers, given: Answers) -> str:
     """Say where what is given contradicts what is saved; empty if nowhere."""
     pairs = (
         ("tail", saved.tail_no, given.tail_no),
@@ -602,6 +535,16 @@ def _contradictions(saved: Answers, given: Answers | Preset) -> str:
 
 def _again(state: State, message: str, tone: Tone = Tone.WARN) -> Turn:
     return Turn(state, (line((message, tone), indent=3),))
+
+
+def _chosen(typed: str, short: Mapping[str, _T], parse: Callable[[str], _T], before: _T | None) -> _T | None:
+    """Take a choice by its letter or its name, Enter for the one before; None if it is neither."""
+    if not typed:
+        return before
+    try:
+        return short.get(typed.lower()) or parse(typed)
+    except UsageError:
+        return None
 
 
 def _not_taken(typed: str, remedy: str) -> str:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from datetime import date
 
-from mlg_troubleshoot.cli.prompts.answers import Answers, Reading, likely_slips, over_limit
+from mlg_troubleshoot.cli.prompts.answers import Answers, Reading, judge, over_limit
 from mlg_troubleshoot.cli.prompts.lines import BLANK, Line, Tone, keys, line
 from mlg_troubleshoot.cli.prompts.sketch import sketch
 from mlg_troubleshoot.cli.prompts.store import Session
-from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, in_unit
 
 UNIT_NAMES = {LengthUnit.INCH: "inches", LengthUnit.THOU: "thou", LengthUnit.MILLIMETRE: "millimetres"}
 CONVENTION_NAMES = {
@@ -47,143 +46,55 @@ REREAD_HELP = (line("Readings with their own unit, such as 13 thou, stay as they
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A question as it is shown.
-
-    Parameters
-    ----------
-    lines : tuple of Line
-        What stands above the prompt.
-    prompt : str
-        Text before the cursor.
-    """
+    """A question as it is shown: what stands above the prompt, and the text before the cursor."""
 
     lines: tuple[Line, ...]
     prompt: str
 
 
-def both_units(length_in: float, *, sign: bool = False) -> str:
-    """Return a length in inches and in millimetres.
-
-    Parameters
-    ----------
-    length_in : float
-        Length. [in]
-    sign : bool
-        True to show a plus sign.
-
-    Returns
-    -------
-    str
-        For example ``0.0130 in = 0.330 mm``.
-    """
+def length(length_in: float, unit: LengthUnit | None, *, sign: bool = False) -> str:
+    """Write a length in the user's unit; one in inches in millimetres, too."""
     mark = "+" if sign else ""
-    return f"{length_in:{mark}.4f} in = {LengthUnit.MILLIMETRE.from_inches(length_in):{mark}.3f} mm"
+    shown = (LengthUnit.INCH, LengthUnit.MILLIMETRE) if unit in (None, LengthUnit.INCH) else (unit,)
+    return " = ".join(f"{u.from_inches(length_in):{mark}.{u.decimals}f} {u}" for u in shown if u is not None)
 
 
 def rule(title: str, width: int) -> Line:
-    """Return a line across the terminal with a title in it.
-
-    Parameters
-    ----------
-    title : str
-        The title.
-    width : int
-        Width of the terminal. [columns]
-
-    Returns
-    -------
-    Line
-        The line.
-    """
+    """Return a line across the terminal with a title in it."""
     rest = max(width - len(title) - 6, 0)
     return line(("── ", Tone.QUIET), (title, Tone.STRONG), (f" {'─' * rest}", Tone.QUIET), rigid=True)
 
 
 def identity(answers: Answers) -> str:
-    """Return tail and side as far as they are known.
-
-    Parameters
-    ----------
-    answers : Answers
-        Answers so far.
-
-    Returns
-    -------
-    str
-        For example ``N123AB LH``.
-    """
+    """Return tail and side as far as they are known."""
     return " ".join(part for part in (answers.tail_no, answers.side) if part)
 
 
-def welcome(gear: Gear, width: int) -> tuple[Line, ...]:
-    """Return the first lines of all.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    width : int
-        Width of the terminal. [columns]
-
-    Returns
-    -------
-    tuple of Line
-        The lines.
-    """
-    return (
+def welcome(gear: Gear, width: int, unfinished: tuple[Session, ...]) -> tuple[Line, ...]:
+    """Return the first lines of all; an inspection that was broken off is mentioned."""
+    shown = [
         BLANK,
         rule(f"{gear.name}: joint clearances", width),
         line("Type an answer and press Enter. Every answer is saved at once."),
         keys(("b", "back"), ("?", "help"), ("q", "save and stop")),
-    )
+    ]
+    if unfinished:
+        last = unfinished[0]
+        told = f"Unfinished: {identity(last.answers)}, begun {last.started:%Y-%m-%d %H:%M}. Go on with it:  "
+        shown.append(line((told, Tone.WARN), ("mlg check --resume", Tone.KEY)))
+    return tuple(shown)
 
 
 def tail_page(answers: Answers) -> Page:
-    """Return the question for the tail number.
-
-    Parameters
-    ----------
-    answers : Answers
-        Answers so far.
-
-    Returns
-    -------
-    Page
-        The question.
-    """
     return Page((BLANK,), f" Tail number{_keeps(answers.tail_no)} > ")
 
 
 def side_page(answers: Answers) -> Page:
-    """Return the question for the side.
-
-    Parameters
-    ----------
-    answers : Answers
-        Answers so far.
-
-    Returns
-    -------
-    Page
-        The question.
-    """
     shown = (BLANK, line("Which gear?   ", ("l", Tone.KEY), " LH, left    ", ("r", Tone.KEY), " RH, right"))
     return Page(shown, f" Side{_keeps(answers.side)} > ")
 
 
 def unit_page(answers: Answers) -> Page:
-    """Return the question for the unit.
-
-    Parameters
-    ----------
-    answers : Answers
-        Answers so far.
-
-    Returns
-    -------
-    Page
-        The question.
-    """
     shown = (
         BLANK,
         line("Unit of your readings?"),
@@ -195,18 +106,6 @@ def unit_page(answers: Answers) -> Page:
 
 
 def convention_page(answers: Answers) -> Page:
-    """Return the question for the convention.
-
-    Parameters
-    ----------
-    answers : Answers
-        Answers so far.
-
-    Returns
-    -------
-    Page
-        The question.
-    """
     choices = (
         line((c.value[0].lower(), Tone.KEY), f" {c.value.replace('_', ' '):<13} {c.meaning}", indent=3)
         for c in ClearanceConvention
@@ -216,51 +115,27 @@ def convention_page(answers: Answers) -> Page:
 
 
 def reread_page(answers: Answers, old: LengthUnit) -> Page:
-    """Return the question whether readings typed so far were in the new unit.
-
-    Parameters
-    ----------
-    answers : Answers
-        Answers with the new unit.
-    old : LengthUnit
-        The unit before.
-
-    Returns
-    -------
-    Page
-        The question.
-    """
+    """Return the question whether readings typed so far were in the new unit."""
     count = sum(a.written is not None and a.written.unit is None for a in answers.joints.values())
     new = UNIT_NAMES[answers.unit or old]
+    were, they = ("reading was", "it") if count == 1 else ("readings were", "they")
     shown = (
         BLANK,
-        line((f"{count} readings were typed as {UNIT_NAMES[old]}. Were they {new}?", Tone.WARN)),
-        line(("y", Tone.KEY), f" yes, they were {new} all along", indent=3),
-        line(("n", Tone.KEY), f" no, they stay {UNIT_NAMES[old]}; only the next ones are {new}", indent=3),
+        line((f"{count} {were} typed as {UNIT_NAMES[old]}, to be read as {new}?", Tone.WARN)),
+        line(("y", Tone.KEY), f" yes, {they} had {new} all along", indent=3),
+        line(("n", Tone.KEY), f" no, {UNIT_NAMES[old]} stay; only the next readings are {new}", indent=3),
     )
     return Page(shown, " y or n > ")
 
 
 def offer_page(saved: Session, gear: Gear) -> Page:
-    """Return the question whether an unfinished inspection is resumed.
-
-    Parameters
-    ----------
-    saved : Session
-        The unfinished inspection.
-    gear : Gear
-        The gear.
-
-    Returns
-    -------
-    Page
-        The question.
-    """
+    """Return the question whether an unfinished inspection is resumed."""
     shown = (
         BLANK,
         line(
             (f"An inspection of {identity(saved.answers)} is unfinished: ", Tone.WARN),
-            f"begun {saved.started:%Y-%m-%d %H:%M}, {len(saved.answers.joints)} of {len(gear.joints)} joints.",
+            f"begun {saved.started:%Y-%m-%d %H:%M}, {len(saved.answers.radial_in)} of {len(gear.joints)} joints "
+            "measured.",
         ),
         line(("y", Tone.KEY), " go on with it", indent=3),
         line(("n", Tone.KEY), " begin a new one and put the old one away", indent=3),
@@ -268,27 +143,9 @@ def offer_page(saved: Session, gear: Gear) -> Page:
     return Page(shown, " Go on with it? y or n > ")
 
 
-def joint_page(gear: Gear, answers: Answers, order: tuple[int, ...], number: int, width: int) -> Page:
-    """Return the question for one joint.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    answers : Answers
-        Answers so far; unit and convention are known.
-    order : tuple of int
-        Joints in the order of asking.
-    number : int
-        The joint.
-    width : int
-        Width of the terminal. [columns]
-
-    Returns
-    -------
-    Page
-        The question.
-    """
+def joint_page(
+    gear: Gear, answers: Answers, order: tuple[int, ...], number: int, width: int, suggested: int | None = None
+) -> Page:
     joint = gear.joint(number)
     place = order.index(number) + 1
     shown = (
@@ -302,55 +159,26 @@ def joint_page(gear: Gear, answers: Answers, order: tuple[int, ...], number: int
         line(f"Limit {_limit(gear, answers, number)}"),
         JOINT_KEYS,
     )
-    return Page(shown, joint_prompt(answers, number))
-
-
-def joint_prompt(answers: Answers, number: int) -> str:
-    """Return the prompt for one joint, with what Enter keeps.
-
-    Parameters
-    ----------
-    answers : Answers
-        Answers so far; unit and convention are known.
-    number : int
-        The joint.
-
-    Returns
-    -------
-    str
-        The prompt.
-    """
     unit = "in" if answers.unit is None else answers.unit.value
     kind = "" if answers.convention is None else f" {CONVENTION_NAMES[answers.convention]}"
-    return f" #{number}{kind}, {unit}{_keeps(_entered(answers, number))} > "
+    enter = _keeps(_entered(answers, number))
+    if not enter and suggested not in (None, number):
+        enter = f" (Enter goes to #{suggested})"
+    return Page(shown, f" #{number}{kind}, {unit}{enter} > ")
 
 
-def confirm_page(gear: Gear, reading: Reading, number: int) -> Page:
-    """Return the question whether a value is really so large.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    reading : Reading
-        The value.
-    number : int
-        The joint.
-
-    Returns
-    -------
-    Page
-        The question, with the slips that would explain the value.
-    """
-    limit = gear.joint(number).limit.value
+def confirm_page(gear: Gear, reading: Reading, number: int, unit: LengthUnit | None) -> Page:
+    """Return the question whether a value is really so large."""
+    limit = length(gear.joint(number).limit.value, unit)
     shown = (
+        line((f"#{number}  {length(reading.radial_in, unit)} radial is far beyond the limit of {limit}.", Tone.WARN)),
         line(
-            (f"#{number}  {both_units(reading.radial_in)} radial is far beyond the limit of {limit:g} in.", Tone.WARN)
+            in_unit(judge(reading.written.text, number, reading.unit, reading.convention, gear).said, reading.unit),
+            indent=3,
         ),
-        *(line(slip, indent=3) for slip in likely_slips(reading, gear)),
         line(
             ("y", Tone.KEY),
-            f" yes, it is really {both_units(reading.as_read_in)} {CONVENTION_NAMES[reading.convention]}",
+            f" yes, it is really {length(reading.as_read_in, unit)} {CONVENTION_NAMES[reading.convention]}",
             indent=3,
         ),
         line(("or type the value again", Tone.QUIET), indent=3),
@@ -358,89 +186,29 @@ def confirm_page(gear: Gear, reading: Reading, number: int) -> Page:
     return Page(shown, f" #{number} y, or the value again > ")
 
 
-def refusal_lines(reading: Reading, gear: Gear, number: int) -> tuple[Line, ...]:
-    """Return why a value is refused.
-
-    Parameters
-    ----------
-    reading : Reading
-        The value.
-    gear : Gear
-        The gear.
-    number : int
-        The joint.
-
-    Returns
-    -------
-    tuple of Line
-        The lines.
-    """
-    most_in = gear.hard_limit.value
-    return (
-        line(
-            (f"✗ #{number}  {_plain(reading.radial_in)} in radial is not taken: ", Tone.BAD),
-            f"the most is {most_in:g} in = {LengthUnit.MILLIMETRE.from_inches(most_in):g} mm.",
-        ),
-        *(line(slip, indent=3) for slip in likely_slips(reading, gear)),
-    )
+def refusal_lines(typed: str, number: int, said: str) -> tuple[Line, ...]:
+    return (line((f"✗ #{number}  {typed} is not taken: ", Tone.BAD), said),)
 
 
 def echo_lines(gear: Gear, answers: Answers, number: int) -> tuple[Line, ...]:
-    """Return a joint's answer as it was understood.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    answers : Answers
-        Answers with this joint's.
-    number : int
-        The joint.
-
-    Returns
-    -------
-    tuple of Line
-        The value as read and as the model uses it, in inches and millimetres; an over-limit remark.
-    """
+    """Return a joint's answer as it was understood."""
     reading = answers.reading(number)
     if reading is None:
         joint = gear.joint(number)
         tail = ": the gear cannot be cleared without it" if joint.critical else ""
         return (line((f"– #{number}  not measured{tail}", Tone.WARN if joint.critical else Tone.QUIET)),)
     kind = CONVENTION_NAMES[reading.convention]
-    shown = [line((f"✓ #{number}  {both_units(reading.as_read_in)} {kind}", Tone.GOOD))]
-    if reading.convention is not ClearanceConvention.RADIAL:
-        shown = [
-            line(
-                (f"✓ #{number}  {both_units(reading.as_read_in)} {kind}", Tone.GOOD),
-                f" → {both_units(reading.radial_in)} radial",
-            )
-        ]
+    unit = answers.unit
+    radial = reading.convention is ClearanceConvention.RADIAL
+    then = "" if radial else f" → {length(reading.radial_in, unit)} radial"
+    shown = [line((f"✓ #{number}  {length(reading.as_read_in, unit)} {kind}", Tone.GOOD), then)]
     if over_limit(reading, gear, number):
-        limit = gear.joint(number).limit.value
-        shown.append(
-            line((f"OVER THE LIMIT of {limit:g} in radial: the manual rejects this joint.", Tone.BAD), indent=5)
-        )
+        limit = length(gear.joint(number).limit.value, unit).partition(" = ")[0]
+        shown.append(line((f"OVER THE LIMIT of {limit} radial: the manual rejects this joint.", Tone.BAD), indent=5))
     return tuple(shown)
 
 
 def joint_help(gear: Gear, answers: Answers, number: int) -> tuple[Line, ...]:
-    """Return what, where and how to measure.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    answers : Answers
-        Answers so far; unit and convention are known.
-    number : int
-        The joint.
-
-    Returns
-    -------
-    tuple of Line
-        The lines.
-    """
     joint = gear.joint(number)
     example = _EXAMPLES[answers.unit or LengthUnit.INCH]
     area = next(a.description for a in gear.areas if a.name == joint.area)
@@ -475,50 +243,56 @@ CONVENTION_HELP = (
 
 
 def more_page(answers: Answers, gear: Gear, width: int) -> Page:
-    """Return the optional question at the end.
-
-    Parameters
-    ----------
-    answers : Answers
-        Answers so far.
-    gear : Gear
-        The gear.
-    width : int
-        Width of the terminal. [columns]
-
-    Returns
-    -------
-    Page
-        The question.
-    """
     unit = answers.unit or LengthUnit.INCH
     plunger, margin = (f"{unit.from_inches(x):.3g}" for x in (0.041, 0.028))
+    outcome = answers.more.get("outcome")
 
     def row(name: str, example: str, meaning: str, given: str | None) -> Line:
         shown = ("   ✓ " + given, Tone.GOOD) if given else ("", Tone.PLAIN)
         return line((f"{name} {example:<6}", Tone.KEY), f" {meaning}", shown, indent=3)
 
-    failed = answers.outcome is Outcome.FAILED
-    retracted = answers.outcome is Outcome.RETRACTED
     shown = (
         BLANK,
         rule(f"{identity(answers)} · if you know it · numbers in {UNIT_NAMES[unit]}", width),
-        row("f", "", "the gear FAILED to retract", "FAILED" if failed else None),
-        row("r", "", "the gear RETRACTED", "RETRACTED" if retracted else None),
-        row(
-            "p",
-            plunger,
-            "plunger off mid-position, + over-travel",
-            None if answers.plunger_in is None else both_units(answers.plunger_in, sign=True),
-        ),
-        row(
-            "m",
-            margin,
-            f"this gear's own margin, else {gear.margin.value:g} in",
-            None if answers.margin_in is None else both_units(answers.margin_in),
-        ),
+        row("f", "", "the gear FAILED to retract", outcome if outcome == "FAILED" else None),
+        row("r", "", "the gear RETRACTED", outcome if outcome == "RETRACTED" else None),
+        row("p", plunger, "plunger off mid-position, + over-travel", answers.more.get("plunger_displacement")),
+        row("m", margin, f"this gear's own margin, else {length(gear.margin.value, unit)}", answers.more.get("margin")),
     )
     return Page(shown, " f, r, p, m, or Enter to go on > ")
+
+
+def confirm_more_page(most_in: float, unit: LengthUnit | None) -> Page:
+    """Return the question whether the plunger really stands so far off."""
+    most = length(most_in, unit)
+    shown = (
+        line((f"That is farther than all joints at their limits could push the plunger ({most}).", Tone.WARN)),
+        line(("y", Tone.KEY), " yes, it was read so   ", ("n", Tone.KEY), " no", indent=3),
+    )
+    return Page(shown, " y, n, or p with the displacement again > ")
+
+
+# What stands on the sign-off page: the word that leads back to it from the review, and its column.
+DETAILS = {"name": "technician_id", "order": "work_order", "gauge": "gauge_id", "date": "inspection_date"}
+_DETAIL_PROMPTS = {
+    "technician_id": "Measured by",
+    "work_order": "Work order",
+    "gauge_id": "Gauge",
+    "inspection_date": "Date of the inspection",
+}
+DETAIL_HELP = (
+    line("Printed on the sign-off page of the report. Enter leaves it empty; x takes it away.", indent=3),
+    line("A date as 2026-03-04 or 4-Mar-2026.", indent=3),
+)
+
+
+def detail_page(answers: Answers, column: str, today: date | None) -> Page:
+    """Return one of the optional questions for the sign-off page."""
+    kept = answers.more.get(column)
+    enter = _keeps(kept) or " (Enter: not stated)"
+    if kept is None and column == "inspection_date" and today is not None:
+        enter = f" (Enter: {today.isoformat()})"
+    return Page((), f" {_DETAIL_PROMPTS[column]}{enter} > ")
 
 
 MORE_HELP = (
@@ -530,40 +304,17 @@ MORE_HELP = (
 
 
 def review_page(gear: Gear, answers: Answers, width: int) -> Page:
-    """Return the table before computing.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    answers : Answers
-        All answers.
-    width : int
-        Width of the terminal. [columns]
-
-    Returns
-    -------
-    Page
-        The table and its question.
-    """
     kind = "radial" if answers.convention is None else CONVENTION_NAMES[answers.convention]
     twice = answers.convention is not ClearanceConvention.RADIAL
-    length = f"{'in':>9}{'mm':>8}"
-    numbers = length * (2 if twice else 1)
+    units = _columns_of(answers)
+    numbers = "".join(f"{unit:>9}" for unit in units) * (2 if twice else 1)
     longest = max(len(joint.name) for joint in gear.joints)
     name_width = max(min(longest, width - len(numbers) - 22), 0)
     head = f"{'#':>3}  {'joint':<{name_width}}{'typed':>11}{numbers}"
-    above = " " * (name_width + 16) + f"{kind:>17}" + (f"{'radial':>17}" if twice else "")
+    across = 9 * len(units)
+    above = " " * (name_width + 16) + f"{kind:>{across}}" + (f"{'radial':>{across}}" if twice else "")
     rows = [_review_row(gear, answers, number, name_width, twice=twice) for number in gear.joint_numbers]
-    extras = [
-        text
-        for text in (
-            None if answers.outcome is None else f"outcome {answers.outcome}",
-            None if answers.plunger_in is None else f"plunger {both_units(answers.plunger_in, sign=True)}",
-            None if answers.margin_in is None else f"margin {both_units(answers.margin_in)}",
-        )
-        if text
-    ]
+    extras = [f"{column.replace('_id', '').replace('_', ' ')} {text}" for column, text in answers.more.items()]
     missing = [n for n in gear.joint_numbers if gear.joint(n).critical and answers.reading(n) is None]
     shown = [
         BLANK,
@@ -590,9 +341,9 @@ def _review_row(gear: Gear, answers: Answers, number: int, name_width: int, *, t
         return line(
             start, (f"{'–':>11}  not measured", Tone.WARN if joint.critical else Tone.QUIET), indent=0, rigid=True
         )
-    values = f"{_as_typed(reading)[:10]:>11}{_columns(reading.as_read_in)}"
-    if twice:
-        values += _columns(reading.radial_in)
+    values = f"{_as_typed(reading)[:10]:>11}"
+    for each in (reading.as_read_in, reading.radial_in)[: 1 + twice]:
+        values += "".join(f"{unit.from_inches(each):>9.{unit.decimals}f}" for unit in _columns_of(answers))
     flag = ("  OVER", Tone.BAD) if over_limit(reading, gear, number) else ("", Tone.PLAIN)
     return line(start, values, flag, indent=0, rigid=True)
 
@@ -600,12 +351,14 @@ def _review_row(gear: Gear, answers: Answers, number: int, name_width: int, *, t
 REVIEW_HELP = (
     line("A joint number changes that joint. OVER: beyond its limit. Nothing is computed before Enter.", indent=3),
     keys(("tail", "tail number"), ("side", "LH or RH"), ("unit", "in, thou or mm")),
-    keys(("reading", "radial, diametral, total play"), ("b", "outcome, plunger, margin")),
+    keys(("reading", "radial, diametral, total play"), ("b", "back, to outcome, plunger, margin")),
+    keys(*((word, column.replace("_id", "").replace("_", " ")) for word, column in DETAILS.items())),
 )
 
 
-def _columns(length_in: float) -> str:
-    return f"{length_in:>9.4f}{LengthUnit.MILLIMETRE.from_inches(length_in):>8.3f}"
+def _columns_of(answers: Answers) -> tuple[LengthUnit, ...]:
+    unit = answers.unit or LengthUnit.INCH
+    return (unit, LengthUnit.MILLIMETRE) if unit is LengthUnit.INCH else (unit,)
 
 
 def _as_typed(reading: Reading) -> str:
@@ -628,18 +381,9 @@ def _keeps(value: str | None) -> str:
 def _limit(gear: Gear, answers: Answers, number: int) -> str:
     limit_in = gear.joint(number).limit.value
     convention = answers.convention or ClearanceConvention.RADIAL
-    read_in = limit_in * convention.per_radial
-    read = both_units(read_in)
-    if answers.unit is LengthUnit.THOU:
-        read = f"{LengthUnit.THOU.from_inches(read_in):g} thou = {read}"
-    if answers.unit is LengthUnit.MILLIMETRE:
-        read = " = ".join(reversed(read.split(" = ")))
-    read = f"{read} {CONVENTION_NAMES[convention]}"
-    return read if convention is ClearanceConvention.RADIAL else f"{read} ({limit_in:g} in radial)"
-
-
-def _plain(length_in: float) -> str:
-    return f"{length_in:.4g}" if math.isfinite(length_in) else "that many"
+    read = f"{length(limit_in * convention.per_radial, answers.unit)} {CONVENTION_NAMES[convention]}"
+    shown = length(limit_in, answers.unit).partition(" = ")[0]
+    return read if convention is ClearanceConvention.RADIAL else f"{read} ({shown} radial)"
 
 
 def _progress(answers: Answers, order: tuple[int, ...]) -> str:

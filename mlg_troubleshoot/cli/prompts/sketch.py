@@ -57,20 +57,6 @@ def sketch(gear: Gear, current: int, width: int) -> tuple[Line, ...]:
 
     Levers are double bars with their pivot below, links are single bars. A mechanism that is no simple
     chain, or a narrow terminal, gets a row of joint numbers.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    current : int
-        Number of the joint to mark.
-    width : int
-        Width of the terminal. [columns]
-
-    Returns
-    -------
-    tuple of Line
-        At most four rows; empty if the terminal is too narrow.
     """
     numbers = {joint.point: joint.number for joint in gear.joints}
     chain = _chain(gear.reference.mechanism.steps)

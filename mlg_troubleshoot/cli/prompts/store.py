@@ -1,48 +1,47 @@
-"""Sessions on disk: every answer is saved at once, and an interrupted inspection can be resumed."""
+"""Sessions in the store: every answer is saved at once, and an interrupted inspection can be resumed."""
 
 from __future__ import annotations
 
 import json
 import os
 import secrets
-import tempfile
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from mlg_troubleshoot.cli.prompts.answers import NOT_MEASURED, Answers, JointAnswer
-from mlg_troubleshoot.decision.inspection import Outcome, Side
+from mlg_troubleshoot.cli.prompts.answers import MORE, NOT_MEASURED, Answers, JointAnswer
+from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
+from mlg_troubleshoot.store import Draft, Drafts, Store
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, parse_length
 
-_SCHEMA = 1
+_SCHEMA = 2
 _KEPT_COMPLETE = 20
+# How long an answer waits for another writer before the next question comes. [s]
+_PATIENCE_S = 3
 
 
 class SessionFileError(TroubleshootError):
     """A saved session that cannot be read or does not belong to this gear."""
 
 
+class DamagedSessionError(SessionFileError):
+    """A saved session that is none."""
+
+
+class SessionTakenError(TroubleshootError):
+    """A session that another run has gone on with since this one read or wrote it."""
+
+
 @dataclass(frozen=True, slots=True)
 class Session:
-    """One inspection as it stands on disk.
+    """One inspection as it stands in the store.
 
-    Parameters
-    ----------
-    id : str
-        Name of the session, which is also the name of its file.
-    gear_id : str
-        The gear it belongs to.
-    started : datetime.datetime
-        When the first question was asked.
-    answers : Answers
-        Answers so far.
-    complete : bool
-        True once it was computed or put away; it is not offered again.
+    A complete one was shown or put away and is not offered again; `writer` tells which run wrote it last.
     """
 
     id: str
@@ -50,236 +49,118 @@ class Session:
     started: datetime
     answers: Answers
     complete: bool = False
+    writer: str = ""
 
 
 def new_session(gear_id: str, started: datetime, answers: Answers) -> Session:
-    """Start a session.
-
-    Parameters
-    ----------
-    gear_id : str
-        The gear.
-    started : datetime.datetime
-        Now.
-    answers : Answers
-        What is known already.
-
-    Returns
-    -------
-    Session
-        A session with a new name.
-    """
     return Session(f"{started:%Y%m%d-%H%M%S}-{secrets.token_hex(2)}", gear_id, started, answers)
-
-
-def state_folder(environment: Mapping[str, str] | None = None) -> Path:
-    """Return where a user's sessions are: ``$XDG_STATE_HOME/mlg-troubleshoot``, else below ``~/.local/state``.
-
-    Parameters
-    ----------
-    environment : mapping of str to str, optional
-        Environment variables, else those of the process.
-
-    Returns
-    -------
-    Path
-        The folder, which need not exist.
-    """
-    known = os.environ if environment is None else environment
-    base = Path(known.get("XDG_STATE_HOME", ""))
-    if not base.is_absolute():
-        base = Path(known.get("HOME") or Path("~").expanduser()) / ".local" / "state"
-    return base / "mlg-troubleshoot"
 
 
 @dataclass(frozen=True, slots=True)
 class SessionStore:
-    """The folder of sessions, one JSON file each, readable by their owner only.
+    """The sessions of a user in the store where finished inspections are kept; made with the first answer."""
 
-    Parameters
-    ----------
-    folder : Path, optional
-        The folder, else the user's; it is made when the first answer is saved.
-    """
+    place: str | Path | None = None
+    run: str = field(default_factory=lambda: secrets.token_hex(4))
+    owner: str = field(default_factory=lambda: os.environ.get("USER") or os.environ.get("USERNAME") or "")
 
-    folder: Path = field(default_factory=state_folder)
+    @property
+    def _drafts(self) -> Drafts:
+        return Drafts(Store(self.place, patience_s=_PATIENCE_S))
 
-    def save(self, session: Session) -> None:
-        """Write a session so that a reader sees the old file or the new one, never a part.
-
-        Parameters
-        ----------
-        session : Session
-            The session.
-
-        Raises
-        ------
-        OutputError
-            If the folder cannot be written.
-        """
-        path = self._path(session.id)
+    def save(self, session: Session) -> Session:
+        """Write a session whole or not at all; `SessionTakenError` if another run has written it meanwhile."""
+        ours = replace(session, writer=self.run)
+        draft = Draft(session.id, self.owner, self.run, session.complete, json.dumps(_as_json(ours)))
         try:
-            self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            handle, name = tempfile.mkstemp(prefix=".saving-", dir=self.folder)
-            try:
-                with os.fdopen(handle, "w", encoding="utf-8") as file:
-                    json.dump(_as_json(session), file, indent=1)
-                    file.flush()
-                    os.fsync(file.fileno())
-                Path(name).replace(path)
-            finally:
-                with suppress(OSError):
-                    Path(name).unlink()
-        except OSError as error:
-            raise OutputError(
-                f"{self.folder}: answers cannot be saved: {error.strerror}",
-                "Free the folder, or set XDG_STATE_HOME to one that can be written.",
-            ) from error
+            saved = self._drafts.save(draft, (session.writer, self.run))
+        except OutputError as error:
+            raise OutputError(f"answers cannot be saved: {error.message}", error.remedy) from error
+        if not saved:
+            raise SessionTakenError(
+                f"another window has gone on with {session.id}", "This entry goes on as one of its own."
+            )
+        return ours
 
     def load(self, session_id: str) -> Session:
-        """Read a session.
-
-        Parameters
-        ----------
-        session_id : str
-            Its name.
-
-        Returns
-        -------
-        Session
-            The session.
-
-        Raises
-        ------
-        SessionFileError
-            If there is none of that name, or its file is damaged.
-        """
-        path = self._path(session_id)
-        try:
-            raw = json.loads(path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            raise SessionFileError(
-                f"there is no saved inspection {session_id!r}", "Run mlg check to begin a new one."
-            ) from None
-        except (OSError, ValueError, RecursionError) as error:
-            raise _damaged(path, str(error)) from error
-        try:
-            session = _from_json(raw)
-        except (KeyError, TypeError, ValueError, OverflowError, UsageError) as error:
-            raise _damaged(path, f"{type(error).__name__}: {error}") from error
-        if session.id != session_id:
-            raise _damaged(path, f"it holds the session {session.id!r}")
-        return session
+        """Read a session."""
+        for draft in self._drafts.newest_first(draft_id=session_id):
+            return _session(draft)
+        raise SessionFileError(f"there is no saved inspection {session_id!r}", "Run mlg check to begin a new one.")
 
     def latest(self) -> Session | None:
-        """Return the unfinished session that was saved last.
-
-        Returns
-        -------
-        Session or None
-            The session; None if nothing is unfinished.
-
-        Raises
-        ------
-        SessionFileError
-            If a damaged file was saved later than any unfinished session.
-        """
-        for path in self._newest_first():
-            session = self.load(path.stem)
-            if not session.complete:
-                return session
+        """Return the unfinished session that was saved last."""
+        for draft in self._drafts.newest_first(self.owner):
+            if not draft.complete:
+                return self._readable(draft)
         return None
 
-    def unfinished(self, gear_id: str, tail_no: str, side: Side) -> tuple[Session | None, tuple[str, ...]]:
-        """Return the last unfinished session of one gear, and what could not be read on the way.
+    def unfinished(self, gear_id: str) -> tuple[tuple[Session, ...], tuple[str, ...]]:
+        """Return the unfinished sessions of a gear, the last one first, and what could not be read on the way."""
+        found, damaged = [], []
+        try:
+            for draft in self._drafts.newest_first(self.owner):
+                if draft.complete:
+                    continue
+                try:
+                    session = self._readable(draft)
+                except SessionFileError as error:
+                    damaged.append(f"{error.message} {error.remedy}")
+                    continue
+                if session.gear_id == gear_id and session.answers.joints:
+                    found.append(session)
+        except OutputError as error:
+            damaged.append(f"{error.message}. {error.remedy}")
+        return tuple(found), tuple(damaged)
 
-        Parameters
-        ----------
-        gear_id : str
-            The gear type.
-        tail_no : str
-            Tail number; upper and lower case are the same.
-        side : Side
-            Which gear.
-
-        Returns
-        -------
-        session : Session or None
-            The session; None if there is none.
-        damaged : tuple of str
-            A message for each file that could not be read.
-        """
-        damaged = []
-        for path in self._newest_first():
-            try:
-                session = self.load(path.stem)
-            except SessionFileError as error:
-                damaged.append(f"{error.message} {error.remedy}")
-                continue
-            answers = session.answers
-            if (
-                not session.complete
-                and session.gear_id == gear_id
-                and answers.side is side
-                and (answers.tail_no or "").casefold() == tail_no.casefold()
-                and answers.joints
-            ):
-                return session, tuple(damaged)
-        return None, tuple(damaged)
+    def _readable(self, draft: Draft) -> Session:
+        """Read a draft; one that is damaged is said once and put away."""
+        try:
+            return _session(draft)
+        except DamagedSessionError:
+            self._drafts.save(replace(draft, complete=True), (draft.writer,))
+            raise
 
     def finish(self, session: Session) -> None:
-        """Mark a session complete, and delete all but the last few complete ones.
-
-        Parameters
-        ----------
-        session : Session
-            The session.
-
-        Raises
-        ------
-        OutputError
-            If the folder cannot be written.
-        """
+        """Mark a session complete, and delete all but the last few complete ones."""
         self.save(replace(session, complete=True))
-        complete = 0
-        for path in self._newest_first():
-            try:
-                complete += self.load(path.stem).complete
-            except SessionFileError:
-                continue
-            if complete > _KEPT_COMPLETE:
-                self.discard(path.stem)
-                complete -= 1
+        drafts = self._drafts
+        complete = [draft.id for draft in drafts.newest_first(self.owner) if draft.complete]
+        for session_id in complete[_KEPT_COMPLETE:]:
+            drafts.discard(session_id)
 
     def discard(self, session_id: str) -> None:
-        """Delete a session; nothing happens if there is none.
-
-        Parameters
-        ----------
-        session_id : str
-            Its name.
-        """
-        with suppress(OSError):
-            self._path(session_id).unlink()
-
-    def _path(self, session_id: str) -> Path:
-        if Path(session_id).name != session_id or not session_id:
-            raise SessionFileError(f"{session_id!r} is not the name of a saved inspection", "Use mlg check --resume.")
-        return self.folder / f"{session_id}.json"
-
-    def _newest_first(self) -> list[Path]:
-        found = []
-        with suppress(OSError):
-            for path in self.folder.glob("*.json"):
-                with suppress(OSError):
-                    found.append((path.stat().st_mtime_ns, path.name, path))
-        return [path for _, _, path in sorted(found, reverse=True)]
+        """Delete a session; nothing happens if there is none."""
+        with suppress(OutputError):
+            self._drafts.discard(session_id)
 
 
-def _damaged(path: Path, why: str) -> SessionFileError:
-    return SessionFileError(
-        f"{path}: this saved inspection is damaged ({why.splitlines()[0]}).",
-        "Delete the file and begin again.",
+def _session(draft: Draft) -> Session:
+    try:
+        raw = json.loads(draft.content)
+    except (ValueError, RecursionError) as error:
+        raise _damaged(draft.id, str(error)) from error
+    known = raw.get("schema_version") if isinstance(raw, dict) else None
+    if isinstance(known, int) and known > _SCHEMA:
+        program = str(raw.get("program", "a newer version"))[:40]
+        raise SessionFileError(
+            f"{draft.id}: this inspection was saved by mlg {program}, which this version "
+            f"({version('mlg-troubleshoot')}) cannot read.",
+            f"It is kept: go on with it in mlg {program} or later, or begin a new one with mlg check.",
+        )
+    try:
+        session = replace(_from_json(raw), writer=draft.writer, complete=draft.complete)
+    except (KeyError, TypeError, ValueError, OverflowError, AttributeError, UsageError) as error:
+        raise _damaged(draft.id, f"{type(error).__name__}: {error}") from error
+    if session.id != draft.id:
+        raise _damaged(draft.id, f"it holds the session {session.id!r}")
+    return session
+
+
+def _damaged(session_id: str, why: str) -> DamagedSessionError:
+    return DamagedSessionError(
+        f"the saved inspection {session_id} is damaged ({why.splitlines()[0][:200]}).",
+        "It is put away and not offered again: begin again with mlg check.",
     )
 
 
@@ -287,19 +168,17 @@ def _as_json(session: Session) -> dict[str, Any]:
     answers = session.answers
     return {
         "schema_version": _SCHEMA,
+        "program": version("mlg-troubleshoot"),
         "id": session.id,
         "gear": session.gear_id,
         "started": session.started.isoformat(timespec="seconds"),
-        "complete": session.complete,
         "record_id": answers.record_id,
         "tail_no": answers.tail_no,
         "side": answers.side,
         "unit": answers.unit,
         "convention": answers.convention,
         "joints": {str(number): _joint_as_json(answer) for number, answer in sorted(answers.joints.items())},
-        "plunger_in": answers.plunger_in,
-        "margin_in": answers.margin_in,
-        "outcome": answers.outcome,
+        "more": dict(answers.more),
     }
 
 
@@ -310,27 +189,28 @@ def _joint_as_json(answer: JointAnswer) -> dict[str, Any] | None:
 
 
 def _from_json(raw: Any) -> Session:
-    if not isinstance(raw, dict) or raw["schema_version"] != _SCHEMA:
+    if raw["schema_version"] == 1:
+        lengths = {"plunger_displacement": raw["plunger_in"], "margin": raw["margin_in"]}
+        more = {"outcome": raw["outcome"], **{n: f"{float(v)!r} in" for n, v in lengths.items() if v is not None}}
+    elif raw["schema_version"] == _SCHEMA:
+        more = dict(raw["more"])
+    else:
         raise ValueError(f"schema_version {_SCHEMA} was expected")
-    unit = raw["unit"]
+    if not set(more) <= set(MORE):
+        raise ValueError(f"{sorted(set(more) - set(MORE))[0]!r} is no column of an entry")
+    unit, side, convention = raw["unit"], raw["side"], raw["convention"]
     return Session(
         id=_text(raw["id"]) or "",
         gear_id=_text(raw["gear"]) or "",
         started=datetime.fromisoformat(raw["started"]),
-        complete=bool(raw["complete"]),
         answers=Answers(
             record_id=_text(raw["record_id"]),
             tail_no=_text(raw["tail_no"]),
-            side=None if raw["side"] is None else Side(raw["side"]),
+            side=None if side is None else Side(side),
             unit=None if unit is None else LengthUnit(unit),
-            convention=None if raw["convention"] is None else ClearanceConvention(raw["convention"]),
-            joints=MappingProxyType(
-                {int(number): _joint_from_json(answer) for number, answer in dict(raw["joints"]).items()}
-            ),
-            plunger_in=_number(raw["plunger_in"]),
-            margin_in=_number(raw["margin_in"]),
-            outcome=None if raw["outcome"] is None else Outcome(raw["outcome"]),
-        ),
+            convention=None if convention is None else ClearanceConvention(convention),
+            joints=MappingProxyType({int(n): _joint_from_json(answer) for n, answer in dict(raw["joints"]).items()}),
+        ).with_more(**{name: _text(text) for name, text in more.items()}),
     )
 
 
@@ -348,11 +228,3 @@ def _text(raw: Any) -> str | None:
     if raw is not None and not (isinstance(raw, str) and raw.isprintable()):
         raise TypeError(f"{raw!r} is not a text")
     return raw
-
-
-def _number(raw: Any) -> float | None:
-    if raw is None:
-        return None
-    if isinstance(raw, bool) or not isinstance(raw, int | float):
-        raise TypeError(f"{raw!r} is not a number")
-    return float(raw)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-import re
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Protocol
 
-from rich.console import Console
 from rich.text import Text
 
-from mlg_troubleshoot.cli.prompts.lines import Line, Tone, to_ascii
+from mlg_troubleshoot.cli.output import DataConsole, console, word
+from mlg_troubleshoot.cli.prompts.lines import Line, Tone
 
 _STYLES = {
     Tone.PLAIN: "",
@@ -35,47 +34,21 @@ class Terminal(Protocol):
         ...
 
     def say(self, lines: Iterable[Line]) -> None:
-        """Show lines.
-
-        Parameters
-        ----------
-        lines : iterable of Line
-            The lines.
-        """
+        """Show lines."""
         ...
 
     def ask(self, prompt: str) -> str:
-        """Ask for one line; EOFError or KeyboardInterrupt if the user ends it.
-
-        Parameters
-        ----------
-        prompt : str
-            Text before the cursor.
-
-        Returns
-        -------
-        str
-            What was typed.
-        """
+        """Ask for one line; EOFError or KeyboardInterrupt if the user ends it."""
         ...
 
 
 class RichTerminal:
-    """A terminal on standard input and standard error; standard output is left to the results.
+    """A terminal on standard input and standard error; standard output is left to the results."""
 
-    Parameters
-    ----------
-    environment : mapping of str to str, optional
-        Environment variables, else those of the process: NO_COLOR, TERM, LANG, LC_CTYPE, LC_ALL.
-    """
-
-    def __init__(self, environment: Mapping[str, str] | None = None) -> None:
-        known = os.environ if environment is None else environment
-        plain = bool(known.get("NO_COLOR")) or known.get("TERM") in ("dumb", "unknown")
-        self._console = Console(
-            stderr=True, highlight=False, markup=False, emoji=False, color_system=None if plain else "auto"
-        )
-        self._ascii = not speaks_utf8(known)
+    def __init__(self) -> None:
+        plain = bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") in ("dumb", "unknown")
+        self._console: DataConsole = console(to_stderr=True, plain=plain)
+        self._edits = sys.stdout.isatty() and _line_editing()
 
     @property
     def width(self) -> int:
@@ -83,17 +56,11 @@ class RichTerminal:
         return min(self._console.width, _WIDEST)
 
     def say(self, lines: Iterable[Line]) -> None:
-        """Show lines; long ones are wrapped below their own beginning.
-
-        Parameters
-        ----------
-        lines : iterable of Line
-            The lines.
-        """
+        """Show lines; long ones are wrapped below their own beginning."""
         for each in lines:
             text = Text()
             for part, tone in each.parts:
-                text.append(self._shown(part), style=_STYLES[tone])
+                text.append_text(word(part, _STYLES[tone]))
             space = max(self.width - each.indent, 1)
             if each.rigid:
                 text.truncate(space)
@@ -105,51 +72,27 @@ class RichTerminal:
                 self._console.print(Text(" " * each.indent if row else "") + row, soft_wrap=True)
 
     def ask(self, prompt: str) -> str:
-        """Ask for one line.
-
-        Parameters
-        ----------
-        prompt : str
-            Text before the cursor.
-
-        Returns
-        -------
-        str
-            What was typed; characters that cannot be read come as a replacement character.
-        """
-        self._console.print(Text(self._shown(prompt), style="bold"), end="", soft_wrap=True)
-        self._console.file.flush()
+        """Ask for one line, with the arrow keys where the terminal and the library can."""
+        shown = word(prompt, "bold")
         try:
+            if self._edits:
+                # The library must know the prompt: it draws the line again.
+                return input(shown.plain)
+            self._console.print(shown, end="", soft_wrap=True)
+            self._console.file.flush()
             return input()
         except UnicodeDecodeError:
             return "\ufffd"
 
-    def _shown(self, text: str) -> str:
-        printable = "".join(c if c.isprintable() else "?" for c in text)
-        return to_ascii(printable) if self._ascii else printable
 
-
-def speaks_utf8(environment: Mapping[str, str]) -> bool:
-    """Tell whether the user's terminal shows UTF-8.
-
-    Python turns a C locale into UTF-8 for itself, so the streams cannot be asked.
-
-    Parameters
-    ----------
-    environment : mapping of str to str
-        Environment variables.
-
-    Returns
-    -------
-    bool
-        True if the locale names UTF-8, or on Windows if the stream is UTF-8.
-    """
-    if sys.platform == "win32":
-        return (sys.stderr.encoding or "").lower().startswith("utf")
-    language = environment.get("LANG", "")
-    types = environment.get("LC_CTYPE", "")
-    if types in ("C.UTF-8", "C.utf8"):
-        # Python's own doing at start-up when the locale is C or unknown.
-        types = ""
-    chosen = environment.get("LC_ALL") or types or language
-    return re.search(r"utf-?8", chosen, re.IGNORECASE) is not None
+def _line_editing() -> bool:
+    """Switch on editing of the typed line; nothing that is typed is kept as a history or changed."""
+    try:
+        import readline
+    except ImportError:
+        return False
+    readline.set_auto_history(False)
+    for setting in ("enable-bracketed-paste off", "input-meta on", "output-meta on", "convert-meta off"):
+        readline.parse_and_bind(f"set {setting}")
+    readline.parse_and_bind("tab: self-insert")
+    return True

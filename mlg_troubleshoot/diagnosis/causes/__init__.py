@@ -6,6 +6,7 @@ import importlib.util
 from pathlib import Path
 
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
+from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip
 from mlg_troubleshoot.diagnosis.causes.joint import DirectionNotWorstCase, JointContact, OvalWear
 from mlg_troubleshoot.diagnosis.causes.linkage import (
     CalibrationRate,
@@ -22,6 +23,7 @@ from mlg_troubleshoot.diagnosis.causes.reading import (
     SideDifference,
     TechnicianBias,
 )
+from mlg_troubleshoot.diagnosis.causes.together import LoadDirections, OtherGeometry
 from mlg_troubleshoot.errors import UsageError
 
 CATALOGUE: tuple[Cause, ...] = (
@@ -39,6 +41,9 @@ CATALOGUE: tuple[Cause, ...] = (
     CalibrationRate(),
     ApproachHysteresis(),
     JointContact(),
+    ConventionSlip(),
+    LoadDirections(),
+    OtherGeometry(),
 )
 
 

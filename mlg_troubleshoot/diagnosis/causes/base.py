@@ -36,8 +36,12 @@ class Scene:
         Where inside the linkage causes act.
     over_in : ndarray, shape (n,)
         Plain prediction, over-travel. [in]
+    directions : ndarray, shape (n, n_joints)
+        Directions that give it. [rad]
     contribution_in : ndarray, shape (n, n_joints)
         What each joint's clearance adds to it, directions held. [in]
+    drawn_share : float
+        How far read clearances were drawn to what wear makes expect. [1]
     """
 
     model: LinkageModel
@@ -46,11 +50,21 @@ class Scene:
     joints: tuple[int, ...]
     where: Discrepancies
     over_in: Array
+    directions: Array
     contribution_in: Array
+    drawn_share: float = 1.0
 
     def place(self, joint: int) -> int:
         """Return the column of a joint."""
         return self.joints.index(joint)
+
+    def is_read(self, joint: int) -> bool:
+        """Tell whether any row has the clearance of a joint; else it is only supposed."""
+        return bool(np.isfinite(self.table.clearance_in[:, self.place(joint)]).any())
+
+
+# Where joints that nobody read make more than this share of the prediction, or could, their wear may be the effect. [1]
+MOST_UNREAD = 0.15
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +80,8 @@ class Candidate:
     setting : mapping
         What else is fixed, for example the day from which it acts.
     stands_in : bool
-        True if its column is missing and something else stands for it: it can be a rival, never a name.
+        True if it can be a rival, never a name: its column is missing and something else stands for it, or joints that
+        nobody read may be the cause as well.
     """
 
     cause: Cause
@@ -82,6 +97,8 @@ class Candidate:
     @property
     def separates(self) -> str:
         """The one reading that would separate it from its rivals."""
+        if self.stands_in and self.setting:
+            return "the same inspections with every joint read"
         if self.stands_in:
             return f"the same inspections with {' and '.join(self.cause.needs)} recorded for each"
         return self.cause.separates
@@ -104,6 +121,16 @@ class Cause(ABC):
     """A small typical value of the parameter, at which the effect is computed."""
     sign: ClassVar[int] = 0
     """+1 or −1 where physics allows one sign of the parameter only, else 0."""
+    of_joints: ClassVar[bool] = False
+    """True if it changes what joints contribute: it is a special case of factors of all joints."""
+    one_scale: ClassVar[bool] = False
+    """True if it scales what all joints contribute alike."""
+    exact: ClassVar[float | None] = None
+    """The only value that the parameter can have, if there is one."""
+    acts_in: ClassVar[str | None] = None
+    """Column of the group of rows that it acts on: what it leaves there must look like noise."""
+    extends: ClassVar[bool] = True
+    """False if it is about what was written and not about the model: it is taken out of the analysis only."""
     sentence: ClassVar[str]
     """What it is, for a technician."""
     inspect: ClassVar[str]
@@ -162,6 +189,10 @@ class Cause(ABC):
             What differs from the plain model, row by row.
         """
 
+    def of_one_tail(self, candidate: Candidate) -> bool:
+        """Tell whether it concerns one tail, so that others cannot teach it: the gain is measured on held-out rows."""
+        return False
+
     def family(self, target: str | None) -> str | None:
         """Return the target under which variants of one name are gathered."""
         return target
@@ -187,58 +218,24 @@ class Cause(ABC):
 
 
 def filled(values: Array, neutral: float) -> Array:
-    """Replace missing cells by a neutral value, so that a cause does nothing there.
-
-    Parameters
-    ----------
-    values : ndarray
-        Cells, NaN where missing.
-    neutral : float
-        Value at which the cause does nothing.
-
-    Returns
-    -------
-    ndarray
-        The cells.
-    """
+    """Replace missing cells by a neutral value, so that a cause does nothing there."""
     return np.where(np.isfinite(values), values, neutral)
 
 
 def offset(scene: Scene, where: ArrayLike, value: float) -> Adjustment:
-    """Return a displacement that comes on top in some rows.
-
-    Parameters
-    ----------
-    scene : Scene
-        Model and rows.
-    where : array_like, shape (n,)
-        1 in the rows that it acts on, 0 elsewhere, or a share. [1]
-    value : float
-        The displacement. [in]
-
-    Returns
-    -------
-    Adjustment
-        The offset.
-    """
+    """Return a displacement that comes on top in some rows."""
     return Adjustment(scene.clearance_in, offset_in=np.asarray(where, float) * value)
 
 
+def share_never_read(scene: Scene) -> float:
+    """Share of joints that no row has in what all joints could move the plunger by. [1]"""
+    never = ~np.isfinite(scene.table.clearance_in).any(axis=0)
+    moved = np.abs(scene.model.plunger_amplification())
+    return float(moved[never].sum() / moved.sum())
+
+
 def levels(texts: NDArray[np.str_], least: int = 3) -> Sequence[str]:
-    """Return the values of a factor that occur often enough to be judged, but not everywhere.
-
-    Parameters
-    ----------
-    texts : ndarray of str, shape (n,)
-        The factor.
-    least : int
-        Fewest rows with and without the value.
-
-    Returns
-    -------
-    sequence of str
-        The values, in order.
-    """
+    """Return the values of a factor that occur often enough to be judged, but not everywhere."""
     found, counts = np.unique(texts, return_counts=True)
     n = len(texts)
     return [str(v) for v, c in zip(found, counts, strict=True) if v and least <= c <= n - least]

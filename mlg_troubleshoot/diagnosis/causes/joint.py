@@ -16,12 +16,13 @@ _ROOM_QUANTILES = (0.05, 0.3, 0.6, 0.8)
 class _JointShare(Cause):
     """A joint contributes more or less than its measured clearance in the worst direction."""
 
+    of_joints: ClassVar[bool] = True
     parameter: ClassVar[str] = "contribution_change"
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield one candidate for each joint that was measured with some wear."""
         for j, joint in enumerate(scene.joints):
-            if np.ptp(scene.clearance_in[:, j]) > 0.0:
+            if scene.is_read(joint) and np.ptp(scene.clearance_in[:, j]) > 0.0:
                 yield Candidate(self, f"joint {joint}", {"joint": joint})
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
@@ -67,6 +68,7 @@ class JointContact(Cause):
     """
 
     name: ClassVar[str] = "joint_contact"
+    of_joints: ClassVar[bool] = True
     parameter: ClassVar[str] = "share_not_taken_up"
     trial: ClassVar[float] = 0.2
     sign: ClassVar[int] = 1
@@ -78,7 +80,7 @@ class JointContact(Cause):
         """Yield candidates of both forms for each pair of neighbours that the gear names."""
         for first, second in scene.where.contact:
             a, b = scene.clearance_in[:, scene.place(first)], scene.clearance_in[:, scene.place(second)]
-            if not np.any(np.minimum(a, b) > 0.0):
+            if not (scene.is_read(first) and scene.is_read(second) and np.any(np.minimum(a, b) > 0.0)):
                 continue
             label = f"joints {first},{second}"
             yield Candidate(self, label, {"pair": (first, second), "room_in": None})

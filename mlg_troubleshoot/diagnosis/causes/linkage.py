@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, filled
+from mlg_troubleshoot.diagnosis.causes.base import MOST_UNREAD, Candidate, Cause, Scene, filled, share_never_read
 from mlg_troubleshoot.gear.adjustment import Adjustment
 
 REFERENCE_TEMPERATURE_C = 20.0
@@ -114,8 +114,10 @@ class UnlistedWear(Cause):
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield a few exponents of wear where the gear says which number it shifts."""
         if scene.where.wear_shift:
+            # Joints that nobody reads wear with landings likewise: beside them it is a rival, never a name.
+            rival = share_never_read(scene) > MOST_UNREAD
             for exponent in _WEAR_EXPONENTS:
-                yield Candidate(self, None, {"wear_exponent": exponent})
+                yield Candidate(self, None, {"wear_exponent": exponent}, stands_in=rival)
 
     def stand_ins(self, scene: Scene) -> Iterator[Candidate]:
         """Yield one candidate in which the wear of the joints stands for the landings that nobody recorded."""
@@ -124,7 +126,7 @@ class UnlistedWear(Cause):
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Shift the lever in proportion to a power of the landings."""
-        if candidate.stands_in:
+        if "wear_exponent" not in candidate.setting:
             worn = scene.clearance_in.mean(axis=0) > 0.0
             landings = 1000.0 * np.mean(scene.clearance_in[:, worn] / scene.clearance_in[:, worn].mean(axis=0), axis=1)
         else:
@@ -138,6 +140,8 @@ class CalibrationRate(Cause):
     """The calibration rate is wrong: all predictions are scaled."""
 
     name: ClassVar[str] = "calibration_rate"
+    of_joints: ClassVar[bool] = True
+    one_scale: ClassVar[bool] = True
     parameter: ClassVar[str] = "rate_change"
     trial: ClassVar[float] = 0.01
     sentence: ClassVar[str] = "The calibration rate of the model is off: every prediction is scaled"

@@ -9,12 +9,19 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mlg_troubleshoot.diagnosis.causes.base import Array, Candidate, Cause, Scene, levels, offset
+from mlg_troubleshoot.diagnosis.causes.base import (
+    MOST_UNREAD,
+    Array,
+    Candidate,
+    Cause,
+    Scene,
+    levels,
+    offset,
+    share_never_read,
+)
 from mlg_troubleshoot.gear.adjustment import Adjustment
 
 _LEAST_ROWS = 3
-# Where joints that make more than this share of the prediction were never read, their wear may be the offset. [1]
-_MOST_UNREAD = 0.15
 
 
 def _date(scene: Scene, day: float) -> str | None:
@@ -24,13 +31,13 @@ def _date(scene: Scene, day: float) -> str | None:
 
 def _from_day_on(scene: Scene, setting: Mapping[str, Any]) -> NDArray[np.bool_]:
     """Rows from the setting's day on; all rows if it has none. The day is found by its date in any table."""
-    if setting["day"] is None:
+    if setting.get("day") is None:
         return np.ones(len(scene.table), bool)
     days = scene.table.quantities.get("day")
     if days is None:
         return np.zeros(len(scene.table), bool)
     start = setting["day"]
-    if setting["since"] is not None and scene.table.first_day is not None:
+    if setting.get("since") is not None and scene.table.first_day is not None:
         start = (date.fromisoformat(setting["since"]) - date.fromisoformat(scene.table.first_day)).days
     return np.asarray(days >= start)
 
@@ -69,6 +76,7 @@ class GaugeBias(_Level):
     name: ClassVar[str] = "gauge_bias"
     needs: ClassVar[tuple[str, ...]] = ("gauge_id",)
     factor: ClassVar[str] = "gauge_id"
+    acts_in: ClassVar[str | None] = "gauge_id"
     label: ClassVar[str] = "gauge"
     sentence: ClassVar[str] = "Readings with {target} are shifted"
     inspect: ClassVar[str] = "Calibration of that gauge"
@@ -81,6 +89,7 @@ class TechnicianBias(_Level):
     name: ClassVar[str] = "technician_bias"
     needs: ClassVar[tuple[str, ...]] = ("technician_id",)
     factor: ClassVar[str] = "technician_id"
+    acts_in: ClassVar[str | None] = "technician_id"
     label: ClassVar[str] = "technician"
     sentence: ClassVar[str] = "Readings by {target} are shifted"
     inspect: ClassVar[str] = "How that technician seats and zeroes the gauge"
@@ -172,6 +181,7 @@ class RiggingOffset(Cause):
     """The plunger rod of one aircraft, or of one of its gears, was re-rigged."""
 
     name: ClassVar[str] = "rigging_offset"
+    acts_in: ClassVar[str | None] = "tail_no"
     needs: ClassVar[tuple[str, ...]] = ("tail_no",)
     parameter: ClassVar[str] = "offset_in"
     trial: ClassVar[float] = 0.001
@@ -197,7 +207,7 @@ class RiggingOffset(Cause):
                 if np.unique(gears[tails == tails[gears == v][0]]).size > 1
             ]
         for label, setting, rows in groups:
-            if _unread_share(scene, rows) > _MOST_UNREAD:
+            if max(_unread_share(scene, rows), share_never_read(scene)) > MOST_UNREAD:
                 continue
             yield Candidate(self, label, {**setting, "day": None, "since": None})
             for day in _change_days(days[rows], 1, 12):
@@ -210,6 +220,10 @@ class RiggingOffset(Cause):
         if "side" in setting:
             where = where & (table.factors["side"] == setting["side"])
         return offset(scene, where & _from_day_on(scene, setting), value)
+
+    def of_one_tail(self, candidate: Candidate) -> bool:
+        """It always does."""
+        return True
 
     def family(self, target: str | None) -> str | None:
         """Gather an aircraft and its single gears under one name."""

@@ -4,6 +4,7 @@ It shares nothing with the program that it tests but the coordinates of the join
 """
 
 from .causes import CATALOGUE, OFF_CATALOGUE
+from .departures import DEPARTURES
 from .generate import (
     KINDS,
     NULLS,
@@ -23,6 +24,7 @@ from .records import COLUMNS, FAULT_KINDS, Fault
 __all__ = [
     "CATALOGUE",
     "COLUMNS",
+    "DEPARTURES",
     "FAULT_KINDS",
     "KINDS",
     "NULLS",

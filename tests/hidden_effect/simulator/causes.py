@@ -120,7 +120,7 @@ def _sign(rng: np.random.Generator) -> float:
     return 1.0 if rng.random() < 0.5 else -1.0
 
 
-def _pick(rng: np.random.Generator, values: NDArray[np.object_], fewest: int = 1) -> str:
+def pick(rng: np.random.Generator, values: NDArray[np.object_], fewest: int = 1) -> str:
     """One identity among those with enough rows."""
     names, counts = np.unique(values.astype(str), return_counts=True)
     usable = names[counts >= fewest]
@@ -232,11 +232,11 @@ def _apply_unlisted_wear(design: Design, state: State, draft: Draft) -> None:
 
 
 def _draw_rigging(rng: np.random.Generator, design: Design) -> Draft:
-    tail = _pick(rng, design.tail, 7)
+    tail = pick(rng, design.tail, 7)
     rows = np.flatnonzero(design.tail == tail)
     side = None
     if rng.random() < 0.35:
-        side = _pick(rng, design.side[rows], 3)
+        side = pick(rng, design.side[rows], 3)
         rows = rows[design.side[rows] == side]
     days = np.unique(design.day[rows])
     start = None
@@ -299,7 +299,7 @@ def _apply_date_step(design: Design, state: State, draft: Draft) -> None:
 
 
 def _draw_gauge(rng: np.random.Generator, design: Design) -> Draft:
-    gauge = _pick(rng, design.gauge, 8)
+    gauge = pick(rng, design.gauge, 8)
     knob = "reading_shift_in" if rng.random() < 0.75 else "clearance_bias_in"
     size = (0.002, 0.006) if knob == "reading_shift_in" else (0.0002, 0.0006)
     parameters = {knob: float(rng.uniform(*size)), "sign": _sign(rng)}
@@ -315,7 +315,7 @@ def _apply_gauge(design: Design, state: State, draft: Draft) -> None:
 
 
 def _draw_technician(rng: np.random.Generator, design: Design) -> Draft:
-    person = _pick(rng, design.technician, 8)
+    person = pick(rng, design.technician, 8)
     knob = "reading_shift_in" if rng.random() < 0.7 else "stop_shift_in"
     parameters = {knob: float(rng.uniform(0.002, 0.006)), "sign": _sign(rng)}
     return Draft(f"technician {person}", person, knob, parameters, ("technician_id",))
@@ -399,7 +399,7 @@ CATALOGUE: dict[str, Cause] = {
 }
 
 
-def _off(
+def off_list(
     name: str,
     variables: tuple[str, ...],
     draw: Callable[[np.random.Generator, Design], Parameters],
@@ -454,16 +454,16 @@ def _far_product(design: Design, p: Parameters) -> Array:
 OFF_CATALOGUE: dict[str, Cause] = {
     cause.name: cause
     for cause in (
-        _off(
+        off_list(
             "technician_in_the_cold",
             ("technician_id", "temperature_c"),
             lambda rng, d: {
-                "technician": _pick(rng, d.technician, 20),
+                "technician": pick(rng, d.technician, 20),
                 "from_c": float(np.median(d.temperature)),
             },
             lambda d, p: (d.technician == p["technician"]) * (d.temperature - p["from_c"]) / 12.0,
         ),
-        _off(
+        off_list(
             "season",
             ("inspection_date",),
             lambda rng, _: {
@@ -472,7 +472,7 @@ OFF_CATALOGUE: dict[str, Cause] = {
             },
             _season,
         ),
-        _off(
+        off_list(
             "grease_drag",
             ("temperature_c",),
             lambda rng, d: {
@@ -482,19 +482,19 @@ OFF_CATALOGUE: dict[str, Cause] = {
             },
             lambda d, p: np.abs((d.temperature - p["middle_c"]) / p["width_c"]) ** p["power"],
         ),
-        _off(
+        off_list(
             "wear_of_one_side",
             ("gear_landings", "side"),
             lambda _, d: {"from_landings": float(np.median(d.landings))},
             lambda d, p: np.where(d.side == "RH", 1.0, -1.0) * (d.landings - p["from_landings"]) / 1000.0,
         ),
-        _off(
+        off_list(
             "pressure_kink",
             ("hydraulic_pressure_psi",),
             _kink,
             lambda d, p: np.abs(d.pressure - p["kink_psi"]) / p["width_psi"],
         ),
-        _off(
+        off_list(
             "cold_oil_under_load",
             ("temperature_c", "hydraulic_pressure_psi"),
             lambda _, d: {
@@ -504,7 +504,7 @@ OFF_CATALOGUE: dict[str, Cause] = {
             },
             lambda d, p: (d.temperature - p["middle_c"]) / 12.0 * (d.pressure - p["middle_psi"]) / p["width_psi"],
         ),
-        _off(
+        off_list(
             "lost_motion_under_load",
             ("approach", "hydraulic_pressure_psi"),
             lambda _, d: {"middle_psi": float(d.pressure.mean()), "width_psi": float(d.pressure.std())},
@@ -512,48 +512,29 @@ OFF_CATALOGUE: dict[str, Cause] = {
                 np.where(d.approach == "RETRACTING", 1.0, -1.0) * (d.pressure - p["middle_psi"]) / p["width_psi"]
             ),
         ),
-        _off(
+        off_list(
             "distant_joints_together",
             ("clearance_{first}_in", "clearance_{second}_in"),
             _far_pair,
             _far_product,
         ),
-        _off(
+        off_list(
             "bellcrank_end_float",
             ("axial_float_{joint}_in",),
             lambda rng, _: {"joint": int(rng.choice([1, 2, 8]))},
             lambda d, p: (d.floats[:, p["joint"] - 1] - 0.02) / 0.015,
         ),
-        _off(
+        off_list(
             "gauge_drift",
             ("gauge_id", "inspection_date"),
-            lambda rng, d: {"gauge": _pick(rng, d.gauge, 20), "middle_day": float(d.day.mean())},
+            lambda rng, d: {"gauge": pick(rng, d.gauge, 20), "middle_day": float(d.day.mean())},
             lambda d, p: (d.gauge == p["gauge"]) * (d.day - p["middle_day"]) / 200.0,
         ),
-        _off(
+        off_list(
             "approach_of_one_technician",
             ("technician_id", "approach"),
-            lambda rng, d: {"technician": _pick(rng, d.technician, 20)},
+            lambda rng, d: {"technician": pick(rng, d.technician, 20)},
             lambda d, p: (d.technician == p["technician"]) * np.where(d.approach == "RETRACTING", 1.0, -1.0),
         ),
     )
 }
-
-
-def find(name: str) -> Cause:
-    """A cause of either list by name.
-
-    Parameters
-    ----------
-    name : str
-        Name of the cause.
-
-    Returns
-    -------
-    Cause
-        The cause.
-    """
-    cause = CATALOGUE.get(name) or OFF_CATALOGUE.get(name)
-    if cause is None:
-        raise KeyError(f"No cause {name!r}; there are {', '.join([*CATALOGUE, *OFF_CATALOGUE])}.")
-    return cause

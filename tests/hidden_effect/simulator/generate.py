@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import causes, linkage, physics, records
+from . import causes, departures, linkage, physics, records
 from .causes import Draft
 from .fleet import Design, date_text, draw_design
 from .physics import Gears
@@ -42,6 +42,7 @@ _STREAMS = {
     "faults": 6,
     "spec": 7,
     "more": 8,
+    "unread": 9,
 }
 _TRIES = 60
 _CLOSE_ENOUGH = 0.01
@@ -88,7 +89,7 @@ class FleetSpec:
     hand_pump : bool
         Some readings are taken on the hand pump.
     geometry : str
-        Letter of the linkage.
+        Letter of the linkage, or two letters and the share of the second as in ``A-C:0.5``.
     reading_noise : float, optional
         Standard deviation of one plunger reading; drawn between 0.0015 and 0.0020 if None [in].
     tail_share : float
@@ -101,6 +102,8 @@ class FleetSpec:
         Plunger readings in each row, 1 to 3; two or three if None [-].
     blank_share : float
         Share of blank cells [-].
+    unread_share : float
+        Share of clearances that were not read, beyond that [-].
     drop_columns : tuple of str
         Columns that the table does not have.
     faults : tuple of str
@@ -121,6 +124,7 @@ class FleetSpec:
     growing: bool = False
     repeats: int | None = None
     blank_share: float = 0.01
+    unread_share: float = 0.0
     drop_columns: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
 
@@ -292,9 +296,10 @@ class _Effects:
         """Effect on reading minus prediction, on the reading alone, and on the recorded clearances."""
         state = self.gears.sound()
         for name, draft in drafts:
-            causes.find(name).apply(self.gears.design, state, draft)
+            departures.find(name).apply(self.gears.design, state, draft)
         only_reading = not state.recorded.any() and all(
-            name in causes.OFF_CATALOGUE or draft.knob == "reading_shift_in" for name, draft in drafts
+            (name not in causes.CATALOGUE and draft.knob == "amplitude_in") or draft.knob == "reading_shift_in"
+            for name, draft in drafts
         )
         reading = state.offset if only_reading else self.gears.read(state) - self.base
         total = reading
@@ -346,7 +351,7 @@ def _draw_effect(
     taken: set[tuple[str, str | None]],
 ) -> Draft:
     """Draw a target and parameters that reach the requested strength, or come nearest to it."""
-    cause = causes.find(spec.cause)
+    cause = departures.find(spec.cause)
     design = effects.gears.design
     best: tuple[Draft, float] | None = None
     for _ in range(_TRIES * (10 if spec.target is not None else 1)):
@@ -463,6 +468,9 @@ def simulate_fleet(spec: FleetSpec, seed: int) -> Fleet:
     errors = records.draw_errors(rng, design, noise, effects.base, repeats=repeats)
     whole = ("gauge_id", "technician_id", "inspection_date") if spec.alias is not None else ()
     blank = records.draw_blanks(_stream(seed, "blanks"), spec.rows, spec.blank_share, whole)
+    if spec.unread_share:
+        unread = _stream(seed, "unread").random((10, spec.rows)) < spec.unread_share
+        blank |= {name: blank[name] | own for name, own in zip(records.CLEARANCES, unread, strict=True)}
     noise_term = _noise_term(effects, errors, blank)
     noise_rms = float(np.sqrt(np.nanmean(noise_term**2)))
 

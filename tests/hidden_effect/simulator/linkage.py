@@ -501,21 +501,38 @@ def _stored() -> dict[str, dict[str, Any]]:
     return stored
 
 
-@lru_cache(maxsize=16)
+def _between(one: Any, other: Any, share: float) -> Any:
+    if isinstance(one, dict):
+        return {key: _between(value, other[key], share) for key, value in one.items() if key in other}
+    if isinstance(one, list):
+        return [_between(a, b, share) for a, b in zip(one, other, strict=True)]
+    return one + share * (other - one) if isinstance(one, float) else one
+
+
+def _drawing(name: str) -> dict[str, Any]:
+    letters, _, share = name.partition(":")
+    if not share:
+        return _stored()[name]
+    one, other = letters.split("-")
+    blend: dict[str, Any] = _between(_stored()[one], _stored()[other], float(share))
+    return blend
+
+
+@lru_cache(maxsize=64)
 def load(name: str = "A") -> Geometry:
-    """Drawing data of one stored linkage, calibrated.
+    """Drawing data of one stored linkage, or of one between two, calibrated.
 
     Parameters
     ----------
     name : str
-        Letter of the linkage.
+        Letter of the linkage, or two letters and the share of the second as in ``A-C:0.5``.
 
     Returns
     -------
     Geometry
         Positions in space, lengths, calibration rate and small-clearance over-travel directions.
     """
-    data = _stored()[name]
+    data = _drawing(name)
     mid = data["mid_position_in"]
     tau, delta, beta = (np.radians(data[k]) for k in ("tau_deg", "dihedral_deg", "plunger_axis_deg"))
     along = np.array([np.cos(tau), np.sin(tau), 0.0])

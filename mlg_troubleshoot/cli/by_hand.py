@@ -1,0 +1,165 @@
+"""One gear entered by hand: by flags, or by the questions on a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from mlg_troubleshoot.workflows import check as task
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.cli.prompts import Terminal
+
+
+@dataclass(frozen=True, slots=True)
+class Flags:
+    """What the flags say of one gear, as it was typed."""
+
+    values: tuple[str, ...]
+    tail: str | None
+    side: str | None
+    record_id: str | None
+    outcome: str | None
+    measured: str | None
+    margin: str | None
+    unit: LengthUnit | None
+    convention: ClearanceConvention | None
+
+    @property
+    def describe_a_gear(self) -> bool:
+        """True if any of them belongs to one gear; unit and convention go with files, too."""
+        single = (self.values, self.tail, self.side, self.record_id, self.outcome, self.measured, self.margin)
+        return any(single)
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """A result that was shown, and what writes its report if that was not asked for by a flag."""
+
+    result: task.CheckResult
+    report: Callable[[], None] | None
+
+
+def from_flags(flags: Flags, gear: Gear) -> Inspection:
+    missing = [
+        flag
+        for flag, value in (("--tail", flags.tail), ("--side", flags.side), ("--convention", flags.convention))
+        if value is None
+    ]
+    if missing or flags.tail is None or flags.side is None or flags.convention is None:
+        raise UsageError(
+            f"--set needs {', '.join(missing)}",
+            "Say which gear (--tail N123 --side LH) and what a clearance reading is (--convention RADIAL, DIAMETRAL "
+            "or TOTAL_PLAY): there is no default.",
+        )
+    side = flags.side.strip().upper()
+    values: dict[str, object] = {
+        "record_id": flags.record_id or f"{flags.tail}-{side}-{datetime.now():%Y%m%dT%H%M%S}",
+        "tail_no": flags.tail,
+        "side": flags.side,
+    }
+    labels: dict[str, str] = {}
+    for text in flags.values:
+        name, sign, written = text.partition("=")
+        number = name.strip().lstrip("#")
+        if not sign or not number.isdecimal() or not written.strip():
+            raise UsageError(f"--set {text!r} is not JOINT=VALUE", "Write for example --set 3=0.013in.")
+        column = f"clearance_{int(number)}"
+        if column in values:
+            raise UsageError(f"--set gives joint {int(number)} twice", "Give each joint once.")
+        values[column], labels[column] = written, f"--set {text!r}"
+    return _judged(values, labels, flags, gear)
+
+
+def _judged(values: Mapping[str, object], labels: Mapping[str, str], flags: Flags, gear: Gear) -> Inspection:
+    """Let the judge of table rows judge the flags; a refusal names the flag."""
+    from mlg_troubleshoot.records import ReadOptions, admit
+
+    more = {"outcome": flags.outcome, "plunger_displacement": flags.measured, "margin": flags.margin}
+    named = {
+        "record_id": f"--record-id {flags.record_id!r}",
+        "tail_no": f"--tail {flags.tail!r}",
+        "side": f"--side {flags.side!r}",
+        "outcome": f"--outcome {flags.outcome!r}",
+        "plunger_displacement": f"--measured {flags.measured!r}",
+        "margin": f"--margin {flags.margin!r}",
+    }
+    options = ReadOptions.of(gear, unit=flags.unit, convention=flags.convention)
+    return admit({**values, **more}, options, {**named, **labels})
+
+
+def ask(
+    flags: Flags,
+    gear: Gear,
+    publish: Callable[[Inspection, LengthUnit], Ending],
+    keep: Callable[[task.CheckResult], None],
+    *,
+    resume: bool,
+    place: str | None = None,
+) -> task.CheckResult:
+    """Ask on the terminal and show the result; the entry stays open until it was shown and kept."""
+    from mlg_troubleshoot.cli.prompts import Answers, RichTerminal, SessionStore, ask_inspection
+
+    store, terminal = SessionStore(place), RichTerminal()
+    saved = store.latest() if resume else None
+    if resume and saved is None:
+        raise UsageError("there is no unfinished entry to resume", "Start a new one: mlg check")
+    nobody = {"record_id": "-", "tail_no": "-", "side": flags.side or "LH", "clearance_convention": "RADIAL"}
+    judged = _judged(nobody, {}, flags, gear)
+    unit = flags.unit or LengthUnit.INCH
+    lengths = {"plunger_displacement": flags.measured, "margin": flags.margin}
+    given = Answers(
+        tail_no=flags.tail,
+        side=None if flags.side is None else judged.side,
+        unit=flags.unit,
+        convention=flags.convention,
+        record_id=flags.record_id,
+    ).with_more(
+        outcome=judged.outcome,
+        **{name: text if text is None or text[-1:].isalpha() else f"{text} {unit}" for name, text in lengths.items()},
+    )
+    entry = ask_inspection(gear, terminal, store, given, saved=saved, advice=_advice(gear))
+    while True:
+        ending = publish(entry.inspection, entry.session.answers.unit or unit)
+        typed = "" if ending.report is None else _what_now(terminal)
+        if typed == "c":
+            entry = ask_inspection(gear, terminal, store, given, saved=entry.session, correct=True)
+            continue
+        if typed == "r" and ending.report is not None:
+            ending.report()
+        keep(ending.result)
+        store.finish(entry.session)
+        return ending.result
+
+
+def _what_now(terminal: Terminal) -> str:
+    try:
+        while True:
+            typed = terminal.ask(" r = write the report, c = correct an answer, Enter = done > ").strip().lower()
+            if typed in ("", "r", "c"):
+                return typed
+    except EOFError:
+        return ""
+
+
+def _advice(gear: Gear) -> Callable[[Mapping[int, float], Sequence[int]], tuple[str, int | None] | None]:
+    """Say after each critical joint which one is worth most next, or that one may stop."""
+
+    def advise(measured: Mapping[int, float], left: Sequence[int]) -> tuple[str, int | None] | None:
+        advice = task.next_joint(gear, measured)
+        if advice.stop and left:
+            return f"{advice.text} Type done.", None
+        joint = next((worth.joint for worth in advice.worth if worth.joint in left), None)
+        if joint is None:
+            return None
+        if advice.expected is not None and joint == advice.joint:
+            return f"{advice.text} Or done.", joint
+        return f"Worth most next: {gear.joint(joint).label}.", joint
+
+    return advise

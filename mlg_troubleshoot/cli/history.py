@@ -1,0 +1,400 @@
+"""``mlg history``: what was kept of each gear, and what is added to it later."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from mlg_troubleshoot.cli import options, output
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.units import LengthUnit, in_unit
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.gear.gear import Gear
+    from mlg_troubleshoot.workflows.history import Forecast, GearLife
+
+EPILOG = (
+    "Example: [b]mlg history N123 LH[/b] · [b]mlg history repair N123 LH --joint 3 --date 2026-05-04[/b] · "
+    "[b]mlg history verify[/b]"
+)
+_SHOW = "show"
+BROKEN = 1
+
+Place = Annotated[
+    str | None,
+    typer.Option("--store", metavar="PATH|URL", help="Where it is kept; else MLG_STORE, else a file of your own."),
+]
+Tail = Annotated[str, typer.Argument(metavar="TAIL", help="Tail number.")]
+Side = Annotated[str, typer.Argument(metavar="LH|RH", help="Which gear.")]
+RecordId = Annotated[str, typer.Argument(metavar="RECORD", help="Record id, or the start of its hash.")]
+Joints = Annotated[list[int], typer.Option("--joint", metavar="N", help="A joint that was restored; may repeat.")]
+Day = Annotated[str, typer.Option("--date", metavar="YYYY-MM-DD", help="Day of the repair.")]
+Landings = Annotated[float | None, typer.Option("--landings", min=0, help="Landings at the repair.")]
+WorkOrder = Annotated[str | None, typer.Option("--work-order", help="Work order.")]
+Right = Annotated[Path, typer.Argument(metavar="FILE", help="A table with the one right inspection.")]
+Why = Annotated[str, typer.Option("--why", metavar="TEXT", help="Why the record does not count.")]
+Found = Annotated[str, typer.Option("--found", metavar="TEXT", help="What was found.")]
+FoundJoint = Annotated[int | None, typer.Option("--joint", metavar="N", help="The joint that it was.")]
+Chain = Annotated[Path, typer.Argument(metavar="FILE", help="JSON Lines, one record a line.")]
+
+NoForecast = Annotated[bool, typer.Option("--no-forecast", help="What was kept only, without looking ahead: faster.")]
+
+
+class HistoryGroup(TyperGroup):
+    """``mlg history`` without the name of a command shows: all gears, an aircraft, or one gear."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put the command that shows in front, where none is named."""
+        if not (args and (args[0] in self.commands or args[0] in ("-h", "--help"))):
+            args = [_SHOW, *args]
+        return super().parse_args(ctx, args)
+
+
+def side_of(text: str) -> str:
+    """Read LH or RH."""
+    if text.strip().upper() not in ("LH", "RH"):
+        raise UsageError(f"side {text!r} is not LH or RH", "Give LH or RH.")
+    return text.strip().upper()
+
+
+def show(
+    tail: Annotated[str | None, typer.Argument(metavar="[TAIL]", help="Tail number; without it all gears.")] = None,
+    side: Annotated[str | None, typer.Argument(metavar="[LH|RH]", help="Which gear; without it both.")] = None,
+    store: Place = None,
+    gear: options.Gear = options.DEFAULT_GEAR,
+    no_forecast: NoForecast = False,
+    report: options.Report = None,
+    page: options.Paper = None,
+    show_in: options.Show = None,
+    as_json: options.Json = False,
+) -> None:
+    """Show what was kept: the gears and their latest state, or one gear's life with the forecast of each joint."""
+    from mlg_troubleshoot.cli.remembered import settings
+    from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.store import Store
+    from mlg_troubleshoot.workflows import history as task
+
+    place, known = Store(store), load_gear(gear)
+    shown = settings(show_in, page, {}, keep=False, quiet=as_json)
+    if tail is None and report is not None:
+        raise UsageError("--report needs a gear", "Give TAIL, or write the page of all gears: mlg fleet --report DIR")
+    if tail is None:
+        found = task.lives(place)
+        if as_json:
+            output.write_json(task.fleet_as_json(list(found.values()), {}))
+        else:
+            _show_gears(list(found.values()), place.place)
+        return
+    sides = ["LH", "RH"] if side is None else [side_of(side)]
+    wanted = [key for key in place.gears() if key[0] == tail and key[1] in sides]
+    if not wanted:
+        task.life_of(place, tail, sides[0])
+    # The whole fleet teaches how joints wear.
+    everything = task.lives(place, tail if no_forecast else None)
+    model = None if no_forecast else task.fit_fleet(everything.values(), known)
+    ahead = task.forecast([everything[key] for key in wanted], model, known)
+    if as_json:
+        if len(wanted) != 1:
+            raise UsageError(f"{tail} has two gears here, and JSON shows one", f"Run: mlg history {tail} LH --json")
+        output.write_json(task.life_as_json(everything[wanted[0]], ahead[wanted[0]], known))
+    else:
+        for key in wanted:
+            _show_life(everything[key], ahead[key], known, shown.show)
+    if report is not None:
+        lives = [everything[key] for key in wanted]
+        output.say_written(
+            task.write_pages(lives, ahead, known, report, fleet=False, page=shown.page.value, unit=shown.show)
+        )
+
+
+def _show_gears(found: Sequence[GearLife], place: str) -> None:
+    from mlg_troubleshoot.workflows import history as task
+
+    console = output.console()
+    if not found:
+        console.print(output.text(f"Nothing is kept in {place}. Keep inspections with: mlg check FILE --keep"))
+        return
+    headings = ("tail", "side", "last seen", "landings", "verdict", "look at", "inspections", "repairs")
+    table = output.plain_table(console, *headings, right=("landings", "inspections", "repairs"))
+    for life in found:
+        seen = life.latest
+        landings = None if seen is None else seen.inspection.gear_landings
+        joint = None if seen is None else task.worst_joint(seen)
+        table.add_row(
+            output.word(life.key[0]),
+            life.key[1],
+            "-" if seen is None else seen.record.day or "no date",
+            "-" if landings is None else f"{landings:g}",
+            "-" if seen is None else str(seen.result.get("verdict")),
+            "-" if joint is None else f"#{joint}",
+            str(len(life.inspections)),
+            str(len(life.repairs)),
+        )
+    console.print(table)
+    _show_advice(found)
+
+
+def _show_advice(found: Sequence[GearLife]) -> None:
+    from mlg_troubleshoot.workflows import history as task
+
+    advice = task.advice(found)
+    if advice.asked:
+        output.console().print(advice.words)
+
+
+def span(samples: Any, gear: Gear) -> str:
+    """Median and 90 % interval of landings, the horizon standing for what lies beyond it."""
+    from mlg_troubleshoot.workflows import history as task
+
+    ends = task.quantiles(samples)
+    if ends is None:
+        return "-"
+    low, middle, high = (landings_shown(end, gear) for end in ends.values())
+    return middle if low == high else f"{middle} ({low} to {high})"
+
+
+def landings_shown(count: float | None, gear: Gear) -> str:
+    """Landings to two digits: a forecast has no more; None lies beyond the horizon."""
+    return f"> {gear.horizon.value:.0f}" if count is None else f"{float(f'{count:.2g}'):.0f}"
+
+
+def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) -> None:
+    from mlg_troubleshoot.workflows import history as task
+
+    console = output.console(unit=unit)
+    told = task.life_as_json(life, ahead, gear)
+    console.print(output.text(" ".join(life.key), "bold"))
+    table = output.plain_table(console, "date", "landings", "what", "record", "hash", right=("landings",))
+    for event in told["events"]:
+        landings = event["gear_landings"]
+        table.add_row(
+            event["date"] or "no date",
+            "-" if landings is None else f"{landings:g}",
+            _what(event, unit),
+            output.word(event["record_id"] or "-"),
+            event["hash"][:10],
+        )
+    console.print(table)
+    if ahead.limit is None and life.latest is not None and life.latest.inspection.gear_landings is None:
+        console.print(output.text("No forecast: the last inspection does not state its landings (gear_landings)."))
+    elif ahead.limit is not None:
+        due = (
+            "beyond the horizon"
+            if ahead.next_inspection is None
+            else f"in {landings_shown(ahead.next_inspection, gear)} landings"
+        )
+        console.print(
+            output.text(
+                f"Landings left from the last inspection: to a joint's limit {span(ahead.limit, gear)}, to the margin "
+                f"{span(ahead.margin, gear)}. Next inspection due {due} (accepted chance "
+                f"{gear.accepted_chance.value:.0%})."
+            )
+        )
+    headings = ("joint", f"limit {unit}", f"readings since restored (landings: {unit})", "landings to its limit")
+    joints = output.plain_table(console, *headings)
+    unread = [f"#{joint['joint']}" for joint in told["joints"] if not joint["readings"]]
+    for joint in told["joints"]:
+        if not joint["readings"] and joint["joint"] not in ahead.joints:
+            continue
+        shown = joint["readings"][-4:]
+        read = ", ".join(f"{landings:g}: {console.length(clearance)}" for landings, clearance in shown) or "none"
+        joints.add_row(
+            f"#{joint['joint']}",
+            console.length(joint["limit_in"]),
+            ("… " if len(joint["readings"]) > len(shown) else "") + read,
+            span(ahead.joints.get(joint["joint"]), gear),
+        )
+    console.print(joints)
+    if unread:
+        console.print(
+            output.text(f"Not read since new or restored: {', '.join(unread)}; never read counts as 0 above.")
+        )
+    _show_advice([life])
+
+
+def _what(event: dict[str, Any], unit: LengthUnit) -> str:
+    match event["kind"]:
+        case "assessment":
+            found = event["predicted_displacement_in"]
+            worst = "" if found is None else in_unit(f", worst case {found:.4f} in", unit)
+            said = f"assessed {event['verdict']}{worst}"
+        case "repair":
+            said = "restored " + ", ".join(f"#{joint}" for joint in event["joints"])
+        case "rerig":
+            said = "re-rigged"
+        case "void":
+            said = f"void: {event['why']}"
+        case "outcome":
+            said = f"found: {event['found']}" + ("" if event["joint"] is None else f" (#{event['joint']})")
+        case "inspection" if not event["counts"]:
+            said = "inspection (corrected or void)"
+        case kind:
+            said = str(kind)
+    return said
+
+
+def repair(
+    tail: Tail,
+    side: Side,
+    joints: Joints,
+    day: Day,
+    landings: Landings = None,
+    work_order: WorkOrder = None,
+    store: Place = None,
+    gear: options.Gear = options.DEFAULT_GEAR,
+) -> None:
+    """Record joints that were restored: their wear starts again."""
+    from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.store import Store
+    from mlg_troubleshoot.workflows import history as task
+
+    known = load_gear(gear)
+    _refuse_unknown(joints, known)
+    record = task.repair(Store(store), (tail, side_of(side)), joints, _day(day), landings, work_order)
+    output.say(f"Kept: repair of {tail} {record.side}, {', '.join(f'#{j}' for j in record.body['joints'])}.")
+
+
+def rerig(
+    tail: Tail, side: Side, day: Day, landings: Landings = None, work_order: WorkOrder = None, store: Place = None
+) -> None:
+    """Record that the reversing valve was re-rigged; the wear of the joints goes on."""
+    from mlg_troubleshoot.store import Store
+    from mlg_troubleshoot.workflows import history as task
+
+    record = task.rerig(Store(store), (tail, side_of(side)), _day(day), landings, work_order)
+    output.say(f"Kept: re-rigging of {tail} {record.side}.")
+
+
+def _refuse_unknown(joints: Sequence[int], gear: Gear) -> None:
+    unknown = [joint for joint in joints if joint not in gear.joint_numbers]
+    if unknown:
+        raise UsageError(
+            f"--joint {unknown[0]}: {gear.name} has no joint {unknown[0]}",
+            f"Its joints are {', '.join(map(str, gear.joint_numbers))}.",
+        )
+
+
+def _day(text: str) -> date:
+    try:
+        return date.fromisoformat(text)
+    except ValueError:
+        raise UsageError(f"--date {text!r} is no date", "Write it as 2026-05-04.") from None
+
+
+def correct(
+    record: RecordId,
+    file: Right,
+    store: Place = None,
+    gear: options.Gear = options.DEFAULT_GEAR,
+    unit: options.Unit = None,
+    convention: options.Convention = None,
+    sheet: options.Sheet = None,
+) -> None:
+    """Append the right inspection for a wrong one; both stay in the chain, the right one counts."""
+    from mlg_troubleshoot.cli.views import notes
+    from mlg_troubleshoot.store import Store
+    from mlg_troubleshoot.workflows import history as task
+    from mlg_troubleshoot.workflows.check import CheckOptions, check_files
+
+    asked = CheckOptions(
+        gear=gear, unit=options.unit_of(unit), convention=options.convention_of(convention), sheet=sheet
+    )
+    result = check_files([file], asked)
+    notes.show_problems(result.problems)
+    added = task.correct(Store(store), record, result, asked)
+    output.say(f"Kept: correction of {record} ({added.tail_no} {added.side}).")
+
+
+def void(record: RecordId, why: Why, store: Place = None) -> None:
+    """Append that a record does not count; it stays in the chain."""
+    from mlg_troubleshoot.store import Store
+    from mlg_troubleshoot.workflows import history as task
+
+    added = task.void(Store(store), record, why)
+    output.say(f"Kept: {record} ({added.tail_no} {added.side}) does not count.")
+
+
+def outcome(
+    record: RecordId,
+    found: Found,
+    joint: FoundJoint = None,
+    store: Place = None,
+    gear: options.Gear = options.DEFAULT_GEAR,
+) -> None:
+    """Record what was found after the advice; mlg history then says how often it was right."""
+    from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.store import Store
+    from mlg_troubleshoot.workflows import history as task
+
+    if joint is not None:
+        _refuse_unknown([joint], load_gear(gear))
+    added = task.outcome(Store(store), record, found, joint)
+    output.say(f"Kept: outcome of {record} ({added.tail_no} {added.side}).")
+
+
+def verify(store: Place = None) -> None:
+    """Walk the chain; the first record that does not fit is named (exit code 1). It proves no identity."""
+    from mlg_troubleshoot.store import Store
+
+    place = Store(store)
+    count, broken = place.verify()
+    if broken is not None:
+        output.write(
+            f"Record {broken.seq} ({broken.kind} {broken.record_id!r}) does not fit the chain: {broken.why}. "
+            f"{count} records before it fit."
+        )
+        raise typer.Exit(BROKEN)
+    output.write(f"{count} records fit the chain.")
+
+
+def export(file: Chain, store: Place = None) -> None:
+    """Write the whole chain as JSON Lines."""
+    from mlg_troubleshoot.outputs import refuse_inputs_as_outputs, write_text
+    from mlg_troubleshoot.store import Store
+
+    place = Store(store)
+    if "://" not in place.place:
+        refuse_inputs_as_outputs([place.place], [("the export", file)])
+    lines = list(place.export())
+    write_text(file, "".join(lines))
+    output.say(f"Written: {file}, {len(lines)} records.")
+
+
+def import_chain(file: Chain, store: Place = None) -> None:
+    """Read an exported chain into an empty store, or the rest of it into a store that holds its beginning."""
+    from mlg_troubleshoot.store import Store
+    from mlg_troubleshoot.workflows import history as task
+
+    added = task.import_file(Store(store), file)
+    output.say(f"Imported: {added.new} records; {added.known} were there already.")
+
+
+def ask_tail(tail: str, kept: str) -> bool:
+    """Ask whether two spellings mean one aircraft."""
+    return typer.confirm(f"Tail {tail!r} differs from {kept!r} only in spelling. Is it the same aircraft?", err=True)
+
+
+def can_ask() -> bool:
+    """True where somebody can answer."""
+    return sys.stdin.isatty() and sys.stderr.isatty()
+
+
+def history_app() -> typer.Typer:
+    """The commands under ``mlg history``."""
+    app = typer.Typer(
+        name="history",
+        cls=HistoryGroup,
+        help="What was kept of each gear: [b]mlg history[/b] · [b]mlg history TAIL LH[/b], and what is added later.",
+        epilog=EPILOG,
+    )
+    app.command(_SHOW, hidden=True)(show)
+    for command in (repair, rerig, correct, void, outcome, verify, export):
+        app.command()(command)
+    app.command("import")(import_chain)
+    return app

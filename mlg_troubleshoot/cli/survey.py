@@ -1,0 +1,108 @@
+"""``mlg gear survey``: the template of a survey, and what a filled-in one says about the gear."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mlg_troubleshoot.cli import options, output
+from mlg_troubleshoot.errors import OutputError, UsageError
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.studies.survey_result import SurveyResult
+
+EPILOG = (
+    "Example: [b]mlg gear survey template survey.xlsx[/b] · "
+    "filled in: [b]mlg gear survey survey.xlsx --write my-gear.toml[/b]"
+)
+
+
+def survey(
+    context: typer.Context,
+    file: Annotated[str, typer.Argument(metavar="FILE|template", help="Filled-in survey, or the word template.")],
+    template: Annotated[
+        Path | None, typer.Argument(metavar="[FILE.csv|FILE.xlsx]", help="Template to write, after the word template.")
+    ] = None,
+    write: Annotated[
+        Path | None, typer.Option("--write", metavar="GEAR.toml", help="Write the surveyed gear, ensemble and table.")
+    ] = None,
+    inspections: Annotated[
+        Path | None,
+        typer.Option("--for", metavar="INSPECTIONS", help="Narrow the displacement of these, not the indices."),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the starts and draws.")] = 0,
+    force: Annotated[bool, typer.Option("--force", help="Replace a template that exists.")] = False,
+    report: options.Report = None,
+    page: Annotated[options.Page, typer.Option("--page", help="Paper of the report.")] = options.Page.A4,
+    as_json: options.Json = False,
+    _version: options.Version = False,
+) -> None:
+    """A geometry from measurements: your own gear in place of the reconstructed one.
+
+    Exit codes: 0 fits · 1 something does not fit · 3 nothing follows from the table.
+    """
+    from mlg_troubleshoot.workflows import survey as task
+
+    gear = context.obj or options.DEFAULT_GEAR
+    if file == "template" and template is not None:
+        if template.exists() and not force:
+            raise OutputError(f"{template} exists already", "Give another name, or --force to replace it.")
+        options.keep_inputs(gear, (), [("the template", template)])
+        task.write_survey_template(template, gear)
+        output.write(
+            f"Written: {template}. Fill in what you read, then: mlg gear survey {template} --write my-gear.toml"
+        )
+        return
+    if template is not None:
+        raise UsageError(f"unexpected {str(template)!r}", "Give one survey, or: mlg gear survey template FILE.csv")
+    options.keep_inputs(gear, [file, inspections], [("--write", write)], report)
+    result = task.survey_gear(file, gear, write=write, inspections=inspections, seed=seed)
+    if as_json:
+        output.write_json(task.survey_values(result))
+    else:
+        _show(result)
+    written = None if report is None else task.write_survey_report(result, Path(file), report, page.value)
+    if written is not None:
+        output.say_written([written])
+    raise typer.Exit(result.exit_code)
+
+
+def _show(result: SurveyResult) -> None:
+    console = output.console()
+    for problem in result.problems:
+        output.say(f"{problem.place()}: {problem.value}: expected {problem.expected}. {problem.remedy}")
+    found = result.survey
+    if found is None:
+        console.print(output.text("Nothing follows from this table: it holds no reading that can be used."))
+    else:
+        wrong = f"{len(found.misfits)} of them do not fit" if found.misfits else "all of them fit"
+        console.print(output.text(f"{result.gear.name}: {len(found.read)} readings, {wrong}.", "bold"))
+        numbers = ("index", "90 % interval", "before")
+        table = output.plain_table(None, "joint", *numbers, right=numbers)
+        rows = zip(result.gear.joints, result.amplification, result.interval, result.before, strict=True)
+        for joint, a, after, before in rows:
+            ends = (f"{low:.3f} to {high:.3f}" for low, high in (after, before))
+            table.add_row(output.word(joint.label), f"{a:.3f}", *ends)
+        console.print(table)
+        mode = found.modes[0]
+        console.print(
+            output.text(
+                f"Index: movement of the plunger per clearance of the joint. The readings determine "
+                f"{mode.parameters:.1f} of {len(mode.vector)} numbers of the linkage; the rest is as it was before."
+            )
+        )
+        for misfit in found.misfits:
+            console.print(output.text(f"Row {misfit.reading.row}, {misfit.reading.words}: {misfit.words}.", "bold"))
+    for each in result.inspections:
+        console.print(output.text(f"{each.record_id}: {each.words}."))
+    for warning in result.warnings:
+        console.print(output.text(f"Note: {warning}."))
+    if result.suggestion is None:
+        console.print(output.text("No further reading would narrow this by 1 %: you can stop."))
+    else:
+        share = 100 * result.suggestion.narrowing
+        console.print(output.text(f"Next: {result.suggestion.reading.words}; narrows this by about {share:.0f} %."))
+    if result.gear_file is not None:
+        console.print(output.text(f"Written: {result.gear_file}. Use it: mlg check FILE --gear {result.gear_file}"))

@@ -1,0 +1,1 @@
+"""What a terminal shows: one gear, a batch, notes and problems."""

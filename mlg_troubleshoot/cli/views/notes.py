@@ -1,0 +1,88 @@
+"""Notes and problems of the input, on stderr."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import groupby
+
+from rich.console import Console
+from rich.padding import Padding
+
+from mlg_troubleshoot.cli import output
+from mlg_troubleshoot.errors import Problem
+
+_LINES_OF_PROBLEMS = 40
+_PROBLEM_COLUMN = 22
+
+
+def show_notes(notes: Sequence[str]) -> None:
+    console = output.console(to_stderr=True)
+    for note in notes:
+        _message(console, f"Note: {note}")
+
+
+def show_problems(problems: Sequence[Problem]) -> None:
+    """Show what is wrong with the input, on stderr: place, value, expected, remedy."""
+    if not problems:
+        return
+    console = output.console(to_stderr=True)
+    noun = "problem" if len(problems) == 1 else "problems"
+    console.print(f"{len(problems)} {noun} in the input:", style="bold")
+    shown = problems[:_LINES_OF_PROBLEMS]
+    if console.is_terminal and len(problems) > 1:
+        _show_problem_tables(console, shown)
+    else:
+        for problem in shown:
+            _show_problem(console, problem)
+    if len(problems) > _LINES_OF_PROBLEMS:
+        rest = len(problems) - _LINES_OF_PROBLEMS
+        _message(
+            console, f"… and {rest} more; --json lists all of them, --annotate marks them in your workbook.", indent=2
+        )
+
+
+def _show_problem(console: Console, problem: Problem) -> None:
+    _message(console, f"{problem.place()}: {_what(problem)}", indent=2)
+    _message(console, f"What to do: {problem.remedy}", indent=4)
+
+
+def _show_problem_tables(console: Console, problems: Sequence[Problem]) -> None:
+    """One table for each sheet; what is wrong with a file as a whole stands before its tables."""
+    for (file, sheet), found in groupby(problems, key=lambda p: (p.file, p.sheet)):
+        group = list(found)
+        for problem in group:
+            if problem.row is None:
+                _show_problem(console, problem)
+        placed = [problem for problem in group if problem.row is not None]
+        if not placed:
+            continue
+        place = ", ".join(part for part in (file, None if sheet is None else f"sheet {sheet!r}") if part is not None)
+        table = output.plain_table(console)
+        table.title, table.title_justify, table.title_style = output.text(place), "left", ""
+        for heading in ("cell", "column", "found"):
+            table.add_column(heading, overflow="fold", max_width=_PROBLEM_COLUMN)
+        table.add_column("expected, and what to do", ratio=1)
+        for problem in placed:
+            table.add_row(
+                output.word(problem.cell or f"row {problem.row}"),
+                output.word(problem.column or "-"),
+                output.text("nothing" if problem.value is None else problem.value),
+                output.text(f"{problem.expected}.\n{problem.remedy}"),
+            )
+        console.print(table)
+
+
+def _message(console: Console, text: str, indent: int = 0) -> None:
+    """Print a message: folded under its own indent on a terminal, one line of a file elsewhere."""
+    if console.is_terminal:
+        console.print(Padding(output.text(text), (0, 0, 0, indent)))
+    else:
+        console.print(output.text(" " * indent + text), soft_wrap=True)
+
+
+def _what(problem: Problem) -> str:
+    if problem.value is None:
+        return f"expected {problem.expected}."
+    if problem.row is None and problem.column is None:
+        return f"{problem.value}; expected {problem.expected}."
+    return f"found {problem.value!r}; expected {problem.expected}."

@@ -1,0 +1,167 @@
+"""One gear: the verdict, what to do and what follows; what stands behind it with ``--detail``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+from mlg_troubleshoot.cli.output import WIDE, DataConsole, plain_table, text, word
+from mlg_troubleshoot.cli.views.tables import MARKS, STYLES, measured_outside, next_words, what_follows
+from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected
+from mlg_troubleshoot.decision.sentences import confidence_words, percent, rigging_sentence
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.units import in_unit
+
+_JOINTS, _NOTES = 5, 4
+_DISCLAIMER = "Troubleshooting aid, not maintenance data; not an approval for return to service"
+
+
+def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool) -> None:
+    """Show one gear, in short on 24 lines of 80 columns."""
+    row = judgement.row if isinstance(judgement, Rejected) else judgement.inspection
+    words = judgement.verdict.words + ", MEASURED" * measured_outside(judgement)
+    title = Text(f"[{MARKS[judgement.verdict]}] {words} ", style=STYLES[judgement.verdict])
+    identity = f" {row.tail_no or 'tail ?'}  {row.side or 'side ?'}  {row.record_id or 'record ?'}"
+    panel = Panel(
+        _body(judgement, screen, detail=detail),
+        title=title.append_text(word(identity, "not bold default")),
+        title_align="left",
+        subtitle=word(gear.provenance, "dim"),
+        subtitle_align="right",
+    )
+    screen.print(panel)
+    if isinstance(judgement, Assessment) and detail:
+        _show_detail(judgement, gear, screen)
+    elif isinstance(judgement, Assessment):
+        screen.print(_short_table(judgement, screen))
+    notes = judgement.warnings if detail else judgement.warnings[:_NOTES]
+    for note in notes:
+        screen.sentence(f"* {note}")
+    if not detail:
+        more = len(judgement.warnings) - len(notes)
+        screen.print(f"{more} more notes; " * (more > 0) + "--detail: all joints, repairs, uncertainty", style="dim")
+    screen.print(_DISCLAIMER, style="dim")
+
+
+def _body(judgement: Judgement, screen: DataConsole, *, detail: bool) -> Text:
+    body = Text()
+    lines: list[tuple[str, str]] = []
+    if isinstance(judgement, Assessment):
+        lines.append((judgement.headline, "bold" if measured_outside(judgement) else ""))
+        lines += [(judgement.measured_statement, "")] if judgement.measured_statement is not None else []
+        lines += [(said, "") for said in _numbers(judgement)] if detail else []
+    lines.append((next_words(judgement), "bold"))
+    if isinstance(judgement, Assessment):
+        follows = what_follows(judgement)
+        lines += [(follows, "")] if follows is not None else []
+        advice = (judgement.measuring, judgement.posterior) if detail else (judgement.posterior,)
+        lines += [(said.text, "") for said in advice if said is not None]
+    for said, style in lines:
+        body.append_text(text(("\n" if body else "") + in_unit(said, screen.unit), style))
+    return body
+
+
+def _numbers(a: Assessment) -> Iterator[str]:
+    """What stands beside the prediction: probability, spread over the linkages, unmeasured joints."""
+    if a.geometry_spread_in is not None and a.probability_within_margin is not None:
+        low, high = a.geometry_spread_in
+        yield (
+            f"Probability that {'the plunger' if a.as_loaded else 'the worst case'} is within the margin: "
+            f"{percent(a.probability_within_margin)}"
+            f"{confidence_words(a.confidence)}. "
+            f"The ensemble of reconstructed linkages gives {low:.4f} to {high:.4f} in."
+        )
+    if any(f.clearance_in is None for f in a.joints):
+        upper = "the linkage does not close" if a.predicted_upper_in is None else f"{a.predicted_upper_in:.4f} in"
+        yield f"Unmeasured joints count as tight in these numbers; with them at their limit the worst case is: {upper}."
+
+
+def _clearance(f: JointFinding, screen: DataConsole) -> str:
+    return "unmeasured" if f.clearance_in is None else screen.length(f.clearance_in)
+
+
+def _short_table(a: Assessment, screen: DataConsole) -> Table:
+    table = plain_table(screen)
+    for heading in ("", "inspect in this order", f"clearance {screen.unit}", f"limit {screen.unit}", "contributes"):
+        table.add_column(heading, justify="left" if heading.startswith("inspect") else "right", no_wrap=True)
+    for f in a.ranked[:_JOINTS]:
+        part = "-" if f.contribution_in is None else screen.length(f.contribution_in)
+        name = f"#{f.joint} {f.name}" + (" OVER LIMIT" if f.over_limit else "")
+        style = "bold" if f.over_limit else ""
+        table.add_row(str(f.rank), name, _clearance(f, screen), screen.length(f.limit_in), part, style=style)
+    return table
+
+
+def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
+    """Everything that is known: all joints with their indices, repairs, re-rigging, the uncertainty budget."""
+    screen.print(_joint_table(a, screen))
+    alike = sorted({tuple(sorted((f.joint, *f.alike))) for f in a.joints if f.alike})
+    if alike:
+        pairs = ", ".join("#" + " = #".join(str(n) for n in group) for group in alike)
+        screen.print(f"Both ends of one link act alike ({pairs}): the plunger cannot tell which end is worn.")
+    if a.repair_sets:
+        screen.print(_repair_table(a, screen))
+        parts = sorted({gear.joint(n).new_part.value for s in a.repair_sets for n in s.joints})
+        listed = " to ".join(f"{value:.4f}" for value in dict.fromkeys((parts[0], parts[-1])))
+        screen.sentence(f"A restored joint counts with the {listed} in radial of a new part.")
+    if a.rigging is not None:
+        screen.sentence(rigging_sentence(a.rigging))
+    if a.budget is not None:
+        shares = ", ".join(f"{name} {u:.4f} in ({percent(share)})" for name, u, share in a.budget.lines)
+        screen.sentence(f"Standard uncertainty, with shares: {shares}. Model: {a.budget.model_source}.")
+    if a.chance_wrong is not None:
+        said = f"Called {a.verdict.words.lower()}, it lies on the other side of the margin with a chance of"
+        screen.print(f"{said} {percent(a.chance_wrong)}.")
+    what = "As loaded is an expectation, the worst case a bound." if a.as_loaded else "The worst case is a bound."
+    screen.print(f"Model: {gear.name}, geometry {gear.provenance}. {what}", style="dim")
+
+
+def _joint_table(a: Assessment, screen: DataConsole) -> Table:
+    table = plain_table(screen)
+    # Two-line headings: with them every column, and first of all the joint, has its place in 80 columns.
+    limit = f"limit\n{screen.unit}"
+    headings = (
+        *("rank", "joint", f"clearance\n{screen.unit}", limit, f"contri-\nbutes {screen.unit}", "S\nfirst", "S\ntotal"),
+        *("ampli-\nfication", "rank\nrange"),
+    )
+    # A narrow terminal leaves the limit to the short view, for the sake of the names.
+    shown = [heading for heading in headings if heading != limit or screen.width >= WIDE]
+    for heading in shown:
+        name = heading == "joint"
+        table.add_column(heading, justify="left" if name else "right", no_wrap=not name, min_width=19 if name else None)
+    for f in a.ranked:
+        cells = dict(zip(headings, _joint_cells(f, screen), strict=True))
+        table.add_row(*(cells[heading] for heading in shown), style="bold" if f.over_limit else "")
+    return table
+
+
+def _joint_cells(f: JointFinding, screen: DataConsole) -> tuple[str, ...]:
+    low, high = f.rank_range
+    return (
+        str(f.rank),
+        f"#{f.joint} {f.name}" + (" OVER LIMIT" if f.over_limit else ""),
+        _clearance(f, screen),
+        screen.length(f.limit_in),
+        "-" if f.contribution_in is None else screen.length(f.contribution_in),
+        f"{f.first_order:.3f}",
+        f"{f.total_order:.3f}",
+        f"{f.plunger_amplification:.2f}",
+        str(low) if low == high else f"{low}-{high}",
+    )
+
+
+def _repair_table(a: Assessment, screen: DataConsole) -> Table:
+    title = Text("Repairs that would bring it within")
+    numbers = ("minutes", f"worst case {screen.unit}", "probability within")
+    table = plain_table(None, "restore", *numbers, right=numbers, title=title)
+    for s in a.repair_sets or ():
+        table.add_row(
+            ", ".join(f"#{n}" for n in s.joints),
+            f"{s.minutes:.0f}",
+            screen.length(s.predicted_displacement_in),
+            percent(s.probability_within_margin),
+        )
+    return table

@@ -1,0 +1,145 @@
+"""A batch of gears under judgement as one object of arrays: what is known of each, held once and handed on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.decision.inspection import Inspection, Outcome
+from mlg_troubleshoot.decision.prediction import (
+    DEFAULT_PLUNGER_U_IN,
+    DIRECTION_SETS,
+    BatchPrediction,
+    Extension,
+    clearances,
+    predict,
+    with_rows,
+)
+from mlg_troubleshoot.decision.second_order import responses
+from mlg_troubleshoot.gear.adjustment import Adjustment
+from mlg_troubleshoot.gear.directions import chance_beyond
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.joints import ROUNDING_IN
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Cases:
+    """n gears under judgement.
+
+    clearance_in: radial clearances, NaN where not measured. [in]
+    gauge_u_in: standard uncertainty of a reading of each joint. [in]
+    own_gauge: joints whose own uncertainty is stated: they have been measured again.
+    margin_in, margin_u_in: margin and its standard uncertainty. [in]
+    mean_in, mean_u_in: mean plunger reading, NaN without one, and its standard uncertainty. [in]
+    failed, retracted: what the record says the gear did; neither if it does not say.
+    """
+
+    gear: Gear
+    inspections: tuple[Inspection, ...]
+    extension: Extension | None
+    clearance_in: Array
+    gauge_u_in: Array
+    own_gauge: Mask
+    margin_in: Array
+    margin_u_in: Array
+    mean_in: Array
+    mean_u_in: Array
+    failed: Mask
+    retracted: Mask
+
+    @classmethod
+    def of(cls, gear: Gear, inspections: Sequence[Inspection], extension: Extension | None = None) -> Cases:
+        numbers, rows = gear.joint_numbers, tuple(inspections)
+        means = [i.measured_displacement_in for i in rows]
+        return cls(
+            gear=gear,
+            inspections=rows,
+            extension=extension,
+            clearance_in=clearances(rows, gear, np.full(len(numbers), np.nan)),
+            gauge_u_in=np.array([i.gauge_us(numbers) for i in rows]),
+            own_gauge=np.array([[number in i.gauge_u_by_joint_in for number in numbers] for i in rows]),
+            margin_in=np.array([gear.margin.value if i.margin_in is None else i.margin_in for i in rows]),
+            margin_u_in=np.array([i.margin_u_in for i in rows]),
+            mean_in=np.array([math.nan if mean is None else mean for mean in means]),
+            mean_u_in=np.array([plunger_u(i) for i in rows]),
+            failed=np.array([i.outcome is Outcome.FAILED for i in rows]),
+            retracted=np.array([i.outcome is Outcome.RETRACTED for i in rows]),
+        )
+
+    def __len__(self) -> int:
+        return len(self.inspections)
+
+    @property
+    def residual_u_in(self) -> float | None:
+        """Scatter that an extension leaves; None without one. [in]"""
+        return None if self.extension is None else self.extension.residual_u_in
+
+    @property
+    def measured(self) -> Mask:
+        return np.isfinite(self.clearance_in)
+
+    @property
+    def over_limit(self) -> Mask:
+        over: Mask = self.clearance_in > self.gear.limits_in + ROUNDING_IN
+        return over
+
+    def filled(self, unmeasured: Array | float) -> Array:
+        """Clearances with something in place of those not measured. [in]"""
+        return np.where(self.measured, self.clearance_in, unmeasured)
+
+    def take(self, rows: NDArray[np.intp]) -> Cases:
+        arrays = {
+            f.name: getattr(self, f.name)[rows]
+            for f in fields(self)
+            if f.name not in ("gear", "inspections", "extension")
+        }
+        return replace(self, inspections=tuple(self.inspections[int(i)] for i in rows), **arrays)
+
+
+def plunger_u(inspection: Inspection) -> float:
+    """Standard uncertainty of the mean plunger reading. [in]"""
+    one = DEFAULT_PLUNGER_U_IN if inspection.plunger_gauge_u_in is None else inspection.plunger_gauge_u_in
+    return one / math.sqrt(max(len(inspection.readings_in), 1))
+
+
+def predict_batch(cases: Cases) -> BatchPrediction:
+    """Predict with unmeasured joints at 0 and at their limit, and the chance with random directions."""
+    gear, measured = cases.gear, cases.measured
+    at_zero = cases.filled(0.0)
+    lower = predict(gear, cases.inspections, at_zero, measured, cases.gauge_u_in, cases.extension)
+    open_rows = np.flatnonzero(~measured.all(axis=1))
+    upper = lower
+    if len(open_rows):
+        some = cases.take(open_rows)
+        found = predict(
+            gear, some.inspections, some.filled(gear.limits_in), some.measured, some.gauge_u_in, some.extension
+        )
+        upper = with_rows(lower, found, open_rows)
+    return BatchPrediction(lower, upper, _chance(cases, at_zero))
+
+
+def _chance(cases: Cases, clearance_in: Array) -> Array:
+    """Chance of exceeding the margin with random directions: by the expansion where clearances are small."""
+    gear, chance = cases.gear, np.empty(len(cases))
+    small = np.all(clearance_in <= gear.confirm_above.value, axis=1) & (cases.extension is None)
+    chance[small] = responses(gear)[0].chance_beyond(clearance_in[small], cases.margin_in[small], DIRECTION_SETS)
+    rows = np.flatnonzero(~small)
+    if len(rows):
+        chance[rows] = exact_chance(cases.take(rows), clearance_in[rows])
+    return chance
+
+
+def exact_chance(cases: Cases, clearance_in: Array, shift_in: float = 0.0) -> Array:
+    """Chance of exceeding the margin with random directions, the plunger shifted. [1]"""
+    model, extension = cases.gear.model, cases.extension
+    found = Adjustment(clearance_in) if extension is None else extension.adjust(cases.inspections, clearance_in)
+    offset = shift_in + (np.zeros(len(cases)) if found.offset_in is None else found.offset_in)
+    acts = found.clearance_in, cases.margin_in, DIRECTION_SETS, found.numbers(model), offset, found.rate_factor
+    return chance_beyond(model, *acts)

@@ -1,0 +1,307 @@
+"""From inspections to judgements: prediction, verdict, ranking and next action."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.decision import plunger_reading, sentences
+from mlg_troubleshoot.decision.assessment import (
+    Assessment,
+    JointFinding,
+    Judgement,
+    Rejected,
+    RepairSet,
+    UncertaintyBudget,
+    Verdict,
+)
+from mlg_troubleshoot.decision.case import Cases, predict_batch
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
+from mlg_troubleshoot.decision.likely_worn import explain
+from mlg_troubleshoot.decision.monte_carlo import check_probability
+from mlg_troubleshoot.decision.next_joint import advise
+from mlg_troubleshoot.decision.plan import Basis, Plan
+from mlg_troubleshoot.decision.planner import Judged, correct, plans
+from mlg_troubleshoot.decision.prediction import (
+    PROVISIONAL_U_IN,
+    PROVISIONAL_U_SHARE,
+    BatchPrediction,
+    Extension,
+    Prediction,
+)
+from mlg_troubleshoot.decision.ranking import rank_joints
+from mlg_troubleshoot.decision.repair import calibrated, repair_sets, search
+from mlg_troubleshoot.decision.rigging import rigging_alternative
+from mlg_troubleshoot.decision.second_order import responses
+from mlg_troubleshoot.decision.verdict_rule import verdict
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.studies.index_table import IndexTable
+
+Array = NDArray[np.float64]
+
+_CHUNK = 1024
+
+
+@dataclass(frozen=True, slots=True)
+class AssessOptions:
+    """What to compute beside verdict, plan, repair sets and allowances.
+
+    advice: say what further measuring is worth, check the probability by Monte Carlo, say what re-rigging would do,
+        and find which joints explain a measured displacement.
+    """
+
+    advice: bool = False
+    seed: int = 1
+    extension: Extension | None = None
+
+
+def assess(
+    rows: Sequence[Inspection | InvalidRow],
+    gear: Gear,
+    table: IndexTable,
+    options: AssessOptions | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> tuple[Judgement, ...]:
+    options = options or AssessOptions()
+    judged: list[Judgement] = []
+    for start in range(0, len(rows), _CHUNK):
+        part = rows[start : start + _CHUNK]
+        valid = [row for row in part if isinstance(row, Inspection)]
+        assessed = iter(_assess_valid(valid, gear, table, options) if valid else ())
+        for row in part:
+            if isinstance(row, Inspection):
+                judged.append(next(assessed))
+            else:
+                judged.append(Rejected(row, correct(row), row.warnings))
+        if progress is not None:
+            progress(len(part))
+    return tuple(judged)
+
+
+def _assess_valid(
+    inspections: Sequence[Inspection], gear: Gear, table: IndexTable, options: AssessOptions
+) -> list[Assessment]:
+    cases = Cases.of(gear, inspections, options.extension)
+    batch = predict_batch(cases)
+    p_lower = batch.lower.probability_within(cases.margin_in, cases.margin_u_in)
+    p_upper = batch.upper.probability_within(cases.margin_in, cases.margin_u_in)
+    missing = np.any(~cases.measured & np.array([joint.critical for joint in gear.joints]), axis=1)
+    plunger = plunger_reading.compare(cases, batch.upper)
+    verdicts = [
+        Verdict.OUTSIDE_MARGIN if beyond else verdict(float(low), float(high), critical_missing=bool(absent))
+        for beyond, low, high, absent in zip(plunger.beyond, p_lower, p_upper, missing, strict=True)
+    ]
+    closes = np.isfinite(batch.lower.displacement_in)
+    found = calibrated(cases, search(cases, batch.upper.displacement_in, batch.upper.u_clearances_in))
+    wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in verdicts]) & closes
+    sets = repair_sets(cases, found, wanted)
+    findings = rank_joints(gear, table, cases.clearance_in, allowances(cases, batch.lower))
+    order = np.array([[f.rank for f in row] for row in findings]).argsort(axis=1)
+    judged = Judged(verdicts, batch, plunger.beyond, plunger.clears, ~plunger.explained, order)
+    courses = plans(cases, judged, found, sets)
+    numbers = _Numbers(batch, p_lower, batch.lower.standard_uncertainty(cases.margin_u_in), plunger)
+    return [
+        _assessment(cases, i, verdicts[i], findings[i], courses[i], sets[i], numbers, options)
+        for i in range(len(cases))
+    ]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Numbers:
+    batch: BatchPrediction
+    p_within: Array
+    u_in: Array
+    plunger: plunger_reading.Compared
+
+
+def _assessment(
+    cases: Cases,
+    i: int,
+    found: Verdict,
+    findings: tuple[JointFinding, ...],
+    plan: Plan,
+    sets: tuple[RepairSet, ...],
+    numbers: _Numbers,
+    options: AssessOptions,
+) -> Assessment:
+    """Everything about one gear of a batch as one result."""
+    inspection, lower, plunger = cases.inspections[i], numbers.batch.lower, numbers.plunger
+    margin = float(cases.margin_in[i])
+    # Adding zero turns a minus zero into zero.
+    displacement = float(lower.displacement_in[i]) + 0.0
+    closes = bool(np.isfinite(displacement))
+    u = float(numbers.u_in[i])
+    # A linkage of the ensemble may not close where the reference does: the uncertainty is then unknown.
+    known = closes and bool(np.isfinite(u))
+    over, under = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
+    upper = float(numbers.batch.upper.displacement_in[i])
+    chance = float(numbers.batch.chance_random[i])
+    budget = _budget(numbers.batch, cases, i) if known else None
+    explained = closes and bool(np.isfinite(cases.mean_in[i]))
+    beyond = bool(plunger.beyond[i])
+    detail = _detail(cases, i, found, (over, under), budget, options) if options.advice and closes else {}
+    return Assessment(
+        inspection=inspection,
+        verdict=found,
+        predicted_displacement_in=displacement if closes else None,
+        over_travel_in=over if closes else None,
+        under_travel_in=under if closes else None,
+        predicted_upper_in=upper if np.isfinite(upper) else None,
+        margin_in=margin,
+        remaining_in=margin - displacement if closes else None,
+        standard_uncertainty_in=u if known else None,
+        probability_within_margin=float(numbers.p_within[i]),
+        probability_exceed_random_directions=chance if closes else None,
+        geometry_spread_in=(float(lower.spread_low_in[i]) + 0.0, float(lower.spread_high_in[i]) + 0.0)
+        if known
+        else None,
+        budget=budget,
+        over_directions_rad=tuple(lower.worst.over_directions[i].tolist()) if closes else (),
+        under_directions_rad=tuple(lower.worst.under_directions[i].tolist()) if closes else (),
+        joints=findings,
+        plan=plan,
+        basis=Basis.MEASURED if beyond else Basis.PREDICTED,
+        bound_in=float(lower.bound_in[i]) + 0.0 if np.isfinite(lower.bound_in[i]) else None,
+        explained_at_most_in=float(plunger.explained_at_most_in[i]) if explained else None,
+        unexplained_in=float(plunger.unexplained_in[i]) if explained else None,
+        headline=_headline(cases, i, found, numbers),
+        measured_statement=None
+        if beyond or not inspection.readings_in
+        else sentences.measured(float(cases.mean_in[i]), margin, "within"),
+        repair_sets=sets if closes else None,
+        warnings=_warnings(inspection, cases.gear, findings, (over, under), u, cases.extension),
+        **detail,
+    )
+
+
+def _budget(batch: BatchPrediction, cases: Cases, i: int) -> UncertaintyBudget:
+    source = (
+        f"provisional: the larger of {PROVISIONAL_U_IN:g} in and {100 * PROVISIONAL_U_SHARE:.0f} % of the prediction, "
+        "because one published failure gives none"
+        if cases.extension is None
+        else f"residual scatter of the diagnosis ({cases.extension.describe()})"
+    )
+    lower = batch.lower
+    return UncertaintyBudget(
+        {
+            joint: float(lower.u_readings_in[i, cases.gear.joint_numbers.index(joint)])
+            for joint in cases.inspections[i].clearance_in
+        },
+        float(lower.u_geometry_in[i]),
+        float(lower.u_model_in[i]),
+        float(cases.margin_u_in[i]),
+        source,
+    )
+
+
+def _detail(
+    cases: Cases,
+    i: int,
+    found: Verdict,
+    worst_in: tuple[float, float],
+    budget: UncertaintyBudget | None,
+    options: AssessOptions,
+) -> dict[str, Any]:
+    """What is worked out for a gear that is looked at alone."""
+    gear, inspection, margin = cases.gear, cases.inspections[i], float(cases.margin_in[i])
+    one, rng = cases.take(np.array([i])), np.random.default_rng(options.seed)
+    detail: dict[str, Any] = {"measuring": advise(gear, inspection, margin, cases.extension), "posterior": None}
+    if budget is not None:
+        detail["confidence"] = check_probability(one, worst_in, budget, rng)
+        if found in (Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE):
+            detail["rigging"] = rigging_alternative(one, worst_in, budget)
+    detail["posterior"] = explain(gear, inspection, rng, residual_u_in=cases.residual_u_in)
+    return detail
+
+
+def _headline(cases: Cases, i: int, found: Verdict, numbers: _Numbers) -> str:
+    margin, mean, plunger = float(cases.margin_in[i]), float(cases.mean_in[i]), numbers.plunger
+    lower = numbers.batch.lower
+    # Adding zero turns a minus zero into zero.
+    said = sentences.Predicted(
+        float(lower.displacement_in[i]) + 0.0, float(lower.bound_in[i]) + 0.0, float(numbers.batch.chance_random[i])
+    )
+    closes = np.isfinite(said.displacement_in)
+    if plunger.beyond[i]:
+        explained = sentences.explained(float(plunger.explained_at_most_in[i]), float(plunger.unexplained_in[i]))
+        then = f"{explained} Predicted: {said}." if closes else sentences.NO_CLOSURE
+        return f"{sentences.measured(mean, margin, 'outside')} {then}"
+    if not closes:
+        return sentences.NO_CLOSURE
+    if found is Verdict.OUTSIDE_MARGIN:
+        return sentences.outside(margin, said)
+    if found is Verdict.WITHIN_MARGIN:
+        return sentences.within(margin, said, failed=bool(cases.failed[i]))
+    if found is Verdict.INCOMPLETE:
+        open_joints = [n for n, read in zip(cases.gear.joint_numbers, cases.measured[i], strict=True) if not read]
+        return sentences.incomplete(open_joints, said)
+    return sentences.inconclusive(margin, said, float(numbers.p_within[i]))
+
+
+def _warnings(
+    inspection: Inspection,
+    gear: Gear,
+    findings: Sequence[JointFinding],
+    worst_in: tuple[float, float],
+    u: float,
+    extension: Extension | None,
+) -> tuple[str, ...]:
+    warnings = list(inspection.warnings)
+    lacking = () if extension is None else extension.lacks(inspection)
+    if lacking:
+        warnings.append(
+            f"The extension of the model needs {', '.join(lacking)}, which this inspection lacks: predicted without."
+        )
+    warnings += [
+        f"Joint #{finding.joint} {finding.name}: {finding.clearance_in:.4f} in radial is above its limit of "
+        f"{finding.limit_in:.4f} in ({gear.joint(finding.joint).limit.kind}): reject to the manual."
+        for finding in findings
+        if finding.over_limit and finding.clearance_in is not None
+    ]
+    down_lock = inspection.plunger_down_lock_in
+    low, high = gear.down_lock_range
+    if down_lock is not None and not low <= down_lock <= high:
+        warnings.append(
+            f"Plunger at Down Lock {down_lock:.4f} in is outside {low:.2f} to {high:.2f} in: check the rigging first."
+        )
+    if not np.all(np.isfinite(worst_in)):
+        warnings.append("With these clearances the linkage does not close in every direction: check the entries.")
+    elif not np.isfinite(u):
+        warnings.append("With these clearances some linkages of the ensemble do not close: the uncertainty is unknown.")
+    else:
+        differs = plunger_reading.disagreement(inspection, *worst_in, u)
+        if differs is not None:
+            warnings.append(differs)
+    if inspection.gauge_u_is_default:
+        warnings.append(f"Gauge uncertainty not stated: {inspection.gauge_u_in:.5f} in radial taken as the default.")
+    if inspection.outcome is Outcome.FAILED and inspection.measured_displacement_in is None:
+        warnings.append("The gear failed and no plunger displacement was measured: measure it at mid-position.")
+    return tuple(warnings)
+
+
+def allowances(cases: Cases, lower: Prediction) -> Array:
+    """How much further each measured joint may wear, alone, until the worst case reaches the margin or it its limit.
+
+    NaN for a joint that was not measured, and for a gear that is beyond its margin already. The second-order expansion,
+    anchored at the exact worst case, gives the wear; one exact worst case along its directions corrects it. [in]
+    """
+    gear, reference = cases.gear, responses(cases.gear)[0]
+    start, worst = cases.filled(0.0), lower.displacement_in
+    slopes, bend = reference.slopes(start), np.diag(reference.worst_curvature)
+    sense = np.where(lower.worst.over_in >= -lower.worst.under_in, 1.0, -1.0)[:, None]
+    left = (cases.margin_in - worst)[:, None]
+    room = np.maximum(gear.limits_in - start, 0.0)
+    # Root of slope·t + ½·bend·t² = left, in the form that stays good where the curvature is none.
+    root = np.sqrt(np.maximum(slopes**2 + 2.0 * sense * bend * left, 0.0))
+    wear = np.minimum(2.0 * left / np.maximum(slopes + root, 1e-9), room)
+    if cases.extension is None:
+        worn = start[:, None, :] + wear[:, :, None] * np.eye(start.shape[1])
+        senses = np.repeat(sense[:, 0], start.shape[1])
+        links = reference.worst_links(worn.reshape(-1, start.shape[1]), senses)
+        exact = (senses * gear.model.displacement(list(links.T))).reshape(wear.shape)
+        wear = np.clip(wear + (cases.margin_in[:, None] - exact) / np.maximum(slopes, 1e-9), 0.0, room)
+    return np.where(cases.measured & (left >= 0.0), wear, np.nan)

@@ -1,0 +1,167 @@
+"""Which joints explain a measured plunger displacement: importance sampling over wear, clearances and directions.
+
+Before the plunger is read each joint is worn beyond its limit with a small chance; a joint that is not worn has a
+clearance that grows rarer towards its limit, a worn one any clearance up to twice its limit. Measured joints have
+their reading with its uncertainty. Every clearance takes a uniformly random direction, and with a small chance
+something other than clearance moves the plunger as well. All of this is assumed: no fleet of this gear is public.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.decision.assessment import ClearanceInterval, GroupChance, Posterior
+from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.prediction import DEFAULT_PLUNGER_U_IN, clearances, model_uncertainty
+from mlg_troubleshoot.decision.second_order import responses
+from mlg_troubleshoot.decision.sentences import percent
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.studies.groups import link_groups
+
+Array = NDArray[np.float64]
+
+_QUANTILES = (0.05, 0.5, 0.95)
+# Below this chance no joint is named as likely worn. [1]
+_WORTH_SAYING = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """What is assumed before the plunger is read.
+
+    worn: chance that one link or pivot is worn beyond its limit, either end of a link being as likely. [1]
+    most_worn: largest clearance of a worn joint in units of its limit. [1]
+    other_cause: chance that something other than clearance moves the plunger. [1]
+    other_cause_u: standard deviation of what it adds, in units of the gear's margin. [1]
+    """
+
+    worn: float = 0.05
+    most_worn: float = 2.0
+    other_cause: float = 0.05
+    other_cause_u: float = 2.0
+
+
+DEFAULT_PRIOR = Prior()
+
+
+def explain(
+    gear: Gear,
+    inspection: Inspection,
+    rng: np.random.Generator,
+    draws: int = 32768,
+    prior: Prior = DEFAULT_PRIOR,
+    residual_u_in: float | None = None,
+) -> Posterior | None:
+    reading = inspection.measured_displacement_in
+    if reading is None:
+        return None
+    found = clearances([inspection], gear, np.full(len(gear.joints), np.nan))[0]
+    drawn, log_weight = _draw_clearances(gear, found, inspection, rng, draws, prior)
+    turns = rng.uniform(0.0, 2.0 * np.pi, drawn.shape)
+    links = np.empty((draws, 2 * drawn.shape[1]))
+    links[:, 0::2], links[:, 1::2] = drawn * np.cos(turns), drawn * np.sin(turns)
+    predicted = responses(gear)[0].displacement(links)
+    gauge = DEFAULT_PLUNGER_U_IN if inspection.plunger_gauge_u_in is None else inspection.plunger_gauge_u_in
+    gauge /= np.sqrt(len(inspection.readings_in))
+    u = np.hypot(model_uncertainty(predicted, residual_u_in), gauge)
+    wide = np.hypot(u, prior.other_cause_u * gear.margin.value)
+    plain = np.log1p(-prior.other_cause) - np.log(u) - 0.5 * ((reading - predicted) / u) ** 2
+    other = np.log(prior.other_cause) - np.log(wide) - 0.5 * ((reading - predicted) / wide) ** 2
+    top = float(np.max(np.maximum(plain, other) + log_weight))
+    by_clearance, by_other = np.exp(plain + log_weight - top), np.exp(other + log_weight - top)
+    weight = by_clearance + by_other
+    total = float(weight.sum())
+    weight = weight / total
+    worn = drawn > gear.limits_in
+    return _summary(gear, drawn, worn, weight, float(by_other.sum()) / total)
+
+
+def _draw_clearances(
+    gear: Gear, found: Array, inspection: Inspection, rng: np.random.Generator, n: int, prior: Prior
+) -> tuple[Array, Array]:
+    """Clearances, and the log of prior over proposal: worn joints are drawn more often than they occur. [in, 1]"""
+    limits = gear.limits_in
+    drawn = np.empty((n, len(found)))
+    log_weight = np.zeros(n)
+    for group in link_groups(gear):
+        for number in group:
+            j = gear.joint_numbers.index(number)
+            if np.isfinite(found[j]):
+                drawn[:, j] = _reading_with_error(float(found[j]), inspection.gauge_u_of(number), rng, n)
+                continue
+            chance = prior.worn / len(group)
+            often = 0.2 / len(group)
+            is_worn = rng.random(n) < often
+            log_weight += np.where(is_worn, np.log(chance / often), np.log((1.0 - chance) / (1.0 - often)))
+            within = 1.0 - np.sqrt(1.0 - rng.random(n))
+            beyond = 1.0 + (prior.most_worn - 1.0) * rng.random(n)
+            drawn[:, j] = limits[j] * np.where(is_worn, beyond, within)
+    return drawn, log_weight
+
+
+def _reading_with_error(found: float, u: float, rng: np.random.Generator, n: int) -> Array:
+    """Clearances that a reading allows: normal, cut off at 0. [in]"""
+    drawn = rng.normal(found, u, n)
+    for _ in range(60):
+        below = drawn < 0.0
+        if not below.any():
+            break
+        drawn[below] = rng.normal(found, u, int(below.sum()))
+    return np.maximum(drawn, 0.0)
+
+
+def _summary(gear: Gear, drawn: Array, worn: NDArray[np.bool_], weight: Array, not_clearance: float) -> Posterior:
+    index = {number: j for j, number in enumerate(gear.joint_numbers)}
+    chances = [
+        GroupChance(group, min(float(weight[worn[:, [index[n] for n in group]].any(axis=1)].sum()), 1.0))
+        for group in link_groups(gear)
+    ]
+    chances.sort(key=lambda chance: -chance.probability)
+    intervals = []
+    for number, j in index.items():
+        low, median, high = _weighted_quantiles(drawn[:, j], weight)
+        intervals.append(ClearanceInterval(number, low, median, high, min(float(weight[worn[:, j]].sum()), 1.0)))
+    called = tuple(chance.joints for chance in chances if chance.probability > 0.5)
+    # A sum of weights may pass 1 by rounding.
+    none = min(float(weight[~worn.any(axis=1)].sum()), 1.0)
+    effective = float(1.0 / np.sum(weight**2))
+    return Posterior(
+        tuple(chances),
+        none,
+        not_clearance,
+        tuple(intervals),
+        called,
+        effective,
+        _text(chances, called, none, not_clearance),
+    )
+
+
+def _weighted_quantiles(values: Array, weight: Array) -> tuple[float, float, float]:
+    order = np.argsort(values)
+    steps = np.cumsum(weight[order])
+    at = np.minimum(np.searchsorted(steps, np.array(_QUANTILES) * steps[-1]), len(values) - 1)
+    low, median, high = values[order][at].tolist()
+    return low, median, high
+
+
+def _text(chances: Sequence[GroupChance], called: Sequence[tuple[int, ...]], none: float, not_clearance: float) -> str:
+    likely = [chance for chance in chances[:2] if chance.probability >= _WORTH_SAYING]
+    ranked = ", then ".join(
+        f"{' or '.join(f'#{n}' for n in chance.joints)} ({percent(chance.probability)})" for chance in likely
+    )
+    # Another chance than those of the joints: both can be so at once.
+    also = f" Chance that something else moved the plunger as well: {percent(not_clearance)}."
+    if not_clearance > 0.8:
+        return f"Something other than joint clearance likely moved the plunger ({percent(not_clearance)})."
+    if called:
+        return f"The measured displacement points to wear: most likely worn {ranked}.{also}"
+    if not likely:
+        return f"No joint is likely worn beyond its limit ({percent(none)} that none is).{also}"
+    return (
+        f"The measured displacement does not show which joint is worn: no joint beyond its limit {percent(none)}; "
+        f"most likely worn {ranked}.{also}"
+    )

@@ -1,0 +1,278 @@
+"""Which joint to measure next, by what its reading is worth per minute, and when to stop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.decision.assessment import MeasuringAdvice, ReadingWorth, Verdict
+from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.plan import minutes_to_measure
+from mlg_troubleshoot.decision.prediction import Extension, clearances, model_uncertainty, predict
+from mlg_troubleshoot.decision.second_order import Response, responses
+from mlg_troubleshoot.decision.sentences import percent
+from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, verdict, zone
+from mlg_troubleshoot.decision.wear_levels import (
+    level_likelihood,
+    level_weights,
+    moments,
+    quantiles,
+    tabled_normal_cdf,
+    uncertainty_parts,
+)
+from mlg_troubleshoot.gear.gear import Gear
+
+Array = NDArray[np.float64]
+
+# At a conformance probability of 95 % one wrong WITHIN weighs as much as this many wrong OUTSIDE.
+COST_OF_WRONG_WITHIN = CONFORMANCE / (1.0 - CONFORMANCE)
+# A drop in risk below this is rounding: the reading has no value of its own.
+_NO_VALUE = 1e-6
+_QUANTILES = 12
+# An expectation is enough where being wrong costs at most this share of what a just conforming OUTSIDE does. [1]
+_ENOUGH_SHARE = 0.5
+# Chance from which a gear counts as too close to its margin for any reading of a joint to settle it. [1]
+_TOO_CLOSE = 0.9
+# Places and weights of a normal distribution, for the worst case once everything is measured.
+_SPOTS = np.linspace(-3.2, 3.2, 65)
+_SPOT_WEIGHTS = np.exp(-0.5 * _SPOTS**2) / np.exp(-0.5 * _SPOTS**2).sum()
+
+
+def decision_risk(probability: Array | float) -> Array:
+    """Expected cost of the better of WITHIN and OUTSIDE. [1]"""
+    p = np.asarray(probability, float)
+    risk: Array = np.minimum(COST_OF_WRONG_WITHIN * (1.0 - p), p)
+    return risk
+
+
+def enough(within: float, too_close: float = 0.0) -> Verdict | None:
+    """Say which verdict an expectation is enough for, to go on troubleshooting."""
+    if decision_risk(within) <= _ENOUGH_SHARE * (1.0 - CONFORMANCE) * (1.0 + 1e-9):
+        return Verdict.WITHIN_MARGIN if within > 0.5 else Verdict.OUTSIDE_MARGIN
+    return Verdict.INCONCLUSIVE if too_close >= _TOO_CLOSE else None
+
+
+@dataclass(frozen=True, slots=True)
+class Outlook:
+    """What to expect of one gear with what is measured so far.
+
+    within: probability of being within the margin, over levels of wear. [1]
+    too_close: probability that the verdict is INCONCLUSIVE once every joint is measured. [1]
+    """
+
+    worth: tuple[ReadingWorth, ...]
+    within: float
+    too_close: float
+
+    @property
+    def enough(self) -> Verdict | None:
+        return enough(self.within, self.too_close)
+
+
+def outlook(
+    gear: Gear,
+    inspection: Inspection,
+    margin_in: float,
+    extension: Extension | None = None,
+    anchor: tuple[float, float] | None = None,
+) -> Outlook:
+    """Find what each reading is worth, and the chances that the gear is within its margin or too close to it.
+
+    The unmeasured joints are taken by their distribution (`wear_levels`). For each joint the probability of being
+    within the margin, once its clearance is known, follows for a range of clearances; what the risk falls by on average
+    is the value of the reading. Where no single reading has a value, the share of the variance of the worst case takes
+    its place. Distribution and expansion serve the ranking only.
+    """
+    found = clearances([inspection], gear, np.full(len(gear.joints), np.nan))[0]
+    missing = np.flatnonzero(~np.isfinite(found))
+    numbers = [gear.joint_numbers[j] for j in missing]
+    opened = frozenset(gear.joint(number).area for number in gear.joint_numbers if number not in numbers)
+    minutes = [minutes_to_measure(gear, [number], opened) for number in numbers]
+    linkages = responses(gear)
+    if anchor is not None:
+        linkages = (linkages[0].anchored(np.nan_to_num(found), *anchor), *linkages[1:])
+    belief = _Belief.of(gear, inspection, margin_in, extension, linkages, found)
+    drops = np.array([belief.risk_drop(int(j)) for j in missing])
+    variances = np.array([belief.variance(int(j)) for j in missing])
+    worth = [
+        ReadingWorth(number, minutes[k], float(drops[k]), float(variances[k]), gear.joint(number).critical)
+        for k, number in enumerate(numbers)
+    ]
+    first = [w for w in worth if w.critical] or worth
+    valued = any(w.risk_drop > _NO_VALUE for w in first)
+    ordered = tuple(sorted(worth, key=lambda w: (not w.critical, -w.per_minute(by_risk=valued))))
+    return Outlook(ordered, belief.within(), belief.too_close())
+
+
+@dataclass(frozen=True, slots=True)
+class _Belief:
+    """One gear with its unmeasured joints distributed, level of wear by level of wear.
+
+    At each level the worst case is taken as normal: a sum over several joints, of which none dominates.
+    """
+
+    weight: Array
+    worst: Array
+    slopes: Array
+    mean: Array
+    spread: Array
+    u_rest: Array
+    limits: Array
+    margin_in: float
+    residual_u_in: float | None
+
+    @classmethod
+    def of(
+        cls,
+        gear: Gear,
+        inspection: Inspection,
+        margin_in: float,
+        extension: Extension | None,
+        linkages: Sequence[Response],
+        found: Array,
+    ) -> _Belief:
+        """Take the unmeasured joints at their mean for each level, and linearise there."""
+        limits, known = gear.limits_in, np.isfinite(found)
+        gauge_u_in = np.array(inspection.gauge_us(gear.joint_numbers))
+        share, variance = moments()
+        mean = np.where(known, np.nan_to_num(found), share[:, None] * limits)
+        worst, slopes, u_rest = uncertainty_parts(linkages, mean, gauge_u_in, inspection.margin_u_in)
+        spread = np.where(known, 0.0, variance[:, None] * limits**2)
+        residual = None if extension is None else extension.residual_u_in
+        weight = level_weights((found / limits)[known])
+        return cls(weight, worst, slopes, mean, spread, u_rest, limits, margin_in, residual)
+
+    def _chance(self, worst: Array, variance: Array, u_rest: Array | None = None) -> Array:
+        """Chance of being within the margin, from the worst case expected and the variance of what is open."""
+        u_rest = self.u_rest if u_rest is None else u_rest
+        u = np.sqrt(variance + u_rest**2 + model_uncertainty(worst, self.residual_u_in) ** 2)
+        return tabled_normal_cdf((self.margin_in - worst) / u)
+
+    def within(self) -> float:
+        """Chance of being within the margin with what is measured so far."""
+        return float(self.weight @ self._chance(self.worst, np.sum(self.slopes**2 * self.spread, axis=1)))
+
+    def too_close(self) -> float:
+        """Chance that neither verdict conforms once every joint is measured."""
+        spread = np.sqrt(np.sum(self.slopes**2 * self.spread, axis=1))
+        worst = self.worst[:, None] + spread[:, None] * _SPOTS
+        within = self._chance(worst, np.zeros_like(worst), self.u_rest[:, None])
+        between = (within > 1.0 - CONFORMANCE) & (within < CONFORMANCE)
+        return float(np.sum(self.weight[:, None] * _SPOT_WEIGHTS * between))
+
+    def risk_drop(self, j: int) -> float:
+        shares = quantiles(_QUANTILES)
+        weight = np.repeat(self.weight / _QUANTILES, _QUANTILES)
+        level = self.weight * level_likelihood(shares.ravel())
+        level /= level.sum(axis=1, keepdims=True)
+        clearance = shares.ravel()[:, None] * self.limits[j]
+        worst = self.worst + self.slopes[:, j] * (clearance - self.mean[:, j])
+        open_still = np.sum(np.delete(self.slopes**2 * self.spread, j, axis=1), axis=1)
+        known = np.sum(level * self._chance(worst, open_still), axis=1)
+        drop = float(decision_risk(weight @ known) - weight @ decision_risk(known))
+        return drop if drop > _NO_VALUE else 0.0
+
+    def variance(self, j: int) -> float:
+        """Variance of the worst case that a reading of one joint removes. [in²]"""
+        within = float(self.weight @ (self.slopes[:, j] ** 2 * self.spread[:, j]))
+        means = self.slopes[:, j] * self.mean[:, j]
+        return within + float(self.weight @ (means - self.weight @ means) ** 2)
+
+
+def advise(gear: Gear, inspection: Inspection, margin_in: float, extension: Extension | None = None) -> MeasuringAdvice:
+    """Say which joint to measure next and whether one may stop.
+
+    One may stop where the verdict is the same with every unmeasured joint measured as 0 and measured at its limit:
+    the worst case grows with every clearance, so nothing between can differ. A joint beyond its limit is found only
+    by measuring it.
+    """
+    found = clearances([inspection], gear, np.full(len(gear.joints), np.nan))[0]
+    open_joints = ~np.isfinite(found)
+    critical = np.array([joint.critical for joint in gear.joints])
+    lowest = np.where(open_joints, 0.0, found)
+    ends = np.array([lowest, np.where(open_joints, gear.limits_in, found)])
+    masks = np.array([~open_joints, np.ones(len(found), bool)])
+    rows = np.array([ends[0], ends[1], ends[0], ends[1]])
+    gauge_u_in = np.array(inspection.gauge_us(gear.joint_numbers))
+    prediction = predict(gear, [inspection] * 4, rows, masks[[0, 0, 1, 1]], np.tile(gauge_u_in, (4, 1)), extension)
+    p = prediction.probability_within(np.full(4, margin_in), np.full(4, inspection.margin_u_in))
+    now = verdict(float(p[0]), float(p[1]), critical_missing=bool(np.any(open_joints & critical)))
+    low, high = zone(float(p[2])), zone(float(p[3]))
+    settled = low is high
+    if not open_joints.any():
+        precise = _can_precision_settle(gear, inspection, margin_in, extension, found, now)
+        certain = None if now is Verdict.INCONCLUSIVE else now
+        return MeasuringAdvice((), not precise, now, float(p[0]), certain, _all_measured(now, precise))
+    anchor = None
+    over, under = float(prediction.worst.over_in[0]), float(prediction.worst.under_in[0])
+    if np.isfinite(over) and np.isfinite(under):
+        anchor = (over, under)
+    ahead = outlook(gear, inspection, margin_in, extension, anchor)
+    return MeasuringAdvice(
+        ahead.worth,
+        stop=settled,
+        verdict=low if settled else now,
+        expected_within=ahead.within,
+        expected=ahead.enough,
+        text=_settled(low) if settled else _text(gear, ahead, inspection),
+    )
+
+
+def _settled(verdict_then: Verdict) -> str:
+    return (
+        f"More measuring does not change the verdict ({verdict_then.words}): you may stop. A joint over its limit is "
+        "found only by measuring it."
+    )
+
+
+def _text(gear: Gear, ahead: Outlook, inspection: Inspection) -> str:
+    best, within = ahead.worth[0], ahead.within
+    name = f"#{best.joint} {gear.joint(best.joint).name}"
+    minutes = f"about {best.minutes:.0f} min access"
+    if ahead.enough is Verdict.INCONCLUSIVE:
+        plunger = "" if inspection.readings_in else " Measure the plunger displacement at mid-position."
+        return (
+            "If the unmeasured joints are worn like the measured ones, measuring them will hardly settle it: too close "
+            f"to the margin (chance {percent(ahead.too_close)}).{plunger} The joint that tells most is {name} "
+            f"({minutes})."
+        )
+    if ahead.enough is None:
+        if best.risk_drop > 0.0:
+            return f"Worth most next: {name} ({minutes})."
+        return f"Next: {name} ({minutes}); no single reading decides, it removes most of the uncertainty per minute."
+    likely = within > 0.5
+    chance = percent(within if likely else 1.0 - within)
+    where = "inside the margin" if likely else "outside the margin"
+    return (
+        f"If the unmeasured joints are worn like the measured ones, the worst case is {where} (chance {chance}): "
+        f"enough to go on troubleshooting. To be certain, measure {name} next ({minutes})."
+    )
+
+
+def _all_measured(now: Verdict, precise: bool) -> str:
+    if now is not Verdict.INCONCLUSIVE:
+        return "All joints are measured: more measuring does not change the verdict."
+    if precise:
+        return "All joints are measured. More precise readings may still settle it."
+    return (
+        "All joints are measured, and more precise readings do not settle it: the uncertainty of the geometry and of "
+        "the model is larger than that of the readings. Measure the plunger displacement at mid-position."
+    )
+
+
+def _can_precision_settle(
+    gear: Gear, inspection: Inspection, margin_in: float, extension: Extension | None, found: Array, now: Verdict
+) -> bool:
+    """True if exact readings, within two standard uncertainties of these ones, could leave INCONCLUSIVE."""
+    if now is not Verdict.INCONCLUSIVE:
+        return False
+    slopes = responses(gear)[0].slopes(found)
+    gauge_u_in = np.array(inspection.gauge_us(gear.joint_numbers))
+    step = 2.0 * gauge_u_in**2 * slopes / np.maximum(np.sqrt(np.sum((gauge_u_in * slopes) ** 2)), 1e-12)
+    rows = np.maximum(np.array([found - step, found + step]), 0.0)
+    prediction = predict(gear, [inspection] * 2, rows, np.zeros((2, len(found)), bool), np.zeros(2), extension)
+    p = prediction.probability_within(np.full(2, margin_in), np.full(2, inspection.margin_u_in))
+    return any(zone(float(value)) is not Verdict.INCONCLUSIVE for value in p)

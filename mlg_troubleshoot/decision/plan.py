@@ -1,0 +1,92 @@
+"""The advice as a plan: what to do, step by step, to an end. Only the first step binds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from mlg_troubleshoot.gear.gear import Gear
+
+
+class Action(StrEnum):
+    """What to do; each has one word on every channel."""
+
+    MEASURE = "MEASURE"
+    MEASURE_AGAIN = "MEASURE_AGAIN"
+    READ_PLUNGER = "READ_PLUNGER"
+    RESTORE = "RESTORE"
+    CONTINUE = "CONTINUE"
+    CORRECT = "CORRECT"
+
+    @property
+    def words(self) -> str:
+        return {
+            "MEASURE": "measure",
+            "MEASURE_AGAIN": "measure again",
+            "READ_PLUNGER": "read the plunger",
+            "RESTORE": "restore",
+            "CONTINUE": "go on",
+            "CORRECT": "correct",
+        }[self.value]
+
+
+class End(StrEnum):
+    WITHIN = "WITHIN"
+    NOT_EXPLAINED = "NOT_EXPLAINED"
+    TOO_CLOSE = "TOO_CLOSE"
+    OUTSIDE_NO_COMPLAINT = "OUTSIDE_NO_COMPLAINT"
+    CANNOT_CLEAR = "CANNOT_CLEAR"
+    CORRECT = "CORRECT"
+
+
+class Basis(StrEnum):
+    MEASURED = "MEASURED"
+    PREDICTED = "PREDICTED"
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step of a plan.
+
+    minutes: how long it takes: an area counts at its first step and again after a repair closed it. [min]
+    gauge_u_needed_in: largest standard uncertainty of one radial reading that serves; for `MEASURE_AGAIN` only. [in]
+    """
+
+    action: Action
+    joints: tuple[int, ...]
+    minutes: float
+    gauge_u_needed_in: float | None
+    text: str
+
+    @property
+    def words(self) -> str:
+        """The step in a few words: ``measure #3, #5``."""
+        joints = ", ".join(f"#{joint}" for joint in self.joints)
+        return f"{self.action.words} {joints}".rstrip()
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The expected course from what is known now to an end.
+
+    steps: the steps, never empty; only the first one binds.
+    """
+
+    steps: tuple[Step, ...]
+    end: End
+
+
+def minutes_to_measure(gear: Gear, joints: Sequence[int], opened: frozenset[str] = frozenset()) -> float:
+    """Minutes to read joints, opening an area once where it is not open."""
+    return _opening(gear, joints, opened) + sum(gear.joint(n).access.value for n in joints)
+
+
+def minutes_to_restore(gear: Gear, joints: Sequence[int], opened: frozenset[str] = frozenset()) -> float:
+    """Minutes to restore joints, opening an area once where it is not open."""
+    return _opening(gear, joints, opened) + sum(gear.joint(n).restore.value for n in joints)
+
+
+def _opening(gear: Gear, joints: Sequence[int], opened: frozenset[str]) -> float:
+    names = {gear.joint(n).area for n in joints} - opened
+    return sum(area.access.value for area in gear.areas if area.name in names)

@@ -1,0 +1,92 @@
+"""A measured plunger displacement beside the prediction."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.decision.case import Cases, plunger_u
+from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.prediction import Prediction
+from mlg_troubleshoot.units import SLIPS
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Compared:
+    """Measured displacements of n gears beside what the joints can explain, unmeasured joints at their limit.
+
+    beyond, clears: measured beyond the margin; within it by two standard uncertainties.
+    explained: false where the displacement is beyond what the joints can explain by two standard uncertainties.
+    explained_at_most_in, unexplained_in: what of it they explain at most, and what they cannot; NaN without a
+        reading. [in]
+    """
+
+    beyond: Mask
+    clears: Mask
+    explained: Mask
+    explained_at_most_in: Array
+    unexplained_in: Array
+
+
+def compare(cases: Cases, upper: Prediction) -> Compared:
+    """Split each measured displacement into what the joints can explain at most and the rest."""
+    size = np.abs(cases.mean_in)
+    bound = np.maximum(np.where(cases.mean_in > 0.0, upper.worst.over_in, -upper.worst.under_in), 0.0)
+    at_most = np.where(np.isfinite(bound), np.minimum(size, bound), size)
+    u = np.hypot(cases.mean_u_in, upper.standard_uncertainty(np.zeros(len(cases))))
+    return Compared(
+        beyond=size > cases.margin_in,
+        clears=size + 2.0 * np.hypot(cases.mean_u_in, cases.margin_u_in) <= cases.margin_in,
+        explained=~(size > at_most + 2.0 * u),
+        explained_at_most_in=at_most,
+        unexplained_in=size - at_most,
+    )
+
+
+def outside(inspection: Inspection, margin_in: float) -> bool:
+    measured = inspection.measured_displacement_in
+    return measured is not None and abs(measured) > margin_in
+
+
+def disagreement(inspection: Inspection, over_in: float, under_in: float, standard_uncertainty_in: float) -> str | None:
+    """Flag a measured displacement that differs from the prediction by more than two standard uncertainties."""
+    measured = inspection.measured_displacement_in
+    if measured is None:
+        return None
+    u = math.hypot(standard_uncertainty_in, plunger_u(inspection))
+    if abs(measured - over_in) <= 2.0 * u:
+        return None
+    differs = (
+        f"Measured {measured:+.4f} in differs from the predicted over-travel {over_in:+.4f} in by more than two "
+        f"combined standard uncertainties ({2 * u:.4f} in)."
+    )
+    if under_in - 2.0 * u <= measured < over_in:
+        slip = _slip(measured, over_in, u)
+        return (
+            f"{differs} It lies inside the worst-case bounds, so it is possible: the clearances need not be taken "
+            f"up in the worst direction.{slip}"
+        )
+    return (
+        f"{differs} It is beyond what the entered clearances can do in any direction. Look for: a clearance read "
+        f"smaller than it is or entered with the wrong unit or convention, an unmeasured joint, a part outside "
+        f"the listed joints, a changed rigging, the plunger gauge.{_slip(measured, over_in, u)}"
+    )
+
+
+def _slip(measured: float, predicted: float, u: float) -> str:
+    """Name a slip of the entry that would make the two agree; it is suggested, never applied."""
+    if predicted <= 0.0 or measured <= 0.0:
+        return ""
+    for slip in SLIPS.values():
+        factor = slip.factor
+        for value in (factor, 1.0 / factor):
+            if abs(measured - predicted * value) <= max(u, 0.05 * abs(measured)):
+                words = " or ".join(dict.fromkeys((slip.too_large, slip.too_small)))
+                return f" A slip that would explain it: {words} (factor {factor:g})."
+    return ""

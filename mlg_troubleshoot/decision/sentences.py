@@ -1,0 +1,164 @@
+"""Every sentence that a verdict, a step or an end can say: one place for screen, batch, files and paper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mlg_troubleshoot.decision.assessment import Confidence, Rigging
+from mlg_troubleshoot.decision.plan import End
+from mlg_troubleshoot.gear.gear import Gear
+
+NO_CLOSURE = "With these clearances the linkage does not close in its worst position: outside any margin."
+CHECK_ENTRIES = "Do not use. Correct: the linkage does not close with these clearances; check the entries."
+GO_ON = {
+    End.WITHIN: "Go on with fault isolation: within margin is not a release to service.",
+    End.NOT_EXPLAINED: "Joint clearances do not explain it: check rigging, lock roller, reversing valve, hydraulics, "
+    "doors.",
+    End.TOO_CLOSE: "Go on: too close to the margin for the model to decide. Look again at the next inspection; record "
+    "its date or landings.",
+    End.OUTSIDE_NO_COMPLAINT: "Go on: clearances could contribute, but no failure is recorded. Engineering decides.",
+    End.CANNOT_CLEAR: "Go on to engineering: no set of joints, restored to new, brings the worst case within the "
+    "margin with 95 % probability.",
+}
+
+
+FAILED_BUT_WITHIN = "Joint clearances do not explain this failure: check hydraulics, reversing valve, doors."
+
+
+def percent(share: float) -> str:
+    """Write a probability as a percentage that is never rounded to a 0 or a 100 that it is not."""
+    if 0.0 < share < 0.001:
+        return "< 0.1 %"
+    if 0.999 < share < 1.0:
+        return "> 99.9 %"
+    near_an_end = 0.0 < share < 0.1 or 0.9 < share < 1.0
+    return f"{100.0 * share:.{1 if near_an_end else 0}f} %"
+
+
+def go_on(end: End, *, failed: bool) -> str:
+    """Step CONTINUE."""
+    return FAILED_BUT_WITHIN if failed and end is End.NOT_EXPLAINED else GO_ON[end]
+
+
+@dataclass(frozen=True, slots=True)
+class Predicted:
+    """The numbers that stand together everywhere.
+
+    displacement_in: worst case, or the displacement as loaded where an extension knows how loads rest the pins. [in]
+    bound_in: worst case over all directions. [in]
+    chance: of leaving the margin with random directions. [1]
+    """
+
+    displacement_in: float
+    bound_in: float
+    chance: float
+
+    @property
+    def loaded(self) -> bool:
+        """True where the prediction is an expectation and no bound."""
+        return self.displacement_in != self.bound_in
+
+    def __str__(self) -> str:
+        chance = f"chance with random directions {percent(self.chance)}"
+        if self.loaded:
+            return f"as loaded {self.displacement_in:.4f} in, worst case {self.bound_in:.4f} in, {chance}"
+        return f"worst case {self.displacement_in:.4f} in, {chance}"
+
+
+def outside(margin_in: float, said: Predicted) -> str:
+    """Headline of OUTSIDE_MARGIN, predicted."""
+    can = "push" if said.loaded else "could push"
+    return f"Clearances {can} the plunger outside its margin of {margin_in:.4f} in ({said})."
+
+
+def measured(measured_in: float, margin_in: float, where: str) -> str:
+    """Where the plunger was measured: ``outside`` or ``within`` its margin; outside is said first and loudest."""
+    sense, word = "beyond" if measured_in > 0 else "short of", "MEASURED" if where == "outside" else "Measured"
+    stands = f"the plunger stands {abs(measured_in):.4f} in {sense} mid-position"
+    return f"{word}: {stands}, {where} its margin of {margin_in:.4f} in."
+
+
+def explained(explained_in: float, unexplained_in: float) -> str:
+    if unexplained_in <= 0.0:
+        return "Joint clearances can explain all of it."
+    return f"Joint clearances can explain {explained_in:.4f} in of it at most; {unexplained_in:.4f} in they cannot."
+
+
+def within(margin_in: float, said: Predicted, *, failed: bool) -> str:
+    """Headline of WITHIN_MARGIN."""
+    then = FAILED_BUT_WITHIN if failed else "Continue fault isolation; not a release."
+    if not said.loaded:
+        return f"Even the worst case stays within the margin of {margin_in:.4f} in ({said}). {then}"
+    loads = f"Other loads than this fleet's could push it to {said.bound_in:.4f} in."
+    return f"Within its margin of {margin_in:.4f} in as loaded ({said.displacement_in:.4f} in). {loads} {then}"
+
+
+def incomplete(open_joints: Sequence[int], said: Predicted) -> str:
+    """Headline of INCOMPLETE."""
+    return f"Cannot clear: not measured {joint_list(open_joints)} ({said} from the measured joints alone)."
+
+
+def inconclusive(margin_in: float, said: Predicted, p_within: float) -> str:
+    """Headline of INCONCLUSIVE."""
+    what = "the plunger" if said.loaded else "the bound"
+    return (
+        f"Too close to the margin of {margin_in:.4f} in to say ({said}; probability that {what} is within the margin "
+        f"{percent(p_within)})."
+    )
+
+
+def measure(gear: Gear, joints: Sequence[int]) -> str:
+    """Step MEASURE."""
+    if len(joints) == 1:
+        return f"Measure #{joints[0]} {gear.joint(joints[0]).name}."
+    return f"Measure, in this order: {joint_list(joints)}."
+
+
+def measure_again(joints: Sequence[int], gauge_u_needed_in: float) -> str:
+    """Step MEASURE_AGAIN."""
+    return (
+        f"Measure {joint_list(joints)} again, with a standard uncertainty of {gauge_u_needed_in:.5f} in radial or less."
+    )
+
+
+READ_PLUNGER = "Read the plunger displacement at mid-position."
+
+
+def restore(joints: Sequence[int], over: Sequence[int], worst_in: float | None, *, unread: bool, expected: bool) -> str:
+    """Step RESTORE; `expected`: what is measured before decides."""
+    if expected:
+        return f"Restore what the readings call for: expected {joint_list(joints)}."
+    said = f"Restore, in this order: {joint_list(joints)}." if len(joints) > 1 else f"Restore {joint_list(joints)}."
+    if over:
+        said += f" Above its limit, reject to the manual: {joint_list(over)}."
+    if worst_in is not None:
+        said += f" The worst case is then {worst_in:.4f} in{', unmeasured joints at their limit' if unread else ''}."
+    return said
+
+
+def correct(columns: Sequence[str]) -> str:
+    """Step CORRECT of a row that cannot be judged."""
+    return f"Do not use. Correct: {', '.join(columns) if columns else 'see the list of problems'}."
+
+
+def joint_list(joints: Sequence[int]) -> str:
+    """Joints as a list: ``#3, #5``."""
+    return ", ".join(f"#{joint}" for joint in joints)
+
+
+def confidence_words(confidence: Confidence | None) -> str:
+    """Say beside a probability what Monte Carlo with the curved response gives."""
+    if confidence is None:
+        return ""
+    error = max(100.0 * confidence.standard_error, 0.01)
+    return f" (Monte Carlo {100.0 * confidence.monte_carlo:.2f} ± {error:.2f} %)"
+
+
+def rigging_sentence(rigging: Rigging) -> str:
+    return (
+        f"Re-rigging alone (plunger shifted by {rigging.shift_in:+.4f} in) would leave a worst case of "
+        f"{rigging.predicted_displacement_in:.4f} in: probability within the margin "
+        f"{percent(rigging.probability_within_margin)}, chance of leaving it with random directions "
+        f"{percent(rigging.probability_exceed_random_directions)}; the joints stay worn."
+    )

@@ -1,0 +1,71 @@
+"""Clearances that one technician, gauge or aircraft has in the other convention: twice or half of what was meant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from mlg_troubleshoot.diagnosis.causes.base import Array, Candidate, Cause, Scene, levels
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.diagnosis.wear import likely_clearances
+from mlg_troubleshoot.gear.adjustment import Adjustment
+
+# Rows from which a group can show a convention of its own.
+_LEAST_ROWS = 6
+# Measured over predicted in the rows of a group, over that of the fleet, from which its convention is in doubt. Read
+# clearances are drawn to what wear makes expect: a slip of a factor 2 shows as 1.4 to 2, and scatter stays below. [1]
+_DOUBT = 1.25
+_LABELS = {"technician_id": "technician", "gauge_id": "gauge", "tail_no": "tail"}
+
+
+class ConventionSlip(Cause):
+    """Diametral or total play written as radial in the rows of one technician, gauge or aircraft, or the reverse."""
+
+    name: ClassVar[str] = "convention_slip"
+    parameter: ClassVar[str] = "share_of_slip"
+    trial: ClassVar[float] = 1.0
+    sign: ClassVar[int] = 1
+    exact: ClassVar[float | None] = 1.0
+    extends: ClassVar[bool] = False
+    sentence: ClassVar[str] = (
+        "The clearances of {target} stand in another convention than they say (radial against diametral or total play)"
+    )
+    inspect: ClassVar[str] = "How those clearances were read and written; the file is left as it is"
+    separates: ClassVar[str] = "one joint measured again by another technician with another gauge"
+
+    def candidates(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield each group whose readings are far off the fleet's share of their prediction."""
+        measured = scene.table.measured_in / np.maximum(scene.over_in, 1e-3)
+        usual = float(np.median(measured))
+        for column, label in _LABELS.items():
+            texts = scene.table.factors.get(column)
+            if texts is None or usual <= 0.0:
+                continue
+            for value in levels(texts, _LEAST_ROWS):
+                own = float(np.median(measured[texts == value])) / usual
+                if own * _DOUBT < 1.0 or own > _DOUBT:
+                    factor = 2.0 if own < 1.0 else 0.5
+                    setting = {"column": column, "value": value, "written_factor": factor}
+                    yield Candidate(self, f"{label} {value}", setting)
+
+    def of_one_tail(self, candidate: Candidate) -> bool:
+        """It does if the group is an aircraft."""
+        return bool(candidate.setting["column"] == "tail_no")
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Take the group's clearances as they were meant, and what wear makes expect of all rows with them."""
+        meant = as_meant(scene.table, candidate.setting)
+        likely = likely_clearances(meant).likely_in
+        read = np.where(np.isfinite(meant.clearance_in), meant.clearance_in, likely)
+        right = read + scene.drawn_share * (likely - read)
+        return Adjustment(np.maximum(scene.clearance_in + value * (right - scene.clearance_in), 0.0))
+
+
+def as_meant(table: DiagnosisTable, setting: Any) -> DiagnosisTable:
+    """The table with the clearances of the group as they were meant."""
+    rows = table.factors[setting["column"]] == setting["value"]
+    factor: Array = np.where(rows, 1.0 / setting["written_factor"], 1.0)
+    return replace(table, clearance_in=table.clearance_in * factor[:, None], gauge_u_in=table.gauge_u_in * factor)

@@ -1,0 +1,196 @@
+"""Causes that change what every joint contributes: where loads rest the pins, and another linkage than the drawn one.
+
+Ten factors cannot be had from 200 rows one by one. They are drawn from what is known before the data are looked at (a
+prior with a covariance), which shrinks them as far as the data leave them open; the marginal likelihood then says
+whether all ten are worth it beside one cause, or one scale for all.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from mlg_troubleshoot.diagnosis.causes.base import Array, Candidate, Cause, Scene
+from mlg_troubleshoot.gear.adjustment import Adjustment
+from mlg_troubleshoot.gear.directions import worst_of_sense
+from mlg_troubleshoot.gear.model import LinkageModel
+
+# Standard deviations of the angle between a pin's resting place and the worst direction that are tried; the last one
+# stands for evenly all around. Fleets with 40°, 90° and all around lie within a factor 1.6 of one of them. [deg]
+SPREADS_DEG = (25.0, 45.0, 70.0, 180.0)
+# Spread of the true linkage about the drawn one over that of the ensemble, and of what it changes in all joints alike:
+# another member, one half as far, and one that nobody has calibrated on the published failure, as the ensemble is:
+# halfway to another member, linkages move the plunger up to 1.8 times as far. [1]
+LINKAGES = ((1.0, 0.0), (0.5, 0.0), (1.0, 0.5))
+# What a true linkage may differ beside the ensemble's spread, each joint on its own: an eighth of the largest. [1]
+ALONE = 0.03
+
+
+@dataclass(frozen=True)
+class Block:
+    """Factors of all joints with what is known of them beforehand.
+
+    cause: `LoadDirections` or `OtherGeometry`.
+    joints: joints that were read.
+    columns, shape (n, k): what each of them contributes: the effect of a change of its factor by one; then further
+        effects. [in]
+    covariance, shape (k, k): covariance of the changes of the factors about none. [1]
+    penalty: logarithm of the number of blocks of the same cause that are tried. [1]
+    uncalibrated: True if all joints may also count more or less alike.
+    """
+
+    cause: JointFactors
+    joints: tuple[int, ...]
+    columns: Array
+    covariance: Array
+    penalty: float
+    uncalibrated: bool = False
+
+    @property
+    def effects_in(self) -> Array:
+        """Independent effects of one standard deviation each, shape (n, k). [in]"""
+        return self.columns @ np.linalg.cholesky(self.covariance)
+
+    def candidate(self, change: Array, covariance: Array) -> Candidate:
+        """The cause with fitted factors, their 95 % intervals, and the joints that only count together."""
+        count = len(self.joints)
+        change, covariance = change[:count], covariance[:count, :count]
+        error = np.sqrt(np.diag(covariance))
+        together = covariance / np.outer(error, error)
+        np.fill_diagonal(together, 0.0)
+        low, high = self.cause.bounds
+        named = [str(joint) for joint in self.joints]
+
+        def by_joint(values: Array) -> dict[str, float]:
+            return dict(zip(named, np.clip(1.0 + values, low, high).tolist(), strict=True))
+
+        setting = {
+            "factors": by_joint(change),
+            "low": by_joint(change - 1.96 * error),
+            "high": by_joint(change + 1.96 * error),
+            "together": tuple(
+                joint for joint, most in zip(self.joints, np.min(together, axis=1), strict=True) if most < _TOGETHER
+            ),
+        }
+        return Candidate(self.cause, None, setting)
+
+
+# Correlation of two factors from which only their sum is known. [1]
+_TOGETHER = -0.7
+
+
+class JointFactors(Cause):
+    """Every joint contributes its own share of what the worst direction of the drawn linkage gives."""
+
+    parameter: ClassVar[str] = "share_of_change"
+    trial: ClassVar[float] = 1.0
+    of_joints: ClassVar[bool] = True
+    bounds: ClassVar[tuple[float, float]]
+
+    @property
+    def bounded(self) -> bool:
+        """True if no joint can contribute more than the worst direction gives."""
+        return self.bounds[1] <= 1.0
+
+    def candidates(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield nothing: the factors of all joints are fitted together."""
+        yield from ()
+
+    @abstractmethod
+    def covariances(self, model: LinkageModel, ensemble: Sequence[LinkageModel]) -> list[Array]:
+        """Covariances of the changes of the joints' factors that are tried, each (n_joints, n_joints). [1]"""
+
+    def blocks(self, scene: Scene, ensemble: Sequence[LinkageModel]) -> list[Block]:
+        """The cause for the joints of a table that were read and are worn."""
+        used = [j for j, n in enumerate(scene.joints) if scene.is_read(n) and np.any(scene.contribution_in[:, j])]
+        joints = tuple(scene.joints[j] for j in used)
+        found = self.covariances(scene.model, ensemble)
+        penalty = float(np.log(max(len(found), 1)))
+        return [Block(self, joints, scene.contribution_in[:, used], k[np.ix_(used, used)], penalty) for k in found]
+
+    def factors(self, joints: Sequence[int], candidate: Candidate, value: float) -> Array:
+        """Factor of each joint, shape (n_joints,). [1]"""
+        fitted = candidate.setting["factors"]
+        return 1.0 + value * np.array([fitted.get(str(joint), 1.0) - 1.0 for joint in joints])
+
+
+class LoadDirections(JointFactors):
+    """Load rests each pin beside its worst direction, by an angle of its own that is the same in all gears."""
+
+    name: ClassVar[str] = "load_directions"
+    bounds: ClassVar[tuple[float, float]] = (-1.0, 1.0)
+    sentence: ClassVar[str] = (
+        "Load rests the pins beside their worst directions: readings are smaller than the bound, joint by joint"
+    )
+    inspect: ClassVar[str] = "Which way the pins rest under load; the prediction is now the displacement as loaded"
+    separates: ClassVar[str] = "one gear's plunger over the whole stroke, or read again with one pin pushed by hand"
+
+    def covariances(self, model: LinkageModel, ensemble: Sequence[LinkageModel]) -> list[Array]:
+        """Mean and variance of cos φ for normal angles: exp(−σ²/2), and (1 − exp(−σ²))² / 2; ½ if all around."""
+        n, found = len(model.joint_numbers), []
+        for spread in np.radians(SPREADS_DEG):
+            around = spread >= np.pi
+            mean, variance = (0.0, 0.5) if around else (np.exp(-(spread**2) / 2), (1 - np.exp(-(spread**2))) ** 2 / 2)
+            found.append((mean - 1.0) ** 2 * np.ones((n, n)) + variance * np.eye(n))
+        return found
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Let each clearance act by its factor along its worst direction."""
+        return Adjustment(scene.clearance_in, direction_factors=self.factors(scene.joints, candidate, value))
+
+
+class OtherGeometry(JointFactors):
+    """The linkage has other dimensions than the reconstructed one: its joints count more or less."""
+
+    name: ClassVar[str] = "geometry"
+    bounds: ClassVar[tuple[float, float]] = (0.0, 3.0)
+    sentence: ClassVar[str] = "The linkage has other dimensions than the drawn one: its joints count more or less"
+    inspect: ClassVar[str] = "Distances between the pivots of one gear (mlg gear survey says which one first)"
+    separates: ClassVar[str] = "the next distance that the survey of one gear asks for"
+
+    def covariances(self, model: LinkageModel, ensemble: Sequence[LinkageModel]) -> list[Array]:
+        """Second moments of what the linkages of the ensemble make of each joint, about the drawn one."""
+        if not ensemble:
+            return []
+        apart = _apart(model, ensemble)
+        spread = apart.T @ apart / len(apart) + ALONE**2 * np.eye(apart.shape[1])
+        return [share**2 * spread + alike**2 for share, alike in LINKAGES]
+
+    def blocks(self, scene: Scene, ensemble: Sequence[LinkageModel]) -> list[Block]:
+        """Beside the factors, how each linkage of the ensemble bends the displacement otherwise than the drawn one."""
+        found = super().blocks(scene, ensemble)
+        if not found:
+            return []
+        apart = _apart(scene.model, ensemble)
+        bent = [
+            worst_of_sense(other, scene.clearance_in)[0] - scene.over_in - scene.contribution_in @ own
+            for other, own in zip(ensemble, apart, strict=True)
+        ]
+        # A linkage that does not close with clearances that were read is not the one that they were read in.
+        bent = [bend for bend in bent if np.isfinite(bend).all()]
+        columns = np.column_stack([found[0].columns, *bent])
+        even = np.eye(len(bent)) / max(len(bent), 1)
+        return [
+            replace(
+                block,
+                columns=columns,
+                covariance=block_diag(block.covariance, share**2 * even),
+                uncalibrated=alike > 0.0,
+            )
+            for block, (share, alike) in zip(found, LINKAGES, strict=True)
+        ]
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Let each clearance count by its factor."""
+        return Adjustment(scene.clearance_in * self.factors(scene.joints, candidate, value))
+
+
+def _apart(model: LinkageModel, ensemble: Sequence[LinkageModel]) -> Array:
+    """Change of each joint's amplification by each linkage of an ensemble, shape (n_linkages, n_joints). [1]"""
+    drawn = model.plunger_amplification()
+    return np.array([other.plunger_amplification() / drawn - 1.0 for other in ensemble])

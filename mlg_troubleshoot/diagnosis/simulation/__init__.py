@@ -1,0 +1,12 @@
+"""Which parameters of any simulation are wrong, from measured data."""
+
+from mlg_troubleshoot.diagnosis.simulation.result import (
+    HeldOutGain,
+    SimulationDiagnosis,
+    Suspect,
+    SuspectFound,
+    Verdict,
+)
+from mlg_troubleshoot.diagnosis.simulation.search import diagnose_simulation
+
+__all__ = ["HeldOutGain", "SimulationDiagnosis", "Suspect", "SuspectFound", "Verdict", "diagnose_simulation"]

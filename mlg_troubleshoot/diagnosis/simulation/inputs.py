@@ -1,0 +1,92 @@
+"""What a caller can get wrong, refused with words before anything is computed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mlg_troubleshoot.diagnosis.simulation.result import Suspect
+from mlg_troubleshoot.errors import UsageError
+
+Array = NDArray[np.float64]
+
+_LEAST_PERMUTATIONS = 19
+
+
+def checked(
+    measured: ArrayLike,
+    suspects: Sequence[Suspect],
+    nuisance: Sequence[Suspect],
+    groups: ArrayLike | None,
+    reading_u: ArrayLike | None,
+    permutations: int,
+) -> tuple[Array, Array | None, NDArray[np.int64] | None]:
+    """Readings as (n, m), declared uncertainty likewise, groups as numbers."""
+    data = _numbers(measured, "measured")
+    data = data[:, None] if data.ndim == 1 else data
+    if data.ndim != 2 or not data.size:
+        raise UsageError(
+            f"measured has shape {data.shape}", "give one row for each row read, one column for each output"
+        )
+    if np.isinf(data).any():
+        raise UsageError(f"measured holds {int(np.isinf(data).sum())} infinite readings", "set them to NaN")
+    _suspects(suspects, nuisance)
+    readings = int(np.isfinite(data).sum())
+    if readings < len(nuisance) + 3:
+        raise UsageError(
+            f"{readings} readings are too few beside {len(nuisance)} nuisance parameters",
+            f"measure {len(nuisance) + 3 - readings} more at least",
+        )
+    if permutations < _LEAST_PERMUTATIONS:
+        raise UsageError(f"permutations is {permutations}", f"at least {_LEAST_PERMUTATIONS} are needed")
+    return data, _declared(reading_u, data), _groups(groups, len(data))
+
+
+def _numbers(values: ArrayLike, name: str) -> Array:
+    try:
+        return np.array(values, float)
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"{name} is no array of numbers: {error}", "give numbers, NaN where not read") from error
+
+
+def _suspects(suspects: Sequence[Suspect], nuisance: Sequence[Suspect]) -> None:
+    if not suspects:
+        raise UsageError("No suspects were given", "name at least one parameter that may be wrong")
+    twice = [name for name, count in Counter(s.name for s in [*suspects, *nuisance]).items() if count > 1]
+    if twice:
+        raise UsageError(f"{', '.join(twice)} stands twice among suspects and nuisance parameters", "name each once")
+    for s in [*suspects, *nuisance]:
+        if not (np.isfinite(s.nominal) and np.isfinite(s.trial)) or s.trial == 0.0:
+            raise UsageError(
+                f"{s.name}: nominal {s.nominal:g}, trial {s.trial:g} {s.unit}".rstrip(),
+                "both must be finite, and the trial a change that does something, never 0",
+            )
+
+
+def _declared(reading_u: ArrayLike | None, data: Array) -> Array | None:
+    if reading_u is None:
+        return None
+    declared = _numbers(reading_u, "reading_u")
+    if declared.shape not in {(), (data.shape[1],), data.shape}:
+        raise UsageError(
+            f"reading_u has shape {declared.shape}, the readings have shape {data.shape}",
+            f"give {data.shape[1]} values, one for each output, or one for each reading",
+        )
+    declared = np.broadcast_to(declared, data.shape)
+    read = declared[np.isfinite(data)]
+    if not np.all(np.isfinite(read) & (read > 0.0)):
+        raise UsageError("reading_u holds a value that is not above 0", "a standard uncertainty is a positive number")
+    return np.array(declared)
+
+
+def _groups(groups: ArrayLike | None, n: int) -> NDArray[np.int64] | None:
+    if groups is None:
+        return None
+    labels = np.asarray(groups)
+    if labels.shape != (n,):
+        raise UsageError(f"groups has shape {labels.shape}, there are {n} rows", "give one label for each row")
+    numbers = np.unique(labels.astype(str), return_inverse=True)[1].astype(np.int64)
+    return numbers if numbers.max() > 0 else None

@@ -1,0 +1,155 @@
+"""What is suspected of a simulation, and what a diagnosis of it says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Verdict(StrEnum):
+    """What measured data say about a simulation."""
+
+    NONE = "NONE"
+    NAMED = "NAMED"
+    AMBIGUOUS = "AMBIGUOUS"
+    UNLISTED = "UNLISTED"
+
+
+@dataclass(frozen=True, slots=True)
+class Suspect:
+    """A parameter of a simulation that may be wrong.
+
+    Parameters
+    ----------
+    name : str
+        Name under which the simulation takes it.
+    nominal : float
+        Value in the simulation as it stands. [unit]
+    trial : float
+        A typical small change, by which its effect is computed; never 0. [unit]
+    unit : str, optional
+        Unit of both.
+    sentence : str, optional
+        What it means if this one is wrong.
+    inspect : str, optional
+        What to inspect if it is named.
+    separates : str, optional
+        The reading that would tell it from what looks like it.
+    """
+
+    name: str
+    nominal: float
+    trial: float
+    unit: str = ""
+    sentence: str = ""
+    inspect: str = ""
+    separates: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class SuspectFound:
+    """A cause that earned its place, or that the data cannot rule out.
+
+    Parameters
+    ----------
+    suspect : Suspect
+        What was suspected.
+    value : float
+        The parameter as fitted: nominal plus change. [unit of the suspect]
+    interval : tuple of float
+        95 % interval of `value`, what looks like it taken to be right. [unit of the suspect]
+    effect_rms : float
+        Root mean square over the readings of what the change does to the prediction, less what the nuisance
+        parameters absorb of it. [unit of the readings]
+    p_value : float
+        Chance of as much for any suspect if nothing more is wrong. [1]
+    aliases : tuple of str
+        Suspects that these rows cannot tell from it, whatever is measured: the class is named, not this member.
+    """
+
+    suspect: Suspect
+    value: float
+    interval: tuple[float, float]
+    effect_rms: float
+    p_value: float
+    aliases: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the suspect."""
+        return self.suspect.name
+
+    @property
+    def separates(self) -> str:
+        """The reading that would tell it from its aliases."""
+        return self.suspect.separates
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOutGain:
+    """Misfit of rows that were not used for the fit.
+
+    Parameters
+    ----------
+    rms_before : float
+        Root mean square with the suspects at their nominal values, nuisance parameters fitted. [unit of the readings]
+    rms_after : float
+        The same with the causes fitted. [unit of the readings]
+    held_out_by : str
+        What was held out together: ``group`` or ``row``.
+    """
+
+    rms_before: float
+    rms_after: float
+    held_out_by: str
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationDiagnosis:
+    """What measured data say about a simulation.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        NONE, NAMED, AMBIGUOUS (the data leave rivals) or UNLISTED (more is left than the suspects explain).
+    causes : tuple of SuspectFound
+        All that earned their place, whatever the verdict, by effect.
+    also_possible : tuple of SuspectFound
+        The whole set that the data leave possible, where there are rivals that no alias class says; else empty.
+    aliases : tuple of tuple of str
+        Classes of suspects that these rows cannot tell apart, known before a measured value is looked at.
+    untestable : tuple of str
+        Suspects that do nothing in these rows which the nuisance parameters do not absorb.
+    gain : HeldOutGain
+        Gain on rows not used for the fit.
+    parameters : mapping of str to float
+        Value of every suspect and nuisance parameter, to predict with.
+    remainder_p : float
+        Chance of as much pattern in what is left if only noise is left. [1]
+    smallest_detectable_rms : float
+        Root mean square of the smallest effect that would have been found four times in five. [unit of the readings]
+    noise : tuple of float
+        Standard deviation of a reading of each output, as it is estimated with all suspects fitted.
+        [unit of the readings]
+    calls : int
+        Times that the simulation was called.
+    permutations : int
+        Data sets drawn with nothing wrong.
+    seed : int
+        Seed.
+    """
+
+    verdict: Verdict
+    causes: tuple[SuspectFound, ...]
+    also_possible: tuple[SuspectFound, ...]
+    aliases: tuple[tuple[str, ...], ...]
+    untestable: tuple[str, ...]
+    gain: HeldOutGain
+    parameters: Mapping[str, float]
+    remainder_p: float
+    smallest_detectable_rms: float
+    noise: tuple[float, ...]
+    calls: int
+    permutations: int
+    seed: int

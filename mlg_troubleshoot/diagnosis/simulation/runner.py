@@ -1,0 +1,150 @@
+"""A simulation that is called with parameters: its predictions, its sensitivities and its fit, all checked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.diagnosis.simulation.result import Suspect
+from mlg_troubleshoot.errors import UsageError
+
+Array = NDArray[np.float64]
+Predict = Callable[[Mapping[str, float]], Any]
+
+# Share of the trial by which a derivative is taken; all of it where so little does nothing.
+_STEP = 0.1
+# Central difference over forward one below which the effect is even about the nominal value, as of a play: then the
+# forward difference stands for it.
+_EVEN = 1e-3
+_ITERATIONS = 30
+# Expected fall of the sum of squares, in variances of a reading, below which parameters stand.
+_STANDS = 1e-3
+
+
+class Runner:
+    """The simulation, asked only for the readings that there are; suspects first, then nuisance parameters."""
+
+    def __init__(self, predict: Predict, measured: Array, suspects: Sequence[Suspect]) -> None:
+        self.predict = predict
+        self.shape = measured.shape
+        self.row, self.output = (places.astype(np.int64) for places in np.nonzero(np.isfinite(measured)))
+        self.reading = measured[self.row, self.output]
+        self.suspects = suspects
+        self.names = [s.name for s in suspects]
+        self.trial = np.array([s.trial for s in suspects], float)
+        self.nominal = np.array([s.nominal for s in suspects], float)
+        self.calls = 0
+
+    def everything(self, values: Array) -> Array:
+        """Predict all rows and outputs, shape (n, m)."""
+        self.calls += 1
+        predicted = np.asarray(self.predict(dict(zip(self.names, values.tolist(), strict=True))), float)
+        if predicted.ndim == 1 and self.shape == (len(predicted), 1):
+            predicted = predicted[:, None]
+        if predicted.shape != self.shape:
+            raise UsageError(
+                f"The simulation returned an array of shape {predicted.shape}, the readings have shape {self.shape}",
+                "predict must return one row for each row read and one column for each output",
+            )
+        return predicted
+
+    def at(self, values: Array) -> Array:
+        """Predict the readings, shape (N,); NaN where the simulation has no answer."""
+        return self.everything(values)[self.row, self.output]
+
+    def nominal_prediction(self) -> Array:
+        """Predict all rows at the nominal values, and refuse what is no number where a reading is."""
+        predicted = self.everything(self.nominal)
+        bad = np.flatnonzero(~np.isfinite(predicted[self.row, self.output]))
+        if len(bad):
+            place = f"row {self.row[bad[0]]}, output {self.output[bad[0]]}"
+            raise UsageError(
+                f"The simulation gives no number for {len(bad)} of {len(self.row)} readings at the nominal values, "
+                f"the first at {place} (counted from 0)",
+                "set these readings to NaN or correct the simulation",
+            )
+        return predicted
+
+    def sensitivities(self, values: Array, base: Array, which: Sequence[int]) -> Array:
+        """Change of the readings for a change of some parameters by their trials, shape (N, len(which))."""
+        columns = np.empty((len(self.row), len(which)))
+        for place, k in enumerate(which):
+            columns[:, place] = self._column(values, base, k)
+        return columns
+
+    def _column(self, values: Array, base: Array, k: int) -> Array:
+        for step in (_STEP, 1.0, 0.01):
+            up, down = (self._moved(values, k, way * step) - base for way in (1.0, -1.0))
+            forward, backward = bool(np.isfinite(up).all()), bool(np.isfinite(down).all())
+            if not (forward or backward):
+                continue
+            even = forward and backward and np.linalg.norm(up - down) < 2.0 * _EVEN * np.linalg.norm(up)
+            both = forward and backward and not even
+            change = (up - down) / 2.0 if both else up if forward else -down
+            if np.any(change) or step == 1.0:
+                return np.asarray(change / step)
+        s = self.suspects[k]
+        raise UsageError(
+            f"The simulation gives no number for all readings at {values[k]:g} ± {abs(s.trial):g} of {s.name}",
+            f"give {s.name} a smaller trial, or correct the simulation",
+        )
+
+    def _moved(self, values: Array, k: int, share: float) -> Array:
+        moved = values.copy()
+        moved[k] += share * self.trial[k]
+        return self.at(moved)
+
+    def fit(
+        self, values: Array, active: Sequence[int], white: Callable[[Array], Array], columns: Array | None = None
+    ) -> tuple[Array, Array, float]:
+        """Fit some parameters by least squares of the whitened misfit (Gauss–Newton), from the values given.
+
+        The sensitivities are computed again only where the sum of squares does not fall as they say. Returned are all
+        values, the prediction, and the sum of squares.
+        """
+        base = self.at(values)
+        rest = white(self.reading - base)
+        cost = float(rest @ rest)
+        if not active:
+            return values, base, cost
+        exact = columns is None
+        slopes = white(self.sensitivities(values, base, active) if columns is None else columns)
+        for _ in range(_ITERATIONS):
+            step = least_squares(slopes, rest)
+            expected = cost - float(np.sum((rest - slopes @ step) ** 2))
+            if expected < _STANDS + 1e-6 * cost:
+                break
+            there = self._shorter(values, active, step, white, cost)
+            slow = there is None or cost - there[3] < 0.7 * expected
+            if there is None and exact:
+                break
+            if there is not None:
+                values, base, rest, cost = there
+            exact = slow
+            if slow:
+                slopes = white(self.sensitivities(values, base, active))
+        return values, base, cost
+
+    def _shorter(
+        self, values: Array, active: Sequence[int], step: Array, white: Callable[[Array], Array], cost: float
+    ) -> tuple[Array, Array, Array, float] | None:
+        """Go along a step, or a part of it, if that makes the sum of squares smaller."""
+        for share in (1.0, 0.5, 0.25, 0.1, 0.02):
+            moved = values.copy()
+            moved[list(active)] += share * step * self.trial[list(active)]
+            base = self.at(moved)
+            rest = white(self.reading - base)
+            if float(rest @ rest) < cost:
+                return moved, base, rest, float(rest @ rest)
+        return None
+
+
+def least_squares(columns: Array, data: Array) -> Array:
+    """Least squares with columns of one length; what cannot be told is spread, not enlarged."""
+    size = np.linalg.norm(columns, axis=0)
+    size = np.where(size > 0.0, size, 1.0)
+    found = np.linalg.lstsq(columns / size, data, rcond=1e-7)[0]
+    return np.asarray((found.T / size).T)

@@ -1,0 +1,151 @@
+"""A linkage as a vector of its free numbers: what a search or a survey moves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.gear.gear import Linkage
+from mlg_troubleshoot.geometry.mechanism import Dyad, Mechanism, Point, Slider, Step
+
+Array = NDArray[np.float64]
+
+
+class DesignSpace:
+    """The design variables of a linkage's topology: coordinates, angles of planes, slider axes, the extension.
+
+    Moving and turning everything together changes nothing, so one pivot of the base plane is held, and with it the
+    direction to another of its points. The extension is the input from Down Lock to the reference position.
+
+    given: the linkage whose topology, held pivot and other end of the stroke are kept.
+    """
+
+    def __init__(self, given: Linkage) -> None:
+        self.given = given
+        self.mechanism = m = given.mechanism
+        base = [p for p in m.points if p.plane == m.planes[0].name]
+        self.held = next((p for p in base if p.fixed and p.virtual_link is not None), base[0])
+        others = [p for p in base if p is not self.held and _apart(p, self.held) > 0.0]
+        level = [p for p in others if p.y == self.held.y and not p.fixed] or [p for p in others if p.fixed] or others
+        self.guide = level[0]
+        self.points = tuple(p.name for p in m.points if p.name not in (self.held.name, self.guide.name))
+        self.planes = tuple(p.name for p in m.planes if p.parent is not None)
+        self.sliders = tuple(s.joint for s in m.steps if isinstance(s, Slider))
+        self.moves_reference = m.reference_input != given.stroke[0]
+        self.names = (
+            f"{self.guide.name}.r",
+            *(f"{p}.{axis}" for p in self.points for axis in "xy"),
+            *(f"{p}.{angle}" for p in self.planes for angle in ("direction", "dihedral")),
+            *(f"{s}.axis" for s in self.sliders),
+            *(("extension",) if self.moves_reference else ()),
+        )
+
+    def vector(self, linkage: Linkage) -> Array:
+        """The variables of a linkage of this topology, as it would stand with the held pivot in its place."""
+        m = linkage.mechanism
+        held, guide = m.point(self.held.name), m.point(self.guide.name)
+        base = m.planes[0].name
+        turn = np.arctan2(self.guide.y - self.held.y, self.guide.x - self.held.x)
+        back = turn - np.arctan2(guide.y - held.y, guide.x - held.x)
+        values: list[float] = [_apart(guide, held)]
+        for point in map(m.point, self.points):
+            x, y = point.x, point.y
+            if point.plane == base and (back or (held.x, held.y) != (self.held.x, self.held.y)):
+                moved = complex(x - held.x, y - held.y) * np.exp(1j * back) + complex(self.held.x, self.held.y)
+                x, y = moved.real, moved.imag
+            values += [x, y]
+        for plane in m.planes:
+            if plane.parent is not None:
+                values += [plane.hinge_direction + (back if plane.parent == base else 0.0), plane.dihedral]
+        values += [s.axis + (back if m.point(s.joint).plane == base else 0.0) for s in m.steps if isinstance(s, Slider)]
+        if self.moves_reference:
+            values.append(m.reference_input - linkage.stroke[0])
+        return np.array(values)
+
+    def assembled(self, vectors: Any) -> Mechanism:
+        """The mechanism of a vector, or of a batch, shape (..., n_variables): its coordinates are then arrays.
+
+        Every branch sign is as the coordinates have it.
+        """
+        x = dict(zip(self.names, np.moveaxis(np.asarray(vectors, float), -1, 0), strict=True))
+        turn = np.arctan2(self.guide.y - self.held.y, self.guide.x - self.held.x)
+        reach = x[f"{self.guide.name}.r"]
+        places = {p: (x[f"{p}.x"], x[f"{p}.y"]) for p in self.points}
+        places[self.guide.name] = (self.held.x + reach * np.cos(turn), self.held.y + reach * np.sin(turn))
+        m = self.mechanism
+        mechanism = replace(
+            m,
+            points=tuple(
+                replace(p, x=places[p.name][0], y=places[p.name][1]) if p.name in places else p for p in m.points
+            ),
+            planes=tuple(
+                replace(p, hinge_direction=x[f"{p.name}.direction"], dihedral=x[f"{p.name}.dihedral"])
+                if p.name in self.planes
+                else p
+                for p in m.planes
+            ),
+            steps=tuple(replace(s, axis=x[f"{s.joint}.axis"]) if isinstance(s, Slider) else s for s in m.steps),
+            reference_input=self.given.stroke[0] + x["extension"] if self.moves_reference else m.reference_input,
+        )
+        steps: list[Step] = []
+        for step in mechanism.steps:
+            if isinstance(step, (Dyad, Slider)):
+                sign: Any = np.where(mechanism.side(step) >= 0.0, 1.0, -1.0)
+                steps.append(replace(step, sign=sign))
+            else:
+                steps.append(step)
+        return replace(mechanism, steps=tuple(steps))
+
+    def linkage(self, vector: Array, name: str = "N") -> Linkage:
+        """The linkage of one vector, in plain numbers."""
+        m = self.assembled(vector)
+        plain = replace(
+            m,
+            points=tuple(replace(p, x=float(p.x), y=float(p.y)) for p in m.points),
+            planes=tuple(
+                replace(p, hinge_direction=float(p.hinge_direction), dihedral=float(p.dihedral)) for p in m.planes
+            ),
+            steps=tuple(_plain_step(s) for s in m.steps),
+            reference_input=float(m.reference_input),
+        )
+        low, high = self.given.stroke
+        return Linkage(name, plain, (low, high + plain.reference_input - self.mechanism.reference_input))
+
+
+def _plain_step(step: Step) -> Step:
+    if isinstance(step, Slider):
+        return replace(step, axis=float(step.axis), sign=float(step.sign))
+    return replace(step, sign=float(step.sign)) if isinstance(step, Dyad) else step
+
+
+def _apart(a: Point, b: Point) -> float:
+    return float(np.hypot(a.x - b.x, a.y - b.y))
+
+
+def member_values(linkage: Linkage) -> dict[str, Any]:
+    """A linkage as a member of an ensemble file."""
+    m = linkage.mechanism
+    steps: dict[str, Any] = {}
+    for step in m.steps:
+        if isinstance(step, (Dyad, Slider)):
+            steps[step.joint] = {"sign": int(step.sign)}
+        if isinstance(step, Slider):
+            steps[step.joint]["axis_deg"] = float(np.degrees(step.axis))
+    planes = {
+        p.name: {
+            "hinge_direction_deg": float(np.degrees(p.hinge_direction)),
+            "dihedral_deg": float(np.degrees(p.dihedral)),
+        }
+        for p in m.planes
+        if p.parent is not None
+    }
+    return {
+        "range": list(linkage.stroke),
+        "reference": m.reference_input,
+        **({"planes": planes} if planes else {}),
+        "points": {p.name: [p.x, p.y] for p in m.points},
+        "steps": steps,
+    }

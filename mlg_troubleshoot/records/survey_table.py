@@ -1,0 +1,260 @@
+"""The table of a survey: written empty for a gear, read back as readings; a bad cell is a `Problem`."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.outputs import write_bytes, write_csv
+from mlg_troubleshoot.records.cells import Cell, column_letters, quote
+from mlg_troubleshoot.records.model import FileRefusedError, ReadOptions
+from mlg_troubleshoot.records.read import load_bytes, open_book
+from mlg_troubleshoot.records.source import NumberedRow
+from mlg_troubleshoot.records.values import CellFaultError, read_choice, read_number, read_text
+from mlg_troubleshoot.studies.survey_readings import Kind, Reading, SurveyedLinkage, default_u
+from mlg_troubleshoot.units import LengthUnit
+
+if TYPE_CHECKING:
+    from openpyxl.worksheet.worksheet import Worksheet
+
+_UNITS = ("in", "mm", "deg")
+COLUMNS = ("kind", "from", "to", *(f"{c}_{u}" for u in _UNITS for c in ("value", "u")), "extension_in", "how")
+_HEADER_WITHIN = 30
+_KINDS = {kind: kind for kind in Kind if kind is not Kind.TRAVEL}
+# No linkage of a landing gear is longer than this; angles are read within one turn.
+_LONGEST_IN, _WIDEST_DEG = 500.0, 360.0
+_HOW = {
+    Kind.DISTANCE: "Pin centre to pin centre: over the outside of both pins, less half of each diameter.",
+    Kind.PLUNGER: "Dial on the plunger, zero at the reference extension; actuator at the extension given.",
+    Kind.EXTENSION: "Travel of the actuator from Down Lock to the reference position.",
+    Kind.ANGLE: "In the gear file's axes, with an inclinometer or from a photograph square to the plane.",
+}
+
+
+def write_survey_template(path: Path, linkage: SurveyedLinkage, planned: Iterable[tuple[Reading, bool]]) -> None:
+    """Write the rows that are worth reading on this gear, as CSV or as a workbook with a sketch."""
+    rows = []
+    for reading, checked in planned:
+        by_others = "Checked by the other readings." if checked else "NOT checked by the others: read it twice."
+        values: dict[str, str | float | None] = {
+            "kind": reading.kind.value,
+            "from": reading.start,
+            "to": reading.end,
+            "extension_in": reading.extension,
+            "how": f"{_HOW[reading.kind]} {by_others}",
+        }
+        if reading.is_angle:
+            values["u_deg"] = round(float(np.degrees(reading.u)), 6)
+        else:
+            values["u_in"] = reading.u
+        rows.append([values.get(column) for column in COLUMNS])
+    if path.suffix.lower() == ".csv":
+        write_csv(path, COLUMNS, rows)
+        return
+    from openpyxl import Workbook
+    from openpyxl.styles import Font
+
+    book = Workbook()
+    sheet = book.worksheets[0]
+    sheet.title = "Survey"
+    for row in (COLUMNS, *rows):
+        sheet.append(list(row))
+    for cell in sheet[1]:
+        cell.font = Font(bold=True)
+    sheet.column_dimensions[column_letters(len(COLUMNS) - 1)].width = 100
+    sheet.freeze_panes = "D2"
+    _sketch(book.create_sheet("Sketch"), linkage)
+    buffer = io.BytesIO()
+    book.save(buffer)
+    write_bytes(path, buffer.getvalue())
+
+
+def _sketch(sheet: Worksheet, linkage: SurveyedLinkage) -> None:
+    """The pins of each plane at the reference position, with their names, and the parts between them."""
+    from openpyxl.chart import Reference, ScatterChart, Series
+    from openpyxl.chart.label import DataLabelList
+
+    mechanism = linkage.space.mechanism
+    sheet.append(["point", "plane", "x in", "y in", "", "part", "x in", "y in"])
+    for point in mechanism.points:
+        sheet.append([point.name, point.plane, point.x, point.y])
+        sheet.cell(sheet.max_row, 1).data_type = sheet.cell(sheet.max_row, 2).data_type = "s"
+    line = 2
+    for k, plane in enumerate(mechanism.planes):
+        chart = ScatterChart()
+        chart.title, chart.style, chart.height, chart.width = f"plane {plane.name}", 13, 14, 20
+        places = {p.name: (p.x, p.y) for p in mechanism.points if p.plane == plane.name}
+        for pair in linkage.rigid:
+            if pair <= places.keys():
+                for name in sorted(pair):
+                    sheet.cell(line, 6, " - ".join(sorted(pair)))
+                    sheet.cell(line, 7, places[name][0])
+                    sheet.cell(line, 8, places[name][1])
+                    line += 1
+                along, across = (
+                    Reference(sheet, min_col=column, min_row=line - 2, max_row=line - 1) for column in (7, 8)
+                )
+                part = Series(across, along)
+                part.graphicalProperties.line.solidFill = "9AA5B1"
+                chart.series.append(part)
+        for row, point in enumerate(mechanism.points, start=2):
+            if point.name in places:
+                spot = Series(
+                    Reference(sheet, min_col=4, min_row=row), Reference(sheet, min_col=3, min_row=row), title=point.name
+                )
+                spot.marker.symbol = "circle"
+                spot.dLbls = DataLabelList(showSerName=True, showVal=False, showLegendKey=False, showCatName=False)
+                chart.series.append(spot)
+        chart.legend = None
+        sheet.add_chart(chart, f"J{2 + 30 * k}")
+
+
+def read_survey(path: Path, linkage: SurveyedLinkage) -> tuple[tuple[Reading, ...], tuple[Problem, ...], str]:
+    """Read the rows that have a value, the cells that are wrong, and the file's SHA-256."""
+    label = str(path)
+    try:
+        data = load_bytes(path)
+        digest = hashlib.sha256(data).hexdigest()
+        book = open_book(data, label, ReadOptions())
+        for sheet in book.sheets:
+            rows = list(sheet.rows())
+            header = next((i for i, (_, cells) in enumerate(rows[:_HEADER_WITHIN]) if "kind" in _names(cells)), None)
+            if header is not None:
+                reader = _Rows(label, sheet.name, _names(rows[header][1]), linkage, comma=book.delimiter == ";")
+                found = [reader.read(row) for row in rows[header + 1 :]]
+                return tuple(r for r in found if r is not None), tuple(reader.problems), digest
+        raise FileRefusedError(
+            "header_missing",
+            "no header of a survey was found",
+            f"the columns {', '.join(COLUMNS[:4])} … in the first {_HEADER_WITHIN} rows",
+            "Use the file that 'mlg gear survey template' writes.",
+        )
+    except FileRefusedError as refusal:
+        return (), (refusal.problem(label),), ""
+
+
+def _names(cells: Sequence[Cell]) -> list[str]:
+    return [cell.strip().lower() if isinstance(cell, str) else "" for cell in cells]
+
+
+class _Rows:
+    """Reads the rows of one sheet and gathers what is wrong with them."""
+
+    def __init__(
+        self, file: str, sheet: str | None, header: list[str], linkage: SurveyedLinkage, *, comma: bool
+    ) -> None:
+        self.file, self.sheet, self.header, self.linkage, self.comma = file, sheet, header, linkage, comma
+        mechanism = linkage.space.mechanism
+        self.points = [p.name for p in mechanism.points]
+        self.problems: list[Problem] = []
+        for i, name in enumerate(header):
+            if name and header.index(name) != i:
+                self._fault(1, name, None, "header_duplicate", "each column once", "Remove one of the columns.")
+
+    def read(self, numbered: NumberedRow) -> Reading | None:
+        """Read one row; None if it has no value, or a cell that is wrong."""
+        number, cells = numbered
+        row = {name: cell for name, cell in zip(self.header, cells, strict=False) if name and cell is not None}
+        given = [f"value_{unit}" for unit in _UNITS if f"value_{unit}" in row]
+        if not given:
+            return None
+        self.column = "kind"
+        try:
+            kind = read_choice(row.get("kind", ""), Kind, "kind_unknown", {})
+            if kind not in _KINDS:
+                raise CellFaultError("kind_unknown", "one of " + ", ".join(_KINDS), "Correct the word.")
+            wanted = ("value_deg",) if self._is_angle(kind) else ("value_in", "value_mm")
+            self.column = given[-1]
+            if len(given) > 1 or given[0] not in wanted:
+                raise CellFaultError(
+                    "value_columns", f"one value, in {' or '.join(wanted)}", "Leave the other columns blank."
+                )
+            value = self._quantity(row[self.column], signed=kind in (Kind.PLUNGER, Kind.ANGLE))
+            u = default_u(kind, is_angle=self._is_angle(kind))
+            for unit in _UNITS:
+                self.column = f"u_{unit}"
+                if self.column in row:
+                    if (unit == "deg") != self._is_angle(kind):
+                        raise CellFaultError("unit_of_u", "an uncertainty in the unit of the value", "Move the number.")
+                    u = self._quantity(row[self.column], signed=False)
+            self.column = "extension_in"
+            extension = None
+            if self.column in row:
+                reach = 3.0 * abs(self.linkage.gear.reference.stroke[1] - self.linkage.low)
+                extension = read_number(
+                    row[self.column],
+                    0.0,
+                    reach,
+                    decimal_comma=self.comma,
+                    expected=f"an extension from 0 to {reach:.4g}",
+                )
+            start, end = self._ends(kind, row)
+        except CellFaultError as fault:
+            self._fault(number, self.column, row.get(self.column), fault.code, fault.expected, fault.remedy)
+            return None
+        return Reading(kind, start, end, value, u, extension, number, self._is_angle(kind))
+
+    def _is_angle(self, kind: Kind) -> bool:
+        turns = self.linkage.space.mechanism.output.kind == "angle"
+        return kind is Kind.ANGLE or (kind is Kind.PLUNGER and turns)
+
+    def _quantity(self, cell: Cell, *, signed: bool) -> float:
+        name, unit = self.column.split("_")
+        if unit == "deg":
+            low, most = (-_WIDEST_DEG, _WIDEST_DEG) if signed else (0.0, _WIDEST_DEG)
+            expected = f"an angle from {low:g} to {most:g} degrees"
+            value = float(np.radians(self._number(cell, low, most, expected)))
+        else:
+            length = LengthUnit.parse(unit)
+            most = length.from_inches(_LONGEST_IN)
+            value = length.to_inches(
+                self._number(cell, -most if signed else 0.0, most, f"a length up to {most:g} {unit}")
+            )
+        if value <= 0.0 and not signed:
+            raise CellFaultError("out_of_range", f"a {name} above 0", "Read it again, or leave it blank.")
+        return value
+
+    def _number(self, cell: Cell, low: float, most: float, expected: str) -> float:
+        return read_number("" if cell is None else cell, low, most, decimal_comma=self.comma, expected=expected)
+
+    def _ends(self, kind: Kind, row: Mapping[str, Cell]) -> tuple[str, str]:
+        texts = []
+        for column in ("from", "to"):
+            cell = row.get(column)
+            self.column = column
+            # A spreadsheet takes the point 4 for a number.
+            texts.append(f"{cell:g}" if isinstance(cell, float) else read_text(cell or "", "a name").strip())
+        start, end = texts
+        space = self.linkage.space
+        if kind is Kind.DISTANCE:
+            points = f"one of the points {', '.join(self.points)}"
+            for column, name in (("from", start), ("to", end)):
+                self._require(name in self.points, column, points, "Correct the name.")
+            self._require(start != end, "to", "another point than in from", "Name both pins.")
+        elif kind is Kind.ANGLE:
+            known = {**dict.fromkeys(space.planes, ("hinge", "dihedral")), **dict.fromkeys(space.sliders, ("axis",))}
+            expected = f"one of {', '.join(known)}"
+            self._require(start in known, "from", expected, "Name a hinged plane or the slider's joint.")
+            self._require(end in known[start], "to", " or ".join(known[start]), "Say which angle it is.")
+        else:
+            self._require(not (start or end), "from" if start else "to", "a blank cell", f"A {kind} needs no points.")
+        expected = "DISTANCE, PLUNGER or ANGLE"
+        remedy = "The reference position of this gear is its Down Lock."
+        self._require(kind is not Kind.EXTENSION or space.moves_reference, "kind", expected, remedy)
+        return start, end
+
+    def _require(self, holds: bool, column: str, expected: str, remedy: str) -> None:
+        if not holds:
+            self.column = column
+            raise CellFaultError("point_unknown", expected, remedy)
+
+    def _fault(self, row: int, column: str, cell: Cell, code: str, expected: str, remedy: str) -> None:
+        place = f"{column_letters(self.header.index(column))}{row}" if column in self.header else None
+        shown = None if cell is None else quote(cell)
+        self.problems.append(Problem(code, self.file, self.sheet, row, column, place, shown, expected, remedy))

@@ -1,0 +1,294 @@
+"""What the reports of one inspection and of a batch are made from; the sentences and tables stand in the templates."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected, Verdict
+from mlg_troubleshoot.decision.inspection import Inspection, Outcome, RowSource, Side
+from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.reporting import inspection_figures as drawn
+from mlg_troubleshoot.reporting.common import Facts, head
+from mlg_troubleshoot.reporting.formats import Lengths, short
+from mlg_troubleshoot.reporting.html import Document
+from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.reporting.publish import safe_stem
+from mlg_troubleshoot.reporting.schematic import joint_mark, joint_state, schematic
+from mlg_troubleshoot.reporting.signs import sign
+from mlg_troubleshoot.units import LengthUnit
+
+SIGNATORIES = ("Measured by", "Independently measured by", "Rectified by", "Inspected by")
+SEVERITY = (Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE, Verdict.INCOMPLETE, Verdict.WITHIN_MARGIN, Verdict.INVALID)
+_SIDES = {Side.LH: "left-hand main landing gear", Side.RH: "right-hand main landing gear"}
+_WARNINGS_ON_FRONT = 3
+_MANUAL = ("manual_ref", "manual_rev")
+_MOST_IN_FRONT = 8
+
+
+def inspection_document(
+    judgement: Judgement,
+    gear: Gear,
+    provenance: ReportProvenance,
+    problems: Iterable[Problem] = (),
+    unit: LengthUnit = LengthUnit.INCH,
+    steps: Sequence[Mapping[str, Any]] = (),
+) -> Document:
+    """Make the document of one inspection; `steps` are the gear's inspections up to this one, side by side."""
+    lengths = Lengths(unit)
+    if isinstance(judgement, Rejected):
+        row = judgement.row
+        stem = safe_stem(row.tail_no, row.side.value if row.side else None, row.record_id, *_place(row.source))
+        context = _rejected(judgement, gear, provenance, problems, lengths)
+        return Document("rejected.html.j2", context, stem)
+    inspection = judgement.inspection
+    stem = safe_stem(inspection.tail_no, inspection.side.value, inspection.record_id)
+    context = _inspection(judgement, gear, provenance, lengths) | {"steps": steps}
+    return Document("inspection.html.j2", context, stem)
+
+
+def _identified(
+    j: Judgement, row: Any, facts: Facts, gear: Gear, provenance: ReportProvenance, lengths: Lengths
+) -> dict[str, Any]:
+    """What every report of one row has: who, the verdict with its sign, title and footer."""
+    side, tail = (row.side.value if row.side else "?"), row.tail_no or "tail not known"
+    record = row.record_id or "record not known"
+    title = f"{tail} {side} – {j.verdict.words} – {record}"
+    footer = f"{short(tail, 20)} {side} · {short(record, 34)}"
+    return {
+        **head(title, footer, gear, provenance, lengths),
+        "j": j,
+        "side": side,
+        "side_words": _SIDES.get(row.side, "side not known"),
+        "tail": tail,
+        "record": record,
+        "facts_entered": facts,
+        "tone": j.verdict.value.lower().replace("_", "-"),
+        "sign": sign(j.verdict.value),
+        "warnings": list(dict.fromkeys((*j.warnings, *row.warnings))),
+    }
+
+
+def _inspection(a: Assessment, gear: Gear, provenance: ReportProvenance, lengths: Lengths) -> dict[str, Any]:
+    inspection = a.inspection
+    carried = [(k.replace("_", " "), v) for k, v in inspection.carried.items() if v and k not in _MANUAL]
+    in_front = [(short(label, 60), short(value, 120)) for label, value in carried[:_MOST_IN_FRONT]]
+    known = _identified(a, inspection, _entered(inspection, lengths), gear, provenance, lengths)
+    warnings = known["warnings"]
+    front = warnings if len(warnings) <= _WARNINGS_ON_FRONT else warnings[: _WARNINGS_ON_FRONT - 1]
+    return {
+        **known,
+        "a": a,
+        "inspected": inspection.inspection_date.isoformat() if inspection.inspection_date else "not recorded",
+        "outcome": inspection.outcome.value if inspection.outcome else "not recorded",
+        "manual": " rev. ".join(v for k in _MANUAL if (v := inspection.carried.get(k))) or "not stated",
+        "carried": in_front,
+        "carried_in_full": carried if carried != in_front else [],
+        "front_warnings": front,
+        "unmeasured": [f.joint for f in a.joints if f.clearance_in is None],
+        "gauge": drawn.margin_gauge(a, lengths),
+        "drawing": schematic(gear, a, lengths),
+        "legend": [
+            (joint_mark("", "over"), "over its limit"),
+            (joint_mark("", "fine"), "within its limit"),
+            (joint_mark("", "missing"), "not measured"),
+        ],
+        "extended": bool(provenance.extension),
+        "rows": _joints(gear, a, lengths),
+        "curve": drawn.plunger_curve(gear, a, lengths),
+        "cases": _sequence(gear, a, lengths),
+        "signatories": [(role, inspection.technician_id or "" if i == 0 else "") for i, role in enumerate(SIGNATORIES)],
+        "intervals": {i.joint: i for i in a.posterior.intervals} if a.posterior else {},
+    }
+
+
+def _rejected(
+    r: Rejected, gear: Gear, provenance: ReportProvenance, problems: Iterable[Problem], lengths: Lengths
+) -> dict[str, Any]:
+    return {
+        **_identified(r, r.row, _entered_in(r.row.source), gear, provenance, lengths),
+        "inspected": "not recorded",
+        "outcome": "not recorded",
+        "manual": "not stated",
+        "carried": [],
+        "correct": r.row.correct,
+        "problems": [p for p in problems if (p.file, p.sheet, str(p.row or "")) == _place(r.row.source, "")],
+    }
+
+
+def _place(source: RowSource, absent: str | None = None) -> tuple[str | None, str | None, str | None]:
+    return source.file, source.sheet, absent if source.row is None else str(source.row)
+
+
+def _entered(inspection: Inspection, lengths: Lengths) -> Facts:
+    i = inspection
+    default = " (default)" if i.gauge_u_is_default else ""
+    found = [
+        ("Landings since overhaul", None if i.gear_landings is None else f"{i.gear_landings:g}"),
+        ("Gauge", i.gauge_id),
+        ("Temperature", None if i.temperature_c is None else f"{i.temperature_c:g}\u00a0°C"),
+        ("Hydraulic pressure", None if i.hydraulic_pressure_psi is None else f"{i.hydraulic_pressure_psi:g}\u00a0psi"),
+        ("Approach", i.approach.value.lower() if i.approach else None),
+        ("Reading uncertainty", f"{lengths.full(i.gauge_u_in, fine=1)} radial{default}"),
+        ("End float", ", ".join(f"#{n} {lengths.full(v)}" for n, v in i.axial_float_in.items()) or None),
+    ]
+    return [(label, value) for label, value in found if value] + _entered_in(i.source)
+
+
+def _entered_in(source: RowSource) -> Facts:
+    parts = [source.file, source.sheet and f"sheet {source.sheet}", source.row and f"row {source.row}"]
+    return [("Entered in", ", ".join(str(part) for part in parts if part))] if source.file else []
+
+
+def _joints(gear: Gear, a: Assessment, lengths: Lengths) -> list[dict[str, Any]]:
+    """The ranked joints, each with its mark, its bar and what was entered."""
+    gauge_u = a.inspection.gauge_u_of
+
+    def bar_end(finding: JointFinding) -> float:
+        if finding.contribution_in is None:
+            return drawn.bar_stand_in(finding)
+        return finding.contribution_in + 2.0 * gauge_u(finding.joint) * finding.plunger_amplification
+
+    longest = max([1e-6, *(bar_end(f) for f in a.joints)])
+    rows = []
+    for f in a.ranked:
+        entered = a.inspection.entered.get(f.joint)
+        state = joint_state(f)
+        rows.append(
+            {
+                "f": f,
+                "location": gear.joint(f.joint).location,
+                "entered": _as_entered(entered.text, entered.unit.value) if entered else None,
+                "state": state,
+                "mark": joint_mark(str(f.joint), state),
+                "bar": drawn.contribution_bar(f, longest, gauge_u(f.joint), lengths),
+                "allowance_in": _allowance(f),
+            }
+        )
+    return rows
+
+
+def _allowance(finding: JointFinding) -> float | None:
+    """How much further a joint may wear: to the margin, and no further than to its own limit. [in]"""
+    if finding.allowance_in is None or finding.clearance_in is None:
+        return None
+    return max(0.0, min(finding.allowance_in, finding.limit_in - finding.clearance_in))
+
+
+def _as_entered(text: str, unit: str) -> str:
+    """The entered text, with its unit if the text does not say it."""
+    return text if any(c.isalpha() or c in '"″”' for c in text) else f"{text} {unit}"
+
+
+def _sequence(gear: Gear, a: Assessment, lengths: Lengths) -> Facts:
+    """What the plunger's position means in the sequence: each sentence with the positions that it holds for."""
+    if gear.cycle is None:
+        return []
+    places: list[tuple[str, float]] = []
+    if a.inspection.measured_displacement_in is not None:
+        places.append(("measured", a.inspection.measured_displacement_in))
+    worst = sorted((v for v in (a.over_travel_in, a.under_travel_in) if v is not None), key=abs, reverse=True)
+    places += [("worst case", v) for v in worst if abs(v) > a.margin_in or v == worst[0]]
+    said: dict[str, list[str]] = {}
+    for name, value in places:
+        sentence = gear.cycle.symptom(value, a.margin_in)
+        said.setdefault(sentence, []).append(f"{name} {lengths.full(value, True)}")
+    return [(_capital(" and ".join(names)), lengths.said(sentence)) for sentence, names in said.items()]
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def latest_of_each_gear(judgements: Sequence[Judgement]) -> tuple[list[int], list[int]]:
+    """Return the places of the latest inspection of each gear, worst first, and of the earlier ones.
+
+    The latest is the one of the last date; without dates, or on one date, the one that stands last. A row that cannot
+    be judged is no inspection of a gear and stands by itself.
+    """
+    last: dict[tuple[str, str], int] = {}
+    earlier: list[int] = []
+    for place, judgement in enumerate(judgements):
+        if isinstance(judgement, Assessment):
+            gear = (judgement.inspection.tail_no, judgement.inspection.side.value)
+            before = last.get(gear)
+            if before is not None and _day(judgements[before]) > _day(judgement):
+                earlier.append(place)
+                continue
+            if before is not None:
+                earlier.append(before)
+            last[gear] = place
+    now = [*last.values(), *(i for i, j in enumerate(judgements) if isinstance(j, Rejected))]
+    return _worst_first(judgements, now), _worst_first(judgements, earlier)
+
+
+def _day(judgement: Judgement) -> date:
+    found = judgement.inspection.inspection_date if isinstance(judgement, Assessment) else None
+    return found or date.min
+
+
+def _worst_first(judgements: Sequence[Judgement], places: Iterable[int]) -> list[int]:
+    return sorted(places, key=lambda i: (_severity(judgements[i]), i))
+
+
+def _severity(judgement: Judgement) -> tuple[int, int, float]:
+    """Sort key: measured beyond the margin first, then by verdict, then by the worst case against the margin."""
+    group = SEVERITY.index(judgement.verdict)
+    if isinstance(judgement, Rejected):
+        return 1, group, 0.0
+    measured = judgement.inspection.measured_displacement_in
+    beyond = measured is not None and abs(measured) > judgement.margin_in
+    predicted = judgement.predicted_displacement_in
+    return (0 if beyond else 1), group, -(math.inf if predicted is None else predicted / judgement.margin_in)
+
+
+def batch_document(
+    judgements: Sequence[Judgement],
+    problems: Sequence[Problem],
+    gear: Gear,
+    provenance: ReportProvenance,
+    notes: Sequence[str] = (),
+    links: Mapping[int, tuple[str, str]] | None = None,
+    unit: LengthUnit = LengthUnit.INCH,
+) -> Document:
+    """Make the document of a batch summary; `links` lead from a place to its HTML and its PDF report."""
+    lengths = Lengths(unit)
+    source = ", ".join(Path(name).name for name in provenance.input_sha256) or "inspections"
+    counted = Counter(j.verdict for j in judgements)
+    latest, earlier = latest_of_each_gear(judgements)
+    judged = [j for j in judgements if isinstance(j, Assessment)]
+    context = {
+        **head(f"Batch summary – {source}", f"Batch summary · {short(source, 40)}", gear, provenance, lengths),
+        "source": source,
+        "asked": len(judgements),
+        "judged": judged,
+        "gears_of": len({(j.inspection.tail_no, j.inspection.side) for j in judged}),
+        "over_limit": sum(any(f.over_limit for f in j.joints) for j in judged),
+        "failed": sum(j.inspection.outcome is Outcome.FAILED for j in judged),
+        "counts": [(v.words, sign(v.value), counted[v]) for v in SEVERITY],
+        "latest": [_line(judgements[i], i, links) for i in latest],
+        "earlier": [_line(judgements[i], i, links) for i in earlier],
+        "problems": problems,
+        "notes": notes,
+    }
+    return Document("batch.html.j2", context, safe_stem("batch", *map(_name, provenance.input_sha256)), landscape=True)
+
+
+def _name(file: str) -> str:
+    return Path(file).name
+
+
+def _line(judgement: Judgement, place: int, links: Mapping[int, tuple[str, str]] | None) -> dict[str, Any]:
+    judged = isinstance(judgement, Assessment)
+    return {
+        "j": judgement,
+        "row": judgement.inspection if isinstance(judgement, Assessment) else judgement.row,
+        "judged": judged,
+        "tone": judgement.verdict.value.lower().replace("_", "-"),
+        "links": (links or {}).get(place, ("", "")),
+    }

@@ -1,0 +1,20 @@
+"""What is kept of a gear's life: an append-only, hash-chained store on SQLite or PostgreSQL."""
+
+from mlg_troubleshoot.store.database import Added, Broken, Kind, Record, Store, StoreError, packed
+from mlg_troubleshoot.store.drafts import Draft, Drafts
+from mlg_troubleshoot.store.inspections import inspection_from, inspection_record, same_inspection
+
+__all__ = [
+    "Added",
+    "Broken",
+    "Draft",
+    "Drafts",
+    "Kind",
+    "Record",
+    "Store",
+    "StoreError",
+    "inspection_from",
+    "inspection_record",
+    "packed",
+    "same_inspection",
+]

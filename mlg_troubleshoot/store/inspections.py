@@ -1,0 +1,90 @@
+"""Inspections as plain JSON values and back, as entered and as read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from datetime import date
+from enum import Enum
+from typing import Any
+
+from mlg_troubleshoot.decision.inspection import Approach, EnteredClearance, Inspection, Outcome, RowSource, Side
+from mlg_troubleshoot.store.database import Kind, Record, packed
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+
+# What says where and how an inspection was entered, not what was found.
+_NOT_CONTENT = ("source", "warnings", "entered")
+_BY_JOINT = ("clearance_in", "gauge_u_by_joint_in", "axial_float_in")
+
+
+_FIELDS = tuple((field.name, field.default) for field in fields(Inspection))
+_AS_THEY_ARE = frozenset((str, int, float, bool, type(None)))
+
+
+def _plain(value: Any) -> Any:
+    if value.__class__ in _AS_THEY_ARE:
+        return value
+    if isinstance(value, Enum | date):
+        return value.value if isinstance(value, Enum) else value.isoformat()
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if isinstance(value, EnteredClearance):
+        return [value.text, value.unit.value]
+    if isinstance(value, RowSource):
+        return [value.file, value.sheet, value.row]
+    return [_plain(each) for each in value] if isinstance(value, tuple) else value
+
+
+def inspection_record(inspection: Inspection, kind: Kind = Kind.INSPECTION, **more: Any) -> Record:
+    """Return an inspection as a record; what is at its default is left out."""
+    day = inspection.inspection_date.isoformat() if inspection.inspection_date else ""
+    body = {}
+    for name, default in _FIELDS:
+        value = getattr(inspection, name)
+        if value is not default and value != default and value not in ({}, ()):
+            body[name] = _plain(value)
+    identity = (inspection.record_id, inspection.tail_no, inspection.side.value, day)
+    return Record(
+        kind,
+        inspection.record_id,
+        inspection.tail_no,
+        inspection.side.value,
+        day,
+        packed({"inspection": body, **more}),
+        identity if kind is Kind.INSPECTION else (),
+    )
+
+
+def inspection_from(record: Record) -> Inspection:
+    """Return the inspection of a record."""
+    body = dict(record.body["inspection"])
+    for name in _BY_JOINT:
+        if name in body:
+            body[name] = {int(number): value for number, value in body[name].items()}
+    if "entered" in body:
+        body["entered"] = {
+            int(n): EnteredClearance(text, LengthUnit(unit)) for n, (text, unit) in body["entered"].items()
+        }
+    if "source" in body:
+        body["source"] = RowSource(*body["source"])
+    for name, kind in (
+        ("side", Side),
+        ("convention", ClearanceConvention),
+        ("outcome", Outcome),
+        ("approach", Approach),
+    ):
+        if name in body:
+            body[name] = kind(body[name])
+    if "inspection_date" in body:
+        body["inspection_date"] = date.fromisoformat(body["inspection_date"])
+    for name in ("readings_in", "warnings"):
+        if name in body:
+            body[name] = tuple(body[name])
+    body.setdefault("clearance_in", {})
+    return Inspection(**body)
+
+
+def same_inspection(one: Record, two: Record) -> bool:
+    """Tell whether two records say the same was found, wherever it was entered."""
+    bare = [{k: v for k, v in r.body.get("inspection", {}).items() if k not in _NOT_CONTENT} for r in (one, two)]
+    return bare[0] == bare[1]

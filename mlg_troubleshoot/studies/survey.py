@@ -1,0 +1,531 @@
+"""A linkage from measurements: design variables by damped least squares from every linkage of the ensemble.
+
+The prior is normal about the mean of the ensemble, with its covariance shrunk: ten members say little about thirty
+numbers' correlations. Each member and some draws are starts; the posterior is normal about its mode (Laplace). A slip
+must not bend the linkage: the first fit is robust (Student's t with four degrees of freedom, the uncertainties widened
+at first), and a reading counts as a misfit by what the others predict for it. Draws are random maximum likelihood: a
+draw of the prior and of the readings' errors, fitted anew by a few steps (Oliver et al. 1996).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.errors import InconclusiveDataError
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Slider
+from mlg_troubleshoot.studies.survey_readings import DEFAULT_U, Kind, Reading, SurveyedLinkage
+from mlg_troubleshoot.units import MM_PER_IN, SLIPS, Slip
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+# The share of the ensemble's covariances that is believed.
+_BELIEVED = 0.5
+# A gear file without an ensemble: half of the linkage's size, thirty degrees.
+_ALONE_SIZE, _ALONE_ANGLE = 0.5, float(np.radians(30.0))
+_LEAST_SPREAD = 0.01
+# Robust fit: uncertainties widened by these factors in turn, with so many steps each; then few starts are left.
+_WIDENED, _STEPS, _KEPT = (300.0, 100.0, 30.0, 10.0, 3.0, 1.0), 6, 6
+# Draws of the prior that are starts beside the ensemble. The loss of a reading where the linkage is open.
+_AROUND, _OPEN, _LAST_STEPS, _TRIALS = 80, 100.0, 25, 8
+# The best few are left and fitted again with uncertainties widened so far, from so many points around each.
+_REHEATED, _AGAIN, _REHEAT_STEPS, _BESIDE = (10.0, 3.0), 12, 4, 0.03
+# One reading in a hundred is a slip, anywhere within some twenty inches: minus twice the logarithm of that density
+# over the one at no error. Without a limit one large slip would cost more than a wrong linkage with small ones.
+_SLIP = 23.0
+_FREEDOM, _ATTEMPTS, _TRUSTED = 4.0, 2, 6.0
+# The greatest of forty clean residuals exceeds 3.9 in 0.4 % of surveys, in about 1 % where the fit bends.
+MISFIT = 3.9
+# Two readings contradict each other, neither of them alone is wrong, if leaving out one or the other fits alike.
+_ALIKE = 9.0
+# With more misfits than this share of the readings nobody knows which of them to believe.
+_MOST_MISFITS = 0.1
+# Two points of the posterior are one if they stand on the same sides and no index differs by more than this share.
+_SAME, _LEAST_WEIGHT = 0.01, 1e-3
+# A joint's other side is tried where the readings place the joint: to a fifth of its distance from the line between.
+_PLACED = 0.2
+_DRAWS, _DRAW_STEPS, _ALONG, _FAR, _FEW = 150, 8, (0.0, 0.1, 0.3, 1.0), 6.0, 0.6
+_SLIPS = (
+    SLIPS["unit"],
+    Slip(MM_PER_IN / 10.0, "centimetres read as inches", "inches read as centimetres"),
+    SLIPS["point"],
+)
+# So many draws of the prior give one that closes.
+_DRAWN_FOR_ONE = 5
+_MISREAD_IN = (1.0, 0.5, 0.25, 0.125, 0.1)
+
+
+@dataclass(frozen=True, slots=True)
+class Misfit:
+    """A reading that the others contradict.
+
+    expected, spread: what the others predict for it, and with what standard uncertainty. [in or rad]
+    suggestion: what would fit.
+    group: rows that contradict each other, this one among them; of one alone it is the slip.
+    """
+
+    reading: Reading
+    expected: float
+    spread: float
+    suggestion: str
+    group: tuple[int, ...]
+
+    @property
+    def words(self) -> str:
+        """What would fit, and with which rows it contradicts."""
+        if len(self.group) < 2:
+            return self.suggestion
+        return f"rows {', '.join(map(str, self.group))} contradict each other; of this one: {self.suggestion}"
+
+
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """One assembly that the survey allows.
+
+    mean, shape (n_variables,): the prior's middle, mirrored with the assembly. [in or rad]
+    covariance, shape (n_variables, n_variables): of the design variables. [in², rad²]
+    weight: share of the posterior. [1]
+    parameters: how many numbers the readings determine. [1]
+    sides: branch sign of each joint on two links or a slider, and on which side of a crank the rest stands.
+    """
+
+    vector: Array
+    mean: Array
+    covariance: Array
+    weight: float
+    chi2: float
+    parameters: float
+    sides: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """What a survey says about a linkage.
+
+    modes: assemblies with their weight, the likeliest first.
+    draws, shape (n, n_variables): from the posterior, all of which close. [in or rad]
+    """
+
+    linkage: SurveyedLinkage
+    readings: tuple[Reading, ...]
+    misfits: tuple[Misfit, ...]
+    modes: tuple[Mode, ...]
+    draws: Array
+
+    @property
+    def read(self) -> tuple[Reading, ...]:
+        """The readings of the table."""
+        return tuple(r for r in self.readings if r.row is not None)
+
+    @property
+    def degrees_of_freedom(self) -> float:
+        """Readings that fit, less the numbers that they determine. [1]"""
+        return max(len(self.readings) - len(self.misfits) - self.modes[0].parameters, 0.0)
+
+    @property
+    def contradicts(self) -> bool:
+        """True if readings contradict each other so that nobody can tell which of them is wrong, or too many do."""
+        most = max(2, _MOST_MISFITS * len(self.read))
+        return len(self.misfits) > most or any(len(m.group) > 1 for m in self.misfits)
+
+
+class Prior:
+    """What is known of the linkage before it is measured: a normal distribution.
+
+    mean, shape (n_variables,): its middle. [in or rad]
+    root, shape (n_variables, n_variables): Cholesky factor of its covariance. [in, rad]
+    members, shape (n_members, n_variables): the ensemble. [in or rad]
+    """
+
+    def __init__(self, linkage: SurveyedLinkage) -> None:
+        gear: Gear = linkage.gear
+        members = np.array([linkage.vector(each) for each in gear.ensemble])
+        angles = linkage.angles
+        # The same direction, one turn further, is no distance.
+        members[:, angles] -= 2 * np.pi * np.round((members[:, angles] - members[0, angles]) / (2 * np.pi))
+        self.members, self.linkage = members, linkage
+        size = float(np.std([c for p in gear.reference.mechanism.points for c in (p.x, p.y)]))
+        alone = np.where(angles, _ALONE_ANGLE, _ALONE_SIZE * size)
+        least = _LEAST_SPREAD * alone
+        if linkage.travel is not None:
+            # What the technical order prescribes is no number of the ensemble: wide here, a reading elsewhere.
+            least[-1] = 0.1 * linkage.travel
+        covariance = np.diag(alone**2)
+        if len(members) > 2:
+            around = np.cov(members.T)
+            covariance = _BELIEVED * around + (1.0 - _BELIEVED) * np.diag(np.diag(around))
+        self.mean = members.mean(axis=0)
+        self.root = np.linalg.cholesky(covariance + np.diag(least**2))
+        self.whiten = np.linalg.inv(self.root)
+
+    def drawn(self, n: int, rng: Generator) -> Array:
+        """Draws of it, whether they close or not."""
+        return np.asarray(self.mean + rng.standard_normal((n, len(self.mean))) @ self.root.T)
+
+    def closing(self, n: int, rng: Generator, readings: tuple[Reading, ...] = ()) -> Array:
+        """Draws of it that close, about so many, as the readings have it that speak of one variable each."""
+        found = self.drawn(_DRAWN_FOR_ONE * n, rng)
+        own = tuple(r for r in readings if r.kind in (Kind.ANGLE, Kind.EXTENSION, Kind.TRAVEL))
+        if own:
+            slopes = self.linkage.slopes(own, self.mean[None])[1][0] @ self.root
+            gain = np.linalg.solve(slopes @ slopes.T + np.diag([r.u**2 for r in own]), slopes) @ self.root.T
+            found = found + ([r.value for r in own] - self.linkage.predicted(own, found)) @ gain
+        return found[self.linkage.closes(found)][:n]
+
+
+class _Fitting:
+    """The readings of one survey against one prior."""
+
+    def __init__(self, linkage: SurveyedLinkage, prior: Prior, readings: tuple[Reading, ...]) -> None:
+        self.linkage, self.prior, self.readings = linkage, prior, readings
+        self.value = np.array([r.value for r in readings])
+        self.u = np.array([r.u for r in readings])
+        self.must_close = False
+
+    def residuals(self, points: Array) -> Array:
+        with np.errstate(all="ignore"):
+            return np.asarray((self.linkage.predicted(self.readings, points) - self.value) / self.u)
+
+    def loss(self, points: Array, means: Array, widened: float, kept: Mask, robust: bool, noise: Any = 0.0) -> Array:
+        r = np.where(kept, (self.residuals(points) - noise) / widened, 0.0)
+        open_ = ~np.isfinite(r)
+        r = np.where(open_, 0.0, r)
+        data = np.where(open_, _OPEN, _robust(r)[0] if robust else r * r)
+        z = (points - means) @ self.prior.whiten.T
+        loss = np.asarray(data.sum(axis=1) + (z * z).sum(axis=1))
+        return np.where(self.linkage.closes(points), loss, np.inf) if self.must_close else loss
+
+    def descend(
+        self, points: Array, kept: Mask, widened: float, steps: int, robust: bool, means: Any = None, noise: Any = 0.0
+    ) -> tuple[Array, Array]:
+        """Damped least squares of all starts at once, in variables in which the prior is the unit sphere."""
+        points = points.copy()
+        means = np.broadcast_to(self.prior.mean if means is None else means, points.shape)
+        noise = np.broadcast_to(noise, (len(points), len(self.readings)))
+        loss = self.loss(points, means, widened, kept, robust, noise)
+        damping = np.full(len(points), 1e-2)
+        moving, n = np.arange(len(points)), points.shape[1]
+        for _ in range(steps):
+            x, before = points[moving], loss[moving]
+            with np.errstate(all="ignore"):
+                found, slopes = self.linkage.slopes(self.readings, x)
+            r = np.where(kept, ((found - self.value) / self.u - noise[moving]) / widened, 0.0)
+            weight = _robust(r)[1] if robust else np.ones_like(r)
+            g = np.where(kept[:, None], slopes / (self.u * widened)[:, None], 0.0) @ self.prior.root
+            # A position that does not close pulls nowhere; that it must close stands in the loss.
+            bad = ~(np.isfinite(g).all(axis=2) & np.isfinite(r))
+            r, g = np.where(bad, 0.0, r), np.where(bad[..., None], 0.0, g)
+            gram = np.swapaxes(g, 1, 2) @ (weight[..., None] * g) + np.eye(n)
+            down = np.einsum("smi,sm->si", g, weight * r) + (x - means[moving]) @ self.prior.whiten.T
+            left = np.arange(len(moving))
+            for _ in range(4 if robust else _TRIALS):
+                at = moving[left]
+                step = np.linalg.solve(gram[left] + damping[at, None, None] * np.eye(n), down[left][..., None])[..., 0]
+                trial = x[left] - np.where(np.isfinite(step), step, 0.0) @ self.prior.root.T
+                new = self.loss(trial, means[at], widened, kept, robust, noise[at])
+                better = new < loss[at]
+                points[at[better]], loss[at[better]] = trial[better], new[better]
+                damping[at] = np.where(better, damping[at] / 5.0, damping[at] * 8.0).clip(1e-9, 1e12)
+                left = left[~better]
+                if not len(left):
+                    break
+            moving = moving[loss[moving] < before - 1e-2]
+            if not len(moving):
+                break
+        return points, loss
+
+    def robust(self, points: Array) -> tuple[Array, Array]:
+        """Fit from every start with uncertainties that shrink to their own; the best few remain.
+
+        What is read at the reference position needs no motion: it comes first and closes from every start. What it
+        does not tell stays as the start has it, so that starts which also move are among them.
+        """
+        everything = np.ones(len(self.readings), dtype=bool)
+        still = tuple(r for r in self.readings if r.extension is None and r.kind is not Kind.PLUNGER)
+        starts = points
+        if len(still) > 2:
+            standing = _Fitting(self.linkage, self.prior, still)
+            for widened in _WIDENED:
+                points, _ = standing.descend(points, everything[: len(still)], widened, _STEPS, True, starts)
+            # Of the linkages that stand right, those that also move are the ones to go on with.
+            order = np.argsort(self.loss(points, starts, _WIDENED[2], everything, robust=True))[: 3 * _KEPT]
+            points, starts = points[order], starts[order]
+        for k, widened in enumerate(_WIDENED[1:] if len(still) > 2 else _WIDENED):
+            points, loss = self.descend(points, everything, widened, _STEPS, True, starts)
+            if k >= 1:
+                order = np.argsort(loss)[: max(_KEPT, len(points) // 2)]
+                points, starts = points[order], starts[order]
+        return self.descend(points, everything, 1.0, _LAST_STEPS, robust=True)
+
+    def reheated(self, points: Array, rng: Generator) -> tuple[Array, Array]:
+        """Fit once more from around each point, as far as wider uncertainties would let it go; the best few remain.
+
+        Beside a valley there often lies a better one, behind a low ridge or where more of the readings close.
+        """
+        everything = np.ones(len(self.readings), dtype=bool)
+        with np.errstate(all="ignore"):
+            found, slopes = self.linkage.slopes(self.readings, points)
+        weight = np.nan_to_num(_robust((found - self.value) / self.u)[1])
+        g = np.nan_to_num(slopes, posinf=0.0, neginf=0.0) / self.u[:, None] @ self.prior.root
+        values, turned = np.linalg.eigh(np.swapaxes(g, 1, 2) @ (weight[..., None] * g))
+        around = [points]
+        for widened in _REHEATED:
+            z = rng.standard_normal((len(points), _AGAIN, points.shape[1]))
+            z /= np.sqrt(1.0 + np.maximum(values, 0.0) / widened**2)[:, None]
+            trial = points[:, None] + np.einsum("pij,pkj->pki", turned, z) @ self.prior.root.T
+            trial = trial.reshape(-1, points.shape[1])
+            around.append(self.descend(trial, everything, widened, _REHEAT_STEPS, robust=True)[0])
+        points, loss = self.descend(np.concatenate(around), everything, 1.0, _STEPS, robust=True)
+        points, _ = self._apart(points, loss, 3 * _KEPT)
+        points, loss = self.descend(points, everything, 1.0, _LAST_STEPS, robust=True)
+        # A few readings may be fitted by what does not move over its stroke.
+        return self._apart(points, np.where(self.linkage.closes(points), loss, np.inf), 2 * _KEPT)
+
+    def _apart(self, points: Array, loss: Array, most: int) -> tuple[Array, Array]:
+        """The best points that are not beside a better one."""
+        found: list[int] = []
+        whitened = points @ self.prior.whiten.T
+        for k in map(int, np.argsort(loss)):
+            if len(found) < most and (np.abs(whitened[found] - whitened[k]).max(axis=1) > _BESIDE).all():
+                found.append(k)
+        return points[found], loss[found]
+
+    def modes(self, points: Array, means: Array, kept: Mask) -> tuple[Mode, ...]:
+        """Least squares on the readings kept, from every point; each mode with its Laplace posterior and evidence."""
+        points, loss = self.descend(points, kept, 1.0, _LAST_STEPS, robust=False, means=means)
+        with np.errstate(all="ignore"):
+            found, slopes = self.linkage.slopes(self.readings, points)
+        closes, index = self.linkage.closes(points), self.linkage.amplification(points)
+        own: list[Array] = []
+        modes: list[Mode] = []
+        evidence: list[float] = []
+        for k in np.argsort(loss):
+            if not (closes[k] and np.isfinite(slopes[k][kept]).all()):
+                continue
+            g = (slopes[k] / self.u[:, None])[kept] @ self.prior.root
+            values, turned = np.linalg.eigh(g.T @ g)
+            values = np.maximum(values, 0.0)
+            root = self.prior.root @ (turned / np.sqrt(1.0 + values))
+            sides = self._sides(points[k])
+            # A valley along which no index changes, as where all of a driving part may turn about its pivot, is one.
+            if any(
+                m.sides == sides and np.abs(np.log(a / index[k])).max() < _SAME for m, a in zip(modes, own, strict=True)
+            ):
+                continue
+            own.append(index[k])
+            r = ((found[k] - self.value) / self.u)[kept]
+            determined = float(np.sum(values / (1.0 + values)))
+            modes.append(Mode(points[k], means[k], root @ root.T, 0.0, float(r @ r), determined, sides))
+            evidence.append(-0.5 * loss[k] - 0.5 * float(np.log1p(values).sum()))
+        if not modes:
+            return ()
+        share = np.exp(np.array(evidence) - max(evidence))
+        share /= share.sum()
+        order = [int(k) for k in np.argsort(-share) if share[k] > _LEAST_WEIGHT]
+        return tuple(replace(modes[k], weight=float(share[k])) for k in order)
+
+    def _sides(self, point: Array) -> tuple[int, ...]:
+        m = self.linkage.space.assembled(point[: len(self.linkage.space.names)])
+        signs = [int(s.sign) for s in m.steps if isinstance(s, (Dyad, Slider))]
+        for crank in (s for s in m.steps if isinstance(s, Crank)):
+            plane = m.point(crank.joint).plane
+            other = next(p.name for p in m.points if p.plane == plane and p.name not in (crank.joint, crank.pivot))
+            arm, away = (m.seen_in_plane(plane, crank.pivot, name) for name in (crank.joint, other))
+            signs.append(1 if arm[0] * away[1] >= arm[1] * away[0] else -1)
+        return tuple(signs)
+
+    def with_mirrored(self, modes: tuple[Mode, ...], kept: Mask) -> tuple[Mode, ...]:
+        """Try the other side of each joint on two links: where the readings allow it, both assemblies are kept.
+
+        The ensemble's side is no knowledge of this gear's: the prior's middle is mirrored with its joint. A linkage
+        that a crank drives moves otherwise if all of it is mirrored.
+        """
+        best, names = modes[0], list(self.linkage.names)
+        points, means = [m.vector for m in modes], [m.mean for m in modes]
+        m = self.linkage.space.assembled(best.vector[: len(self.linkage.space.names)])
+        for step in m.steps:
+            if not isinstance(step, (Dyad, Slider)) or f"{step.joint}.x" not in names:
+                continue
+            plane, i = m.point(step.joint).plane, names.index(f"{step.joint}.x")
+            arm = np.array(m.seen_in_plane(plane, step.upstream, step.joint))
+            if isinstance(step, Slider):
+                across = np.array([np.cos(step.axis), np.sin(step.axis)])
+            else:
+                base = np.array(m.seen_in_plane(plane, step.upstream, step.downstream))
+                across = np.array([-base[1], base[0]]) / np.hypot(*base)
+            far = float(arm @ across)
+            if np.sqrt(across @ best.covariance[i : i + 2, i : i + 2] @ across) > _PLACED * abs(far):
+                continue
+            moved = np.zeros(len(names))
+            moved[i : i + 2] = -2.0 * far * across
+            points.append(best.vector + moved)
+            means.append(best.mean + moved)
+        if any(isinstance(step, Crank) for step in m.steps):
+            points += [p * self.linkage.mirror for p in points]
+            means += [c * self.linkage.mirror for c in means]
+        return self.modes(np.array(points), np.array(means), kept) or modes if len(points) > len(modes) else modes
+
+    def misfits(self, mode: Mode, kept: Mask) -> tuple[tuple[Misfit, ...], Mask]:
+        """Readings that the others contradict, one after the other, and the readings that remain."""
+        kept, back = kept.copy(), np.zeros_like(kept)
+        for _ in range(len(self.readings)):
+            mode = (self.modes(mode.vector[None], mode.mean[None], kept) or (mode,))[0]
+            gap, spread = self._left_out(mode, kept)
+            size = np.nan_to_num(np.abs(gap) / spread, nan=np.inf)
+            again = ~kept & (size < MISFIT)
+            if again.any():
+                # Never the same reading out and in: one that was taken back stays.
+                i = int(np.argmin(np.where(again, size, np.inf)))
+                kept[i] = back[i] = True
+                continue
+            size = np.where(kept & ~back, size, 0.0)
+            worst = int(np.argmax(size))
+            if size[worst] < MISFIT:
+                break
+            kept[worst] = False
+        found: dict[int | None, Misfit] = {}
+        for i in map(int, np.flatnonzero(~kept)):
+            words, sure = self._suggestion(mode, i, gap, spread, ~kept)
+            group = (i,) if sure else self._alike(mode, kept, i, float(gap[i] / spread[i]))
+            rows = tuple(sorted(r.row for r in (self.readings[j] for j in group) if r.row is not None))
+            own = self.readings[i]
+            found[own.row] = Misfit(own, float(self.value[i] - gap[i]), float(spread[i]), words, rows)
+            for other in (self.readings[j] for j in group if j != i):
+                also = Misfit(other, other.value, other.u, "contradicts the others of its group", rows)
+                found.setdefault(other.row, also)
+        return tuple(m for row, m in found.items() if row is not None), kept
+
+    def _left_out(self, mode: Mode, kept: Mask) -> tuple[Array, Array]:
+        """How far each reading is from what the others predict, and the standard uncertainty of that."""
+        found, slopes = self.linkage.slopes(self.readings, mode.vector[None])
+        gap, g = self.value - found[0], slopes[0]
+        known = np.einsum("mi,ij,mj->m", g, mode.covariance, g) / self.u**2
+        # With the reading among those kept its own weight is taken out; else the prediction's is added.
+        held = np.clip(1.0 - known, 1e-9, None)
+        return np.where(kept, gap / held, gap), self.u * np.where(kept, 1.0 / np.sqrt(held), np.sqrt(1.0 + known))
+
+    def _alike(self, mode: Mode, kept: Mask, i: int, size: float) -> tuple[int, ...]:
+        """Readings one of which is wrong without anybody telling which: leaving out any of them fits alike."""
+        slopes = self.linkage.slopes(self.readings, mode.vector[None])[1][0] / self.u[:, None]
+        column = mode.covariance @ slopes[i]
+        covariance = mode.covariance - np.outer(column, column) / (1.0 + slopes[i] @ column)
+        rows = np.flatnonzero(kept | (np.arange(len(kept)) == i))
+        residual = np.eye(len(rows)) - slopes[rows] @ covariance @ slopes[rows].T
+        at = int(np.flatnonzero(rows == i)[0])
+        alike = residual[at] ** 2 / np.clip(residual[at, at] * np.diag(residual), 1e-12, None)
+        return tuple(int(j) for j in rows[(1.0 - np.minimum(alike, 1.0)) * size**2 < _ALIKE])
+
+    def _suggestion(self, mode: Mode, i: int, gap: Array, spread: Array, out: Mask) -> tuple[str, bool]:
+        """What would make a misfit fit, and whether that says that this reading is the wrong one."""
+        reading, near = self.readings[i], 3.5 * float(spread[i])
+        value, expected = reading.value, reading.value - float(gap[i])
+        if not reading.is_angle:
+            for slip in _SLIPS:
+                for size, factor, words in (
+                    ("large", 1 / slip.factor, slip.too_large),
+                    ("small", slip.factor, slip.too_small),
+                ):
+                    if abs(value * factor - expected) < near:
+                        right = f"{value * factor:.4g} in would fit"
+                        return f"{right}: the value is {slip.factor:g} times too {size}, {words}", True
+        for j in map(int, np.flatnonzero(out)):
+            other = self.readings[j]
+            if j != i and other.row is not None and other.kind is reading.kind:
+                back = other.value - float(gap[j])
+                if abs(other.value - expected) < near and abs(value - back) < 3.5 * float(spread[j]):
+                    return f"swapped with row {other.row}: {other.words}", True
+        if reading.kind is Kind.DISTANCE:
+            names = [p.name for p in self.linkage.space.mechanism.points]
+            others = [
+                Reading(Kind.DISTANCE, a, b, extension=reading.extension)
+                for a, b in [(reading.start, n) for n in names] + [(n, reading.end) for n in names]
+                if a != b and {a, b} != {reading.start, reading.end}
+            ]
+            guess = self.linkage.predicted(tuple(others), mode.vector[None])[0]
+            best = int(np.nanargmin(np.abs(guess - value)))
+            if abs(guess[best] - value) < 3.5 * reading.u:
+                return f"a wrong pin: {others[best].start} to {others[best].end} measures {guess[best]:.4g} in", True
+        if not reading.is_angle:
+            for inches in _MISREAD_IN:
+                if near < 0.4 * inches and abs(abs(gap[i]) - inches) < near:
+                    return f"misread by {inches:g} in: {expected:.4g} in would fit", True
+        return f"the others give {reading.shown(expected)} ± {reading.shown(float(spread[i]))}: read it again", False
+
+    def draws(self, modes: tuple[Mode, ...], kept: Mask, rng: Generator) -> Array:
+        """Draws from the posterior, all of which close: of each mode its share."""
+        prior, n = self.prior, len(self.prior.mean)
+        found = []
+        for mode in modes:
+            count = max(1, round(_DRAWS * mode.weight))
+            means = mode.mean + rng.standard_normal((count, n)) @ prior.root.T
+            noise = rng.standard_normal((count, len(self.readings)))
+            g = self.linkage.slopes(self.readings, mode.vector[None])[1][0] / self.u[:, None]
+            g = np.where(kept[:, None], g, 0.0)
+            pulled = (means - mode.mean) @ prior.whiten.T @ prior.whiten + noise @ g
+            # A valley is curved: each draw begins as far along its linear step as that helps.
+            steps = [mode.vector + t * pulled @ mode.covariance for t in _ALONG]
+            if mode.parameters < _FEW * n:
+                # So little is known that the modes say little: each draw begins at its own draw of the prior.
+                means = steps[0] = np.concatenate([prior.closing(count, rng), means])[:count]
+                del steps[1:]
+            losses = [self.loss(x, means, 1.0, kept, False, noise) for x in steps]
+            points = np.choose(np.argmin(losses, axis=0)[:, None], steps)
+            points, loss = self.descend(points, kept, 1.0, _DRAW_STEPS, robust=False, means=means, noise=noise)
+            # What is left of the loss of a draw that arrived is chi-squared, with as many degrees as readings.
+            arrived = loss < kept.sum() + _FAR * np.sqrt(2.0 * kept.sum())
+            found.append(points[arrived & self.linkage.closes(points)])
+        everything = np.concatenate(found)
+        if len(everything) < 2:
+            raise InconclusiveDataError(
+                "no linkage near the fitted one moves over its whole stroke", "Check the extensions and their unit."
+            )
+        return np.asarray(rng.permutation(everything))
+
+
+def _robust(r: Array) -> tuple[Array, Array]:
+    """Loss of residuals and their weights: Student's t, or a slip, which costs the same however large it is."""
+    loss = (_FREEDOM + 1.0) * np.log1p(r * r / _FREEDOM)
+    sound = 1.0 / (1.0 + np.exp((loss - _SLIP) / 2.0))
+    return loss + 2.0 * np.log(sound), sound * (_FREEDOM + 1.0) / (_FREEDOM + r * r)
+
+
+def fit(gear: Gear, readings: tuple[Reading, ...], rng: Generator) -> Survey:
+    """Find the linkages that fit the readings, what does not fit, and draws from the posterior."""
+    linkage = SurveyedLinkage(gear)
+    prior = Prior(linkage)
+    if linkage.travel is not None:
+        readings = (*readings, Reading(Kind.TRAVEL, value=linkage.travel, u=DEFAULT_U[Kind.TRAVEL]))
+    fitting = _Fitting(linkage, prior, readings)
+    points = prior.members[:0]
+    for _ in range(_ATTEMPTS):
+        reached, loss = fitting.robust(np.concatenate([prior.members, prior.closing(_AROUND, rng, readings)]))
+        points, loss = fitting.reheated(np.concatenate([points[:_KEPT], reached[np.argsort(loss)][:_KEPT]]), rng)
+        kept = np.abs(fitting.residuals(points[:1])[0]) < _TRUSTED
+        # What does not fit is a slip or another valley.
+        if kept.all():
+            break
+    modes = fitting.modes(points, np.broadcast_to(prior.mean, points.shape), kept)
+    if not modes:
+        # Few readings are fitted best by what does not move over its stroke: search among what does.
+        fitting.must_close = True
+        points = prior.closing(_AROUND, rng, readings)
+        if len(points):
+            points, loss = fitting.descend(points, np.ones_like(kept), 1.0, _LAST_STEPS, robust=True)
+            points = points[np.argsort(loss)[: 2 * _KEPT]]
+            kept = np.abs(fitting.residuals(points[:1])[0]) < _TRUSTED
+        modes = fitting.modes(points, np.broadcast_to(prior.mean, points.shape), kept)
+    if not modes:
+        raise InconclusiveDataError(
+            "no linkage of this type has these dimensions: none of the starts can be assembled with them",
+            "Check the units and the points of the readings.",
+        )
+    misfits, kept = fitting.misfits(modes[0], kept)
+    vectors, means = (np.array([getattr(m, part) for m in modes]) for part in ("vector", "mean"))
+    modes = fitting.modes(vectors, means, kept) or modes
+    modes = fitting.with_mirrored(modes, kept)
+    return Survey(linkage, readings, misfits, modes, fitting.draws(modes, kept, rng))

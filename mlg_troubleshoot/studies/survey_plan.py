@@ -1,0 +1,132 @@
+"""Which readings are worth taking: the rows of a template, the next reading, and what a survey leaves unknown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.studies.survey import Prior
+from mlg_troubleshoot.studies.survey_readings import DEFAULT_U, MINUTES, Kind, Reading, SurveyedLinkage
+
+Array = NDArray[np.float64]
+# Between each two members of the ensemble a template is planned for so many linkages, where they close. An index
+# known to two percent needs no better reading.
+_BETWEEN, _WELL_KNOWN = (0.25, 0.5, 0.75), 0.02
+# A reading counts as checked by the others if they predict it to three times its own uncertainty.
+_CHECKED, _SWEEPS = 0.1, 8
+# What a check by the others is worth beside a well-known index.
+_BRACING, _LOOSE = 0.2, 0.02
+
+# A reading that narrows less than this is not worth taking; one that so many of the draws cannot reach is none.
+_LEAST_NARROWING, _OPEN = 0.01, 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Suggested:
+    """A reading worth taking: the share by which it is expected to narrow what is unknown. [1]"""
+
+    reading: Reading
+    narrowing: float
+
+
+def planned(gear: Gear, distances: int = 24) -> tuple[tuple[Reading, bool], ...]:
+    """The rows of a template, each with whether the others check it.
+
+    The extension, the plunger over the stroke, the angles, and distances at the reference position: those that leave
+    the least unknown of the logarithms of the amplification indices, by a linear estimate on average over linkages of
+    the ensemble and between them, and that check each other. From the rigid pairs each is exchanged for a better one
+    until none is better: other choices to begin with end worse.
+    """
+    design = _Design(SurveyedLinkage(gear))
+    count = min(distances, len(design.free))
+    rows = [*design.given, *sorted(design.exchanged(design.free[: min(count, len(design.linkage.rigid))], count))]
+    held = np.median(design.held(rows), axis=0)
+    return tuple((design.pool[i], bool(h > _CHECKED)) for i, h in zip(rows, held, strict=True))
+
+
+class _Design:
+    """Slopes of everything that can be read, in variables in which the prior is the unit sphere."""
+
+    def __init__(self, linkage: SurveyedLinkage) -> None:
+        prior = Prior(linkage)
+        members = prior.members
+        between = [(1 - t) * a + t * b for i, a in enumerate(members) for b in members[:i] for t in _BETWEEN]
+        points = np.array([*members, *between])
+        points = points[linkage.closes(points)]
+        self.linkage, self.pool = linkage, linkage.candidates()
+        u = np.array([r.u for r in self.pool])
+        with np.errstate(all="ignore"):
+            slopes = linkage.slopes(self.pool, points)[1] / u[:, None] @ prior.root
+            wanted = linkage.log_slopes(points) @ prior.root
+        sound = np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(wanted).all(axis=(1, 2))
+        self.slopes, self.wanted = slopes[sound], wanted[sound]
+        self.given = [i for i, r in enumerate(self.pool) if r.kind is not Kind.DISTANCE]
+        self.free = [i for i, r in enumerate(self.pool) if r.kind is Kind.DISTANCE]
+        self.known = np.eye(slopes.shape[2])
+        if linkage.travel is not None:
+            self.known = self.known + np.outer(*2 * [prior.root[-1] / DEFAULT_U[Kind.TRAVEL]])
+
+    def covariance(self, rows: list[int]) -> Array:
+        """Covariance of each linkage's variables after these readings."""
+        g = self.slopes[:, rows]
+        return np.asarray(np.linalg.inv(self.known + np.swapaxes(g, 1, 2) @ g))
+
+    def held(self, rows: list[int]) -> Array:
+        """How much of each reading the others check, shape (n_linkages, n_rows): 1 if they tell it exactly. [1]"""
+        g = self.slopes[:, rows]
+        return np.asarray(1.0 - (g @ self.covariance(rows) * g).sum(axis=2))
+
+    def best(self, taken: list[int]) -> int:
+        """The distance to read beside those taken."""
+        rows, others = [*self.given, *taken], [j for j in self.free if j not in taken]
+        covariance, g, known = self.covariance(rows), self.slopes[:, others], self.slopes[:, rows]
+        moved = np.swapaxes(g @ covariance, 1, 2)
+        size = 1.0 + (np.swapaxes(g, 1, 2) * moved).sum(axis=1)[:, None, :]
+        wanted = (self.wanted @ covariance * self.wanted).sum(axis=2)[:, :, None] - (self.wanted @ moved) ** 2 / size
+        held = 1.0 - (known @ covariance * known).sum(axis=2)[:, :, None] + (known @ moved) ** 2 / size
+        checks = np.log(np.maximum(np.concatenate([held, 1.0 / size], axis=1), 0.0) + _LOOSE).sum(axis=1)
+        cost = np.log(np.maximum(wanted, 0.0) + _WELL_KNOWN**2).sum(axis=1) - _BRACING * checks
+        return others[int(np.argmin(cost.mean(axis=0)))]
+
+    def exchanged(self, taken: list[int], count: int) -> list[int]:
+        """Fill up a choice and exchange its distances one by one."""
+        while len(taken) < count:
+            taken = [*taken, self.best(taken)]
+        for _ in range(_SWEEPS if count < len(self.free) else 0):
+            before = set(taken)
+            for _ in range(count):
+                taken = [*taken[1:], self.best(taken[1:])]
+            if before == set(taken):
+                break
+        return taken
+
+
+def suggested(linkage: SurveyedLinkage, draws: Array, wanted: Array, taken: tuple[Reading, ...]) -> Suggested | None:
+    """The reading that narrows the wanted quantities most per minute, None if none of them matters.
+
+    By how much is the linear estimate over the draws: a reading y with uncertainty u leaves of the variance of q the
+    share 1 − cov(q, y)² / (var q · (var y + u²)).
+    wanted, shape (n_draws, n_quantities): quantities in one unit, on which the variances add. [any]
+    """
+    known = {r.what for r in taken}
+    candidates = tuple(c for c in linkage.candidates() if c.what not in known)
+    if not candidates:
+        return None
+    with np.errstate(all="ignore"):
+        y = linkage.predicted(candidates, draws)
+    reached = np.isfinite(y).mean(axis=0) >= 1.0 - _OPEN
+    candidates, y = tuple(c for c, r in zip(candidates, reached, strict=True) if r), y[:, reached]
+    sound = np.isfinite(y).all(axis=1) & np.isfinite(wanted).all(axis=1)
+    y, q = y[sound] - y[sound].mean(axis=0), wanted[sound] - wanted[sound].mean(axis=0)
+    total = float((q * q).sum())
+    if total <= 0.0 or len(y) < 3 or not candidates:
+        return None
+    u = np.array([c.u for c in candidates])
+    explained = ((q.T @ y) ** 2).sum(axis=0) / ((y * y).sum(axis=0) + len(y) * u * u) / total
+    # What chance alone would explain with so many draws.
+    narrowing = 1.0 - np.sqrt(1.0 - np.clip(explained - 1.0 / len(y), 0.0, 1.0))
+    best = int(np.argmax(narrowing / np.array([MINUTES[c.kind] for c in candidates])))
+    return Suggested(candidates[best], float(narrowing[best])) if narrowing[best] >= _LEAST_NARROWING else None

@@ -1,0 +1,283 @@
+"""What a survey reads, and what a linkage predicts for it: distances, plunger positions, angles, the extension."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.gear.design import DesignSpace
+from mlg_troubleshoot.gear.gear import Gear, Linkage
+from mlg_troubleshoot.geometry.kernel import Kernel
+from mlg_troubleshoot.geometry.mechanism import Dyad, Lever, Mechanism, Slider, Slot
+from mlg_troubleshoot.geometry.program import write_program
+
+Array = NDArray[np.float64]
+_STEP = 1e-5
+# Positions over the stroke among which the plunger's least displacement is sought, and plunger positions to read.
+_POSITIONS, _PLUNGER_READINGS = 25, 9
+
+
+class Kind(StrEnum):
+    """What is read."""
+
+    DISTANCE = "DISTANCE"
+    PLUNGER = "PLUNGER"
+    ANGLE = "ANGLE"
+    EXTENSION = "EXTENSION"
+    # Not a row of a table: the travel that the technical order prescribes (section 4.2) counts as one more reading.
+    TRAVEL = "TRAVEL"
+
+
+# Standard uncertainties where a reading states none: in, in, rad, in and, for the prescribed travel, in.
+DEFAULT_U = {
+    Kind.DISTANCE: 0.01,
+    Kind.PLUNGER: 0.0015,
+    Kind.ANGLE: float(np.radians(1.0)),
+    Kind.EXTENSION: 0.005,
+    Kind.TRAVEL: 0.005,
+}
+
+
+def default_u(kind: Kind, *, is_angle: bool) -> float:
+    """Standard uncertainty of a reading that states none; an output that turns is read as an angle. [in or rad]"""
+    return DEFAULT_U[Kind.ANGLE if is_angle else kind]
+
+
+# Minutes that a reading takes at the gear, assumed: two hands and a caliper; the dial stands once for all positions.
+MINUTES = {Kind.DISTANCE: 3.0, Kind.PLUNGER: 2.0, Kind.ANGLE: 6.0, Kind.EXTENSION: 2.0}
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One row of a survey.
+
+    start, end: point names, or plane and ``hinge`` or ``dihedral``, or slider and ``axis``; empty where not needed.
+    value: NaN for a reading that is planned. [in or rad]
+    u: its standard uncertainty. [in or rad]
+    extension: input at the reading, from Down Lock; None at the reference position. [in or rad]
+    row: row of the file; None for a planned one and for the prescribed travel.
+    is_angle: true if the value is an angle.
+    """
+
+    kind: Kind
+    start: str = ""
+    end: str = ""
+    value: float = np.nan
+    u: float = 0.01
+    extension: float | None = None
+    row: int | None = None
+    is_angle: bool = False
+
+    @property
+    def what(self) -> tuple[str, frozenset[str], float | None]:
+        """What is read, whichever pin is named first."""
+        return self.kind.value, frozenset((self.start, self.end)), self.extension
+
+    @property
+    def words(self) -> str:
+        """What is read, in words."""
+        at = "" if self.extension is None else f" at extension {self.extension:g}"
+        match self.kind:
+            case Kind.DISTANCE:
+                return f"distance {self.start} to {self.end}{at}"
+            case Kind.ANGLE:
+                return f"angle of the {self.end} of {self.start}"
+            case Kind.PLUNGER:
+                return f"plunger{at}"
+            case Kind.EXTENSION:
+                return "extension from Down Lock to the reference position"
+            case _:
+                return "prescribed travel of the plunger"
+
+    def in_units(self, value: float) -> float:
+        """A value of this reading as a person writes it. [in or deg]"""
+        return float(np.degrees(value)) if self.is_angle else value
+
+    def shown(self, value: float) -> str:
+        """The same with its unit."""
+        return f"{self.in_units(value):.4g}{'°' if self.is_angle else ' in'}"
+
+
+class SurveyedLinkage:
+    """Design variables of a gear's linkage with its calibration, and what they predict, for batches of vectors."""
+
+    def __init__(self, gear: Gear) -> None:
+        self.gear = gear
+        self.space = DesignSpace(gear.reference)
+        self.kernel = Kernel(gear.reference.mechanism)
+        self.travel = gear.calibration.travel_in
+        self.names = (*self.space.names, *(("travel",) if self.travel is not None else ()))
+        self.angles = np.array([n.endswith((".direction", ".dihedral", ".axis")) for n in self.names])
+        # Signs of the variables of the same linkage, seen from the other side.
+        self.mirror = np.where(self.angles | np.array([n.endswith(".y") for n in self.names]), -1.0, 1.0)
+        self.low = gear.reference.stroke[0]
+        self._beyond = gear.reference.stroke[1] - gear.reference.mechanism.reference_input
+
+    def vector(self, linkage: Linkage) -> Array:
+        """The variables of one of the gear's linkages."""
+        return np.append(self.space.vector(linkage), [] if self.travel is None else [self.travel])
+
+    def linkage(self, vector: Array, name: str) -> Linkage:
+        """The linkage of one vector."""
+        return self.space.linkage(vector[: len(self.space.names)], name)
+
+    def _assembled(self, vectors: Array) -> tuple[Mechanism, Array]:
+        """Mechanisms of a batch and their reference inputs, shape (n_vectors, 1)."""
+        mechanism = self.space.assembled(vectors[:, : len(self.space.names)])
+        return mechanism, np.broadcast_to(np.asarray(mechanism.reference_input, float), len(vectors))[:, None]
+
+    def _numbers(self, mechanism: Mechanism, count: int) -> list[Any]:
+        numbers = write_program(mechanism).parameters.values()
+        return [np.broadcast_to(np.asarray(v, float), count)[:, None] for v in numbers]
+
+    def _rate(self, vectors: Array, numbers: list[Any], reference: Array) -> Any:
+        """Rate k of section 4.2 by a parabola through the least position and its neighbours, shape (n, 1). [1]"""
+        if self.travel is None:
+            return 1.0
+        at = self.low + (reference + self._beyond - self.low) * np.linspace(0.0, 1.0, _POSITIONS)
+        raw = self.kernel.output(at, self.kernel.no_clearance(), numbers)
+        direction = np.sign(raw[:, -1:] - raw[:, :1])
+        along = direction * raw
+        i = np.clip(np.argmin(along, axis=1), 1, _POSITIONS - 2)[:, None] + np.arange(-1, 2)
+        before, least, after = np.take_along_axis(along, i, 1).T
+        slope, bend = (after - before) / 2.0, after - 2.0 * least + before
+        step = np.clip(-slope / np.maximum(bend, 1e-12), -1.0, 1.0)
+        least = least + step * (slope + step * bend / 2.0)
+        return direction * vectors[:, -1:] / (along[:, -1:] - least[:, None])
+
+    def predicted(self, readings: tuple[Reading, ...], vectors: Array) -> Array:
+        """What each vector predicts for each reading, shape (n_vectors, n_readings); NaN where it does not close."""
+        mechanism, reference = self._assembled(vectors)
+        moves = [r for r in readings if r.kind is Kind.PLUNGER or r.extension is not None]
+        extensions = list(dict.fromkeys(r.extension for r in moves))
+        nothing = self.kernel.no_clearance()
+        moved: dict[str, Array] = {}
+        curve = np.empty(())
+        if moves:
+            numbers = self._numbers(mechanism, len(vectors))
+            at = [reference if e is None else np.full_like(reference, self.low + e) for e in extensions]
+            inputs = np.concatenate(at, axis=1)
+            if any(r.kind is Kind.DISTANCE for r in moves):
+                positions = self.kernel.positions(inputs, nothing, numbers)
+                for name in {name for r in moves if r.kind is Kind.DISTANCE for name in (r.start, r.end)}:
+                    origin, axes = mechanism.frame(mechanism.point(name).plane)
+                    x, y = (np.broadcast_to(c, inputs.shape)[..., None] for c in positions[name])
+                    moved[name] = origin[..., None, :] + x * axes[..., None, 0, :] + y * axes[..., None, 1, :]
+            if any(r.kind is Kind.PLUNGER for r in moves):
+                curve = self.kernel.output(inputs, nothing, numbers) - self.kernel.output(reference, nothing, numbers)
+                curve = curve * self._rate(vectors, numbers, reference)
+        still = {p.name: mechanism.reference_in_space(p.name) for p in mechanism.points}
+        found = np.empty((len(vectors), len(readings)))
+        for i, r in enumerate(readings):
+            match r.kind:
+                case Kind.DISTANCE:
+                    places = (
+                        still
+                        if r.extension is None
+                        else {name: moved[name][:, extensions.index(r.extension)] for name in (r.start, r.end)}
+                    )
+                    apart = places[r.start] - places[r.end]
+                    found[:, i] = np.sqrt((apart * apart).sum(axis=-1))
+                case Kind.PLUNGER:
+                    found[:, i] = curve[:, extensions.index(r.extension)]
+                case Kind.ANGLE:
+                    name = f"{r.start}.{'direction' if r.end == 'hinge' else r.end}"
+                    turned = vectors[:, self.names.index(name)]
+                    # The nearest of the turns that mean the same direction.
+                    found[:, i] = turned - 2 * np.pi * np.round((turned - np.nan_to_num(r.value)) / (2 * np.pi))
+                case Kind.EXTENSION:
+                    found[:, i] = reference[:, 0] - self.low
+                case Kind.TRAVEL:
+                    found[:, i] = vectors[:, -1]
+        return found
+
+    def slopes(self, readings: tuple[Reading, ...], vectors: Array) -> tuple[Array, Array]:
+        """Predictions and their derivatives by central differences, shape (n_vectors, n_readings, n_variables)."""
+        count, n = vectors.shape
+        steps = np.concatenate([np.zeros((1, n)), np.eye(n), -np.eye(n)]) * _STEP
+        found = self.predicted(readings, (vectors[:, None, :] + steps).reshape(-1, n)).reshape(count, 2 * n + 1, -1)
+        slopes: Array = ((found[:, 1 : n + 1] - found[:, n + 1 :]) / (2 * _STEP)).swapaxes(1, 2)
+        return found[:, 0], slopes
+
+    def _gradient(self, vectors: Array) -> tuple[Array, Array, list[Any], Any]:
+        """Derivatives of the displacement by the virtual links, with what a further solution needs."""
+        mechanism, reference = self._assembled(vectors)
+        numbers = self._numbers(mechanism, len(vectors))
+        n = len(self.kernel.no_clearance())
+        links = np.concatenate([np.eye(n), -np.eye(n)]) * _STEP
+        rate = self._rate(vectors, numbers, reference)
+        moved = self.kernel.output(reference + self._beyond, [links[:, i] for i in range(n)], numbers)
+        return (moved[:, :n] - moved[:, n:]) / (2 * _STEP) * rate, reference, numbers, rate
+
+    def amplification(self, vectors: Array) -> Array:
+        """Plunger amplification index A_iP of each joint (Eq. 8) for a batch, shape (n_vectors, n_joints). [1]"""
+        gradient = self._gradient(vectors)[0]
+        return np.asarray(np.hypot(gradient[:, 0::2], gradient[:, 1::2]))
+
+    def displacement(self, vectors: Array, clearance_in: Array) -> Array:
+        """Displacement of the plunger, the larger of both senses, every clearance along its own gradient.
+
+        clearance_in, shape (n_cases, n_joints): radial clearances. [in]
+        Returns, shape (n_vectors, n_cases): displacement; NaN where the linkage does not close. [in]
+        """
+        gradient, reference, numbers, rate = self._gradient(vectors)
+        length = np.repeat(np.maximum(np.hypot(gradient[:, 0::2], gradient[:, 1::2]), 1e-12), 2, axis=1)
+        link = np.repeat(clearance_in, 2, axis=1)[None] * (gradient / length)[:, None]
+        at, none = reference + self._beyond, self.kernel.no_clearance()
+        zero = self.kernel.output(at, none, numbers)
+        ends = [self.kernel.output(at, [*np.moveaxis(sense * link, -1, 0)], numbers) - zero for sense in (1.0, -1.0)]
+        return np.asarray(np.max(np.abs(ends), axis=0) * np.abs(rate))
+
+    def log_slopes(self, vectors: Array) -> Array:
+        """Derivatives of the logarithms of the amplification indices, shape (n_vectors, n_joints, n_variables)."""
+        count, n = vectors.shape
+        steps = np.concatenate([np.eye(n), -np.eye(n)]) * _STEP * 10.0
+        found = np.log(self.amplification((vectors[:, None, :] + steps).reshape(-1, n))).reshape(count, 2 * n, -1)
+        return np.asarray(((found[:, :n] - found[:, n:]) / (20.0 * _STEP)).swapaxes(1, 2))
+
+    def closes(self, vectors: Array) -> NDArray[np.bool_]:
+        """Tell which vectors make a linkage that moves over its stroke and moves its plunger as prescribed."""
+        mechanism, reference = self._assembled(vectors)
+        at = self.low + (reference + self._beyond - self.low) * np.linspace(0.0, 1.0, _POSITIONS)
+        curve = self.kernel.output(at, self.kernel.no_clearance(), self._numbers(mechanism, len(vectors)))
+        return np.asarray(np.isfinite(curve).all(axis=1) & np.isfinite(self.amplification(vectors)).all(axis=1))
+
+    def candidates(self) -> tuple[Reading, ...]:
+        """Everything that can be read: the extension, the plunger over the stroke, every angle, every distance."""
+        m, (low, high) = self.space.mechanism, self.gear.reference.stroke
+        found = [Reading(Kind.EXTENSION)] if self.space.moves_reference else []
+        # A round figure of each ninth of the stroke is easier to set than the ninth.
+        at = [round((high - low) * k / _PLUNGER_READINGS, 2) for k in range(_PLUNGER_READINGS + 1)]
+        at.pop(0 if not self.space.moves_reference else _PLUNGER_READINGS)
+        found += [Reading(Kind.PLUNGER, extension=e, is_angle=m.output.kind == "angle") for e in at]
+        for plane in self.space.planes:
+            found += [Reading(Kind.ANGLE, plane, what, is_angle=True) for what in ("hinge", "dihedral")]
+        found += [Reading(Kind.ANGLE, slider, "axis", is_angle=True) for slider in self.space.sliders]
+        names = [p.name for p in m.points]
+        pairs = [*map(tuple, self.rigid), *combinations(names, 2)]
+        ends = (sorted(p, key=names.index) for p in pairs)
+        distances = {frozenset(p): Reading(Kind.DISTANCE, p[0], p[1]) for p in ends}
+        return tuple(replace(r, u=default_u(r.kind, is_angle=r.is_angle)) for r in (*found, *distances.values()))
+
+    @property
+    def rigid(self) -> tuple[frozenset[str], ...]:
+        """Pairs of pins on one rigid part; the actuator counts as one at the reference position."""
+        pairs: list[tuple[str, str]] = []
+        for step in self.space.mechanism.steps:
+            match step:
+                case Dyad():
+                    pairs += [(step.upstream, step.joint), (step.joint, step.downstream)]
+                case Lever():
+                    pairs += [(step.pivot, step.joint), (step.follows, step.joint), (step.pivot, step.follows)]
+                case Slot():
+                    pairs += [(step.pivot, step.joint), (step.pivot, step.pin), (step.pin, step.joint)]
+                case Slider():
+                    pairs.append((step.upstream, step.joint))
+                case _:
+                    pairs.append((step.pivot, step.joint))
+        return tuple(dict.fromkeys(map(frozenset, pairs)))

@@ -1,0 +1,72 @@
+"""What a survey gave, for whoever shows it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.studies.survey import Survey
+from mlg_troubleshoot.studies.survey_plan import Suggested
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class InspectedGear:
+    """What the geometry leaves open of one inspection's displacement in the worst directions. [in]"""
+
+    record_id: str
+    displacement_in: float
+    interval_in: tuple[float, float]
+    probability_within_margin: float
+
+    @property
+    def words(self) -> str:
+        """The same in words."""
+        low, high = self.interval_in
+        return (
+            f"{self.displacement_in:.4f} in in the worst directions, 90 % {low:.4f} to {high:.4f} in; within the "
+            f"margin on {100 * self.probability_within_margin:.0f} % of the linkages that fit"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyResult:
+    """What a survey gave.
+
+    gear: the gear as it was before.
+    survey: the fit; None if nothing was read.
+    problems: cells that are wrong; their rows were not used.
+    before, interval, shape (n_joints, 2): 90 % intervals of the amplification indices, before and after. [1]
+    amplification, shape (n_joints,): indices of the surveyed linkage. [1]
+    suggestion: the reading to take next; None if none would narrow anything.
+    inspections: what is left open of given inspections.
+    warnings: assemblies, published numbers that this gear leaves, and what else a reader must know.
+    gear_file: the gear file that was written.
+    input_sha256: hash of the table.
+    """
+
+    gear: Gear
+    survey: Survey | None
+    problems: tuple[Problem, ...]
+    before: Array
+    interval: Array
+    amplification: Array
+    suggestion: Suggested | None
+    inspections: tuple[InspectedGear, ...]
+    warnings: tuple[str, ...]
+    gear_file: Path | None
+    input_sha256: str
+    seed: int
+
+    @property
+    def exit_code(self) -> int:
+        """0 if everything fits, 1 if something does not, 3 if nothing follows."""
+        if self.survey is None:
+            return 3
+        return 1 if self.survey.misfits or self.problems else 0

@@ -1,0 +1,96 @@
+"""What readings say of the level and the drift of each unit, for many posterior draws and many units at once.
+
+Level x and drift b of a path run over a clock c = usage^q:
+
+    x(c + d) = x(c) + b d + s W(d)         Wiener increments
+    b(c + d) = b(c) + v W(d)               integrated Wiener: the drift itself wanders
+    x(c + d) = x(c) + Gamma(d / s², b s²)  gamma increments: mean b d, variance b² s² d
+
+Paths begin at x ~ N(start, start_sd²) with b = unit's drift + N(0, (1 - kept) drift_sd²), and the unit's drift is
+N(drift, kept drift_sd²), so that a restored part keeps a share of its own pace. A reading is x + N(0, r²). Wiener and
+integrated Wiener are filtered exactly (Kalman); gamma increments by their mean and their variance, which is what is
+expected of it from the readings so far: s² d E[b²] = s² d (mean² + variance of the drift).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.wear.paths import Array, Steps
+
+_LOG_2PI = float(np.log(2.0 * np.pi))
+# A level is never known better than this share of the whole rise. [1]
+_LEAST_VARIANCE = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Draws:
+    """Parameters, each of shape (draws, 1), in the units of ``Scale``; ``gamma`` says that increments are gamma."""
+
+    gamma: NDArray[np.bool_]
+    start: Array
+    start_sd: Array
+    drift: Array
+    drift_sd: Array
+    increment_sd: Array
+    wander_sd: Array
+    reading_sd: Array
+    power: Array
+    kept: Array
+
+    def take(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> Draws:
+        """Return some of the draws."""
+        return Draws(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """Mean and covariance of level and drift at the last step, arrays (draws, units)."""
+
+    level: Array
+    drift: Array
+    level_var: Array
+    both_cov: Array
+    drift_var: Array
+
+
+def clock(usage: Array, power: Array) -> Array:
+    """Turn usage into the time that drift and increments count."""
+    return np.where(power == 1.0, usage, np.maximum(usage, 0.0) ** power)
+
+
+def follow(steps: Steps, draws: Draws) -> tuple[Array, State]:
+    """Filter the readings of every unit; return log likelihood (draws, units) and the state at the end."""
+    shape = (len(draws.start), steps.seen.shape[1])
+    x, b = np.broadcast_to(draws.start, shape), np.broadcast_to(draws.drift, shape)
+    unit = b
+    own, kept = (1.0 - draws.kept) * draws.drift_sd**2, draws.kept * draws.drift_sd**2
+    pxx, pxb, pxu = np.broadcast_to(draws.start_sd**2, shape), np.zeros(shape), np.zeros(shape)
+    pbb, pbu, puu = (np.broadcast_to(v, shape) for v in (own + kept, kept, kept))
+    total = np.zeros(shape)
+    before = np.zeros(shape)
+    for begins, seen, usage, value, known in zip(
+        steps.begins, steps.seen, steps.usage, steps.value, steps.known_r2, strict=True
+    ):
+        now = clock(usage, draws.power)
+        if begins.any():
+            x, b = np.where(begins, draws.start, x), np.where(begins, unit, b)
+            pxx, pxb, pxu = (np.where(begins, v, p) for v, p in ((draws.start_sd**2, pxx), (0.0, pxb), (0.0, pxu)))
+            pbb, pbu = np.where(begins, puu + own, pbb), np.where(begins, puu, pbu)
+        d, before = now - np.where(begins, 0.0, before), now
+        x = x + b * d
+        w2, s2 = draws.wander_sd**2 * d, draws.increment_sd**2 * d
+        s2 = np.where(draws.gamma, s2 * (b * b + pbb), s2)
+        pxx = pxx + d * (2.0 * pxb + d * pbb) + s2 + w2 * d * d / 3.0
+        pxb, pbb, pxu = pxb + d * pbb + w2 * d / 2.0, pbb + w2, pxu + d * pbu
+        s = pxx + np.where(np.isnan(known), draws.reading_sd**2, known) + _LEAST_VARIANCE
+        g = seen / s
+        off = value - x
+        total = total - 0.5 * seen * (off * off / s + np.log(s) + _LOG_2PI)
+        x, b, unit = x + g * pxx * off, b + g * pxb * off, unit + g * pxu * off
+        pbb, pbu, puu = pbb - g * pxb * pxb, pbu - g * pxb * pxu, puu - g * pxu * pxu
+        pxb, pxu, pxx = pxb - g * pxx * pxb, pxu - g * pxx * pxu, pxx - g * pxx * pxx
+    return total, State(x, b, pxx, pxb, pbb)

@@ -1,0 +1,374 @@
+"""Fit wear of many units at once, and forecast it: by simulation over the posterior draws."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.wear.filtering import Draws, State, clock, follow
+from mlg_troubleshoot.wear.paths import Array, Scale, WearPath, lay_out, scale_of
+from mlg_troubleshoot.wear.posterior import members, posterior
+
+# Posterior draws that every forecast is averaged over. [1]
+_DRAWS = 128
+# Simulated paths of a unit when few and when many units are asked for at once. [1]
+_PATHS, _PATHS_OF_MANY, _MANY = 4096, 256, 64
+# Units read twice or more, and other units, that the population is learnt from at most: more would not narrow it. [1]
+_LEARN_FROM, _LEARN_FROM_OTHERS = 160, 40
+# Beyond the usage that any unit has reached, the clock of drift and increments runs faster or slower by this share
+# (one standard deviation): nothing read so far can tell of a curve that bends later. [1]
+_DOUBT = 0.25
+# The clock of a simulated path never stops. [1]
+_SLOWEST = 0.1
+# Least drift of gamma increments, as a share of the fleet's typical one. [1]
+_LEAST_DRIFT = 1e-3
+# Where an integrated Wiener path is looked at, in multiples of the time that it would need about. [1]
+_GRID = np.concatenate([[0.0], np.geomspace(0.02, 40.0, 44)])
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """Samples of what was asked, with infinity for what never happens.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (..., n_samples)
+        Samples on the last axis, before it one axis a question. [as asked]
+    """
+
+    samples: Array
+
+    def quantile(self, probability: ArrayLike) -> Array:
+        """Return quantiles of the samples.
+
+        Parameters
+        ----------
+        probability : float or array_like of shape (p,)
+            Probabilities from 0 to 1. [1]
+
+        Returns
+        -------
+        ndarray, shape (..., p)
+            Quantiles; infinite, never NaN, where a quantile lies among samples that never happen. [as asked]
+        """
+        ordered = np.sort(self.samples, axis=-1)
+        at = np.asarray(probability, float) * (ordered.shape[-1] - 1)
+        low, high = (ordered[..., f(at).astype(int)] for f in (np.floor, np.ceil))
+        share = at - np.floor(at)
+        with np.errstate(invalid="ignore"):
+            return np.where((share == 0.0) | (low == high), low, low + share * (high - low))
+
+    def chance_up_to(self, value: ArrayLike) -> Array:
+        """Return the probability of the value or less.
+
+        Parameters
+        ----------
+        value : float or array_like of shape (...)
+            Value to stay at or below. [as asked]
+
+        Returns
+        -------
+        ndarray, shape (...)
+            Share of the samples. [1]
+        """
+        return np.asarray(np.mean(self.samples <= np.asarray(value)[..., None], axis=-1))
+
+
+@dataclass(frozen=True, slots=True)
+class WearModel:
+    """Wear of units from one population.
+
+    Parameters
+    ----------
+    paths : mapping of str to tuple of WearPath
+        What was read, by unit, in the order of time.
+    kinds : mapping of str to float
+        Posterior probability of each kind of increments. [1]
+    scale : Scale
+        Units of the computation.
+    draws : Draws
+        Posterior draws of the population's parameters.
+    seed : int
+        Seed of fit and forecasts.
+    """
+
+    paths: Mapping[str, tuple[WearPath, ...]]
+    kinds: Mapping[str, float]
+    scale: Scale
+    draws: Draws
+    seed: int
+
+    def forecast(self, unit: str | Sequence[str], usage: ArrayLike, *, reading: bool = True) -> Samples:
+        """Forecast readings of the current path of a unit, or of many units at once.
+
+        Parameters
+        ----------
+        unit : str or sequence of str
+            The unit or n units; one that is not known is a new one of the same population.
+        usage : array_like of shape (m,) or (n, m)
+            Usage since the last restoration, the same for all units or one row a unit. Before the last reading the
+            path is followed back along its drift. [usage]
+        reading : bool
+            Of a new reading, with its error; otherwise of the wear itself. Along the usages each sample is one path.
+
+        Returns
+        -------
+        Samples
+            Of shape (m, n_samples) or (n, m, n_samples). [value]
+        """
+        units = [unit] if isinstance(unit, str) else list(unit)
+        asked = np.asarray(usage, float)
+        if not np.isfinite(asked).all() or (asked < 0.0).any():
+            raise UsageError("a usage to forecast is negative or not finite", "Give usages from 0.")
+        wanted = np.broadcast_to(np.atleast_1d(asked), (len(units), np.atleast_1d(asked).shape[-1]))
+        rng = np.random.default_rng(self.seed)
+        found = np.concatenate([*self._forecast_parts(units, wanted, rng, reading=reading)])
+        return Samples(found[0] if isinstance(unit, str) else found)
+
+    def usage_to_limit(self, unit: str | Sequence[str], limit: ArrayLike) -> Samples:
+        """Forecast the usage at which the wear itself, not a reading of it, crosses a limit.
+
+        Parameters
+        ----------
+        unit : str or sequence of str
+            The unit or n units.
+        limit : float or array_like of shape (n,)
+            The limit, for all units or for each. [value]
+
+        Returns
+        -------
+        Samples
+            Of shape (n_samples,) or (n, n_samples): usage since the last restoration at the crossing, infinite where
+            there never is one; at the last reading where the limit is passed already. [usage]
+        """
+        units = [unit] if isinstance(unit, str) else list(unit)
+        limits = np.broadcast_to((np.asarray(limit, float) - self.scale.start) / self.scale.value, (len(units),))
+        rng = np.random.default_rng(self.seed)
+        parts = []
+        for chosen, count in _chunks(len(units)):
+            last = self._last([units[i] for i in chosen])
+            ends = self._ends([units[i] for i in chosen], count, rng)
+            parts.append(np.concatenate([end.crossing(limits[chosen], last, rng) for end in ends]))
+        samples = np.concatenate([_last_axis(part) for part in parts]) * self.scale.usage
+        return Samples(samples[0] if isinstance(unit, str) else samples)
+
+    def _forecast_parts(
+        self, units: Sequence[str], wanted: Array, rng: np.random.Generator, *, reading: bool
+    ) -> Iterator[Array]:
+        for chosen, count in _chunks(len(units)):
+            names = [units[i] for i in chosen]
+            order = np.argsort(wanted[chosen], axis=1)
+            ascending = np.take_along_axis(wanted[chosen], order, axis=1) / self.scale.usage
+            last, known = self._last(names), self._known_reading(names)
+            ends = self._ends(names, count, rng)
+            found = np.concatenate([end.follow(ascending, last, known, rng, reading=reading) for end in ends])
+            samples = np.moveaxis(found, (0, 1, 2, 3), (2, 0, 3, 1)).reshape(*ascending.shape, -1)
+            back = np.take_along_axis(samples, np.argsort(order, axis=1)[:, :, None], axis=1)
+            yield self.scale.start + self.scale.value * back
+
+    def _paths(self, unit: str) -> tuple[WearPath, ...]:
+        return self.paths[unit] if unit in self.paths else (WearPath(unit, (), ()),)
+
+    def _last(self, units: Sequence[str]) -> Array:
+        return np.array([np.max(self._paths(u)[-1].usage, initial=0.0) for u in units]) / self.scale.usage
+
+    def _known_reading(self, units: Sequence[str]) -> Array:
+        """Variance of the next reading, NaN where it is estimated: a new reading is like the last ones."""
+        default = next(iter(self.paths.values()))[-1].reading_u
+        last = [self.paths[u][-1].reading_u if u in self.paths else default for u in units]
+        return np.array([np.nan if u is None else (u / self.scale.value) ** 2 for u in last])
+
+    def _ends(self, units: Sequence[str], count: int, rng: np.random.Generator) -> list[_Ends]:
+        steps = lay_out([self._paths(unit) for unit in units], self.scale)
+        # Draws stand kind by kind: every second one keeps their shares.
+        every = self.draws if count > _PATHS_OF_MANY else self.draws.take(np.arange(0, _DRAWS, 2))
+        repeats = count // len(every.start)
+        ends = []
+        for is_gamma in (False, True):
+            draws = every.take(every.gamma[:, 0] == is_gamma)
+            if len(draws.start):
+                ends.append(_Ends.drawn(draws, follow(steps, draws)[1], repeats, rng))
+        return ends
+
+
+@dataclass(frozen=True, slots=True)
+class _Ends:
+    """Level, drift and pace beyond the reach of paths at their last reading, each (draws, units, repeats)."""
+
+    draws: Draws
+    level: Array
+    drift: Array
+    pace: Array
+
+    @classmethod
+    def drawn(cls, draws: Draws, state: State, repeats: int, rng: np.random.Generator) -> _Ends:
+        """Sample levels and drifts jointly."""
+        shape = (*state.level.shape[:2], repeats)
+        level, drift, level_var, cov, drift_var = (
+            getattr(state, name)[:, :, None] for name in ("level", "drift", "level_var", "both_cov", "drift_var")
+        )
+        sd = np.sqrt(np.maximum(level_var, 1e-30))
+        one, two, three = rng.standard_normal((3, *shape))
+        rest = np.sqrt(np.maximum(drift_var - (cov / sd) ** 2, 0.0))
+        pace = np.maximum(1.0 + _DOUBT * three, _SLOWEST)
+        drift = drift + cov / sd * one + rest * two
+        # What wears by gamma increments never goes back.
+        return cls(draws, level + sd * one, np.maximum(drift, _LEAST_DRIFT) if draws.gamma.any() else drift, pace)
+
+    def _column(self, name: str) -> Array:
+        return np.asarray(getattr(self.draws, name))[:, :, None]
+
+    def follow(self, usage: Array, last: Array, known: Array, rng: np.random.Generator, *, reading: bool) -> Array:
+        """Simulate the paths on to ascending usages (units, m); return (draws, units, repeats, m)."""
+        power, s, v = self._column("power"), self._column("increment_sd"), self._column("wander_sd")
+        x, b, before = self.level, self.drift, np.zeros_like(self.level)
+        start = clock(last[None, :, None], power)
+        out = np.empty((*x.shape, usage.shape[1]))
+        for j in range(usage.shape[1]):
+            at = clock(usage[None, :, j, None], power)
+            now = np.minimum(at, 1.0) - start + self.pace * np.maximum(at - 1.0, 0.0)
+            d, before = now - before, now
+            span = np.abs(d)
+            if self.draws.gamma.any():
+                shape = np.maximum(d, 0.0) / s**2
+                x = x + np.where(d > 0.0, b * s**2 * rng.standard_gamma(shape), b * d)
+            else:
+                one, two = rng.standard_normal((2, *x.shape))
+                x = x + b * d + v * span**1.5 * one / 2.0 + np.sqrt(v * v * span**3 / 12.0 + s * s * span) * two
+                b = b + v * np.sqrt(span) * one
+            out[..., j] = x
+            if reading:
+                sd = np.where(np.isnan(known)[None, :, None], self._column("reading_sd"), np.sqrt(known)[None, :, None])
+                out[..., j] += sd * rng.standard_normal(x.shape)
+        return out
+
+    def crossing(self, limit: Array, last: Array, rng: np.random.Generator) -> Array:
+        """Usage at which each path crosses its limit, (draws, units, repeats)."""
+        away = limit[None, :, None] - self.level
+        power, s, v = self._column("power"), self._column("increment_sd"), self._column("wander_sd")
+        ahead = np.maximum(away, 1e-12)
+        if self.draws.gamma.any():
+            time = _gamma_passage(ahead / (self.drift * s**2), rng) * s**2
+        else:
+            wanders = v[:, 0, 0] > 0.0
+            time = np.empty(away.shape)
+            time[~wanders] = _wiener_passage(ahead[~wanders], self.drift[~wanders], s[~wanders], rng)
+            time[wanders] = _integrated_passage(ahead[wanders], self.drift[wanders], v[wanders], rng)
+        start = clock(last[None, :, None], power)
+        within = np.maximum(1.0 - start, 0.0)
+        at = start + np.minimum(time, within) + np.maximum(time - within, 0.0) / self.pace
+        usage = at ** (1.0 / power)
+        return np.where(away <= 0.0, last[None, :, None], np.maximum(usage, last[None, :, None]))
+
+
+def _wiener_passage(away: Array, drift: Array, sd: Array, rng: np.random.Generator) -> Array:
+    """First passage of a Wiener process with drift: inverse Gaussian, sampled after Michael, Schucany and Haas (1976).
+
+    Against its drift it passes with probability exp(2 drift away / sd²) only, and then as if the drift were turned.
+    """
+    speed = np.maximum(np.abs(drift), 1e-9)
+    mean = away / speed
+    phi = rng.standard_normal(away.shape) ** 2 * sd * sd / (away * speed)
+    short = mean / (1.0 + phi / 2.0 + np.sqrt(phi + phi * phi / 4.0))
+    time = np.where(rng.uniform(size=away.shape) * (mean + short) <= mean, short, mean * (mean / short))
+    against = (drift < 0.0) & (rng.uniform(size=away.shape) > np.exp(-2.0 * speed * away / np.maximum(sd, 1e-9) ** 2))
+    return np.where(against, np.inf, time)
+
+
+def _integrated_passage(away: Array, drift: Array, sd: Array, rng: np.random.Generator) -> Array:
+    """First passage when the drift itself wanders: paths on a grid, the same for every unit, scaled to each."""
+    draws, _units, repeats = away.shape
+    gap = np.diff(_GRID)
+    one, two = rng.standard_normal((2, draws, 1, repeats, len(gap)))
+    slope = np.cumsum(np.sqrt(gap) * one, axis=-1)
+    begins = np.concatenate([np.zeros_like(slope[..., :1]), slope[..., :-1]], axis=-1)
+    area = np.cumsum(begins * gap + gap**1.5 * (one / 2.0 + two / np.sqrt(12.0)), axis=-1)
+    scale = away / (np.maximum(drift, 0.0) + (sd * sd * away) ** (1.0 / 3.0))
+    rate, rough = drift * scale, sd * scale**1.5
+    time, below, found = np.full(away.shape, np.inf), np.zeros(away.shape), np.zeros(away.shape, bool)
+    for k in range(len(gap)):
+        level = rate * _GRID[k + 1] + rough * area[..., k]
+        new = (level >= away) & ~found
+        part = (away[new] - below[new]) / (level[new] - below[new])
+        time[new] = scale[new] * (_GRID[k] + part * gap[k])
+        found |= new
+        below = level
+    return time
+
+
+def _gamma_passage(away: Array, rng: np.random.Generator) -> Array:
+    """Shape at which a gamma process of scale 1 passes ``away``: its distribution inverted by bisection.
+
+    The quantile of a gamma distribution is taken after Wilson and Hilferty (1931).
+    """
+    z = rng.standard_normal(away.shape)
+    low, high = np.zeros(away.shape), away + 6.0 * np.sqrt(away) + 20.0
+    for _ in range(40):
+        middle = (low + high) / 2.0
+        shape = np.maximum(middle, 1e-9)
+        over = shape * np.maximum(1.0 - 1.0 / (9.0 * shape) + z / (3.0 * np.sqrt(shape)), 0.0) ** 3 >= away
+        low, high = np.where(over, low, middle), np.where(over, middle, high)
+    return (low + high) / 2.0
+
+
+def _last_axis(found: Array) -> Array:
+    """Put (draws, units, repeats) as (units, samples)."""
+    return np.moveaxis(found, 1, 0).reshape(found.shape[1], -1)
+
+
+def _chunks(units: int) -> Iterator[tuple[NDArray[np.intp], int]]:
+    size, count = (_MANY, _PATHS) if units <= _MANY else (250, _PATHS_OF_MANY)
+    for first in range(0, units, size):
+        yield np.arange(first, min(first + size, units)), count
+
+
+def fit_wear(paths: Sequence[WearPath], *, seed: int = 0) -> WearModel:
+    """Learn how a population of units wears, from readings of some of them.
+
+    Each unit has a drift from the population's; increments are correlated along a path (Wiener, integrated Wiener or
+    gamma) in proportion to usage or to a power of it, all averaged in the measure of their evidence; readings have
+    errors, at least of the resolution that they show; a restoration starts a new path of the same unit. See
+    ``filtering`` for the equations and ``posterior`` for the priors.
+
+    Parameters
+    ----------
+    paths : sequence of WearPath
+        Paths of all units; those of one unit in the order of time.
+    seed : int
+        Seed of the random numbers of the fit and of its forecasts.
+
+    Returns
+    -------
+    WearModel
+        Forecasts for every unit and for new ones.
+
+    Raises
+    ------
+    UsageError
+        If nothing was read at all.
+    """
+    if not any(len(np.asarray(path.usage)) for path in paths):
+        raise UsageError("no path has a reading", "Give at least one reading of one unit.")
+    by_unit: dict[str, list[WearPath]] = {}
+    for path in paths:
+        by_unit.setdefault(path.unit, []).append(path)
+    rng = np.random.default_rng(seed)
+    scale = scale_of(paths)
+    readings = {unit: max(len(np.asarray(path.usage)) for path in own) for unit, own in by_unit.items()}
+    learn: list[str] = []
+    for most, pool in (
+        (_LEARN_FROM, [u for u, n in readings.items() if n > 1]),
+        (_LEARN_FROM_OTHERS, [u for u, n in readings.items() if n == 1]),
+    ):
+        learn += [pool[i] for i in sorted(rng.permutation(len(pool))[:most])]
+    steps = lay_out([by_unit[unit] for unit in learn], scale)
+    kinds = members(
+        estimate_reading=any(path.reading_u is None for unit in learn for path in by_unit[unit]),
+        restored=any(len(by_unit[unit]) > 1 for unit in learn),
+    )
+    draws, shares = posterior(steps, scale, _DRAWS, rng, kinds)
+    return WearModel({unit: tuple(own) for unit, own in by_unit.items()}, shares, scale, draws, seed)

@@ -1,0 +1,138 @@
+"""Wear read at irregular usages, and the same readings laid out for filtering many units at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mlg_troubleshoot.errors import UsageError
+
+Array = NDArray[np.float64]
+# Decimals beyond which a difference between two readings is taken for rounding in the computer. [1]
+_DECIMALS = 9
+# Readings lie on a grid if it has at least this many readings to a step of their range, and not by chance. [1]
+_MOST_STEPS = 2000
+# Share of the parts whose values fall from which on wear is taken to fall. [1]
+_FALLING = 0.75
+
+
+@dataclass(frozen=True, slots=True)
+class WearPath:
+    """Readings of one part between two restorations.
+
+    Parameters
+    ----------
+    unit : str
+        The part. Paths of one unit stand in the order of time; a restoration begins a new one.
+    usage : array_like of shape (n,)
+        Usage at each reading, counted from the restoration, ascending; empty for a part restored and not read since.
+        [usage]
+    value : array_like of shape (n,)
+        Wear as read. [value]
+    reading_u : float or None
+        Standard uncertainty of a reading; None lets it be estimated. [value]
+    """
+
+    unit: str
+    usage: ArrayLike
+    value: ArrayLike
+    reading_u: float | None = None
+
+    def __post_init__(self) -> None:
+        usage, value = (np.array(numbers, float).ravel() for numbers in (self.usage, self.value))
+        if len(usage) != len(value):
+            raise UsageError(
+                f"path of {self.unit}: {len(usage)} usages and {len(value)} values", "Give one value a usage."
+            )
+        if not (np.isfinite(usage).all() and np.isfinite(value).all()):
+            raise UsageError(f"path of {self.unit}: a usage or a value is not a finite number", "Leave it out.")
+        if (usage < 0.0).any() or (np.diff(usage) < 0.0).any():
+            raise UsageError(
+                f"path of {self.unit}: usage must ascend from 0, not {', '.join(f'{u:g}' for u in usage[:8])}",
+                "Count the usage from the last restoration and begin a new path there.",
+            )
+        if self.reading_u is not None and not (np.isfinite(self.reading_u) and self.reading_u >= 0.0):
+            raise UsageError(f"path of {self.unit}: reading_u is {self.reading_u:g}", "Give zero or more, or None.")
+        for numbers in (usage, value):
+            numbers.flags.writeable = False
+        object.__setattr__(self, "usage", usage)
+        object.__setattr__(self, "value", value)
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """What one usage and one value are in the numbers that the filters see: about 1 over all that was read."""
+
+    usage: float
+    value: float
+    start: float
+    resolution: float
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """Readings of many units side by side, arrays of shape (steps, units): in each step a unit is read once at most.
+
+    ``begins`` marks the first step of a path, ``seen`` a reading; ``known_r2`` is NaN where it is to be estimated.
+    """
+
+    begins: NDArray[np.bool_]
+    seen: NDArray[np.bool_]
+    usage: Array
+    value: Array
+    known_r2: Array
+
+
+def grid_step(values: Array) -> float:
+    """Step of the grid that all readings lie on, 0 if there is none."""
+    unique = np.unique(np.round(values, _DECIMALS))
+    if len(unique) < 3:
+        return 0.0
+    # The greatest common divisor of all differences, up to rounding.
+    whole = np.round(np.diff(unique) * 10.0**_DECIMALS).astype(np.int64)
+    step = float(np.gcd.reduce(whole)) / 10.0**_DECIMALS
+    return step if (unique[-1] - unique[0]) / step <= _MOST_STEPS else 0.0
+
+
+def scale_of(paths: Sequence[WearPath]) -> Scale:
+    """Find the scales of usage and value, the common start, and which way the wear goes (the sign of the value)."""
+    usages = [np.asarray(path.usage) for path in paths]
+    values = [np.asarray(path.value) for path in paths]
+    everything = np.concatenate([*values, np.empty(0)])
+    reach = max((float(u[-1]) for u in usages if len(u)), default=0.0) or 1.0
+    start = float(np.median([v[0] for v in values if len(v)])) if len(everything) else 0.0
+    pairs = [(u, v) for u, v in zip(usages, values, strict=True) if len(u) > 1 and u[-1] > u[0]]
+    rates = np.array([(v[-1] - v[0]) / (u[-1] - u[0]) for u, v in pairs])
+    rise = float(np.median(rates)) * reach if len(rates) else 0.0
+    if not rise:
+        rise = float(np.std(everything)) if len(everything) > 1 else 0.0
+    known = [path.reading_u for path in paths if path.reading_u]
+    least = max(2.0 * float(np.median(known)) if known else 0.0, 1e-3 * float(np.ptp(everything)) if pairs else 0.0)
+    size = max(abs(rise), least) or max(abs(start), 1.0)
+    # Wear grows unless most parts say otherwise.
+    falls = len(rates) > 0 and float(np.mean(rates < 0.0)) >= _FALLING
+    return Scale(reach, -size if falls else size, start, grid_step(everything))
+
+
+def lay_out(groups: Sequence[Sequence[WearPath]], scale: Scale) -> Steps:
+    """Lay the paths of each unit behind each other; shorter units are padded in front, so that all end together."""
+    lengths = [sum(max(len(np.asarray(path.usage)), 1) for path in group) for group in groups]
+    shape = (max(lengths, default=0), len(groups))
+    begins, seen = np.zeros(shape, bool), np.zeros(shape, bool)
+    usage, value, known = np.zeros(shape), np.zeros(shape), np.full(shape, np.nan)
+    for column, (group, length) in enumerate(zip(groups, lengths, strict=True)):
+        row = shape[0] - length
+        for path in group:
+            at, read = np.asarray(path.usage) / scale.usage, (np.asarray(path.value) - scale.start) / scale.value
+            rows = slice(row, row + max(len(at), 1))
+            begins[row, column] = True
+            if len(at):
+                seen[rows, column] = True
+                usage[rows, column], value[rows, column] = at, read
+                if path.reading_u is not None:
+                    known[rows, column] = (path.reading_u / scale.value) ** 2
+            row = rows.stop
+    return Steps(begins, seen, usage, value, known)

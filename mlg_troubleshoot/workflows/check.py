@@ -1,0 +1,451 @@
+"""Judge inspections: tables, single gears, and what is written of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mlg_troubleshoot.decision.assessment import Assessment, Judgement, MeasuringAdvice, Verdict
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, Side
+from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.decision.next_joint import advise
+from mlg_troubleshoot.decision.prediction import Extension
+from mlg_troubleshoot.errors import OutputError, Problem, UsageError
+from mlg_troubleshoot.gear.directions import WorstCase, worst_case
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.outputs import write_csv
+from mlg_troubleshoot.records.model import TableOptions
+from mlg_troubleshoot.studies.index_table import load_index_table
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.records import ReadResult
+    from mlg_troubleshoot.reporting import WrittenReport
+    from mlg_troubleshoot.studies.verification import VerifiedNumber
+
+ALL_JUDGED, NOT_ALL_WITHIN, NOTHING_JUDGED = 0, 1, 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckOptions(TableOptions):
+    """What the user asks of a check.
+
+    Parameters
+    ----------
+    gear : str
+        Shipped gear or gear file.
+    unit : LengthUnit or None
+        Unit of lengths that do not say one.
+    convention : ClearanceConvention or None
+        Convention of rows that do not say one.
+    sheet : str or None
+        Worksheet.
+    column_map, remembered_map : mapping of str to str
+        Columns by header, as given for this table and as remembered from others.
+    remembered : str or None
+        What was remembered, in words for the report.
+    decimal_comma : bool
+        True if ``0,013`` means 0.013.
+    advice : bool or None
+        Compute what is looked at for one gear: Monte Carlo, re-rigging, worn joints; None does so for a single one.
+    seed : int
+        Seed of the Monte Carlo draws.
+    extension : Extension or None
+        An extension of the model.
+    """
+
+    gear: str = DEFAULT_GEAR
+    remembered: str | None = None
+    advice: bool | None = None
+    seed: int = 1
+    extension: Extension | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CheckResult:
+    """What a check found.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    judgements : tuple of Assessment or Rejected
+        One for each data row, in the order of the input.
+    problems : tuple of Problem
+        What is wrong with the input.
+    notes : tuple of str
+        Notes on the input as a whole.
+    inputs_sha256 : mapping of str to str
+        Hash of each input file by name.
+    read : ReadResult or None
+        What was read, for annotating the user's workbook; None for an inspection entered by hand.
+    seed : int
+        Seed of the Monte Carlo draws.
+    """
+
+    gear: Gear
+    judgements: tuple[Judgement, ...]
+    problems: tuple[Problem, ...]
+    notes: tuple[str, ...]
+    inputs_sha256: Mapping[str, str]
+    read: ReadResult | None = None
+    seed: int = 1
+
+    @property
+    def counts(self) -> dict[Verdict, int]:
+        """How many rows have each verdict."""
+        return {v: sum(j.verdict is v for j in self.judgements) for v in Verdict}
+
+    @property
+    def exit_code(self) -> int:
+        """Exit code of the contract: 3 nothing judged; 1 something needs attention; else 0."""
+        judged = [j for j in self.judgements if isinstance(j, Assessment)]
+        if not judged:
+            return NOTHING_JUDGED
+        fine = all(
+            j.verdict is Verdict.WITHIN_MARGIN
+            and not any(f.over_limit for f in j.joints)
+            and j.inspection.outcome is not Outcome.FAILED
+            for j in judged
+        )
+        return ALL_JUDGED if fine and len(judged) == len(self.judgements) else NOT_ALL_WITHIN
+
+
+def check_files(
+    sources: Sequence[Path | BinaryIO],
+    options: CheckOptions,
+    on_read: Callable[[int, int | None], None] | None = None,
+    on_judged: Callable[[int, int], None] | None = None,
+) -> CheckResult:
+    """Judge every inspection of the given files.
+
+    Parameters
+    ----------
+    sources : sequence of Path or binary file
+        Tables; a folder stands for the tables in it.
+    options : CheckOptions
+        What the user declared.
+    on_read : callable, optional
+        Called with rows read and, if known, their number.
+    on_judged : callable, optional
+        Called with rows judged and their number.
+
+    Returns
+    -------
+    CheckResult
+        Judgements, problems and notes.
+
+    Raises
+    ------
+    UsageError
+        If a mapped column does not exist.
+    """
+    from mlg_troubleshoot.records import ReadOptions, read_many
+
+    gear = load_gear(options.gear)
+    read = read_many(sources, ReadOptions.of(gear, options), progress=on_read)
+    hashes = {file.name: file.sha256 for file in read.files if file.sha256 is not None}
+    result = _judge(gear, read.rows, read.problems, read.notes, hashes, options, on_judged)
+    return replace(result, read=read)
+
+
+def check_inspection(inspection: Inspection, options: CheckOptions) -> CheckResult:
+    return _judge(load_gear(options.gear), (inspection,), (), (), {}, options, None)
+
+
+def check(
+    inspection: Inspection,
+    gear: Gear | str | Path = DEFAULT_GEAR,
+    *,
+    advice: bool = True,
+    extension: Extension | None = None,
+) -> Assessment:
+    """Judge one inspection, from Python.
+
+    Parameters
+    ----------
+    inspection : Inspection
+        What was measured. It is judged as a row of a table is: without `entered` its clearances and their
+        uncertainties are readings in its convention; with `entered` they were read before and are radial. [in]
+    gear : Gear, str or Path
+        The gear, its shipped name, or a gear file.
+    advice : bool
+        Check the probability by Monte Carlo, find worn joints, and say what further measuring and re-rigging are worth.
+    extension : Extension, optional
+        An extension of the model.
+
+    Returns
+    -------
+    Assessment
+        Verdict, prediction, ranked joints and next action.
+
+    Raises
+    ------
+    UsageError
+        If a table with these values would be refused, with the same words.
+    """
+    from mlg_troubleshoot.records import ReadOptions, judge_again
+
+    known = gear if isinstance(gear, Gear) else load_gear(gear)
+    (judged,) = assess(
+        [judge_again(inspection, ReadOptions.of(known))],
+        known,
+        load_index_table(known),
+        AssessOptions(advice=advice, extension=extension),
+    )
+    if not isinstance(judged, Assessment):
+        raise TypeError(f"{type(inspection).__name__} is not an Inspection")
+    return judged
+
+
+def predict(clearance_in: Mapping[int, float] | ArrayLike, gear: Gear | str | Path = DEFAULT_GEAR) -> WorstCase:
+    """Predict the plunger displacement in the worst directions, from Python.
+
+    Parameters
+    ----------
+    clearance_in : mapping of int to float, or array_like of shape (n_joints,) or (n, n_joints)
+        Radial clearances: of one gear by joint number, joints that are not named being tight, or of n gears in
+        the order of the joints. [in]
+    gear : Gear, str or Path
+        The gear, its shipped name, or a gear file.
+
+    Returns
+    -------
+    WorstCase
+        Over-travel, under-travel, the larger of the two and the directions, one row a gear. [in, rad]
+
+    Raises
+    ------
+    UsageError
+        If the gear has no such joint, or a clearance is negative or not a number.
+    """
+    known = gear if isinstance(gear, Gear) else load_gear(gear)
+    numbers = known.joint_numbers
+    if isinstance(clearance_in, Mapping):
+        unknown = sorted(set(clearance_in) - set(numbers))
+        if unknown:
+            raise UsageError(
+                f"{known.name} has no joint {unknown[0]}", f"Its joints are {', '.join(map(str, numbers))}."
+            )
+        clearance_in = [clearance_in.get(number, 0.0) for number in numbers]
+    rows = np.atleast_2d(np.asarray(clearance_in, float))
+    if rows.ndim != 2 or rows.shape[1] != len(numbers):
+        raise UsageError(
+            f"clearances of shape {rows.shape} do not fit {len(numbers)} joints", "Give one column a joint."
+        )
+    if not np.all(rows >= 0.0):
+        raise UsageError(f"a clearance of {rows[~(rows >= 0.0)][0]:g} in is none", "Give zero or more.")
+    return worst_case(known.model, rows)
+
+
+def next_joint(
+    gear: Gear, measured: Mapping[int, float], margin_in: float | None = None, extension: Extension | None = None
+) -> MeasuringAdvice:
+    """Say which joint's reading is worth most next, and whether one may stop measuring."""
+    so_far = replace(trial_inspection(gear), clearance_in=dict(measured), margin_in=margin_in)
+    return advise(gear, so_far, gear.margin.value if margin_in is None else margin_in, extension)
+
+
+def before_and_after(judgements: Sequence[Judgement]) -> tuple[Assessment, Assessment] | None:
+    """Return two inspections of one gear in the order of their dates: before and after a repair."""
+    if len(judgements) != 2:
+        return None
+    first, second = judgements
+    if not (isinstance(first, Assessment) and isinstance(second, Assessment)):
+        return None
+    one, two = first.inspection, second.inspection
+    if (one.tail_no, one.side) != (two.tail_no, two.side):
+        return None
+    dates = (one.inspection_date, two.inspection_date)
+    if dates[0] is not None and dates[1] is not None and dates[1] < dates[0]:
+        return second, first
+    return first, second
+
+
+def _judge(
+    gear: Gear,
+    rows: Sequence[Inspection | InvalidRow],
+    problems: Sequence[Problem],
+    notes: Sequence[str],
+    hashes: Mapping[str, str],
+    options: CheckOptions,
+    on_judged: Callable[[int, int], None] | None,
+) -> CheckResult:
+    single = len(rows) == 1
+    done = 0
+
+    def advance(count: int) -> None:
+        nonlocal done
+        done += count
+        if on_judged is not None:
+            on_judged(done, len(rows))
+
+    judgements = assess(
+        rows,
+        gear,
+        load_index_table(gear),
+        AssessOptions(
+            advice=single if options.advice is None else options.advice, seed=options.seed, extension=options.extension
+        ),
+        advance,
+    )
+    return CheckResult(gear, judgements, tuple(problems), tuple(notes), hashes, seed=options.seed)
+
+
+def write_reports(
+    result: CheckResult,
+    options: CheckOptions,
+    directory: Path,
+    formats: Sequence[str] = ("html", "pdf"),
+    page: str = "A4",
+    on_written: Callable[[int, int], None] | None = None,
+    *,
+    unit: LengthUnit = LengthUnit.INCH,
+    before: Sequence[Sequence[Mapping[str, Any]]] = (),
+) -> tuple[WrittenReport, ...]:
+    """Write a report for each inspection and, for a batch, its summary.
+
+    Parameters
+    ----------
+    result : CheckResult
+        The check.
+    options : CheckOptions
+        What the user declared.
+    directory : Path
+        Folder to write to; it is made if it does not exist.
+    formats : sequence of str
+        Any of ``html``, ``pdf`` and ``pdf-ua`` (tagged).
+    page : str
+        ``A4`` or ``Letter``.
+    on_written : callable, optional
+        Called with reports written and their number.
+    unit : LengthUnit
+        The unit that its readers use.
+    before : sequence, optional
+        What each gear was like before, as `history.seen_before` says it.
+
+    Returns
+    -------
+    tuple of WrittenReport
+        What was written, the summary of a batch first.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written to.
+    """
+    if directory.exists() and not directory.is_dir():
+        raise OutputError(f"{directory} is a file, not a folder", "Give a folder that you may write to.")
+    from mlg_troubleshoot.reporting import provenance_of
+    from mlg_troubleshoot.reporting import write_reports as write_all
+
+    return write_all(
+        result.judgements,
+        result.problems,
+        result.gear,
+        directory,
+        formats=formats,
+        page=page,
+        unit=unit,
+        provenance=provenance_of(
+            result.gear,
+            result.inputs_sha256,
+            extension=None if options.extension is None else options.extension.describe(),
+            remembered=options.remembered,
+        ),
+        notes=result.notes,
+        before=before,
+        progress=on_written,
+    )
+
+
+def write_template(
+    file: Path, gear: str = DEFAULT_GEAR, *, page: str = "A4", unit: LengthUnit = LengthUnit.INCH
+) -> None:
+    """Write an empty inspection workbook or, where the name ends in .pdf or .html, a form to fill in by hand."""
+    loaded = load_gear(gear)
+    if file.suffix.lower() != ".xlsx":
+        from mlg_troubleshoot.reporting.form import write_form
+
+        write_form(file, loaded, page=page, unit=unit)
+        return
+    from mlg_troubleshoot.records import write_template as write
+
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write(file, [(joint.number, joint.name, joint.location) for joint in loaded.joints])
+    except OSError as error:
+        raise OutputError(f"{file} cannot be written: {error.strerror}", "Choose another folder.") from error
+
+
+def verify_gear(gear: str = DEFAULT_GEAR) -> tuple[VerifiedNumber, ...]:
+    """Compare what the paper prints with what the model gives."""
+    from mlg_troubleshoot.studies.verification import verify
+
+    return verify(load_gear(gear))
+
+
+# What a reader acts on comes first: on paper the rest is on the page after it.
+# Columns of the verdicts that bear the names of what an assessment holds; margin_used_in is its margin.
+_NUMBERS = (
+    *("predicted_displacement_in", "over_travel_in", "under_travel_in", "margin_used_in", "remaining_in"),
+    *("probability_within_margin", "probability_exceed_random_directions"),
+)
+
+
+def _verdict_columns(judgement: Judgement) -> dict[str, str | float | None]:
+    a = judgement if isinstance(judgement, Assessment) else None
+    return {
+        "verdict": str(judgement.verdict),
+        "basis": None if a is None else str(a.basis),
+        **{name: getattr(a, "margin_in" if name == "margin_used_in" else name, None) for name in _NUMBERS},
+        "joints_over_limit": None if a is None else ", ".join(f"#{f.joint}" for f in a.joints if f.over_limit),
+        "next_action": judgement.next_action.text,
+        "end": str(judgement.end),
+    }
+
+
+def write_verdicts(result: CheckResult, file: Path) -> None:
+    """Write the verdicts as CSV, one line a row of the input, in its order."""
+    rows = []
+    for judgement in result.judgements:
+        row = judgement.inspection if isinstance(judgement, Assessment) else judgement.row
+        identity = (row.record_id, row.tail_no, None if row.side is None else str(row.side))
+        place = (row.source.file, row.source.sheet, row.source.row)
+        rows.append((*identity, *_verdict_columns(judgement).values(), *place))
+    columns = ("verdict", "basis", *_NUMBERS, "joints_over_limit", "next_action", "end")
+    write_csv(file, ("record_id", "tail_no", "side", *columns, "file", "sheet", "row"), rows)
+
+
+def annotate(result: CheckResult, source: Path, out: Path) -> tuple[str, ...]:
+    """Write a copy of the user's workbook with bad cells marked and verdict columns added."""
+    from mlg_troubleshoot.records import annotate_workbook
+
+    if result.read is None:
+        raise UsageError("there is no workbook to annotate", "Give the workbook as FILE.")
+    verdicts = {
+        (j.inspection if isinstance(j, Assessment) else j.row).source: _verdict_columns(j) for j in result.judgements
+    }
+    over_limit = {
+        j.inspection.source: {f.joint: f.limit_in for f in j.joints if f.over_limit}
+        for j in result.judgements
+        if isinstance(j, Assessment)
+    }
+    return annotate_workbook(source, out, result.read, verdicts, over_limit)
+
+
+def trial_inspection(gear: Gear) -> Inspection:
+    """A gear with every joint at twice its limit."""
+    return Inspection(
+        record_id="trial",
+        tail_no="trial",
+        side=Side.LH,
+        convention=ClearanceConvention.RADIAL,
+        clearance_in={joint.number: 2.0 * joint.limit.value for joint in gear.joints},
+    )

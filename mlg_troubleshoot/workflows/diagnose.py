@@ -1,0 +1,238 @@
+"""Measured against predicted: diagnose tables, write and load extensions of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO
+
+from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.errors import InconclusiveDataError, Problem
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.records.model import TableOptions
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension
+    from mlg_troubleshoot.diagnosis.faults import DataFault
+    from mlg_troubleshoot.reporting import WrittenReport
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DiagnoseOptions(TableOptions):
+    """What the user asks of a diagnosis.
+
+    Parameters
+    ----------
+    gear : str
+        Shipped gear or gear file.
+    unit : LengthUnit or None
+        Unit of lengths that do not say one.
+    convention : ClearanceConvention or None
+        Convention of rows that do not say one.
+    sheet : str or None
+        Worksheet.
+    column_map, remembered_map : mapping of str to str
+        Columns by header, as given for this table and as remembered from others.
+    remembered : str or None
+        What was remembered, in words for the report.
+    decimal_comma : bool
+        True if ``0,013`` means 0.013.
+    cause_files : tuple of Path
+        Python files with the user's own causes.
+    permutations : int
+        Data sets drawn with nothing wrong.
+    seed : int
+        Seed of all randomness.
+    """
+
+    gear: str = DEFAULT_GEAR
+    remembered: str | None = None
+    cause_files: tuple[Path, ...] = ()
+    permutations: int = 999
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnoseResult:
+    """What a diagnosis found.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    diagnosis : Diagnosis
+        Verdict, causes, gain, remainder.
+    extension : ModelExtension or None
+        The extended model; None unless a cause is named.
+    problems : tuple of Problem
+        What is wrong with the input.
+    notes : tuple of str
+        Notes on the input as a whole.
+    inputs_sha256 : mapping of str to str
+        Hash of each input file by name.
+    """
+
+    gear: Gear
+    diagnosis: Diagnosis
+    extension: ModelExtension | None
+    problems: tuple[Problem, ...]
+    notes: tuple[str, ...]
+    inputs_sha256: Mapping[str, str]
+
+
+# A length that cannot be is refused by a check; here it is a row whose slip is to be found.
+_ANY_LENGTH_IN = 10.0
+
+
+def diagnose_files(
+    sources: Sequence[Path | BinaryIO], options: DiagnoseOptions, progress: Callable[[float], None] | None = None
+) -> DiagnoseResult:
+    """Compare the measured displacements of tables with the model's predictions.
+
+    Parameters
+    ----------
+    sources : sequence of Path or binary file
+        Tables.
+    options : DiagnoseOptions
+        What the user declared.
+    progress : callable, optional
+        Called with the share that is done.
+
+    Returns
+    -------
+    DiagnoseResult
+        Verdict, causes, extension and gain.
+
+    Raises
+    ------
+    InconclusiveDataError
+        If the tables cannot answer the question.
+    """
+    from mlg_troubleshoot.diagnosis import ModelExtension, diagnose, load_causes, table_from_inspections
+    from mlg_troubleshoot.records import ReadOptions, read_many
+
+    gear = load_gear(options.gear)
+    own = tuple(cause for file in options.cause_files for cause in load_causes(file))
+    reading = replace(
+        ReadOptions.of(gear, options), clearance_hard_max_in=_ANY_LENGTH_IN, plunger_hard_max_in=_ANY_LENGTH_IN
+    )
+    read = read_many(sources, reading)
+    valid = read.inspections
+    if not valid:
+        first = read.problems[0] if read.problems else None
+        why = "no row could be read" if first is None else f"{first.place()}: expected {first.expected}"
+        raise InconclusiveDataError(f"nothing to diagnose: {why}", "" if first is None else first.remedy)
+    # The same inspection again is no further evidence. Rows that share an id and differ were refused.
+    once = list({(i.source.file, i.record_id): i for i in reversed(valid)}.values())[::-1]
+    notes = (*read.notes, *_evidence_notes(once, len(valid) - len(once), gear))
+    diagnosis = diagnose(
+        gear.model,
+        table_from_inspections(once, gear),
+        gear.discrepancies,
+        own_causes=own,
+        ensemble=gear.ensemble_models[1:],
+        permutations=options.permutations,
+        seed=options.seed,
+        progress=progress,
+    )
+    by_record = {inspection.record_id: inspection for inspection in once}
+    faults = tuple(_as_written(fault, by_record[fault.record_id]) for fault in diagnosis.faults)
+    diagnosis = replace(diagnosis, rows_read=len(read.rows), faults=faults)
+    hashes = {file.name: file.sha256 for file in read.files if file.sha256 is not None}
+    extension = None
+    if diagnosis.terms:
+        extension = ModelExtension(
+            gear,
+            diagnosis.terms,
+            diagnosis.residual_u_in,
+            tuple(hashes.values()),
+            diagnosis.rows_used,
+            diagnosis.unread,
+        )
+    return DiagnoseResult(gear, diagnosis, extension, read.problems, notes, hashes)
+
+
+def _as_written(fault: DataFault, inspection: Inspection) -> DataFault:
+    """A fault in a clearance with the unit and the convention in which it was entered, not as the model has it."""
+    kind, _, rest = fault.column.partition("_")
+    joint = int(rest.split("_")[0]) if kind == "clearance" else 0
+    entered = inspection.entered.get(joint)
+    if entered is None or (entered.unit is LengthUnit.INCH and inspection.convention is ClearanceConvention.RADIAL):
+        return fault
+    suggested = fault.suggested
+    if suggested is not None:
+        suggested = f"{entered.unit.from_inches(float(suggested) * inspection.convention.per_radial):.4g}"
+    column = f"clearance_{joint}_{entered.unit.value}"
+    return replace(fault, column=column, value=entered.text, suggested=suggested)
+
+
+def _evidence_notes(inspections: Sequence[Inspection], again: int, gear: Gear) -> Iterator[str]:
+    """What a diagnosis cannot use: inspections that stand twice, joints that nobody measured."""
+    if again:
+        yield f"inspections that stand twice count once: rows left out: {again}"
+    unread = [n for n in gear.model.joint_numbers if all(i.clearance_in.get(n) is None for i in inspections)]
+    if unread:
+        listed = ", ".join(f"#{n}" for n in unread)
+        yield f"not measured in any row: {listed}; counted as worn like the others of their gear, and not testable"
+
+
+def write_extension(extension: ModelExtension, file: Path) -> None:
+    """Write an extension as TOML.
+
+    Parameters
+    ----------
+    extension : ModelExtension
+        The extension.
+    file : Path
+        File to write.
+    """
+    from mlg_troubleshoot.diagnosis import save_extension
+
+    save_extension(extension, file)
+
+
+def write_diagnosis_report(
+    result: DiagnoseResult, options: DiagnoseOptions, directory: Path, page: str, *, unit: LengthUnit = LengthUnit.INCH
+) -> WrittenReport:
+    from mlg_troubleshoot.reporting import provenance_of
+    from mlg_troubleshoot.reporting.diagnosis_report import write_diagnosis_report as write
+
+    return write(
+        result.diagnosis,
+        result.gear,
+        directory,
+        extension=result.extension,
+        provenance=provenance_of(result.gear, result.inputs_sha256, seed=options.seed, remembered=options.remembered),
+        page=page,
+        unit=unit,
+        problems=result.problems,
+        notes=result.notes,
+    )
+
+
+def load_model_extension(files: Sequence[Path], gear: str, cause_files: Sequence[Path] = ()) -> ModelExtension | None:
+    """Load the extensions that a check shall predict with.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Extension files; several are stacked.
+    gear : str
+        Shipped gear or gear file.
+    cause_files : sequence of Path
+        Python files with the user's own causes.
+
+    Returns
+    -------
+    ModelExtension or None
+        The extension; None if no file is given.
+    """
+    if not files:
+        return None
+    from mlg_troubleshoot.diagnosis import load_causes, load_extension
+
+    own = tuple(cause for file in cause_files for cause in load_causes(file))
+    return load_extension(files, load_gear(gear), own)

@@ -1,0 +1,788 @@
+"""A gear's life: keep what was found, show it again, forecast it, and correct what was wrong."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from datetime import date
+from functools import cache, cached_property
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
+from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.store import (
+    Added,
+    Kind,
+    Record,
+    Store,
+    StoreError,
+    inspection_from,
+    inspection_record,
+    packed,
+    same_inspection,
+)
+from mlg_troubleshoot.units import LengthUnit
+from mlg_troubleshoot.wear import Samples, WearModel, WearPath, fit_wear
+from mlg_troubleshoot.workflows.check import CheckOptions, CheckResult
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from mlg_troubleshoot.reporting import WrittenReport
+
+Array = NDArray[np.float64]
+GearKey = tuple[str, str]
+# Chance of being over a limit or outside the margin at which the next inspection is due, and the landings beyond
+# which nothing is forecast: assumed, no source states them. [1, landings]
+# Where a forecast stands between the last inspection and the horizon. [1]
+_AHEAD = np.concatenate([[0.0], np.geomspace(0.00125, 1.0, 28)])
+# Where the gear's model is asked about the worst case of clearances that go on to wear. [landings]
+_ASKED = _AHEAD[[0, 8, 14, 18, 22, 25, 28]]
+_GEARS_AT_ONCE = 100
+# Stands for the worst case of a linkage that does not close: beyond any margin. [in]
+_NOT_CLOSING_IN = 1e3
+# A drop of this many forecast standard deviations is no wear: a restoration that nobody recorded. [1]
+_DROP = 4.0
+# Two gears that both fit their own wear as badly as this share of sound ones, and each other's better by this much of
+# the log likelihood, were exchanged. [1]
+_POOR, _EXCHANGED = 0.02, 8.0
+# An inspection that fits another gear's wear as badly as this was not taken there: without it a restored gear passed
+# for exchanged in 3 of 20 fleets of 100. [1]
+_NO_FIT = 0.001
+
+
+@dataclass(frozen=True)
+class Seen:
+    """An inspection as it stands after corrections, with the last assessment of it; unpacked when it is asked for."""
+
+    record: Record
+    assessed: Record | None = None
+
+    @cached_property
+    def inspection(self) -> Inspection:
+        """What was found."""
+        return inspection_from(self.record)
+
+    @cached_property
+    def result(self) -> Mapping[str, Any]:
+        """What the check said, in the form of its JSON; empty if it was never judged."""
+        found: Mapping[str, Any] = {} if self.assessed is None else self.assessed.body["result"]
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class GearLife:
+    """What stands of one gear: inspections and repairs in the order of time, outcomes, and every record as it came."""
+
+    key: GearKey
+    records: tuple[Record, ...]
+    inspections: tuple[Seen, ...]
+    repairs: tuple[Record, ...]
+    outcomes: tuple[Record, ...]
+
+    @property
+    def latest(self) -> Seen | None:
+        """The last inspection."""
+        return self.inspections[-1] if self.inspections else None
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """Landings that remain from a gear's last inspection, of the joints ever read; infinite beyond the horizon."""
+
+    joints: Mapping[int, Samples] = field(default_factory=dict)
+    limit: Samples | None = None
+    margin: Samples | None = None
+    next_inspection: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """How often the joint that was found stood in the advice, with a 90 % interval (Jeffreys)."""
+
+    right: int
+    asked: int
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Ends of the interval of the hit rate."""
+        from scipy.special import betaincinv
+
+        a, b = self.right + 0.5, self.asked - self.right + 0.5
+        low, high = (float(betaincinv(a, b, p)) for p in (0.05, 0.95))
+        return (0.0 if self.right == 0 else low), (1.0 if self.right == self.asked else high)
+
+    @property
+    def words(self) -> str:
+        """The hit rate in a sentence."""
+        if not self.asked:
+            return "No outcome was recorded against the advice yet."
+        low, high = self.interval
+        return (
+            f"The advice was right in {self.right} of {self.asked} outcomes that name a joint "
+            f"({low:.0%} to {high:.0%} with 90 % confidence)."
+        )
+
+    def describe(self) -> dict[str, int | float | None]:
+        """The hit rate as JSON; its interval is null where no outcome names a joint."""
+        low, high = self.interval if self.asked else (None, None)
+        return {"right": self.right, "outcomes": self.asked, "p05": low, "p95": high}
+
+
+# --- keeping
+
+
+def keep(
+    result: CheckResult, options: CheckOptions, store: Store, same_tail: Callable[[str, str], bool] | None = None
+) -> Added:
+    """Add the judged inspections of a check and their assessments, all or none.
+
+    ``same_tail`` answers whether two spellings of a tail number mean one aircraft; without it they are refused.
+    """
+    judged = [j for j in result.judgements if isinstance(j, Assessment)]
+    tails = _settled_tails(judged, store, same_tail)
+    records: list[Record] = []
+    for assessment in judged:
+        written = assessment.inspection
+        inspection = replace(written, tail_no=tails.get(written.tail_no, written.tail_no))
+        records.append(inspection_record(inspection))
+        records.append(_assessment(result.gear, options, assessment, records[-1]))
+    return store.add(records, lambda kept, new: new.kind is not Kind.INSPECTION or _agrees(store, kept, new))
+
+
+def _agrees(store: Store, kept: Record, new: Record) -> bool:
+    """The same as kept, or as what the kept one was corrected to."""
+    return same_inspection(kept, new) or any(
+        record.kind is Kind.CORRECTION and record.body["supersedes"] == kept.digest and same_inspection(record, new)
+        for record in store.of_gear(kept.tail_no, kept.side)
+    )
+
+
+def _assessment(gear: Gear, options: CheckOptions, assessment: Assessment, of: Record) -> Record:
+    from mlg_troubleshoot.reporting.json_form import kept_as_json
+
+    extension = None if options.extension is None else options.extension.describe()
+    by = {
+        "program_version": _program_version(),
+        "geometry_sha256": gear.geometry_sha256,
+        "extension": extension,
+    }
+    body = packed({**by, "result": kept_as_json(assessment)})
+    identity = (of.identity_hash.hex(), *(str(value) for value in by.values()), of.packed.hex())
+    return replace(of, kind=Kind.ASSESSMENT, packed=body, identity=identity)
+
+
+@cache
+def _program_version() -> str:
+    return version("mlg-troubleshoot")
+
+
+def _settled_tails(
+    judged: Sequence[Assessment], store: Store, same_tail: Callable[[str, str], bool] | None
+) -> dict[str, str]:
+    """Spellings that differ only in case, blanks or dashes: never one aircraft without being asked."""
+    known = dict.fromkeys(tail for tail, _side in store.gears())
+    by_key: dict[str, str] = {}
+    for tail in known:
+        by_key.setdefault(_tail_key(tail), tail)
+    settled: dict[str, str] = {}
+    for tail in dict.fromkeys(a.inspection.tail_no for a in judged):
+        other = by_key.setdefault(_tail_key(tail), tail)
+        if tail in known or other == tail:
+            continue
+        if same_tail is None:
+            raise StoreError(
+                f"tail {tail!r} differs from {other!r} only in case, blanks or dashes; nothing was kept",
+                "Correct it, or say --tails same (one aircraft) or --tails apart (two).",
+            )
+        if same_tail(tail, other):
+            settled[tail] = other
+    return settled
+
+
+def _tail_key(tail: str) -> str:
+    return re.sub(r"[\s_‐-―−-]+", "", tail).casefold()
+
+
+# --- reading back
+
+
+def lives(store: Store, tail: str | None = None, side: str | None = None) -> dict[GearKey, GearLife]:
+    """Every gear's life, or those of one aircraft."""
+    found: dict[GearKey, list[Record]] = {}
+    for record in store.all() if tail is None else store.of_gear(tail, side):
+        found.setdefault((record.tail_no, record.side), []).append(record)
+    return {key: _life(key, records) for key, records in sorted(found.items())}
+
+
+def life_of(store: Store, tail: str, side: str) -> GearLife:
+    """One gear's life; a gear that nothing is kept of is a usage error that names near spellings."""
+    found = lives(store, tail, side).get((tail, side))
+    if found is None:
+        near = [f"{t} {s}" for t, s in store.gears() if _tail_key(t) == _tail_key(tail)]
+        raise UsageError(
+            f"nothing is kept of {tail} {side} in {store.place}",
+            f"There is {', '.join(near)}." if near else "See which gears are kept: mlg history",
+        )
+    return found
+
+
+def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
+    seen: dict[str, Seen] = {}
+    events: dict[str, Record] = {}
+    for record in records:
+        if record.kind is Kind.INSPECTION:
+            seen[record.digest] = Seen(record)
+        elif record.kind is Kind.CORRECTION:
+            first = next((k for k, s in seen.items() if record.body["supersedes"] in (k, s.record.digest)), None)
+            if first is not None:
+                seen[first] = Seen(record)
+        elif record.kind is Kind.VOID:
+            gone = record.body["voids"]
+            seen = {k: s for k, s in seen.items() if gone not in (k, s.record.digest)}
+            events.pop(gone, None)
+        elif record.kind is Kind.ASSESSMENT:
+            same = [k for k, s in seen.items() if (s.record.record_id, s.record.day) == (record.record_id, record.day)]
+            if same:
+                seen[same[-1]] = replace(seen[same[-1]], assessed=record)
+        else:
+            events[record.digest] = record
+    ordered = sorted(seen.values(), key=_when_seen)
+    repairs = [r for r in events.values() if r.kind in (Kind.REPAIR, Kind.RERIG)]
+    return GearLife(
+        key,
+        tuple(records),
+        tuple(ordered),
+        tuple(sorted(repairs, key=lambda r: (r.day, r.seq))),
+        tuple(r for r in events.values() if r.kind is Kind.OUTCOME),
+    )
+
+
+def _when_seen(seen: Seen) -> tuple[str, float, int]:
+    """Order of inspections: by day, and as they were kept; without a day by landings, before those that have one."""
+    landings = None if seen.record.day else seen.inspection.gear_landings
+    return seen.record.day, -1.0 if landings is None else landings, seen.record.seq
+
+
+def find(store: Store, record_id: str) -> Record:
+    """Find the record that a command names: by its id, or by the first letters of its hash where an id is not one."""
+    live = [
+        record
+        for life in lives(store).values()
+        for record in (*(s.record for s in life.inspections), *life.repairs, *life.outcomes)
+    ]
+    found = [r for r in live if r.record_id == record_id and r.kind in (Kind.INSPECTION, Kind.CORRECTION)]
+    found = found or [r for r in live if len(record_id) >= 6 and r.digest.startswith(record_id.lower())]
+    if len(found) == 1:
+        return found[0]
+    if not found:
+        raise UsageError(f"no record {record_id!r} stands in {store.place}", "See the records: mlg history TAIL SIDE")
+    named = ", ".join(f"{r.digest[:10]} ({r.tail_no} {r.side} {r.day or 'no date'})" for r in found[:6])
+    raise UsageError(f"{len(found)} records are called {record_id!r}: {named}", "Name one by the start of its hash.")
+
+
+# --- what is added later
+
+
+def repair(
+    store: Store, key: GearKey, joints: Sequence[int], day: date, landings: float | None, work_order: str | None
+) -> Record:
+    """Record that joints were restored."""
+    life_of(store, *key)
+    body = {"joints": sorted(set(joints)), "landings": landings, "work_order": work_order}
+    return _added(store, Record(Kind.REPAIR, work_order or "", *key, day.isoformat(), packed(body)))
+
+
+def rerig(store: Store, key: GearKey, day: date, landings: float | None, work_order: str | None) -> Record:
+    """Record that the reversing valve was re-rigged: the joints wear on, the plunger stands elsewhere."""
+    life_of(store, *key)
+    body = {"landings": landings, "work_order": work_order}
+    return _added(store, Record(Kind.RERIG, work_order or "", *key, day.isoformat(), packed(body)))
+
+
+def correct(store: Store, record_id: str, result: CheckResult, options: CheckOptions) -> Record:
+    """Append the right inspection for a wrong one; the wrong one stays readable in the chain."""
+    wrong = find(store, record_id)
+    judged = [j for j in result.judgements if isinstance(j, Assessment)]
+    if len(judged) != 1 or len(result.judgements) != 1:
+        raise UsageError(
+            f"a correction is one inspection, and the file holds {len(result.judgements)} ({len(judged)} sound)",
+            "Give a file with the one right row.",
+        )
+    right = judged[0].inspection
+    if (right.tail_no, right.side.value) != (wrong.tail_no, wrong.side):
+        raise UsageError(
+            f"the correction is of {right.tail_no} {right.side}, the record of {wrong.tail_no} {wrong.side}",
+            "Void the record (mlg history void) and keep the right one: mlg check FILE --keep",
+        )
+    record = inspection_record(right, Kind.CORRECTION, supersedes=wrong.digest)
+    store.add([record, _assessment(result.gear, options, judged[0], record)])
+    return record
+
+
+def void(store: Store, record_id: str, why: str) -> Record:
+    """Append that a record does not count."""
+    wrong = find(store, record_id)
+    if not why.strip():
+        raise UsageError("--why is empty", "Say why the record does not count.")
+    body = {"voids": wrong.digest, "why": why}
+    return _added(store, replace(wrong, kind=Kind.VOID, packed=packed(body), identity=()))
+
+
+def outcome(store: Store, record_id: str, found: str, joint: int | None) -> Record:
+    """Record what was found after the advice."""
+    of = find(store, record_id)
+    if of.kind not in (Kind.INSPECTION, Kind.CORRECTION):
+        raise UsageError(f"{record_id!r} is a {of.kind}", "Give the record of the inspection that advised.")
+    body = {"of": of.digest, "found": found, "joint": joint}
+    return _added(store, replace(of, kind=Kind.OUTCOME, packed=packed(body), identity=()))
+
+
+def _added(store: Store, record: Record) -> Record:
+    store.add([record])
+    return record
+
+
+def advice(found: Iterable[GearLife]) -> Advice:
+    """Count outcomes that name a joint, and those whose joint was advised first."""
+    right = asked = 0
+    for life in found:
+        by_digest = {r.digest: r.record_id for r in life.records}
+        for record in life.outcomes:
+            joint = record.body["joint"]
+            result = next(
+                (s.result for s in life.inspections if s.record.record_id == by_digest.get(record.body["of"])), {}
+            )
+            if joint is not None and result:
+                first = {j["joint"] for j in result["joints"] if j["rank"] == 1}
+                advised = set((result.get("next_action") or {}).get("joints") or ()) | first
+                asked, right = asked + 1, right + (joint in advised)
+    return Advice(right, asked)
+
+
+# --- forecasts
+
+
+def _landings_of(record: Record, life: GearLife) -> float | None:
+    """Landings at a repair: as recorded, else between the inspections about it, by their days."""
+    stated = record.body.get("landings")
+    if stated is not None:
+        return float(stated)
+    dated = [
+        (date.fromisoformat(s.record.day).toordinal(), s.inspection.gear_landings)
+        for s in life.inspections
+        if s.record.day and s.inspection.gear_landings is not None
+    ]
+    if not dated or not record.day:
+        return None
+    days, landings = zip(*dated, strict=True)
+    return float(np.interp(date.fromisoformat(record.day).toordinal(), days, landings))
+
+
+def wear_paths(life: GearLife, joints: Sequence[int]) -> dict[int, tuple[list[WearPath], float]]:
+    """Paths of each joint between its restorations, and the landings at which the current one began."""
+    events: list[tuple[float, str, int, Seen | Record]] = [
+        (s.inspection.gear_landings, s.record.day, s.record.seq, s)
+        for s in life.inspections
+        if s.inspection.gear_landings is not None
+    ]
+    for record in life.repairs:
+        at = _landings_of(record, life)
+        if record.kind is Kind.REPAIR and at is not None:
+            events.append((at, record.day, record.seq, record))
+    events.sort(key=lambda event: event[:3])
+    found = {}
+    for joint in joints:
+        unit, begun = unit_of(life.key, joint), 0.0
+        paths: list[WearPath] = []
+        usage: list[float] = []
+        value: list[float] = []
+        reading_u: float | None = None
+        for landings, _day, _seq, event in events:
+            if isinstance(event, Record):
+                if joint in event.body["joints"]:
+                    paths.append(WearPath(unit, usage, value, reading_u))
+                    usage, value, begun = [], [], landings
+            elif joint in event.inspection.clearance_in:
+                usage.append(landings - begun)
+                value.append(event.inspection.clearance_in[joint])
+                reading_u = event.inspection.gauge_u_of(joint)
+        found[joint] = ([*paths, WearPath(unit, usage, value, reading_u)], begun)
+    return found
+
+
+def unit_of(key: GearKey, joint: int) -> str:
+    """Name of a joint of a gear for the forecasts."""
+    return f"{key[0]} {key[1]} #{joint}"
+
+
+def fit_fleet(found: Iterable[GearLife], gear: Gear) -> WearModel | None:
+    """Learn the wear of all joints of all gears; None if no inspection states its landings."""
+    paths = [
+        path
+        for life in found
+        for own, _begun in wear_paths(life, gear.joint_numbers).values()
+        for path in own
+        if len(own) > 1 or len(np.asarray(path.usage))
+    ]
+    return fit_wear(paths) if any(len(np.asarray(path.usage)) for path in paths) else None
+
+
+def forecast(
+    found: Sequence[GearLife],
+    model: WearModel | None,
+    gear: Gear,
+    progress: Callable[[str, int, int], None] = lambda _name, _done, _total: None,
+) -> dict[GearKey, Forecast]:
+    """Forecast gears from their last inspection on; one without landings has no forecast."""
+    known = [life for life in found if life.latest and life.latest.inspection.gear_landings is not None]
+    forecasts: dict[GearKey, Forecast] = {}
+    if model is not None:
+        parts = [known[first : first + _GEARS_AT_ONCE] for first in range(0, len(known), _GEARS_AT_ONCE)]
+        # Each part draws from the model's seed: the same whoever works it out, and NumPy lets others work meanwhile.
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            for part, some in zip(parts, pool.map(lambda p: [*_forecast_some(p, model, gear)], parts), strict=True):
+                forecasts.update(zip((life.key for life in part), some, strict=True))
+                progress("Looking ahead", len(forecasts), len(known))
+    return {life.key: forecasts.get(life.key, Forecast()) for life in found}
+
+
+def _forecast_some(part: Sequence[GearLife], model: WearModel, gear: Gear) -> Iterator[Forecast]:
+    numbers = gear.joint_numbers
+    now = np.array([_latest_landings(life) for life in part])
+    begun = np.array([[start for _own, start in wear_paths(life, numbers).values()] for life in part])
+    ahead = gear.horizon.value * _AHEAD
+    usage = np.maximum(now[:, None, None] + ahead - begun[:, :, None], 0.0)
+    units = [unit_of(life.key, number) for life in part for number in numbers]
+    wear = np.maximum(model.forecast(units, usage.reshape(-1, len(_AHEAD)), reading=False).samples, 0.0)
+    wear = wear.reshape(len(part), len(numbers), len(_AHEAD), -1)
+    amplification = gear.model.plunger_amplification()
+    read = np.array([[any(n in s.inspection.clearance_in for s in life.inspections) for n in numbers] for life in part])
+    # A joint that was never read counts as it does in the prediction: not at all.
+    wear = np.where(read[:, :, None, None], wear, 0.0)
+    straight = np.einsum("j,gjts->gts", amplification, wear)
+    # The model itself says how far the worst case departs from the sum of amplified clearances as they wear.
+    asked = np.searchsorted(_AHEAD, _ASKED)
+    middle = np.median(wear[:, :, asked, :], axis=3)
+    predicted = worst_case(gear.model, np.moveaxis(middle, 1, 2).reshape(-1, len(numbers))).magnitude_in
+    summed = np.einsum("j,gjt->gt", amplification, middle)
+    # A linkage that does not close is outside any margin.
+    ratio = np.where(np.isnan(predicted), _NOT_CLOSING_IN, predicted).reshape(summed.shape) / np.maximum(summed, 1e-12)
+    for g, life in enumerate(part):
+        latest = life.latest
+        stated = None if latest is None else latest.inspection.margin_in
+        margin = gear.margin.value if stated is None else stated
+        displacement = straight[g] * np.interp(_AHEAD, _ASKED, ratio[g])[:, None]
+        to_limit = np.stack([_first_passage(ahead, wear[g, j], gear.limits_in[j]) for j in range(len(numbers))])
+        of_joints = {number: Samples(to_limit[j]) for j, number in enumerate(numbers) if read[g, j]}
+        to_margin = _first_passage(ahead, displacement, margin)
+        first = Samples(np.minimum(to_limit.min(axis=0), to_margin))
+        due = float(first.quantile(gear.accepted_chance.value))
+        yield Forecast(
+            of_joints,
+            Samples(to_limit.min(axis=0)),
+            Samples(to_margin),
+            due if np.isfinite(due) else None,
+        )
+
+
+def _latest_landings(life: GearLife) -> float:
+    landings = None if life.latest is None else life.latest.inspection.gear_landings
+    return 0.0 if landings is None else landings
+
+
+def _first_passage(ahead: Array, paths: Array, limit: float) -> Array:
+    """Landings at which each simulated path (ahead, samples) first passes a limit, infinite beyond the horizon."""
+    over = paths > limit
+    k = np.argmax(over, axis=0)
+    sample = np.arange(paths.shape[1])
+    high, low = paths[k, sample], paths[np.maximum(k - 1, 0), sample]
+    with np.errstate(invalid="ignore"):
+        part = np.where(np.isfinite(high), (limit - low) / np.where(high > low, high - low, 1.0), 1.0)
+    at = ahead[np.maximum(k - 1, 0)] + part * (ahead[k] - ahead[np.maximum(k - 1, 0)])
+    return np.where(over.any(axis=0), np.where(k == 0, 0.0, at), np.inf)
+
+
+# --- slips that the wear shows
+
+
+def suggestions(found: Sequence[GearLife], model: WearModel | None, gear: Gear) -> list[str]:
+    """Name last inspections that look like a restoration nobody recorded, or like two gears exchanged."""
+    if model is None:
+        return []
+
+    kept = [life for life in found if _can_be_compared(life)]
+    off = _departures([(life, life) for life in kept], model, gear)
+    said: list[str] = []
+    swapped: set[int] = set()
+    poor = [i for i, z in enumerate(off) if _fit(z) < _POOR]
+    # Gears are exchanged on one aircraft, or by those who entered one day's sheets.
+    pairs = [(i, j) for n, i in enumerate(poor) for j in poor[n + 1 :] if _may_be_exchanged(kept[i], kept[j])]
+    crossed = _departures([(kept[a], kept[b]) for i, j in pairs for a, b in ((i, j), (j, i))], model, gear)
+    gains = []
+    for n, (i, j) in enumerate(pairs):
+        others = crossed[2 * n : 2 * n + 2]
+        gain = (_square(off[i], off[j]) - _square(*others)) / 2.0
+        if gain > _EXCHANGED and min(map(_fit, others)) > _NO_FIT:
+            gains.append((gain, i, j))
+    # The clearest pair first: a gear was exchanged with one other at most.
+    for _gain, i, j in sorted(gains, reverse=True):
+        if not {i, j} & swapped:
+            swapped |= {i, j}
+            one, two = (" ".join(kept[k].key) for k in (i, j))
+            said.append(f"The last inspections of {one} and {two} fit each other's wear: were they exchanged?")
+    for i, (life, z) in enumerate(zip(kept, off, strict=True)):
+        dropped = [number for number, score in zip(gear.joint_numbers, z, strict=True) if score <= -_DROP]
+        if dropped and i not in swapped:
+            listed = ", ".join(f"#{number}" for number in dropped)
+            said.append(
+                f"{' '.join(life.key)}: {listed} read far tighter than before: restored, and not recorded? "
+                f"mlg history repair {' '.join(life.key)} --joint {dropped[0]} --date D"
+            )
+    return said
+
+
+def _fit(scores: Array) -> float:
+    """Chance that an inspection of a gear lies as far from its forecasts as these scores do. [1]"""
+    from scipy.special import chdtrc
+
+    return float(chdtrc(np.sum(np.isfinite(scores)), _square(scores)))
+
+
+def _square(*scores: Array) -> float:
+    return float(sum(np.nansum(z**2) for z in scores))
+
+
+def _may_be_exchanged(one: GearLife, two: GearLife) -> bool:
+    return one.key[0] == two.key[0] or one.inspections[-1].record.day == two.inspections[-1].record.day
+
+
+def _can_be_compared(life: GearLife) -> bool:
+    """Seen twice, the last time with its landings."""
+    return len(life.inspections) > 1 and life.inspections[-1].inspection.gear_landings is not None
+
+
+def _departures(pairs: Sequence[tuple[GearLife, GearLife]], model: WearModel, gear: Gear) -> list[Array]:
+    """How far the newest inspections of gears lie from what others' histories promised, in standard deviations."""
+    numbers = gear.joint_numbers
+    paths: dict[str, tuple[WearPath, ...]] = {}
+    at: list[tuple[int, int]] = []
+    ahead, read = [], []
+    for n, (history, newest) in enumerate(pairs):
+        last = newest.inspections[-1].inspection
+        landings = last.gear_landings or 0.0
+        before = replace(history, inspections=history.inspections[:-1])
+        for j, (own, begun) in enumerate(wear_paths(before, numbers).values()):
+            if numbers[j] in last.clearance_in and len(np.asarray(own[-1].usage)):
+                paths[f"{n} {j}"] = tuple(own)
+                at.append((n, j))
+                ahead.append(max(landings - begun, 0.0))
+                read.append(last.clearance_in[numbers[j]])
+    scores = np.full((len(pairs), len(numbers)), np.nan)
+    if at:
+        samples = replace(model, paths=paths).forecast(list(paths), np.array(ahead)[:, None]).samples[:, 0]
+        scores[tuple(np.array(at).T)] = (np.array(read) - samples.mean(axis=1)) / samples.std(axis=1)
+    return list(scores)
+
+
+# --- as JSON
+
+
+def quantiles(samples: Samples | None) -> dict[str, float | None] | None:
+    """The 5, 50 and 95 % quantiles; null beyond the horizon."""
+    if samples is None:
+        return None
+    ends = samples.quantile([0.05, 0.5, 0.95])
+    return {n: float(end) if np.isfinite(end) else None for n, end in zip(("p05", "p50", "p95"), ends, strict=True)}
+
+
+def worst_joint(seen: Seen) -> int | None:
+    """The joint to look at first."""
+    return next((joint["joint"] for joint in seen.result.get("joints", ()) if joint["rank"] == 1), None)
+
+
+_URGENCY = ("OUTSIDE_MARGIN", "INCONCLUSIVE", "INCOMPLETE", "INVALID", "WITHIN_MARGIN")
+
+
+def fleet_as_json(found: Sequence[GearLife], forecasts: Mapping[GearKey, Forecast]) -> dict[str, Any]:
+    """One line a gear, worst first: verdict, then landings to its next inspection."""
+    lines = []
+    for life in found:
+        if (seen := life.latest) is None:
+            continue
+        ahead = forecasts.get(life.key, Forecast())
+        lines.append(
+            {
+                "tail_no": life.key[0],
+                "side": life.key[1],
+                "record_id": seen.record.record_id,
+                "inspection_date": seen.record.day or None,
+                "gear_landings": seen.inspection.gear_landings,
+                "verdict": seen.result.get("verdict"),
+                "worst_joint": worst_joint(seen),
+                "landings_to_limit": quantiles(ahead.limit),
+                "landings_to_margin": quantiles(ahead.margin),
+                "next_inspection_landings": ahead.next_inspection,
+                "repairs": len(life.repairs),
+            }
+        )
+    lines.sort(key=_urgency)
+    return {"schema_version": 1, "gears": lines, "advice": advice(found).describe()}
+
+
+def _urgency(line: Mapping[str, Any]) -> tuple[int, float, str, str]:
+    due = line["next_inspection_landings"]
+    verdict = line["verdict"]
+    rank = _URGENCY.index(verdict) if verdict in _URGENCY else len(_URGENCY)
+    return rank, float("inf") if due is None else due, line["tail_no"], line["side"]
+
+
+def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
+    """One gear's events in the order of the chain, and each joint's readings since it was last restored."""
+    current = {s.record.digest: s for s in life.inspections}
+    events = []
+    for record in life.records:
+        body = record.body
+        event: dict[str, Any] = {
+            "kind": record.kind.value,
+            "record_id": record.record_id or None,
+            "date": record.day or None,
+            "gear_landings": body.get("landings", body.get("inspection", {}).get("gear_landings")),
+            "hash": record.digest,
+        }
+        if record.kind is Kind.ASSESSMENT:
+            result = body["result"]
+            event |= {name: result.get(name) for name in ("verdict", "predicted_displacement_in", "margin_in")}
+            event |= {name: body[name] for name in ("program_version", "geometry_sha256", "extension")}
+        elif record.kind in (Kind.INSPECTION, Kind.CORRECTION):
+            event |= {"counts": record.digest in current, "supersedes": body.get("supersedes")}
+            event["clearance_in"] = body["inspection"].get("clearance_in", {})
+        else:
+            event |= {name: value for name, value in body.items() if name != "landings"}
+        events.append(event)
+    joints = []
+    for number, (own, begun) in wear_paths(life, gear.joint_numbers).items():
+        current_path = own[-1]
+        readings = zip(np.asarray(current_path.usage) + begun, np.asarray(current_path.value), strict=True)
+        joints.append(
+            {
+                "joint": number,
+                "limit_in": gear.joint(number).limit.value,
+                "readings": [[float(landings), float(clearance)] for landings, clearance in readings],
+                "landings_to_limit": quantiles(ahead.joints.get(number)),
+            }
+        )
+    tail, side = life.key
+    told = {"schema_version": 1, "tail_no": tail, "side": side, "events": events, "joints": joints}
+    return {**told, "advice": advice([life]).describe()}
+
+
+def import_file(store: Store, file: Path) -> Added:
+    """Add an exported chain."""
+    try:
+        with file.open(encoding="utf-8") as lines:
+            return store.restore(lines, file.name)
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"{file} cannot be read: {error}", "Give a file written by: mlg history export") from error
+
+
+# --- pages
+
+# Inspections that stand side by side on the page of a gear's life.
+_SIDE_BY_SIDE = 4
+
+
+def side_by_side(life: GearLife, now: Assessment | None = None) -> list[dict[str, Any]]:
+    """The last inspections of a gear, up to one that is not kept yet, each with what was restored since the one before.
+
+    Nothing where that one has none before it.
+    """
+    rows = [
+        (s.inspection, (s.record.day, s.record.seq), s.result.get("predicted_displacement_in"), s.result.get("verdict"))
+        for s in life.inspections
+    ]
+    if now is not None:
+        found = now.inspection
+        day = found.inspection_date.isoformat() if found.inspection_date else ""
+        at = (day or "9999", life.records[-1].seq + 1)
+        rows = [r for r in rows if r[0].record_id != found.record_id and r[1] < at]
+        rows += [(found, at, now.predicted_displacement_in, now.verdict.value)] if rows else []
+    steps: list[dict[str, Any]] = []
+    before = ("9999", 0)
+    for inspection, at, worst_in, verdict in rows:
+        since = [r for r in life.repairs if before < (r.day, r.seq) < at]
+        steps.append(
+            {
+                "record_id": inspection.record_id,
+                "date": inspection.inspection_date.isoformat() if inspection.inspection_date else "",
+                "gear_landings": inspection.gear_landings,
+                "clearance_in": inspection.clearance_in,
+                "restored": sorted({joint for r in since for joint in r.body.get("joints", ())}),
+                "rerigged": any(r.kind is Kind.RERIG for r in since),
+                "worst_in": worst_in,
+                "verdict": verdict,
+            }
+        )
+        before = at
+    return steps[-_SIDE_BY_SIDE:]
+
+
+def seen_before(judgements: Sequence[Judgement], store: Store) -> list[list[dict[str, Any]]]:
+    """What each judged gear was like before, side by side with what it is now; empty for one that is new."""
+    known = set(store.gears())
+
+    def of(judgement: Judgement) -> list[dict[str, Any]]:
+        if isinstance(judgement, Rejected):
+            return []
+        key = (judgement.inspection.tail_no, judgement.inspection.side.value)
+        return side_by_side(life_of(store, *key), judgement) if key in known else []
+
+    return [of(judgement) for judgement in judgements]
+
+
+def write_pages(
+    found: Sequence[GearLife],
+    forecasts: Mapping[GearKey, Forecast],
+    gear: Gear,
+    directory: Path,
+    *,
+    fleet: bool,
+    page: str = "A4",
+    unit: LengthUnit = LengthUnit.INCH,
+) -> list[WrittenReport]:
+    """Write the page of each gear's life and, for a fleet, the page that links them."""
+    from mlg_troubleshoot.reporting import fleet_report, provenance_of
+
+    last = max((record for life in found for record in life.records), key=lambda r: r.seq, default=None)
+    made = provenance_of(gear, {} if last is None else {f"store up to record {last.seq}": last.digest})
+    written = []
+    if fleet:
+        series = {
+            life.key: (
+                [seen.result.get("predicted_displacement_in") for seen in life.inspections],
+                life.latest.result.get("margin_in") if life.latest else None,
+            )
+            for life in found
+        }
+        told, words = fleet_as_json(found, forecasts), advice(found).words
+        written.append(fleet_report.write_fleet_page(told, series, words, directory, gear, made, page=page, unit=unit))
+    for life in found:
+        # The pages behind the lines of a fleet are for the screen.
+        formats = ("html",) if fleet else ("html", "pdf")
+        told = life_as_json(life, forecasts.get(life.key, Forecast()), gear)
+        written.append(
+            fleet_report.write_life_page(
+                told, side_by_side(life), directory, gear, made, formats=formats, page=page, unit=unit
+            )
+        )
+    return written

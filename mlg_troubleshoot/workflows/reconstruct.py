@@ -1,0 +1,76 @@
+"""Where coordinates come from: a linkage that meets printed numbers, and the ensemble's text for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import tomli_w
+
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.design import member_values
+from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.outputs import write_text
+from mlg_troubleshoot.studies.targets import load_targets, targets_file
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.studies.reconstruct import Reconstruction
+
+_SOURCE = "Found by mlg gear reconstruct (reconstructed): chosen to meet numbers, not measured."
+
+
+def reconstruct_linkage(
+    gear: str,
+    *,
+    targets: Path | None = None,
+    seed: int = 0,
+    start: str | None = None,
+    name: str = "N",
+    minutes: float = 15.0,
+    out: Path | None = None,
+    progress: Callable[[str, int, int | None], None] | None = None,
+) -> tuple[Reconstruction, str]:
+    """Search a linkage, or polish the one named `start`; return it with its text for an ensemble file."""
+    from mlg_troubleshoot.studies.reconstruct import reconstruct
+
+    if not name.isidentifier():
+        raise UsageError(f"name {name!r}", "Use letters and digits, beginning with a letter.")
+    known = load_gear(gear)
+    wanted = load_targets(targets_file(known) if targets is None else targets)
+    linkages = {linkage.name: linkage for linkage in known.ensemble}
+    if start is not None and start not in linkages:
+        raise UsageError(f"{known.name} has no linkage {start!r}", f"Give one of {', '.join(linkages)}.")
+    begin = None if start is None else linkages[start]
+    found = reconstruct(known, wanted, np.random.default_rng(seed), seed, begin, minutes, progress)
+    text = tomli_w.dumps({"members": {name: member_values(found.linkage)}})
+    if out is not None:
+        write_text(out, tomli_w.dumps({"source": _SOURCE}) + "\n" + text)
+    return found, text
+
+
+def reconstruction_values(found: Reconstruction, text: str) -> dict[str, object]:
+    return {
+        "schema_version": 1,
+        "seed": found.seed,
+        "linkages_tried": found.evaluations,
+        "meets_all": found.meets_all,
+        "numbers": found.numbers,
+        "determined": found.determined,
+        "free": found.numbers - found.determined,
+        "loosest": [{"number": name, "free_part": part} for name, part in found.loosest],
+        "targets": [
+            {
+                "quantity": each.target.quantity,
+                "printed": each.target.printed,
+                "accepted": each.target.tolerance,
+                "computed": each.computed,
+                "unit": each.target.unit,
+                "holds": each.holds,
+                "binds": each.binds,
+            }
+            for each in found.met
+        ],
+        "member_toml": text,
+    }

@@ -1,0 +1,228 @@
+"""Which causes planned columns could tell apart, before anything is measured."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN
+from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate
+from mlg_troubleshoot.diagnosis.inference import RULED_OUT
+from mlg_troubleshoot.diagnosis.noise import TAIL_RATIOS
+from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
+from mlg_troubleshoot.diagnosis.simulation.search import ALIKE, beside
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.records.columns import Kind
+from mlg_troubleshoot.records.headers import parse_canonical
+
+Array = NDArray[np.float64]
+
+# The planned fleet: two years of twenty aircraft (assumed), and what one row scatters, tail by tail [in]
+# (docs/explanation/diagnosis.md: a gauge that repeats to 1.5 thou, and what clearances and pins add).
+TAILS, VISITS, ROW_IN = 20, 5, 0.0025
+# Expected distance in log-likelihood at which two are told apart four times in five: d²/2 − 0.84 d = RULED_OUT.
+_APART = 0.84 + float(np.sqrt(0.84**2 + 2.0 * RULED_OUT))
+# Effect over the error of its mean (S) from which some hundred candidates let one stand out four times in five.
+_FOUND = 5.0
+# Columns beside clearances, cheapest first: what is written down anyway, what is read off, what must be measured.
+FURTHER = {
+    "side": Kind.SIDE,
+    "tail_no": Kind.TAIL_NO,
+    "day": Kind.DATE,
+    "technician_id": Kind.TECHNICIAN_ID,
+    "gauge_id": Kind.GAUGE_ID,
+    "approach": Kind.APPROACH,
+    "temperature_c": Kind.TEMPERATURE,
+    "hydraulic_pressure_psi": Kind.PRESSURE,
+    "gear_landings": Kind.LANDINGS,
+    "axial_float": Kind.AXIAL_FLOAT,
+}
+_JOINT = re.compile(r"clearance_(\d+)_in")
+_NAMES = {kind: name for name, kind in FURTHER.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class CausePlanned:
+    """What the planned columns could say about one cause.
+
+    found_from_in: root mean square from which it stands out four times in five; None if it cannot be tested. [in]
+    told_apart_from_in: root mean square from which it is found and told from that four times in five; None if never.
+        [in]
+    further_column: cheapest column that halves that size, or makes it finite.
+    separating_reading: the reading that tells them apart whatever the columns.
+    """
+
+    cause: str
+    target: str | None
+    found_from_in: float | None
+    missing_column: str | None
+    nearest: str | None
+    told_apart_from_in: float | None
+    further_column: str | None
+    separating_reading: str
+
+
+def separable(gear: str = DEFAULT_GEAR, columns: Sequence[str] | None = None) -> tuple[CausePlanned, ...]:
+    """Say which causes the planned columns can and cannot tell apart; without clearance columns all joints are read."""
+    model = load_gear(gear)
+    recorded, joints = _planned(columns, model)
+    here = _Plan(model, recorded, joints)
+
+    @cache
+    def beside_it(column: str) -> _Plan:
+        number = _JOINT.fullmatch(column)
+        return (
+            _Plan(model, recorded, joints | {int(number[1])}) if number else _Plan(model, recorded | {column}, joints)
+        )
+
+    access = sorted((j.access.value, j.number) for j in model.joints if j.number not in joints)
+    further = [name for name in FURTHER if name not in recorded] + [f"clearance_{number}_in" for _min, number in access]
+    with threadpool_limits(1, "blas"):
+        judged = tuple(_judged(here, beside_it, further, key) for key in here.keys if key not in here.stand_ins)
+    return judged + tuple(
+        CausePlanned(c.name, None, None, FURTHER[lacks].value, None, None, None, c.separates)
+        for c in CATALOGUE
+        if (lacks := next((n for n in c.needs if n not in recorded), None)) is not None
+    )
+
+
+def _planned(columns: Sequence[str] | None, gear: Gear) -> tuple[set[str], set[int]]:
+    if columns is None:
+        return set(FURTHER), set(gear.joint_numbers)
+    recorded: set[str] = set()
+    joints: set[int] = set()
+    for name in columns:
+        field = parse_canonical(name, gear.joint_numbers)
+        if field is None:
+            raise UsageError(f"{name} is no column of an inspection table", "see docs/reference/columns.md")
+        if field.kind in _NAMES:
+            recorded.add(_NAMES[field.kind])
+        elif field.kind is Kind.CLEARANCE and field.number in gear.joint_numbers:
+            joints.add(int(field.number))
+    return recorded, joints or set(gear.joint_numbers)
+
+
+class _Plan:
+    """Effects of all testable causes in a planned fleet, as far as bias, slope and tails leave them."""
+
+    def __init__(self, gear: Gear, recorded: set[str], joints: set[int]) -> None:
+        table = _fleet(gear, recorded, joints)
+        plain = build_scene(gear.model, table, gear.discrepancies)
+        found = [c for cause in CATALOGUE if set(cause.needs) <= recorded for c in cause.candidates(plain.scene)]
+        found += [c for cause in CATALOGUE if not set(cause.needs) <= recorded for c in cause.stand_ins(plain.scene)]
+        effects = effect_columns(plain.scene, found)
+        effects[:, [not _speaks_for_all(c, table) for c in found]] = 0.0
+        tails = TAIL_RATIOS[1] * (table.tails[:, None] == np.unique(table.tails))
+        common = np.linalg.cholesky(np.eye(len(table)) + tails @ tails.T)
+        # A slope of the prediction is a cause of its own; a shift of all rows is none.
+        white, level = (np.asarray(np.linalg.solve(common, x), float) for x in (effects, np.ones((len(table), 1))))
+        left, seen = beside(white, level)
+        size = np.linalg.norm(left, axis=0)
+        self.sign = np.array([c.cause.sign for c in found])
+        self.unit = np.where(seen, left / np.where(seen, size, 1.0), 0.0) * np.where(self.sign == 0, 1, self.sign)
+        # Root mean square of an effect over what of it can be seen.
+        self.hidden = np.linalg.norm(effects, axis=0) / np.where(seen, size, np.inf)
+        self.candidates = found
+        self.keys: dict[tuple[str, str | None], list[int]] = {}
+        for k in np.flatnonzero(seen):
+            self.keys.setdefault(_key(found[k]), []).append(int(k))
+        self.stand_ins = {_key(c) for c in found if c.stands_in}
+        self.row_in = ROW_IN / float(np.sqrt(len(table)))
+
+    def nearest(self, key: tuple[str, str | None]) -> tuple[str | None, float]:
+        """The cause that looks most like one, and the size from which they are told apart; infinite if never. [in]"""
+        best, name = 0.0, None
+        for other, places in self.keys.items():
+            if other != key:
+                mine = self.keys[key]
+                cosine = self.unit[:, mine].T @ self.unit[:, places]
+                # Physics allows some causes one sign only: two that push apart are no rivals.
+                one_way = (self.sign[mine][:, None] * self.sign[places]) != 0
+                alike = float(np.max(np.where(one_way, np.maximum(cosine, 0.0), cosine) ** 2))
+                if alike > best:
+                    best, name = alike, " ".join(part for part in other if part)
+        apart = 1.0 - best
+        return name, float("inf") if apart < ALIKE else _APART * self._row(key) / float(np.sqrt(apart))
+
+    def found_from(self, key: tuple[str, str | None]) -> float:
+        """Size from which a cause stands out. [in]"""
+        return _FOUND * self._row(key)
+
+    def _row(self, key: tuple[str, str | None]) -> float:
+        return self.row_in * float(np.min(self.hidden[self.keys[key]]))
+
+
+def _key(candidate: Candidate) -> tuple[str, str | None]:
+    target = candidate.target or ""
+    return candidate.cause.name, target if target.startswith("joint") else None
+
+
+def _speaks_for_all(candidate: Candidate, table: DiagnosisTable) -> bool:
+    """One aircraft, gauge or technician stands for all of them, and the middle of the time for every date."""
+    target = candidate.target or ""
+    first = {str(texts[0]) for texts in table.factors.values()}
+    day = candidate.setting.get("day")
+    middle = day is None or abs(float(day) - 365.0) < 40.0
+    return middle and (not target or target.startswith("joint") or target.split(" ", 1)[-1] in first)
+
+
+def _judged(
+    here: _Plan, beside_it: Callable[[str], _Plan], further: Sequence[str], key: tuple[str, str | None]
+) -> CausePlanned:
+    name, apart = here.nearest(key)
+    split = None
+    if apart > 2.0 * here.found_from(key):
+        better = (c for c in further if key in beside_it(c).keys and beside_it(c).nearest(key)[1] < 0.5 * apart)
+        found = next(better, None)
+        split = FURTHER[found].value if found in FURTHER else found
+    reading = here.candidates[here.keys[key][0]].separates
+    told = max(apart, here.found_from(key)) if np.isfinite(apart) else None
+    return CausePlanned(*key, here.found_from(key), None, name, told, split, reading)
+
+
+def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
+    """Rows as a planned fleet would give them: wear along landings, seasons, hand pump or not, people at bases."""
+    rng = np.random.default_rng(0)
+    n = TAILS * 2 * VISITS
+    tail = np.repeat(np.arange(TAILS), 2 * VISITS)
+    gears = np.repeat(np.arange(2 * TAILS), VISITS)
+    day = np.sort(rng.uniform(0.0, 730.0, (2 * TAILS, VISITS)), axis=1).ravel()
+    landings = rng.uniform(500.0, 6000.0, 2 * TAILS)[gears] + 2.5 * day
+    limits = np.array([joint.limit.value for joint in gear.joints])
+    wear = rng.lognormal(0.0, 0.4, (2 * TAILS, len(limits)))[gears] * limits * landings[:, None] / 8000.0
+    clearance = np.abs(wear + DEFAULT_GAUGE_U_IN * rng.standard_normal(wear.shape))
+    clearance[:, [joint not in joints for joint in gear.joint_numbers]] = np.nan
+    quantities = {
+        "day": day,
+        "gear_landings": landings,
+        "temperature_c": 12.0 - 14.0 * np.cos(2.0 * np.pi * day / 365.25) + 6.0 * rng.standard_normal(n),
+        "hydraulic_pressure_psi": rng.choice([1500.0, 2200.0, 2900.0, 3000.0, 3050.0], n),
+    }
+    factors = {
+        "tail_no": np.array([f"T{k:02d}" for k in tail]),
+        "side": np.where(gears % 2 == 0, "LH", "RH"),
+        "approach": rng.choice(["EXTENDING", "RETRACTING"], n),
+        "gauge_id": np.where(rng.random(n) < 0.7, tail % 4, rng.integers(0, 4, n)).astype(str),
+        "technician_id": np.array([f"W{k}" for k in np.where(rng.random(n) < 0.7, tail % 5, rng.integers(0, 5, n))]),
+    }
+    floats = rng.uniform(0.0, 0.02, clearance.shape) if "axial_float" in recorded else None
+    return DiagnosisTable(
+        clearance_in=clearance,
+        readings_in=np.full((n, 1), np.nan),
+        record_id=tuple(str(k) for k in range(n)),
+        row=np.arange(n),
+        margin_in=np.full(n, gear.margin.value),
+        gauge_u_in=np.full(n, DEFAULT_GAUGE_U_IN),
+        quantities={name: values for name, values in quantities.items() if name in recorded},
+        factors={name: texts for name, texts in factors.items() if name in recorded},
+        axial_float_in=floats,
+    )

@@ -1,0 +1,244 @@
+"""A study and what goes beside it: statements, proofs, indices of measured inspections, table, report.
+
+What computes is imported where it is needed: a check must not wait for scipy.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.outputs import write_csv
+from mlg_troubleshoot.studies.index_table import write_index_table
+from mlg_troubleshoot.studies.targets import targets_file
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.reporting import WrittenReport
+    from mlg_troubleshoot.studies.findings import StudyFindings
+    from mlg_troubleshoot.studies.given_data import GivenDataIndices
+    from mlg_troubleshoot.studies.study import StudyOptions
+    from mlg_troubleshoot.studies.worst_search import WorstSearch
+
+from mlg_troubleshoot.units import LengthUnit
+
+
+@dataclass(frozen=True, slots=True)
+class GivenDataResult:
+    """First-order indices of measured inspections; used are valid rows that have a measured displacement."""
+
+    file: str
+    rows_read: int
+    rows_used: int
+    indices: GivenDataIndices
+
+
+Progress = Callable[[str, int, int | None], None]
+
+
+def run_study(
+    gear: Gear | str | Path = DEFAULT_GEAR,
+    options: StudyOptions | None = None,
+    *,
+    statements: bool = False,
+    bound: bool = False,
+    designs: bool = False,
+    progress: Progress | None = None,
+) -> StudyFindings:
+    """Recompute the sensitivity and amplification indices of a gear, and what is asked for beside them.
+
+    Parameters
+    ----------
+    gear : Gear or str or Path
+        The gear, a shipped one's name, or a gear file.
+    options : StudyOptions, optional
+        Design, accuracy, seed, distribution and directions; else the standard study.
+    statements : bool
+        Check the statements of the gear's source.
+    bound : bool
+        Prove the worst displacement with every clearance at its limit.
+    designs : bool
+        Compare the designs of the paper.
+    progress : callable, optional
+        Called with the stage, how much of it is done, and how much there is or None.
+
+    Returns
+    -------
+    StudyFindings
+        The study; an interrupted one has ``result.finished`` false and nothing beside it.
+
+    Raises
+    ------
+    UsageError
+        If the options do not fit together, or statements are asked for that the gear does not have.
+    """
+    from mlg_troubleshoot.studies import study
+    from mlg_troubleshoot.studies.findings import StudyFindings
+    from mlg_troubleshoot.studies.statements import check_statements
+
+    known = gear if isinstance(gear, Gear) else load_gear(gear)
+    wanted = options or study.StudyOptions()
+    told = progress or (lambda _stage, _done, _total: None)
+    if statements and not targets_file(known).exists():
+        raise UsageError(f"{known.name} has no printed statements", f"Write {targets_file(known).name} beside it.")
+    findings = StudyFindings(known, wanted, study.run_study(known, wanted, told))
+    if not findings.result.finished:
+        return findings
+    if designs:
+        findings = replace(findings, designs=study.compare_designs(known, wanted, told))
+    if statements:
+        found = check_statements(known, progress=lambda done, total: told("statements", done, total))
+        findings = replace(findings, statements=found)
+    if bound:
+        findings = replace(findings, searches=_searches(known, wanted, told))
+    return findings
+
+
+def _searches(gear: Gear, options: StudyOptions, told: Progress) -> tuple[WorstSearch, ...]:
+    from mlg_troubleshoot.studies.worst_search import search_worst
+
+    found = []
+    for k, sense in enumerate((1.0, -1.0)):
+        rng = np.random.default_rng(np.random.SeedSequence(options.seed, spawn_key=(1000 + k,)))
+        limits = gear.limits_in if options.limits_in is None else options.limits_in
+        found.append(search_worst(gear.model, limits, sense, rng, options.seed))
+        told("proof", k + 1, 2)
+    return tuple(found)
+
+
+def refuse_other_tables(options: StudyOptions) -> None:
+    """Refuse a study whose result is not the table that goes with a gear, before the work."""
+    if not options.is_standard:
+        raise UsageError(
+            "--write-table with other than the standard study",
+            "Use design fast, sampled or tensor, without --directions, --distribution, --limit, --beyond-margin.",
+        )
+
+
+def write_study_table(findings: StudyFindings) -> Path:
+    """Write the table of indices that goes with the gear; one that is not complete or not standard is refused."""
+    refuse_other_tables(findings.options)
+    if not findings.result.finished:
+        raise UsageError("the study was interrupted, its table is not complete", "Run it again to the end.")
+    write_index_table(findings.result.table, findings.gear.indices_file)
+    return findings.gear.indices_file
+
+
+def given_data_study(file: Path, gear: Gear, seed: int) -> GivenDataResult:
+    """Estimate first-order indices from the inspections of a table: no model, only what was measured."""
+    from mlg_troubleshoot.diagnosis import table_from_inspections
+    from mlg_troubleshoot.records import ReadOptions, read_many
+    from mlg_troubleshoot.studies.given_data import given_data_indices
+
+    read = read_many([file], ReadOptions.of(gear))
+    measured = [each for each in read.inspections if each.measured_displacement_in is not None]
+    displacement = np.array([each.measured_displacement_in for each in measured], dtype=np.float64)
+    clearance = table_from_inspections(measured, gear).clearance_in
+    indices = given_data_indices(clearance, displacement, np.random.default_rng(seed))
+    return GivenDataResult(file.name, len(read.rows), len(measured), indices)
+
+
+def write_study_report(
+    findings: StudyFindings, directory: Path, page: str, *, unit: LengthUnit = LengthUnit.INCH
+) -> WrittenReport:
+    from mlg_troubleshoot.reporting import provenance_of
+    from mlg_troubleshoot.reporting.study_report import write_study_report as write
+
+    targets = targets_file(findings.gear)
+    hashes = {targets.name: sha256(targets.read_bytes()).hexdigest()} if findings.statements else {}
+    return write(
+        findings,
+        directory,
+        provenance=provenance_of(findings.gear, hashes, seed=findings.options.seed),
+        page=page,
+        unit=unit,
+    )
+
+
+def study_values(findings: StudyFindings, given: GivenDataResult | None = None) -> dict[str, Any]:
+    """Return the study as plain values, as the JSON contract has it; what is not known is null."""
+    from mlg_troubleshoot.reporting.json_form import plain
+
+    result, options = findings.result, findings.options
+    growth = result.growth
+    values = {
+        **result.table.as_dict(),
+        "directions": str(options.directions),
+        "distribution": options.distribution,
+        "of": "exceeding the margin" if options.beyond_margin else "displacement",
+        "accuracy": options.accuracy,
+        "finished": result.finished,
+        "note": result.indices.note,
+        "mean": result.indices.mean,
+        "variance": result.indices.variance,
+        "first_order_plain": None if result.plain is None else result.plain.tolist(),
+        "second_order": None if result.indices.second_order is None else result.indices.second_order.tolist(),
+        "groups": [asdict(group) for group in result.groups],
+        "ensemble": [linkage.name for linkage in findings.gear.ensemble],
+        "amplification": {
+            "local_stage": growth.local_stage.tolist(),
+            "max_stage": growth.max_stage.tolist(),
+            "local_plunger": growth.local_plunger.tolist(),
+            "max_plunger": growth.max_plunger.tolist(),
+            "exact_plunger": growth.exact.tolist(),
+        },
+        "statements": [
+            {**asdict(statement), "outcome": str(statement.outcome), "paragraph": statement.paragraph}
+            for statement in findings.statements
+        ],
+        "bounds": [
+            {
+                "sense": "over-travel" if found.sense > 0 else "under-travel",
+                "sequential_in": found.sequential_in,
+                "searched_in": found.searched_in,
+                "found_in": found.proved.found_in,
+                "bound_in": found.proved.bound_in,
+                "stroke_in": found.proved.stroke_in,
+                "directions_rad": found.proved.directions.tolist(),
+            }
+            for found in findings.searches
+        ],
+    }
+    if given is not None:
+        values["given_data"] = _given_values(findings.gear, given)
+    cleaned: dict[str, Any] = plain(values)
+    return cleaned
+
+
+def _given_values(gear: Gear, given: GivenDataResult) -> dict[str, Any]:
+    found = given.indices
+    lists = (found.first_order.tolist(), found.interval.tolist(), found.rows.tolist())
+    return {
+        "file": given.file,
+        "rows_read": given.rows_read,
+        "rows_used": given.rows_used,
+        "joints": [
+            {"joint": number, "first_order": first, "first_order_interval": ends, "rows": rows}
+            for number, first, ends, rows in zip(gear.joint_numbers, *lists, strict=True)
+        ],
+    }
+
+
+def write_study_csv(findings: StudyFindings, path: Path) -> None:
+    heads = [
+        "joint", "name", "first_order", "first_order_low", "first_order_high", "total_order", "total_order_low",
+        "total_order_high", "plunger_amplification", "max_amplification_index", "rank", "rank_least", "rank_greatest",
+        "first_order_least", "first_order_greatest",
+    ]  # fmt: skip
+    rows = []
+    for joint, e in zip(findings.gear.joints, findings.result.table.joints, strict=True):
+        numbers = (
+            e.first_order, *e.first_order_interval, e.total_order, *e.total_order_interval,
+            e.plunger_amplification, e.max_amplification_index,
+        )  # fmt: skip
+        known = [v if math.isfinite(v) else None for v in (*numbers, *e.first_order_spread)]
+        rows.append((e.joint, joint.name, *known[: len(numbers)], e.rank, *e.rank_range, *known[len(numbers) :]))
+    write_csv(path, heads, rows)

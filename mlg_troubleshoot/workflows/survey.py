@@ -1,0 +1,309 @@
+"""A geometry from measurements: a survey in, a gear file with its ensemble and index table out."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import tomli_w
+from numpy.typing import NDArray
+
+from mlg_troubleshoot.datafile import LONGEST_NAME, is_name, read_toml
+from mlg_troubleshoot.errors import GearFileError, MechanismError, UsageError
+from mlg_troubleshoot.gear.design import member_values
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.outputs import refuse_inputs_as_outputs, write_text
+from mlg_troubleshoot.studies.index_table import write_index_table
+from mlg_troubleshoot.studies.targets import targets_file
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.reporting import WrittenReport
+    from mlg_troubleshoot.studies.survey import Survey
+    from mlg_troubleshoot.studies.survey_result import SurveyResult
+
+Array = NDArray[np.float64]
+# Members of the ensemble that a surveyed gear file gets beside its reference: their range holds most of the posterior.
+_MEMBERS = 11
+_DECIMALS = 6
+# A second assembly with less than this share of the posterior is no doubt worth naming.
+_WORTH_NAMING = 0.02
+# Draws of the prior that stand for a gear of which nothing was read yet.
+_UNREAD = 2000
+
+
+def write_survey_template(file: Path, gear: str | Path = DEFAULT_GEAR) -> None:
+    """Write the rows that are worth reading on a gear, as CSV or xlsx."""
+    from mlg_troubleshoot.records.survey_table import write_survey_template as write
+    from mlg_troubleshoot.studies.survey_plan import planned
+    from mlg_troubleshoot.studies.survey_readings import SurveyedLinkage
+
+    if file.suffix.lower() not in (".csv", ".xlsx"):
+        raise UsageError(f"{file.name!r} ends neither in .csv nor in .xlsx", "Give a name that ends in one of them.")
+    known = load_gear(gear)
+    write(file, SurveyedLinkage(known), planned(known))
+
+
+def survey_gear(
+    file: str | Path,
+    gear: str | Path | Gear = DEFAULT_GEAR,
+    *,
+    write: Path | None = None,
+    inspections: Path | None = None,
+    seed: int = 0,
+) -> SurveyResult:
+    """Find the linkage that a survey speaks of, and write it as a gear file with ensemble and index table.
+
+    Nothing is written if readings contradict each other. With inspections, the next reading narrows what is unknown
+    of their displacement, in place of the indices.
+    """
+    from mlg_troubleshoot.records.survey_table import read_survey
+    from mlg_troubleshoot.studies.survey import Prior, fit
+    from mlg_troubleshoot.studies.survey_plan import suggested
+    from mlg_troubleshoot.studies.survey_readings import SurveyedLinkage
+    from mlg_troubleshoot.studies.survey_result import InspectedGear, SurveyResult
+
+    known = gear if isinstance(gear, Gear) else load_gear(gear)
+    if write is not None:
+        _check_target(write, known)
+    linkage, rng = SurveyedLinkage(known), np.random.default_rng(seed)
+    cases = _clearances(inspections, known)
+    readings, problems, digest = read_survey(Path(file), linkage)
+    members = linkage.amplification(np.array([linkage.vector(each) for each in known.ensemble]))
+    before = np.quantile(members, [0.05, 0.95], axis=0).T
+    found = fit(known, readings, rng) if readings else None
+    warnings: tuple[str, ...] = ()
+    path = None
+    if found is None:
+        draws = Prior(linkage).closing(_UNREAD, rng)
+        middle, interval = linkage.vector(known.reference)[None], before
+    else:
+        draws, middle = found.draws, found.modes[0].vector[None]
+        interval = np.quantile(linkage.amplification(draws), [0.05, 0.95], axis=0).T
+        warnings = _assemblies(found)
+        if write is not None and found.contradicts:
+            warnings += ("readings contradict each other, so that no gear file was written",)
+        elif write is not None:
+            path = _write_gear(known, found, write, f"{Path(file).name}, SHA-256 {digest[:12]}")
+            warnings += _left_targets(known, path)
+    clearance = np.array([c for _, c in cases]).reshape(len(cases), len(known.joints))
+    moved = linkage.displacement(draws, clearance)
+    own = linkage.displacement(middle, clearance)
+    # Logarithms: a few linkages near a dead centre would else decide alone. Without clearance nothing moves.
+    unknown = np.log(np.maximum(moved if cases else linkage.amplification(draws), 1e-9))
+    suggestion = suggested(linkage, draws, unknown, readings)
+    judged = tuple(
+        InspectedGear(name, float(d), _ends(each), float(np.mean(each <= known.margin.value)))
+        for (name, _), d, each in zip(cases, own[0], moved.T, strict=True)
+    )
+    return SurveyResult(
+        known,
+        found,
+        problems,
+        before,
+        interval,
+        linkage.amplification(middle)[0],
+        suggestion,
+        judged,
+        warnings,
+        path,
+        digest,
+        seed,
+    )
+
+
+def _ends(values: Array) -> tuple[float, float]:
+    low, high = np.nanquantile(values, [0.05, 0.95])
+    return float(low), float(high)
+
+
+def _check_target(write: Path, gear: Gear) -> None:
+    if write.suffix.lower() != ".toml" or not is_name(write.stem) or len(write.stem) > LONGEST_NAME:
+        raise UsageError(f"{write.name!r} cannot be the name of a gear file", "Give a short name that ends in .toml.")
+    refuse_inputs_as_outputs(gear.files, [("the surveyed gear", path) for path in (write, *_beside(write))])
+
+
+def _beside(path: Path) -> tuple[Path, Path]:
+    """Names of the ensemble and of the table of indices that go with a gear file."""
+    return path.with_name(f"{path.stem}-ensemble.toml"), path.with_name(f"{path.stem}-indices.json")
+
+
+def _clearances(file: Path | None, gear: Gear) -> list[tuple[str, Array]]:
+    """Clearances of given inspections; as in the prediction of a check, a joint that was not read counts 0."""
+    if file is None:
+        return []
+    from mlg_troubleshoot.records import ReadOptions, read_many
+
+    read = read_many([file], ReadOptions.of(gear))
+    if not read.inspections:
+        raise UsageError(f"{file}: no inspection in it can be judged", "Run mlg check on it and correct what it names.")
+    return [
+        (each.record_id, np.array([each.clearance_in.get(n) or 0.0 for n in gear.joint_numbers]))
+        for each in read.inspections
+    ]
+
+
+def _assemblies(found: Survey) -> tuple[str, ...]:
+    """Both assemblies, or both shapes of one assembly, where the survey allows two."""
+    steps = [s for s in found.linkage.space.mechanism.steps if hasattr(s, "sign")]
+    modes = [mode for mode in found.modes if mode.weight >= _WORTH_NAMING]
+    places = [f"joint {s.joint} on the {{}} of the line between its links' other ends" for s in steps]
+    places += ["the rest on the {} of the crank"] * (len(found.modes[0].sides) - len(steps))
+    shares: dict[str, float] = {}
+    for mode in modes:
+        parts = [
+            place.format("left" if mode.sides[i] > 0 else "right")
+            for i, place in enumerate(places)
+            if len({m.sides[i] for m in modes}) > 1
+        ]
+        if len({m.sides for m in modes}) == 1:
+            moved = np.where(found.linkage.angles, 0.0, np.abs(mode.vector - modes[0].vector))
+            name = found.linkage.names[int(np.argmax(moved))].split(".")[0]
+            parts = [f"one with point {name} elsewhere by {moved.max():.3f} in" if moved.any() else "as written"]
+        text = ", ".join(parts)
+        shares[text] = shares.get(text, 0.0) + mode.weight
+    texts = "; ".join(f"{text} ({100 * share:.0f} %)" for text, share in shares.items())
+    return (f"the survey allows {len(shares)} assemblies: {texts}",) if len(shares) > 1 else ()
+
+
+def _left_targets(before: Gear, path: Path) -> tuple[str, ...]:
+    """Published numbers that the surveyed gear leaves: they are another gear's, or the paper's alone."""
+    from mlg_troubleshoot.studies.verification import verify
+
+    targets = targets_file(before)
+    if not targets.exists():
+        return ()
+    left = [n for n in verify(load_gear(path), targets) if n.should_hold and not n.holds]
+    return tuple(
+        f"{n.quantity}: the paper prints {n.printed}, this gear has {n.computed:.4g} {n.unit}".rstrip() for n in left
+    )
+
+
+def _write_gear(gear: Gear, found: Survey, path: Path, source: str) -> Path:
+    """Write the gear file, its ensemble and its table of indices."""
+    from mlg_troubleshoot.studies.study import StudyOptions, run_study
+
+    linkage = found.linkage
+    ensemble, indices = _beside(path)
+    members = {
+        f"S{k}": member_values(linkage.linkage(np.round(v, _DECIMALS), f"S{k}"))
+        for k, v in enumerate(found.draws[:_MEMBERS], start=1)
+    }
+    values = deepcopy(read_toml(gear.path).values)
+    values.update(id=path.stem, ensemble=ensemble.name, indices=indices.name)
+    values["provenance"] = f"surveyed ({len(found.read)} readings, {source})"
+    _put(values, found, source)
+    drawn = {"source": f"Drawn from the posterior of survey {source}.", "members": members}
+    try:
+        write_text(ensemble, tomli_w.dumps(drawn))
+        write_text(path, tomli_w.dumps(values))
+        write_index_table(run_study(load_gear(path), StudyOptions()).table, indices)
+    except (GearFileError, MechanismError) as error:
+        raise UsageError(f"the surveyed gear cannot be written: {error.message}", error.remedy) from error
+    return path
+
+
+def _put(values: dict[str, Any], found: Survey, source: str) -> None:
+    """Put the surveyed numbers into a gear file's values, each with a source that says its uncertainty."""
+    linkage, mode = found.linkage, found.modes[0]
+    new = member_values(linkage.linkage(np.round(mode.vector, _DECIMALS), "A"))
+    spread = dict(zip(linkage.names, np.std(found.draws, axis=0), strict=True))
+    sources = values["sources"]
+
+    def put(entry: dict[str, Any], numbers: dict[str, Any], what: str, *parts: tuple[str, str, float, str]) -> None:
+        entry.update(numbers)
+        known = [f"{label} ± {spread[name] * scale:.2g} {unit}" for name, label, scale, unit in parts if name in spread]
+        text = f"Survey {source}: {what}, standard uncertainty {', '.join(known) or 'none: held in place'}."
+        entry["source"] = f"survey_{len(sources)}"
+        sources[entry["source"]] = {"kind": "measured", "text": text}
+
+    turned = float(np.degrees(1.0))
+    stroke = {"range": new["range"], "reference": new["reference"]}
+    put(values["input"], stroke, "actuator extension", ("extension", "extension", 1.0, "in"))
+    for plane in values["planes"]:
+        if plane["name"] in new.get("planes", {}):
+            name = plane["name"]
+            parts = ((f"{name}.direction", "hinge", turned, "°"), (f"{name}.dihedral", "dihedral", turned, "°"))
+            put(plane, new["planes"][name], f"plane {name}", *parts)
+    for point in values["points"]:
+        name = point["name"]
+        axes = [(f"{name}.{axis}", axis, 1.0, "in") for axis in ("x", "y", "r")]
+        put(point, {"at": new["points"][name]}, f"point {name}", *axes)
+    for step in values["steps"]:
+        step.update(new["steps"].get(step["joint"], {}))
+        if "axis_deg" in step:
+            put(step, {}, f"axis of {step['joint']}", (f"{step['joint']}.axis", "axis", turned, "°"))
+    if linkage.travel is not None:
+        old = sources[values["calibration"]["source"]]["text"]
+        travel = {"travel": float(round(mode.vector[-1], _DECIMALS))}
+        put(values["calibration"], travel, f"travel; the rest as before: {old}", ("travel", "travel", 1.0, "in"))
+
+
+def survey_values(result: SurveyResult) -> dict[str, Any]:
+    """Return a survey as plain values, as the JSON contract has it."""
+    found, suggestion = result.survey, result.suggestion
+    mode = None if found is None else found.modes[0]
+    rows = zip(result.gear.joints, result.amplification, result.interval, result.before, strict=True)
+    values: dict[str, Any] = {
+        "schema_version": 1,
+        "gear_file": None if result.gear_file is None else str(result.gear_file),
+        "joints": [
+            {
+                "joint": joint.number,
+                "plunger_amplification": float(a),
+                "interval_90": after.tolist(),
+                "before": before.tolist(),
+            }
+            for joint, a, after, before in rows
+        ],
+        "next": []
+        if suggestion is None
+        else [
+            {
+                "kind": suggestion.reading.kind.value,
+                "from": suggestion.reading.start or None,
+                "to": suggestion.reading.end or None,
+                "extension_in": suggestion.reading.extension,
+                "expected_narrowing": suggestion.narrowing,
+            }
+        ],
+        "misfits": [
+            {
+                "row": m.reading.row,
+                "value_in": None if m.reading.is_angle else m.reading.value,
+                "expected_in": None if m.reading.is_angle else m.expected,
+                **({k: m.reading.in_units(v) for k, v in angles} if m.reading.is_angle else {}),
+                "suggestion": m.words,
+            }
+            for m in (() if found is None else found.misfits)
+            for angles in [(("value_deg", m.reading.value), ("expected_deg", m.expected))]
+        ],
+        "chi2": None if mode is None else mode.chi2,
+        "degrees_of_freedom": None if found is None else found.degrees_of_freedom,
+        "warnings": list(result.warnings),
+        "problems": [problem.as_dict() for problem in result.problems],
+    }
+    if result.inspections:
+        values["inspections"] = [
+            {
+                "record_id": each.record_id,
+                "displacement_in": each.displacement_in,
+                "interval_90": list(each.interval_in),
+                "probability_within_margin": each.probability_within_margin,
+            }
+            for each in result.inspections
+        ]
+    return values
+
+
+def write_survey_report(result: SurveyResult, file: Path, directory: Path, page: str = "A4") -> WrittenReport | None:
+    """Write the report of a survey; None if nothing follows from the table."""
+    from mlg_troubleshoot.reporting import provenance_of
+    from mlg_troubleshoot.reporting.survey_report import write_survey_report as write
+
+    if result.survey is None:
+        return None
+    provenance = provenance_of(result.gear, {file.name: result.input_sha256}, seed=result.seed)
+    return write(result, result.survey, directory, provenance=provenance, page=page)

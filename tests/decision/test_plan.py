@@ -1,0 +1,105 @@
+"""The plan: its first step is the one next action, and it comes to an end."""
+
+from __future__ import annotations
+
+import pytest
+
+from mlg_troubleshoot.decision.assessment import Verdict
+from mlg_troubleshoot.decision.inspection import Outcome
+from mlg_troubleshoot.decision.judge_rows import assess
+from mlg_troubleshoot.decision.plan import Action, Basis, End
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.reporting.json_form import check_as_json
+from mlg_troubleshoot.studies.index_table import IndexTable
+from tests.decision.conftest import Judge, every_joint, inspected
+
+
+def test_a_gear_that_failed_has_its_plunger_read_first(gear: Gear, judge: Judge) -> None:
+    first = judge({3: 0.013, 5: 0.007}, outcome=Outcome.FAILED).next_action
+    assert (first.action, first.joints, first.minutes) == (Action.READ_PLUNGER, (), gear.plunger_reading.value)
+
+
+def test_a_plunger_measured_beyond_its_margin_is_outside_whatever_is_predicted(judge: Judge) -> None:
+    found = judge(every_joint(0.001), readings_in=(0.060,))
+    assert (found.verdict, found.basis) == (Verdict.OUTSIDE_MARGIN, Basis.MEASURED)
+    assert found.headline.startswith("MEASURED: the plunger stands 0.0600 in beyond mid-position, outside")
+    assert found.probability_within_margin is not None
+    assert found.probability_within_margin > 0.95
+
+
+def test_what_the_joints_explain_and_what_they_cannot_add_up_to_what_was_measured(judge: Judge) -> None:
+    found = judge(every_joint(0.001), readings_in=(-0.060,))
+    assert found.explained_at_most_in == pytest.approx(-(found.under_travel_in or 0.0))
+    assert found.explained_at_most_in + (found.unexplained_in or 0.0) == pytest.approx(0.060)
+    most, rest = found.explained_at_most_in, found.unexplained_in or 0.0
+    assert f"can explain {most:.4f} in of it at most; {rest:.4f} in they cannot" in found.headline
+
+
+def test_an_unmeasured_joint_may_explain_a_displacement_up_to_its_limit(judge: Judge) -> None:
+    found = judge(every_joint(0.001) | {}, readings_in=(0.030,))
+    some = judge(dict.fromkeys(range(1, 9), 0.001), readings_in=(0.030,))
+    assert (found.explained_at_most_in or 0.0) < (some.explained_at_most_in or 0.0)
+    assert some.explained_at_most_in == pytest.approx(min(0.030, some.predicted_upper_in or 0.0))
+
+
+def test_without_a_reading_nothing_is_explained(judge: Judge) -> None:
+    found = judge(every_joint(0.001))
+    assert (found.explained_at_most_in, found.unexplained_in) == (None, None)
+
+
+def test_a_displacement_beyond_what_the_joints_explain_is_not_explained(judge: Judge) -> None:
+    found = judge(every_joint(0.001), readings_in=(0.060,))
+    assert [step.action for step in found.plan.steps] == [Action.CONTINUE]
+    assert found.end is End.NOT_EXPLAINED
+
+
+def test_a_joint_over_its_limit_is_restored_before_a_displacement_counts_as_unexplained(judge: Judge) -> None:
+    found = judge(every_joint(0.001, j7=0.008), readings_in=(0.060,))
+    assert [(step.action, step.joints) for step in found.plan.steps] == [(Action.RESTORE, (7,)), (Action.CONTINUE, ())]
+
+
+def test_a_plan_ends_in_going_on_without_minutes(judge: Judge) -> None:
+    for clearance in (0.001, 0.002, 0.003):
+        last = judge(every_joint(clearance)).plan.steps[-1]
+        assert (last.action, last.minutes) == (Action.CONTINUE, 0.0)
+
+
+def test_the_next_action_of_the_json_is_the_first_step_of_its_plan(gear: Gear, judge: Judge) -> None:
+    form = check_as_json(gear, [judge({3: 0.013})], [], [])["inspections"][0]
+    assert form["next_action"] == form["plan"][0]
+    assert form["end"] in set(End)
+
+
+def test_joints_are_measured_again_where_a_better_gauge_likely_settles_the_verdict(judge: Judge) -> None:
+    found = judge(every_joint(0.0018))
+    assert found.verdict is Verdict.INCONCLUSIVE
+    first = found.next_action
+    assert (first.action, first.joints, first.gauge_u_needed_in) == (Action.MEASURE_AGAIN, (2, 4, 3, 5), 0.0003)
+    assert found.end is End.WITHIN
+
+
+def test_far_from_both_verdicts_nothing_is_measured_again(judge: Judge) -> None:
+    found = judge(every_joint(0.0019))
+    assert (found.verdict, found.next_action.action, found.end) == (
+        Verdict.INCONCLUSIVE,
+        Action.CONTINUE,
+        End.TOO_CLOSE,
+    )
+
+
+def test_a_joint_whose_own_uncertainty_is_stated_is_not_measured_again(gear: Gear, table: IndexTable) -> None:
+    read = inspected(every_joint(0.0018), gauge_u_by_joint_in=dict.fromkeys(range(1, 11), 0.0005))
+    (found,) = assess([read], gear, table)
+    assert found.next_action.action is Action.CONTINUE
+
+
+def test_an_area_counts_once_and_again_after_a_repair_closed_it(judge: Judge) -> None:
+    steps = judge({3: 0.013, 5: 0.007}, outcome=Outcome.FAILED).plan.steps
+    # Sidestay 15 min with #2, #4, #1; link assembly 20 min with five joints; then 120 min a joint, all open.
+    assert [step.minutes for step in steps] == [12.0, 50.0, 56.0, 120.0 * len(steps[3].joints), 0.0]
+
+
+def test_a_gear_that_retracts_has_only_the_joint_over_its_limit_restored(judge: Judge) -> None:
+    found = judge(every_joint(0.004, j7=0.008), outcome=Outcome.RETRACTED)
+    assert (found.next_action.action, found.next_action.joints) == (Action.RESTORE, (7,))
+    assert found.end is End.OUTSIDE_NO_COMPLAINT

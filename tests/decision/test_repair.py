@@ -1,0 +1,163 @@
+"""Repair sets and allowances."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.decision import repair
+from mlg_troubleshoot.decision.assessment import RepairSet
+from mlg_troubleshoot.decision.case import Cases, predict_batch
+from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.judge_rows import AssessOptions, allowances
+from mlg_troubleshoot.decision.plan import minutes_to_measure
+from mlg_troubleshoot.decision.prediction import predict
+from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.gear.gear import Gear
+from tests.decision.conftest import Judge, every_joint, inspected
+
+FAILURE = {3: 0.013, 5: 0.007}
+# The failure with the other joints in good condition.
+FULL_FAILURE = every_joint(0.001, j3=0.013, j5=0.007)
+MARGIN_IN = 0.03
+
+
+def repair_sets(gear: Gear, inspection: Inspection, margin_in: float = MARGIN_IN) -> tuple[RepairSet, ...]:
+    """Repair sets of one gear."""
+    cases = Cases.of(gear, [replace(inspection, margin_in=margin_in)])
+    upper = predict_batch(cases).upper
+    found = repair.calibrated(cases, repair.search(cases, upper.displacement_in, upper.u_clearances_in))
+    return repair.repair_sets(cases, found, np.array([True]))[0]
+
+
+def allowance(gear: Gear, inspection: Inspection) -> dict[int, float]:
+    """Allowances of one gear."""
+    cases = Cases.of(gear, [inspection])
+    found = allowances(cases, predict_batch(cases).lower)[0]
+    return dict(zip(gear.joint_numbers, found.tolist(), strict=True))
+
+
+def probabilities_after(gear: Gear, *repairs: tuple[int, ...]) -> np.ndarray:
+    """Probability that the failed gear is within its margin after each of these repairs."""
+    n = len(repairs)
+    rows = np.array([[0.0005 if j in restored else FULL_FAILURE[j] for j in range(1, 11)] for restored in repairs])
+    found = predict(gear, [inspected({})] * n, rows, np.ones((n, 10), bool), np.full(n, 0.0005))
+    return found.probability_within(np.full(n, MARGIN_IN), np.zeros(n))
+
+
+def test_restoring_joint_three_alone_is_too_close(gear: Gear) -> None:
+    assert 0.76 <= probabilities_after(gear, (3,))[0] <= 0.91
+
+
+def test_restoring_joints_three_and_five_clears_the_failure(gear: Gear, judge: Judge) -> None:
+    assert probabilities_after(gear, (3, 5))[0] >= 0.95
+    sets = judge(FULL_FAILURE, AssessOptions()).repair_sets
+    assert sets is not None
+    assert sets[0].joints == (3, 5)
+
+
+@pytest.fixture(scope="module")
+def sets_of_failure(gear: Gear) -> tuple[tuple[int, ...], ...]:
+    return tuple(s.joints for s in repair_sets(gear, inspected(FULL_FAILURE), MARGIN_IN))
+
+
+def test_every_repair_set_reaches_95_percent(gear: Gear, sets_of_failure: tuple[tuple[int, ...], ...]) -> None:
+    assert probabilities_after(gear, *sets_of_failure).min() >= 0.95
+
+
+def test_no_repair_set_contains_a_joint_too_many(gear: Gear, sets_of_failure: tuple[tuple[int, ...], ...]) -> None:
+    # Joint 3 is over its limit and must be in every set.
+    smaller = [tuple(j for j in joints if j != spare) for joints in sets_of_failure for spare in joints if spare != 3]
+    assert probabilities_after(gear, *smaller).max() < 0.95
+
+
+def test_a_joint_over_its_limit_is_in_every_repair_set_even_where_it_moves_the_plunger_little(gear: Gear) -> None:
+    found = repair_sets(gear, inspected(every_joint(0.001, j3=0.0074, j5=0.0074, j7=0.008)), MARGIN_IN)
+    assert found
+    assert all(7 in s.joints for s in found)
+
+
+def test_repair_sets_come_by_access_time_and_then_by_size(gear: Gear) -> None:
+    found = repair_sets(gear, inspected(every_joint(0.005)), MARGIN_IN)
+    keys = [(s.minutes, len(s.joints)) for s in found]
+    assert keys == sorted(keys)
+    assert len(found) > 1
+
+
+def test_opening_an_area_counts_once(gear: Gear) -> None:
+    # Sidestay 15 min, #3 and #5 8 min each; link assembly 20 min, #6 6 min.
+    assert minutes_to_measure(gear, (3,)) == 23
+    assert minutes_to_measure(gear, (3, 5)) == 31
+    assert minutes_to_measure(gear, (3, 5, 6)) == 57
+
+
+def test_a_restored_joint_has_the_clearance_of_a_new_part(gear: Gear) -> None:
+    best = next(s for s in repair_sets(gear, inspected(FULL_FAILURE), MARGIN_IN) if s.joints == (3, 5))
+    row = np.array([[0.0005 if j in (3, 5) else 0.001 for j in range(1, 11)]])
+    assert best.predicted_displacement_in == pytest.approx(worst_case(gear.model, row).magnitude_in[0], abs=1e-12)
+
+
+def test_where_nothing_need_be_restored_there_is_no_repair_set(gear: Gear) -> None:
+    assert repair_sets(gear, inspected(dict.fromkeys(range(1, 6), 0.002)), MARGIN_IN) == ()
+
+
+def test_where_no_set_is_sufficient_there_is_no_repair_set(gear: Gear) -> None:
+    assert repair_sets(gear, inspected(every_joint(0.005)), 0.004) == ()
+
+
+def test_only_measured_joints_are_proposed_for_repair(gear: Gear) -> None:
+    read = {1: 0.0, 2: 0.005, 3: 0.013, 4: 0.0, 5: 0.007, 6: 0.0, 7: 0.0, 8: 0.0}
+    found = repair_sets(gear, inspected(read), MARGIN_IN)
+    assert found
+    assert {j for s in found for j in s.joints} <= {2, 3, 5}
+
+
+def test_a_gear_within_its_margin_has_no_repair_sets(judge: Judge) -> None:
+    assert judge(every_joint(0.001), AssessOptions()).repair_sets == ()
+
+
+def test_a_joint_worn_by_its_allowance_brings_the_worst_case_to_the_margin(gear: Gear) -> None:
+    clearance = every_joint(0.0017)
+    found = allowance(gear, inspected(clearance))
+    for joint in (1, 2, 3, 4, 5):
+        worn = clearance | {joint: clearance[joint] + found[joint]}
+        row = np.array([[worn[j] for j in range(1, 11)]])
+        assert worst_case(gear.model, row).magnitude_in[0] == pytest.approx(MARGIN_IN, abs=2e-5)
+
+
+def test_a_joint_with_more_amplification_has_less_allowance(gear: Gear) -> None:
+    found = allowance(gear, inspected(every_joint(0.0017)))
+    assert found[2] < found[1] < found[6]
+
+
+def test_an_allowance_ends_at_the_limit_of_the_joint_where_that_comes_before_the_margin(gear: Gear) -> None:
+    assert allowance(gear, inspected(every_joint(0.0017)))[6] == pytest.approx(0.0058)
+
+
+def test_beyond_the_margin_there_is_no_allowance(judge: Judge) -> None:
+    found = judge(FAILURE, AssessOptions())
+    assert {finding.allowance_in for finding in found.joints} == {None}
+
+
+def test_an_unmeasured_joint_has_no_allowance(judge: Judge) -> None:
+    found = judge({3: 0.001}, AssessOptions())
+    assert [f.joint for f in found.joints if f.allowance_in is not None] == [3]
+
+
+@pytest.mark.parametrize("unread", [(6, 7), (2,), (8, 9, 10), (1, 2, 4)])
+def test_the_search_knows_what_every_set_leaves_with_unread_joints_at_their_limit(
+    gear: Gear, unread: tuple[int, ...]
+) -> None:
+    joints = every_joint(0.001, j1=0.004, j3=0.009, j4=0.005, j5=0.006)
+    cases = Cases.of(gear, [inspected({j: value for j, value in joints.items() if j not in unread}, margin_in=0.045)])
+    upper = predict_batch(cases).upper
+    found = repair.search(cases, upper.displacement_in, upper.u_clearances_in)
+    sets = np.flatnonzero(np.isfinite(found.slack_in[0]))
+    now, n = cases.filled(gear.limits_in)[0], len(sets)
+    rows = np.where(found.table.members[sets], np.minimum(0.0005, now), now)
+    exact = predict(gear, cases.inspections * n, rows, np.repeat(cases.measured, n, axis=0), np.full(n, 0.0005))
+    slack = 0.045 - exact.displacement_in - 1.645 * exact.standard_uncertainty(np.zeros(n))
+    assert n >= 64
+    assert found.slack_in[0, sets] == pytest.approx(slack, abs=0.0005)

@@ -1,0 +1,248 @@
+"""What a real fleet departs in first, each in a small fleet whose departure is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot import load_gear
+from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension, diagnose, load_extension, save_extension
+from mlg_troubleshoot.diagnosis.causes.together import OtherGeometry
+from mlg_troubleshoot.diagnosis.scene import build_scene
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.errors import InconclusiveDataError
+from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
+from mlg_troubleshoot.gear.directions import worst_case, worst_of_sense
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.model import links_from
+
+from .conftest import Array, fleet
+
+FACTORS = np.array([0.9, 0.3, 0.95, -0.2, 0.6, 0.8, 0.5, 0.9, 0.2, 0.7])
+
+
+def as_loaded(gear: Gear, clearance_in: Array) -> Array:
+    """Displacement with each clearance in its share of the worst direction. [in]"""
+    directions = worst_case(gear.model, clearance_in).over_directions
+    return gear.model.displacement(links_from(FACTORS * clearance_in, directions))
+
+
+def loads(table: DiagnosisTable, over: Array) -> Array:
+    return as_loaded(load_gear(), table.clearance_in) - over
+
+
+def loads_and_a_gauge(table: DiagnosisTable, over: Array) -> Array:
+    return loads(table, over) + np.where(table.factors["gauge_id"] == "G-2", 0.004, 0.0)
+
+
+def one_technician_twice(table: DiagnosisTable) -> DiagnosisTable:
+    factor = np.where(table.factors["technician_id"] == "T-2", 2.0, 1.0)
+    return replace(table, clearance_in=table.clearance_in * factor[:, None])
+
+
+def worn_with_landings(gear: Gear) -> DiagnosisTable:
+    """A fleet with nothing wrong whose joints wear with landings, each gear's joint at a rate of its own."""
+    plain, rng = fleet(gear.model, rows=200), np.random.default_rng(11)
+    gears = np.unique(plain.gears, return_inverse=True)[1]
+    rate = 0.0014 * rng.lognormal(0.0, 0.4, (gears.max() + 1, 10))[gears]
+    kilo = plain.quantities["gear_landings"][:, None] / 1000.0
+    clearance = (0.0006 + rate * kilo) * rng.lognormal(0.0, 0.25, (200, 10))
+    return fleet(gear.model, rows=200, clearance_in=clearance, quantities=dict(plain.quantities))
+
+
+def unread(table: DiagnosisTable) -> DiagnosisTable:
+    values = table.clearance_in.copy()
+    values[:, [0, 5, 6, 7, 8, 9]] = np.nan
+    return replace(table, clearance_in=values)
+
+
+def worn_where_nobody_reads(gear: Gear) -> DiagnosisTable:
+    """One aircraft whose unread joints are worn much further than those of the others."""
+    table = unread(worn_with_landings(gear))
+    more = np.where(table.factors["tail_no"] == "N103", 0.012, 0.0)
+    return replace(table, readings_in=table.readings_in + more.reshape(-1, *[1] * (table.readings_in.ndim - 1)))
+
+
+def pressure_on_one_tail(table: DiagnosisTable, _over: Array) -> Array:
+    pressure = table.quantities["hydraulic_pressure_psi"]
+    return np.where(table.factors["tail_no"] == "N103", (3000.0 - pressure) / 1e5, 0.0)
+
+
+def on_another_linkage(member: int, worn_further: float = 1.0, all_further: float = 1.0) -> DiagnosisTable:
+    """A fleet whose linkage is a member of the ensemble; joint 4, or all of them, moves it further than was read."""
+    gear, factor = load_gear(), np.full(10, all_further)
+    factor[3] *= worn_further
+    other = gear.ensemble_models[1 + member]
+    return fleet(gear.model, lambda t, over: worst_case(other, factor * t.clearance_in).over_in - over, rows=200)
+
+
+FLEETS: dict[str, Callable[[Gear], DiagnosisTable]] = {
+    "nothing": lambda gear: fleet(gear.model, rows=200),
+    "loads": lambda gear: fleet(gear.model, loads, rows=200),
+    "loads and a gauge": lambda gear: fleet(gear.model, loads_and_a_gauge, rows=200),
+    "convention": lambda gear: one_technician_twice(fleet(gear.model, rows=200)),
+    "unread": lambda gear: unread(worn_with_landings(gear)),
+    "worn unread": worn_where_nobody_reads,
+    "oval on another linkage": lambda _gear: on_another_linkage(5, worn_further=1.5),
+    "a linkage that nobody calibrated": lambda _gear: on_another_linkage(2, all_further=1.7),
+    "all readings 1.7 times as large": lambda gear: fleet(gear.model, lambda _t, over: 0.7 * over, rows=200),
+    "one tail": lambda gear: fleet(gear.model, pressure_on_one_tail, rows=200),
+}
+
+
+@cache
+def found(name: str) -> Diagnosis:
+    """The diagnosis of one fleet, once for all tests of a worker."""
+    gear = load_gear()
+    return diagnose(
+        gear.model, FLEETS[name](gear), gear.discrepancies, ensemble=gear.ensemble_models[1:], permutations=99
+    )
+
+
+def named(name: str) -> set[tuple[str, str | None]]:
+    return {(c.candidate.cause.name, c.candidate.target) for c in found(name).causes}
+
+
+def test_directions_under_load_are_named() -> None:
+    assert named("loads") == {("load_directions", None)}
+
+
+def test_nothing_is_named_where_nothing_departs() -> None:
+    assert found("nothing").verdict == "NONE"
+
+
+def test_the_intervals_of_the_factors_hold_the_true_ones() -> None:
+    (cause,) = found("loads").causes
+    bands = [cause.interval_shown[f"factor_{joint}"] for joint in range(1, 11)]
+    assert sum(low <= true <= high for true, (low, high) in zip(FACTORS, bands, strict=True)) >= 8
+
+
+def test_the_factors_are_known_better_than_before_the_data() -> None:
+    (cause,) = found("loads").causes
+    low, high = cause.interval_shown["factor_2"]
+    assert high - low < 0.6
+
+
+def test_both_ends_of_a_link_may_count_only_together() -> None:
+    (cause,) = found("loads").causes
+    assert set(cause.candidate.setting["together"]) <= set(range(1, 11))
+
+
+def test_rows_of_other_tails_are_predicted_as_well_as_noise_allows() -> None:
+    gain = found("loads").gain
+    assert gain is not None
+    assert gain.rms_after_in < 1.3 * 0.0015 < 0.3 * gain.rms_before_in
+
+
+def test_a_gauge_that_reads_off_is_named_beside_the_directions() -> None:
+    assert named("loads and a gauge") == {("load_directions", None), ("gauge_bias", "gauge G-2")}
+
+
+def test_the_extension_predicts_the_plunger_as_loaded(gear: Gear) -> None:
+    table = FLEETS["loads"](gear)
+    extension = ModelExtension(gear, found("loads").terms, 0.002, ("ab",), 200)
+    (term,) = extension.terms
+    scene = build_scene(gear.model, table, gear.discrepancies).scene
+    moved = adjusted_worst_case(gear.model, term.candidate.cause.adjust(scene, term.candidate, term.value))
+    assert moved.over_in == pytest.approx(as_loaded(gear, scene.clearance_in), abs=0.003)
+    assert np.array_equal(moved.over_in, moved.under_in)
+
+
+def test_an_extension_as_loaded_comes_back_from_its_file(gear: Gear, tmp_path: Path) -> None:
+    save_extension(ModelExtension(gear, found("loads").terms, 0.002, ("ab",), 200, (6, 7)), tmp_path / "e.toml")
+    back = load_extension([tmp_path / "e.toml"], gear)
+    assert (dict(back.terms[0].candidate.setting), back.unread) == (
+        dict(found("loads").terms[0].candidate.setting),
+        (6, 7),
+    )
+
+
+def test_a_factor_of_minus_one_turns_the_displacement_round(gear: Gear) -> None:
+    clearance = np.zeros((1, 10))
+    clearance[0, 2] = 0.002
+    over, turned = (
+        adjusted_worst_case(gear.model, Adjustment(clearance, direction_factors=np.full(10, factor))).over_in[0]
+        for factor in (1.0, -1.0)
+    )
+    assert turned == pytest.approx(-over, rel=0.02)
+
+
+def test_a_table_of_the_other_sign_is_still_refused(gear: Gear) -> None:
+    turned = fleet(gear.model, lambda _t, over: -2.0 * over)
+    with pytest.raises(InconclusiveDataError, match="times the predicted"):
+        diagnose(gear.model, turned, gear.discrepancies, permutations=99)
+
+
+def test_a_linkage_that_does_not_close_with_what_was_read_is_not_the_gear_s(gear: Gear) -> None:
+    worn = fleet(gear.model)
+    worn.clearance_in[0] = 0.018
+    scene = build_scene(gear.model, worn, gear.discrepancies).scene
+    others = gear.ensemble_models[1:]
+    closing = [bool(np.isfinite(worst_of_sense(other, scene.clearance_in)[0]).all()) for other in others]
+    blocks = OtherGeometry().blocks(scene, others)
+    assert 0 < sum(closing) < len(others)
+    assert {b.columns.shape[1] for b in blocks} == {10 + sum(closing)}
+    assert all(np.isfinite(b.effects_in).all() for b in blocks)
+
+
+def test_a_technician_who_writes_the_other_convention_is_named() -> None:
+    assert named("convention") == {("convention_slip", "technician T-2")}
+
+
+def test_an_oval_bore_is_named_beside_another_linkage() -> None:
+    assert named("oval on another linkage") == {("oval_wear", "joint 4"), ("geometry", None)}
+
+
+def test_readings_beyond_the_bound_are_another_linkage_and_no_resting_place_of_pins() -> None:
+    (cause,) = found("a linkage that nobody calibrated").causes
+    assert (cause.candidate.cause.name, cause.aliases) == ("geometry", ())
+
+
+def test_a_scale_of_that_size_is_not_put_down_to_the_rate_alone() -> None:
+    assert ("calibration_rate", None) not in named("all readings 1.7 times as large")
+    possible = {c.candidate.cause.name for c in found("all readings 1.7 times as large").also_possible}
+    assert possible >= {"calibration_rate", "geometry"}
+
+
+def test_every_clearance_in_the_other_convention_is_listed_as_it_was_entered_and_as_it_is_used() -> None:
+    d = found("convention")
+    entered = np.where(d.used.factors["technician_id"] == "T-2", d.used.clearance_in.T, np.nan).T
+    read = np.argwhere(np.isfinite(entered))
+    assert [(c.place, c.column) for c in d.corrected] == [(i, f"clearance_{j + 1}_in") for i, j in read.tolist()]
+    shown = np.array([[c.value, c.suggested] for c in d.corrected], float)
+    assert shown == pytest.approx(entered[tuple(read.T)][:, None] / (1.0, 2.0), rel=1e-3)
+
+
+def test_nothing_is_corrected_where_no_convention_is_named() -> None:
+    assert found("loads").corrected == ()
+
+
+def test_a_convention_never_changes_a_prediction() -> None:
+    assert found("convention").terms == ()
+
+
+def test_joints_that_nobody_read_are_no_cause() -> None:
+    assert found("unread").verdict == "NONE"
+
+
+def test_an_aircraft_whose_unread_joints_may_be_worn_is_not_named_as_re_rigged() -> None:
+    assert not {name for name, _target in named("worn unread")} & {"rigging_offset", "unlisted_wear"}
+
+
+def test_joints_that_nobody_read_are_said_with_what_they_add() -> None:
+    d = found("unread")
+    assert d.unread == (1, 6, 7, 8, 9, 10)
+    assert 0.2 < d.unread_in / float(np.mean(d.predicted_in)) < 0.5
+    assert 0.0 < d.unread_u_in < d.unread_in
+
+
+def test_an_effect_of_one_tail_alone_is_unlisted_with_its_variable() -> None:
+    assert (found("one tail").verdict, set(found("one tail").unlisted_variables)) == (
+        "UNLISTED",
+        {"tail_no", "hydraulic_pressure_psi"},
+    )

@@ -1,0 +1,71 @@
+"""The cheap forms of the screen's algebra against the plain ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.diagnosis.covariance import NoiseModel
+from mlg_troubleshoot.diagnosis.screen import Screen
+
+from .conftest import Array
+
+RNG = np.random.default_rng(5)
+N = 60
+NOISE = NoiseModel(
+    relative=RNG.uniform(0.8, 1.5, N),
+    tails=np.arange(N) % 7,
+    gears=np.arange(N) % 14,
+    loadings=0.2 * RNG.standard_normal((N, 2)),
+    floor_in=0.0,
+    gear_ratio=0.3,
+    tail_ratios=(0.0, 0.4, 1.1),
+    scale_in=1.0,
+)
+
+
+def dense(ratio: float) -> Array:
+    """The covariance written out."""
+    low = NOISE.factors(ratio)
+    return np.asarray(np.diag(NOISE.relative**2) + low @ low.T)
+
+
+@pytest.mark.parametrize("ratio", NOISE.tail_ratios)
+def test_the_inverse_covariance_is_that_of_the_whole_matrix(ratio: float) -> None:
+    columns = RNG.standard_normal((N, 3))
+    product, log_determinant = NOISE.precision_times(columns, ratio)
+    assert product == pytest.approx(np.linalg.solve(dense(ratio), columns))
+    assert log_determinant == pytest.approx(np.linalg.slogdet(dense(ratio))[1])
+
+
+def likelihood(columns: Array, data: Array) -> float:
+    """Largest log-likelihood of a least-squares fit over the tail ratios, by the whole matrix."""
+    found = []
+    for ratio in NOISE.tail_ratios:
+        root = np.linalg.inv(np.linalg.cholesky(dense(ratio)))
+        left = root @ data
+        if columns.shape[1]:
+            left -= root @ columns @ np.linalg.lstsq(root @ columns, left, rcond=None)[0]
+        found.append(-0.5 * N * np.log(left @ left / N) - 0.5 * np.linalg.slogdet(dense(ratio))[1])
+    return float(max(found))
+
+
+def test_the_gain_of_a_candidate_beside_a_fixed_one_is_that_of_least_squares() -> None:
+    fixed, columns, data = RNG.standard_normal((N, 1)), RNG.standard_normal((N, 4)), RNG.standard_normal((N, 1))
+    gain = Screen(NOISE, columns, np.zeros(4), fixed).run(data).gain[:, 0]
+    both = [likelihood(np.column_stack([fixed, column]), data[:, 0]) for column in columns.T]
+    assert gain == pytest.approx(np.array(both) - likelihood(fixed, data[:, 0]), abs=1e-9)
+
+
+def test_the_largest_gain_is_that_of_all_candidates_less_their_penalties() -> None:
+    columns, sets = RNG.standard_normal((N, 6)), RNG.standard_normal((N, 20))
+    penalty = np.array([0.0, 1.5, 0.7, 1.5, np.inf, 0.0])
+    screen = Screen(NOISE, columns, np.array([0, 1, -1, 0, 0, 1]))
+    assert screen.largest(sets, penalty) == pytest.approx(np.max(screen.run(sets).gain - penalty[:, None], axis=0))
+
+
+@pytest.mark.parametrize(("sign", "explains"), [(0, True), (-1, True), (1, False)])
+def test_a_candidate_explains_nothing_with_a_sign_that_it_cannot_have(sign: int, explains: bool) -> None:
+    column = RNG.standard_normal((N, 1))
+    gain = Screen(NOISE, column, np.array([sign])).run(-column + 0.1 * RNG.standard_normal((N, 1))).gain[0, 0]
+    assert bool(gain > 1.0) is explains

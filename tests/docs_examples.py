@@ -1,0 +1,133 @@
+"""The examples and pictures of README.md and docs/: run, drawn, compared, and brought up to date.
+
+``python tests/docs_examples.py`` rewrites what the commands print and draws the pictures again (of pages that
+are named only those); ``test_docs.py`` fails while that would change anything.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+README = ROOT / "README.md"
+PAGES = (README, *sorted((ROOT / "docs").rglob("*.md")), ROOT / "inspection_data" / "README.md")
+PICTURES = ROOT / ".github" / "pictures"
+_BLOCK = re.compile(r"^```console\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+_PROMPT = "$ "
+_FONTS = "DejaVu Sans, Verdana, Segoe UI, sans-serif"
+
+
+@dataclass(frozen=True)
+class Session:
+    """One fenced console block: commands, each with what it prints."""
+
+    commands: tuple[str, ...]
+    printed: tuple[str, ...]
+
+    def written(self) -> str:
+        """The block as it stands in the README, without its fences."""
+        return "".join(f"{_PROMPT}{c}\n{p}" for c, p in zip(self.commands, self.printed, strict=True))
+
+
+def sessions(text: str) -> Iterator[tuple[re.Match[str], Session]]:
+    """Find every console block of a text."""
+    for match in _BLOCK.finditer(text):
+        parts = re.split(rf"^{re.escape(_PROMPT)}", match[1], flags=re.MULTILINE)[1:]
+        pairs = [part.partition("\n") for part in parts]
+        yield match, Session(tuple(p[0] for p in pairs), tuple(p[2] for p in pairs))
+
+
+def run(commands: tuple[str, ...], folder: Path) -> Session:
+    """Run the commands of a block one after the other in a shell, as a reader would; stderr is not shown."""
+    for name in ("inspection_data", "mlg_troubleshoot", "tests", "docs"):
+        if not (folder / name).exists():
+            (folder / name).symlink_to(ROOT / name)
+    here = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
+    mark = "-- end of a command --"
+    # Each command sees the exit code of the one before it, as at a prompt.
+    script = "\n".join(f"{command}\ncode=$?; printf '%s\\n' '{mark}'; (exit $code)" for command in commands)
+    done = subprocess.run(
+        ["bash", "-c", script],
+        cwd=folder,
+        env={**os.environ, "PATH": here, "TERM": "dumb", "COLUMNS": "110"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        encoding="utf-8",
+        check=False,
+    )
+    printed = ["\n".join(line.rstrip() for line in p.split("\n")) for p in done.stdout.split(f"{mark}\n")[:-1]]
+    return Session(commands, tuple(printed))
+
+
+def refreshed(text: str, folder: Path) -> str:
+    """The README with what its commands print today."""
+    pieces, end = [], 0
+    for match, session in sessions(text):
+        pieces += [text[end : match.start(1)], run(session.commands, folder).written()]
+        end = match.end(1)
+    return "".join((*pieces, text[end:]))
+
+
+def pictures() -> dict[str, str]:
+    """Draw the pictures of the README: the linkage of the published failure, and what its plunger does."""
+    from mlg_troubleshoot import ClearanceConvention, Inspection, Side, check, load_gear
+    from mlg_troubleshoot.reporting.inspection_figures import plunger_curve
+    from mlg_troubleshoot.reporting.schematic import schematic
+
+    gear = load_gear()
+    failure = {3: 0.013, 5: 0.007}
+    found = check(Inspection("PAPER-4.4", "not-stated", Side.LH, ClearanceConvention.RADIAL, failure), gear)
+    drawn = schematic(gear, found, width=900.0)
+    return {
+        "linkage.svg": _standing_alone(
+            [str(panel) for _plane, panel, _width in drawn.panels],
+            f"{gear.name}, linkage {gear.reference.name} at mid-position: {gear.provenance}. "
+            f"Arrows: worst-case clearances of the published failure, {drawn.exaggeration} times larger than life.",
+        ),
+        "plunger.svg": _standing_alone(
+            [str(plunger_curve(gear, found, width=620.0))],
+            "Plunger over the release stroke, nominal and with the clearances of the published failure.",
+        ),
+    }
+
+
+def _standing_alone(panels: list[str], caption: str) -> str:
+    """Set drawings side by side in a file of their own, with a caption below."""
+    sizes = [tuple(map(float, re.search(r'width="([\d.]+)" height="([\d.]+)"', p).groups())) for p in panels]  # type: ignore[union-attr]
+    gap, margin, below = 6.0, 12.0, 26.0
+    width = sum(w for w, _ in sizes) + gap * (len(sizes) - 1) + 2 * margin
+    height = max(h for _, h in sizes) + 2 * margin + below
+    parts, x = [], margin
+    for panel, (w, _) in zip(panels, sizes, strict=True):
+        parts.append(panel.replace("<svg ", f'<svg x="{x:g}" y="{margin:g}" ', 1))
+        x += w + gap
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" width="{width:g}" '
+        f'height="{height:g}" font-family="{_FONTS}" role="img">'
+        f'<rect width="100%" height="100%" fill="#ffffff"/>{"".join(parts)}'
+        f'<text x="{margin:g}" y="{height - margin:g}" font-size="11" fill="#3c4650">{caption}</text></svg>\n'
+    )
+
+
+def main() -> None:
+    """Bring the pages that are named, or all of them, and the pictures up to date."""
+    import tempfile
+
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    for name, drawing in pictures().items():
+        (PICTURES / name).write_text(drawing, encoding="utf-8")
+    wanted = [Path(name).resolve() for name in sys.argv[1:]] or PAGES
+    for page in wanted:
+        with tempfile.TemporaryDirectory() as folder:
+            page.write_text(refreshed(page.read_text(encoding="utf-8"), Path(folder)), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,246 @@
+"""A gear file is data: nothing in it runs, and what no gear can have is refused with its place."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+
+from mlg_troubleshoot.datafile import LONGEST_LINE, MOST_BYTES, read_json, read_toml
+from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.errors import GearFileError, MechanismError
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.geometry.intervals import Box
+from mlg_troubleshoot.geometry.kernel import numba_is_installed
+from mlg_troubleshoot.geometry.mechanism import Crank, Mechanism, Output, Plane, Point
+from mlg_troubleshoot.geometry.program import write_program
+from mlg_troubleshoot.reporting import ReportProvenance, inspection_document
+from mlg_troubleshoot.reporting.html import render
+from mlg_troubleshoot.studies.index_table import IndexTable
+from mlg_troubleshoot.studies.targets import load_targets, targets_file
+from mlg_troubleshoot.units import ClearanceConvention
+
+# Printable and short, so that no check of names keeps them from the generators.
+HOSTILE = (
+    "x = __import__('os')._exit(7)",
+    "0;__import__('os')._exit(7)",
+    "a\\nimport os;os._exit(7)",
+    "</text><script>alert(1)</script>",
+    '"onload="alert(1)',
+    "{{7*7}}{%raw%}",
+    "lambda:0",
+    "p0",
+    "t3",
+    "s",
+    "None",
+    "#",
+    "'''",
+)
+
+
+def renamed(value: Any, names: dict[str, str]) -> Any:
+    if isinstance(value, dict):
+        return {k: renamed(v, names) for k, v in value.items()}
+    if isinstance(value, list):
+        return [renamed(v, names) for v in value]
+    return names.get(value, value) if isinstance(value, str) else value
+
+
+@pytest.fixture(scope="module")
+def hostile(gear: Gear, tmp_path_factory: pytest.TempPathFactory) -> Gear:
+    """The shipped linkage, each of its points under a hostile name."""
+    raw = tomllib.loads(gear.path.read_text(encoding="utf-8"))
+    names = dict(zip([p["name"] for p in raw["points"]], HOSTILE, strict=True))
+    names |= {"sidestay": "<b>plane</b>", "locking pin": "<img src=x onerror=alert(1)>"}
+    for joint in raw["joints"]:
+        joint["point"] = names[str(joint["number"])]
+    del raw["diagnosis"], raw["ensemble"]
+    path = tmp_path_factory.mktemp("hostile") / "gear.toml"
+    path.write_text(tomli_w.dumps(renamed(raw, names)), encoding="utf-8")
+    return load_gear(path)
+
+
+def test_hostile_names_never_become_code_in_the_program(hostile: Gear, gear: Gear) -> None:
+    programs = [write_program(g.reference.mechanism) for g in (hostile, gear)]
+    assert programs[0].lines == programs[1].lines
+    assert programs[0].inputs == programs[1].inputs
+
+
+def test_a_linkage_with_hostile_names_moves_as_the_same_linkage_with_plain_names(hostile: Gear, gear: Gear) -> None:
+    assert hostile.model.plunger_amplification().tolist() == gear.model.plunger_amplification().tolist()
+    x = [list(m.model.kernel.positions(0.3, m.model.kernel.no_clearance()).values())[-1] for m in (hostile, gear)]
+    assert x[0] == x[1]
+
+
+def test_hostile_names_do_not_reach_the_formulas_on_ranges(hostile: Gear, gear: Gear) -> None:
+    box = Box(np.full((20, 1), -1e-4), np.full((20, 1), 1e-4))
+    ends = [g.model.kernel.enclose(0.4, box.variables()).value for g in (hostile, gear)]
+    assert [end.tolist() for end in ends[0]] == [end.tolist() for end in ends[1]]
+
+
+@pytest.mark.skipif(not numba_is_installed(), reason="without numba nothing is compiled")
+@pytest.mark.slow
+def test_hostile_names_do_not_reach_the_compiled_loop(hostile: Gear, gear: Gear) -> None:
+    clearance = np.full((10, 3), 0.001)
+    moved = [g.model.kernel.batch(0.6, clearance, np.zeros(10), compiled=True) for g in (hostile, gear)]
+    assert moved[0].tolist() == moved[1].tolist()
+
+
+def test_hostile_names_are_text_in_the_drawing_of_a_report(hostile: Gear, table: IndexTable) -> None:
+    gear = hostile
+    own = replace(table, geometry_sha256=gear.geometry_sha256, ensemble_sha256=gear.ensemble_sha256)
+    inspection = Inspection("R", "N1", Side.LH, ClearanceConvention.RADIAL, {3: 0.013, 5: 0.007})
+    (judged,) = assess([inspection], gear, own, AssessOptions())
+    told = ReportProvenance("1", datetime(2024, 5, 17, tzinfo=UTC), gear.geometry_sha256)
+    html = render(inspection_document(judged, gear, told), "A4")
+    assert "<script>" not in html
+    assert "<img" not in html
+    assert "<b>plane" not in html
+    assert "&lt;b&gt;plane&lt;/b&gt;" in html
+
+
+def test_two_numbers_that_names_make_alike_are_refused() -> None:
+    # The lengths a-b to c and a to b-c would both be called length.a-b-c.
+    points = [("a-b", 0.0, 0.0), ("c", 1.0, 0.0), ("a", 3.0, 0.0), ("b-c", 5.0, 0.0)]
+    text = {"planes": (Plane("base"),), "reference_input": 0.0, "output": Output("angle", "c", "a-b")}
+    parts = tuple(Point(n, "base", x, y, fixed=n in {"a-b", "a"}) for n, x, y in points)
+    with pytest.raises(MechanismError, match=r"Two numbers .* 'length.a-b-c'"):
+        write_program(Mechanism(points=parts, steps=(Crank("c", "a-b"), Crank("b-c", "a")), **text))
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["", " ", "x" * 41, "a\x00b", "a\x1b[31m", "a\nb", "a\u202eb", "a\u2066b", "a\u200bb", "\ud800", "a\ufffeb"],
+)
+def test_a_name_that_cannot_be_shown_as_it_is_is_refused(name: str) -> None:
+    with pytest.raises(MechanismError, match="cannot be the name of a part"):
+        Mechanism((Plane("base"),), (Point(name, "base", 0.0, 0.0, True),), (), Output("angle", name, name), 0.0)
+
+
+Edit = Callable[[str, str], Path]
+
+
+@pytest.fixture
+def edited(gear: Gear, tmp_path: Path) -> Edit:
+    def edit(old: str, new: str, file: str = "hawker-800xp.toml") -> Path:
+        for each in gear.path.parent.glob("hawker-800xp*"):
+            shutil.copy(each, tmp_path)
+        path = tmp_path / file
+        text = path.read_text(encoding="utf-8")
+        assert old in text
+        path.write_text(text.replace(old, new, 1), encoding="utf-8")
+        return tmp_path / "hawker-800xp.toml"
+
+    return edit
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            'name = "F"',
+            r'name = "F\u202e"',
+            r"points\[1\]\.name: expected a text .* all of them printable",
+        ),
+        ('name = "locking pin"', f'name = "{"p" * 41}"', r"joints\[2\]\.name: expected a name of 1 to 40"),
+        ('provenance = "', r'provenance = "\u001b[31m', r"provenance: expected a text .* printable"),
+        ('ensemble = "hawker', 'ensemble = "../hawker', r"ensemble: expected the name of a file beside"),
+        ('ensemble = "hawker-800xp-ensemble.toml"', 'ensemble = ""', r"ensemble: expected the name of a file beside"),
+        ('indices = "hawker', 'indices = "/etc/hawker', r"indices: expected the name of a file beside"),
+        ('indices = "hawker', r'indices = "a\\hawker', r"indices: expected the name of a file beside"),
+        ("at = [-1.8, -11.85]", "at = [1e308, -11.85]", r"points\[F\]\.at: expected two numbers"),
+        ("at = [-1.8, -11.85]", "at = [1e5, -11.85]", r"points\[F\]\.at: expected two numbers from -10000 to 10000"),
+        ("at = [-1.8, -11.85]", f"at = [1{'0' * 400}, 1]", r"points\[F\]\.at: expected two numbers"),
+        ("range = [0.0, 0.687]", "range = [0.687, 0.687]", r"input\.range: expected two different numbers"),
+        ("dihedral_deg = 48.92", "dihedral_deg = 1e9", r"dihedral_deg: expected a number from -720 to 720"),
+        ("access_min = 15", "access_min = 1e9", r"access_min: expected a number of 0 or more, at most 100000"),
+        ("virtual_link = 4", "virtual_link = -4", r"virtual_link: expected a whole number from 1 to 999"),
+        ("virtual_links = [1]", "virtual_links = [-1]", r"virtual_links: expected whole numbers from 1 to 999"),
+        ("virtual_links = [1]", "virtual_links = [true]", r"virtual_links: expected a list of whole numbers"),
+        ("number = 1\n", f"number = {10**30}\n", r"number: expected a whole number, found a number of 100 bits"),
+        ("[0.01, 0.05]", "[0.05, 0.01]", r"down_lock_range: expected two numbers, the smaller one first"),
+        ("schema = 1", "schema = 1\nx = " + "[" * 5000 + "]" * 5000, r"nested more than 24 deep|a line has"),
+        ("schema = 1", "schema = 1\nx = " + "[\n" * 5000 + "]" * 5000, r"nested more than 24 deep"),
+        ("schema = 1", "schema = 1\nx = " + "{a=" * 30 + "1" + "}" * 30, r"nested more than 24 deep"),
+        ("schema = 1", "schema = 1\n" + "a." * LONGEST_LINE + "a = 1", r"a line has \d+ characters"),
+        ("schema = 1", "schema = 1\n# " + "x\n# " * MOST_BYTES, r"at most 2000000 are read"),
+        ("schema = 1", "schema = 1" + "\n[[steps]]" * 300, r"steps: expected at most 200 entries"),
+        ("schema = 1", "schema = 1\nseen = 2024-01-01", r"seen: expected a known key"),
+    ],
+)
+def test_what_no_gear_can_have_is_refused_with_file_key_and_expectation(
+    edited: Edit, old: str, new: str, words: str
+) -> None:
+    began = time.monotonic()
+    with pytest.raises(GearFileError, match=words) as caught:
+        load_gear(edited(old, new))
+    assert "hawker-800xp.toml" in caught.value.message
+    assert time.monotonic() - began < 5.0
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "words"),
+    [
+        (
+            "ensemble",
+            "reference = 0.576",
+            "reference = true",
+            r"ensemble\.toml: members\.B\.reference: expected a number",
+        ),
+        ("ensemble", "dihedral_deg = 48.656", "dihedral_deg = nan", r"dihedral_deg: expected a number, found nan"),
+        ("ensemble", '"F" = [-1.243', '"F" = [inf', r"members\.B\.points\.F: expected two numbers"),
+        ("ensemble", "[members.B]", r'[members."B\u202e"]', r"expected a name of 1 to 40 printable"),
+        ("ensemble", "dihedral_deg = 48.656", "dihedral_deg = 1e6", r"expected a number from -720 to 720"),
+        ("targets", "value = 0.0472", "value = nan", r"targets\.toml: targets\[1\]\.value: expected a number"),
+        ("targets", "{ 3 = 0.013", "{ 3 = true", r"clearance_in\.3: expected a number"),
+        ("targets", "{ 3 = 0.013", '{ "²" = 0.013', r"clearance_in\.²: expected the number of a joint"),
+        ("targets", "{ 3 = 0.013", "{ 3 = -0.013", r"clearance_in\.3: expected a number from 0 to 1"),
+    ],
+)
+def test_numbers_of_the_ensemble_and_of_the_targets_are_judged_likewise(
+    edited: Edit, file: str, old: str, new: str, words: str
+) -> None:
+    path = edited(old, new, f"hawker-800xp-{file}.toml")  # type: ignore[call-arg]
+    with pytest.raises(GearFileError, match=words):
+        load_targets(targets_file(load_gear(path)))
+
+
+@pytest.mark.parametrize("text", ["[" * 5000 + "]" * 5000, '{"a": ' * 5000 + "1" + "}" * 5000, "1" * 5000, "[]", "3"])
+def test_a_json_file_that_is_too_deep_or_no_table_is_refused(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "x.json"
+    file.write_text(text)
+    with pytest.raises(GearFileError, match=r"x\.json: (cannot be read as JSON|expected names)"):
+        read_json(file, "")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_a_pipe_in_place_of_a_gear_file_is_refused_and_not_waited_for(tmp_path: Path) -> None:
+    pipe = tmp_path / "gear.toml"
+    os.mkfifo(pipe)
+    with pytest.raises(GearFileError, match="is no regular file"):
+        load_gear(pipe)
+
+
+def test_a_folder_in_place_of_a_gear_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(GearFileError, match="is no regular file"):
+        read_toml(tmp_path)
+
+
+def test_code_in_place_of_a_name_does_not_run(edited: Edit, tmp_path: Path) -> None:
+    mark = tmp_path / "ran"
+    path = edited('joint = "10"\nupstream', f"joint = \"0\\nopen({str(mark)!r},'w')\"\nupstream")
+    with pytest.raises(GearFileError, match=r"steps\[10\]\.joint|expected a name of 1 to 40"):
+        _ = load_gear(path).model
+    assert not mark.exists()

@@ -1,0 +1,79 @@
+"""The committed result of the departures' fleets, and what its lines count."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.hidden_effect.departures import LINES, RESULT, markdown, run, summarise
+
+COMMITTED: dict[str, Any] = json.loads(RESULT.read_text(encoding="utf-8"))
+
+
+def record(group: str, named: list[list[str | None]], truth: list[list[str | None]], **more: Any) -> dict[str, Any]:
+    nothing = {"verdict": "NAMED" if named else "NONE", "class": [], "also": [], "before": 0.002, "after": 0.001}
+    return {"group": group, "named": named, "truth": truth, "regression": None, **nothing, **more}
+
+
+def rate(line: str, *records: dict[str, Any]) -> float:
+    return float(summarise(list(records))["lines"][line]["rate"])
+
+
+def test_the_figures_show_the_table_of_the_committed_result() -> None:
+    figures = (Path(__file__).parents[2] / "docs/reference/figures.md").read_text(encoding="utf-8")
+    assert markdown(COMMITTED) in figures
+
+
+def test_every_line_of_the_committed_result_says_on_how_many_fleets() -> None:
+    assert set(COMMITTED["lines"]) == set(LINES)
+    assert all(rate["n"] > 0 and rate["low"] <= rate["rate"] <= rate["high"] for rate in COMMITTED["lines"].values())
+    assert COMMITTED["fleets"] == sum(COMMITTED["of_each"].values())
+
+
+@pytest.mark.parametrize(
+    ("named", "of_class", "false"),
+    [
+        ([["geometry", None]], [], 0.0),
+        ([["load_directions", None]], ["geometry"], 0.0),
+        ([["load_directions", None]], [], 1.0),
+        ([["oval_wear", "joint 3"]], [], 1.0),
+        ([], [], 0.0),
+    ],
+)
+def test_on_another_linkage_only_the_linkage_or_its_class_is_there(
+    named: list[list[str | None]], of_class: list[str], false: float
+) -> None:
+    one = record("linkage, nothing hidden", named, [], **{"class": of_class})
+    assert rate("another linkage, nothing hidden: a cause named that is not there", one) == false
+
+
+def test_a_hidden_cause_counts_as_named_with_the_linkage_beside_it_but_not_with_another_target() -> None:
+    truth: list[list[str | None]] = [["gauge_bias", "gauge G-1"]]
+    right = record("linkage, one cause", [*truth, ["geometry", None]], truth)
+    wrong = record("linkage, one cause", [["gauge_bias", "gauge G-2"]], truth)
+    assert rate("another linkage, one cause, S = 15: named, geometry beside it or not", right, wrong) == 0.5
+
+
+def test_directions_are_asked_for_only_where_a_regression_beats_one_scale() -> None:
+    loads: list[list[str | None]] = [["load_directions", None]]
+    line = "load directions, spread 40°: named (or their class), where a regression beats one scale"
+    told, dull = (record("loads:40", named, loads, beats=bool(named)) for named in (loads, []))
+    assert rate(line, told, dull) == 1.0
+
+
+def test_a_table_that_is_refused_counts_as_not_named() -> None:
+    refused = record("convention", [], [["?", None]], verdict="INCONCLUSIVE")
+    assert rate("other convention of 8 rows and more: named with its target", refused) == 0.0
+
+
+def test_on_another_linkage_a_cause_is_named_although_a_single_joint_would_explain_the_rest() -> None:
+    one = run(("linkage, one cause", 26, 3_400_026))
+    assert rate("another linkage, one cause, S = 15: named, geometry beside it or not", one) == 1.0
+
+
+def test_a_pin_that_rests_far_off_its_worst_direction_is_not_named_beside_another_linkage() -> None:
+    one = run(("loads:40", 27, 34_400_027))
+    assert rate("load directions: something else named", one) == 0.0

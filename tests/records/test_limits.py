@@ -1,0 +1,185 @@
+"""What is refused before it can cost time or memory, and texts that no file can carry."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import random
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import openpyxl
+import pytest
+
+from mlg_troubleshoot import datafile
+from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.records import (
+    ReadOptions,
+    annotate_workbook,
+    cells,
+    csvfile,
+    read,
+    read_inspections,
+    read_many,
+    xls,
+    zipguard,
+)
+from mlg_troubleshoot.reporting import pdf
+
+HEADER = "record_id,tail_no,side,clearance_convention,clearance_3_in,clearance_5_in\n"
+GOOD = "R1,N1,LH,RADIAL,0.013,0.007\n"
+_READ = """
+import sys, time
+from mlg_troubleshoot.records import ReadOptions, read_inspections
+made = {"blank lines": b"\\n" * 60_000_000, "blank lines below": sys.stdin.buffer.read() + b"\\r\\n" * 9_000_000,
+        "commas": b"," * 100_000_000, "commas below": sys.stdin.buffer.read() + b"," * 20_000_000,
+        "one line": b"x" * 24_000_000, "wide letters": "\\U0001f600".encode() * 6_000_000,
+        "stray quotes": sys.stdin.buffer.read() + (b'R,"N1' + b",LH" * 30 + b"\\n") * 90_000}[sys.argv[1]]
+import io
+start = time.process_time()
+found = read_inspections(io.BytesIO(made), ReadOptions(), name="t.csv")
+peak = int(open("/proc/self/status").read().split("VmHWM:")[1].split()[0])  # what rusage gives is the parent's, too
+print(len(found.problems), time.process_time() - start, peak / 1000)
+"""
+
+
+@pytest.mark.parametrize(
+    "made", ["blank lines", "blank lines below", "commas", "commas below", "one line", "wide letters"]
+)
+def test_a_monster_is_refused_within_10_s_and_500_mb(made: str) -> None:
+    run = [sys.executable, "-c", _READ, made]
+    done = subprocess.run(run, input=(HEADER + GOOD).encode(), capture_output=True, check=True)
+    problems, seconds, megabytes = map(float, done.stdout.split())
+    assert problems
+    assert seconds < 10
+    assert megabytes < 500
+
+
+@pytest.mark.slow
+def test_a_stray_quotation_mark_in_every_row_is_named_within_10_s() -> None:
+    run = [sys.executable, "-c", _READ, "stray quotes"]
+    done = subprocess.run(run, input=HEADER.encode(), capture_output=True, check=True)
+    problems, seconds, _ = map(float, done.stdout.split())
+    assert problems >= 1
+    assert seconds < 10
+
+
+@pytest.fixture
+def fifo(tmp_path: Path) -> Path:
+    os.mkfifo(tmp_path / "pipe.csv")
+    return tmp_path / "pipe.csv"
+
+
+def test_a_pipe_is_refused_as_argument_and_in_a_folder(fifo: Path) -> None:
+    (fifo.parent / "good.csv").write_text(HEADER + GOOD)
+    for source in (fifo, fifo.parent, Path("/dev/zero")):
+        result = read_many([source], ReadOptions())
+        assert [(p.code, p.value) for p in result.problems] == [("file_kind", "a pipe or a device")]
+    assert len(read_many([fifo.parent], ReadOptions()).inspections) == 1
+
+
+def test_endless_standard_input_is_refused_and_not_read_to_its_end() -> None:
+    with Path("/dev/zero").open("rb") as endless:
+        run = [sys.executable, "-m", "mlg_troubleshoot", "check", "-", "--json"]
+        done = subprocess.run(run, stdin=endless, capture_output=True, check=False, timeout=60)
+    assert done.returncode == 3
+    assert [p["code"] for p in json.loads(done.stdout)["problems"]] == ["file_too_large"]
+
+
+STRANGE = ["\ufffe", "\x01", "\uffff"]
+
+
+@pytest.mark.parametrize("character", STRANGE)
+@pytest.mark.parametrize("column", ["record_id", "tail_no", "remarks", "gauge_id"])
+def test_a_character_that_no_file_can_carry_is_a_named_problem(character: str, column: str) -> None:
+    header = [*HEADER.strip().split(","), "gauge_id", "remarks"]
+    cells = [*GOOD.strip().split(","), "G", "fine"]
+    cells[header.index(column)] = f"A{character}B"
+    data = (",".join(header) + "\n" + ",".join(cells) + "\n").encode()
+    (problem,) = read_inspections(io.BytesIO(data), ReadOptions(), name="t.csv").problems
+    assert problem.column == column
+    assert problem.value is not None
+    assert problem.value.isprintable()
+
+
+def test_a_column_of_the_user_s_own_keeps_such_a_character_visible() -> None:
+    data = (HEADER.strip() + ",tool\ufffebox\n" + GOOD.strip() + ",re\ufffed\n").encode()
+    (row,) = read_inspections(io.BytesIO(data), ReadOptions(), name="t.csv").rows
+    assert isinstance(row, Inspection)
+    assert dict(row.carried) == {"tool\\xfffebox": "re\\xfffed"}
+
+
+@pytest.mark.parametrize("escape", ["_xD800_", "_xFFFE_", "_x0001_"])
+@pytest.mark.parametrize("place", ["A2", "B2", "G1", "G2", "A3"])
+def test_such_a_character_in_a_workbook_leaves_json_and_annotated_copy_whole(tmp_path, xlsx, escape, place):
+    def change(book):
+        sheet = book.worksheets[0]
+        sheet["G1"], sheet["G2"] = "tool box", "red"
+        sheet[place] = f"A{escape}B"
+
+    source, out = tmp_path / "in.xlsx", tmp_path / "out.xlsx"
+    source.write_bytes(xlsx(change=change))
+    result = read_many([source], ReadOptions())
+    json.dumps([str(result.rows), *(p.as_dict() for p in result.problems)], ensure_ascii=False).encode("utf-8")
+    annotate_workbook(source, out, result, {row.source: {"verdict": "X"} for row in result.rows})
+    assert openpyxl.load_workbook(out).worksheets[0]["B1"].value == "tail_no"
+
+
+def test_a_file_name_that_is_no_text_is_shown_in_a_way_that_every_output_can_carry(tmp_path: Path) -> None:
+    name = os.fsencode(tmp_path) + b"/a\xff.csv"
+    Path(os.fsdecode(name)).write_text(HEADER + GOOD)
+    result = read_many([Path(os.fsdecode(name))], ReadOptions())
+    assert result.files[0].name.endswith("a\\xdcff.csv")
+    result.files[0].name.encode("utf-8")
+
+
+def test_a_comment_full_of_the_names_of_elements_costs_no_time(read, package):
+    comment = "<!--" + "<mergeCell " * 60_000 + "-->"
+    start = time.process_time()
+    result = read(
+        package(after=comment, sheet_data='<row r="1"><c r="A1" t="inlineStr"><is><t>x</t></is></c></row>'), "t.xlsx"
+    )
+    assert result.problems
+    assert time.process_time() - start < 5
+
+
+def test_the_page_on_trust_states_the_limits_that_hold() -> None:
+    page = (Path(__file__).parents[2] / "docs/explanation/trust.md").read_text(encoding="utf-8")
+    stated = [
+        f"| {read.MAX_FILE_BYTES // 10**6} MB |",
+        f"{csvfile._MAX_BYTES // 10**6} MB, {csvfile._MAX_LINES:,} lines, {csvfile._MAX_LINE_CHARACTERS:,} characters",
+        f"{csvfile._MAX_FIELDS:,} separators",
+        f"{csvfile._MAX_FIELD_LINES} lines |",
+        f"(.xls) | {xls.MAX_BYTES // 10**6} MB |",
+        f"{zipguard.MAX_EXPANDED_BYTES // 10**6} MB unpacked, {zipguard.MAX_RATIO} times",
+        f"{zipguard.MAX_MEMBERS:,} parts",
+        f"{zipguard.MAX_OPEN_BYTES // 10**6} MB of its XML; {zipguard.MAX_ITEMS:,} rows, texts or merged ranges",
+        f"{cells.MAX_ROWS:,} rows × {cells.MAX_COLUMNS} columns",
+        f"{datafile.MOST_BYTES // 10**6} MB, {datafile.LONGEST_LINE:,} characters a line, {datafile.DEEPEST} levels",
+        f"{datafile.LONGEST_NAME} printable characters",
+        f"{pdf.TIME_LIMIT_S:.0f} s",
+    ]
+    assert [limit for limit in stated if limit not in page] == []
+
+
+@pytest.mark.parametrize(
+    ("before", "repeated", "count"),
+    [
+        ('<row r="1">', "<c/>", 600_000),
+        pytest.param("", "<a>", 800_000, marks=pytest.mark.slow),
+        ('<row r="1"><c r="A1" t="inlineStr"><is><t>', "x" * 60, 50_000),
+        pytest.param("", "<row/>", 1_100_000, marks=pytest.mark.slow),
+    ],
+)
+def test_what_would_pile_up_while_a_sheet_is_read_is_refused_within_10_s(read, package, before, repeated, count):
+    # The comment keeps the part below the limit of its packing.
+    noise = f"<!--{random.Random(1).randbytes(60_000).hex()}-->"
+    data = package(noise + before + repeated * count)
+    start = time.process_time()
+    (problem,) = read(data, "t.xlsx").problems
+    assert problem.code == "file_too_large"
+    assert "rows or texts" in problem.value or "one row or text" in problem.value
+    assert time.process_time() - start < 10

@@ -1,0 +1,159 @@
+"""One value, four ways in: a cell, a flag, a prompt answer and Python give one result, one warning and one refusal."""
+
+from __future__ import annotations
+
+import io
+import math
+from dataclasses import dataclass, replace
+
+import pytest
+
+from mlg_troubleshoot import Inspection, Side, TroubleshootError, check
+from mlg_troubleshoot.cli.by_hand import Flags, from_flags
+from mlg_troubleshoot.cli.prompts.answers import Answers, JointAnswer, Judgement, judge
+from mlg_troubleshoot.cli.prompts.more import read_more
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.records import ReadOptions, judge_again, read_inspections
+from mlg_troubleshoot.units import ClearanceConvention as Convention
+from mlg_troubleshoot.units import LengthUnit
+
+VALUES = (
+    *("0", "0.0", ".013", "0.013", "0.013 in", "13 thou", "0.33 mm", '.007"', "0.381 mm", "15 thou", "0.015", "0.0151"),
+    *("0.02in", "0.05", "0.0501", "0.33", "13", "1.3e-2", "+0.004", "-0.013", "\u22120.013", "0,013", "1/64", "nan"),
+    *("inf", "1e309", "0.013 cm", "x", "0.0.13", "50 thou", "51 thou", "1.27 mm"),
+)
+MARGINS = ("0.03", "0.2in", "0.3in", "0", "-0.03", "0.762 mm")
+NUMBERS = (0.0, 0.013, 0.015, 0.0151, 0.05, 0.0501, 0.33, -0.013, math.nan, math.inf, 13.0)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What came of a value: its radial inches, the margin and the warnings, or the words of the refusal."""
+
+    radial_in: float | None = None
+    margin_in: float | None = None
+    warnings: tuple[str, ...] = ()
+    refused: str = ""
+
+
+def by_cell(gear: Gear, value: object, margin: str, convention: Convention) -> Found:
+    name = "margin" if isinstance(value, str) else "margin_in"
+    clearance = "clearance_3" if isinstance(value, str) else "clearance_3_in"
+    text = f"record_id\ttail_no\tside\t{clearance}\t{name}\nR1\tN1\tLH\t{str(value).replace(chr(34), chr(34) * 4)}"
+    if '"' in str(value):
+        text = text.replace(str(value).replace('"', '""""'), f'"{str(value).replace(chr(34), chr(34) * 2)}"')
+    data = io.BytesIO(f"{text}\t{margin}\n".encode())
+    options = ReadOptions.of(gear, unit=LengthUnit.INCH, convention=convention)
+    result = read_inspections(data, options, name="t.csv")
+    (row,) = result.rows
+    if isinstance(row, Inspection):
+        return Found(row.clearance_in[3], row.margin_in, row.warnings)
+    return Found(refused=" ".join(f"{p.expected} {p.remedy}" for p in result.problems))
+
+
+def by_flag(gear: Gear, value: str, margin: str, convention: Convention) -> Found:
+    flags = Flags((f"3={value}",), "N1", "LH", "R1", None, None, margin, LengthUnit.INCH, convention)
+    try:
+        row = from_flags(flags, gear)
+    except UsageError as error:
+        return Found(refused=words(error))
+    return Found(row.clearance_in[3], row.margin_in, row.warnings)
+
+
+def words(error: TroubleshootError) -> str:
+    """Return a refusal as expectation and remedy, without the name of what was refused."""
+    expected = [part.partition("expected ")[2] for part in error.message.split("; --")]
+    return " ".join([*expected, error.remedy])
+
+
+def by_prompt(gear: Gear, value: str, margin: str, convention: Convention) -> Found:
+    judged = judge(value, 3, LengthUnit.INCH, convention, gear)
+    refused = [judged.said.removeprefix("expected ").replace(". ", " ", 1)]
+    answers = Answers(tail_no="N1", side=Side.LH, unit=LengthUnit.INCH, convention=convention)
+    try:
+        answers, _ = read_more(answers, f"m {margin}", gear)
+        refused = refused if judged.judgement is Judgement.REFUSE else []
+    except UsageError as error:
+        refused = [*(refused if judged.judgement is Judgement.REFUSE else []), words(error)]
+    if refused:
+        return Found(refused=" ".join(refused))
+    assert judged.written is not None
+    answers = answers.with_joint(3, JointAnswer(judged.written))
+    row = answers.inspection(gear, "R1")
+    assert (judged.judgement is Judgement.CONFIRM) == bool(row.warnings)
+    return Found(row.clearance_in[3], row.margin_in, row.warnings)
+
+
+def said(found: Found) -> set[str]:
+    return set(found.refused.replace(".", "").split())
+
+
+@pytest.mark.parametrize("value", VALUES)
+def test_a_value_gives_the_same_as_a_cell_a_flag_and_a_prompt_answer(gear: Gear, value: str) -> None:
+    for convention in (Convention.RADIAL, Convention.TOTAL_PLAY):
+        for margin in MARGINS:
+            cell = by_cell(gear, value, margin, convention)
+            for other in (by_flag(gear, value, margin, convention), by_prompt(gear, value, margin, convention)):
+                assert replace(other, refused="") == replace(cell, refused="")
+                assert said(other) == said(cell)
+
+
+@pytest.mark.parametrize("value", NUMBERS)
+@pytest.mark.parametrize("convention", Convention)
+def test_a_number_gives_the_same_in_python_as_in_a_cell(gear: Gear, value: float, convention: Convention) -> None:
+    cell = by_cell(gear, value, "0.03", convention)
+    given = Inspection("R1", "N1", Side.LH, convention, {3: value}, margin_in=0.03)
+    try:
+        row = judge_again(given, ReadOptions.of(gear))
+        found = Found(row.clearance_in[3], row.margin_in, row.warnings)
+    except TroubleshootError as error:
+        found = Found(refused=words(error))
+    assert replace(found, refused="") == replace(cell, refused="")
+    assert said(found) == said(cell)
+
+
+def test_the_list_holds_values_that_are_taken_warned_of_and_refused(gear: Gear) -> None:
+    found = [by_cell(gear, value, "0.03", Convention.RADIAL) for value in VALUES]
+    assert sum(bool(f.refused) for f in found) >= 10
+    assert sum(bool(f.warnings) for f in found) >= 4
+    assert sum(f.radial_in is not None and not f.warnings for f in found) >= 10
+
+
+def test_python_reads_total_play_as_a_table_does(gear: Gear) -> None:
+    radial = check(Inspection("R1", "N1", Side.LH, Convention.RADIAL, {3: 0.013, 5: 0.007}), gear, advice=False)
+    play = check(Inspection("R1", "N1", Side.LH, Convention.TOTAL_PLAY, {3: 0.026, 5: 0.014}), gear, advice=False)
+    assert play.predicted_displacement_in == radial.predicted_displacement_in
+
+
+def test_an_inspection_that_was_judged_is_not_halved_again(gear: Gear) -> None:
+    options = ReadOptions.of(gear)
+    given = Inspection(
+        "R1", "N1", Side.LH, Convention.TOTAL_PLAY, {3: 0.026}, gauge_u_in=0.002, gauge_u_by_joint_in={3: 0.001}
+    )
+    once = judge_again(given, options)
+    assert (once.clearance_in, once.gauge_u_in, once.gauge_u_of(3)) == ({3: 0.013}, 0.001, 0.0005)
+    assert judge_again(once, options) == once
+
+
+@pytest.mark.parametrize("joint", [11, 0, -1, "3", 3.5])
+def test_a_joint_that_the_gear_lacks_is_refused_in_python(gear: Gear, joint: object) -> None:
+    with pytest.raises(TroubleshootError, match="a joint from 1 to 10"):
+        check(Inspection("R1", "N1", Side.LH, Convention.RADIAL, {joint: 0.01}), gear)  # type: ignore[dict-item]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("tail_no", " ", "tail number"),
+        ("side", "UP", "LH or RH"),
+        ("margin_in", 0.3, "a margin above 0 and up to 0.2 in"),
+        ("readings_in", (0.02, 0.6), "plunger displacement from -0.5 to 0.5 in"),
+        ("temperature_c", 61, "-60 to 60"),
+        ("gauge_u_by_joint_in", {3: 0.0}, "a gauge u above 0"),
+    ],
+)
+def test_whatever_a_table_would_refuse_is_refused_in_python(gear: Gear, name: str, value: object, words: str) -> None:
+    good = Inspection("R1", "N1", Side.LH, Convention.RADIAL, {3: 0.01})
+    with pytest.raises(TroubleshootError, match=words):
+        check(replace(good, **{name: value}), gear)  # type: ignore[arg-type]

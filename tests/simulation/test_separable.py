@@ -1,0 +1,65 @@
+"""``mlg gear separable``: what planned columns could tell apart, before anything is measured."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+
+import pytest
+from typer.testing import CliRunner
+
+from mlg_troubleshoot.cli.app import app
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.workflows.separable import CausePlanned, separable
+
+TWO_JOINTS = ("tail_no", "side", "clearance_3_in", "clearance_5_in")
+
+
+@cache
+def planned(*columns: str) -> dict[tuple[str, str | None], CausePlanned]:
+    return {(cause.cause, cause.target): cause for cause in separable(columns=columns or None)}
+
+
+def test_contact_of_the_only_joints_that_are_read_looks_like_a_wrong_rate_unless_it_is_large() -> None:
+    contact = planned(*TWO_JOINTS)["joint_contact", "joints 3,5"]
+    assert contact.nearest == "calibration_rate"
+    assert contact.found_from_in is not None
+    assert contact.told_apart_from_in is None or contact.told_apart_from_in > 5.0 * contact.found_from_in
+
+
+def test_the_cheapest_column_that_splits_them_is_one_more_clearance_which_does_split_them() -> None:
+    further = planned(*TWO_JOINTS)["joint_contact", "joints 3,5"].further_column
+    assert further is not None
+    assert further.startswith("clearance_")
+    assert planned(*TWO_JOINTS, further)["joint_contact", "joints 3,5"].told_apart_from_in is not None
+
+
+def test_a_cause_whose_column_is_not_planned_says_which() -> None:
+    pressure = planned(*TWO_JOINTS)["elastic_compliance", None]
+    assert pressure.missing_column == "hydraulic_pressure_psi"
+    assert pressure.found_from_in is None
+
+
+def test_causes_that_physics_lets_push_apart_only_are_no_rivals() -> None:
+    oval = planned(*TWO_JOINTS)["oval_wear", "joint 3"]
+    assert oval.nearest != "direction_not_worst_case joint 3"
+    assert oval.told_apart_from_in is not None
+
+
+def test_what_is_told_apart_is_no_smaller_than_what_is_found() -> None:
+    for cause in planned(*TWO_JOINTS).values():
+        if cause.told_apart_from_in is not None:
+            assert cause.found_from_in is not None
+            assert cause.told_apart_from_in >= cause.found_from_in > 0.0
+
+
+def test_a_column_that_no_table_has_is_refused() -> None:
+    with pytest.raises(UsageError, match="oil_colour is no column"):
+        separable(columns=["oil_colour"])
+
+
+def test_the_command_writes_json_and_names_what_it_cannot_test() -> None:
+    told = CliRunner().invoke(app, ["gear", "separable", "--columns", ",".join(TWO_JOINTS), "--json"])
+    assert told.exit_code == 0
+    causes = json.loads(told.stdout)["causes"]
+    assert {c["missing_column"] for c in causes if c["cause"] == "thermal_growth"} == {"temperature_c"}

@@ -1,0 +1,186 @@
+"""The store: nothing lost, nothing twice, nothing changed unseen."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.store import Kind, Record, Store, StoreError, inspection_from, inspection_record, same_inspection
+
+from . import places
+
+OLD = Path(__file__).parent / "data"
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    return tmp_path / "folder" / "store.sqlite"
+
+
+@pytest.fixture
+def store(place: Path) -> Store:
+    found = Store(place)
+    found.add(places.records(1, 6))
+    return found
+
+
+def test_an_inspection_comes_back_as_it_was_kept(store: Store) -> None:
+    assert inspection_from(store.all(Kind.INSPECTION)[2]) == places.inspection(3)
+
+
+def test_the_same_inspection_twice_is_one(store: Store) -> None:
+    again = store.add(places.records(1, 8), same_inspection)
+    assert (again.new, again.known) == (4, 10)
+
+
+def test_the_same_inspection_from_another_file_is_the_same(store: Store) -> None:
+    moved = replace(places.inspection(2), source=places.RowSource("other.xlsx", "Sheet", 9), warnings=("seen",))
+    assert store.add([inspection_record(moved)], same_inspection).new == 0
+
+
+def test_the_same_identity_with_other_content_is_refused_and_nothing_of_the_call_is_kept(store: Store) -> None:
+    other = [*places.records(20, 22), inspection_record(places.inspection(3, clearance_in=0.009))]
+    with pytest.raises(StoreError, match=r"R3 \(N3 LH 2026-01-04\).*nothing of this was kept"):
+        store.add(other, lambda kept, new: new.kind is not Kind.INSPECTION or same_inspection(kept, new))
+    assert len(store.all()) == 10
+
+
+def test_an_empty_file_is_an_empty_store(tmp_path: Path) -> None:
+    (tmp_path / "empty").touch()
+    assert Store(tmp_path / "empty").all() == []
+    Store(tmp_path / "empty").add(places.records(1, 2))
+    assert len(Store(tmp_path / "empty").all()) == 2
+
+
+def test_reading_makes_no_file(place: Path) -> None:
+    assert Store(place).gears() == []
+    assert not place.exists()
+
+
+def test_a_file_that_is_no_store_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("no store at all, but a long enough text to be read as one" * 30)
+    with pytest.raises(StoreError, match="not a database"):
+        Store(tmp_path / "notes.txt").gears()
+
+
+@pytest.mark.parametrize("url", ["mysql://host/db", "what://ever", "postgresql+nodriver://host/db"])
+def test_a_place_that_no_store_can_be_at_is_refused(url: str) -> None:
+    with pytest.raises(UsageError, match="store"):
+        Store(url)
+
+
+@pytest.mark.parametrize("change", ["UPDATE mlg_records SET side = 'RH'", "DELETE FROM mlg_records"])
+def test_the_database_itself_refuses_to_change_a_record(store: Store, place: Path, change: str) -> None:
+    with sqlite3.connect(place) as raw, pytest.raises(sqlite3.IntegrityError, match="only ever added"):
+        raw.execute(change)
+
+
+def test_an_untouched_chain_fits(store: Store) -> None:
+    assert store.verify() == (10, None)
+
+
+COLUMNS = ("seq", "kind", "record_id", "tail_no", "side", "day", "identity", "body", "hash")
+
+
+def forged(place: Path, column: str, seq: int) -> Iterator[object]:
+    """Values with one byte changed, at the first, a middle and the last place."""
+    with sqlite3.connect(place) as raw:
+        (value,) = raw.execute(f"SELECT {column} FROM mlg_records WHERE seq = ?", (seq,)).fetchone()
+    if isinstance(value, int):
+        yield value + 100
+        return
+    as_bytes = value.encode() if isinstance(value, str) else value
+    for at in {0, len(as_bytes) // 2, len(as_bytes) - 1}:
+        changed = as_bytes[:at] + bytes([as_bytes[at] ^ 1]) + as_bytes[at + 1 :]
+        yield changed.decode() if isinstance(value, str) else changed
+    if isinstance(value, str):
+        # No text at all, and a text with a byte that is none.
+        yield b"\xff" + as_bytes
+
+
+@pytest.mark.parametrize("column", COLUMNS)
+def test_a_changed_byte_in_any_field_is_found_and_its_record_named(store: Store, place: Path, column: str) -> None:
+    for value in list(forged(place, column, 4)):
+        with sqlite3.connect(place) as raw:
+            raw.execute("DROP TRIGGER IF EXISTS mlg_no_update")
+            (before,) = raw.execute(f"SELECT {column} FROM mlg_records WHERE seq = 4").fetchone()
+            raw.execute(f"UPDATE mlg_records SET {column} = ? WHERE seq = 4", (value,))
+        _count, broken = store.verify()
+        assert broken is not None
+        # A record that was put elsewhere leaves a gap where it stood.
+        assert broken.seq == (5 if column == "seq" else 4), value
+        with sqlite3.connect(place) as raw:
+            at = value if column == "seq" else 4
+            raw.execute(f"UPDATE mlg_records SET {column} = ? WHERE seq = ?", (before, at))
+    assert store.verify() == (10, None)
+
+
+def test_a_record_that_was_taken_out_is_missed(store: Store, place: Path) -> None:
+    with sqlite3.connect(place) as raw:
+        raw.execute("DROP TRIGGER mlg_no_delete")
+        raw.execute("DELETE FROM mlg_records WHERE seq = 4")
+    count, broken = store.verify()
+    assert count == 3
+    assert broken is not None
+    assert "record 4 is missing" in broken.why
+
+
+def test_an_exported_chain_comes_back_whole(store: Store, tmp_path: Path) -> None:
+    other = Store(tmp_path / "other.sqlite")
+    assert other.restore(store.export(), "chain").new == 10
+    assert list(other.export()) == list(store.export())
+    assert other.verify() == (10, None)
+
+
+def test_an_export_says_each_records_kind_and_content(store: Store) -> None:
+    first = json.loads(next(iter(store.export())))
+    assert first["kind"] == "inspection"
+    assert first["content"]["inspection"]["clearance_in"] == {"3": 0.002, "10": 0.001}
+
+
+def test_the_rest_of_a_chain_is_added_to_its_beginning(store: Store, tmp_path: Path) -> None:
+    beginning = Store(tmp_path / "other.sqlite")
+    beginning.restore(list(store.export())[:4], "chain")
+    assert beginning.restore(store.export(), "chain").new == 6
+
+
+def test_another_chain_is_not_mixed_in(store: Store, tmp_path: Path) -> None:
+    other = Store(tmp_path / "other.sqlite")
+    other.add(places.records(30, 32))
+    with pytest.raises(StoreError, match="two different chains"):
+        other.restore(store.export(), "chain")
+    assert len(other.all()) == 4
+
+
+def test_an_export_in_which_a_word_was_changed_is_refused(store: Store, tmp_path: Path) -> None:
+    lines = [line.replace('"N3"', '"N4"') for line in store.export()]
+    with pytest.raises(StoreError, match="line 5"):
+        Store(tmp_path / "other.sqlite").restore(lines, "chain")
+
+
+def test_a_store_of_a_newer_schema_is_refused(store: Store, place: Path) -> None:
+    with sqlite3.connect(place) as raw:
+        raw.execute("INSERT INTO mlg_meta VALUES (99)")
+    with pytest.raises(StoreError, match="schema version 99"):
+        Store(place).gears()
+
+
+@pytest.mark.parametrize("version", sorted(OLD.glob("version-*.sqlite")), ids=lambda path: path.stem)
+def test_a_store_of_each_schema_version_can_be_read_and_added_to(version: Path, tmp_path: Path) -> None:
+    copied = tmp_path / "store.sqlite"
+    copied.write_bytes(version.read_bytes())
+    store = Store(copied)
+    assert inspection_from(store.all(Kind.INSPECTION)[0]) == places.inspection(1)
+    assert store.add(places.records(1, 5), lambda kept, new: kept.kind is new.kind).new == 2
+    assert store.verify() == (8, None)
+
+
+def test_a_repair_kept_twice_is_one(store: Store) -> None:
+    repair = Record(Kind.REPAIR, "", "N1", "LH", "2026-03-01", places.packed({"joints": [3]}))
+    assert [store.add([repair]).new for _ in range(2)] == [1, 0]

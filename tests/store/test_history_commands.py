@@ -1,0 +1,441 @@
+"""``mlg check --keep``, ``mlg history …`` and ``mlg fleet``."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from datetime import date, timedelta
+from pathlib import Path
+
+import numpy as np
+import pypdf
+import pytest
+import scipy.stats
+
+from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.gear import gear_file
+from mlg_troubleshoot.reporting.fleet_report import interval_bar
+from mlg_troubleshoot.store import Kind, Record, Store, inspection_record, packed
+from mlg_troubleshoot.units import ClearanceConvention
+from tests.cli.conftest import Run, mlg, row
+
+RADIAL = ClearanceConvention.RADIAL
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("MLG_STORE", str(tmp_path / "store.sqlite"))
+    return tmp_path / "store.sqlite"
+
+
+def table(folder: Path, *rows: Mapping[str, str], name: str = "table.csv") -> Path:
+    path = folder / name
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, fieldnames=list(dict.fromkeys(c for r in rows for c in r)))
+        writer.writeheader()
+        writer.writerows(rows)
+    return path
+
+
+def visit(n: int, worn_in: float, tail: str = "N123", side: str = "LH", **more: str) -> dict[str, str]:
+    """The n-th visit of a gear whose joint 3 reads so; 400 landings and 90 days between visits."""
+    day = date(2024, 1, 10) + timedelta(days=90 * n)
+    seen = {"inspection_date": day.isoformat(), "gear_landings": str(400 * n), "clearance_3_in": f"{worn_in:.4f}"}
+    return row(record_id=f"{tail}-{side}-{n}", tail_no=tail, side=side, **seen, **more)
+
+
+def keep(folder: Path, *rows: Mapping[str, str], more: tuple[str, ...] = ()) -> Run:
+    return mlg("check", table(folder, *rows), "--keep", *more)
+
+
+def seeded(*visits: tuple[int, float]) -> None:
+    """Keep visits of N123 LH as a check would, without one: what was found is joint 3 first."""
+    found: list[Record] = []
+    for n, worn_in in visits:
+        day = date(2024, 1, 10) + timedelta(days=90 * n)
+        seen = Inspection(
+            f"N123-LH-{n}", "N123", Side.LH, RADIAL, {3: worn_in}, inspection_date=day, gear_landings=400.0 * n
+        )
+        result = {"verdict": "OUTSIDE_MARGIN", "joints": [{"joint": 3, "rank": 1}], "predicted_displacement_in": 0.05}
+        body = {
+            "result": {**result, "margin_in": 0.03},
+            "program_version": "0",
+            "geometry_sha256": "0",
+            "extension": None,
+        }
+        found.append(inspection_record(seen))
+        found.append(replace(found[-1], kind=Kind.ASSESSMENT, packed=packed(body), identity=(f"{n}",)))
+    Store().add(found)
+
+
+def life(*more: str) -> dict[str, object]:
+    run = mlg("history", "N123", "LH", "--json", *(more or ("--no-forecast",)))
+    assert run.code == 0, run.err
+    found: dict[str, object] = run.json
+    return found
+
+
+def joint_3(told: dict[str, object]) -> dict[str, object]:
+    joints = told["joints"]
+    assert isinstance(joints, list)
+    found: dict[str, object] = joints[2]
+    return found
+
+
+def test_a_check_keeps_only_when_asked(tmp_path: Path, place: Path) -> None:
+    mlg("check", table(tmp_path, visit(1, 0.001)))
+    assert not place.exists()
+
+
+def test_keeping_does_not_change_what_a_check_says(tmp_path: Path, place: Path) -> None:
+    file = table(tmp_path, visit(1, 0.001), visit(2, 0.013))
+    plain, kept = mlg("check", file, "--json"), mlg("check", file, "--json", "--keep")
+    assert (plain.code, plain.out) == (kept.code, kept.out)
+
+
+def test_keeping_a_file_twice_keeps_it_once(tmp_path: Path, place: Path) -> None:
+    assert "4 new records, 0 known" in keep(tmp_path, visit(1, 0.001), visit(2, 0.002)).err
+    assert "0 new records, 4 known" in keep(tmp_path, visit(1, 0.001), visit(2, 0.002)).err
+
+
+def test_the_same_identity_with_other_content_is_refused_with_what_to_do(tmp_path: Path, place: Path) -> None:
+    keep(tmp_path, visit(1, 0.001))
+    run = keep(tmp_path, visit(2, 0.002), visit(1, 0.005))
+    assert run.code == 5
+    assert "N123-LH-1" in run.err
+    assert "mlg history correct" in run.err
+    assert len(Store(place).all()) == 2
+
+
+def test_a_tail_in_another_spelling_is_not_merged_in_silence(tmp_path: Path, place: Path) -> None:
+    keep(tmp_path, visit(1, 0.001))
+    other = visit(2, 0.002, tail="n-123")
+    refused = keep(tmp_path, other)
+    assert refused.code == 5
+    assert "'n-123' differs from 'N123'" in refused.err
+    assert keep(tmp_path, other, more=("--tails", "same")).code == 0
+    assert Store(place).gears() == [("N123", "LH")]
+
+
+def test_two_aircraft_whose_tails_look_alike_can_be_kept_apart(tmp_path: Path, place: Path) -> None:
+    keep(tmp_path, visit(1, 0.001))
+    assert keep(tmp_path, visit(2, 0.002, tail="N 123"), more=("--tails", "apart")).code == 0
+    assert Store(place).gears() == [("N 123", "LH"), ("N123", "LH")]
+
+
+def test_a_repair_starts_the_wear_of_its_joints_again(tmp_path: Path, place: Path) -> None:
+    seeded((1, 0.003), (2, 0.006))
+    repair = ("history", "repair", "N123", "LH", "--joint", "3", "--date", "2024-08-01", "--landings", "810")
+    assert mlg(*repair).code == 0
+    seeded((3, 0.0008))
+    told = life()
+    assert joint_3(told)["readings"] == [[1200.0, 0.0008]]
+    assert [event["kind"] for event in told["events"]].count("repair") == 1  # type: ignore[attr-defined, index]
+
+
+@pytest.mark.slow
+def test_landings_left_grow_by_a_repair(tmp_path: Path, place: Path) -> None:
+    keep(tmp_path, visit(0, 0.0005), visit(1, 0.0025), visit(2, 0.0045))
+    before = joint_3(life("--gear", "hawker-800xp"))["landings_to_limit"]
+    mlg("history", "repair", "N123", "LH", "--joint", "3", "--date", "2024-08-01", "--landings", "801")
+    after = joint_3(life("--gear", "hawker-800xp"))["landings_to_limit"]
+    assert isinstance(before, dict)
+    assert isinstance(after, dict)
+    assert 100.0 < before["p50"] < 1500.0
+    assert before["p05"] < before["p50"] < before["p95"]
+    assert after["p50"] > before["p50"]
+
+
+def test_a_correction_counts_and_what_it_corrects_does_not(tmp_path: Path, place: Path) -> None:
+    seeded((1, 0.001), (2, 0.02))
+    right = table(tmp_path, visit(2, 0.002), name="right.csv")
+    assert mlg("history", "correct", "N123-LH-2", right).code == 0
+    assert joint_3(life())["readings"] == [[400.0, 0.001], [800.0, 0.002]]
+    assert Store(place).verify()[1] is None
+
+
+def test_a_corrected_inspection_kept_again_is_known(tmp_path: Path, place: Path) -> None:
+    keep(tmp_path, visit(1, 0.02))
+    mlg("history", "correct", "N123-LH-1", table(tmp_path, visit(1, 0.002), name="right.csv"))
+    assert keep(tmp_path, visit(1, 0.002)).code == 0
+    assert joint_3(life())["readings"] == [[400.0, 0.002]]
+
+
+def test_a_correction_of_another_gear_is_refused(tmp_path: Path, place: Path) -> None:
+    seeded((1, 0.001))
+    run = mlg("history", "correct", "N123-LH-1", table(tmp_path, visit(1, 0.001, side="RH"), name="right.csv"))
+    assert run.code == 2
+    assert "N123 RH" in run.err
+
+
+def test_a_void_inspection_does_not_count(tmp_path: Path, place: Path) -> None:
+    seeded((1, 0.001), (2, 0.009))
+    assert mlg("history", "void", "N123-LH-2", "--why", "another aircraft").code == 0
+    assert joint_3(life())["readings"] == [[400.0, 0.001]]
+    assert mlg("history", "void", "N123-LH-2", "--why", "again").code == 2
+
+
+def test_outcomes_say_how_often_the_advice_was_right(tmp_path: Path, place: Path) -> None:
+    seeded((1, 0.013), (2, 0.014))
+    mlg("history", "outcome", "N123-LH-1", "--found", "worn bearing", "--joint", "3")
+    mlg("history", "outcome", "N123-LH-2", "--found", "worn pin", "--joint", "9")
+    assert "The advice was right in 1 of 2 outcomes" in mlg("history").out
+
+
+def test_the_hit_rate_of_the_advice_is_in_the_json_with_its_interval(tmp_path: Path, place: Path) -> None:
+    seeded((1, 0.013))
+    assert mlg("history", "--json").json["advice"] == {"right": 0, "outcomes": 0, "p05": None, "p95": None}
+    mlg("history", "outcome", "N123-LH-1", "--found", "worn bearing", "--joint", "3")
+    # Jeffreys' interval of 1 of 1: the beta distribution of 1.5 and 0.5.
+    expected = {"right": 1, "outcomes": 1, "p05": pytest.approx(scipy.stats.beta(1.5, 0.5).ppf(0.05)), "p95": 1.0}
+    assert mlg("history", "--json").json["advice"] == expected
+    assert life()["advice"] == expected
+
+
+def test_a_life_is_shown_in_the_unit_that_the_user_reads(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    seeded((1, 0.0100))
+    shown = mlg("history", "N123", "LH", "--no-forecast", "--show", "mm").out
+    assert "400: 0.254" in shown
+    assert "worst case 1.270 mm" in shown
+
+
+def test_a_re_rigging_is_an_event_of_a_life_and_the_joints_wear_on(tmp_path: Path, place: Path) -> None:
+    seeded((1, 0.001), (3, 0.002))
+    assert mlg("history", "rerig", "N123", "LH", "--date", "2024-07-15", "--landings", "800").code == 0
+    told = life()
+    assert told["events"][-1]["kind"] == "rerig"
+    assert joint_3(told)["readings"] == [[400.0, 0.001], [1200.0, 0.002]]
+    mlg("history", "N123", "LH", "--no-forecast", "--report", tmp_path)
+    assert "re-rigged" in next(tmp_path.glob("mlg-life-*.html")).read_text(encoding="utf-8")
+
+
+def test_the_fleet_page_is_printed_on_the_paper_that_was_asked_for(tmp_path: Path, place: Path) -> None:
+    seeded((1, 0.001))
+    mlg("fleet", "--no-forecast", "--report", tmp_path, "--page", "Letter")
+    page = pypdf.PdfReader(tmp_path / "fleet.pdf").pages[0]
+    assert sorted(map(float, page.mediabox[2:])) == [612.0, 792.0]
+
+
+def test_verify_says_what_fits_and_names_what_does_not(tmp_path: Path, place: Path) -> None:
+    seeded((1, 0.001), (2, 0.002))
+    assert mlg("history", "verify").out == "4 records fit the chain.\n"
+    data = bytearray(place.read_bytes())
+    at = data.rindex(b"N123-LH-2")
+    data[at] = ord("M")
+    place.write_bytes(data)
+    run = mlg("history", "verify")
+    assert run.code == 1
+    assert "M123-LH-2" in run.out
+
+
+def test_an_export_is_imported_with_its_chain(tmp_path: Path, place: Path) -> None:
+    seeded((1, 0.001), (2, 0.002))
+    mlg("history", "repair", "N123", "LH", "--joint", "3", "--date", "2024-08-01")
+    assert mlg("history", "export", tmp_path / "chain.jsonl").code == 0
+    kinds = [json.loads(line)["kind"] for line in (tmp_path / "chain.jsonl").read_text().splitlines()]
+    assert kinds == ["inspection", "assessment", "inspection", "assessment", "repair"]
+    other = ("--store", tmp_path / "other.sqlite")
+    assert mlg("history", "import", tmp_path / "chain.jsonl", *other).code == 0
+    assert mlg("history", "verify", *other).out == "5 records fit the chain.\n"
+
+
+@pytest.mark.parametrize("line", ["[" * 5000 + "]" * 5000, "9" * 5000, "[]", "{", "\x00"])
+def test_what_is_no_exported_record_is_refused_with_its_line(tmp_path: Path, line: str) -> None:
+    (tmp_path / "chain.jsonl").write_text(line + "\n", encoding="utf-8")
+    run = mlg("history", "import", tmp_path / "chain.jsonl", "--store", tmp_path / "other.sqlite")
+    assert run.code == 5
+    assert "chain.jsonl, line 1 is no exported record" in run.err
+
+
+def test_an_export_does_not_replace_the_store(tmp_path: Path, place: Path) -> None:
+    seeded((1, 0.001))
+    assert mlg("history", "export", place).code == 2
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("history", "N9", "LH"),
+        ("history", "N123", "XX"),
+        ("history", "void", "unknown", "--why", "x"),
+        ("history", "repair", "N123", "LH", "--joint", "33", "--date", "2024-08-01"),
+        ("history", "repair", "N123", "LH", "--joint", "3", "--date", "yesterday"),
+        ("history", "import", "not-there.jsonl"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_as_usage(tmp_path: Path, place: Path, command: tuple[str, ...]) -> None:
+    seeded((1, 0.001))
+    run = mlg(*command)
+    assert run.code == 2
+    assert "What to do:" in run.err
+
+
+def test_an_empty_store_says_how_to_keep(place: Path) -> None:
+    run = mlg("history")
+    assert run.code == 0
+    assert "--keep" in run.out
+
+
+def test_the_fleet_is_the_latest_inspection_of_each_gear_worst_first(tmp_path: Path, place: Path) -> None:
+    keep(tmp_path, visit(1, 0.013), visit(2, 0.001), visit(1, 0.001, side="RH"), visit(2, 0.013, side="RH"))
+    told = mlg("fleet", "--json", "--no-forecast").json
+    assert [(g["tail_no"], g["side"], g["verdict"], g["record_id"]) for g in told["gears"]] == [
+        ("N123", "RH", "OUTSIDE_MARGIN", "N123-RH-2"),
+        ("N123", "LH", "WITHIN_MARGIN", "N123-LH-2"),
+    ]
+    assert told["gears"][0]["worst_joint"] == 3
+
+
+def test_a_fleet_without_landings_has_no_forecast_and_says_null(tmp_path: Path, place: Path) -> None:
+    keep(tmp_path, {k: v for k, v in visit(1, 0.001).items() if k != "gear_landings"})
+    (gear,) = mlg("fleet", "--json").json["gears"]
+    assert gear["landings_to_limit"] is None
+    assert gear["next_inspection_landings"] is None
+
+
+@pytest.mark.slow
+def test_a_gear_that_wears_faster_is_due_earlier(tmp_path: Path, place: Path) -> None:
+    slow = [visit(n, 0.0005 + 0.0004 * n) for n in range(4)]
+    fast = [visit(n, 0.0005 + 0.0014 * n, side="RH") for n in range(4)]
+    keep(tmp_path, *slow, *fast)
+    gears = {g["side"]: g for g in mlg("fleet", "--json").json["gears"]}
+    assert gears["RH"]["next_inspection_landings"] < gears["LH"]["next_inspection_landings"]
+    assert gears["RH"]["landings_to_limit"]["p50"] < gears["LH"]["landings_to_limit"]["p50"]
+
+
+@pytest.mark.slow
+def test_a_joint_read_over_its_limit_has_no_landings_left(tmp_path: Path, place: Path) -> None:
+    keep(tmp_path, visit(1, 0.001), visit(2, 0.001), visit(1, 0.001, side="RH"), visit(2, 0.013, side="RH"))
+    worst = mlg("fleet", "--json").json["gears"][0]
+    assert (worst["landings_to_limit"]["p50"], worst["next_inspection_landings"]) == (0.0, 0.0)
+
+
+@pytest.mark.slow
+def test_a_missed_restoration_is_suggested(tmp_path: Path, place: Path) -> None:
+    others = [visit(n, 0.0005 + 0.001 * n + i * 0.0001, tail=f"N{i}") for i in range(8) for n in range(5)]
+    worn = [visit(n, 0.0005 + 0.0014 * n) for n in range(5)]
+    keep(tmp_path, *others, *worn, visit(5, 0.0005))
+    notes = mlg("fleet").err
+    assert "N123 LH: #3 read far tighter than before" in notes
+    assert notes.count("read far tighter") == 1
+
+
+@pytest.mark.slow
+def test_a_restored_gear_is_not_taken_for_one_of_two_that_were_exchanged(place: Path) -> None:
+    # Of these gears the restored one departs so far from its wear that another one's inspection fits it better.
+    rng = np.random.default_rng(6)
+    paces = 1.5e-6 * np.exp(0.4 * rng.standard_normal((12, 10)))
+    seen = {
+        (gear, visit): np.round(0.0005 + 400.0 * (visit + 1) * paces[gear] + 0.0002 * rng.standard_normal(10), 4)
+        for gear in range(12)
+        for visit in range(8)
+    }
+    seen[0, 7] = np.full(10, 0.0005)
+    seen[1, 7], seen[2, 7] = seen[2, 7], seen[1, 7]
+    Store(place).add(
+        [
+            inspection_record(
+                Inspection(
+                    f"{gear}-{visit}",
+                    f"N{gear}",
+                    Side.LH,
+                    RADIAL,
+                    {n + 1: float(max(value, 0.0)) for n, value in enumerate(read)},
+                    inspection_date=date(2024, 1, 1) + timedelta(days=60 * visit),
+                    gear_landings=400.0 * (visit + 1),
+                )
+            )
+            for (gear, visit), read in seen.items()
+        ]
+    )
+    notes = mlg("fleet").err
+    assert "N1 LH and N2 LH fit each other's wear" in notes
+    assert "N0 LH: " in notes
+    assert "N0 LH and" not in notes
+
+
+def test_the_fleet_page_has_a_line_a_gear_that_links_to_its_life(tmp_path: Path, place: Path) -> None:
+    seeded((1, 0.001), (2, 0.012))
+    assert mlg("fleet", "--no-forecast", "--report", tmp_path / "out").code == 0
+    page = (tmp_path / "out" / "fleet.html").read_text(encoding="utf-8")
+    (linked,) = re.findall(r'href="([^"#]+\.html)"', page)
+    assert (tmp_path / "out" / "fleet.pdf").exists()
+    assert "0.0120" in (tmp_path / "out" / linked).read_text(encoding="utf-8")
+
+
+def test_the_page_of_a_life_shows_before_and_after_with_what_was_restored(tmp_path: Path, place: Path) -> None:
+    seeded((1, 0.0101))
+    mlg("history", "repair", "N123", "LH", "--joint", "3", "--date", "2024-05-01", "--landings", "500")
+    seeded((2, 0.0007))
+    assert mlg("history", "N123", "LH", "--no-forecast", "--report", tmp_path).code == 0
+    (file,) = tmp_path.glob("*life*.html")
+    page = re.sub(r"<[^>]+>", " ", file.read_text(encoding="utf-8"))
+    assert re.search(r"#3 short link inner bearing, in\s+0\.0101\s+0\.0007", page)
+    assert re.search(r"Restored since the one before\s+–\s+#3", page)
+
+
+def test_landings_left_are_drawn_with_an_arrow_beyond_the_horizon() -> None:
+    near = interval_bar({"p05": 100.0, "p50": 400.0, "p95": 900.0}, 20_000)
+    far = interval_bar({"p05": 100.0, "p50": 400.0, "p95": None}, 20_000)
+    assert "<path" not in near
+    assert "<path" in far
+    assert "100, 400, beyond" in far
+
+
+@pytest.fixture
+def own_gear(tmp_path: Path) -> Callable[[str], Path]:
+    """A gear file with another outlook."""
+    shutil.copytree(Path(gear_file.__file__).parent / "data", tmp_path / "gear")
+
+    def write(outlook: str) -> Path:
+        file = tmp_path / "gear" / "hawker-800xp.toml"
+        text, old = file.read_text(encoding="utf-8"), "horizon_landings = 20000\naccepted_chance = 0.05"
+        assert old in text
+        file.write_text(text.replace(old, outlook), encoding="utf-8")
+        return file
+
+    return write
+
+
+def test_a_forecast_beyond_the_horizon_of_the_gear_file_is_null(place: Path, own_gear: Callable[[str], Path]) -> None:
+    seeded((1, 0.001), (2, 0.0012), (3, 0.0014))
+    far = joint_3(life("--gear", "hawker-800xp"))["landings_to_limit"]
+    near = joint_3(life("--gear", str(own_gear("horizon_landings = 50\naccepted_chance = 0.05"))))["landings_to_limit"]
+    assert far["p05"] > 50
+    assert near["p95"] is None
+
+
+def test_who_accepts_a_larger_chance_inspects_later(place: Path, own_gear: Callable[[str], Path]) -> None:
+    seeded((1, 0.001), (2, 0.0012), (3, 0.0014))
+    (usual,) = mlg("fleet", "--json").json["gears"]
+    bold = own_gear("horizon_landings = 20000\naccepted_chance = 0.3")
+    (later,) = mlg("fleet", "--json", "--gear", bold).json["gears"]
+    assert later["next_inspection_landings"] > usual["next_inspection_landings"]
+
+
+def report_of(tmp_path: Path, *rows: Mapping[str, str], name: str) -> str:
+    run = mlg("check", table(tmp_path, *rows), "--keep", "--report", tmp_path / name, "--format", "html")
+    assert run.code in {0, 1}, run.err
+    (page,) = (tmp_path / name).glob("*.html")
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", page.read_text(encoding="utf-8")))
+
+
+def test_the_report_of_a_gear_seen_before_shows_before_and_after_and_what_was_restored(
+    tmp_path: Path, place: Path
+) -> None:
+    first = report_of(tmp_path, visit(1, 0.013), name="first")
+    mlg("history", "repair", "N123", "LH", "--joint", "3", "--date", visit(1, 0.0)["inspection_date"])
+    then = report_of(tmp_path, visit(2, 0.001), name="then")
+    assert "Before and after" not in first
+    assert "Restored since the one before – #3 #1" in then
+    assert "#3 short link inner bearing, in 0.0130 0.0010" in then
+
+
+def test_the_same_inspection_again_is_not_its_own_past(tmp_path: Path, place: Path) -> None:
+    report_of(tmp_path, visit(1, 0.013), name="first")
+    assert "Before and after" not in report_of(tmp_path, visit(1, 0.013), name="again")

@@ -1,0 +1,169 @@
+"""README.md and docs/: their commands work, their sessions and pictures are what the program makes today."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import tomllib
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+from pytest_examples import CodeExample, EvalExample, find_examples
+
+from mlg_troubleshoot.diagnosis import CATALOGUE
+from mlg_troubleshoot.records.columns import Kind
+from tests import docs_examples
+from tests.docs_examples import PAGES, PICTURES, README, ROOT
+
+TEXT = README.read_text(encoding="utf-8")
+CHECK_COMMAND = (
+    "python3 -m venv .venv && .venv/bin/pip install -q . && "
+    ".venv/bin/mlg check inspection_data/failure_case.csv --report report"
+)
+TEST_COMMAND = "python3 -m venv .venv && .venv/bin/pip install -q -e '.[dev]' && .venv/bin/python -m pytest"
+SESSIONS = {
+    f"{page.relative_to(ROOT).as_posix()} {session.commands[0].split('|')[0].strip()[:50]}": session
+    for page in PAGES
+    for _match, session in docs_examples.sessions(page.read_text(encoding="utf-8"))
+}
+NUMBER = re.compile(r"-?\d+\.\d+")
+OUT_OF_DATE = "run: python tests/docs_examples.py"
+
+
+def test_the_first_command_stands_there_exactly() -> None:
+    assert f"```sh\n{CHECK_COMMAND}\n```" in TEXT
+
+
+def test_the_test_command_stands_directly_under_its_mark() -> None:
+    assert f"<!-- test command -->\n```sh\n{TEST_COMMAND}\n```" in TEXT
+
+
+def test_continuous_integration_takes_the_test_command_from_here() -> None:
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    (line,) = [line for line in script.splitlines() if line.startswith("test_command=")]
+    found = subprocess.run(
+        ["bash", "-c", f'{line}\nprintf %s "$test_command"'], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert found.stdout == TEST_COMMAND
+
+
+def test_exit_code_1_is_explained_beside_the_command() -> None:
+    after = TEXT.partition(CHECK_COMMAND)[2][:200]
+    assert 'exit code 1. That is no error: it means "not within margin"' in after
+
+
+# Pages of many long commands: run with the slow part.
+LONG = {"life-of-a-gear.md", "diagnosis-solution.md"}
+
+
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(page, marks=[pytest.mark.slow] * (page.name in LONG)) for page in PAGES],
+    ids=lambda page: page.relative_to(ROOT).as_posix(),
+)
+def test_a_page_shows_what_its_commands_print_today(page: Path, tmp_path: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    assert docs_examples.refreshed(text, tmp_path) == text, OUT_OF_DATE
+
+
+def test_there_are_sessions() -> None:
+    assert len(SESSIONS) > 5
+
+
+@pytest.mark.parametrize("example", list(find_examples(*PAGES)), ids=str)
+def test_the_python_examples_are_true(example: CodeExample, eval_example: EvalExample) -> None:
+    eval_example.run_print_check(example)
+
+
+@pytest.mark.parametrize("name", ["linkage.svg", "plunger.svg"])
+def test_a_picture_is_what_the_program_draws_today(name: str) -> None:
+    shipped, drawn = (PICTURES / name).read_text(encoding="utf-8"), docs_examples.pictures()[name]
+    assert NUMBER.sub("#", shipped) == NUMBER.sub("#", drawn), OUT_OF_DATE
+    # Other processors round the last digit otherwise.
+    assert [float(n) for n in NUMBER.findall(shipped)] == pytest.approx(
+        [float(n) for n in NUMBER.findall(drawn)], abs=0.02
+    ), OUT_OF_DATE
+
+
+def test_a_picture_says_where_the_geometry_comes_from() -> None:
+    assert "reconstructed from published figures, not drawing data" in (PICTURES / "linkage.svg").read_text("utf-8")
+
+
+def anchors(text: str) -> set[str]:
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {"#" + re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def links() -> list[tuple[Path, str]]:
+    found = ((page, set(re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")))) for page in PAGES)
+    return [(page, link) for page, here in found for link in sorted(here) if not link.startswith("https:")]
+
+
+@pytest.mark.parametrize(("page", "link"), links(), ids=lambda part: part.name if isinstance(part, Path) else part)
+def test_every_link_leads_somewhere(page: Path, link: str) -> None:
+    name, _, heading = link.partition("#")
+    target = page.parent / unquote(name) if name else page
+    assert target.exists()
+    assert not heading or f"#{heading}" in anchors(target.read_text(encoding="utf-8"))
+
+
+def test_every_page_can_be_reached_from_the_readme() -> None:
+    reached, todo = {README}, [README]
+    while todo:
+        page = todo.pop()
+        for origin, link in links():
+            target = (origin.parent / unquote(link.partition("#")[0])).resolve()
+            if origin == page and target.suffix == ".md" and target not in reached:
+                reached.add(target)
+                todo.append(target)
+    assert {page.relative_to(ROOT).as_posix() for page in PAGES if page not in reached} == set()
+
+
+def test_every_script_that_is_named_exists() -> None:
+    scripts = {s for page in PAGES for s in re.findall(r"python ((?:\w+/)+\w+\.py)", page.read_text(encoding="utf-8"))}
+    assert scripts
+    assert [s for s in scripts if not (ROOT / s).is_file()] == []
+
+
+def test_the_python_version_is_that_of_the_project() -> None:
+    wanted = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["requires-python"]
+    assert f"Python {wanted.removeprefix('>=')} or later" in TEXT
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "does not replace the maintenance manual's limits",
+        "not an approval for return to service",
+        "The geometry is synthetic",
+        "The published failure was fitted",
+        "The worst case is a bound",
+        "Both ends of one link act alike",
+        "In-plane joint clearance only",
+    ],
+)
+def test_what_the_program_cannot_say_is_said(said: str) -> None:
+    assert said in " ".join(TEXT.split())
+
+
+@pytest.mark.parametrize("cause", [cause.name for cause in CATALOGUE])
+def test_every_cause_has_a_page_that_says_what_it_needs(cause: str) -> None:
+    page = (ROOT / f"docs/explanation/causes/{cause}.md").read_text(encoding="utf-8")
+    assert f"`{cause}`" in page
+    assert "| needs |" in page
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_every_column_is_described(kind: Kind) -> None:
+    page = (ROOT / "docs/reference/columns.md").read_text(encoding="utf-8")
+    assert f"`{kind}" in page
+
+
+def test_the_readme_is_no_book() -> None:
+    assert len(TEXT.splitlines()) <= 200
+
+
+def test_every_room_of_the_package_is_named() -> None:
+    rooms = {p.name for p in (ROOT / "mlg_troubleshoot").iterdir() if p.is_dir() and not p.name.startswith("_")}
+    assert {room for room in rooms if f"`{room}/`" not in TEXT} == set()

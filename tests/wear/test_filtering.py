@@ -1,0 +1,96 @@
+"""The filter and the passage times against closed forms of other libraries."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from mlg_troubleshoot.wear import WearPath
+from mlg_troubleshoot.wear.filtering import Draws, follow
+from mlg_troubleshoot.wear.model import _gamma_passage, _integrated_passage, _wiener_passage
+from mlg_troubleshoot.wear.paths import Scale, grid_step, lay_out
+
+AS_IT_IS = Scale(usage=1.0, value=1.0, start=0.0, resolution=0.0)
+FIRST, SECOND = [0.2, 0.5, 0.9], [0.3, 0.4]
+READ = np.array([0.35, 0.5, 1.1, 0.4, 0.45])
+
+
+def parameters(**changed: float) -> Draws:
+    values = {
+        "start": 0.1,
+        "start_sd": 0.2,
+        "drift": 0.9,
+        "drift_sd": 0.3,
+        "increment_sd": 0.0,
+        "wander_sd": 0.0,
+        "reading_sd": 0.1,
+        "power": 1.3,
+        "kept": 0.6,
+    }
+    return Draws(np.array([[False]]), **{name: np.array([[v]]) for name, v in (values | changed).items()})
+
+
+def dense(increment_sd: float, wander_sd: float) -> float:
+    """Log density of the readings written down as one normal vector, both paths of the unit together."""
+    c = np.array(FIRST + SECOND) ** 1.3
+    path = np.array([0, 0, 0, 1, 1])
+    same = path[:, None] == path
+    low, high = np.minimum.outer(c, c), np.maximum.outer(c, c)
+    cov = same * (0.2**2 + increment_sd**2 * low + wander_sd**2 * low**2 * (3.0 * high - low) / 6.0)
+    cov = cov + 0.3**2 * np.where(same, 1.0, 0.6) * np.outer(c, c) + 0.1**2 * np.eye(5)
+    return float(stats.multivariate_normal(0.1 + 0.9 * c, cov).logpdf(READ))
+
+
+@pytest.mark.parametrize(("increment_sd", "wander_sd"), [(0.4, 0.0), (0.0, 0.7)], ids=["wiener", "integrated"])
+def test_the_filter_gives_the_density_of_the_readings_as_one_normal_vector(
+    increment_sd: float, wander_sd: float
+) -> None:
+    paths = [WearPath("a", FIRST, READ[:3]), WearPath("a", SECOND, READ[3:])]
+    found, _state = follow(lay_out([paths], AS_IT_IS), parameters(increment_sd=increment_sd, wander_sd=wander_sd))
+    assert found[0, 0] == pytest.approx(dense(increment_sd, wander_sd), abs=1e-9)
+
+
+def test_a_longer_unit_beside_it_changes_nothing_for_a_unit() -> None:
+    short, long = [WearPath("a", [0.5], [0.6])], [WearPath("b", FIRST, READ[:3])]
+    draws = parameters(increment_sd=0.4)
+    alone = follow(lay_out([short], AS_IT_IS), draws)[0][0, 0]
+    assert follow(lay_out([short, long], AS_IT_IS), draws)[0][0, 0] == pytest.approx(alone, abs=1e-12)
+
+
+def test_a_wiener_path_passes_when_the_inverse_gaussian_distribution_says() -> None:
+    away, drift, sd = (np.full((20_000, 1, 1), v) for v in (0.8, 0.5, 0.6))
+    times = _wiener_passage(away, drift, sd, np.random.default_rng(1)).ravel()
+    mean, shape = 0.8 / 0.5, (0.8 / 0.6) ** 2
+    assert stats.kstest(times, stats.invgauss(mean / shape, scale=shape).cdf).pvalue > 0.01
+
+
+def test_against_its_drift_a_wiener_path_passes_with_the_known_chance() -> None:
+    away, drift, sd = (np.full((20_000, 1, 1), v) for v in (0.3, -0.5, 0.6))
+    times = _wiener_passage(away, drift, sd, np.random.default_rng(1))
+    assert np.isfinite(times).mean() == pytest.approx(np.exp(-2.0 * 0.3 * 0.5 / 0.36), abs=0.015)
+
+
+def test_a_gamma_path_passes_when_the_gamma_distribution_says() -> None:
+    shapes = _gamma_passage(np.full(20_000, 6.0), np.random.default_rng(1))
+    for q in (0.05, 0.5, 0.95):
+        # Passed by shape k: a gamma variable of that shape is above 6.
+        assert stats.gamma(np.quantile(shapes, q)).sf(6.0) == pytest.approx(q, abs=0.015)
+
+
+def test_a_wandering_drift_passes_when_fine_simulated_steps_do() -> None:
+    away, drift, sd = (np.full((4000, 1, 1), v) for v in (0.8, 0.5, 0.4))
+    times = _integrated_passage(away, drift, sd, np.random.default_rng(1)).ravel()
+    rng, dt = np.random.default_rng(2), 0.01
+    rate = 0.5 + 0.4 * np.cumsum(np.sqrt(dt) * rng.standard_normal((4000, 1500)), axis=1)
+    over = np.cumsum(rate * dt, axis=1) >= 0.8
+    fine = np.where(over.any(axis=1), (np.argmax(over, axis=1) + 1) * dt, np.inf)
+    ours, theirs = (np.sort(t)[[200, 2000, 3000]] for t in (times, fine))
+    assert ours == pytest.approx(theirs, rel=0.06)
+
+
+@pytest.mark.parametrize(
+    ("values", "step"), [([0.9, 0.95, 1.3, 2.0], 0.05), ([0.1, 0.1, 0.2], 0.0), ([0.1234567, 0.98, 2.0 / 3.0], 0.0)]
+)
+def test_the_resolution_is_the_step_of_the_grid_that_readings_lie_on(values: list[float], step: float) -> None:
+    assert grid_step(np.array(values)) == pytest.approx(step)
