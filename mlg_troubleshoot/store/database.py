@@ -182,11 +182,16 @@ def _record(row: Any) -> Record:
     )
 
 
-def default_place() -> str:
-    """Where the store is when nobody says: ``MLG_STORE``, or a file in the user's data folder."""
+def own_file() -> str:
+    """Return the store in the user's data folder."""
     from platformdirs import user_data_path
 
-    return os.environ.get("MLG_STORE") or str(user_data_path("mlg") / "store.sqlite")
+    return str(user_data_path("mlg") / "store.sqlite")
+
+
+def default_place() -> str:
+    """Where the store is when nobody says: ``MLG_STORE``, or the user's own file."""
+    return os.environ.get("MLG_STORE") or own_file()
 
 
 class Store:

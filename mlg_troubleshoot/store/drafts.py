@@ -57,5 +57,8 @@ class Drafts:
 
     def discard(self, draft_id: str) -> None:
         """Delete a draft; nothing happens if there is none."""
+        if self.store.is_new:
+            return
         with self.store.transaction(writing=True) as connection:
-            connection.execute(DRAFTS.delete().where(DRAFTS.c.draft_id == draft_id))
+            if sql.inspect(connection).has_table(DRAFTS.name):
+                connection.execute(DRAFTS.delete().where(DRAFTS.c.draft_id == draft_id))

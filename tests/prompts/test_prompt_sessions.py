@@ -471,3 +471,50 @@ def test_an_entry_whose_result_could_not_be_kept_stays_unfinished(
             place=str(store.place),
         )
     assert len(latest(store).answers.joints) == 10
+
+
+# A server that cannot be reached for a while.
+
+
+@pytest.fixture
+def server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SessionStore:
+    """A store on a server that is not there, and a data folder of the user's own."""
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    return SessionStore("postgresql+psycopg://nobody@127.0.0.1:1/none")
+
+
+def back_again(server: SessionStore, tmp_path: Path) -> SessionStore:
+    """The server is back; here it is a SQLite store addressed as one is."""
+    return replace(server, place=f"sqlite:///{tmp_path}/server.sqlite", away="")
+
+
+def test_while_a_server_is_away_the_answers_are_saved_on_this_machine(gear: Gear, server: SessionStore) -> None:
+    terminal, stopped = interrupted(gear, server, [*HEADING, ".004"])
+    assert latest(server).answers.radial_in == {1: 0.004}
+    assert terminal.screen.count("the server cannot be reached") == 1
+    assert stopped.session_id is not None
+
+
+def test_when_the_server_is_back_the_entry_goes_on_there(gear: Gear, server: SessionStore, tmp_path: Path) -> None:
+    interrupted(gear, server, [*HEADING, ".004"])
+    there = back_again(server, tmp_path)
+    there.save(latest(there))
+    assert [len(drafts(there)), len(drafts(replace(server, place=None)))] == [1, 0]
+
+
+def test_what_was_answered_while_the_server_was_away_is_the_newer(
+    gear: Gear, server: SessionStore, tmp_path: Path
+) -> None:
+    there = back_again(server, tmp_path)
+    interrupted(gear, there, [*HEADING, ".004"])
+    session = latest(there)
+    server.save(replace(session, answers=replace(session.answers, tail_no="N9")))
+    assert latest(there).answers.tail_no == "N9"
+
+
+def test_a_file_that_cannot_be_written_is_not_exchanged_for_another(
+    gear: Gear, tmp_path: Path, server: SessionStore
+) -> None:
+    (tmp_path / "file").write_text("")
+    _, stopped = interrupted(gear, SessionStore(tmp_path / "file" / "store.sqlite"), [*HEADING, ".004"])
+    assert (stopped.session_id, replace(server, place=None).latest()) == (None, None)

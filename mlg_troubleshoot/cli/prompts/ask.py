@@ -61,6 +61,8 @@ class _Saver:
             self.saved = False
             self._say_once(f"{error.message}. {error.remedy} You can go on.")
             return
+        if self._store.away:
+            self._say_once(self._store.away)
         self.saved = True
 
     def resume(self, session: Session) -> None:

@@ -16,7 +16,7 @@ from typing import Any
 from mlg_troubleshoot.cli.prompts.answers import MORE, NOT_MEASURED, Answers, JointAnswer
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
-from mlg_troubleshoot.store import Draft, Drafts, Store
+from mlg_troubleshoot.store import Draft, Drafts, Store, own_file
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, parse_length
 
 _SCHEMA = 2
@@ -56,24 +56,33 @@ def new_session(gear_id: str, started: datetime, answers: Answers) -> Session:
     return Session(f"{started:%Y%m%d-%H%M%S}-{secrets.token_hex(2)}", gear_id, started, answers)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class SessionStore:
-    """The sessions of a user in the store where finished inspections are kept; made with the first answer."""
+    """The sessions of a user in the store where finished inspections are kept; made with the first answer.
+
+    While a server cannot be reached a file of this user takes them, and `away` says so.
+    """
 
     place: str | Path | None = None
     run: str = field(default_factory=lambda: secrets.token_hex(4))
     owner: str = field(default_factory=lambda: os.environ.get("USER") or os.environ.get("USERNAME") or "")
+    away: str = ""
 
     @property
     def _drafts(self) -> Drafts:
         return Drafts(Store(self.place, patience_s=_PATIENCE_S))
+
+    @property
+    def _own_drafts(self) -> tuple[Drafts, ...]:
+        """What waits on this machine for a server."""
+        return (Drafts(Store(own_file())),) if "://" in self._drafts.store.place else ()
 
     def save(self, session: Session) -> Session:
         """Write a session whole or not at all; `SessionTakenError` if another run has written it meanwhile."""
         ours = replace(session, writer=self.run)
         draft = Draft(session.id, self.owner, self.run, session.complete, json.dumps(_as_json(ours)))
         try:
-            saved = self._drafts.save(draft, (session.writer, self.run))
+            saved = self._save(draft, (session.writer, self.run))
         except OutputError as error:
             raise OutputError(f"answers cannot be saved: {error.message}", error.remedy) from error
         if not saved:
@@ -82,15 +91,39 @@ class SessionStore:
             )
         return ours
 
+    def _save(self, draft: Draft, writers: tuple[str, ...]) -> bool:
+        try:
+            saved = self._drafts.save(draft, writers)
+        except OutputError:
+            for own in self._own_drafts:
+                saved = own.save(draft, writers)
+                self.away = f"the server cannot be reached; until it can, answers are saved here: {own.store.place}"
+                return saved
+            raise
+        for own in self._own_drafts if saved else ():
+            own.discard(draft.id)
+        return saved
+
+    def _newest_first(self, owner: str | None = None, draft_id: str | None = None) -> list[Draft]:
+        """Drafts of the store; what waits on this machine is newer than its like there."""
+        own = [draft for drafts in self._own_drafts for draft in drafts.newest_first(owner, draft_id)]
+        try:
+            found = self._drafts.newest_first(owner, draft_id)
+        except OutputError:
+            if not own:
+                raise
+            return own
+        return own + [draft for draft in found if draft.id not in {each.id for each in own}]
+
     def load(self, session_id: str) -> Session:
         """Read a session."""
-        for draft in self._drafts.newest_first(draft_id=session_id):
+        for draft in self._newest_first(draft_id=session_id):
             return _session(draft)
         raise SessionFileError(f"there is no saved inspection {session_id!r}", "Run mlg check to begin a new one.")
 
     def latest(self) -> Session | None:
         """Return the unfinished session that was saved last."""
-        for draft in self._drafts.newest_first(self.owner):
+        for draft in self._newest_first(self.owner):
             if not draft.complete:
                 return self._readable(draft)
         return None
@@ -99,7 +132,7 @@ class SessionStore:
         """Return the unfinished sessions of a gear, the last one first, and what could not be read on the way."""
         found, damaged = [], []
         try:
-            for draft in self._drafts.newest_first(self.owner):
+            for draft in self._newest_first(self.owner):
                 if draft.complete:
                     continue
                 try:
@@ -118,21 +151,21 @@ class SessionStore:
         try:
             return _session(draft)
         except DamagedSessionError:
-            self._drafts.save(replace(draft, complete=True), (draft.writer,))
+            self._save(replace(draft, complete=True), (draft.writer,))
             raise
 
     def finish(self, session: Session) -> None:
         """Mark a session complete, and delete all but the last few complete ones."""
         self.save(replace(session, complete=True))
-        drafts = self._drafts
-        complete = [draft.id for draft in drafts.newest_first(self.owner) if draft.complete]
+        complete = [draft.id for draft in self._newest_first(self.owner) if draft.complete]
         for session_id in complete[_KEPT_COMPLETE:]:
-            drafts.discard(session_id)
+            self.discard(session_id)
 
     def discard(self, session_id: str) -> None:
         """Delete a session; nothing happens if there is none."""
-        with suppress(OutputError):
-            self._drafts.discard(session_id)
+        for drafts in (*self._own_drafts, self._drafts):
+            with suppress(OutputError):
+                drafts.discard(session_id)
 
 
 def _session(draft: Draft) -> Session:
