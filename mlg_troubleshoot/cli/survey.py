@@ -35,22 +35,26 @@ def survey(
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the starts and draws.")] = 0,
     force: Annotated[bool, typer.Option("--force", help="Replace a template that exists.")] = False,
     report: options.Report = None,
-    page: Annotated[options.Page, typer.Option("--page", help="Paper of the report.")] = options.Page.A4,
+    page: options.Paper = None,
+    show: options.Show = None,
     as_json: options.Json = False,
+    quiet: options.Quiet = False,
     _version: options.Version = False,
 ) -> None:
     """A geometry from measurements: your own gear in place of the reconstructed one.
 
     Exit codes: 0 fits · 1 something does not fit · 3 nothing follows from the table.
     """
+    from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.workflows import survey as task
 
+    shown = settings(show, page, {}, keep=False, quiet=quiet)
     gear = context.obj or options.DEFAULT_GEAR
     if file == "template" and template is not None:
         if template.exists() and not force:
             raise OutputError(f"{template} exists already", "Give another name, or --force to replace it.")
         options.keep_inputs(gear, (), [("the template", template)])
-        task.write_survey_template(template, gear)
+        task.write_survey_template(template, gear, shown.show)
         output.write(
             f"Written: {template}. Fill in what you read, then: mlg gear survey {template} --write my-gear.toml"
         )
@@ -62,23 +66,21 @@ def survey(
     if as_json:
         output.write_json(task.survey_values(result))
     else:
-        _show(result)
-    written = None if report is None else task.write_survey_report(result, Path(file), report, page.value)
+        _show(result, output.console(unit=shown.show))
+    written = None if report is None else task.write_survey_report(result, Path(file), report, shown.page, shown.show)
     if written is not None:
-        output.say_written([written])
+        output.say_written([written], quiet=quiet)
     raise typer.Exit(result.exit_code)
 
 
-def _show(result: SurveyResult) -> None:
-    console = output.console()
+def _show(result: SurveyResult, console: output.DataConsole) -> None:
     for problem in result.problems:
         output.say(f"{problem.place()}: {problem.value}: expected {problem.expected}. {problem.remedy}")
     found = result.survey
     if found is None:
-        console.print(output.text("Nothing follows from this table: it holds no reading that can be used."))
+        console.print("Nothing follows from this table: it holds no reading that can be used.")
     else:
-        wrong = f"{len(found.misfits)} of them do not fit" if found.misfits else "all of them fit"
-        console.print(output.text(f"{result.gear.name}: {len(found.read)} readings, {wrong}.", "bold"))
+        console.print(f"{result.gear.name}: {found.words}", style="bold")
         numbers = ("index", "90 % interval", "before")
         table = output.plain_table(None, "joint", *numbers, right=numbers)
         rows = zip(result.gear.joints, result.amplification, result.interval, result.before, strict=True)
@@ -88,21 +90,19 @@ def _show(result: SurveyResult) -> None:
         console.print(table)
         mode = found.modes[0]
         console.print(
-            output.text(
-                f"Index: movement of the plunger per clearance of the joint. The readings determine "
-                f"{mode.parameters:.1f} of {len(mode.vector)} numbers of the linkage; the rest is as it was before."
-            )
+            f"Index: movement of the plunger per clearance of the joint. The readings determine "
+            f"{mode.parameters:.1f} of {len(mode.vector)} numbers of the linkage; the rest is as it was before."
         )
         for misfit in found.misfits:
-            console.print(output.text(f"Row {misfit.reading.row}, {misfit.reading.words}: {misfit.words}.", "bold"))
+            console.sentence(f"Row {misfit.reading.row}, {misfit.reading.words}: {misfit.words}.", "bold")
     for each in result.inspections:
-        console.print(output.text(f"{each.record_id}: {each.words}."))
+        console.sentence(f"{each.record_id}: {each.words}.")
     for warning in result.warnings:
-        console.print(output.text(f"Note: {warning}."))
+        console.sentence(f"Note: {warning}.")
     if result.suggestion is None:
-        console.print(output.text("No further reading would narrow this by 1 %: you can stop."))
+        console.print("No further reading would narrow this by 1 %: you can stop.")
     else:
         share = 100 * result.suggestion.narrowing
-        console.print(output.text(f"Next: {result.suggestion.reading.words}; narrows this by about {share:.0f} %."))
+        console.sentence(f"Next: {result.suggestion.reading.words}; narrows this by about {share:.0f} %.")
     if result.gear_file is not None:
-        console.print(output.text(f"Written: {result.gear_file}. Use it: mlg check FILE --gear {result.gear_file}"))
+        console.print(f"Written: {result.gear_file}. Use it: mlg check FILE --gear {result.gear_file}")

@@ -24,7 +24,15 @@ if TYPE_CHECKING:
     from openpyxl.worksheet.worksheet import Worksheet
 
 _UNITS = ("in", "mm", "deg")
-COLUMNS = ("kind", "from", "to", *(f"{c}_{u}" for u in _UNITS for c in ("value", "u")), "extension_in", "how")
+COLUMNS = (
+    "kind",
+    "from",
+    "to",
+    *(f"{c}_{u}" for u in _UNITS for c in ("value", "u")),
+    "extension_in",
+    "extension_mm",
+    "how",
+)
 _HEADER_WITHIN = 30
 _KINDS = {kind: kind for kind in Kind if kind is not Kind.TRAVEL}
 # No linkage of a landing gear is longer than this; angles are read within one turn.
@@ -37,22 +45,27 @@ _HOW = {
 }
 
 
-def write_survey_template(path: Path, linkage: SurveyedLinkage, planned: Iterable[tuple[Reading, bool]]) -> None:
-    """Write the rows that are worth reading on this gear, as CSV or as a workbook with a sketch."""
+def write_survey_template(
+    path: Path, linkage: SurveyedLinkage, planned: Iterable[tuple[Reading, bool]], unit: LengthUnit = LengthUnit.INCH
+) -> None:
+    """Write the rows that are worth reading on this gear, as CSV or as a workbook with a sketch; in inches or mm."""
     rows = []
+    metric = LengthUnit.MILLIMETRE if unit is LengthUnit.MILLIMETRE else LengthUnit.INCH
+    drive = metric if linkage.driven_in == "in" else LengthUnit.INCH
     for reading, checked in planned:
         by_others = "Checked by the other readings." if checked else "NOT checked by the others: read it twice."
         values: dict[str, str | float | None] = {
             "kind": reading.kind.value,
             "from": reading.start,
             "to": reading.end,
-            "extension_in": reading.extension,
             "how": f"{_HOW[reading.kind]} {by_others}",
         }
         if reading.is_angle:
             values["u_deg"] = round(float(np.degrees(reading.u)), 6)
         else:
-            values["u_in"] = reading.u
+            values[f"u_{metric}"] = round(metric.from_inches(reading.u), 6)
+        if reading.extension is not None:
+            values[f"extension_{drive}"] = round(drive.from_inches(reading.extension), 2)
         rows.append([values.get(column) for column in COLUMNS])
     if path.suffix.lower() == ".csv":
         write_csv(path, COLUMNS, rows)
@@ -183,22 +196,12 @@ class _Rows:
                     if (unit == "deg") != self._is_angle(kind):
                         raise CellFaultError("unit_of_u", "an uncertainty in the unit of the value", "Move the number.")
                     u = self._quantity(row[self.column], signed=False)
-            self.column = "extension_in"
-            extension = None
-            if self.column in row:
-                reach = 3.0 * abs(self.linkage.gear.reference.stroke[1] - self.linkage.low)
-                extension = read_number(
-                    row[self.column],
-                    0.0,
-                    reach,
-                    decimal_comma=self.comma,
-                    expected=f"an extension from 0 to {reach:.4g}",
-                )
+            extension = self._extension(row)
             start, end = self._ends(kind, row)
         except CellFaultError as fault:
             self._fault(number, self.column, row.get(self.column), fault.code, fault.expected, fault.remedy)
             return None
-        return Reading(kind, start, end, value, u, extension, number, self._is_angle(kind))
+        return Reading(kind, start, end, value, u, extension, number, self._is_angle(kind), self.linkage.driven_in)
 
     def _is_angle(self, kind: Kind) -> bool:
         turns = self.linkage.space.mechanism.output.kind == "angle"
@@ -219,6 +222,20 @@ class _Rows:
         if value <= 0.0 and not signed:
             raise CellFaultError("out_of_range", f"a {name} above 0", "Read it again, or leave it blank.")
         return value
+
+    def _extension(self, row: Mapping[str, Cell]) -> float | None:
+        extension = None
+        reach = 3.0 * abs(self.linkage.gear.reference.stroke[1] - self.linkage.low)
+        for unit in (LengthUnit.INCH, LengthUnit.MILLIMETRE):
+            self.column = f"extension_{unit}"
+            if self.column in row:
+                if extension is not None or (unit is not LengthUnit.INCH and self.linkage.driven_in != "in"):
+                    raise CellFaultError("extension_columns", "one extension, in the unit of the input", "Leave one.")
+                most = unit.from_inches(reach)
+                extension = unit.to_inches(
+                    self._number(row[self.column], 0.0, most, f"an extension from 0 to {most:.4g}")
+                )
+        return extension
 
     def _number(self, cell: Cell, low: float, most: float, expected: str) -> float:
         return read_number("" if cell is None else cell, low, most, decimal_comma=self.comma, expected=expected)

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from mlg_troubleshoot.gear.gear import Linkage
 from mlg_troubleshoot.reporting.common import head
 from mlg_troubleshoot.reporting.figures import INK, RULE, SOFT, Canvas
-from mlg_troubleshoot.reporting.formats import Lengths, number, several
+from mlg_troubleshoot.reporting.formats import Lengths, number
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.reporting.publish import USUAL_FORMATS, WrittenReport, publish, safe_stem
@@ -24,26 +24,30 @@ _WIDTH, _EDGE = 330.0, 26.0
 
 
 def write_survey_report(
-    result: SurveyResult, found: Survey, directory: Path, *, provenance: ReportProvenance, page: str = "A4"
+    result: SurveyResult,
+    found: Survey,
+    directory: Path,
+    *,
+    provenance: ReportProvenance,
+    page: str = "A4",
+    unit: LengthUnit = LengthUnit.INCH,
 ) -> WrittenReport:
     """Write the report of a survey as HTML and, where the engine can, as PDF."""
     mark = sha256(repr([(r.words, r.value, r.u) for r in found.readings]).encode()).hexdigest()[:8]
     stem = safe_stem("survey", result.gear.id, mark)
-    document = Document("survey.html.j2", _context(result, found, provenance), stem)
+    document = Document("survey.html.j2", _context(result, found, provenance, Lengths(unit)), stem)
     return publish(document, directory, formats=USUAL_FORMATS, page=page, created=provenance.created)
 
 
-def _context(result: SurveyResult, found: Survey, provenance: ReportProvenance) -> dict[str, Any]:
+def _context(result: SurveyResult, found: Survey, provenance: ReportProvenance, lengths: Lengths) -> dict[str, Any]:
     gear, mode, suggestion = result.gear, found.modes[0], result.suggestion
     fitted = found.linkage.predicted(found.read, mode.vector[None])[0]
     width = np.log(result.interval[:, 1] / result.interval[:, 0])
-    wrong = f"{len(found.misfits)} of them do not fit" if found.misfits else "all of them fit"
-    lengths = Lengths(LengthUnit.INCH)
     return {
         **head(f"Survey – {gear.name}", f"Survey · {gear.id}", gear, provenance, lengths),
         "result": result,
         "found": found,
-        "summary": f"{several(len(found.read), 'reading')}, {wrong}.",
+        "summary": found.words,
         "written": None if result.gear_file is None else result.gear_file.name,
         "determined": f"{mode.parameters:.1f} of {len(mode.vector)}",
         "widest": f"± {100 * float(np.expm1(width.max() / 2)):.1f} %",

@@ -123,6 +123,13 @@ class Survey:
         return tuple(r for r in self.readings if r.row is not None)
 
     @property
+    def words(self) -> str:
+        """How many were read, and how many of them fit."""
+        read, wrong = len(self.read), len(self.misfits)
+        fit = f"{wrong} do{'es' if wrong == 1 else ''} not fit" if wrong else "all of them fit"
+        return f"{read} reading{'' if read == 1 else 's'}, {fit}."
+
+    @property
     def degrees_of_freedom(self) -> float:
         """Readings that fit, less the numbers that they determine. [1]"""
         return max(len(self.readings) - len(self.misfits) - self.modes[0].parameters, 0.0)
@@ -431,7 +438,7 @@ class _Fitting:
                     ("small", slip.factor, slip.too_small),
                 ):
                     if abs(value * factor - expected) < near:
-                        right = f"{value * factor:.4g} in would fit"
+                        right = f"{reading.shown(value * factor)} would fit"
                         return f"{right}: the value is {slip.factor:g} times too {size}, {words}", True
         for j in map(int, np.flatnonzero(out)):
             other = self.readings[j]
@@ -449,11 +456,14 @@ class _Fitting:
             guess = self.linkage.predicted(tuple(others), mode.vector[None])[0]
             best = int(np.nanargmin(np.abs(guess - value)))
             if abs(guess[best] - value) < 3.5 * reading.u:
-                return f"a wrong pin: {others[best].start} to {others[best].end} measures {guess[best]:.4g} in", True
+                return (
+                    f"a wrong pin: {others[best].start} to {others[best].end} measures {reading.shown(guess[best])}",
+                    True,
+                )
         if not reading.is_angle:
             for inches in _MISREAD_IN:
                 if near < 0.4 * inches and abs(abs(gap[i]) - inches) < near:
-                    return f"misread by {inches:g} in: {expected:.4g} in would fit", True
+                    return f"misread by {reading.shown(inches)}: {reading.shown(expected)} would fit", True
         return f"the others give {reading.shown(expected)} ± {reading.shown(float(spread[i]))}: read it again", False
 
     def draws(self, modes: tuple[Mode, ...], kept: Mask, rng: Generator) -> Array:

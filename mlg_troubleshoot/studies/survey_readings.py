@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mlg_troubleshoot.gear.design import DesignSpace
 from mlg_troubleshoot.gear.gear import Gear, Linkage
 from mlg_troubleshoot.geometry.kernel import Kernel
-from mlg_troubleshoot.geometry.mechanism import Dyad, Lever, Mechanism, Slider, Slot
+from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot
 from mlg_troubleshoot.geometry.program import write_program
 
 Array = NDArray[np.float64]
@@ -62,6 +62,7 @@ class Reading:
     extension: input at the reading, from Down Lock; None at the reference position. [in or rad]
     row: row of the file; None for a planned one and for the prescribed travel.
     is_angle: true if the value is an angle.
+    driven_in: unit of the input.
     """
 
     kind: Kind
@@ -72,6 +73,7 @@ class Reading:
     extension: float | None = None
     row: int | None = None
     is_angle: bool = False
+    driven_in: str = "in"
 
     @property
     def what(self) -> tuple[str, frozenset[str], float | None]:
@@ -80,8 +82,8 @@ class Reading:
 
     @property
     def words(self) -> str:
-        """What is read, in words."""
-        at = "" if self.extension is None else f" at extension {self.extension:g}"
+        """What is read, in words; as in all sentences of a survey, lengths are in inches with four decimals."""
+        at = "" if self.extension is None else f" at extension {self.extension:.4f} {self.driven_in}"
         match self.kind:
             case Kind.DISTANCE:
                 return f"distance {self.start} to {self.end}{at}"
@@ -100,7 +102,7 @@ class Reading:
 
     def shown(self, value: float) -> str:
         """The same with its unit."""
-        return f"{self.in_units(value):.4g}{'°' if self.is_angle else ' in'}"
+        return f"{np.degrees(value):.4g}°" if self.is_angle else f"{value:.4f} in"
 
 
 class SurveyedLinkage:
@@ -116,6 +118,7 @@ class SurveyedLinkage:
         # Signs of the variables of the same linkage, seen from the other side.
         self.mirror = np.where(self.angles | np.array([n.endswith(".y") for n in self.names]), -1.0, 1.0)
         self.low = gear.reference.stroke[0]
+        self.driven_in = "rad" if any(isinstance(s, Crank) for s in self.space.mechanism.steps) else "in"
         self._beyond = gear.reference.stroke[1] - gear.reference.mechanism.reference_input
 
     def vector(self, linkage: Linkage) -> Array:
@@ -262,7 +265,10 @@ class SurveyedLinkage:
         pairs = [*map(tuple, self.rigid), *combinations(names, 2)]
         ends = (sorted(p, key=names.index) for p in pairs)
         distances = {frozenset(p): Reading(Kind.DISTANCE, p[0], p[1]) for p in ends}
-        return tuple(replace(r, u=default_u(r.kind, is_angle=r.is_angle)) for r in (*found, *distances.values()))
+        return tuple(
+            replace(r, u=default_u(r.kind, is_angle=r.is_angle), driven_in=self.driven_in)
+            for r in (*found, *distances.values())
+        )
 
     @property
     def rigid(self) -> tuple[frozenset[str], ...]:

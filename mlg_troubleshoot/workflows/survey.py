@@ -18,6 +18,7 @@ from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
 from mlg_troubleshoot.outputs import refuse_inputs_as_outputs, write_text
 from mlg_troubleshoot.studies.index_table import write_index_table
 from mlg_troubleshoot.studies.targets import targets_file
+from mlg_troubleshoot.units import LengthUnit
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.reporting import WrittenReport
@@ -34,8 +35,8 @@ _WORTH_NAMING = 0.02
 _UNREAD = 2000
 
 
-def write_survey_template(file: Path, gear: str | Path = DEFAULT_GEAR) -> None:
-    """Write the rows that are worth reading on a gear, as CSV or xlsx."""
+def write_survey_template(file: Path, gear: str | Path = DEFAULT_GEAR, unit: LengthUnit = LengthUnit.INCH) -> None:
+    """Write the rows that are worth reading on a gear, as CSV or xlsx, in inches or millimetres."""
     from mlg_troubleshoot.records.survey_table import write_survey_template as write
     from mlg_troubleshoot.studies.survey_plan import planned
     from mlg_troubleshoot.studies.survey_readings import SurveyedLinkage
@@ -43,7 +44,7 @@ def write_survey_template(file: Path, gear: str | Path = DEFAULT_GEAR) -> None:
     if file.suffix.lower() not in (".csv", ".xlsx"):
         raise UsageError(f"{file.name!r} ends neither in .csv nor in .xlsx", "Give a name that ends in one of them.")
     known = load_gear(gear)
-    write(file, SurveyedLinkage(known), planned(known))
+    write(file, SurveyedLinkage(known), planned(known), unit)
 
 
 def survey_gear(
@@ -161,7 +162,7 @@ def _assemblies(found: Survey) -> tuple[str, ...]:
         if len({m.sides for m in modes}) == 1:
             moved = np.where(found.linkage.angles, 0.0, np.abs(mode.vector - modes[0].vector))
             name = found.linkage.names[int(np.argmax(moved))].split(".")[0]
-            parts = [f"one with point {name} elsewhere by {moved.max():.3f} in" if moved.any() else "as written"]
+            parts = [f"one with point {name} elsewhere by {moved.max():.4f} in" if moved.any() else "as written"]
         text = ", ".join(parts)
         shares[text] = shares.get(text, 0.0) + mode.weight
     texts = "; ".join(f"{text} ({100 * share:.0f} %)" for text, share in shares.items())
@@ -221,7 +222,7 @@ def _put(values: dict[str, Any], found: Survey, source: str) -> None:
 
     turned = float(np.degrees(1.0))
     stroke = {"range": new["range"], "reference": new["reference"]}
-    put(values["input"], stroke, "actuator extension", ("extension", "extension", 1.0, "in"))
+    put(values["input"], stroke, "actuator extension", ("extension", "extension", 1.0, linkage.driven_in))
     for plane in values["planes"]:
         if plane["name"] in new.get("planes", {}):
             name = plane["name"]
@@ -298,7 +299,9 @@ def survey_values(result: SurveyResult) -> dict[str, Any]:
     return values
 
 
-def write_survey_report(result: SurveyResult, file: Path, directory: Path, page: str = "A4") -> WrittenReport | None:
+def write_survey_report(
+    result: SurveyResult, file: Path, directory: Path, page: str = "A4", unit: LengthUnit = LengthUnit.INCH
+) -> WrittenReport | None:
     """Write the report of a survey; None if nothing follows from the table."""
     from mlg_troubleshoot.reporting import provenance_of
     from mlg_troubleshoot.reporting.survey_report import write_survey_report as write
@@ -306,4 +309,4 @@ def write_survey_report(result: SurveyResult, file: Path, directory: Path, page:
     if result.survey is None:
         return None
     provenance = provenance_of(result.gear, {file.name: result.input_sha256}, seed=result.seed)
-    return write(result, result.survey, directory, provenance=provenance, page=page)
+    return write(result, result.survey, directory, provenance=provenance, page=page, unit=unit)

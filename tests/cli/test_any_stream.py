@@ -15,6 +15,8 @@ from mlg_troubleshoot.cli import output
 from tests.cli.conftest import DATA, FAILURE, FLEET, ROOT, mlg
 
 pexpect = pytest.importorskip("pexpect")
+FOUR_BAR = ROOT / "tests" / "geometry" / "data" / "four-bar.toml"
+SURVEY = ROOT / "tests" / "studies" / "data" / "four-bar-survey.csv"
 STORE = ROOT / "tests" / "store" / "data" / "version-1.sqlite"
 COMMANDS = {
     "help": (("--help",), 0),
@@ -32,6 +34,7 @@ COMMANDS = {
     "fleet": (("fleet", "--no-forecast", "--store", str(STORE)), 0),
     "separable": (("gear", "separable"), 0),
     "survey template": (("gear", "survey", "template", "neu–2.csv"), 0),
+    "survey": (("gear", "--gear", str(FOUR_BAR), "survey", str(SURVEY), "--show", "mm"), 1),
     "diagnose": (("diagnose", str(DATA / "measured_pressure.csv"), "--permutations", "99"), 1),
 }
 STREAMS = {

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import csv
+import re
+from html import unescape
 from pathlib import Path
 
+import numpy as np
 import openpyxl
 import pytest
 
 from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.records.survey_table import read_survey, write_survey_template
 from mlg_troubleshoot.studies.index_table import load_index_table
+from mlg_troubleshoot.studies.survey_readings import Kind, Reading, SurveyedLinkage
+from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows.survey import survey_gear, survey_values
 
 from .conftest import mlg
 
 FOUR_BAR = Path(__file__).parents[1] / "geometry" / "data" / "four-bar.toml"
-HEADER = ["kind", "from", "to", "value_in", "value_mm", "value_deg", "u_in", "extension_in"]
+HEADER = ["kind", "from", "to", "value_in", "value_mm", "value_deg", "u_in", "extension_in", "extension_mm"]
 # With the ground at 12 degrees from the crank, by hand.
 GOOD = [
     ("O2", "A", 2.1, ""), ("A", "B", 7.15, ""), ("B", "O4", 9.1, ""), ("O2", "O4", 6.05, ""), ("A", "O4", 4.0197, ""),
@@ -137,6 +143,7 @@ def test_contradicting_readings_are_named_together_and_no_gear_file_is_written(t
         (["DISTANCE", "O2", "A", "", "", 30, "", ""], "F2", "one value"),
         (["DISTANCE", "O2", "A", 2, "", "", 0, ""], "G2", "above 0"),
         (["DISTANCE", "O2", "A", 2, "", "", "", 99], "H2", "an extension from 0"),
+        (["DISTANCE", "O2", "A", 2, "", "", "", "", 9], "I2", "one extension"),
         (["LENGTH", "O2", "A", 2, "", "", "", ""], "A2", ""),
         (["TRAVEL", "", "", 2, "", "", "", ""], "A2", "DISTANCE"),
         (["EXTENSION", "", "", 2, "", "", "", ""], "A2", "DISTANCE"),
@@ -173,6 +180,59 @@ def test_a_report_shows_what_was_read_what_follows_and_both_linkages(tmp_path: P
     assert run.code == 0, run.err
     (page,) = (tmp_path / "out").glob("*.html")
     html = page.read_text(encoding="utf-8")
-    for words in ("What follows, and what remains unknown", "The linkage before and now", "distance A to B", "7.15 in"):
+    for words in (
+        "What follows, and what remains unknown",
+        "The linkage before and now",
+        "distance A to B",
+        "7.1500 in",
+    ):
         assert words in html
     assert html.count("stroke-dasharray") >= 3
+
+
+@pytest.fixture(scope="module", params=["in", "thou", "mm"])
+def shown(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str, str]:
+    """Screen and report of a survey with one slip and two assemblies, in a unit."""
+    folder = tmp_path_factory.mktemp("shown")
+    rows = good_rows()
+    rows[1][3] = 7.15 * 25.4
+    report = ("--report", folder, "--page", "Letter")
+    run = survey(table(folder / "s.csv", rows), "--show", request.param, *report)
+    (page,) = folder.glob("*.html")
+    body = re.sub(r"<style>.*?</style>|<[^>]*>", " ", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    return request.param, " ".join(run.out.split()), " ".join(unescape(body).replace("\u00a0", " ").split())
+
+
+def test_screen_and_report_of_a_survey_stand_in_the_readers_unit(shown: tuple[str, str, str]) -> None:
+    unit, *pages = shown
+    fits = {"in": "7.1500 in would fit", "thou": "7150.0 thou would fit", "mm": "181.610 mm would fit"}[unit]
+    others = {"in", "thou", "mm"} - {unit}
+    for page in pages:
+        assert fits in page
+        assert not re.search(rf"\d ({'|'.join(others)})\b", page)
+
+
+def test_the_unit_of_a_survey_is_remembered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "mlg.toml").write_text('show = "mm"\npage = "Letter"\n')
+    monkeypatch.chdir(tmp_path)
+    assert survey("template", "s.csv").code == 0
+    assert "lengths shown in mm" in survey("s.csv").err
+
+
+def test_a_template_in_millimetres_means_the_same_as_one_in_inches(tmp_path: Path) -> None:
+    linkage = SurveyedLinkage(load_gear())
+    plan = [(Reading(Kind.PLUNGER, u=0.0015, extension=0.5), True), (Reading(Kind.DISTANCE, "F", "1", u=0.01), True)]
+    readings = []
+    for unit, factor in ((LengthUnit.INCH, 1.0), (LengthUnit.MILLIMETRE, 25.4)):
+        file = tmp_path / f"{unit}.csv"
+        write_survey_template(file, linkage, plan, unit)
+        with file.open(newline="") as read:
+            rows = list(csv.DictReader(read))
+        with file.open("w", newline="") as filled:
+            writer = csv.DictWriter(filled, rows[0].keys())
+            writer.writeheader()
+            writer.writerows({**row, f"value_{unit}": 2.0 * factor} for row in rows)
+        found, problems, _ = read_survey(file, linkage)
+        assert problems == ()
+        readings.append([(r.value, r.u, r.extension or 0.0) for r in found])
+    assert readings[1] == pytest.approx(np.array(readings[0]), rel=1e-4)
