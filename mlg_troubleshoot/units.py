@@ -119,13 +119,6 @@ class WrittenLength:
     unit: LengthUnit | None
     text: str
 
-    def inches(self, default: LengthUnit | None) -> float:
-        """Return the length, reading a bare number in a default unit."""
-        unit = self.unit or default
-        if unit is None:
-            raise UsageError(f"{self.text!r} has no unit", "Write the unit: 0.013in, 13thou or 0.33mm.")
-        return unit.to_inches(self.value)
-
 
 _WRITTEN = re.compile(
     r"""^\s*(?P<number>[+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)

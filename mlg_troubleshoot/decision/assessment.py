@@ -36,12 +36,10 @@ class Verdict(StrEnum):
 class JointFinding:
     """One line of the ranked table.
 
-    clearance_in: radial clearance; None if not measured. [in]
-    contribution_in: plunger amplification × clearance; None if not measured. [in]
+    contribution_in: plunger amplification × radial clearance; both None if not measured. [in]
     first_order, total_order: sensitivity indices of the precomputed table (Eqs. 1 and 2). [1]
     plunger_amplification: A_iP at mid-position in the limit of small clearance (Eq. 8). [1]
-    rank: order in which to inspect, from 1.
-    rank_range: best and worst rank of its contribution over the ensemble of geometries.
+    rank, rank_range: order in which to inspect, from 1, and how it varies over the ensemble of geometries.
     alike: joints at the other end of the same link: plunger data alone cannot tell them apart.
     allowance_in: how much further this joint alone may wear until the worst case reaches the margin; None if it is
         not measured or the worst case is beyond the margin already. [in]
@@ -64,12 +62,9 @@ class JointFinding:
 
 @dataclass(frozen=True, slots=True)
 class RepairSet:
-    """A set of joints which, restored, brings the worst case within the margin.
+    """A set of joints which, restored, brings the worst case within the margin; both numbers are those afterwards.
 
-    predicted_displacement_in: worst-case displacement afterwards. [in]
-    probability_within_margin: probability that the bound is within the margin afterwards. [1]
-    access_minutes: time to reach them. [min]
-    minutes: time to open their areas and restore them. [min]
+    access_minutes, minutes: time to reach them; to open their areas and restore them. [min]
     """
 
     joints: tuple[int, ...]
@@ -81,12 +76,7 @@ class RepairSet:
 
 @dataclass(frozen=True, slots=True)
 class Rigging:
-    """What re-rigging alone would do: the plunger's range shifted to the middle, the clearances left as they are.
-
-    predicted_displacement_in: worst case afterwards: half of the range between the worst cases of both senses. [in]
-    probability_exceed_random_directions: chance of leaving the margin afterwards with uniformly random directions.
-        [1]
-    """
+    """What re-rigging alone would do: half of the range between both worst cases is left, clearances as they are."""
 
     shift_in: float
     predicted_displacement_in: float
@@ -98,7 +88,7 @@ class Rigging:
 class ReadingWorth:
     """What measuring one joint is worth.
 
-    minutes: time to reach it from the state of the inspection, areas that are open already being free. [min]
+    minutes: from the state of the inspection, areas that are open already being free. [min]
     risk_drop: expected drop of the decision risk; 0 where this reading alone cannot change the decision. [1]
     variance_in2: share of the variance of the worst case that the reading removes. [in²]
     critical: true if no gear can be cleared without it.
@@ -116,10 +106,8 @@ class ReadingWorth:
 
 @dataclass(frozen=True, slots=True)
 class MeasuringAdvice:
-    """Which joint to measure next, and whether one may stop.
+    """Which joint to measure next, the best one first, and whether one may stop: no reading will change the verdict.
 
-    worth: the unmeasured joints, best first.
-    stop: true if more measuring will not change the verdict.
     verdict: the verdict that stands if one may stop, else the verdict so far.
     expected_within: chance that the gear is within its margin, unmeasured joints taken by their distribution. For
         the advice only: a verdict takes them at their bounds. [1]
@@ -142,12 +130,7 @@ class MeasuringAdvice:
 
 @dataclass(frozen=True, slots=True)
 class Confidence:
-    """How far the probability of being within the margin can be trusted as a number.
-
-    analytic: with the response taken as linear in the errors of the readings. [1]
-    monte_carlo: with its curvature, by Monte Carlo. [1]
-    standard_error: of the Monte Carlo value. [1]
-    """
+    """The probability of being within the margin with a linear response, and with its curvature by Monte Carlo. [1]"""
 
     analytic: float
     monte_carlo: float
@@ -157,12 +140,7 @@ class Confidence:
 
 @dataclass(frozen=True, slots=True)
 class UncertaintyBudget:
-    """Standard uncertainties behind the probability, at the prediction with unmeasured joints at 0.
-
-    readings_in: of each measured joint. [in]
-    geometry_in: spread of the prediction over the ensemble of geometries. [in]
-    model_source: where `model_in` comes from: provisional, or the residual scatter of a diagnosis.
-    """
+    """Standard uncertainties behind the probability, at the prediction with unmeasured joints at 0. [in]"""
 
     readings_in: Mapping[int, float]
     geometry_in: float
@@ -199,11 +177,7 @@ class GroupChance:
 
 @dataclass(frozen=True, slots=True)
 class ClearanceInterval:
-    """What is known of one joint's clearance after the readings.
-
-    low_in, median_in, high_in: median and ends of the central 90 % interval of the radial clearance. [in]
-    worn: chance that it is beyond its limit. [1]
-    """
+    """Median and central 90 % interval of one radial clearance, and the chance that it is beyond its limit. [in, 1]"""
 
     joint: int
     low_in: float
@@ -214,9 +188,8 @@ class ClearanceInterval:
 
 @dataclass(frozen=True, slots=True)
 class Posterior:
-    """Which joints explain a measured plunger displacement.
+    """Which joints explain a measured plunger displacement, most likely worn first.
 
-    groups: groups of joints, most likely worn first.
     no_joint_worn: chance that no joint is worn beyond its limit. [1]
     not_clearance: chance that something other than clearance displaced the plunger. [1]
     called_worn: groups that are more likely worn than not.
@@ -369,7 +342,6 @@ class Rejected:
 
     @property
     def next_action(self) -> Step:
-        """The one next action: the plan's first step."""
         return self.plan.steps[0]
 
     @property

@@ -31,15 +31,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Cases:
-    """n gears under judgement.
-
-    clearance_in: radial clearances, NaN where not measured. [in]
-    gauge_u_in: standard uncertainty of a reading of each joint. [in]
-    own_gauge: joints whose own uncertainty is stated: they have been measured again.
-    margin_in, margin_u_in: margin and its standard uncertainty. [in]
-    mean_in, mean_u_in: mean plunger reading, NaN without one, and its standard uncertainty. [in]
-    failed, retracted: what the record says the gear did; neither if it does not say.
-    """
+    """n gears under judgement, NaN where nothing was measured; `own_gauge`: joints that were measured again. [in]"""
 
     gear: Gear
     inspections: tuple[Inspection, ...]

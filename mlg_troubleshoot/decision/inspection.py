@@ -43,11 +43,7 @@ class EnteredClearance:
 
 @dataclass(frozen=True, slots=True)
 class RowSource:
-    """Where an inspection came from.
-
-    file: file as the user named it; None for the prompts and the command line.
-    row: row in the file, counted from 1 with the header included.
-    """
+    """Where an inspection came from; `row` counts from 1 with the header, no file stands for prompts and flags."""
 
     file: str | None = None
     sheet: str | None = None
@@ -154,11 +150,7 @@ class Inspection:
 
 @dataclass(frozen=True, slots=True)
 class InvalidRow:
-    """A data row that cannot be judged; its problems stand in the list of problems.
-
-    correct: the columns to correct, in the order of the table.
-    warnings: what else the reader noticed about this row, suggestions included.
-    """
+    """A data row that cannot be judged, with the columns to correct; its problems stand in the list of problems."""
 
     record_id: str | None
     tail_no: str | None

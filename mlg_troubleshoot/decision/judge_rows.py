@@ -48,11 +48,7 @@ _CHUNK = 1024
 
 @dataclass(frozen=True, slots=True)
 class AssessOptions:
-    """What to compute beside verdict, plan, repair sets and allowances.
-
-    advice: say what further measuring is worth, check the probability by Monte Carlo, say what re-rigging would do,
-        and find which joints explain a measured displacement.
-    """
+    """What to compute beside verdict, plan, repair sets and allowances; `advice` is what is worth it for one gear."""
 
     advice: bool = False
     seed: int = 1

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.decision.assessment import ClearanceInterval, GroupChance, Posterior
+from mlg_troubleshoot.decision.case import plunger_u
 from mlg_troubleshoot.decision.inspection import Inspection
-from mlg_troubleshoot.decision.prediction import DEFAULT_PLUNGER_U_IN, clearances, model_uncertainty
+from mlg_troubleshoot.decision.prediction import clearances, model_uncertainty
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.gear.gear import Gear
@@ -65,9 +66,7 @@ def explain(
     links = np.empty((draws, 2 * drawn.shape[1]))
     links[:, 0::2], links[:, 1::2] = drawn * np.cos(turns), drawn * np.sin(turns)
     predicted = responses(gear)[0].displacement(links)
-    gauge = DEFAULT_PLUNGER_U_IN if inspection.plunger_gauge_u_in is None else inspection.plunger_gauge_u_in
-    gauge /= np.sqrt(len(inspection.readings_in))
-    u = np.hypot(model_uncertainty(predicted, residual_u_in), gauge)
+    u = np.hypot(model_uncertainty(predicted, residual_u_in), plunger_u(inspection))
     wide = np.hypot(u, prior.other_cause_u * gear.margin.value)
     plain = np.log1p(-prior.other_cause) - np.log(u) - 0.5 * ((reading - predicted) / u) ** 2
     other = np.log(prior.other_cause) - np.log(wide) - 0.5 * ((reading - predicted) / wide) ** 2

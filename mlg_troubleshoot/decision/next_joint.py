@@ -57,11 +57,7 @@ def enough(within: float, too_close: float = 0.0) -> Verdict | None:
 
 @dataclass(frozen=True, slots=True)
 class Outlook:
-    """What to expect of one gear with what is measured so far.
-
-    within: probability of being within the margin, over levels of wear. [1]
-    too_close: probability that the verdict is INCONCLUSIVE once every joint is measured. [1]
-    """
+    """Chances that one gear is within its margin, and that it is INCONCLUSIVE once every joint is measured. [1]"""
 
     worth: tuple[ReadingWorth, ...]
     within: float

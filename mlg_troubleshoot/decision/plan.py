@@ -68,10 +68,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The expected course from what is known now to an end.
-
-    steps: the steps, never empty; only the first one binds.
-    """
+    """The expected course from what is known now to an end; never empty, and only its first step binds."""
 
     steps: tuple[Step, ...]
     end: End

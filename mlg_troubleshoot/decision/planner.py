@@ -48,8 +48,6 @@ NOT_CLOSING = Plan((Step(Action.CORRECT, (), 0.0, None, sentences.CHECK_ENTRIES)
 class Judged:
     """What the verdict found about n gears, for the plan.
 
-    verdicts: the verdicts.
-    batch: with unmeasured joints at 0 and at their limit, and with random directions.
     beyond, clears, unexplained: the plunger was measured beyond its margin; within it by two standard uncertainties;
         beyond what joints explain.
     order: places of the joints in the order of their rank.

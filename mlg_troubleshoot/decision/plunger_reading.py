@@ -49,11 +49,6 @@ def compare(cases: Cases, upper: Prediction) -> Compared:
     )
 
 
-def outside(inspection: Inspection, margin_in: float) -> bool:
-    measured = inspection.measured_displacement_in
-    return measured is not None and abs(measured) > margin_in
-
-
 def disagreement(inspection: Inspection, over_in: float, under_in: float, standard_uncertainty_in: float) -> str | None:
     """Flag a measured displacement that differs from the prediction by more than two standard uncertainties."""
     measured = inspection.measured_displacement_in

@@ -169,11 +169,7 @@ def _slopes(model: LinkageModel, adjustment: Adjustment, worst: WorstCase) -> Ar
 
 @dataclass(frozen=True, slots=True)
 class BatchPrediction:
-    """Everything the rule needs for n gears.
-
-    lower, upper: with unmeasured joints at 0 and at their limit. [in]
-    chance_random: chance of exceeding the margin with uniformly random directions. [1]
-    """
+    """n gears with unmeasured joints at 0 and at their limit, and the chance of exceeding the margin at random. [1]"""
 
     lower: Prediction
     upper: Prediction

@@ -43,12 +43,7 @@ def go_on(end: End, *, failed: bool) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Predicted:
-    """The numbers that stand together everywhere.
-
-    displacement_in: worst case, or the displacement as loaded where an extension knows how loads rest the pins. [in]
-    bound_in: worst case over all directions. [in]
-    chance: of leaving the margin with random directions. [1]
-    """
+    """The numbers that stand together everywhere: as predicted, over all directions, and in random ones. [in, 1]"""
 
     displacement_in: float
     bound_in: float

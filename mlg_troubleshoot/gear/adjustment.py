@@ -40,10 +40,7 @@ class Adjustment:
         return self.clearance_in if self.direction_factors is None else self.clearance_in * self.direction_factors
 
     def numbers(self, model: LinkageModel) -> dict[str, Array]:
-        """Return the changed numbers of one linkage.
-
-        Returns, shape (n,): new values by name. [in, rad or 1]
-        """
+        """New values of the changed numbers of one linkage, by name, shape (n,). [in, rad or 1]"""
         nominal = dict(zip(model.kernel.parameter_names, model.kernel.parameters.tolist(), strict=True))
         names = [*self.changed, *(name for name in self.scaled if name not in self.changed)]
         return {

@@ -4,17 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-NOT_STATED = "not stated"
-
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """One of the four stages of the cycle.
-
-    name: Down Lock, Moving Up, Moving Down or Up Lock.
-    meaning: what happens in it.
-    plunger: position of the reversing-valve plunger: in, mid or out.
-    """
+    """One of the four stages of the cycle, with the position of the plunger in it: in, mid or out."""
 
     name: str
     meaning: str
@@ -23,13 +16,7 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class ValveState:
-    """One combination of plunger position and oil flow.
-
-    plunger: in, mid or out.
-    flow: direction in which the oil moves: retracting or extending.
-    stage: stage of the cycle in which the combination occurs.
-    result: what the source says follows, or "not stated".
-    """
+    """What follows from a position of the plunger and a direction of the oil flow; it may be "not stated"."""
 
     plunger: str
     flow: str
@@ -39,14 +26,7 @@ class ValveState:
 
 @dataclass(frozen=True, slots=True)
 class RetractionCycle:
-    """Stages, valve combinations and what a misplaced plunger means.
-
-    release: steps of the release of the Down Lock, in order.
-    retraction_order, extension_order: order of doors and gear.
-    valve: the six combinations of three positions and two flow directions.
-    beyond, short, within: what a plunger beyond, short of and at mid-position means.
-    source: where all this stands.
-    """
+    """Steps of the release, order of doors and gear, valve combinations, and what a misplaced plunger means."""
 
     stages: tuple[Stage, ...]
     release: tuple[str, ...]

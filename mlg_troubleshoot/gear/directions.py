@@ -128,12 +128,7 @@ def _harmonics(sampled: Array) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
 
 
 def random_directions(n_joints: int, n: int) -> Array:
-    """Uniform directions for all joints, spread evenly by a rank-1 lattice: the same set at every call.
-
-    n_joints: number of joints.
-    n: number of sets of directions.
-    Returns, shape (n, n_joints): directions. [rad]
-    """
+    """Uniform directions, shape (n, n_joints), even by a rank-1 lattice: the same set at every call. [rad]"""
     # Powers of the generalised golden ratio of the dimension: badly approximable together, hence even.
     root = 1.5
     for _ in range(60):

@@ -17,12 +17,7 @@ from mlg_troubleshoot.geometry.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True)
 class Linkage:
-    """One set of numbers for the gear's linkage.
-
-    name: ``A`` for the reference of the shipped gear, ``B`` … for its ensemble.
-    mechanism: coordinates and steps.
-    stroke: input at Down Lock and at mid-position. [in]
-    """
+    """One set of numbers for the linkage, ``A`` being the reference; the stroke ends at mid-position. [in]"""
 
     name: str
     mechanism: Mechanism
@@ -31,11 +26,7 @@ class Linkage:
 
 @dataclass(frozen=True, slots=True)
 class Area:
-    """A part of the gear that must be opened to reach its joints.
-
-    name, description: its name and what opening it means.
-    access: time to open and close it, once for all joints in it. [min]
-    """
+    """A part of the gear that is opened and closed once for all joints in it."""
 
     name: str
     description: str
@@ -44,11 +35,7 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class TiltedLink:
-    """A link whose projected length shrinks when end float lets it tilt.
-
-    length: the model's number.
-    floats: joints whose end floats tilt it: both ends of a link, or the pivot of a lever.
-    """
+    """A link whose projected length shrinks when end float of its joints (of a lever: of its pivot) lets it tilt."""
 
     length: str
     floats: tuple[int, ...]
@@ -159,18 +146,7 @@ class Gear:
         return (self.model, *(self.model_of(linkage) for linkage in self.ensemble[1:]))
 
     def model_of(self, linkage: Linkage) -> LinkageModel:
-        """Calibrate one linkage of this gear.
-
-        Parameters
-        ----------
-        linkage : Linkage
-            The linkage.
-
-        Returns
-        -------
-        LinkageModel
-            The linkage with this gear's calibration.
-        """
+        """Calibrate one linkage of this gear."""
         return LinkageModel(linkage.mechanism, linkage.stroke, self.calibration)
 
     @property
@@ -193,23 +169,7 @@ class Gear:
         return groups
 
     def joint(self, number: int) -> JointSpec:
-        """Return the joint of that number.
-
-        Parameters
-        ----------
-        number : int
-            Number of the joint.
-
-        Returns
-        -------
-        JointSpec
-            The joint.
-
-        Raises
-        ------
-        KeyError
-            If the gear has no such joint.
-        """
+        """Return the joint of that number; `KeyError` if the gear has none."""
         for joint in self.joints:
             if joint.number == number:
                 return joint

@@ -43,13 +43,7 @@ _GEOMETRY_KEYS = ("input", "planes", "points", "steps", "output", "calibration")
 
 
 def shipped_gears() -> tuple[str, ...]:
-    """Return the names of the gears that ship with the program.
-
-    Returns
-    -------
-    tuple of str
-        Names for :func:`load_gear`.
-    """
+    """Return the names of the gears that ship with the program, for :func:`load_gear`."""
     folder = Path(str(files("mlg_troubleshoot.gear"))) / "data"
     names = {p.stem for p in folder.glob("*.toml")}
     return tuple(sorted(n for n in names if not n.endswith(("-ensemble", "-targets"))))

@@ -32,16 +32,10 @@ class Joint(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class JointSpec:
-    """A joint as the gear file describes it.
+    """A joint as the gear file describes it; its number is also that of its virtual link.
 
-    number: its number, which is also the number of its virtual link.
-    point: the mechanism's point.
-    name, location: what it is called and where a technician finds it.
-    limit: largest radial clearance that the manual allows. [in]
-    new_part: radial clearance after the joint is restored. [in]
-    access: time to reach and measure this joint once its area is open. [min]
-    restore: time to restore it once its area is open. [min]
-    area: area that must be opened for it; opening counts once for all joints of the area.
+    limit, new_part: radial clearance that the manual allows at most, and that a restored joint has. [in]
+    access, restore: time to measure it, and to restore it, once its area is open. [min]
     critical: true for a joint without whose measurement nothing can be cleared (joints 1 to 5 of the paper).
     """
 

@@ -70,11 +70,7 @@ class LinkageModel:
         return float(direction * travel_in / (direction * self._mid - along[least]))
 
     def numbers(self, changed: Mapping[str, Any] | None) -> Sequence[Any] | None:
-        """Return the linkage's numbers with some of them changed, for the kernel.
-
-        changed: new values by parameter name; arrays broadcast with the virtual links.
-        Raises `KeyError` if the linkage has no number of that name.
-        """
+        """The linkage's numbers with some changed by name, for the kernel; arrays broadcast with the virtual links."""
         if not changed:
             return None
         values: list[Any] = self.kernel.parameters.tolist()
@@ -95,12 +91,7 @@ class LinkageModel:
         return np.asarray(self.rate * (self.kernel.output(at, links, self.numbers(changed)) - zero))
 
     def plunger(self, stroke: Any, links: Sequence[Any] | None = None) -> Array:
-        """Plunger position over the release stroke (Fig. 12): P(s) = P(0) + k (p(s) − p(0)).
-
-        stroke: actuator extension from Down Lock. [in]
-        links: components of each virtual link, else no clearance. [in]
-        Returns: position; NaN where the linkage does not close. [in]
-        """
+        """Plunger position (Fig. 12), P(s) = P(0) + k (p(s) − p(0)), by extension and links; NaN if not closed. [in]"""
         links = self.kernel.no_clearance() if links is None else links
         moved = self.kernel.output(stroke, links) - self._down_lock
         return np.asarray(self.calibration.down_lock_in + self.rate * moved)

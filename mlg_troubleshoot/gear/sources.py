@@ -18,12 +18,7 @@ class SourceKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A source that numbers of a gear file refer to by name.
-
-    name: name within the gear file.
-    kind: what kind of source.
-    text: the source in words: document, section, how it was obtained.
-    """
+    """A source in words, which numbers of a gear file refer to by name: document, section, how it was obtained."""
 
     name: str
     kind: SourceKind
@@ -32,11 +27,7 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Sourced:
-    """A number with its unit and its source.
-
-    kind: what kind of source.
-    source: the source in words.
-    """
+    """A number with its unit and its source in words."""
 
     value: float
     unit: str

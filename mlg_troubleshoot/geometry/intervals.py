@@ -354,11 +354,7 @@ def _sine(x: Pair) -> Pair:
 
 
 def cosine_range(low: Array, high: Array) -> Pair:
-    """Range of the cosine over ranges of angles.
-
-    low, high: ranges. [rad]
-    Returns low, high: bounds of the cosine. [1]
-    """
+    """Range of the cosine over ranges of angles. [rad, 1]"""
     # The margins cover the rounding of shifted angles and of the library's cosine.
     slack = 1e-15 + 4.0 * np.spacing(np.maximum(np.abs(low), np.abs(high)))
     low, high = low - slack, high + slack

@@ -74,10 +74,7 @@ class Kernel:
     def positions(
         self, position: Array | float, links: Sequence[Array | float], parameters: Sequence[Any] | None = None
     ) -> dict[str, tuple[Array, Array]]:
-        """Coordinates of every point, each in its own plane.
-
-        Returns: x and y of each point; a joint with a virtual link is given at its downstream link. [in]
-        """
+        """x and y of every point in its own plane, of one with a virtual link at its downstream link. [in]"""
         names = self._program.joints
         wanted = tuple(dict.fromkeys(n for pair in names.values() for n in pair))
         if self._joints is None:

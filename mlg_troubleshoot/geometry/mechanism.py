@@ -83,11 +83,7 @@ class Dyad:
 
 @dataclass(frozen=True, slots=True)
 class Lever:
-    """A rigid link of three joints, the middle one fixed (Fig. 9c): one joint follows another.
-
-    joint, pivot, follows: the joint located, the fixed pivot, and the joint of the same lever that is already
-      located.
-    """
+    """A rigid link of three joints, the middle one fixed (Fig. 9c): `joint` follows one that is already located."""
 
     joint: str
     pivot: str
@@ -97,10 +93,7 @@ class Lever:
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """A lever that a pin turns in a radial slot: the pin sets the lever's direction only.
-
-    joint, pivot, pin: the joint on the lever's other arm, the fixed pivot, and the pin.
-    """
+    """A lever that a pin turns in a radial slot: the pin sets the direction of its other arm, to `joint`, only."""
 
     joint: str
     pivot: str

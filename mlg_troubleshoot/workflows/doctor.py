@@ -4,25 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.errors import TroubleshootError
 from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
 from mlg_troubleshoot.studies.index_table import load_index_table
-
-if TYPE_CHECKING:
-    pass
-
 from mlg_troubleshoot.workflows.check import CheckOptions, check_inspection, trial_inspection, write_reports
 
 
 @dataclass(frozen=True, slots=True)
 class Ability:
-    """One thing that an installation can do, or cannot.
-
-    needed: False for what only makes things faster or nicer.
-    """
+    """One thing that an installation can do, or cannot; what only makes things faster or nicer is not needed."""
 
     ability: str
     detail: str
