@@ -297,6 +297,11 @@ class Assessment:
     posterior: Posterior | None = None
 
     @property
+    def row(self) -> Inspection:
+        """What was measured, by the name that it has where a row cannot be judged."""
+        return self.inspection
+
+    @property
     def as_loaded(self) -> bool:
         """True where the prediction is the displacement as loaded: an expectation, with the bound beside it."""
         return self.predicted_displacement_in != self.bound_in

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mlg_troubleshoot.decision.assessment import Confidence, Rigging
+from mlg_troubleshoot.decision.assessment import Assessment, Confidence, Rigging
 from mlg_troubleshoot.decision.plan import End
 from mlg_troubleshoot.gear.gear import Gear
 
@@ -148,6 +148,18 @@ def confidence_words(confidence: Confidence | None) -> str:
         return ""
     error = max(100.0 * confidence.standard_error, 0.01)
     return f" (Monte Carlo {100.0 * confidence.monte_carlo:.2f} ± {error:.2f} %)"
+
+
+def chance_wrong_sentence(a: Assessment) -> str | None:
+    """The chance that a verdict by the prediction is wrong; None where no prediction decides."""
+    if a.chance_wrong is None:
+        return None
+    what = "displacement as loaded" if a.as_loaded else "worst case"
+    unread = "; joints that were not measured count as 0" if any(f.clearance_in is None for f in a.joints) else ""
+    return (
+        f"Called {a.verdict.words.lower()}, the {what} of this gear lies on the other side of the margin with a chance "
+        f"of {percent(a.chance_wrong)}{unread}."
+    )
 
 
 def rigging_sentence(rigging: Rigging) -> str:

@@ -14,13 +14,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.inspection_report import batch_document, inspection_document
 from mlg_troubleshoot.reporting.provenance import ReportProvenance, provenance_of
-from mlg_troubleshoot.reporting.publish import (
-    USUAL_FORMATS,
-    Progress,
-    WrittenReport,
-    publish,
-    publish_all,
-)
+from mlg_troubleshoot.reporting.publish import USUAL_FORMATS, Progress, WrittenReport, publish, publish_all
 from mlg_troubleshoot.units import LengthUnit
 
 __all__ = [
@@ -60,15 +54,9 @@ def write_reports(  # noqa: PLR0913 - what a batch is, and how and for whom it i
         inspection_document(j, gear, provenance, problems, unit, steps)
         for j, steps in zip(judgements, before or [()] * len(judgements), strict=True)
     )
+    wanted: dict[str, Any] = {"formats": formats, "page": page}
     reports = publish_all(
-        _told_apart(documents),
-        len(judgements),
-        directory,
-        formats=formats,
-        page=page,
-        created=provenance.created,
-        workers=workers,
-        progress=progress,
+        _told_apart(documents), len(judgements), directory, workers=workers, progress=progress, **wanted
     )
     if len(reports) == 1:
         return tuple(reports)
@@ -77,7 +65,7 @@ def write_reports(  # noqa: PLR0913 - what a batch is, and how and for whom it i
         for place, report in enumerate(reports)
     }
     summary = batch_document(judgements, problems, gear, provenance, notes, links, unit)
-    return (publish(summary, directory, formats=formats, page=page, created=provenance.created), *reports)
+    return (publish(summary, directory, **wanted), *reports)
 
 
 def _told_apart(documents: Iterable[Document]) -> Iterator[Document]:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from typing import Any
 
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.sources import SourceKind
-from mlg_troubleshoot.reporting.formats import Lengths, digest, moment, several
+from mlg_troubleshoot.reporting.formats import Lengths, digest
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.studies.groups import link_groups
 
@@ -28,10 +27,10 @@ def head(title: str, footer: str, gear: Gear, provenance: ReportProvenance, leng
         "footer_left": footer,
         "footer_middle": _program_and_hashes(provenance),
         "disclaimer": DISCLAIMER,
-        "source_counts": source_counts(gear),
+        "source_counts": [(sum(n.kind is kind for n in gear.numbers), kind.value) for kind in SourceKind],
         "limits_of": sorted({(j.limit.value, j.limit.kind, j.limit.source) for j in gear.joints}),
         "alike": [" = ".join(map("#{}".format, pair)) for pair in link_groups(gear) if len(pair) > 1],
-        "provenance": provenance_facts(gear, provenance),
+        "made": provenance,
         "made_on": provenance.created.date().isoformat(),
         "lengths": lengths,
         "unit": lengths.unit.value,
@@ -45,28 +44,3 @@ def _program_and_hashes(p: ReportProvenance) -> str:
     if hashes:
         parts.append(f"input {digest(hashes[0], 8)}" if len(hashes) == 1 else f"{len(hashes)} inputs")
     return " · ".join(parts)
-
-
-def provenance_facts(gear: Gear, provenance: ReportProvenance) -> Facts:
-    p = provenance
-    found: list[tuple[str, str | None]] = [
-        ("Program", f"mlg-troubleshoot {p.program_version}"),
-        ("Made at", moment(p.created)),
-        ("Gear file", f"{gear.path.name} ({gear.id})"),
-        ("Geometry", f"sha256 {p.geometry_sha256}"),
-        ("Ensemble", f"{several(len(gear.ensemble), 'geometry', 'geometries')}, sha256 {gear.ensemble_sha256}"),
-        ("Sensitivity table", f"sha256 {p.indices_sha256}" if p.indices_sha256 else None),
-        *(("Input", f"{name}, sha256 {sha256}") for name, sha256 in p.input_sha256.items()),
-        ("Input", None if p.input_sha256 else "prompts or command line"),
-        ("Seed", None if p.seed is None else str(p.seed)),
-        ("Extension", p.extension or "none"),
-        ("Settings", p.remembered),
-    ]
-    return [(label, value) for label, value in found if value]
-
-
-def source_counts(gear: Gear) -> str:
-    """Say how many numbers behind a prediction come from which kind of source."""
-    counts = Counter(n.kind for n in gear.numbers)
-    parts = [f"{counts[kind]} {kind.value}" for kind in SourceKind if counts.get(kind)]
-    return f"Of {len(gear.numbers)} numbers behind a verdict: {', '.join(parts)}."

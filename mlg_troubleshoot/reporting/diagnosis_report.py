@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from mlg_troubleshoot.diagnosis import CATALOGUE, Diagnosis, ModelExtension
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import diagnosis_figures as drawn
-from mlg_troubleshoot.reporting.common import Facts, head, provenance_facts
+from mlg_troubleshoot.reporting.common import head
 from mlg_troubleshoot.reporting.diagnosis_figures import Residuals
 from mlg_troubleshoot.reporting.diagnosis_lines import (
     cause_words,
@@ -27,8 +27,7 @@ from mlg_troubleshoot.reporting.diagnosis_lines import (
 from mlg_troubleshoot.reporting.formats import Lengths, several, short
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
-from mlg_troubleshoot.reporting.publish import USUAL_FORMATS, WrittenReport, publish, safe_stem
-from mlg_troubleshoot.reporting.signs import sign
+from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.units import LengthUnit
 
 _WORDS = {
@@ -44,24 +43,18 @@ _MOST_CHANGES = 40
 PlotPair = tuple[Markup, Markup, str]
 
 
-def write_diagnosis_report(  # noqa: PLR0913 - what was found, and how and for whom it is printed
-    diagnosis: Diagnosis,
+def diagnosis_document(
+    d: Diagnosis,
     gear: Gear,
-    directory: Path,
-    *,
-    extension: ModelExtension | None,
     provenance: ReportProvenance,
-    formats: Sequence[str] = USUAL_FORMATS,
-    page: str = "A4",
+    extension: ModelExtension | None,
     unit: LengthUnit = LengthUnit.INCH,
     problems: Iterable[Problem] = (),
     notes: Iterable[str] = (),
-) -> WrittenReport:
-    context = _context(diagnosis, gear, extension, provenance, Lengths(unit))
-    context |= {"problems": list(problems), "notes": list(notes)}
+) -> Document:
+    context = _context(d, gear, extension, provenance, Lengths(unit))
     stem = safe_stem("diagnosis", *(Path(name).stem for name in provenance.input_sha256))
-    document = Document("diagnosis.html.j2", context, stem)
-    return publish(document, directory, formats=formats, page=page, created=provenance.created)
+    return Document("diagnosis.html.j2", {**context, "problems": list(problems), "notes": list(notes)}, stem)
 
 
 def _context(
@@ -74,14 +67,12 @@ def _context(
     chance = found[0].p_value if found else d.remainder_p
     return {
         **head(f"Measured against predicted – {source}", f"Diagnosis · {short(source, 40)}", gear, provenance, lengths),
-        "provenance": _provenance(d, gear, provenance),
         "source": source,
         "d": d,
         "days": _days(d),
         "g": d.gain,
         "words": words,
         "tone": tone,
-        "sign": sign(d.verdict),
         "headline": _headline(d, lengths),
         "action": what_to_do(d),
         "chance": None if chance is None else chance_words(chance, d.permutations),
@@ -202,8 +193,3 @@ def _changes(residuals: Residuals) -> list[dict[str, Any]]:
             }
         )
     return rows
-
-
-def _provenance(d: Diagnosis, gear: Gear, provenance: ReportProvenance) -> Facts:
-    facts = [fact for fact in provenance_facts(gear, provenance) if fact[0] != "Extension"]
-    return [*facts, ("Null data sets", f"{d.permutations}, drawn with seed {d.seed}")]

@@ -18,9 +18,8 @@ from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 def write_form(file: Path, gear: Gear, *, page: str = "A4", unit: LengthUnit = LengthUnit.INCH) -> None:
     """Write the form as PDF or HTML, as the name ends; limits stand in `unit`."""
-    provenance = provenance_of(gear, {})
     context = {
-        **head(f"Joint clearances – {gear.name}", gear.name, gear, provenance, Lengths(unit)),
+        **head(f"Joint clearances – {gear.name}", gear.name, gear, provenance_of(gear, {}), Lengths(unit)),
         "conventions": tuple(ClearanceConvention),
         "drawing": blank_schematic(gear),
     }
@@ -30,7 +29,7 @@ def write_form(file: Path, gear: Gear, *, page: str = "A4", unit: LengthUnit = L
         return
     try:
         with PdfEngine() as engine:
-            made, _ = engine.convert(render(document, page, for_pdf=True), page, provenance.created)
+            made, _ = engine.convert(render(document, page, for_pdf=True), page, document.created)
     except PdfError as error:
         instead = file.with_suffix(".html").name
         raise OutputError(f"no PDF can be made: {error}", f"Write {instead} and print it from a browser.") from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import datetime
 from functools import cache
 from typing import Any
 from urllib.parse import quote
@@ -15,22 +16,25 @@ from markupsafe import Markup
 
 from mlg_troubleshoot.reporting import formats
 from mlg_troubleshoot.reporting.glyphs import breakable, font_faces
+from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.reporting.resources import templates_folder
 from mlg_troubleshoot.visible import visible
 
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A document to be made from a template that extends ``base.html.j2``.
-
-    context: what it shows; at least what :func:`~mlg_troubleshoot.reporting.common.head` returns.
-    landscape: True for wide tables.
-    """
+    """A document of a template that extends ``base.html.j2``; its context holds at least what `common.head` says."""
 
     template: str
     context: Mapping[str, Any]
     stem: str
     landscape: bool = False
+
+    @property
+    def created(self) -> datetime:
+        """The moment of the document: the same input and the same moment give the same bytes."""
+        made: ReportProvenance = self.context["made"]
+        return made.created
 
 
 @cache
@@ -58,6 +62,7 @@ def environment() -> Environment:
         several=formats.several,
         short=formats.short,
         minutes=formats.minutes,
+        moment=formats.moment,
     )
     return made
 

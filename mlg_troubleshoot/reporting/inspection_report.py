@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from datetime import date
 from pathlib import Path
 from typing import Any
 
-from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected, Verdict
-from mlg_troubleshoot.decision.inspection import Inspection, Outcome, RowSource, Side
+from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected
+from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, Outcome, RowSource, Side
+from mlg_troubleshoot.decision.order import WORST_FIRST, latest_of_each_gear
+from mlg_troubleshoot.decision.sentences import chance_wrong_sentence
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import inspection_figures as drawn
@@ -20,11 +20,9 @@ from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.reporting.schematic import joint_mark, joint_state, schematic
-from mlg_troubleshoot.reporting.signs import sign
 from mlg_troubleshoot.units import LengthUnit
 
 SIGNATORIES = ("Measured by", "Independently measured by", "Rectified by", "Inspected by")
-SEVERITY = (Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE, Verdict.INCOMPLETE, Verdict.WITHIN_MARGIN, Verdict.INVALID)
 _SIDES = {Side.LH: "left-hand main landing gear", Side.RH: "right-hand main landing gear"}
 _WARNINGS_ON_FRONT = 3
 _MANUAL = ("manual_ref", "manual_rev")
@@ -69,7 +67,6 @@ def _identified(
         "record": record,
         "facts_entered": facts,
         "tone": j.verdict.value.lower().replace("_", "-"),
-        "sign": sign(j.verdict.value),
         "warnings": list(dict.fromkeys((*j.warnings, *row.warnings))),
     }
 
@@ -99,6 +96,7 @@ def _inspection(a: Assessment, gear: Gear, provenance: ReportProvenance, lengths
             (joint_mark("", "missing"), "not measured"),
         ],
         "extended": bool(provenance.extension),
+        "wrong": chance_wrong_sentence(a),
         "rows": _joints(gear, a, lengths),
         "curve": drawn.plunger_curve(gear, a, lengths),
         "cases": _sequence(gear, a, lengths),
@@ -155,22 +153,18 @@ def _joints(gear: Gear, a: Assessment, lengths: Lengths) -> list[dict[str, Any]]
         return finding.contribution_in + 2.0 * gauge_u(finding.joint) * finding.plunger_amplification
 
     longest = max([1e-6, *(bar_end(f) for f in a.joints)])
-    rows = []
-    for f in a.ranked:
-        entered = a.inspection.entered.get(f.joint)
-        state = joint_state(f)
-        rows.append(
-            {
-                "f": f,
-                "location": gear.joint(f.joint).location,
-                "entered": _as_entered(entered.text, entered.unit.value) if entered else None,
-                "state": state,
-                "mark": joint_mark(str(f.joint), state),
-                "bar": drawn.contribution_bar(f, longest, gauge_u(f.joint), lengths),
-                "allowance_in": _allowance(f),
-            }
-        )
-    return rows
+    return [
+        {
+            "f": f,
+            "location": gear.joint(f.joint).location,
+            "entered": _as_entered(a.inspection.entered.get(f.joint)),
+            "state": joint_state(f),
+            "mark": joint_mark(str(f.joint), joint_state(f)),
+            "bar": drawn.contribution_bar(f, longest, gauge_u(f.joint), lengths),
+            "allowance_in": _allowance(f),
+        }
+        for f in a.ranked
+    ]
 
 
 def _allowance(finding: JointFinding) -> float | None:
@@ -180,9 +174,11 @@ def _allowance(finding: JointFinding) -> float | None:
     return max(0.0, min(finding.allowance_in, finding.limit_in - finding.clearance_in))
 
 
-def _as_entered(text: str, unit: str) -> str:
+def _as_entered(entered: EnteredClearance | None) -> str | None:
     """The entered text, with its unit if the text does not say it."""
-    return text if any(c.isalpha() or c in '"″”' for c in text) else f"{text} {unit}"
+    if entered is None or any(c.isalpha() or c in '"″”' for c in entered.text):
+        return None if entered is None else entered.text
+    return f"{entered.text} {entered.unit}"
 
 
 def _sequence(gear: Gear, a: Assessment, lengths: Lengths) -> Facts:
@@ -203,48 +199,6 @@ def _sequence(gear: Gear, a: Assessment, lengths: Lengths) -> Facts:
 
 def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
-
-
-def latest_of_each_gear(judgements: Sequence[Judgement]) -> tuple[list[int], list[int]]:
-    """Return the places of the latest inspection of each gear, worst first, and of the earlier ones.
-
-    The latest is the one of the last date; without dates, or on one date, the one that stands last. A row that cannot
-    be judged is no inspection of a gear and stands by itself.
-    """
-    last: dict[tuple[str, str], int] = {}
-    earlier: list[int] = []
-    for place, judgement in enumerate(judgements):
-        if isinstance(judgement, Assessment):
-            gear = (judgement.inspection.tail_no, judgement.inspection.side.value)
-            before = last.get(gear)
-            if before is not None and _day(judgements[before]) > _day(judgement):
-                earlier.append(place)
-                continue
-            if before is not None:
-                earlier.append(before)
-            last[gear] = place
-    now = [*last.values(), *(i for i, j in enumerate(judgements) if isinstance(j, Rejected))]
-    return _worst_first(judgements, now), _worst_first(judgements, earlier)
-
-
-def _day(judgement: Judgement) -> date:
-    found = judgement.inspection.inspection_date if isinstance(judgement, Assessment) else None
-    return found or date.min
-
-
-def _worst_first(judgements: Sequence[Judgement], places: Iterable[int]) -> list[int]:
-    return sorted(places, key=lambda i: (_severity(judgements[i]), i))
-
-
-def _severity(judgement: Judgement) -> tuple[int, int, float]:
-    """Sort key: measured beyond the margin first, then by verdict, then by the worst case against the margin."""
-    group = SEVERITY.index(judgement.verdict)
-    if isinstance(judgement, Rejected):
-        return 1, group, 0.0
-    measured = judgement.inspection.measured_displacement_in
-    beyond = measured is not None and abs(measured) > judgement.margin_in
-    predicted = judgement.predicted_displacement_in
-    return (0 if beyond else 1), group, -(math.inf if predicted is None else predicted / judgement.margin_in)
 
 
 def batch_document(
@@ -270,25 +224,11 @@ def batch_document(
         "gears_of": len({(j.inspection.tail_no, j.inspection.side) for j in judged}),
         "over_limit": sum(any(f.over_limit for f in j.joints) for j in judged),
         "failed": sum(j.inspection.outcome is Outcome.FAILED for j in judged),
-        "counts": [(v.words, sign(v.value), counted[v]) for v in SEVERITY],
-        "latest": [_line(judgements[i], i, links) for i in latest],
-        "earlier": [_line(judgements[i], i, links) for i in earlier],
+        "counts": [(v, counted[v]) for v in WORST_FIRST],
+        "latest": [(judgements[i], (links or {}).get(i, ("", ""))) for i in latest],
+        "earlier": [(judgements[i], (links or {}).get(i, ("", ""))) for i in earlier],
         "problems": problems,
         "notes": notes,
     }
-    return Document("batch.html.j2", context, safe_stem("batch", *map(_name, provenance.input_sha256)), landscape=True)
-
-
-def _name(file: str) -> str:
-    return Path(file).name
-
-
-def _line(judgement: Judgement, place: int, links: Mapping[int, tuple[str, str]] | None) -> dict[str, Any]:
-    judged = isinstance(judgement, Assessment)
-    return {
-        "j": judgement,
-        "row": judgement.inspection if isinstance(judgement, Assessment) else judgement.row,
-        "judged": judged,
-        "tone": judgement.verdict.value.lower().replace("_", "-"),
-        "links": (links or {}).get(place, ("", "")),
-    }
+    stem = safe_stem("batch", *(Path(name).name for name in provenance.input_sha256))
+    return Document("batch.html.j2", context, stem, landscape=True)

@@ -16,9 +16,7 @@ from mlg_troubleshoot.gear.gear import Gear
 class ReportProvenance:
     """Program, inputs and moment behind a report.
 
-    created: moment of the report, given by the caller: the same input and the same moment give the same bytes.
     input_sha256: hash of the bytes of each input file by its name; empty for prompts and the command line.
-    seed: seed of whatever was drawn at random; None if nothing was.
     remembered: remembered settings that shaped the report, and the file that they come from.
     """
 
@@ -26,7 +24,6 @@ class ReportProvenance:
     created: datetime
     geometry_sha256: str
     input_sha256: Mapping[str, str] = field(default_factory=dict)
-    indices_sha256: str | None = None
     seed: int | None = None
     extension: str | None = None
     remembered: str | None = None
@@ -45,7 +42,6 @@ def provenance_of(
         moment_of_report(),
         gear.geometry_sha256,
         dict(input_sha256),
-        None,
         seed,
         extension,
         remembered,

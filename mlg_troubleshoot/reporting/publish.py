@@ -11,7 +11,6 @@ import unicodedata
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 
 from mlg_troubleshoot.errors import UsageError
@@ -61,9 +60,8 @@ def publish(
     document: Document,
     directory: Path,
     *,
-    formats: Sequence[str],
-    page: str,
-    created: datetime,
+    formats: Sequence[str] = USUAL_FORMATS,
+    page: str = "A4",
     engine: PdfEngine | None = None,
 ) -> WrittenReport:
     unknown = sorted(set(formats) - set(FORMATS))
@@ -87,7 +85,7 @@ def publish(
                 wanted |= {"html", "pdf"}
         if "pdf" in wanted:
             try:
-                pdf, found = _pdf(document, page, created, running)
+                pdf, found = _pdf(document, page, running)
                 notes += found
                 made["pdf"] = _written(directory / f"{document.stem}.pdf", pdf)
             except PdfError as error:
@@ -114,10 +112,10 @@ def _warm_up(engine: PdfEngine) -> None:
         return
 
 
-def _pdf(document: Document, page: str, created: datetime, engine: PdfEngine) -> tuple[bytes, list[str]]:
+def _pdf(document: Document, page: str, engine: PdfEngine) -> tuple[bytes, list[str]]:
     """Make the PDF; characters that no font of this machine can draw are spelled out."""
     html = render(document, page, for_pdf=True)
-    made, boxes = engine.convert(html, page, created)
+    made, boxes = engine.convert(html, page, document.created)
     missing = missing_characters(html)
     if not missing or not boxes:
         return made, []
@@ -127,7 +125,7 @@ def _pdf(document: Document, page: str, created: datetime, engine: PdfEngine) ->
     )
     on_paper = "Text in ‹ › stands for characters that this PDF's fonts lack; the HTML report has them as entered."
     html = render(document, page, for_pdf=True, glyph_note=on_paper)
-    return engine.convert(spell_out(html, missing), page, created)[0], [note]
+    return engine.convert(spell_out(html, missing), page, document.created)[0], [note]
 
 
 def publish_all(
@@ -137,7 +135,6 @@ def publish_all(
     *,
     formats: Sequence[str],
     page: str,
-    created: datetime,
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> list[WrittenReport]:
@@ -151,7 +148,7 @@ def publish_all(
     def one(document: Document) -> WrittenReport:
         engine = engines.get()
         try:
-            return publish(document, directory, formats=formats, page=page, created=created, engine=engine)
+            return publish(document, directory, formats=formats, page=page, engine=engine)
         finally:
             engines.put(engine)
 

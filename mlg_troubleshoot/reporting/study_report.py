@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from hashlib import sha256
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,12 +14,11 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import study_figures as drawn
-from mlg_troubleshoot.reporting.common import Facts, head, provenance_facts
+from mlg_troubleshoot.reporting.common import head
 from mlg_troubleshoot.reporting.formats import ABSENT, MINUS, Lengths, joint_list
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
-from mlg_troubleshoot.reporting.publish import USUAL_FORMATS, WrittenReport, publish, safe_stem
-from mlg_troubleshoot.reporting.signs import sign
+from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.reporting.study_figures import BarSeries, Style
 from mlg_troubleshoot.studies.findings import StudyFindings
 from mlg_troubleshoot.studies.statements import Outcome
@@ -39,22 +37,14 @@ _DIRECTIONS = {
 }
 
 
-def write_study_report(
-    findings: StudyFindings,
-    directory: Path,
-    *,
-    provenance: ReportProvenance,
-    formats: Sequence[str] = USUAL_FORMATS,
-    page: str = "A4",
-    unit: LengthUnit = LengthUnit.INCH,
-) -> WrittenReport:
-    table = findings.result.table
+def study_document(
+    findings: StudyFindings, provenance: ReportProvenance, unit: LengthUnit = LengthUnit.INCH
+) -> Document:
     options = findings.options
     asked = repr(replace(options, scheduler=None, state=None, workers=1))
-    mark = sha256(f"{table.geometry_sha256} {asked}".encode()).hexdigest()[:8]
+    mark = sha256(f"{findings.result.table.geometry_sha256} {asked}".encode()).hexdigest()[:8]
     stem = safe_stem("study", findings.gear.id, options.design, f"seed {options.seed}", mark)
-    document = Document("study.html.j2", _context(findings, provenance, Lengths(unit)), stem)
-    return publish(document, directory, formats=formats, page=page, created=provenance.created)
+    return Document("study.html.j2", _context(findings, provenance, Lengths(unit)), stem)
 
 
 def _context(f: StudyFindings, provenance: ReportProvenance, lengths: Lengths) -> dict[str, Any]:
@@ -62,7 +52,6 @@ def _context(f: StudyFindings, provenance: ReportProvenance, lengths: Lengths) -
     order = sorted(table.joints, key=lambda e: (e.rank, e.joint))
     return {
         **head(f"Sensitivity study – {f.gear.name}", f"Sensitivity study · {f.gear.id}", f.gear, provenance, lengths),
-        "provenance": _provenance(f, provenance),
         "f": f,
         "table": table,
         "limits": sorted({entry.limit_in for entry in table.joints}),
@@ -82,7 +71,6 @@ def _context(f: StudyFindings, provenance: ReportProvenance, lengths: Lengths) -
         "lead": _stage_that_leads(f, lengths) if _compares_methods(f) else None,
         "designs": _designs(f),
         "compared": _designs_compared(f),
-        "sign": sign,
         "isfinite": math.isfinite,
     }
 
@@ -205,13 +193,3 @@ def _designs_compared(f: StudyFindings) -> dict[str, Any] | None:
         "change": float((f.designs[-1].shares - f.designs[0].shares)[top].sum()),
         "scatter": float(max(d.scatter.max() for d in f.designs)),
     }
-
-
-def _provenance(f: StudyFindings, provenance: ReportProvenance) -> Facts:
-    facts = [fact for fact in provenance_facts(f.gear, provenance) if provenance.input_sha256 or fact[0] != "Input"]
-    facts += [("Design", f.result.table.design), ("Linkages", ", ".join(linkage.name for linkage in f.gear.ensemble))]
-    if f.designs:
-        facts.append(("Designs' seed", f"{f.designs[0].seed}, a stream for each iteration"))
-    if f.searches:
-        facts.append(("Search's seed", f"{f.searches[0].seed}, a stream for each sense"))
-    return facts

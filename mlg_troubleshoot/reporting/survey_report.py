@@ -15,7 +15,7 @@ from mlg_troubleshoot.reporting.figures import INK, RULE, SOFT, Canvas
 from mlg_troubleshoot.reporting.formats import Lengths, number
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
-from mlg_troubleshoot.reporting.publish import USUAL_FORMATS, WrittenReport, publish, safe_stem
+from mlg_troubleshoot.reporting.publish import WrittenReport, publish, safe_stem
 from mlg_troubleshoot.studies.survey import Survey
 from mlg_troubleshoot.studies.survey_result import SurveyResult
 from mlg_troubleshoot.units import LengthUnit
@@ -36,7 +36,7 @@ def write_survey_report(
     mark = sha256(repr([(r.words, r.value, r.u) for r in found.readings]).encode()).hexdigest()[:8]
     stem = safe_stem("survey", result.gear.id, mark)
     document = Document("survey.html.j2", _context(result, found, provenance, Lengths(unit)), stem)
-    return publish(document, directory, formats=USUAL_FORMATS, page=page, created=provenance.created)
+    return publish(document, directory, page=page)
 
 
 def _context(result: SurveyResult, found: Survey, provenance: ReportProvenance, lengths: Lengths) -> dict[str, Any]:

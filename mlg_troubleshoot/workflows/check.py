@@ -415,7 +415,7 @@ def write_verdicts(result: CheckResult, file: Path) -> None:
     """Write the verdicts as CSV, one line a row of the input, in its order."""
     rows = []
     for judgement in result.judgements:
-        row = judgement.inspection if isinstance(judgement, Assessment) else judgement.row
+        row = judgement.row
         identity = (row.record_id, row.tail_no, None if row.side is None else str(row.side))
         place = (row.source.file, row.source.sheet, row.source.row)
         rows.append((*identity, *_verdict_columns(judgement).values(), *place))
@@ -429,9 +429,7 @@ def annotate(result: CheckResult, source: Path, out: Path) -> tuple[str, ...]:
 
     if result.read is None:
         raise UsageError("there is no workbook to annotate", "Give the workbook as FILE.")
-    verdicts = {
-        (j.inspection if isinstance(j, Assessment) else j.row).source: _verdict_columns(j) for j in result.judgements
-    }
+    verdicts = {j.row.source: _verdict_columns(j) for j in result.judgements}
     over_limit = {
         j.inspection.source: {f.joint: f.limit_in for f in j.joints if f.over_limit}
         for j in result.judgements

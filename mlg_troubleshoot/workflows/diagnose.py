@@ -197,20 +197,12 @@ def write_extension(extension: ModelExtension, file: Path) -> None:
 def write_diagnosis_report(
     result: DiagnoseResult, options: DiagnoseOptions, directory: Path, page: str, *, unit: LengthUnit = LengthUnit.INCH
 ) -> WrittenReport:
-    from mlg_troubleshoot.reporting import provenance_of
-    from mlg_troubleshoot.reporting.diagnosis_report import write_diagnosis_report as write
+    from mlg_troubleshoot.reporting import provenance_of, publish
+    from mlg_troubleshoot.reporting.diagnosis_report import diagnosis_document
 
-    return write(
-        result.diagnosis,
-        result.gear,
-        directory,
-        extension=result.extension,
-        provenance=provenance_of(result.gear, result.inputs_sha256, seed=options.seed, remembered=options.remembered),
-        page=page,
-        unit=unit,
-        problems=result.problems,
-        notes=result.notes,
-    )
+    made = provenance_of(result.gear, result.inputs_sha256, seed=options.seed, remembered=options.remembered)
+    told = (result.extension, unit, result.problems, result.notes)
+    return publish(diagnosis_document(result.diagnosis, result.gear, made, *told), directory, page=page)
 
 
 def load_model_extension(files: Sequence[Path], gear: str, cause_files: Sequence[Path] = ()) -> ModelExtension | None:

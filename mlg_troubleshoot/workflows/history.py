@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
 from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.order import WORST_FIRST
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
@@ -611,9 +612,6 @@ def worst_joint(seen: Seen) -> int | None:
     return next((joint["joint"] for joint in seen.result.get("joints", ()) if joint["rank"] == 1), None)
 
 
-_URGENCY = ("OUTSIDE_MARGIN", "INCONCLUSIVE", "INCOMPLETE", "INVALID", "WITHIN_MARGIN")
-
-
 def fleet_as_json(found: Sequence[GearLife], forecasts: Mapping[GearKey, Forecast]) -> dict[str, Any]:
     """One line a gear, worst first: verdict, then landings to its next inspection."""
     lines = []
@@ -643,7 +641,7 @@ def fleet_as_json(found: Sequence[GearLife], forecasts: Mapping[GearKey, Forecas
 def _urgency(line: Mapping[str, Any]) -> tuple[int, float, str, str]:
     due = line["next_inspection_landings"]
     verdict = line["verdict"]
-    rank = _URGENCY.index(verdict) if verdict in _URGENCY else len(_URGENCY)
+    rank = WORST_FIRST.index(verdict) if verdict in WORST_FIRST else len(WORST_FIRST)
     return rank, float("inf") if due is None else due, line["tail_no"], line["side"]
 
 
@@ -761,7 +759,7 @@ def write_pages(
     unit: LengthUnit = LengthUnit.INCH,
 ) -> list[WrittenReport]:
     """Write the page of each gear's life and, for a fleet, the page that links them."""
-    from mlg_troubleshoot.reporting import fleet_report, provenance_of
+    from mlg_troubleshoot.reporting import fleet_report, provenance_of, publish
 
     last = max((record for life in found for record in life.records), key=lambda r: r.seq, default=None)
     made = provenance_of(gear, {} if last is None else {f"store up to record {last.seq}": last.digest})
@@ -775,14 +773,12 @@ def write_pages(
             for life in found
         }
         told, words = fleet_as_json(found, forecasts), advice(found).words
-        written.append(fleet_report.write_fleet_page(told, series, words, directory, gear, made, page=page, unit=unit))
+        document = fleet_report.fleet_document(told, series, words, gear, made, unit)
+        written.append(publish(document, directory, page=page))
     for life in found:
         # The pages behind the lines of a fleet are for the screen.
         formats = ("html",) if fleet else ("html", "pdf")
         told = life_as_json(life, forecasts.get(life.key, Forecast()), gear)
-        written.append(
-            fleet_report.write_life_page(
-                told, side_by_side(life), directory, gear, made, formats=formats, page=page, unit=unit
-            )
-        )
+        document = fleet_report.life_document(told, side_by_side(life), gear, made, unit)
+        written.append(publish(document, directory, formats=formats, page=page))
     return written

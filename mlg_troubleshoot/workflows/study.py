@@ -149,18 +149,13 @@ def given_data_study(file: Path, gear: Gear, seed: int) -> GivenDataResult:
 def write_study_report(
     findings: StudyFindings, directory: Path, page: str, *, unit: LengthUnit = LengthUnit.INCH
 ) -> WrittenReport:
-    from mlg_troubleshoot.reporting import provenance_of
-    from mlg_troubleshoot.reporting.study_report import write_study_report as write
+    from mlg_troubleshoot.reporting import provenance_of, publish
+    from mlg_troubleshoot.reporting.study_report import study_document
 
     targets = targets_file(findings.gear)
     hashes = {targets.name: sha256(targets.read_bytes()).hexdigest()} if findings.statements else {}
-    return write(
-        findings,
-        directory,
-        provenance=provenance_of(findings.gear, hashes, seed=findings.options.seed),
-        page=page,
-        unit=unit,
-    )
+    made = provenance_of(findings.gear, hashes, seed=findings.options.seed)
+    return publish(study_document(findings, made, unit), directory, page=page)
 
 
 def study_values(findings: StudyFindings, given: GivenDataResult | None = None) -> dict[str, Any]:

@@ -152,6 +152,14 @@ def test_every_view_says_that_it_is_no_approval(source: object) -> None:
     assert "not an approval for return to service" in words
 
 
+@pytest.mark.parametrize("read", [True, False])
+def test_the_chance_of_a_wrong_verdict_says_how_unread_joints_count(read: bool, table: Table) -> None:
+    unread = {} if read else {"clearance_9_in": ""}
+    words = " ".join(mlg("check", table(row(**unread)), "--detail").out.split())
+    assert "of this gear lies on the other side of the margin with a chance of" in words
+    assert ("; joints that were not measured count as 0." in words) is not read
+
+
 def test_joints_that_act_alike_are_said_where_they_are_named(detailed: Run) -> None:
     assert "Both ends of one link act alike (#3 = #5, #6 = #7, #9 = #10)" in detailed.out
 

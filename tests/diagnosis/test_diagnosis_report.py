@@ -14,9 +14,9 @@ import pytest
 
 from mlg_troubleshoot.diagnosis import CATALOGUE, Diagnosis, ModelExtension, diagnose
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting import ReportProvenance
+from mlg_troubleshoot.reporting import ReportProvenance, publish
 from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
-from mlg_troubleshoot.reporting.diagnosis_report import write_diagnosis_report
+from mlg_troubleshoot.reporting.diagnosis_report import diagnosis_document
 from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions, diagnose_files
 from mlg_troubleshoot.workflows.diagnose import write_diagnosis_report as report_of
 
@@ -46,17 +46,9 @@ def make(gear: Gear, tmp_path_factory: pytest.TempPathFactory) -> Make:
     def made(table: DiagnosisTable) -> Made:
         found = diagnose(gear.model, table, gear.discrepancies, permutations=199, seed=4)
         extension = ModelExtension(gear, found.terms, found.residual_u_in, (), found.rows_used) if found.terms else None
-        written = write_diagnosis_report(
-            found,
-            gear,
-            tmp_path_factory.mktemp("report"),
-            extension=extension,
-            provenance=ReportProvenance(
-                "9.8.7", datetime(2024, 5, 17, tzinfo=UTC), "ab" * 32, {"f.csv": "cd" * 32}, seed=4
-            ),
-            formats=("html",),
-            notes=("Column 'mood' is not known.",),
-        )
+        made_of = ReportProvenance("9.8.7", datetime(2024, 5, 17, tzinfo=UTC), "ab" * 32, {"f.csv": "cd" * 32}, seed=4)
+        document = diagnosis_document(found, gear, made_of, extension, notes=("Column 'mood' is not known.",))
+        written = publish(document, tmp_path_factory.mktemp("report"), formats=("html",))
         assert written.html is not None
         html = written.html.read_text(encoding="utf-8")
         body = re.sub(r"<style>.*?</style>", " ", html, flags=re.DOTALL)

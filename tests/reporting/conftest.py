@@ -94,7 +94,7 @@ def write_inspection_report(
 ) -> WrittenReport:
     """Write the report of one inspection."""
     document = inspection_document(judgement, gear, provenance, problems, unit)
-    return publish(document, folder, formats=formats, page=page, created=provenance.created)
+    return publish(document, folder, formats=formats, page=page)
 
 
 @dataclass(frozen=True)

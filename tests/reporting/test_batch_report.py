@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
+from mlg_troubleshoot.decision.order import latest_of_each_gear
 from mlg_troubleshoot.errors import OutputError, Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import ReportProvenance, WrittenReport, batch_document, publish, write_reports
-from mlg_troubleshoot.reporting.inspection_report import latest_of_each_gear
 
 from .conftest import FAILURE, SOUND, WORN, Judge, readable
 from .test_pdf import opened
@@ -31,7 +31,7 @@ def write_batch_report(
     notes: Sequence[str] = (),
 ) -> WrittenReport:
     document = batch_document(judgements, problems, gear, provenance, notes)
-    return publish(document, folder, formats=formats, page="A4", created=provenance.created)
+    return publish(document, folder, formats=formats)
 
 
 PROBLEM = Problem("side", "fleet.csv", None, 7, "side", "C7", "LEFT", "LH or RH", "Write LH or RH.")
@@ -82,7 +82,7 @@ def test_every_gear_has_one_line(summary: tuple[str, bytes]) -> None:
 
 def test_the_worst_gear_stands_first(summary: tuple[str, bytes]) -> None:
     order = records(summary[0])
-    assert order.index("worn") < order.index("published") < order.index("sound") < order.index("R-9")
+    assert order.index("worn") < order.index("published") < order.index("R-9") < order.index("sound")
 
 
 def test_a_gear_measured_beyond_its_margin_stands_before_all_others(summary: tuple[str, bytes]) -> None:
@@ -161,6 +161,13 @@ def test_each_gear_has_one_line_with_its_latest_inspection(twice: list[Judgement
     latest, earlier = latest_of_each_gear(twice)
     named = [[j.inspection.record_id for j in (twice[i] for i in places)] for places in (latest, earlier)]
     assert named == [["autumn", "other"], ["spring", "summer"]]
+
+
+def test_an_inspection_without_a_date_is_no_earlier_one(judge: Judge, twice: list[Judgement]) -> None:
+    undated = judge(SOUND, record_id="undated", tail_no="N2", inspection_date=None)
+    latest, earlier = latest_of_each_gear([*twice, undated])
+    assert len(twice) in latest
+    assert len(earlier) == 2
 
 
 def test_a_gear_that_cannot_be_cleared_has_no_probability_that_would_clear_it(

@@ -13,14 +13,15 @@ from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.figures import Axis, Bar, Canvas, Plot, Series, draw_bar, nice_ticks
 from mlg_troubleshoot.reporting.formats import Lengths
+from mlg_troubleshoot.reporting.html import environment
 from mlg_troubleshoot.reporting.inspection_figures import margin_gauge, plunger_curve
 from mlg_troubleshoot.reporting.schematic import schematic
-from mlg_troubleshoot.reporting.signs import SIGNS, sign
 from mlg_troubleshoot.units import LengthUnit
 
 from .conftest import FAILURE, SOUND, WORN, Judge
 
 INCHES = Lengths()
+SIGNS = environment().get_template("signs.html.j2").module.SIGNS  # type: ignore[attr-defined]
 
 
 def rectangles(svg: str) -> list[dict[str, str]]:
@@ -29,7 +30,8 @@ def rectangles(svg: str) -> list[dict[str, str]]:
 
 @pytest.mark.parametrize("of", SIGNS)
 def test_a_sign_is_well_formed(of: str) -> None:
-    assert ET.fromstring(sign(of)).get("role") == "img"
+    drawn = environment().get_template("signs.html.j2").module.sign(of)  # type: ignore[attr-defined]
+    assert ET.fromstring(drawn.strip()).get("role") == "img"
 
 
 def test_every_verdict_has_its_own_shape() -> None:

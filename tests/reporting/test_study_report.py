@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting import ReportProvenance
-from mlg_troubleshoot.reporting.study_report import write_study_report
+from mlg_troubleshoot.reporting import ReportProvenance, publish
+from mlg_troubleshoot.reporting.study_report import study_document
 from mlg_troubleshoot.studies.certified import CertifiedBound
 from mlg_troubleshoot.studies.findings import StudyFindings
 from mlg_troubleshoot.studies.statements import check_statements
@@ -46,7 +46,7 @@ def report(findings: StudyFindings, provenance: ReportProvenance, tmp_path_facto
 
 
 def written(findings: StudyFindings, provenance: ReportProvenance, folders: pytest.TempPathFactory) -> str:
-    made = write_study_report(findings, folders.mktemp("study"), provenance=provenance, formats=("html",))
+    made = publish(study_document(findings, provenance), folders.mktemp("study"), formats=("html",))
     assert made.html is not None
     return readable(made.html.read_text(encoding="utf-8")).replace("\u00a0", " ").replace("\u200b", "")
 

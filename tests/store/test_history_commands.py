@@ -382,8 +382,8 @@ def test_the_page_of_a_life_shows_before_and_after_with_what_was_restored(tmp_pa
 def test_landings_left_are_drawn_with_an_arrow_beyond_the_horizon() -> None:
     near = interval_bar({"p05": 100.0, "p50": 400.0, "p95": 900.0}, 20_000)
     far = interval_bar({"p05": 100.0, "p50": 400.0, "p95": None}, 20_000)
-    assert "<path" not in near
-    assert "<path" in far
+    assert "<polygon" not in near
+    assert "<polygon" in far
     assert "100, 400, beyond" in far
 
 

@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from datetime import date
 
 from rich.text import Text
 
 from mlg_troubleshoot.cli.output import WIDE, DataConsole, plain_table, word
 from mlg_troubleshoot.cli.views.tables import MARKS, STYLES, Cell, few_words, lines_of, measured_outside
-from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected, Verdict
+from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Verdict
+from mlg_troubleshoot.decision.order import latest_of_each_gear, worst_first
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.workflows.check import CheckResult
 
 _LINES = 60
-_WORST_FIRST = (
-    Verdict.OUTSIDE_MARGIN,
-    Verdict.INCONCLUSIVE,
-    Verdict.INCOMPLETE,
-    Verdict.INVALID,
-    Verdict.WITHIN_MARGIN,
-)
 
 
 def show(result: CheckResult, screen: DataConsole, *, every: bool) -> None:
@@ -29,10 +22,11 @@ def show(result: CheckResult, screen: DataConsole, *, every: bool) -> None:
     counts = result.counts
     listed = " · ".join(f"{counts[v]} {v.value.replace('_', ' ').lower()}" for v in Verdict if counts[v])
     screen.print(f"{len(result.judgements)} inspections: {listed}")
-    shown = list(result.judgements) if every else latest(result.judgements)
-    if len(shown) < len(result.judgements):
-        screen.print(f"{len(shown)} gears, the latest inspection of each; --all shows every inspection.")
-    ordered = sorted(shown, key=_urgency)
+    latest, earlier = latest_of_each_gear(result.judgements)
+    if earlier and not every:
+        screen.print(f"{len(latest)} gears, the latest inspection of each; --all shows every inspection.")
+    places = worst_first(result.judgements, (*latest, *earlier)) if every else latest
+    ordered = [result.judgements[place] for place in places]
     headings = ["", "verdict", "tail", "side", "date", f"worst {screen.unit}", "chance", "next"]
     wide = screen.width >= WIDE
     if wide or every or any(_date(judgement) is None for judgement in ordered):
@@ -47,7 +41,7 @@ def show(result: CheckResult, screen: DataConsole, *, every: bool) -> None:
         screen.print(line, no_wrap=True, overflow="ellipsis")
     if len(ordered) > _LINES:
         screen.print(f"… and {len(ordered) - _LINES} more; --csv or --json lists all of them.")
-    worn = Counter(f.joint for j in shown if isinstance(j, Assessment) for f in j.joints if f.over_limit)
+    worn = Counter(f.joint for j in ordered if isinstance(j, Assessment) for f in j.joints if f.over_limit)
     if worn:
         joints = ", ".join(f"#{joint} on {count}" for joint, count in worn.most_common())
         screen.print(f"Joints over their limit: {joints} of these.")
@@ -59,32 +53,12 @@ def show(result: CheckResult, screen: DataConsole, *, every: bool) -> None:
     )
 
 
-def latest(judgements: Sequence[Judgement]) -> list[Judgement]:
-    """Return the latest inspection of each gear; rows whose gear or date is not known stand for themselves."""
-    kept: dict[object, tuple[date, Judgement]] = {}
-    for place, judgement in enumerate(judgements):
-        row = judgement.row if isinstance(judgement, Rejected) else judgement.inspection
-        day = _date(judgement)
-        key = place if day is None or row.tail_no is None else (row.tail_no, row.side)
-        found = kept.get(key)
-        if found is None or (day is not None and day >= found[0]):
-            kept[key] = (day or date.min, judgement)
-    return [judgement for _, judgement in kept.values()]
-
-
 def _date(judgement: Judgement) -> date | None:
     return judgement.inspection.inspection_date if isinstance(judgement, Assessment) else None
 
 
-def _urgency(judgement: Judgement) -> tuple[int, float]:
-    if isinstance(judgement, Assessment) and measured_outside(judgement):
-        return (-1, judgement.margin_in - abs(judgement.inspection.measured_displacement_in or 0.0))
-    remaining = judgement.remaining_in if isinstance(judgement, Assessment) else None
-    return (_WORST_FIRST.index(judgement.verdict), float("-inf") if remaining is None else remaining)
-
-
 def _cells(judgement: Judgement, screen: DataConsole) -> dict[str, Cell]:
-    row = judgement.row if isinstance(judgement, Rejected) else judgement.inspection
+    row = judgement.row
     cells: dict[str, Cell] = {
         "": MARKS[judgement.verdict],
         "verdict": Text(judgement.verdict.value.removesuffix("_MARGIN"), style=STYLES[judgement.verdict]),

@@ -10,8 +10,8 @@ from rich.text import Text
 
 from mlg_troubleshoot.cli.output import WIDE, DataConsole, plain_table, text, word
 from mlg_troubleshoot.cli.views.tables import MARKS, STYLES, measured_outside, next_words, what_follows
-from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected
-from mlg_troubleshoot.decision.sentences import confidence_words, percent, rigging_sentence
+from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement
+from mlg_troubleshoot.decision.sentences import chance_wrong_sentence, confidence_words, percent, rigging_sentence
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import in_unit
 
@@ -21,7 +21,7 @@ _DISCLAIMER = "Troubleshooting aid, not maintenance data; not an approval for re
 
 def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool) -> None:
     """Show one gear, in short on 24 lines of 80 columns."""
-    row = judgement.row if isinstance(judgement, Rejected) else judgement.inspection
+    row = judgement.row
     words = judgement.verdict.words + ", MEASURED" * measured_outside(judgement)
     title = Text(f"[{MARKS[judgement.verdict]}] {words} ", style=STYLES[judgement.verdict])
     identity = f" {row.tail_no or 'tail ?'}  {row.side or 'side ?'}  {row.record_id or 'record ?'}"
@@ -112,9 +112,9 @@ def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
     if a.budget is not None:
         shares = ", ".join(f"{name} {u:.4f} in ({percent(share)})" for name, u, share in a.budget.lines)
         screen.sentence(f"Standard uncertainty, with shares: {shares}. Model: {a.budget.model_source}.")
-    if a.chance_wrong is not None:
-        said = f"Called {a.verdict.words.lower()}, it lies on the other side of the margin with a chance of"
-        screen.print(f"{said} {percent(a.chance_wrong)}.")
+    wrong = chance_wrong_sentence(a)
+    if wrong is not None:
+        screen.print(wrong)
     what = "As loaded is an expectation, the worst case a bound." if a.as_loaded else "The worst case is a bound."
     screen.print(f"Model: {gear.name}, geometry {gear.provenance}. {what}", style="dim")
 
