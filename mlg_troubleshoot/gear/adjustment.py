@@ -56,6 +56,7 @@ class Adjustment:
             {name: np.asarray(values)[rows] for name, values in self.scaled.items()},
             None if self.rate_factor is None else self.rate_factor[rows],
             None if self.offset_in is None else self.offset_in[rows],
+            self.direction_factors,
         )
 
 

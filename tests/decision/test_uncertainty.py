@@ -213,6 +213,13 @@ def test_the_bound_is_the_worst_case_over_all_directions_whatever_an_extension_p
     assert loaded.bound_in == pytest.approx(judge(WORN).predicted_displacement_in, abs=1e-12)
 
 
+def test_the_geometry_spread_is_that_of_the_prediction_as_loaded_on_every_linkage(
+    judge: Judge, loaded: Assessment
+) -> None:
+    plain = judge(WORN).geometry_spread_in or (0.0, 0.0)
+    assert loaded.geometry_spread_in == pytest.approx([0.4 * end for end in plain], rel=0.04)
+
+
 def test_a_shift_moves_the_bound_too(judge: Judge) -> None:
     shifted = judge(WORN, AssessOptions(extension=Shifted()), gauge_id="G-1")
     assert shifted.bound_in == shifted.predicted_displacement_in

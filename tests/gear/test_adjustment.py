@@ -80,3 +80,16 @@ def test_the_chance_with_random_directions_counts_rate_and_offset(gear: Gear) ->
 def test_an_offset_alone_decides_when_there_is_no_clearance(gear: Gear) -> None:
     zero, margin = np.zeros((2, 10)), np.full(2, 0.03)
     assert chance_beyond(gear.model, zero, margin, 64, offset_in=np.array([0.029, 0.031])).tolist() == [0.0, 1.0]
+
+
+def test_some_rows_of_an_adjustment_move_as_they_do_among_all(gear: Gear) -> None:
+    three = np.array([0.0, 0.001, -0.001])
+    whole = Adjustment(
+        CLEARANCE, {LINK: three}, {"length.6-7": 1.0 + three}, 1.0 + three, three, np.linspace(-1.0, 1.0, 10)
+    )
+    all_rows, last = (
+        adjusted_worst_case(gear.model, whole),
+        adjusted_worst_case(gear.model, whole.take(np.array([2, 1]))),
+    )
+    assert last.over_in == pytest.approx(all_rows.over_in[[2, 1]])
+    assert last.under_in == pytest.approx(all_rows.under_in[[2, 1]])
