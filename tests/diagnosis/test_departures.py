@@ -24,20 +24,23 @@ from mlg_troubleshoot.gear.model import links_from
 from .conftest import Array, fleet
 
 FACTORS = np.array([0.9, 0.3, 0.95, -0.2, 0.6, 0.8, 0.5, 0.9, 0.2, 0.7])
+# Loads that turn every pin against its worst direction, and ones that turn the pin of joint 3 alone, the others alike.
+AGAINST = np.array([-0.6, -0.2, -0.5, -0.5, -0.7, -0.2, -0.4, -0.8, -0.6, -0.3])
+ONE_TURNED = np.array([0.8, 0.8, 0.3, 0.8, 0.8, 0.8, 0.8, 0.8, 0.8, 0.8])
 
 
-def as_loaded(gear: Gear, clearance_in: Array) -> Array:
+def as_loaded(gear: Gear, clearance_in: Array, factors: Array = FACTORS) -> Array:
     """Displacement with each clearance in its share of the worst direction. [in]"""
     directions = worst_case(gear.model, clearance_in).over_directions
-    return gear.model.displacement(links_from(FACTORS * clearance_in, directions))
+    return gear.model.displacement(links_from(factors * clearance_in, directions))
 
 
-def loads(table: DiagnosisTable, over: Array) -> Array:
-    return as_loaded(load_gear(), table.clearance_in) - over
+def loads(table: DiagnosisTable, over: Array, factors: Array = FACTORS) -> Array:
+    return as_loaded(load_gear(), table.clearance_in, factors) - over
 
 
-def loads_and_a_gauge(table: DiagnosisTable, over: Array) -> Array:
-    return loads(table, over) + np.where(table.factors["gauge_id"] == "G-2", 0.004, 0.0)
+def loads_and_a_gauge(table: DiagnosisTable, over: Array, factors: Array = FACTORS, bias_in: float = 0.004) -> Array:
+    return loads(table, over, factors) + np.where(table.factors["gauge_id"] == "G-2", bias_in, 0.0)
 
 
 def one_technician_twice(table: DiagnosisTable) -> DiagnosisTable:
@@ -85,6 +88,10 @@ FLEETS: dict[str, Callable[[Gear], DiagnosisTable]] = {
     "nothing": lambda gear: fleet(gear.model, rows=200),
     "loads": lambda gear: fleet(gear.model, loads, rows=200),
     "loads and a gauge": lambda gear: fleet(gear.model, loads_and_a_gauge, rows=200),
+    "loads against": lambda gear: fleet(
+        gear.model, lambda t, over: loads_and_a_gauge(t, over, AGAINST, 0.012), rows=200
+    ),
+    "one pin turned": lambda gear: fleet(gear.model, lambda t, over: loads(t, over, ONE_TURNED), rows=200),
     "convention": lambda gear: one_technician_twice(fleet(gear.model, rows=200)),
     "unread": lambda gear: unread(worn_with_landings(gear)),
     "worn unread": worn_where_nobody_reads,
@@ -143,6 +150,15 @@ def test_a_gauge_that_reads_off_is_named_beside_the_directions() -> None:
     assert named("loads and a gauge") == {("load_directions", None), ("gauge_bias", "gauge G-2")}
 
 
+def test_readings_against_the_prediction_are_no_slip_of_the_sign_where_the_clearances_tell_of_them() -> None:
+    assert named("loads against") == {("load_directions", None), ("gauge_bias", "gauge G-2")}
+
+
+def test_a_scale_and_one_direction_are_not_told_from_directions_of_all_joints() -> None:
+    rivals = {c.candidate.cause.name for c in found("one pin turned").also_possible}
+    assert rivals == {"calibration_rate", "direction_not_worst_case", "load_directions"}
+
+
 def test_the_extension_predicts_the_plunger_as_loaded(gear: Gear) -> None:
     table = FLEETS["loads"](gear)
     extension = ModelExtension(gear, found("loads").terms, 0.002, ("ab",), 200)
@@ -170,6 +186,13 @@ def test_a_factor_of_minus_one_turns_the_displacement_round(gear: Gear) -> None:
         for factor in (1.0, -1.0)
     )
     assert turned == pytest.approx(-over, rel=0.02)
+
+
+def test_readings_against_the_prediction_that_no_clearance_tells_of_are_refused(gear: Gear) -> None:
+    own = np.random.default_rng(5).normal(-0.012, 0.004, 120)
+    unrelated = fleet(gear.model, lambda _t, over: own - over)
+    with pytest.raises(InconclusiveDataError, match="times the predicted"):
+        diagnose(gear.model, unrelated, gear.discrepancies, ensemble=gear.ensemble_models[1:], permutations=99)
 
 
 def test_a_table_of_the_other_sign_is_still_refused(gear: Gear) -> None:

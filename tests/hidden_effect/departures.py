@@ -69,7 +69,9 @@ def _spec(group: str, i: int, seed: int) -> simulator.FleetSpec:
     if group.startswith("loads:"):
         hidden = (effect("load_directions", parameters={"spread_deg": float(group.split(":")[1])}),)
     elif group.startswith("loads and"):
-        hidden = (effect("load_directions"), effect(group.rsplit(maxsplit=1)[-1], strength=14.0))
+        # A gauge of the plunger: the S of a gauge of the clearances is that of the worst directions.
+        known = {"reading_shift_in": 0.003} if group.endswith("gauge_bias") else {}
+        hidden = (effect("load_directions"), effect(group.rsplit(maxsplit=1)[-1], strength=14.0, parameters=known))
     elif group == "convention":
         hidden = (effect("convention_slip"),)
     elif group == "one group":
