@@ -160,6 +160,7 @@ def plunger_curve(
             series.append(figures.Series(label, x, tuple((moved * per_inch).tolist()), dash=dash, width=2.2))
     measured = _measured_along(gear, a, start, end)
     margin = a.margin_in * per_inch
+    farthest = max([end + 0.3 * (end - start), *(place for place, _ in measured)])
     values = [v for one in series for v in one.y] + [y * per_inch for _, y in measured] + [margin, -margin, 0.0]
     span = (end - start) * per_inch
     canvas = Canvas(
@@ -171,7 +172,10 @@ def plunger_curve(
     )
     plot = figures.Plot(
         canvas,
-        figures.Axis(f"actuator extension from Down Lock, {shown.unit}", *_wide(start * per_inch, span)),
+        # Room for the labels beyond mid-position.
+        figures.Axis(
+            f"actuator extension from Down Lock, {shown.unit}", start * per_inch - 0.02 * span, farthest * per_inch
+        ),
         figures.Axis.around(f"displacement from nominal, {shown.unit}", values, 0.08),
         left=56,
         top=26,
@@ -192,11 +196,6 @@ def plunger_curve(
         canvas.marker("triangle", *plot.at(place * per_inch, value * per_inch), 5.0)
     plot.draw_legend(series, plot.area[0], 10, markers=[("triangle", "measured")] if measured else ())
     return canvas.svg()
-
-
-def _wide(start: float, span: float) -> tuple[float, float]:
-    """Ends of the axis, with room for the labels beyond mid-position."""
-    return start - 0.02 * span, start + 1.3 * span
 
 
 def _measured_along(gear: Gear, a: Assessment, start: float, end: float) -> list[tuple[float, float]]:

@@ -26,6 +26,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from mlg_troubleshoot.errors import TroubleshootError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.records.survey_table import COLUMNS
+from mlg_troubleshoot.studies.survey_readings import Reading
 from mlg_troubleshoot.studies.survey_result import SurveyResult
 from mlg_troubleshoot.workflows.survey import survey_gear, write_survey_template
 from tests.gear.independent_solver import LoopClosure
@@ -150,13 +152,76 @@ def surveyed(
     return rows, rows_wrong
 
 
-def run(rows: list[dict[str, object]], folder: Path, write: bool = False) -> SurveyResult:
+def run(rows: list[dict[str, object]], folder: Path, inspections: Path | None = None) -> SurveyResult:
     path = folder / "survey.csv"
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, rows[0].keys())
+        writer = csv.DictWriter(file, COLUMNS)
         writer.writeheader()
         writer.writerows(rows)
-    return survey_gear(path, write=folder / "own.toml" if write else None)
+    return survey_gear(path, inspections=inspections)
+
+
+def row_of(reading: Reading) -> dict[str, str]:
+    """A reading that the survey asks for, as a row of the template."""
+    extension = "" if reading.extension is None else str(reading.extension)
+    return {"kind": reading.kind.value, "from": reading.start, "to": reading.end, "extension_in": extension}
+
+
+def followed(
+    hidden: Hidden, template: list[dict[str, str]], rng: np.random.Generator, folder: Path
+) -> list[list[float]]:
+    """Widths of a worn gear's displacement after each reading: in the template's order, and as ``next`` asks.
+
+    Each ends where half the first width is reached. The same reading has the same error in both.
+    """
+    inspections = folder / "worn.csv"
+    clearances = {f"clearance_{n}_in": round(c, 4) for n, c in enumerate(rng.uniform(0.0, LIMIT, 10), start=1)}
+    with inspections.open("w", newline="", encoding="utf-8") as file:
+        row = {"tail_no": "N1", "side": "LH", "clearance_convention": "RADIAL", **clearances}
+        writer = csv.DictWriter(file, row.keys())
+        writer.writeheader()
+        writer.writerow(row)
+    errors: dict[tuple[str, ...], float] = {}
+    first = run([], folder, inspections)
+    found = []
+    for asked in (False, True):
+        result, rows, widths = first, list[dict[str, object]](), [width_of(first)]
+        while widths[-1] > widths[0] / 2.0 and len(rows) < len(template):
+            if asked and result.suggestion is None:
+                break
+            row = row_of(result.suggestion.reading) if asked and result.suggestion else template[len(rows)]
+            value, at = hidden.read(row)
+            known = tuple(row[c] for c in ("kind", "from", "to", "extension_in"))
+            value += U[row["kind"]] * errors.setdefault(known, float(rng.standard_normal()))
+            column = "value_deg" if row["kind"] == "ANGLE" else "value_in"
+            rows.append({**row, column: value, "extension_in": "" if at is None else at})
+            result = run(rows, folder, inspections)
+            widths.append(width_of(result))
+        found.append(widths)
+    return found
+
+
+def width_of(result: SurveyResult) -> float:
+    low, high = result.inspections[0].interval_in
+    return high - low
+
+
+def follow(count: int, seed: int) -> None:
+    """Print how many readings ``next`` needs beside the template's order."""
+    rng, ten = np.random.default_rng(seed), numbers_of_the_ten()
+    shares = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_survey_template(folder / "template.csv")
+        template = list(csv.DictReader((folder / "template.csv").read_text(encoding="utf-8").splitlines()))
+        for k in range(count):
+            plain, asked = followed(drawn(ten, rng), template, rng, folder)
+            needed = [len(widths) - 1 for widths in (plain, asked)]
+            shares.append(needed[1] / needed[0])
+            halved = ["" if w[-1] <= w[0] / 2.0 else " (not halved)" for w in (plain, asked)]
+            print(f"{k}: template {needed[0]}{halved[0]}, next {needed[1]}{halved[1]}", flush=True)
+    print(f"readings by next / in the template's order: median {100 * np.median(shares):.0f} %,", end=" ")
+    print(f"at most 60 % on {sum(share <= 0.6 for share in shares)} of {count} (target 60 %), seed {seed}")
 
 
 def ends(hits: int, n: int) -> str:
@@ -172,7 +237,11 @@ def main() -> None:
     parser.add_argument("--slips", type=int, default=10, help="Linkages for each kind of slip.")
     parser.add_argument("--worn", type=int, default=1000, help="Worn gears on all linkages together.")
     parser.add_argument("--seed", type=int, default=20261122)
+    parser.add_argument("--follow", type=int, help="Only: what ``next`` saves, on so many linkages.")
     chosen = parser.parse_args()
+    if chosen.follow:
+        follow(chosen.follow, chosen.seed)
+        return
     rng, ten = np.random.default_rng(chosen.seed), numbers_of_the_ten()
     errors, held, worn, seconds, alarms, failed, before = [], [], [], [], 0, 0, []
     with tempfile.TemporaryDirectory() as name:

@@ -105,6 +105,19 @@ def test_two_readings_of_one_distance_that_differ_are_named_together(four_bar: G
     assert {m.group for m in found.misfits} == {(3, 7)}
 
 
+def test_swapped_readings_are_named_as_swapped_and_do_not_bend_the_linkage(four_bar: Gear) -> None:
+    readings = list(readings_of((*BRACED, ("O2", "B", LATER)), 2e-3))
+    one, other = readings[4], readings[6]
+    readings[4], readings[6] = replace(one, value=other.value), replace(other, value=one.value)
+    found = fit(four_bar, tuple(readings), np.random.default_rng(0))
+    assert {m.reading.row: m.suggestion.partition(":")[0] for m in found.misfits} == {
+        6: "swapped with row 8",
+        8: "swapped with row 6",
+    }
+    best = found.linkage.amplification(found.modes[0].vector[None])[0]
+    assert best[1:3] == pytest.approx(index_of((CRANK, COUPLER, ROCKER, GROUND, TURN)), rel=1e-3)
+
+
 def test_distances_that_no_triangle_has_are_named_together(four_bar: Gear) -> None:
     readings = list(readings_of(LENGTHS, 0.01))
     # Ground less crank is 3.95 in: no two of the three readings say which is a tenth too long or too short.
@@ -112,6 +125,55 @@ def test_distances_that_no_triangle_has_are_named_together(four_bar: Gear) -> No
     found = fit(four_bar, tuple(readings), np.random.default_rng(0))
     assert found.contradicts
     assert {2, 5, 6} <= {m.reading.row for m in found.misfits}
+
+
+SLIDER_CRANK = FOUR_BAR.with_name("slider-crank.toml")
+# Crank, rod, offset of the slider's axis below the crank's pivot, turn of the crank from that axis at the reference.
+SLIDER = (2.1, 5.2, 1.1, 0.05)
+
+
+def slider_readings(numbers: Sequence[float] | np.ndarray) -> dict[tuple[Kind, str, str, float | None], float]:
+    """Distances, and positions of the slider from its place at the reference, by the textbook formula."""
+    crank, rod, offset, turn = numbers
+
+    def place(angle: float) -> float:
+        return float(crank * np.cos(turn + angle) + np.sqrt(rod**2 - (crank * np.sin(turn + angle) + offset) ** 2))
+
+    found: dict[tuple[Kind, str, str, float | None], float] = {
+        (Kind.DISTANCE, "O2", "A", None): float(crank),
+        (Kind.DISTANCE, "A", "C", None): float(rod),
+    }
+    for angle in (0.25, 0.5, 0.75, 1.0):
+        found[Kind.DISTANCE, "O2", "C", angle] = float(np.hypot(place(angle), offset))
+        found[Kind.PLUNGER, "", "", angle] = place(angle) - place(0.0)
+    return found
+
+
+def secant(numbers: Sequence[float] | np.ndarray) -> float:
+    """Amplification of a slider-crank at the end of its stroke, one radian: secant of the rod to the axis."""
+    crank, rod, offset, turn = numbers
+    return float(1.0 / np.sqrt(1.0 - ((crank * np.sin(turn + 1.0) + offset) / rod) ** 2))
+
+
+def test_the_slider_crank_has_the_amplification_and_the_uncertainty_of_its_closed_form() -> None:
+    u = {Kind.DISTANCE: 2e-3, Kind.PLUNGER: 5e-4}
+    values = slider_readings(SLIDER)
+    readings = tuple(
+        Reading(kind, a, b, value, u[kind], at, row, driven_in="rad")
+        for row, ((kind, a, b, at), value) in enumerate(values.items(), start=2)
+    )
+    found = fit(load_gear(SLIDER_CRANK), readings, np.random.default_rng(0))
+    index = found.linkage.amplification(found.draws)[:, 0]
+    best = found.linkage.amplification(found.modes[0].vector[None])[0]
+    steps = 1e-6 * np.eye(4)
+    ends = [[np.array(list(slider_readings(SLIDER + s * h).values())) for s in (1, -1)] for h in steps]
+    slopes = np.array([(a - b) / 2e-6 for a, b in ends]).T / [[u[key[0]]] for key in values]
+    wanted = np.array([(secant(SLIDER + h) - secant(SLIDER - h)) / 2e-6 for h in steps])
+    assert found.misfits == ()
+    assert best == pytest.approx(np.full(3, secant(SLIDER)), rel=1e-4)
+    assert float(np.std(index)) == pytest.approx(
+        float(np.sqrt(wanted @ np.linalg.inv(slopes.T @ slopes) @ wanted)), rel=0.15
+    )
 
 
 def linkage_between(linkage: SurveyedLinkage, first: int, second: int, share: float) -> np.ndarray:
