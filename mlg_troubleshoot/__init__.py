@@ -40,6 +40,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from mlg_troubleshoot.decision.assessment import Assessment, Verdict
     from mlg_troubleshoot.decision.inspection import Inspection, Outcome, Side
+    from mlg_troubleshoot.diagnosis.extension import write_extension
     from mlg_troubleshoot.errors import TroubleshootError
     from mlg_troubleshoot.gear.gear import Gear
     from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
@@ -54,13 +55,13 @@ if TYPE_CHECKING:
         DiagnoseResult,
         diagnose_files,
         load_model_extension,
-        write_extension,
     )
     from mlg_troubleshoot.workflows.study import run_study
 
 _HOME = {
     "decision.assessment": "Assessment Verdict",
     "decision.inspection": "Inspection Outcome Side",
+    "diagnosis.extension": "write_extension",
     "errors": "TroubleshootError",
     "gear.gear": "Gear",
     "gear.gear_file": "load_gear shipped_gears",
@@ -70,7 +71,7 @@ _HOME = {
     "studies.study": "StudyOptions",
     "units": "ClearanceConvention LengthUnit parse_length",
     "workflows.check": "CheckOptions CheckResult check check_files predict write_reports",
-    "workflows.diagnose": "DiagnoseOptions DiagnoseResult diagnose_files load_model_extension write_extension",
+    "workflows.diagnose": "DiagnoseOptions DiagnoseResult diagnose_files load_model_extension",
     "workflows.study": "run_study",
 }
 _MODULES = {name: module for module, names in _HOME.items() for name in names.split()}

@@ -41,6 +41,10 @@ class LengthUnit(StrEnum):
         """A length in inches, in this unit."""
         return value_in * self.per_inch
 
+    def shown(self, value_in: float, *, sign: bool = False) -> str:
+        """A length in inches as a number in this unit, with its decimals."""
+        return f"{self.from_inches(value_in):{'+' if sign else ''}.{self.decimals}f}"
+
     @classmethod
     def parse(cls, text: str) -> LengthUnit:
         """Read a unit as people write it: ``in``, ``inch``, ``"``, ``thou``, ``mil``, ``mm``."""

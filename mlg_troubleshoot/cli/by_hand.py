@@ -82,14 +82,9 @@ def _judged(values: Mapping[str, object], labels: Mapping[str, str], flags: Flag
     from mlg_troubleshoot.records import ReadOptions, admit
 
     more = {"outcome": flags.outcome, "plunger_displacement": flags.measured, "margin": flags.margin}
-    named = {
-        "record_id": f"--record-id {flags.record_id!r}",
-        "tail_no": f"--tail {flags.tail!r}",
-        "side": f"--side {flags.side!r}",
-        "outcome": f"--outcome {flags.outcome!r}",
-        "plunger_displacement": f"--measured {flags.measured!r}",
-        "margin": f"--margin {flags.margin!r}",
-    }
+    typed = {"record_id": flags.record_id, "tail_no": flags.tail, "side": flags.side, **more}
+    names = {"tail_no": "tail", "plunger_displacement": "measured"}
+    named = {column: f"--{names.get(column, column).replace('_', '-')} {text!r}" for column, text in typed.items()}
     options = ReadOptions.of(gear, unit=flags.unit, convention=flags.convention)
     return admit({**values, **more}, options, {**named, **labels})
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, BinaryIO
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -113,6 +113,7 @@ def check(
     """
     from mlg_troubleshoot.cli.by_hand import Ending, Flags
     from mlg_troubleshoot.cli.remembered import settings
+    from mlg_troubleshoot.store import Store
     from mlg_troubleshoot.workflows import check as task
     from mlg_troubleshoot.workflows.diagnose import load_model_extension
 
@@ -127,8 +128,8 @@ def check(
     shown = settings(show, page, columns, keep=remember, quiet=quiet)
     asked = task.CheckOptions(
         gear=gear,
-        unit=options.unit_of(unit),
-        convention=options.convention_of(convention),
+        unit=unit,
+        convention=convention,
         sheet=sheet,
         column_map=columns,
         remembered_map=shown.headers,
@@ -137,10 +138,10 @@ def check(
         seed=seed,
         extension=load_model_extension(extension or (), gear, causes or ()),
     )
-    flags = Flags(tuple(values or ()), tail, side, record_id, outcome, measured, margin, asked.unit, asked.convention)
-    unit = shown.show if show or shown.show is not LengthUnit.INCH else None
+    flags = Flags(tuple(values or ()), tail, side, record_id, outcome, measured, margin, unit, convention)
+    reader_unit = shown.show if show or shown.show is not LengthUnit.INCH else None
 
-    place = _store(store) if keep or not (given or values) else None
+    place = Store(store) if keep or not (given or values) else None
     kept = partial(_keep, asked=asked, place=place, tails=tails, quiet=quiet)
 
     def publish(result: task.CheckResult, entered_in: LengthUnit = LengthUnit.INCH) -> None:
@@ -150,20 +151,20 @@ def check(
             found = (result.gear, result.judgements, result.problems, result.notes, result.seed)
             output.write_json(check_json_pieces(*found) if len(result.judgements) > 1 else check_as_json(*found))
         else:
-            _show(result, unit or entered_in, detail=detail, every=every, quiet=quiet)
+            _show(result, reader_unit or entered_in, detail=detail, every=every, quiet=quiet)
         if csv is not None:
             task.write_verdicts(result, csv)
         if annotate is not None:
             _annotate(Path(given[0]), annotate, result, quiet=quiet)
         if report is not None:
-            seen = replace(shown, show=unit or entered_in)
+            seen = replace(shown, show=reader_unit or entered_in)
             _write_reports(result, asked, report, formats, seen, place, quiet=quiet)
 
     def publish_entry(inspection: Inspection, entered_in: LengthUnit) -> Ending:
         result = task.check_inspection(inspection, asked)
         publish(result, entered_in)
         offered = report is None and not as_json
-        seen = replace(shown, show=unit or entered_in)
+        seen = replace(shown, show=reader_unit or entered_in)
         write = partial(_write_reports, result, asked, Path("report"), formats, seen, place, quiet=quiet)
         return Ending(result, write if offered else None)
 
@@ -176,12 +177,6 @@ def check(
     if result.problems and not as_json and not result.judgements:
         output.say("No row could be judged.")
     raise typer.Exit(result.exit_code)
-
-
-def _store(place: str | None) -> Store:
-    from mlg_troubleshoot.store import Store
-
-    return Store(place)
 
 
 def _keep(
@@ -216,7 +211,7 @@ def _result(files: Sequence[str], flags: Flags, asked: task.CheckOptions, *, qui
         return task.check_inspection(by_hand.from_flags(flags, load_gear(asked.gear)), asked)
     with stages(quiet=quiet) as bar:
         return task.check_files(
-            sources_of(files),
+            [Path(name) for name in files],
             asked,
             on_read=lambda done, total: bar("Reading", done, total),
             on_judged=lambda done, total: bar("Judging", done, total),
@@ -241,11 +236,6 @@ def _ask(
             "Pass a FILE, - for standard input, or --set JOINT=VALUE with --tail, --side and --convention.",
         )
     return by_hand.ask(flags, load_gear(asked.gear), publish, keep, resume=resume, place=place)
-
-
-def sources_of(files: Sequence[str]) -> list[Path | BinaryIO]:
-    """Return the tables to read; ``-`` is standard input."""
-    return [Path(name) for name in files]
 
 
 def _show(result: task.CheckResult, unit: LengthUnit, *, detail: bool, every: bool, quiet: bool) -> None:

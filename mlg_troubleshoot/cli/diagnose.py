@@ -54,10 +54,10 @@ def diagnose(
 
     Exit codes: 0 nothing found · 1 something found · 3 cannot be concluded from this table · 2 usage.
     """
-    from mlg_troubleshoot.cli.check import sources_of
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.cli.views.notes import show_notes, show_problems
+    from mlg_troubleshoot.diagnosis import write_extension as keep_extension
     from mlg_troubleshoot.reporting.json_form import SCHEMA_VERSION, diagnosis_as_json
     from mlg_troubleshoot.workflows import diagnose as task
 
@@ -66,8 +66,8 @@ def diagnose(
     shown = settings(show, page, columns, keep=remember, quiet=quiet)
     asked = task.DiagnoseOptions(
         gear=gear,
-        unit=options.unit_of(unit),
-        convention=options.convention_of(convention),
+        unit=unit,
+        convention=convention,
         sheet=sheet,
         decimal_comma=decimal_comma,
         column_map=columns,
@@ -80,7 +80,7 @@ def diagnose(
     try:
         with stages(quiet=quiet) as bar:
             result = task.diagnose_files(
-                sources_of(files), asked, progress=lambda share: bar("Diagnosing", int(100 * share), 100)
+                [Path(name) for name in files], asked, progress=lambda share: bar("Diagnosing", int(100 * share), 100)
             )
     except InconclusiveDataError as error:
         if as_json:
@@ -99,7 +99,7 @@ def diagnose(
             f"No extension written: the verdict is {result.diagnosis.verdict}, no cause of the model is named alone."
         )
     elif write_extension is not None and result.extension is not None:
-        task.write_extension(result.extension, write_extension)
+        keep_extension(result.extension, write_extension)
         output.say(f"Extension: {write_extension}. Use it: mlg check FILE --extension {write_extension}")
     if report is not None:
         written = task.write_diagnosis_report(result, asked, report, str(shown.page), unit=shown.show)

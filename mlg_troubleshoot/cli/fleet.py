@@ -67,10 +67,10 @@ def _show(gears: list[dict[str, Any]], gear: Gear) -> None:
             _left(line["landings_to_margin"], gear),
             "-" if due is None else history.landings_shown(due, gear),
         )
-    console.print(output.text(f"{len(gears)} gears; landings left are those from the last inspection, median (5 %)."))
+    console.print(f"{len(gears)} gears; landings left are those from the last inspection, median (5 %).")
     console.print(table)
     if len(gears) > _LINES:
-        console.print(output.text(f"… and {len(gears) - _LINES} more; --json lists all of them."))
+        console.print(f"… and {len(gears) - _LINES} more; --json lists all of them.")
 
 
 def _left(ends: dict[str, float | None] | None, gear: Gear) -> str:

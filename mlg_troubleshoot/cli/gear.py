@@ -100,9 +100,10 @@ def _as_json(gear: Gear) -> dict[str, object]:
 def verify(context: typer.Context, as_json: options.Json = False, _version: options.Version = False) -> None:
     """Print every number the paper prints beside what the model gives; exit 1 if one that should hold does not."""
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.workflows import check as task
+    from mlg_troubleshoot.studies import verification
 
-    gear, numbers = load_gear(context.obj), task.verify_gear(context.obj)
+    gear = load_gear(context.obj)
+    numbers = verification.verify(gear)
     failed = [n for n in numbers if n.should_hold and not n.holds]
     if as_json:
         output.write_json({"gear": gear.id, "numbers": [asdict(n) for n in numbers]})

@@ -118,7 +118,7 @@ def _show_gears(found: Sequence[GearLife], place: str) -> None:
 
     console = output.console()
     if not found:
-        console.print(output.text(f"Nothing is kept in {place}. Keep inspections with: mlg check FILE --keep"))
+        console.print(f"Nothing is kept in {place}. Keep inspections with: mlg check FILE --keep")
         return
     headings = ("tail", "side", "last seen", "landings", "verdict", "look at", "inspections", "repairs")
     table = output.plain_table(console, *headings, right=("landings", "inspections", "repairs"))
@@ -182,7 +182,7 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
         )
     console.print(table)
     if ahead.limit is None and life.latest is not None and life.latest.inspection.gear_landings is None:
-        console.print(output.text("No forecast: the last inspection does not state its landings (gear_landings)."))
+        console.print("No forecast: the last inspection does not state its landings (gear_landings).")
     elif ahead.limit is not None:
         due = (
             "beyond the horizon"
@@ -190,11 +190,9 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
             else f"in {landings_shown(ahead.next_inspection, gear)} landings"
         )
         console.print(
-            output.text(
-                f"Landings left from the last inspection: to a joint's limit {span(ahead.limit, gear)}, to the margin "
-                f"{span(ahead.margin, gear)}. Next inspection due {due} (accepted chance "
-                f"{gear.accepted_chance.value:.0%})."
-            )
+            f"Landings left from the last inspection: to a joint's limit {span(ahead.limit, gear)}, to the margin "
+            f"{span(ahead.margin, gear)}. Next inspection due {due} (accepted chance "
+            f"{gear.accepted_chance.value:.0%})."
         )
     headings = ("joint", f"limit {unit}", f"readings since restored (landings: {unit})", "landings to its limit")
     joints = output.plain_table(console, *headings)
@@ -212,9 +210,7 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
         )
     console.print(joints)
     if unread:
-        console.print(
-            output.text(f"Not read since new or restored: {', '.join(unread)}; never read counts as 0 above.")
-        )
+        console.print(f"Not read since new or restored: {', '.join(unread)}; never read counts as 0 above.")
     _show_advice([life])
 
 
@@ -302,9 +298,7 @@ def correct(
     from mlg_troubleshoot.workflows import history as task
     from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 
-    asked = CheckOptions(
-        gear=gear, unit=options.unit_of(unit), convention=options.convention_of(convention), sheet=sheet
-    )
+    asked = CheckOptions(gear=gear, unit=unit, convention=convention, sheet=sheet)
     result = check_files([file], asked)
     notes.show_problems(result.problems)
     added = task.correct(Store(store), record, result, asked)

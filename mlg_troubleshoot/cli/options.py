@@ -39,11 +39,15 @@ Version = Annotated[
     bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and stop.")
 ]
 Gear = Annotated[str, typer.Option("--gear", metavar="NAME|TOML", help="Shipped gear or a gear file.")]
-Unit = Annotated[str | None, typer.Option("--unit", metavar="in|thou|mm", help="Unit of lengths that do not say one.")]
+Unit = Annotated[
+    LengthUnit | None,
+    typer.Option("--unit", parser=LengthUnit.parse, metavar="in|thou|mm", help="Unit of lengths that do not say one."),
+]
 Convention = Annotated[
-    str | None,
+    ClearanceConvention | None,
     typer.Option(
         "--convention",
+        parser=ClearanceConvention.parse,
         metavar="RADIAL|DIAMETRAL|TOTAL_PLAY",
         help="What a clearance reading is, for rows that do not say it. No default: the factor 2 flips verdicts.",
     ),
@@ -68,16 +72,6 @@ Remember = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Write the result as JSON to stdout.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no notes.")]
-
-
-def unit_of(given: str | None) -> LengthUnit | None:
-    """Read ``--unit``."""
-    return None if given is None else LengthUnit.parse(given)
-
-
-def convention_of(given: str | None) -> ClearanceConvention | None:
-    """Read ``--convention``."""
-    return None if given is None else ClearanceConvention.parse(given)
 
 
 def columns_by_header(pairs: Sequence[str] | None) -> dict[str, str]:

@@ -81,7 +81,7 @@ class DataConsole(Console):
 
     def length(self, value_in: float, *, sign: bool = False) -> str:
         """Write a length as a number in the unit that the user reads."""
-        return f"{self.unit.from_inches(value_in):{'+' if sign else ''}.{self.unit.decimals}f}"
+        return self.unit.shown(value_in, sign=sign)
 
     def sentence(self, said: str, style: str = "") -> None:
         """Print a sentence of this program, its lengths in the unit that the user reads."""

@@ -2,7 +2,7 @@
 
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate, Cause, Scene, load_causes
 from mlg_troubleshoot.diagnosis.diagnose import Diagnosis, NamedCause, diagnose
-from mlg_troubleshoot.diagnosis.extension import ModelExtension, Term, load_extension, save_extension
+from mlg_troubleshoot.diagnosis.extension import ModelExtension, Term, load_extension, write_extension
 from mlg_troubleshoot.diagnosis.simulation import (
     HeldOutGain,
     SimulationDiagnosis,
@@ -32,6 +32,6 @@ __all__ = [
     "diagnose_simulation",
     "load_causes",
     "load_extension",
-    "save_extension",
     "table_from_inspections",
+    "write_extension",
 ]

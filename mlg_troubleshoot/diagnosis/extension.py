@@ -152,7 +152,7 @@ def adjustment_of(
     return Adjustment(clearance, changed, scaled, rate, shift, loaded)
 
 
-def save_extension(extension: ModelExtension, file: Path) -> None:
+def write_extension(extension: ModelExtension, file: Path) -> None:
     """Write an extension as TOML.
 
     Parameters

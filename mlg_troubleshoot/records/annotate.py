@@ -16,6 +16,7 @@ from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.records.cells import column_letters, writable
 from mlg_troubleshoot.records.columns import Field, Kind
 from mlg_troubleshoot.records.model import FileRefusedError, ReadResult, SheetLayout
+from mlg_troubleshoot.records.template import FONT
 from mlg_troubleshoot.units import LengthUnit
 
 if TYPE_CHECKING:
@@ -228,7 +229,7 @@ def _behind_table(sheet: Worksheet, layout: SheetLayout, free: int, own: Verdict
     for column, header in enumerate(_headers(own), free):
         cell = sheet.cell(layout.header_row, column)
         _put(cell, header)
-        cell.font = Font(name="Calibri", bold=True)
+        cell.font = Font(name=FONT, bold=True)
         _fill(cell, _HEADER_FILL)
         cell.alignment = Alignment(wrap_text=True, vertical="center")
         found = {s.row: v[header] for s, v in own.items() if s.row is not None and v.get(header) is not None}
@@ -270,6 +271,6 @@ def _beside_form(sheet: Worksheet, layout: SheetLayout, free: int, own: VerdictC
         for offset, (header, value) in enumerate(values.items()):
             label = sheet.cell(layout.header_row + offset, free)
             _put(label, header)
-            label.font = Font(name="Calibri", bold=True)
+            label.font = Font(name=FONT, bold=True)
             if value is not None:
                 _put(sheet.cell(layout.header_row + offset, free + 1), value)

@@ -41,20 +41,19 @@ class Kind(StrEnum):
     REMARKS = "remarks"
 
 
-LENGTHS = frozenset(
-    {
-        Kind.CLEARANCE,
-        Kind.AXIAL_FLOAT,
-        Kind.GAUGE_U,
-        Kind.PLUNGER_GAUGE_U,
-        Kind.PLUNGER_DOWN_LOCK,
-        Kind.ACTUATOR_EXTENSION,
-        Kind.PLUNGER_POSITION,
-        Kind.PLUNGER_DISPLACEMENT,
-        Kind.MARGIN,
-        Kind.MARGIN_U,
-    }
-)
+# Largest magnitude that can be meant, in inches; beyond it the unit or the point is wrong.
+LENGTH_RANGE_IN: dict[Kind, tuple[float, float]] = {
+    Kind.AXIAL_FLOAT: (0.0, 0.5),
+    Kind.GAUGE_U: (0.0, 0.02),
+    Kind.PLUNGER_GAUGE_U: (0.0, 0.05),
+    Kind.PLUNGER_DOWN_LOCK: (-0.2, 0.2),
+    Kind.ACTUATOR_EXTENSION: (0.0, 5.0),
+    Kind.PLUNGER_POSITION: (-2.0, 2.0),
+    Kind.MARGIN: (0.0, 0.2),
+    Kind.MARGIN_U: (0.0, 0.1),
+}
+# The gear says how large clearances and plunger displacements can be.
+LENGTHS = frozenset((*LENGTH_RANGE_IN, Kind.CLEARANCE, Kind.PLUNGER_DISPLACEMENT))
 PER_JOINT = frozenset({Kind.CLEARANCE, Kind.AXIAL_FLOAT})
 NUMBERED = PER_JOINT | {Kind.GAUGE_U, Kind.PLUNGER_DISPLACEMENT}
 REQUIRED = (Kind.TAIL_NO, Kind.SIDE)

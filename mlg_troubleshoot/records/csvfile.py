@@ -84,11 +84,9 @@ class CsvSheet:
         self._budget = _QUOTE_BUDGET
 
     def merged(self) -> Sequence[MergedRange]:
-        """Return nothing: CSV has no merged cells."""
         return ()
 
     def rows(self) -> Iterator[NumberedRow]:
-        """Read the rows that are not blank, with their numbers counted from 1."""
         for number, fields in enumerate(self._records(), 1):
             cells: list[Cell] = [field if field and not field.isspace() else None for field in fields]
             if not any(cells):

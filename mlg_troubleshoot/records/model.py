@@ -18,12 +18,21 @@ Progress = Callable[[int, int | None], None]
 class TableOptions:
     """What the user declares about tables.
 
-    unit, convention: of the lengths, and of the rows, that do not say one.
-    sheet: worksheet to read; ``*`` reads every sheet that holds inspections; None takes the only one.
-    column_map: column by header (or by letter), for headers that are not understood: ``{"Spiel 3": "clearance_3_mm"}``;
-        the target ``carry`` lets a column travel to the report unread.
-    remembered_map: the same as remembered from another table: a header that is not there is no problem.
-    decimal_comma: true if ``0,013`` means 0.013.
+    Parameters
+    ----------
+    unit : LengthUnit or None
+        Unit of lengths that do not say one.
+    convention : ClearanceConvention or None
+        Convention of rows that do not say one.
+    sheet : str or None
+        Worksheet to read; ``*`` reads every sheet that holds inspections, None takes the only one.
+    column_map : mapping of str to str
+        Column by header (or by letter), for headers that are not understood: ``{"Spiel 3": "clearance_3_mm"}``; the
+        target ``carry`` lets a column travel to the report unread.
+    remembered_map : mapping of str to str
+        The same as remembered from another table: a header that is not there is no problem.
+    decimal_comma : bool
+        True if ``0,013`` means 0.013.
     """
 
     unit: LengthUnit | None = None

@@ -65,11 +65,10 @@ class OdsSheet:
         self._merged: list[MergedRange] = []
 
     def merged(self) -> Sequence[MergedRange]:
-        """Return the merged ranges of the rows read so far (rows from 1, columns from 0)."""
+        """Return those of the rows read so far."""
         return tuple(self._merged)
 
     def rows(self) -> Iterator[NumberedRow]:
-        """Read the rows that are not blank, with their numbers counted from 1."""
         self.facts.__init__()  # type: ignore[misc]
         self._merged.clear()
         table, last = -1, 0

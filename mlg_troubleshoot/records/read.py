@@ -44,28 +44,28 @@ class _Candidate:
     has_rows: bool
 
 
-class _Ticker:
-    """Adds up the rows of all files for the progress display."""
+def _ticker(progress: Progress | None) -> Callable[[int], None]:
+    """Add up the rows of all files for the progress display."""
+    done = 0
 
-    def __init__(self, progress: Progress | None) -> None:
-        self._progress = progress
-        self._done = 0
+    def tick(rows: int) -> None:
+        nonlocal done
+        done += rows
+        if progress is not None:
+            progress(done, None)
 
-    def __call__(self, rows: int) -> None:
-        self._done += rows
-        if self._progress is not None:
-            self._progress(self._done, None)
+    return tick
 
 
 def read_inspections(
     source: Source, options: ReadOptions, *, name: str | None = None, progress: Progress | None = None
 ) -> ReadResult:
-    return _finish([_read_file(source, options, name, _Ticker(progress))])
+    return _finish([_read_file(source, options, name, _ticker(progress))])
 
 
 def read_many(sources: Iterable[Source], options: ReadOptions, *, progress: Progress | None = None) -> ReadResult:
     """Read the inspections of several files, folders and patterns as one batch."""
-    ticker = _Ticker(progress)
+    ticker = _ticker(progress)
     return _finish([_read_file(item, options, None, ticker) for source in sources for item in expand(source)])
 
 
@@ -97,7 +97,7 @@ class _FileResult:
     found: Collected
 
 
-def _read_file(source: Source, options: ReadOptions, name: str | None, ticker: _Ticker) -> _FileResult:
+def _read_file(source: Source, options: ReadOptions, name: str | None, ticker: Callable[[int], None]) -> _FileResult:
     label = writable(name or (str(source) if isinstance(source, str | Path) else STDIN_NAME))
     digest: str | None = None
     kind = "unreadable"
@@ -211,7 +211,9 @@ def _is_instructions(rows: Sequence[NumberedRow]) -> bool:
     return isinstance(first, str) and first.strip().lower().startswith(_INSTRUCTIONS)
 
 
-def _read_book(book: Workbook, options: ReadOptions, label: str, ticker: _Ticker, found: Collected) -> None:
+def _read_book(
+    book: Workbook, options: ReadOptions, label: str, ticker: Callable[[int], None], found: Collected
+) -> None:
     chosen = _choose(book, options, found)
     for candidate in chosen:
         sheet = candidate.sheet

@@ -22,7 +22,7 @@ from mlg_troubleshoot.decision.inspection import (
     Side,
 )
 from mlg_troubleshoot.records.cells import Cell, OddCell, OddKind, column_letters, quote, show, writable
-from mlg_troubleshoot.records.columns import CARRIED, LENGTHS, VERDICT_BEARING, Field, Kind
+from mlg_troubleshoot.records.columns import CARRIED, LENGTH_RANGE_IN, LENGTHS, VERDICT_BEARING, Field, Kind
 from mlg_troubleshoot.records.model import FileRefusedError, TableInHand
 from mlg_troubleshoot.records.slips import scale_slip
 from mlg_troubleshoot.records.values import (
@@ -59,17 +59,6 @@ _CONVENTION_HINTS = {
     **dict.fromkeys(("play", "total", "tir", "dial"), "TOTAL_PLAY"),
 }
 
-# Largest magnitude that can be meant, in inches; beyond it the unit or the point is wrong.
-_LENGTH_RANGE_IN: dict[Kind, tuple[float, float]] = {
-    Kind.AXIAL_FLOAT: (0.0, 0.5),
-    Kind.GAUGE_U: (0.0, 0.02),
-    Kind.PLUNGER_GAUGE_U: (0.0, 0.05),
-    Kind.PLUNGER_DOWN_LOCK: (-0.2, 0.2),
-    Kind.ACTUATOR_EXTENSION: (0.0, 5.0),
-    Kind.PLUNGER_POSITION: (-2.0, 2.0),
-    Kind.MARGIN: (0.0, 0.2),
-    Kind.MARGIN_U: (0.0, 0.1),
-}
 _NEVER_BLANK = (VERDICT_BEARING - {Kind.CLEARANCE}) | {*CARRIED, Kind.GAUGE_ID, Kind.TECHNICIAN_ID}
 _SIGNED = frozenset({Kind.PLUNGER_DOWN_LOCK, Kind.PLUNGER_POSITION, Kind.PLUNGER_DISPLACEMENT})
 # What else a row may say, read cell by cell; the flag says whether a comma is the decimal mark.
@@ -473,7 +462,7 @@ class RowReader:
 
     def _one_length(self, cell: str | float | OddCell, field: Field, row_unit: LengthUnit | None) -> float:
         most = self._options.plunger_hard_max_in
-        low, high = _LENGTH_RANGE_IN.get(field.kind, (-most, most))
+        low, high = LENGTH_RANGE_IN.get(field.kind, (-most, most))
         unit = field.unit or row_unit or LengthUnit.INCH
         what = field.kind.value.replace("_", " ")
         expected = f"{what} from {unit.from_inches(low):.4g} to {unit.from_inches(high):.4g} {unit.value}"

@@ -9,34 +9,23 @@ from typing import TYPE_CHECKING
 
 from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.records.cells import column_letters
-from mlg_troubleshoot.records.columns import LENGTHS, Field, Kind
+from mlg_troubleshoot.records.columns import CARRIED, LENGTHS, Field, Kind
 from mlg_troubleshoot.records.forms import FORM_TITLE
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:
     from openpyxl import Workbook
-    from openpyxl.comments import Comment
     from openpyxl.worksheet.worksheet import Worksheet
 
 JointLine = tuple[int, str, str]
 
 _ROWS = 500
-_FONT = "Calibri"
+# The font of what this program writes into workbooks.
+FONT = "Calibri"
 _LINE_PT = 15.0
 _HEADER_FILL = "FFD9E2EC"
 _REQUIRED_FILL = "FFFFE9A8"
-_TEXT_KINDS = frozenset(
-    {
-        Kind.RECORD_ID,
-        Kind.TAIL_NO,
-        Kind.GAUGE_ID,
-        Kind.TECHNICIAN_ID,
-        Kind.WORK_ORDER,
-        Kind.MANUAL_REF,
-        Kind.MANUAL_REV,
-        Kind.REMARKS,
-    }
-)
+_TEXT_KINDS = frozenset({Kind.RECORD_ID, Kind.TAIL_NO, Kind.GAUGE_ID, Kind.TECHNICIAN_ID, *CARRIED})
 _MUST = frozenset({Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE, Kind.CONVENTION})
 _CHOICES: dict[Kind, tuple[str, ...]] = {
     Kind.SIDE: ("LH", "RH"),
@@ -129,20 +118,8 @@ def _fields(joints: Sequence[JointLine], unit: LengthUnit | None) -> list[Field]
         length(Kind.PLUNGER_GAUGE_U),
         length(Kind.MARGIN),
         length(Kind.MARGIN_U),
-        *(
-            Field(kind)
-            for kind in (
-                Kind.TEMPERATURE,
-                Kind.PRESSURE,
-                Kind.APPROACH,
-                Kind.GAUGE_ID,
-                Kind.TECHNICIAN_ID,
-                Kind.WORK_ORDER,
-                Kind.MANUAL_REF,
-                Kind.MANUAL_REV,
-                Kind.REMARKS,
-            )
-        ),
+        *(Field(kind) for kind in (Kind.TEMPERATURE, Kind.PRESSURE, Kind.APPROACH, Kind.GAUGE_ID, Kind.TECHNICIAN_ID)),
+        *(Field(kind) for kind in CARRIED),
         *(length(Kind.AXIAL_FLOAT, n) for n in numbers),
     ]
 
@@ -168,7 +145,7 @@ def _instructions(book: Workbook, joints: Sequence[JointLine]) -> None:
         cell.data_type = "s"
         cell.alignment = Alignment(wrap_text=True, vertical="top")
         _as_high_as(sheet, row, line, 83)
-    sheet["A1"].font = Font(name=_FONT, bold=True, size=14)
+    sheet["A1"].font = Font(name=FONT, bold=True, size=14)
     sheet.row_dimensions[1].height = 24
     _fit_to_width(sheet)
 
@@ -187,13 +164,8 @@ def _fit_to_width(sheet: Worksheet) -> None:
     sheet.sheet_properties.pageSetUpPr = PageSetupProperties(fitToPage=True)
 
 
-def _comment(text: str) -> Comment:
-    from openpyxl.comments import Comment
-
-    return Comment(text, "mlg", width=320, height=120)
-
-
 def _table(book: Workbook, joints: Sequence[JointLine], unit: LengthUnit) -> None:
+    from openpyxl.comments import Comment
     from openpyxl.styles import Alignment, Border, Font, PatternFill, Side
     from openpyxl.worksheet.pagebreak import Break
 
@@ -203,11 +175,11 @@ def _table(book: Workbook, joints: Sequence[JointLine], unit: LengthUnit) -> Non
     for index, field in enumerate(fields):
         letters = column_letters(index)
         cell = sheet.cell(1, index + 1, field.name)
-        cell.font = Font(name=_FONT, bold=True)
+        cell.font = Font(name=FONT, bold=True)
         cell.fill = PatternFill("solid", fgColor=_REQUIRED_FILL if field.kind in _MUST else _HEADER_FILL)
         cell.alignment = Alignment(wrap_text=True, vertical="center", horizontal="center")
         cell.border = Border(bottom=line, right=line)
-        cell.comment = _comment(_explain(field, joints))
+        cell.comment = Comment(_explain(field, joints), "mlg", width=320, height=120)
         sheet.column_dimensions[letters].width = 30 if field.kind is Kind.REMARKS else 13
         number_format = _number_format(field.kind)
         for row in range(2, _ROWS + 2):
@@ -253,7 +225,7 @@ def _form(book: Workbook, joints: Sequence[JointLine]) -> None:
 
     sheet = book.create_sheet("Form")
     sheet["A1"] = FORM_TITLE
-    sheet["A1"].font = Font(name=_FONT, bold=True, size=14)
+    sheet["A1"].font = Font(name=FONT, bold=True, size=14)
     sheet["A2"] = "One sheet is one inspection. Yellow lines must be filled in; blank means not measured."
     for letters, width in (("A", 28), ("B", 24), ("C", 66)):
         sheet.column_dimensions[letters].width = width
@@ -268,11 +240,11 @@ def _form(book: Workbook, joints: Sequence[JointLine]) -> None:
         value.border = Border(left=line, right=line, top=line, bottom=line)
         value.number_format = _number_format(field.kind) or "General"
         value.alignment = label.alignment = Alignment(horizontal="left", vertical="top")
-        label.font = Font(name=_FONT, bold=must)
+        label.font = Font(name=FONT, bold=must)
         hint.value = _explain(field, joints)
         hint.data_type = "s"
         hint.alignment = Alignment(wrap_text=True, vertical="top")
-        hint.font = Font(name=_FONT, size=9, color="FF52606D")
+        hint.font = Font(name=FONT, size=9, color="FF52606D")
         _as_high_as(sheet, row, hint.value, 94)
         _validate(sheet, field.kind, f"B{row}")
         row += 1

@@ -34,23 +34,10 @@ _INVISIBLE = {ord(c): None for c in "\u200b\u200c\u200d\u2060\ufeff"}
 # What people write where nothing was measured; the error value #N/A is none of them.
 NOT_MEASURED = frozenset(
     (
-        "n/a",
-        "na",
-        "n.a.",
-        "-",
-        "--",
-        "\u2010",
-        "\u2011",
-        "\u2012",
-        "\u2013",
-        "\u2014",
-        "\u2212",
-        "nm",
-        "n/m",
-        "n.m.",
-        "nil",
+        *("-", "--", "\u2010", "\u2011", "\u2012", "\u2013", "\u2014", "\u2212", "n/a", "na", "n.a.", "nm", "n/m"),
+        *("n.m.", "nil", "none", "not measured", "not taken", "not done", "not applicable", "not accessible"),
     )
-).union(("none", "not measured", "not taken", "not done", "not applicable", "not accessible"))
+)
 
 _E = TypeVar("_E", bound=StrEnum)
 _CHOICES: dict[type[StrEnum], dict[str, StrEnum]] = {}

@@ -114,11 +114,9 @@ class XlsSheet:
         self.facts = SheetFacts()
 
     def merged(self) -> Sequence[MergedRange]:
-        """Return merged ranges as first row, first column, last row, last column (rows from 1, columns from 0)."""
         return [(top + 1, left, bottom, right - 1) for top, bottom, left, right in self._sheet.merged_cells]
 
     def rows(self) -> Iterator[NumberedRow]:
-        """Read the rows that are not blank, with their numbers counted from 1."""
         sheet = self._sheet
         self.facts.__init__()  # type: ignore[misc]
         self.facts.formulas.update(self._formulas)

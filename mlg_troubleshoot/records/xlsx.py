@@ -171,10 +171,7 @@ class XlsxSheet:
         self.book = book
 
     def merged(self) -> Sequence[MergedRange]:
-        """Return merged ranges as first row, first column, last row, last column (rows from 1, columns from 0).
-
-        They stand behind the last row and are asked for before the first is judged, so that the part is searched.
-        """
+        """Search the part: they stand behind the last row and are asked for before the first is judged."""
         found: list[MergedRange] = []
         tail = b""
         for chunk in self.book.archive.chunks(self.part):
@@ -188,7 +185,6 @@ class XlsxSheet:
         return found
 
     def rows(self) -> Iterator[NumberedRow]:
-        """Read the rows that are not blank, with their numbers counted from 1."""
         self.facts.__init__()  # type: ignore[misc]
         with damage(f"sheet {self.name!r} cannot be read"):
             for number, cells in _Rows(self).parse():

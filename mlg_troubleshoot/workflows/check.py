@@ -27,31 +27,20 @@ from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 if TYPE_CHECKING:
     from mlg_troubleshoot.records import ReadResult
     from mlg_troubleshoot.reporting import WrittenReport
-    from mlg_troubleshoot.studies.verification import VerifiedNumber
 
 ALL_JUDGED, NOT_ALL_WITHIN, NOTHING_JUDGED = 0, 1, 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckOptions(TableOptions):
-    """What the user asks of a check.
+    """What the user asks of a check, beside what :class:`TableOptions` declare about its tables.
 
     Parameters
     ----------
     gear : str
         Shipped gear or gear file.
-    unit : LengthUnit or None
-        Unit of lengths that do not say one.
-    convention : ClearanceConvention or None
-        Convention of rows that do not say one.
-    sheet : str or None
-        Worksheet.
-    column_map, remembered_map : mapping of str to str
-        Columns by header, as given for this table and as remembered from others.
     remembered : str or None
         What was remembered, in words for the report.
-    decimal_comma : bool
-        True if ``0,013`` means 0.013.
     advice : bool or None
         Compute what is looked at for one gear: Monte Carlo, re-rigging, worn joints; None does so for a single one.
     seed : int
@@ -382,13 +371,6 @@ def write_template(
         write(file, [(joint.number, joint.name, joint.location) for joint in loaded.joints])
     except OSError as error:
         raise OutputError(f"{file} cannot be written: {error.strerror}", "Choose another folder.") from error
-
-
-def verify_gear(gear: str = DEFAULT_GEAR) -> tuple[VerifiedNumber, ...]:
-    """Compare what the paper prints with what the model gives."""
-    from mlg_troubleshoot.studies.verification import verify
-
-    return verify(load_gear(gear))
 
 
 # What a reader acts on comes first: on paper the rest is on the page after it.

@@ -22,24 +22,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DiagnoseOptions(TableOptions):
-    """What the user asks of a diagnosis.
+    """What the user asks of a diagnosis, beside what :class:`TableOptions` declare about its tables.
 
     Parameters
     ----------
     gear : str
         Shipped gear or gear file.
-    unit : LengthUnit or None
-        Unit of lengths that do not say one.
-    convention : ClearanceConvention or None
-        Convention of rows that do not say one.
-    sheet : str or None
-        Worksheet.
-    column_map, remembered_map : mapping of str to str
-        Columns by header, as given for this table and as remembered from others.
     remembered : str or None
         What was remembered, in words for the report.
-    decimal_comma : bool
-        True if ``0,013`` means 0.013.
     cause_files : tuple of Path
         Python files with the user's own causes.
     permutations : int
@@ -177,21 +167,6 @@ def _evidence_notes(inspections: Sequence[Inspection], again: int, gear: Gear) -
     if unread:
         listed = ", ".join(f"#{n}" for n in unread)
         yield f"not measured in any row: {listed}; counted as worn like the others of their gear, and not testable"
-
-
-def write_extension(extension: ModelExtension, file: Path) -> None:
-    """Write an extension as TOML.
-
-    Parameters
-    ----------
-    extension : ModelExtension
-        The extension.
-    file : Path
-        File to write.
-    """
-    from mlg_troubleshoot.diagnosis import save_extension
-
-    save_extension(extension, file)
 
 
 def write_diagnosis_report(

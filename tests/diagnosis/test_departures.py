@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot import load_gear
-from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension, diagnose, load_extension, save_extension
+from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension, diagnose, load_extension, write_extension
 from mlg_troubleshoot.diagnosis.causes.together import OtherGeometry
 from mlg_troubleshoot.diagnosis.scene import build_scene
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
@@ -170,7 +170,7 @@ def test_the_extension_predicts_the_plunger_as_loaded(gear: Gear) -> None:
 
 
 def test_an_extension_as_loaded_comes_back_from_its_file(gear: Gear, tmp_path: Path) -> None:
-    save_extension(ModelExtension(gear, found("loads").terms, 0.002, ("ab",), 200, (6, 7)), tmp_path / "e.toml")
+    write_extension(ModelExtension(gear, found("loads").terms, 0.002, ("ab",), 200, (6, 7)), tmp_path / "e.toml")
     back = load_extension([tmp_path / "e.toml"], gear)
     assert (dict(back.terms[0].candidate.setting), back.unread) == (
         dict(found("loads").terms[0].candidate.setting),

@@ -18,8 +18,8 @@ from mlg_troubleshoot.diagnosis import (
     Scene,
     Term,
     load_extension,
-    save_extension,
     table_from_inspections,
+    write_extension,
 )
 from mlg_troubleshoot.diagnosis.extension import adjustment_of
 from mlg_troubleshoot.errors import GearFileError, OutputError, TroubleshootError
@@ -75,7 +75,7 @@ def offset_of(gear: Gear, terms: tuple[Term, ...], **changes: object) -> float:
 
 @pytest.mark.parametrize("saved", [STRETCH, RATE, GAUGE, RIGGED, CONTACT], ids=lambda t: t.candidate.cause.name)
 def test_a_term_comes_back_from_its_file_as_it_was(saved: Term, gear: Gear, tmp_path: Path) -> None:
-    save_extension(extension(gear, saved), tmp_path / "e.toml")
+    write_extension(extension(gear, saved), tmp_path / "e.toml")
     (back,) = load_extension([tmp_path / "e.toml"], gear).terms
     assert (back.value, back.interval) == (saved.value, saved.interval)
     assert (back.candidate.cause.name, back.candidate.target) == (saved.candidate.cause.name, saved.candidate.target)
@@ -86,30 +86,30 @@ def test_a_term_comes_back_from_its_file_as_it_was(saved: Term, gear: Gear, tmp_
 
 def test_a_term_that_came_back_predicts_the_same(gear: Gear, tmp_path: Path) -> None:
     terms = (STRETCH, RATE, GAUGE, RIGGED, CONTACT)
-    save_extension(extension(gear, *terms), tmp_path / "e.toml")
+    write_extension(extension(gear, *terms), tmp_path / "e.toml")
     assert offset_of(gear, load_extension([tmp_path / "e.toml"], gear).terms) == offset_of(gear, terms)
 
 
 def test_hostile_text_comes_back_as_it_was(gear: Gear, tmp_path: Path) -> None:
     saved = term("rigging_offset", 0.01, f"tail {HOSTILE}", tail=HOSTILE, day=None, since=None)
-    save_extension(extension(gear, saved), tmp_path / "e.toml")
+    write_extension(extension(gear, saved), tmp_path / "e.toml")
     (back,) = load_extension([tmp_path / "e.toml"], gear).terms
     assert (back.candidate.target, back.candidate.setting["tail"]) == (f"tail {HOSTILE}", HOSTILE)
 
 
 def test_the_file_says_on_which_data_and_geometry_it_rests(gear: Gear, tmp_path: Path) -> None:
-    save_extension(extension(gear, RATE), tmp_path / "e.toml")
+    write_extension(extension(gear, RATE), tmp_path / "e.toml")
     raw = tomllib.loads((tmp_path / "e.toml").read_text(encoding="utf-8"))
     assert (raw["geometry_sha256"], raw["data_sha256"], raw["rows"]) == (gear.geometry_sha256, ["ab" * 32], 200)
 
 
 def test_the_file_keeps_the_scatter_that_is_left(gear: Gear, tmp_path: Path) -> None:
-    save_extension(extension(gear, RATE), tmp_path / "e.toml")
+    write_extension(extension(gear, RATE), tmp_path / "e.toml")
     assert load_extension([tmp_path / "e.toml"], gear).residual_u_in == 0.0031
 
 
 def test_an_extension_of_another_geometry_is_refused(gear: Gear, tmp_path: Path) -> None:
-    save_extension(extension(replace(gear, geometry_sha256="0" * 64), RATE), tmp_path / "e.toml")
+    write_extension(extension(replace(gear, geometry_sha256="0" * 64), RATE), tmp_path / "e.toml")
     with pytest.raises(GearFileError, match="made on another geometry") as refused:
         load_extension([tmp_path / "e.toml"], gear)
     assert "Diagnose again" in refused.value.remedy
@@ -135,7 +135,7 @@ def test_a_file_that_is_no_extension_is_refused(gear: Gear, tmp_path: Path) -> N
 )
 def test_a_damaged_extension_is_refused_with_its_name(written: str, instead: str, gear: Gear, tmp_path: Path) -> None:
     file = tmp_path / "e.toml"
-    save_extension(extension(gear, RATE), file)
+    write_extension(extension(gear, RATE), file)
     text = file.read_text(encoding="utf-8")
     assert written in text
     file.write_text(text.replace(written, instead), encoding="utf-8")
@@ -163,7 +163,7 @@ def test_a_number_that_cannot_be_is_refused_with_its_key(
     written: str, instead: str, expected: str, gear: Gear, tmp_path: Path
 ) -> None:
     file = tmp_path / "e.toml"
-    save_extension(extension(gear, RATE), file)
+    write_extension(extension(gear, RATE), file)
     file.write_text(file.read_text(encoding="utf-8").replace(written, instead), encoding="utf-8")
     with pytest.raises(GearFileError, match=r"e\.toml: ") as refused:
         load_extension([file], gear)
@@ -176,14 +176,14 @@ def test_a_number_that_cannot_be_is_refused_with_its_key(
 )
 def test_a_term_without_its_setting_is_refused(damaged: str, gear: Gear, tmp_path: Path) -> None:
     file = tmp_path / "e.toml"
-    save_extension(extension(gear, term(damaged, 0.01)), file)
+    write_extension(extension(gear, term(damaged, 0.01)), file)
     with pytest.raises(TroubleshootError, match=r"e\.toml"):
         load_extension([file], gear)
 
 
 def test_a_cause_that_is_not_known_asks_for_the_file_of_causes(gear: Gear, tmp_path: Path) -> None:
     file = tmp_path / "e.toml"
-    save_extension(extension(gear, RATE), file)
+    write_extension(extension(gear, RATE), file)
     file.write_text(file.read_text(encoding="utf-8").replace("calibration_rate", "moon_phase"), encoding="utf-8")
     with pytest.raises(GearFileError, match="moon_phase") as refused:
         load_extension([file], gear)
@@ -193,7 +193,7 @@ def test_a_cause_that_is_not_known_asks_for_the_file_of_causes(gear: Gear, tmp_p
 def test_an_extension_that_cannot_be_written_says_so(gear: Gear, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(OutputError, match="cannot be written"):
-        save_extension(extension(gear, RATE), tmp_path / "file" / "e.toml")
+        write_extension(extension(gear, RATE), tmp_path / "file" / "e.toml")
 
 
 def test_offsets_add_up(gear: Gear) -> None:
@@ -201,8 +201,8 @@ def test_offsets_add_up(gear: Gear) -> None:
 
 
 def test_files_stack_in_their_order(gear: Gear, tmp_path: Path) -> None:
-    save_extension(extension(gear, GAUGE), tmp_path / "one.toml")
-    save_extension(extension(gear, RIGGED), tmp_path / "two.toml")
+    write_extension(extension(gear, GAUGE), tmp_path / "one.toml")
+    write_extension(extension(gear, RIGGED), tmp_path / "two.toml")
     both = load_extension([tmp_path / "one.toml", tmp_path / "two.toml"], gear)
     assert offset_of(gear, both.terms) == pytest.approx(0.004 - 0.01, abs=1e-12)
 

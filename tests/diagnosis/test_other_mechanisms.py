@@ -16,7 +16,7 @@ from mlg_troubleshoot.diagnosis import (
     ModelExtension,
     diagnose,
     load_extension,
-    save_extension,
+    write_extension,
 )
 from mlg_troubleshoot.diagnosis.extension import adjustment_of
 from mlg_troubleshoot.errors import GearFileError
@@ -120,7 +120,7 @@ def test_causes_that_need_a_place_in_the_linkage_are_not_tried(crank: Gear) -> N
 
 def test_its_extension_does_not_fit_a_landing_gear(crank: Gear, gear: Gear, tmp_path: Path) -> None:
     terms = found_in(crank, bench(factor=1.12)).terms
-    save_extension(ModelExtension(crank, terms, 0.0005, (), ROWS), tmp_path / "crank.toml")
+    write_extension(ModelExtension(crank, terms, 0.0005, (), ROWS), tmp_path / "crank.toml")
     with pytest.raises(GearFileError, match="another geometry"):
         load_extension([tmp_path / "crank.toml"], gear)
 

@@ -12,8 +12,6 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, WrittenLength, parse_length
 
-# Typed values are decimal, limits are binary: a value on a limit is within it.
-_EPS_IN = 1e-9
 # Columns that an entry may have beside its heading and its clearances, in the order in which they are shown.
 LENGTHS = ("plunger_displacement", "margin")
 SIGN_OFF = ("technician_id", "work_order", "gauge_id", "inspection_date")
@@ -154,7 +152,3 @@ def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> 
     if problems or not isinstance(read, Inspection):
         raise UsageError(f"{typed!r} is not taken: expected {problems[0].expected}", problems[0].remedy)
     return read
-
-
-def over_limit(reading: Reading, gear: Gear, number: int) -> bool:
-    return reading.radial_in > gear.joint(number).limit.value + _EPS_IN

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import date
 
-from mlg_troubleshoot.cli.prompts.answers import Answers, Reading, judge, over_limit
+from mlg_troubleshoot.cli.prompts.answers import Answers, Reading, judge
 from mlg_troubleshoot.cli.prompts.lines import BLANK, Line, Tone, keys, line
 from mlg_troubleshoot.cli.prompts.sketch import sketch
 from mlg_troubleshoot.cli.prompts.store import Session
@@ -52,11 +52,9 @@ class Page:
     prompt: str
 
 
-def length(length_in: float, unit: LengthUnit | None, *, sign: bool = False) -> str:
+def length(length_in: float, unit: LengthUnit | None) -> str:
     """Write a length in the user's unit; one in inches in millimetres, too."""
-    mark = "+" if sign else ""
-    shown = (LengthUnit.INCH, LengthUnit.MILLIMETRE) if unit in (None, LengthUnit.INCH) else (unit,)
-    return " = ".join(f"{u.from_inches(length_in):{mark}.{u.decimals}f} {u}" for u in shown if u is not None)
+    return " = ".join(f"{u.shown(length_in)} {u}" for u in _units_shown(unit))
 
 
 def rule(title: str, width: int) -> Line:
@@ -202,7 +200,7 @@ def echo_lines(gear: Gear, answers: Answers, number: int) -> tuple[Line, ...]:
     radial = reading.convention is ClearanceConvention.RADIAL
     then = "" if radial else f" → {length(reading.radial_in, unit)} radial"
     shown = [line((f"✓ #{number}  {length(reading.as_read_in, unit)} {kind}", Tone.GOOD), then)]
-    if over_limit(reading, gear, number):
+    if gear.joint(number).is_over_limit(reading.radial_in):
         limit = length(gear.joint(number).limit.value, unit).partition(" = ")[0]
         shown.append(line((f"OVER THE LIMIT of {limit} radial: the manual rejects this joint.", Tone.BAD), indent=5))
     return tuple(shown)
@@ -306,7 +304,7 @@ MORE_HELP = (
 def review_page(gear: Gear, answers: Answers, width: int) -> Page:
     kind = "radial" if answers.convention is None else CONVENTION_NAMES[answers.convention]
     twice = answers.convention is not ClearanceConvention.RADIAL
-    units = _columns_of(answers)
+    units = _units_shown(answers.unit)
     numbers = "".join(f"{unit:>9}" for unit in units) * (2 if twice else 1)
     longest = max(len(joint.name) for joint in gear.joints)
     name_width = max(min(longest, width - len(numbers) - 22), 0)
@@ -343,8 +341,8 @@ def _review_row(gear: Gear, answers: Answers, number: int, name_width: int, *, t
         )
     values = f"{_as_typed(reading)[:10]:>11}"
     for each in (reading.as_read_in, reading.radial_in)[: 1 + twice]:
-        values += "".join(f"{unit.from_inches(each):>9.{unit.decimals}f}" for unit in _columns_of(answers))
-    flag = ("  OVER", Tone.BAD) if over_limit(reading, gear, number) else ("", Tone.PLAIN)
+        values += "".join(f"{unit.shown(each):>9}" for unit in _units_shown(answers.unit))
+    flag = ("  OVER", Tone.BAD) if gear.joint(number).is_over_limit(reading.radial_in) else ("", Tone.PLAIN)
     return line(start, values, flag, indent=0, rigid=True)
 
 
@@ -356,9 +354,8 @@ REVIEW_HELP = (
 )
 
 
-def _columns_of(answers: Answers) -> tuple[LengthUnit, ...]:
-    unit = answers.unit or LengthUnit.INCH
-    return (unit, LengthUnit.MILLIMETRE) if unit is LengthUnit.INCH else (unit,)
+def _units_shown(unit: LengthUnit | None) -> tuple[LengthUnit, ...]:
+    return (LengthUnit.INCH, LengthUnit.MILLIMETRE) if unit in (None, LengthUnit.INCH) else (unit or LengthUnit.INCH,)
 
 
 def _as_typed(reading: Reading) -> str:
