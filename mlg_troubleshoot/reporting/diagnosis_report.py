@@ -22,7 +22,7 @@ from mlg_troubleshoot.reporting.diagnosis_lines import (
     fitted_numbers,
     kind_words,
     name_words,
-    what_to_do,
+    seven_lines,
 )
 from mlg_troubleshoot.reporting.formats import Lengths, several, short
 from mlg_troubleshoot.reporting.html import Document
@@ -74,7 +74,7 @@ def _context(
         "words": words,
         "tone": tone,
         "headline": _headline(d, lengths),
-        "action": what_to_do(d),
+        "action": seven_lines(d, lengths.unit)[-1].text,
         "chance": None if chance is None else chance_words(chance, d.permutations),
         "plots": _plots(residuals),
         "scatter": drawn.measured_against_predicted(residuals),
@@ -85,9 +85,6 @@ def _context(
         "catalogue": {cause.name: cause for cause in CATALOGUE},
         "most_ruled_out": _MOST_RULED_OUT,
         "kind_words": kind_words,
-        "name_words": name_words,
-        "cause_words": cause_words,
-        "column_words": column_words,
         "as_loaded": any("load_directions" in (o.cause.name for o in (c.candidate, *c.aliases)) for c in d.causes),
         "changes": _changes(residuals),
         "more_changes": len(d.gain.verdicts_changed) - _MOST_CHANGES if d.gain else 0,
