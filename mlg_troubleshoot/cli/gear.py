@@ -66,34 +66,24 @@ def _show(gear: Gear) -> None:
 
 
 def _as_json(gear: Gear) -> dict[str, object]:
+    from mlg_troubleshoot.reporting.json_form import chosen, plain
+
+    told = ("name", "location", "limit", "new_part", "access", "area", "critical")
     return {
-        "id": gear.id,
-        "name": gear.name,
-        "provenance": gear.provenance,
-        "geometry_sha256": gear.geometry_sha256,
+        **chosen(gear, "id", "name", "provenance", "geometry_sha256"),
         "ensemble": [linkage.name for linkage in gear.ensemble],
         "calibration_rate": gear.model.rate,
-        "margin": asdict(gear.margin),
+        "margin": plain(gear.margin),
         "release_stroke_in": gear.reference.stroke[1],
         "joints": [
-            {
-                "joint": joint.number,
-                "name": joint.name,
-                "location": joint.location,
-                "limit": asdict(joint.limit),
-                "new_part": asdict(joint.new_part),
-                "access": asdict(joint.access),
-                "area": joint.area,
-                "critical": joint.critical,
-                "acts_like": list(gear.alike[joint.number]),
-            }
+            {"joint": joint.number, **chosen(joint, *told), "acts_like": list(gear.alike[joint.number])}
             for joint in gear.joints
         ],
         "points": {
             point.name: {"plane": point.plane, "at_in": [point.x, point.y], "fixed": point.fixed}
             for point in gear.reference.mechanism.points
         },
-        "numbers": [asdict(number) for number in gear.numbers],
+        "numbers": plain(gear.numbers),
     }
 
 

@@ -205,8 +205,25 @@ class Posterior:
     text: str
 
 
+class _Planned:
+    """What has a plan: its first step is the one next action."""
+
+    __slots__ = ()
+    plan: Plan
+
+    @property
+    def next_action(self) -> Step:
+        """The one next action: the plan's first step."""
+        return self.plan.steps[0]
+
+    @property
+    def end(self) -> End:
+        """Where the plan is expected to end."""
+        return self.plan.end
+
+
 @dataclass(frozen=True, slots=True)
-class Assessment:
+class Assessment(_Planned):
     """The decision about one gear.
 
     Parameters
@@ -318,23 +335,13 @@ class Assessment:
         return {Verdict.WITHIN_MARGIN: 1.0 - within, Verdict.OUTSIDE_MARGIN: within}.get(self.verdict)
 
     @property
-    def next_action(self) -> Step:
-        """The one next action: the plan's first step."""
-        return self.plan.steps[0]
-
-    @property
-    def end(self) -> End:
-        """Where the plan is expected to end."""
-        return self.plan.end
-
-    @property
     def ranked(self) -> tuple[JointFinding, ...]:
         """The joints in the order in which to inspect them."""
         return tuple(sorted(self.joints, key=lambda finding: finding.rank))
 
 
 @dataclass(frozen=True, slots=True)
-class Rejected:
+class Rejected(_Planned):
     """A row that cannot be judged: verdict INVALID, its numbers absent."""
 
     row: InvalidRow
@@ -344,14 +351,6 @@ class Rejected:
     @property
     def verdict(self) -> Verdict:
         return Verdict.INVALID
-
-    @property
-    def next_action(self) -> Step:
-        return self.plan.steps[0]
-
-    @property
-    def end(self) -> End:
-        return self.plan.end
 
 
 Judgement = Assessment | Rejected

@@ -109,7 +109,8 @@ class Kernel:
         if compiled:
             if self._loop is None:
                 body = self._program.source((self._program.output,), release=False)
-                self._loop = _compiled_loop(body, self._layout())
+                layout = (len(self.parameters), self._program.virtual_links, self._program.output)
+                self._loop = _compiled_loop(body, layout)
             self._loop(float(position), clearance, unit, self.parameters, result)
             return result
         numbers = self.parameters.tolist()
@@ -119,9 +120,6 @@ class Kernel:
                 links = [part[j] * unit[j, axis] for j in range(len(unit)) for axis in (0, 1)]
                 result[start : start + CHUNK] = self._output(position, links, numbers)[0]
         return result
-
-    def _layout(self) -> tuple[int, int, str]:
-        return len(self.parameters), self._program.virtual_links, self._program.output
 
 
 def _function(program: Program, results: tuple[str, ...]) -> Callable[..., tuple[Any, ...]]:

@@ -159,7 +159,7 @@ class Mechanism:
         known = {point.name for point in self.points if point.fixed}
         used = [point.virtual_link for point in self.points if point.virtual_link is not None]
         for step in self.steps:
-            for needed in _needs(step):
+            for needed in needs(step):
                 if needed not in known:
                     raise MechanismError(
                         f"Step {step.joint!r} needs {needed!r}, which is neither fixed nor located before it."
@@ -271,7 +271,8 @@ def _column(value: Any) -> Vector:
     return np.asarray(value)[..., None]
 
 
-def _needs(step: Step) -> tuple[str, ...]:
+def needs(step: Step) -> tuple[str, ...]:
+    """The points that a step locates its joint from."""
     match step:
         case Crank():
             return (step.pivot,)

@@ -149,7 +149,7 @@ def _load(source: str | Path, out: str | Path) -> bytes:
         # The same guard as in reading: nothing dangerous reaches the library that writes.
         XlsxFile(data)
     except FileRefusedError as refusal:
-        raise UsageError(f"{source}: {refusal.found}", refusal.remedy) from None
+        raise UsageError(f"{source}: {refusal}", refusal.problem.remedy) from None
     except OSError as error:
         raise UsageError(f"{source} cannot be opened: {error.strerror}", "Check the path.") from None
     return data

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import Cell, column_letters
@@ -20,11 +21,11 @@ FORM_TITLE = "MLG inspection form"
 _DECLARATIONS = frozenset({Kind.UNIT, Kind.CONVENTION})
 
 
+@dataclass(frozen=True, slots=True)
 class Form:
-    def __init__(self, lines: Sequence[tuple[int, str, Cell]], label_column: int, value_column: int) -> None:
-        self.lines = tuple(lines)
-        self.label_column = label_column
-        self.value_column = value_column
+    lines: Sequence[tuple[int, str, Cell]]
+    label_column: int
+    value_column: int
 
     def is_untouched(self, options: ReadOptions) -> bool:
         """Tell whether nothing has been filled in yet."""

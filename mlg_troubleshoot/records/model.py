@@ -173,14 +173,4 @@ class FileRefusedError(Exception):
         cell: str | None = None,
     ) -> None:
         super().__init__(found)
-        self.code = code
-        self.found = found
-        self.expected = expected
-        self.remedy = remedy
-        self.sheet = sheet
-        self.row = row
-        self.cell = cell
-
-    def problem(self, file: str | None) -> Problem:
-        """Return the refusal as an entry of the list of problems."""
-        return Problem(self.code, file, self.sheet, self.row, None, self.cell, self.found, self.expected, self.remedy)
+        self.problem = Problem(code, None, sheet, row, None, cell, found, expected, remedy)

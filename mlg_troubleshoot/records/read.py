@@ -31,6 +31,7 @@ _INSTRUCTIONS = "instructions"
 _SUFFIXES = frozenset((".csv", ".tsv", ".txt", ".xlsx", ".xlsm", ".xls", ".ods"))
 
 Source = str | Path | BinaryIO
+_Found = tuple[FileRead, Collected]
 
 
 @dataclass(slots=True)
@@ -91,13 +92,7 @@ def _is_scratch(path: Path) -> bool:
     return path.name.startswith(("~$", ".~lock", "."))
 
 
-@dataclass(slots=True)
-class _FileResult:
-    file: FileRead
-    found: Collected
-
-
-def _read_file(source: Source, options: ReadOptions, name: str | None, ticker: Callable[[int], None]) -> _FileResult:
+def _read_file(source: Source, options: ReadOptions, name: str | None, ticker: Callable[[int], None]) -> _Found:
     label = writable(name or (str(source) if isinstance(source, str | Path) else STDIN_NAME))
     digest: str | None = None
     kind = "unreadable"
@@ -119,9 +114,9 @@ def _read_file(source: Source, options: ReadOptions, name: str | None, ticker: C
         # A reader that stops halfway has not seen the whole table: none of its rows are used.
         found.rows.clear()
         found.layouts.clear()
-        found.problems[:] = [refusal.problem(label)]
+        found.problems[:] = [replace(refusal.problem, file=label)]
     found.notes[:] = [f"{label}: {note}" for note in found.notes]
-    return _FileResult(FileRead(label, kind, digest, len(found.rows)), found)
+    return FileRead(label, kind, digest, len(found.rows)), found
 
 
 def load_bytes(source: Source) -> bytes:
@@ -340,12 +335,12 @@ def _no_header(candidate: _Candidate) -> FileRefusedError:
     )
 
 
-def _finish(results: Sequence[_FileResult]) -> ReadResult:
+def _finish(results: Sequence[_Found]) -> ReadResult:
     """Join the files, compare the rows with each other, and put the problems in order."""
-    rows = [row for result in results for row in result.found.rows]
-    layouts = tuple(layout for result in results for layout in result.found.layouts)
-    problems = [p for result in results for p in result.found.problems]
-    contents = {source: content for result in results for source, content in result.found.invalid_content.items()}
+    rows = [row for _, found in results for row in found.rows]
+    layouts = tuple(layout for _, found in results for layout in found.layouts)
+    problems = [p for _, found in results for p in found.problems]
+    contents = {source: content for _, found in results for source, content in found.invalid_content.items()}
     problems += settle_duplicates(rows, layouts, contents)
     for place, warnings in history_warnings(rows).items():
         rows[place] = replace(rows[place], warnings=(*rows[place].warnings, *warnings))
@@ -354,17 +349,17 @@ def _finish(results: Sequence[_FileResult]) -> ReadResult:
     return ReadResult(
         tuple(rows),
         tuple(problems),
-        tuple(note for result in results for note in result.found.notes),
+        tuple(note for _, found in results for note in found.notes),
         layouts,
-        tuple(result.file for result in results),
+        tuple(file for file, _ in results),
     )
 
 
-def _places(results: Sequence[_FileResult]) -> Callable[[Problem], tuple[int, int, int]]:
-    files = {result.file.name: i for i, result in enumerate(reversed(results))}
+def _places(results: Sequence[_Found]) -> Callable[[Problem], tuple[int, int, int]]:
+    files = {file.name: i for i, (file, _) in enumerate(reversed(results))}
     sheets: dict[tuple[str | None, str | None], int] = {}
-    for result in results:
-        for layout in result.found.layouts:
+    for _, found in results:
+        for layout in found.layouts:
             sheets.setdefault((layout.file, layout.sheet), len(sheets))
 
     def key(problem: Problem) -> tuple[int, int, int]:

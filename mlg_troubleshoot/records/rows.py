@@ -208,7 +208,8 @@ class RowReader:
 
     def faulty(self, row: int, cells: Sequence[Cell], why: FileRefusedError) -> InvalidRow:
         """Refuse a row that could not be taken apart."""
-        return self._refused_row(row, cells, None, why.code, why.found, why.expected, why.remedy)
+        told = why.problem
+        return self._refused_row(row, cells, None, told.code, str(why), told.expected, told.remedy)
 
     def _refused_row(
         self, row: int, cells: Sequence[Cell], record_id: str | None, code: str, found: str, expected: str, remedy: str

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -149,7 +150,7 @@ def read_survey(path: Path, linkage: SurveyedLinkage) -> tuple[tuple[Reading, ..
             "Use the file that 'mlg gear survey template' writes.",
         )
     except FileRefusedError as refusal:
-        return (), (refusal.problem(label),), ""
+        return (), (replace(refusal.problem, file=label),), ""
 
 
 def _names(cells: Sequence[Cell]) -> list[str]:

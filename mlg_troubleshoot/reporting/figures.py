@@ -30,6 +30,7 @@ _CHARACTER = 0.62
 
 Anchor = Literal["start", "middle", "end"]
 Marker = Literal["circle", "square", "diamond", "triangle", "cross", "ring"]
+Style = Literal["solid", "mid", "open"]
 Place = tuple[float, float]
 
 
@@ -308,7 +309,7 @@ class Bar:
     value: float | None
     low: float | None = None
     high: float | None = None
-    style: Literal["solid", "mid", "open"] = "mid"
+    style: Style = "mid"
 
 
 def draw_bar(canvas: Canvas, bar: Bar, x: float, y: float, height: float, per_value: float) -> float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 from markupsafe import Markup
@@ -123,7 +122,7 @@ def contribution_bar(finding: JointFinding, longest_in: float, gauge_u_in: float
     else:
         canvas = Canvas(200, 14, name, lengths.full(value))
         u2 = 2.0 * gauge_u_in * finding.plunger_amplification
-        style: Literal["solid", "mid"] = "solid" if finding.over_limit else "mid"
+        style: figures.Style = "solid" if finding.over_limit else "mid"
         bar = Bar(value, max(value - u2, 0.0), value + u2, style)
     figures.draw_bar(canvas, bar, 1, 2, 10, 196 / longest_in if longest_in > 0 else 0.0)
     canvas.line(1, 0, 1, 14, colour=SOFT)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected
-from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, Outcome, RowSource, Side
+from mlg_troubleshoot.decision.inspection import EnteredClearance, Outcome, RowSource, Side
 from mlg_troubleshoot.decision.order import WORST_FIRST, latest_of_each_gear
 from mlg_troubleshoot.decision.sentences import chance_wrong_sentence
 from mlg_troubleshoot.errors import Problem
@@ -50,10 +50,9 @@ def inspection_document(
     return Document("inspection.html.j2", context, stem)
 
 
-def _identified(
-    j: Judgement, row: Any, facts: Facts, gear: Gear, provenance: ReportProvenance, lengths: Lengths
-) -> dict[str, Any]:
+def _identified(j: Judgement, gear: Gear, provenance: ReportProvenance, lengths: Lengths) -> dict[str, Any]:
     """What every report of one row has: who, the verdict with its sign, title and footer."""
+    row = j.row
     side, tail = (row.side.value if row.side else "?"), row.tail_no or "tail not known"
     record = row.record_id or "record not known"
     title = f"{tail} {side} – {j.verdict.words} – {record}"
@@ -62,10 +61,9 @@ def _identified(
         **head(title, footer, gear, provenance, lengths),
         "j": j,
         "side": side,
-        "side_words": _SIDES.get(row.side, "side not known"),
+        "side_words": "side not known" if row.side is None else _SIDES[row.side],
         "tail": tail,
         "record": record,
-        "facts_entered": facts,
         "tone": j.verdict.value.lower().replace("_", "-"),
         "warnings": list(dict.fromkeys((*j.warnings, *row.warnings))),
     }
@@ -75,15 +73,12 @@ def _inspection(a: Assessment, gear: Gear, provenance: ReportProvenance, lengths
     inspection = a.inspection
     carried = [(k.replace("_", " "), v) for k, v in inspection.carried.items() if v and k not in _MANUAL]
     in_front = [(short(label, 60), short(value, 120)) for label, value in carried[:_MOST_IN_FRONT]]
-    known = _identified(a, inspection, _entered(inspection, lengths), gear, provenance, lengths)
+    known = _identified(a, gear, provenance, lengths)
     warnings = known["warnings"]
     front = warnings if len(warnings) <= _WARNINGS_ON_FRONT else warnings[: _WARNINGS_ON_FRONT - 1]
     return {
         **known,
         "a": a,
-        "inspected": inspection.inspection_date.isoformat() if inspection.inspection_date else "not recorded",
-        "outcome": inspection.outcome.value if inspection.outcome else "not recorded",
-        "manual": " rev. ".join(v for k in _MANUAL if (v := inspection.carried.get(k))) or "not stated",
         "carried": in_front,
         "carried_in_full": carried if carried != in_front else [],
         "front_warnings": front,
@@ -109,10 +104,7 @@ def _rejected(
     r: Rejected, gear: Gear, provenance: ReportProvenance, problems: Iterable[Problem], lengths: Lengths
 ) -> dict[str, Any]:
     return {
-        **_identified(r, r.row, _entered_in(r.row.source), gear, provenance, lengths),
-        "inspected": "not recorded",
-        "outcome": "not recorded",
-        "manual": "not stated",
+        **_identified(r, gear, provenance, lengths),
         "carried": [],
         "correct": r.row.correct,
         "problems": [p for p in problems if (p.file, p.sheet, str(p.row or "")) == _place(r.row.source, "")],
@@ -121,26 +113,6 @@ def _rejected(
 
 def _place(source: RowSource, absent: str | None = None) -> tuple[str | None, str | None, str | None]:
     return source.file, source.sheet, absent if source.row is None else str(source.row)
-
-
-def _entered(inspection: Inspection, lengths: Lengths) -> Facts:
-    i = inspection
-    default = " (default)" if i.gauge_u_is_default else ""
-    found = [
-        ("Landings since overhaul", None if i.gear_landings is None else f"{i.gear_landings:g}"),
-        ("Gauge", i.gauge_id),
-        ("Temperature", None if i.temperature_c is None else f"{i.temperature_c:g}\u00a0°C"),
-        ("Hydraulic pressure", None if i.hydraulic_pressure_psi is None else f"{i.hydraulic_pressure_psi:g}\u00a0psi"),
-        ("Approach", i.approach.value.lower() if i.approach else None),
-        ("Reading uncertainty", f"{lengths.full(i.gauge_u_in, fine=1)} radial{default}"),
-        ("End float", ", ".join(f"#{n} {lengths.full(v)}" for n, v in i.axial_float_in.items()) or None),
-    ]
-    return [(label, value) for label, value in found if value] + _entered_in(i.source)
-
-
-def _entered_in(source: RowSource) -> Facts:
-    parts = [source.file, source.sheet and f"sheet {source.sheet}", source.row and f"row {source.row}"]
-    return [("Entered in", ", ".join(str(part) for part in parts if part))] if source.file else []
 
 
 def _joints(gear: Gear, a: Assessment, lengths: Lengths) -> list[dict[str, Any]]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot
+from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot, needs
 from mlg_troubleshoot.reporting.figures import INK, PALE, PAPER, RULE, SOFT, Anchor, Canvas, Place, text_width
 from mlg_troubleshoot.reporting.formats import Lengths
 
@@ -142,19 +142,7 @@ class _PlaneDrawing:
         self.mechanism: Mechanism = gear.reference.mechanism
         self.plane = plane
         self.steps = [s for s in self.mechanism.steps if self.mechanism.point(s.joint).plane == plane]
-        names = {s.joint for s in self.steps}
-        for step in self.steps:
-            match step:
-                case Dyad():
-                    names |= {step.upstream, step.downstream}
-                case Lever():
-                    names |= {step.pivot, step.follows}
-                case Slot():
-                    names |= {step.pivot, step.pin}
-                case Slider():
-                    names.add(step.upstream)
-                case Crank():
-                    names.add(step.pivot)
+        names = {name for step in self.steps for name in (step.joint, *needs(step))}
         # Points of another plane are drawn where they stand above this one.
         origin, axes = self.mechanism.frame(plane)
         self.points: dict[str, Place] = {}

@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting.figures import INK, PALE, RULE, SOFT, Axis, Bar, Canvas, Plot, Series, draw_bar
+from mlg_troubleshoot.reporting.figures import INK, PALE, RULE, SOFT, Axis, Bar, Canvas, Plot, Series, Style, draw_bar
 from mlg_troubleshoot.reporting.formats import Lengths, number
 
 Array = NDArray[np.float64]
-Style = Literal["solid", "mid", "open"]
 _POINTS = 81
 _BAR_HEIGHT = 9.0
 _GAP = 7.0

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import study_figures as drawn
 from mlg_troubleshoot.reporting.common import head
+from mlg_troubleshoot.reporting.figures import Style
 from mlg_troubleshoot.reporting.formats import ABSENT, MINUS, Lengths, joint_list
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.reporting.publish import safe_stem
-from mlg_troubleshoot.reporting.study_figures import BarSeries, Style
+from mlg_troubleshoot.reporting.study_figures import BarSeries
 from mlg_troubleshoot.studies.findings import StudyFindings
 from mlg_troubleshoot.studies.statements import Outcome
 from mlg_troubleshoot.studies.study import Directions

@@ -51,24 +51,20 @@ def reconstruct_linkage(
 
 
 def reconstruction_values(found: Reconstruction, text: str) -> dict[str, object]:
+    from mlg_troubleshoot.reporting.json_form import chosen
+
     return {
         "schema_version": 1,
         "seed": found.seed,
         "linkages_tried": found.evaluations,
-        "meets_all": found.meets_all,
-        "numbers": found.numbers,
-        "determined": found.determined,
+        **chosen(found, "meets_all", "numbers", "determined"),
         "free": found.numbers - found.determined,
         "loosest": [{"number": name, "free_part": part} for name, part in found.loosest],
         "targets": [
             {
-                "quantity": each.target.quantity,
-                "printed": each.target.printed,
+                **chosen(each.target, "quantity", "printed", "unit"),
                 "accepted": each.target.tolerance,
-                "computed": each.computed,
-                "unit": each.target.unit,
-                "holds": each.holds,
-                "binds": each.binds,
+                **chosen(each, "computed", "holds", "binds"),
             }
             for each in found.met
         ],

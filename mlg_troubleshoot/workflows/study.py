@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -160,7 +160,7 @@ def write_study_report(
 
 def study_values(findings: StudyFindings, given: GivenDataResult | None = None) -> dict[str, Any]:
     """Return the study as plain values, as the JSON contract has it; what is not known is null."""
-    from mlg_troubleshoot.reporting.json_form import plain
+    from mlg_troubleshoot.reporting.json_form import chosen, plain
 
     result, options = findings.result, findings.options
     growth = result.growth
@@ -174,30 +174,21 @@ def study_values(findings: StudyFindings, given: GivenDataResult | None = None) 
         "note": result.indices.note,
         "mean": result.indices.mean,
         "variance": result.indices.variance,
-        "first_order_plain": None if result.plain is None else result.plain.tolist(),
-        "second_order": None if result.indices.second_order is None else result.indices.second_order.tolist(),
-        "groups": [asdict(group) for group in result.groups],
+        "first_order_plain": result.plain,
+        "second_order": result.indices.second_order,
+        "groups": result.groups,
         "ensemble": [linkage.name for linkage in findings.gear.ensemble],
         "amplification": {
-            "local_stage": growth.local_stage.tolist(),
-            "max_stage": growth.max_stage.tolist(),
-            "local_plunger": growth.local_plunger.tolist(),
-            "max_plunger": growth.max_plunger.tolist(),
-            "exact_plunger": growth.exact.tolist(),
+            **chosen(growth, "local_stage", "max_stage", "local_plunger", "max_plunger"),
+            "exact_plunger": growth.exact,
         },
-        "statements": [
-            {**asdict(statement), "outcome": str(statement.outcome), "paragraph": statement.paragraph}
-            for statement in findings.statements
-        ],
+        "statements": [{**plain(statement), "paragraph": statement.paragraph} for statement in findings.statements],
         "bounds": [
             {
                 "sense": "over-travel" if found.sense > 0 else "under-travel",
-                "sequential_in": found.sequential_in,
-                "searched_in": found.searched_in,
-                "found_in": found.proved.found_in,
-                "bound_in": found.proved.bound_in,
-                "stroke_in": found.proved.stroke_in,
-                "directions_rad": found.proved.directions.tolist(),
+                **chosen(found, "sequential_in", "searched_in"),
+                **chosen(found.proved, "found_in", "bound_in", "stroke_in"),
+                "directions_rad": found.proved.directions,
             }
             for found in findings.searches
         ],
@@ -212,9 +203,7 @@ def _given_values(gear: Gear, given: GivenDataResult) -> dict[str, Any]:
     found = given.indices
     lists = (found.first_order.tolist(), found.interval.tolist(), found.rows.tolist())
     return {
-        "file": given.file,
-        "rows_read": given.rows_read,
-        "rows_used": given.rows_used,
+        **{name: getattr(given, name) for name in ("file", "rows_read", "rows_used")},
         "joints": [
             {"joint": number, "first_order": first, "first_order_interval": ends, "rows": rows}
             for number, first, ends, rows in zip(gear.joint_numbers, *lists, strict=True)
