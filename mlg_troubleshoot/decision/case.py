@@ -15,6 +15,7 @@ from mlg_troubleshoot.decision.prediction import (
     DIRECTION_SETS,
     BatchPrediction,
     Extension,
+    Prediction,
     clearances,
     predict,
     with_rows,
@@ -86,6 +87,11 @@ class Cases:
         """Clearances with something in place of those not measured. [in]"""
         return np.where(self.measured, self.clearance_in, unmeasured)
 
+    def predict(self, clearance_in: Array, measured: Mask | None = None) -> Prediction:
+        """Predict these gears with other clearances than those read. [in]"""
+        known = self.measured if measured is None else measured
+        return predict(self.gear, self.inspections, clearance_in, known, self.gauge_u_in, self.extension)
+
     def take(self, rows: NDArray[np.intp]) -> Cases:
         arrays = {
             f.name: getattr(self, f.name)[rows]
@@ -103,17 +109,12 @@ def plunger_u(inspection: Inspection) -> float:
 
 def predict_batch(cases: Cases) -> BatchPrediction:
     """Predict with unmeasured joints at 0 and at their limit, and the chance with random directions."""
-    gear, measured = cases.gear, cases.measured
     at_zero = cases.filled(0.0)
-    lower = predict(gear, cases.inspections, at_zero, measured, cases.gauge_u_in, cases.extension)
-    open_rows = np.flatnonzero(~measured.all(axis=1))
-    upper = lower
+    lower = upper = cases.predict(at_zero)
+    open_rows = np.flatnonzero(~cases.measured.all(axis=1))
     if len(open_rows):
         some = cases.take(open_rows)
-        found = predict(
-            gear, some.inspections, some.filled(gear.limits_in), some.measured, some.gauge_u_in, some.extension
-        )
-        upper = with_rows(lower, found, open_rows)
+        upper = with_rows(lower, some.predict(some.filled(cases.gear.limits_in)), open_rows)
     return BatchPrediction(lower, upper, _chance(cases, at_zero))
 
 

@@ -203,14 +203,13 @@ def _detail(
     options: AssessOptions,
 ) -> dict[str, Any]:
     """What is worked out for a gear that is looked at alone."""
-    gear, inspection, margin = cases.gear, cases.inspections[i], float(cases.margin_in[i])
     one, rng = cases.take(np.array([i])), np.random.default_rng(options.seed)
-    detail: dict[str, Any] = {"measuring": advise(gear, inspection, margin, cases.extension), "posterior": None}
+    detail: dict[str, Any] = {"measuring": advise(one)}
     if budget is not None:
         detail["confidence"] = check_probability(one, worst_in, budget, rng)
         if found in (Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE):
             detail["rigging"] = rigging_alternative(one, worst_in, budget)
-    detail["posterior"] = explain(gear, inspection, rng, residual_u_in=cases.residual_u_in)
+    detail["posterior"] = explain(one, rng)
     return detail
 
 

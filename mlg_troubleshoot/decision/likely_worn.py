@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.decision.assessment import ClearanceInterval, GroupChance, Posterior
-from mlg_troubleshoot.decision.case import plunger_u
-from mlg_troubleshoot.decision.inspection import Inspection
-from mlg_troubleshoot.decision.prediction import clearances, model_uncertainty
+from mlg_troubleshoot.decision.case import Cases
+from mlg_troubleshoot.decision.prediction import model_uncertainty
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.gear.gear import Gear
@@ -49,24 +48,16 @@ class Prior:
 DEFAULT_PRIOR = Prior()
 
 
-def explain(
-    gear: Gear,
-    inspection: Inspection,
-    rng: np.random.Generator,
-    draws: int = 32768,
-    prior: Prior = DEFAULT_PRIOR,
-    residual_u_in: float | None = None,
-) -> Posterior | None:
-    reading = inspection.measured_displacement_in
-    if reading is None:
+def explain(one: Cases, rng: np.random.Generator, draws: int = 32768, prior: Prior = DEFAULT_PRIOR) -> Posterior | None:
+    gear, reading = one.gear, float(one.mean_in[0])
+    if not np.isfinite(reading):
         return None
-    found = clearances([inspection], gear, np.full(len(gear.joints), np.nan))[0]
-    drawn, log_weight = _draw_clearances(gear, found, inspection, rng, draws, prior)
+    drawn, log_weight = _draw_clearances(one, rng, draws, prior)
     turns = rng.uniform(0.0, 2.0 * np.pi, drawn.shape)
     links = np.empty((draws, 2 * drawn.shape[1]))
     links[:, 0::2], links[:, 1::2] = drawn * np.cos(turns), drawn * np.sin(turns)
     predicted = responses(gear)[0].displacement(links)
-    u = np.hypot(model_uncertainty(predicted, residual_u_in), plunger_u(inspection))
+    u = np.hypot(model_uncertainty(predicted, one.residual_u_in), one.mean_u_in[0])
     wide = np.hypot(u, prior.other_cause_u * gear.margin.value)
     plain = np.log1p(-prior.other_cause) - np.log(u) - 0.5 * ((reading - predicted) / u) ** 2
     other = np.log(prior.other_cause) - np.log(wide) - 0.5 * ((reading - predicted) / wide) ** 2
@@ -79,18 +70,16 @@ def explain(
     return _summary(gear, drawn, worn, weight, float(by_other.sum()) / total)
 
 
-def _draw_clearances(
-    gear: Gear, found: Array, inspection: Inspection, rng: np.random.Generator, n: int, prior: Prior
-) -> tuple[Array, Array]:
+def _draw_clearances(one: Cases, rng: np.random.Generator, n: int, prior: Prior) -> tuple[Array, Array]:
     """Clearances, and the log of prior over proposal: worn joints are drawn more often than they occur. [in, 1]"""
-    limits = gear.limits_in
+    gear, found, limits = one.gear, one.clearance_in[0], one.gear.limits_in
     drawn = np.empty((n, len(found)))
     log_weight = np.zeros(n)
     for group in link_groups(gear):
         for number in group:
             j = gear.joint_numbers.index(number)
             if np.isfinite(found[j]):
-                drawn[:, j] = _reading_with_error(float(found[j]), inspection.gauge_u_of(number), rng, n)
+                drawn[:, j] = _reading_with_error(float(found[j]), float(one.gauge_u_in[0, j]), rng, n)
                 continue
             chance = prior.worn / len(group)
             often = 0.2 / len(group)

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.decision.assessment import MeasuringAdvice, ReadingWorth, Verdict
-from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.plan import minutes_to_measure
-from mlg_troubleshoot.decision.prediction import Extension, clearances, model_uncertainty, predict
+from mlg_troubleshoot.decision.prediction import model_uncertainty
 from mlg_troubleshoot.decision.second_order import Response, responses
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, verdict, zone
@@ -23,7 +23,6 @@ from mlg_troubleshoot.decision.wear_levels import (
     tabled_normal_cdf,
     uncertainty_parts,
 )
-from mlg_troubleshoot.gear.gear import Gear
 
 Array = NDArray[np.float64]
 
@@ -68,13 +67,7 @@ class Outlook:
         return enough(self.within, self.too_close)
 
 
-def outlook(
-    gear: Gear,
-    inspection: Inspection,
-    margin_in: float,
-    extension: Extension | None = None,
-    anchor: tuple[float, float] | None = None,
-) -> Outlook:
+def outlook(one: Cases, anchor: tuple[float, float] | None = None) -> Outlook:
     """Find what each reading is worth, and the chances that the gear is within its margin or too close to it.
 
     The unmeasured joints are taken by their distribution (`wear_levels`). For each joint the probability of being
@@ -82,15 +75,14 @@ def outlook(
     is the value of the reading. Where no single reading has a value, the share of the variance of the worst case takes
     its place. Distribution and expansion serve the ranking only.
     """
-    found = clearances([inspection], gear, np.full(len(gear.joints), np.nan))[0]
-    missing = np.flatnonzero(~np.isfinite(found))
+    gear, missing = one.gear, np.flatnonzero(~one.measured[0])
     numbers = [gear.joint_numbers[j] for j in missing]
     opened = frozenset(gear.joint(number).area for number in gear.joint_numbers if number not in numbers)
     minutes = [minutes_to_measure(gear, [number], opened) for number in numbers]
     linkages = responses(gear)
     if anchor is not None:
-        linkages = (linkages[0].anchored(np.nan_to_num(found), *anchor), *linkages[1:])
-    belief = _Belief.of(gear, inspection, margin_in, extension, linkages, found)
+        linkages = (linkages[0].anchored(one.filled(0.0)[0], *anchor), *linkages[1:])
+    belief = _Belief.of(one, linkages)
     drops = np.array([belief.risk_drop(int(j)) for j in missing])
     variances = np.array([belief.variance(int(j)) for j in missing])
     worth = [
@@ -121,25 +113,15 @@ class _Belief:
     residual_u_in: float | None
 
     @classmethod
-    def of(
-        cls,
-        gear: Gear,
-        inspection: Inspection,
-        margin_in: float,
-        extension: Extension | None,
-        linkages: Sequence[Response],
-        found: Array,
-    ) -> _Belief:
+    def of(cls, one: Cases, linkages: Sequence[Response]) -> _Belief:
         """Take the unmeasured joints at their mean for each level, and linearise there."""
-        limits, known = gear.limits_in, np.isfinite(found)
-        gauge_u_in = np.array(inspection.gauge_us(gear.joint_numbers))
+        limits, known, found = one.gear.limits_in, one.measured[0], one.filled(0.0)[0]
         share, variance = moments()
-        mean = np.where(known, np.nan_to_num(found), share[:, None] * limits)
-        worst, slopes, u_rest = uncertainty_parts(linkages, mean, gauge_u_in, inspection.margin_u_in)
+        mean = np.where(known, found, share[:, None] * limits)
+        worst, slopes, u_rest = uncertainty_parts(linkages, mean, one.gauge_u_in[0], float(one.margin_u_in[0]))
         spread = np.where(known, 0.0, variance[:, None] * limits**2)
-        residual = None if extension is None else extension.residual_u_in
         weight = level_weights((found / limits)[known])
-        return cls(weight, worst, slopes, mean, spread, u_rest, limits, margin_in, residual)
+        return cls(weight, worst, slopes, mean, spread, u_rest, limits, float(one.margin_in[0]), one.residual_u_in)
 
     def _chance(self, worst: Array, variance: Array, u_rest: Array | None = None) -> Array:
         """Chance of being within the margin, from the worst case expected and the variance of what is open."""
@@ -178,42 +160,40 @@ class _Belief:
         return within + float(self.weight @ (means - self.weight @ means) ** 2)
 
 
-def advise(gear: Gear, inspection: Inspection, margin_in: float, extension: Extension | None = None) -> MeasuringAdvice:
-    """Say which joint to measure next and whether one may stop.
+def advise(one: Cases) -> MeasuringAdvice:
+    """Say of one gear which joint to measure next and whether one may stop.
 
     One may stop where the verdict is the same with every unmeasured joint measured as 0 and measured at its limit:
     the worst case grows with every clearance, so nothing between can differ. A joint beyond its limit is found only
     by measuring it.
     """
-    found = clearances([inspection], gear, np.full(len(gear.joints), np.nan))[0]
-    open_joints = ~np.isfinite(found)
+    gear, open_joints = one.gear, ~one.measured[0]
     critical = np.array([joint.critical for joint in gear.joints])
-    lowest = np.where(open_joints, 0.0, found)
-    ends = np.array([lowest, np.where(open_joints, gear.limits_in, found)])
-    masks = np.array([~open_joints, np.ones(len(found), bool)])
-    rows = np.array([ends[0], ends[1], ends[0], ends[1]])
-    gauge_u_in = np.array(inspection.gauge_us(gear.joint_numbers))
-    prediction = predict(gear, [inspection] * 4, rows, masks[[0, 0, 1, 1]], np.tile(gauge_u_in, (4, 1)), extension)
-    p = prediction.probability_within(np.full(4, margin_in), np.full(4, inspection.margin_u_in))
+    ends = np.vstack([one.filled(0.0), one.filled(gear.limits_in)])
+    four = one.take(np.zeros(4, np.intp))
+    # As it is, and as if both ends had been read.
+    read = np.vstack([one.measured, one.measured, np.ones((2, len(critical)), bool)])
+    prediction = four.predict(np.vstack([ends, ends]), read)
+    p = prediction.probability_within(four.margin_in, four.margin_u_in)
     now = verdict(float(p[0]), float(p[1]), critical_missing=bool(np.any(open_joints & critical)))
     low, high = zone(float(p[2])), zone(float(p[3]))
     settled = low is high
     if not open_joints.any():
-        precise = _can_precision_settle(gear, inspection, margin_in, extension, found, now)
+        precise = _can_precision_settle(one, now)
         certain = None if now is Verdict.INCONCLUSIVE else now
         return MeasuringAdvice((), not precise, now, float(p[0]), certain, _all_measured(now, precise))
     anchor = None
     over, under = float(prediction.worst.over_in[0]), float(prediction.worst.under_in[0])
     if np.isfinite(over) and np.isfinite(under):
         anchor = (over, under)
-    ahead = outlook(gear, inspection, margin_in, extension, anchor)
+    ahead = outlook(one, anchor)
     return MeasuringAdvice(
         ahead.worth,
         stop=settled,
         verdict=low if settled else now,
         expected_within=ahead.within,
         expected=ahead.enough,
-        text=_settled(low) if settled else _text(gear, ahead, inspection),
+        text=_settled(low) if settled else _text(one, ahead),
     )
 
 
@@ -224,12 +204,12 @@ def _settled(verdict_then: Verdict) -> str:
     )
 
 
-def _text(gear: Gear, ahead: Outlook, inspection: Inspection) -> str:
+def _text(one: Cases, ahead: Outlook) -> str:
     best, within = ahead.worth[0], ahead.within
-    name = f"#{best.joint} {gear.joint(best.joint).name}"
+    name = one.gear.joint(best.joint).label
     minutes = f"about {best.minutes:.0f} min access"
     if ahead.enough is Verdict.INCONCLUSIVE:
-        plunger = "" if inspection.readings_in else " Measure the plunger displacement at mid-position."
+        plunger = "" if np.isfinite(one.mean_in[0]) else " Measure the plunger displacement at mid-position."
         return (
             "If the unmeasured joints are worn like the measured ones, measuring them will hardly settle it: too close "
             f"to the margin (chance {percent(ahead.too_close)}).{plunger} The joint that tells most is {name} "
@@ -259,16 +239,13 @@ def _all_measured(now: Verdict, precise: bool) -> str:
     )
 
 
-def _can_precision_settle(
-    gear: Gear, inspection: Inspection, margin_in: float, extension: Extension | None, found: Array, now: Verdict
-) -> bool:
+def _can_precision_settle(one: Cases, now: Verdict) -> bool:
     """True if exact readings, within two standard uncertainties of these ones, could leave INCONCLUSIVE."""
     if now is not Verdict.INCONCLUSIVE:
         return False
-    slopes = responses(gear)[0].slopes(found)
-    gauge_u_in = np.array(inspection.gauge_us(gear.joint_numbers))
+    found, gauge_u_in, two = one.clearance_in[0], one.gauge_u_in[0], one.take(np.zeros(2, np.intp))
+    slopes = responses(one.gear)[0].slopes(found)
     step = 2.0 * gauge_u_in**2 * slopes / np.maximum(np.sqrt(np.sum((gauge_u_in * slopes) ** 2)), 1e-12)
     rows = np.maximum(np.array([found - step, found + step]), 0.0)
-    prediction = predict(gear, [inspection] * 2, rows, np.zeros((2, len(found)), bool), np.zeros(2), extension)
-    p = prediction.probability_within(np.full(2, margin_in), np.full(2, inspection.margin_u_in))
+    p = two.predict(rows, np.zeros(rows.shape, bool)).probability_within(two.margin_in, two.margin_u_in)
     return any(zone(float(value)) is not Verdict.INCONCLUSIVE for value in p)

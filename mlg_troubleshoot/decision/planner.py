@@ -18,7 +18,7 @@ from mlg_troubleshoot.decision.assessment import RepairSet, Verdict
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import InvalidRow
 from mlg_troubleshoot.decision.plan import Action, End, Plan, Step, minutes_to_measure, minutes_to_restore
-from mlg_troubleshoot.decision.prediction import BatchPrediction, model_uncertainty, predict
+from mlg_troubleshoot.decision.prediction import BatchPrediction, model_uncertainty
 from mlg_troubleshoot.decision.repair import SCORE, Search, search, subsets_of
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import verdict
@@ -307,7 +307,7 @@ def _verdicts_after_limits(cases: Cases, judged: Judged, critical: Mask) -> list
     p = []
     for unread in (np.zeros(len(new)), cases.gear.limits_in):
         after = np.where(some.over_limit, new, some.filled(unread))
-        found = predict(cases.gear, some.inspections, after, some.measured, some.gauge_u_in, some.extension)
+        found = some.predict(after)
         p.append(found.probability_within(some.margin_in, some.margin_u_in))
     missing: Mask = np.any(~some.measured & critical, axis=1)
     for k, row in enumerate(rows):

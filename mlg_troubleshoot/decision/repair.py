@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mlg_troubleshoot.decision.assessment import RepairSet
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.plan import minutes_to_measure, minutes_to_restore
-from mlg_troubleshoot.decision.prediction import Prediction, model_uncertainty, predict
+from mlg_troubleshoot.decision.prediction import Prediction, model_uncertainty
 from mlg_troubleshoot.decision.second_order import Response, responses
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.gear.gear import Gear
@@ -192,7 +192,7 @@ def _restored(cases: Cases, rows: NDArray[np.intp], places: NDArray[np.intp]) ->
     some = cases.take(rows)
     now = some.filled(cases.gear.limits_in)
     after = np.where(subsets_of(cases.gear).members[places], np.minimum(now, new), now)
-    found = predict(cases.gear, some.inspections, after, some.measured, some.gauge_u_in, some.extension)
+    found = some.predict(after)
     return found, found.probability_within(some.margin_in, some.margin_u_in)
 
 

@@ -166,11 +166,7 @@ def _sequence(gear: Gear, a: Assessment, lengths: Lengths) -> Facts:
     for name, value in places:
         sentence = gear.cycle.symptom(value, a.margin_in)
         said.setdefault(sentence, []).append(f"{name} {lengths.full(value, True)}")
-    return [(_capital(" and ".join(names)), lengths.said(sentence)) for sentence, names in said.items()]
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
+    return [(" and ".join(names), lengths.said(sentence)) for sentence, names in said.items()]
 
 
 def batch_document(

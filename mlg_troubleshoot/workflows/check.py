@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, MeasuringAdvice, Verdict
+from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, Side
 from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
 from mlg_troubleshoot.decision.next_joint import advise
@@ -233,12 +234,9 @@ def predict(clearance_in: Mapping[int, float] | ArrayLike, gear: Gear | str | Pa
     return worst_case(known.model, rows)
 
 
-def next_joint(
-    gear: Gear, measured: Mapping[int, float], margin_in: float | None = None, extension: Extension | None = None
-) -> MeasuringAdvice:
+def next_joint(gear: Gear, measured: Mapping[int, float]) -> MeasuringAdvice:
     """Say which joint's reading is worth most next, and whether one may stop measuring."""
-    so_far = replace(trial_inspection(gear), clearance_in=dict(measured), margin_in=margin_in)
-    return advise(gear, so_far, gear.margin.value if margin_in is None else margin_in, extension)
+    return advise(Cases.of(gear, [replace(trial_inspection(gear), clearance_in=dict(measured))]))
 
 
 def before_and_after(judgements: Sequence[Judgement]) -> tuple[Assessment, Assessment] | None:

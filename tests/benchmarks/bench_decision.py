@@ -87,7 +87,8 @@ def _explain_some(rows: Sequence[int], fleet: worn_gears.Fleet, measured: NDArra
     found = []
     for row in rows:
         read = {j + 1: float(fleet.read_in[row, j]) for j in range(10) if measured[row, j]}
-        answer = explain(gear, inspection(read, float(fleet.plunger_in[row])), np.random.default_rng(row), draws=DRAWS)
+        one = Cases.of(gear, [inspection(read, float(fleet.plunger_in[row]))])
+        answer = explain(one, np.random.default_rng(row), draws=DRAWS)
         assert answer is not None
         true = fleet.true_in[row]
         inside = [i.low_in <= true[i.joint - 1] <= i.high_in for i in answer.intervals]
@@ -194,7 +195,7 @@ def _verdicts(gear: Gear, read: Array, measured: NDArray[np.bool_]) -> list[Verd
 def _expected(gear: Gear, read: Array, measured: NDArray[np.bool_]) -> Verdict | None:
     """Which verdict the distribution that ranks readings is enough for."""
     so_far = inspection({j + 1: float(read[j]) for j in np.flatnonzero(measured)})
-    return outlook(gear, so_far, MARGIN_IN).enough
+    return outlook(Cases.of(gear, [so_far])).enough
 
 
 Order = Callable[[Gear, Array, NDArray[np.bool_]], int]
@@ -208,7 +209,7 @@ def fixed_order(_gear: Gear, _read: Array, measured: NDArray[np.bool_]) -> int:
 def by_worth(gear: Gear, read: Array, measured: NDArray[np.bool_]) -> int:
     """The next joint by what its reading is worth per minute."""
     so_far = inspection({j + 1: float(read[j]) for j in np.flatnonzero(measured)})
-    return outlook(gear, so_far, MARGIN_IN).worth[0].joint
+    return outlook(Cases.of(gear, [so_far])).worth[0].joint
 
 
 def measure(gear: Gear, read: Array, order: Order, stop: str) -> Tally:

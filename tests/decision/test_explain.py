@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import norm
 
 from mlg_troubleshoot.decision.assessment import Posterior
+from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.judge_rows import AssessOptions
 from mlg_troubleshoot.decision.likely_worn import Prior, explain
 from mlg_troubleshoot.gear.gear import Gear
@@ -18,7 +19,10 @@ from tests.decision.conftest import Judge, every_joint, inspected
 
 def explained(gear: Gear, clearance_in: dict[int, float], reading_in: float, **more: object) -> Posterior:
     found = explain(
-        gear, inspected(clearance_in, readings_in=(reading_in,)), np.random.default_rng(2), draws=4096, **more
+        Cases.of(gear, [inspected(clearance_in, readings_in=(reading_in,))]),
+        np.random.default_rng(2),
+        draws=4096,
+        **more,
     )
     assert found is not None
     return found
@@ -29,7 +33,7 @@ def chance(found: Posterior, joint: int) -> float:
 
 
 def test_without_a_plunger_reading_nothing_is_explained(gear: Gear) -> None:
-    assert explain(gear, inspected({3: 0.013}), np.random.default_rng(2)) is None
+    assert explain(Cases.of(gear, [inspected({3: 0.013})]), np.random.default_rng(2)) is None
 
 
 def test_the_only_unmeasured_link_explains_a_large_displacement(gear: Gear) -> None:
@@ -89,7 +93,7 @@ def test_importance_sampling_agrees_with_drawing_from_the_prior(gear: Gear) -> N
     fleet = worn_gears.explained_fleet(40_000, np.random.default_rng(3))
     near = np.abs(fleet.plunger_in - 0.02) < 0.001
     worn = fleet.true_in[near] > worn_gears.LIMIT_IN
-    found = explain(gear, inspected({}, readings_in=(0.02,)), np.random.default_rng(2))
+    found = explain(Cases.of(gear, [inspected({}, readings_in=(0.02,))]), np.random.default_rng(2))
     assert found is not None
     for group in found.groups:
         share = worn[:, [j - 1 for j in group.joints]].any(axis=1).mean()
@@ -104,7 +108,9 @@ def test_ninety_percent_intervals_cover_the_clearances_of_a_simulated_fleet(gear
     for row in range(120):
         read = {j: float(fleet.read_in[row, j - 1]) for j in range(1, 11) if rng.random() < 0.5}
         found = explain(
-            gear, inspected(read, readings_in=(float(fleet.plunger_in[row]),)), np.random.default_rng(row), draws=2048
+            Cases.of(gear, [inspected(read, readings_in=(float(fleet.plunger_in[row]),))]),
+            np.random.default_rng(row),
+            draws=2048,
         )
         assert found is not None
         inside += [
@@ -137,18 +143,15 @@ def test_the_model_that_explains_is_uncertain_by_ten_percent_of_what_it_predicts
     u = np.hypot(np.maximum(0.003, 0.1 * np.abs(moved)), gauge_u_in)
     by_clearance = 0.95 * norm.pdf(reading_in, moved, u).mean()
     by_other = 0.05 * norm.pdf(reading_in, moved, np.hypot(u, 2.0 * 0.03)).mean()
-    found = explain(
-        gear,
-        inspected(every_joint(0.0, j1=0.03), readings_in=(reading_in,), gauge_u_in=1e-5),
-        np.random.default_rng(2),
-    )
+    one = inspected(every_joint(0.0, j1=0.03), readings_in=(reading_in,), gauge_u_in=1e-5)
+    found = explain(Cases.of(gear, [one]), np.random.default_rng(2))
     assert found is not None
     assert found.not_clearance == pytest.approx(by_other / (by_clearance + by_other), abs=0.02)
 
 
 def test_a_coarse_reading_of_one_joint_leaves_its_clearance_open(gear: Gear) -> None:
     read = inspected(every_joint(0.004), readings_in=(0.02,), gauge_u_by_joint_in={5: 0.002})
-    found = explain(gear, read, np.random.default_rng(1))
+    found = explain(Cases.of(gear, [read]), np.random.default_rng(1))
     assert found is not None
     width = {each.joint: each.high_in - each.low_in for each in found.intervals}
     assert width[5] > 2.0 * width[3]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Assessment, MeasuringAdvice, Verdict
+from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
 from mlg_troubleshoot.decision.next_joint import (
     COST_OF_WRONG_WITHIN,
@@ -38,7 +39,7 @@ MARGIN_IN = 0.03
 
 
 def advised(gear: Gear, clearance_in: dict[int, float], margin_in: float = MARGIN_IN) -> MeasuringAdvice:
-    return advise(gear, inspected(clearance_in), margin_in)
+    return advise(Cases.of(gear, [inspected(clearance_in, margin_in=margin_in)]))
 
 
 def test_the_second_order_worst_case_is_within_one_percent_up_to_the_limit(gear: Gear) -> None:
@@ -115,7 +116,7 @@ def test_the_table_of_the_normal_distribution_is_exact_to_a_millionth() -> None:
 def test_the_chance_of_being_within_agrees_with_drawing_gears(gear: Gear) -> None:
     # Gears drawn level by level, each judged by the exact prediction.
     measured = {3: 0.003, 5: 0.003}
-    within = outlook(gear, inspected(measured), MARGIN_IN).within
+    within = outlook(Cases.of(gear, [inspected(measured)])).within
     rng = np.random.default_rng(9)
     shares = quantiles(400)
     weights = level_weights(np.array([0.003, 0.003]) / 0.0075)
@@ -138,12 +139,12 @@ def test_an_area_that_is_open_costs_no_minutes_again(gear: Gear) -> None:
 
 
 def test_missing_critical_joints_stand_before_all_others(gear: Gear) -> None:
-    worth = outlook(gear, inspected({3: 0.001, 9: 0.001}), MARGIN_IN).worth
+    worth = outlook(Cases.of(gear, [inspected({3: 0.001, 9: 0.001})])).worth
     assert {w.joint for w in worth[:4]} == {1, 2, 4, 5}
 
 
 def test_the_next_joint_is_worth_most_per_minute_of_access(gear: Gear) -> None:
-    worth = [w for w in outlook(gear, inspected({9: 0.0005}), MARGIN_IN).worth if w.critical]
+    worth = [w for w in outlook(Cases.of(gear, [inspected({9: 0.0005})])).worth if w.critical]
     assert worth[0].risk_drop > 0.0
     assert worth[0].risk_drop / worth[0].minutes == max(w.risk_drop / w.minutes for w in worth)
     # The variance alone would choose another joint.
@@ -152,27 +153,27 @@ def test_the_next_joint_is_worth_most_per_minute_of_access(gear: Gear) -> None:
 
 def test_a_reading_that_is_worth_more_may_still_come_later_because_of_its_access(gear: Gear) -> None:
     critical = dict.fromkeys(range(1, 6), 0.0015)
-    worth = {w.joint: w for w in outlook(gear, inspected(critical), MARGIN_IN).worth}
+    worth = {w.joint: w for w in outlook(Cases.of(gear, [inspected(critical)])).worth}
     assert worth[8].risk_drop > worth[6].risk_drop
     assert list(worth).index(6) < list(worth).index(8)
 
 
 def test_where_no_single_reading_has_a_value_the_variance_per_minute_decides(gear: Gear) -> None:
     # Two badly worn ends: no single reading can make WITHIN the better answer again.
-    worth = [w for w in outlook(gear, inspected({3: 0.0074, 5: 0.0074}), MARGIN_IN).worth if w.critical]
+    worth = [w for w in outlook(Cases.of(gear, [inspected({3: 0.0074, 5: 0.0074})])).worth if w.critical]
     assert {w.risk_drop for w in worth} == {0.0}
     assert worth[0].variance_in2 / worth[0].minutes == max(w.variance_in2 / w.minutes for w in worth)
 
 
 def test_both_ends_of_one_link_are_worth_the_same(gear: Gear) -> None:
-    worth = {w.joint: w for w in outlook(gear, inspected({1: 0.001, 2: 0.001}), MARGIN_IN).worth}
+    worth = {w.joint: w for w in outlook(Cases.of(gear, [inspected({1: 0.001, 2: 0.001})])).worth}
     assert worth[3].risk_drop == pytest.approx(worth[5].risk_drop, rel=1e-3)
     assert worth[9].variance_in2 == pytest.approx(worth[10].variance_in2, rel=1e-3)
 
 
 def test_a_reading_is_never_worth_less_than_nothing(gear: Gear) -> None:
     for measured in ({}, {2: 0.002}, {2: 0.007, 4: 0.006}):
-        assert min(w.risk_drop for w in outlook(gear, inspected(measured), MARGIN_IN).worth) >= 0.0
+        assert min(w.risk_drop for w in outlook(Cases.of(gear, [inspected(measured)])).worth) >= 0.0
 
 
 def test_outside_already_one_may_stop(gear: Gear) -> None:
@@ -237,7 +238,7 @@ def test_the_chance_of_being_too_close_is_that_of_gears_drawn_from_the_same_dist
     found = predict(gear, [inspected(measured)] * 3000, clearance, np.ones((3000, 10), bool), np.full(3000, 0.0005))
     p = found.probability_within(np.full(3000, MARGIN_IN), np.zeros(3000))
     truth = np.mean((p > 0.05) & (p < 0.95))
-    assert outlook(gear, inspected(measured), MARGIN_IN).too_close == pytest.approx(truth, abs=0.05)
+    assert outlook(Cases.of(gear, [inspected(measured)])).too_close == pytest.approx(truth, abs=0.05)
 
 
 def test_a_gear_that_no_further_joint_will_settle_is_told_to_measure_the_plunger(gear: Gear) -> None:
@@ -248,7 +249,7 @@ def test_a_gear_that_no_further_joint_will_settle_is_told_to_measure_the_plunger
 
 def test_a_plunger_that_was_measured_is_not_asked_for_again(gear: Gear) -> None:
     read = replace(inspected(dict.fromkeys(range(1, 6), 0.0022)), readings_in=(0.02,))
-    assert "Measure the plunger" not in advise(gear, read, MARGIN_IN).text
+    assert "Measure the plunger" not in advise(Cases.of(gear, [read])).text
 
 
 def test_an_expectation_never_becomes_a_verdict(judge: Judge) -> None:
@@ -256,7 +257,7 @@ def test_an_expectation_never_becomes_a_verdict(judge: Judge) -> None:
 
 
 def test_an_inconclusive_gear_that_precision_cannot_settle_is_told_so(gear: Gear) -> None:
-    found = advise(gear, inspected(every_joint(0.0021), gauge_u_in=0.0001), MARGIN_IN)
+    found = advise(Cases.of(gear, [inspected(every_joint(0.0021), gauge_u_in=0.0001)]))
     assert (found.stop, found.verdict) == (True, Verdict.INCONCLUSIVE)
     assert "do not settle it" in found.text
 
@@ -278,7 +279,7 @@ def test_with_advice_the_next_action_is_the_same(judge: Judge) -> None:
 
 def test_a_critical_joint_is_next_even_where_another_would_tell_more(gear: Gear) -> None:
     joints = tuple(replace(joint, critical=joint.number == 9) for joint in gear.joints)
-    worth = outlook(replace(gear, joints=joints), inspected({}), MARGIN_IN).worth
+    worth = outlook(Cases.of(replace(gear, joints=joints), [inspected({})])).worth
     assert worth[0].joint == 9
     assert worth[0].variance_in2 / worth[0].minutes < worth[1].variance_in2 / worth[1].minutes
 
@@ -287,10 +288,10 @@ def test_the_advice_knows_the_own_uncertainty_of_a_joint(gear: Gear, table: Inde
     read = inspected(every_joint(0.0015), gauge_u_by_joint_in={5: 0.004})
     (judged,) = assess([read], gear, table)
     assert isinstance(judged, Assessment)
-    assert advise(gear, read, MARGIN_IN).expected_within == pytest.approx(judged.probability_within_margin, abs=1e-12)
+    assert advise(Cases.of(gear, [read])).expected_within == pytest.approx(judged.probability_within_margin, abs=1e-12)
 
 
 def test_a_coarse_reading_leaves_more_levels_of_displacement_open(gear: Gear) -> None:
     measured = {3: 0.004, 5: 0.004}
-    fine, coarse = (outlook(gear, inspected(measured, gauge_u_by_joint_in={5: u}), MARGIN_IN) for u in (0.0005, 0.01))
+    fine, coarse = (outlook(Cases.of(gear, [inspected(measured, gauge_u_by_joint_in={5: u})])) for u in (0.0005, 0.01))
     assert abs(coarse.within - 0.5) < abs(fine.within - 0.5)

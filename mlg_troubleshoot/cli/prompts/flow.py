@@ -173,21 +173,8 @@ class Flow:
             return self._back(state)
         if word == "?":
             return Turn(state, self._help(state))
-        taken: dict[Ask, Callable[[State, str], Turn]] = {
-            Ask.TAIL: self._tail,
-            Ask.SIDE: self._side,
-            Ask.UNIT: self._unit,
-            Ask.CONVENTION: self._convention,
-            Ask.OFFER: self._offer,
-            Ask.REREAD: self._reread,
-            Ask.JOINT: self._joint,
-            Ask.CONFIRM: self._confirm,
-            Ask.MORE: self._more,
-            Ask.CONFIRM_MORE: self._confirm_more,
-            Ask.DETAIL: self._detail,
-            Ask.REVIEW: self._review,
-        }
-        turn = taken[state.ask](state, typed)
+        take, _ = _QUESTIONS[state.ask]
+        turn = take(self, state, typed)
         here, passing = (state.ask, state.at), (Ask.OFFER, Ask.REREAD, Ask.CONFIRM, Ask.CONFIRM_MORE)
         moved = (turn.state.ask, turn.state.at) != here and state.ask not in passing
         return replace(turn, state=replace(turn.state, trail=(*state.trail, here) if moved else state.trail))
@@ -195,19 +182,7 @@ class Flow:
     def _help(self, state: State) -> tuple[Line, ...]:
         if state.ask in (Ask.JOINT, Ask.CONFIRM):
             return pages.joint_help(self.gear, state.answers, state.joint)
-        shown = {
-            Ask.TAIL: pages.TAIL_HELP,
-            Ask.SIDE: pages.SIDE_HELP,
-            Ask.UNIT: pages.UNIT_HELP,
-            Ask.CONVENTION: pages.CONVENTION_HELP,
-            Ask.OFFER: pages.OFFER_HELP,
-            Ask.REREAD: pages.REREAD_HELP,
-            Ask.MORE: pages.MORE_HELP,
-            Ask.CONFIRM_MORE: pages.MORE_HELP,
-            Ask.DETAIL: pages.DETAIL_HELP,
-            Ask.REVIEW: pages.REVIEW_HELP,
-        }
-        return shown[state.ask]
+        return _QUESTIONS[state.ask][1]
 
     def _tail(self, state: State, typed: str) -> Turn:
         answers = state.answers
@@ -554,3 +529,20 @@ def _not_taken(typed: str, remedy: str) -> str:
 def _unconfirmed(answers: Answers) -> Answers:
     joints = {number: replace(answer, confirmed=False) for number, answer in answers.joints.items()}
     return replace(answers, joints=MappingProxyType(joints))
+
+
+# What takes the answer to a question, and its help; that of a joint is the joint's own.
+_QUESTIONS: dict[Ask, tuple[Callable[[Flow, State, str], Turn], tuple[Line, ...]]] = {
+    Ask.TAIL: (Flow._tail, pages.TAIL_HELP),
+    Ask.SIDE: (Flow._side, pages.SIDE_HELP),
+    Ask.UNIT: (Flow._unit, pages.UNIT_HELP),
+    Ask.CONVENTION: (Flow._convention, pages.CONVENTION_HELP),
+    Ask.OFFER: (Flow._offer, pages.OFFER_HELP),
+    Ask.REREAD: (Flow._reread, pages.REREAD_HELP),
+    Ask.JOINT: (Flow._joint, ()),
+    Ask.CONFIRM: (Flow._confirm, ()),
+    Ask.MORE: (Flow._more, pages.MORE_HELP),
+    Ask.CONFIRM_MORE: (Flow._confirm_more, pages.MORE_HELP),
+    Ask.DETAIL: (Flow._detail, pages.DETAIL_HELP),
+    Ask.REVIEW: (Flow._review, pages.REVIEW_HELP),
+}
