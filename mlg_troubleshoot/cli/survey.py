@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,18 +13,23 @@ from mlg_troubleshoot.errors import OutputError, UsageError
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.studies.survey_result import SurveyResult
+    from mlg_troubleshoot.units import LengthUnit
 
 EPILOG = (
     "Example: [b]mlg gear survey template survey.xlsx[/b] · "
-    "filled in: [b]mlg gear survey survey.xlsx --write my-gear.toml[/b]"
+    "filled in: [b]mlg gear survey survey.xlsx --write my-gear.toml[/b] · "
+    "asked for at the line: [b]mlg gear survey ask survey.csv[/b]"
 )
 
 
 def survey(
     context: typer.Context,
-    file: Annotated[str, typer.Argument(metavar="FILE|template", help="Filled-in survey, or the word template.")],
+    file: Annotated[
+        str, typer.Argument(metavar="FILE|template|ask", help="Filled-in survey, or the word template or ask.")
+    ],
     template: Annotated[
-        Path | None, typer.Argument(metavar="[FILE.csv|FILE.xlsx]", help="Template to write, after the word template.")
+        Path | None,
+        typer.Argument(metavar="[FILE.csv|FILE.xlsx]", help="Template to write; after ask: where answers are kept."),
     ] = None,
     write: Annotated[
         Path | None, typer.Option("--write", metavar="GEAR.toml", help="Write the surveyed gear, ensemble and table.")
@@ -45,6 +51,7 @@ def survey(
 
     Exit codes: 0 fits · 1 something does not fit · 3 nothing follows from the table.
     """
+    from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.workflows import survey as task
 
@@ -59,10 +66,15 @@ def survey(
             f"Written: {template}. Fill in what you read, then: mlg gear survey {template} --write my-gear.toml"
         )
         return
-    if template is not None:
+    if file == "ask" and template is not None:
+        file = _asked(template, gear, shown.show)
+    elif template is not None:
         raise UsageError(f"unexpected {str(template)!r}", "Give one survey, or: mlg gear survey template FILE.csv")
     options.keep_inputs(gear, [file, inspections], [("--write", write)], report)
-    result = task.survey_gear(file, gear, write=write, inspections=inspections, seed=seed)
+    with stages(quiet=quiet) as bar:
+        result = task.survey_gear(
+            file, gear, write=write, inspections=inspections, seed=seed, told=lambda *done: bar("Fitting", *done)
+        )
     if as_json:
         output.write_json(task.survey_values(result))
     else:
@@ -71,6 +83,29 @@ def survey(
     if written is not None:
         output.say_written([written], quiet=quiet)
     raise typer.Exit(result.exit_code)
+
+
+def _asked(file: Path, gear: str, unit: LengthUnit) -> str:
+    """Ask for the readings on the terminal; the file keeps them, so that a later run goes on where this one stopped."""
+    from mlg_troubleshoot.cli.prompts import RichTerminal
+    from mlg_troubleshoot.cli.survey_prompts import ask_survey
+    from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.workflows.survey import write_survey_template
+
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        raise UsageError("this is not a terminal to ask on", "Fill in a template: mlg gear survey template FILE.csv")
+    options.keep_inputs(gear, (), [("the survey", file)])
+    if not file.exists():
+        write_survey_template(file, gear, unit)
+    again = f"Kept: {file}. Go on: mlg gear survey ask {file}"
+    try:
+        if ask_survey(file, load_gear(gear), RichTerminal()):
+            return str(file)
+    except (EOFError, KeyboardInterrupt):
+        output.say(again)
+        raise KeyboardInterrupt from None
+    output.say(again)
+    raise typer.Exit
 
 
 def _show(result: SurveyResult, console: output.DataConsole) -> None:

@@ -9,6 +9,7 @@ draw of the prior and of the readings' errors, fitted anew by a few steps (Olive
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -39,6 +40,8 @@ _REHEATED, _AGAIN, _REHEAT_STEPS, _BESIDE = (10.0, 3.0), 12, 4, 0.03
 # over the one at no error. Without a limit one large slip would cost more than a wrong linkage with small ones.
 _SLIP = 23.0
 _FREEDOM, _ATTEMPTS, _TRUSTED = 4.0, 2, 6.0
+# Of a fit: each attempt, what does not fit, the modes, the draws.
+_STAGES = _ATTEMPTS + 3
 # The greatest of forty clean residuals exceeds 3.9 in 0.4 % of surveys, in about 1 % where the fit bends.
 MISFIT = 3.9
 # Two readings contradict each other, neither of them alone is wrong, if leaving out one or the other fits alike.
@@ -185,7 +188,7 @@ class Prior:
         return found[self.linkage.closes(found)][:n]
 
 
-class _Fitting:
+class Fitting:
     """The readings of one survey against one prior."""
 
     def __init__(self, linkage: SurveyedLinkage, prior: Prior, readings: tuple[Reading, ...]) -> None:
@@ -256,7 +259,7 @@ class _Fitting:
         still = tuple(r for r in self.readings if r.extension is None and r.kind is not Kind.PLUNGER)
         starts = points
         if len(still) > 2:
-            standing = _Fitting(self.linkage, self.prior, still)
+            standing = Fitting(self.linkage, self.prior, still)
             for widened in _WIDENED:
                 points, _ = standing.descend(points, everything[: len(still)], widened, _STEPS, True, starts)
             # Of the linkages that stand right, those that also move are the ones to go on with.
@@ -504,17 +507,24 @@ def _robust(r: Array) -> tuple[Array, Array]:
     return loss + 2.0 * np.log(sound), sound * (_FREEDOM + 1.0) / (_FREEDOM + r * r)
 
 
-def fit(gear: Gear, readings: tuple[Reading, ...], rng: Generator) -> Survey:
-    """Find the linkages that fit the readings, what does not fit, and draws from the posterior."""
+def fit(
+    gear: Gear, readings: tuple[Reading, ...], rng: Generator, told: Callable[[int, int], None] = lambda *_: None
+) -> Survey:
+    """Find the linkages that fit the readings, what does not fit, and draws from the posterior.
+
+    told: called with the stages that are done and how many there are.
+    """
+    told(0, _STAGES)
     linkage = SurveyedLinkage(gear)
     prior = Prior(linkage)
     if linkage.travel is not None:
         readings = (*readings, Reading(Kind.TRAVEL, value=linkage.travel, u=DEFAULT_U[Kind.TRAVEL]))
-    fitting = _Fitting(linkage, prior, readings)
+    fitting = Fitting(linkage, prior, readings)
     points = prior.members[:0]
-    for _ in range(_ATTEMPTS):
+    for attempt in range(_ATTEMPTS):
         reached, loss = fitting.robust(np.concatenate([prior.members, prior.closing(_AROUND, rng, readings)]))
         points, loss = fitting.reheated(np.concatenate([points[:_KEPT], reached[np.argsort(loss)][:_KEPT]]), rng)
+        told(attempt + 1, _STAGES)
         kept = np.abs(fitting.residuals(points[:1])[0]) < _TRUSTED
         # What does not fit is a slip or another valley.
         if kept.all():
@@ -534,8 +544,12 @@ def fit(gear: Gear, readings: tuple[Reading, ...], rng: Generator) -> Survey:
             "no linkage of this type has these dimensions: none of the starts can be assembled with them",
             "Check the units and the points of the readings.",
         )
+    told(_STAGES - 2, _STAGES)
     misfits, kept = fitting.misfits(modes[0], kept)
     vectors, means = (np.array([getattr(m, part) for m in modes]) for part in ("vector", "mean"))
     modes = fitting.modes(vectors, means, kept) or modes
     modes = fitting.with_mirrored(modes, kept)
-    return Survey(linkage, readings, misfits, modes, fitting.draws(modes, kept, rng))
+    told(_STAGES - 1, _STAGES)
+    draws = fitting.draws(modes, kept, rng)
+    told(_STAGES, _STAGES)
+    return Survey(linkage, readings, misfits, modes, draws)

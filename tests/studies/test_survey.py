@@ -12,7 +12,7 @@ import pytest
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.studies.survey import Survey, fit
+from mlg_troubleshoot.studies.survey import Fitting, Prior, Survey, fit
 from mlg_troubleshoot.studies.survey_plan import planned, suggested
 from mlg_troubleshoot.studies.survey_readings import Kind, Reading, SurveyedLinkage
 
@@ -88,6 +88,14 @@ def test_the_posterior_of_the_four_bar_is_the_closed_forms_propagated_uncertaint
     wanted = np.array([(index_of(numbers + h) - index_of(numbers - h)) / 2e-6 for h in steps])
     expected = float(np.sqrt(wanted @ np.linalg.inv(slopes.T @ slopes) @ wanted))
     assert float(np.std(braced.linkage.amplification(braced.draws)[:, 1])) == pytest.approx(expected, rel=0.15)
+
+
+def test_a_fit_tells_how_far_it_is(four_bar: Gear) -> None:
+    told: list[tuple[int, int]] = []
+    fit(four_bar, readings_of(LENGTHS, 2e-3), np.random.default_rng(0), lambda *done: told.append(done))
+    assert told == sorted(told)
+    assert told[0][0] == 0
+    assert told[-1][0] == told[-1][1]
 
 
 def test_lengths_alone_leave_both_sides_of_a_joint_and_of_the_crank(four_bar: Gear) -> None:
@@ -202,6 +210,16 @@ def read(gear: Gear, truth: np.ndarray, plan: tuple[tuple[Reading, bool], ...]) 
     rows = tuple(replace(r, extension=None if r.extension is None else r.extension * reach) for r, _ in plan)
     values = linkage.predicted(rows, truth[None])[0] + rng.standard_normal(len(rows)) * [r.u for r in rows]
     return tuple(replace(r, value=float(v), row=i) for i, (r, v) in enumerate(zip(rows, values, strict=True), start=2))
+
+
+def test_a_fit_that_is_held_up_is_freed_by_fitting_again_from_around_it(gear: Gear, read: tuple[Reading, ...]) -> None:
+    linkage = SurveyedLinkage(gear)
+    prior = Prior(linkage)
+    fitting = Fitting(linkage, prior, read)
+    held_up, before = fitting.descend(prior.members[7:8], np.ones(len(read), dtype=bool), 1.0, 25, robust=True)
+    _, after = fitting.reheated(held_up, np.random.default_rng(0))
+    assert before[0] > 100.0
+    assert after[0] < 30.0
 
 
 @pytest.fixture(scope="module")
