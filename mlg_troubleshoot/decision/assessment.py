@@ -151,7 +151,12 @@ class UncertaintyBudget:
     @property
     def clearances_in(self) -> float:
         """Of all readings together. [in]"""
-        return math.sqrt(sum(u**2 for u in self.readings_in.values()))
+        return math.hypot(*self.readings_in.values())
+
+    @property
+    def combined_in(self) -> float:
+        """Of the prediction against the margin. [in]"""
+        return math.hypot(self.clearances_in, self.geometry_in, self.model_in, self.margin_in)
 
     @property
     def lines(self) -> tuple[tuple[str, float, float], ...]:
@@ -163,7 +168,7 @@ class UncertaintyBudget:
             "model": self.model_in,
             "margin": self.margin_in,
         }
-        variance = sum(u**2 for u in parts.values()) or 1.0
+        variance = self.combined_in**2 or 1.0
         return tuple((name, u, u**2 / variance) for name, u in parts.items())
 
 

@@ -34,8 +34,7 @@ from mlg_troubleshoot.decision.prediction import (
     Prediction,
 )
 from mlg_troubleshoot.decision.ranking import rank_joints
-from mlg_troubleshoot.decision.repair import calibrated, repair_sets, search
-from mlg_troubleshoot.decision.rigging import rigging_alternative
+from mlg_troubleshoot.decision.repair import calibrated, repair_sets, rigging_alternative, search
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import verdict
 from mlg_troubleshoot.gear.gear import Gear
@@ -60,7 +59,7 @@ def assess(
     gear: Gear,
     table: IndexTable,
     options: AssessOptions | None = None,
-    progress: Callable[[int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> tuple[Judgement, ...]:
     options = options or AssessOptions()
     judged: list[Judgement] = []
@@ -74,7 +73,7 @@ def assess(
             else:
                 judged.append(Rejected(row, correct(row), row.warnings))
         if progress is not None:
-            progress(len(part))
+            progress(len(judged), len(rows))
     return tuple(judged)
 
 

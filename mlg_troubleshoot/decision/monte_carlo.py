@@ -36,8 +36,7 @@ def check_probability(
     curved = normal_cdf((margin_in - response.magnitude(start + errors)) / u_rest)
     linear = normal_cdf((margin_in - centre - errors @ slopes) / u_rest)
     known = float(normal_cdf(np.array((margin_in - centre) / np.hypot(u_rest, u_readings))))
-    total = np.hypot(u_rest, budget.clearances_in)
-    analytic = float(normal_cdf(np.array((margin_in - centre) / total)))
+    analytic = float(normal_cdf(np.array((margin_in - centre) / budget.combined_in)))
     # Draws in pairs of opposite errors: one pair is one independent value.
     difference = (curved - linear).reshape(2, -1).mean(axis=0)
     error = float(difference.std(ddof=1) / np.sqrt(len(difference)))

@@ -1,4 +1,4 @@
-"""Which joints to restore: all subsets of all gears as one array, the chosen ones checked by the exact worst case."""
+"""What to restore: all subsets of all gears as one array, the best checked exactly; and what re-rigging would do."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from mlg_troubleshoot.decision.assessment import RepairSet
-from mlg_troubleshoot.decision.case import Cases
+from mlg_troubleshoot.decision.assessment import RepairSet, Rigging, UncertaintyBudget
+from mlg_troubleshoot.decision.case import Cases, exact_chance
 from mlg_troubleshoot.decision.plan import minutes_to_measure, minutes_to_restore
 from mlg_troubleshoot.decision.prediction import Prediction, model_uncertainty
 from mlg_troubleshoot.decision.second_order import Response, responses
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
+from mlg_troubleshoot.decision.wear_levels import normal_cdf
 from mlg_troubleshoot.gear.gear import Gear
 
 Array = NDArray[np.float64]
@@ -232,3 +233,16 @@ def _least(table: Subsets, slack_in: Array) -> Sequence[NDArray[np.intp]]:
         # Whatever holds the set just chosen is longer: it holds as many of its joints as it has.
         open_sets &= members[best] @ members.T < members[best].sum(axis=1, keepdims=True)
     return [np.array(places, dtype=np.intp) for places in chosen]
+
+
+def rigging_alternative(one: Cases, worst_in: tuple[float, float], budget: UncertaintyBudget) -> Rigging:
+    """Shift the plunger so that the worst cases of both senses are equally far.
+
+    Re-rigging moves the range of the plunger and cannot narrow it: what remains is half the distance between both
+    worst cases. The uncertainties of the decision rule stay as they are.
+    """
+    over, under = worst_in
+    shift, left = -0.5 * (over + under), 0.5 * (over - under)
+    chance = exact_chance(one, one.filled(0.0), shift)
+    within = float(normal_cdf((one.margin_in - left) / budget.combined_in)[0])
+    return Rigging(shift, left, within, float(chance[0]))

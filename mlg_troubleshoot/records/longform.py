@@ -63,11 +63,8 @@ class LongReader:
         key = show(record).strip()
         group = self._groups.get(key) if key else None
         if group is None:
-            group = _Group(
-                row,
-                [*filled, *[None] * (self._width - width)],
-                [(row, f"{column_letters(i)}{row}") for i in range(self._width)],
-            )
+            places = [(row, f"{column_letters(i)}{row}") for i in range(self._width)]
+            group = _Group(row, [*filled, *[None] * (self._width - width)], places)
             for p in self._own():
                 group.cells[p.index] = None
             if key:
@@ -94,15 +91,9 @@ class LongReader:
                 group.cells[p.index] = here
                 group.places[p.index] = (row, f"{column_letters(p.index)}{row}")
             elif p.field is not None:
-                self._fault(
-                    group,
-                    p,
-                    row,
-                    here,
-                    "record_contradicts",
-                    f"{show(there)}, as in cell {group.places[p.index][1]}",
-                    "All rows of one record must agree. Correct one of them, or the record id.",
-                )
+                expected = f"{show(there)}, as in cell {group.places[p.index][1]}"
+                remedy = "All rows of one record must agree. Correct one of them, or the record id."
+                self._fault(group, (p, row, here), "record_contradicts", expected, remedy)
 
     def _take_reading(self, group: _Group, row: int, filled: Sequence[Cell]) -> None:
         if self._joint is None:
@@ -114,15 +105,9 @@ class LongReader:
         joint = self._joint_number(cell)
         if joint is None:
             joints = self._table.options.joint_numbers
-            self._fault(
-                group,
-                self._joint,
-                row,
-                cell,
-                "joint_unknown" if cell is not None else "joint_missing",
-                f"a joint number from {min(joints)} to {max(joints)}",
-                "Enter the joint's number.",
-            )
+            code = "joint_missing" if cell is None else "joint_unknown"
+            expected = f"a joint number from {min(joints)} to {max(joints)}"
+            self._fault(group, (self._joint, row, cell), code, expected, "Enter the joint's number.")
             return
         for p, reading in readings:
             slot = self._slots[p.index, joint]
@@ -134,15 +119,9 @@ class LongReader:
             elif first == reading:
                 group.warnings.append(f"joint {joint} is given twice with the same reading (row {row})")
             else:
-                self._fault(
-                    group,
-                    p,
-                    row,
-                    reading,
-                    "joint_twice",
-                    f"one reading of joint {joint}; cell {group.places[slot][1]} says {show(first)}",
-                    "Keep the right one, or correct the joint number.",
-                )
+                expected = f"one reading of joint {joint}; cell {group.places[slot][1]} says {show(first)}"
+                remedy = "Keep the right one, or correct the joint number."
+                self._fault(group, (p, row, reading), "joint_twice", expected, remedy)
 
     def _joint_number(self, cell: Cell) -> int | None:
         if cell is None or isinstance(cell, OddCell):
@@ -156,8 +135,9 @@ class LongReader:
         return number if number in self._table.options.joint_numbers else None
 
     def _fault(
-        self, group: _Group, p: PlacedField, row: int, cell: Cell, code: str, expected: str, remedy: str
+        self, group: _Group, place: tuple[PlacedField, int, Cell], code: str, expected: str, remedy: str
     ) -> None:
+        p, row, cell = place
         if p.header not in group.bad:
             group.bad.append(p.header)
         found = None if cell is None else quote(cell)

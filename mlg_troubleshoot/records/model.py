@@ -44,6 +44,28 @@ class TableOptions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TableResult:
+    """What a task tells of the tables that it read.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    problems : tuple of Problem
+        What is wrong with the input.
+    notes : tuple of str
+        Notes on the input as a whole.
+    inputs_sha256 : mapping of str to str
+        Hash of each input file by name.
+    """
+
+    gear: Gear
+    problems: tuple[Problem, ...] = ()
+    notes: tuple[str, ...] = ()
+    inputs_sha256: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ReadOptions(TableOptions):
     """What is declared about tables, and what the gear says of the values in them.
 
@@ -148,6 +170,11 @@ class ReadResult:
     notes: tuple[str, ...] = ()
     layouts: tuple[SheetLayout, ...] = ()
     files: tuple[FileRead, ...] = ()
+
+    @property
+    def inputs_sha256(self) -> dict[str, str]:
+        """Hash of each file that could be opened, by its name."""
+        return {file.name: file.sha256 for file in self.files if file.sha256 is not None}
 
     @property
     def inspections(self) -> tuple[Inspection, ...]:

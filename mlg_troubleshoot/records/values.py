@@ -43,29 +43,28 @@ _E = TypeVar("_E", bound=StrEnum)
 _CHOICES: dict[type[StrEnum], dict[str, StrEnum]] = {}
 
 
+_ODD_CELLS = {
+    OddKind.ERROR: (
+        "cell_error",
+        "The cell shows the error {text}, which is not the same as not measured. Enter the value, or empty the cell if "
+        "it was not measured.",
+    ),
+    OddKind.NO_VALUE: (
+        "formula_without_value",
+        "The formula has never been calculated. Open the file in a spreadsheet program, save it, read it again.",
+    ),
+    OddKind.DATE: (
+        "cell_is_date",
+        "The cell is formatted as a date or time; a fraction such as 1/8 is turned into one. Format the cell as a "
+        "number (or text) and enter the value again.",
+    ),
+}
+
+
 def odd_cell_fault(cell: OddCell, expected: str) -> CellFaultError:
     """Return the fault of a cell that holds an error, a date, a truth value or nothing that was computed."""
-    if cell.kind is OddKind.ERROR:
-        return CellFaultError(
-            "cell_error",
-            expected,
-            f"The cell shows the error {cell.text}, which is not the same as not measured. Enter the value, or empty "
-            "the cell if it was not measured.",
-        )
-    if cell.kind is OddKind.NO_VALUE:
-        return CellFaultError(
-            "formula_without_value",
-            expected,
-            "The formula has never been calculated. Open the file in a spreadsheet program, save it, read it again.",
-        )
-    if cell.kind is OddKind.DATE:
-        return CellFaultError(
-            "cell_is_date",
-            expected,
-            "The cell is formatted as a date or time; a fraction such as 1/8 is turned into one. Format the cell as "
-            "a number (or text) and enter the value again.",
-        )
-    return CellFaultError("cell_is_boolean", expected, "The cell holds TRUE or FALSE. Enter the value.")
+    code, remedy = _ODD_CELLS.get(cell.kind, ("cell_is_boolean", "The cell holds TRUE or FALSE. Enter the value."))
+    return CellFaultError(code, expected, remedy.replace("{text}", cell.text))
 
 
 def plain_text(text: str) -> str:

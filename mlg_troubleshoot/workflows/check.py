@@ -16,12 +16,12 @@ from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
 from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
 from mlg_troubleshoot.decision.next_joint import advise
 from mlg_troubleshoot.decision.prediction import Extension
-from mlg_troubleshoot.errors import OutputError, Problem, UsageError
+from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
 from mlg_troubleshoot.outputs import write_csv
-from mlg_troubleshoot.records.model import TableOptions
+from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.studies.index_table import load_index_table
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
@@ -57,33 +57,21 @@ class CheckOptions(TableOptions):
     extension: Extension | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class CheckResult:
-    """What a check found.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckResult(TableResult):
+    """What a check found, beside what :class:`TableResult` tells of its tables.
 
     Parameters
     ----------
-    gear : Gear
-        The gear.
     judgements : tuple of Assessment or Rejected
         One for each data row, in the order of the input.
-    problems : tuple of Problem
-        What is wrong with the input.
-    notes : tuple of str
-        Notes on the input as a whole.
-    inputs_sha256 : mapping of str to str
-        Hash of each input file by name.
     read : ReadResult or None
         What was read, for annotating the user's workbook; None for an inspection entered by hand.
     seed : int
         Seed of the Monte Carlo draws.
     """
 
-    gear: Gear
     judgements: tuple[Judgement, ...]
-    problems: tuple[Problem, ...]
-    notes: tuple[str, ...]
-    inputs_sha256: Mapping[str, str]
     read: ReadResult | None = None
     seed: int = 1
 
@@ -140,13 +128,12 @@ def check_files(
 
     gear = load_gear(options.gear)
     read = read_many(sources, ReadOptions.of(gear, options), progress=on_read)
-    hashes = {file.name: file.sha256 for file in read.files if file.sha256 is not None}
-    result = _judge(gear, read.rows, read.problems, read.notes, hashes, options, on_judged)
-    return replace(result, read=read)
+    told = {"problems": read.problems, "notes": read.notes, "inputs_sha256": read.inputs_sha256, "read": read}
+    return _judge(gear, read.rows, options, on_judged, **told)
 
 
 def check_inspection(inspection: Inspection, options: CheckOptions) -> CheckResult:
-    return _judge(load_gear(options.gear), (inspection,), (), (), {}, options, None)
+    return _judge(load_gear(options.gear), (inspection,), options)
 
 
 def check(
@@ -258,31 +245,14 @@ def before_and_after(judgements: Sequence[Judgement]) -> tuple[Assessment, Asses
 def _judge(
     gear: Gear,
     rows: Sequence[Inspection | InvalidRow],
-    problems: Sequence[Problem],
-    notes: Sequence[str],
-    hashes: Mapping[str, str],
     options: CheckOptions,
-    on_judged: Callable[[int, int], None] | None,
+    on_judged: Callable[[int, int], None] | None = None,
+    **told: Any,
 ) -> CheckResult:
-    single = len(rows) == 1
-    done = 0
-
-    def advance(count: int) -> None:
-        nonlocal done
-        done += count
-        if on_judged is not None:
-            on_judged(done, len(rows))
-
-    judgements = assess(
-        rows,
-        gear,
-        load_index_table(gear),
-        AssessOptions(
-            advice=single if options.advice is None else options.advice, seed=options.seed, extension=options.extension
-        ),
-        advance,
-    )
-    return CheckResult(gear, judgements, tuple(problems), tuple(notes), hashes, seed=options.seed)
+    advice = len(rows) == 1 if options.advice is None else options.advice
+    asked = AssessOptions(advice=advice, seed=options.seed, extension=options.extension)
+    judgements = assess(rows, gear, load_index_table(gear), asked, on_judged)
+    return CheckResult(gear=gear, judgements=judgements, seed=options.seed, **told)
 
 
 def write_reports(
@@ -364,11 +334,7 @@ def write_template(
         return
     from mlg_troubleshoot.records import write_template as write
 
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        write(file, [(joint.number, joint.name, joint.location) for joint in loaded.joints])
-    except OSError as error:
-        raise OutputError(f"{file} cannot be written: {error.strerror}", "Choose another folder.") from error
+    write(file, [(joint.number, joint.name, joint.location) for joint in loaded.joints])
 
 
 # What a reader acts on comes first: on paper the rest is on the page after it.

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from mlg_troubleshoot.decision.inspection import Inspection
-from mlg_troubleshoot.errors import InconclusiveDataError, Problem
+from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
-from mlg_troubleshoot.records.model import TableOptions
+from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:
@@ -45,32 +45,20 @@ class DiagnoseOptions(TableOptions):
     seed: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class DiagnoseResult:
-    """What a diagnosis found.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DiagnoseResult(TableResult):
+    """What a diagnosis found, beside what :class:`TableResult` tells of its tables.
 
     Parameters
     ----------
-    gear : Gear
-        The gear.
     diagnosis : Diagnosis
         Verdict, causes, gain, remainder.
     extension : ModelExtension or None
         The extended model; None unless a cause is named.
-    problems : tuple of Problem
-        What is wrong with the input.
-    notes : tuple of str
-        Notes on the input as a whole.
-    inputs_sha256 : mapping of str to str
-        Hash of each input file by name.
     """
 
-    gear: Gear
     diagnosis: Diagnosis
     extension: ModelExtension | None
-    problems: tuple[Problem, ...]
-    notes: tuple[str, ...]
-    inputs_sha256: Mapping[str, str]
 
 
 # A length that cannot be is refused by a check; here it is a row whose slip is to be found.
@@ -131,18 +119,24 @@ def diagnose_files(
     by_record = {inspection.record_id: inspection for inspection in once}
     faults = tuple(_as_written(fault, by_record[fault.record_id]) for fault in diagnosis.faults)
     diagnosis = replace(diagnosis, rows_read=len(read.rows), faults=faults)
-    hashes = {file.name: file.sha256 for file in read.files if file.sha256 is not None}
     extension = None
     if diagnosis.terms:
         extension = ModelExtension(
             gear,
             diagnosis.terms,
             diagnosis.residual_u_in,
-            tuple(hashes.values()),
+            tuple(read.inputs_sha256.values()),
             diagnosis.rows_used,
             diagnosis.unread,
         )
-    return DiagnoseResult(gear, diagnosis, extension, read.problems, notes, hashes)
+    return DiagnoseResult(
+        gear=gear,
+        diagnosis=diagnosis,
+        extension=extension,
+        problems=read.problems,
+        notes=notes,
+        inputs_sha256=read.inputs_sha256,
+    )
 
 
 def _as_written(fault: DataFault, inspection: Inspection) -> DataFault:
