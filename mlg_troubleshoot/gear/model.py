@@ -14,6 +14,8 @@ from mlg_troubleshoot.geometry.kernel import Kernel
 from mlg_troubleshoot.geometry.mechanism import Mechanism
 
 Array = NDArray[np.float64]
+# Step of central differences. [in]
+_STEP_IN = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,16 +98,12 @@ class LinkageModel:
         moved = self.kernel.output(stroke, links) - self._down_lock
         return np.asarray(self.calibration.down_lock_in + self.rate * moved)
 
-    def plunger_amplification(self, step_in: float = 1e-5) -> Array:
-        """Plunger amplification index A_iP of each joint at mid-position (Eq. 8) in the limit of small clearance.
-
-        step_in: step of the central differences. [in]
-        Returns, shape (n_joints,): largest plunger displacement per unit of clearance over all directions. [1]
-        """
+    def plunger_amplification(self) -> Array:
+        """Amplification index A_iP of each joint to the plunger at mid-position (Eq. 8), for small clearances. [1]"""
         n = 2 * len(self.joint_numbers)
-        steps = np.vstack([np.eye(n), -np.eye(n)]) * step_in
+        steps = np.vstack([np.eye(n), -np.eye(n)]) * _STEP_IN
         moved = self.displacement([steps[:, i] for i in range(n)])
-        gradient = (moved[:n] - moved[n:]) / (2 * step_in)
+        gradient = (moved[:n] - moved[n:]) / (2 * _STEP_IN)
         return np.hypot(gradient[0::2], gradient[1::2])
 
 

@@ -15,7 +15,8 @@ from mlg_troubleshoot.errors import OutputError, Problem, UsageError
 from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.records.cells import column_letters, writable
 from mlg_troubleshoot.records.columns import Field, Kind
-from mlg_troubleshoot.records.model import FileRefusedError, ReadResult, SheetLayout
+from mlg_troubleshoot.records.model import ReadResult, SheetLayout
+from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.template import FONT
 from mlg_troubleshoot.units import LengthUnit
 

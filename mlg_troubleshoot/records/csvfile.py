@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 
 from mlg_troubleshoot.records.cells import MAX_COLUMNS, MAX_ROWS, Cell
-from mlg_troubleshoot.records.model import FileRefusedError
+from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.source import MergedRange, NumberedRow, SheetFacts
 
 # A quoted field may be as long as a line; the module's own limit would make it a fault.
@@ -55,22 +55,12 @@ def _strictly(data: bytes, encoding: str) -> str:
 
 
 def _too_large(what: str, row: int | None = None) -> FileRefusedError:
-    return FileRefusedError(
-        "file_too_large",
-        what,
-        f"at most {MAX_ROWS} rows, {MAX_COLUMNS} columns and {_MAX_LINE_CHARACTERS} characters a line",
-        "Read the inspection table alone, or split the file.",
-        row=row,
-    )
+    limits = f"at most {MAX_ROWS} rows, {MAX_COLUMNS} columns and {_MAX_LINE_CHARACTERS} characters a line"
+    return FileRefusedError("file_too_large", what, limits, row=row)
 
 
 def not_text() -> FileRefusedError:
-    return FileRefusedError(
-        "not_a_table",
-        "the file is neither text nor a spreadsheet",
-        "a CSV file in UTF-8, UTF-16 or Windows-1252, or an .xlsx workbook",
-        "Save the table as .xlsx or as CSV (UTF-8) and read that.",
-    )
+    return FileRefusedError("not_a_table", "the file is neither text nor a spreadsheet")
 
 
 class CsvSheet:
@@ -112,7 +102,8 @@ class CsvSheet:
             else:
                 fields = self._quoted(line, lines, usual, number)
             if "\0" in line:
-                self.facts.faulty[number] = _zero_character(number)
+                what = "a zero character: the file is damaged there"
+                self.facts.faulty[number] = FileRefusedError("csv_nul", what, row=number)
             usual = len(fields) or usual
             yield fields
 
@@ -132,7 +123,8 @@ class CsvSheet:
                     lines.popleft()
                 return fields
         # The quotation mark is a stray one: the row is named as faulty and the next line is a row again.
-        self.facts.faulty[number] = _unclosed_quote(number)
+        what = "a quotation mark that is not closed, or stands in the middle of a field"
+        self.facts.faulty[number] = FileRefusedError("csv_quote", what, row=number)
         return line.split(self._delimiter)
 
     def _parse(self, record: str) -> list[str] | None:
@@ -141,26 +133,6 @@ class CsvSheet:
         except csv.Error:
             return None
         return parsed[0] if len(parsed) == 1 else None
-
-
-def _unclosed_quote(row: int) -> FileRefusedError:
-    return FileRefusedError(
-        "csv_quote",
-        "a quotation mark that is not closed, or stands in the middle of a field",
-        "quotation marks in pairs around a whole field",
-        "Correct the quotation marks of this row; write inches as 0.013 in.",
-        row=row,
-    )
-
-
-def _zero_character(row: int) -> FileRefusedError:
-    return FileRefusedError(
-        "csv_nul",
-        "a zero character: the file is damaged there",
-        "plain text",
-        "Enter this row again, or save the table again as CSV (UTF-8).",
-        row=row,
-    )
 
 
 class CsvFile:

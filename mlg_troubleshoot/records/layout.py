@@ -12,11 +12,10 @@ from mlg_troubleshoot.records.cells import Cell, column_letters, show, writable
 from mlg_troubleshoot.records.columns import IDENTITY, LENGTHS, PER_JOINT, REQUIRED, Field, Kind
 from mlg_troubleshoot.records.headers import Recognition, Standing, near_miss, parse_target, recognise, tidy
 from mlg_troubleshoot.records.model import ReadOptions
+from mlg_troubleshoot.records.refusals import HEADER_SEARCH_ROWS
 from mlg_troubleshoot.records.rows import PlacedField
 from mlg_troubleshoot.records.source import MergedRange, NumberedRow
 from mlg_troubleshoot.units import UNIT_SPELLINGS, LengthUnit
-
-HEADER_SEARCH_ROWS = 20
 
 
 @dataclass(frozen=True, slots=True)

@@ -183,21 +183,3 @@ class ReadResult:
     @property
     def invalid(self) -> tuple[InvalidRow, ...]:
         return tuple(row for row in self.rows if isinstance(row, InvalidRow))
-
-
-class FileRefusedError(Exception):
-    """A file or a sheet that cannot be read as a table; caught inside this package and made a `Problem`."""
-
-    def __init__(
-        self,
-        code: str,
-        found: str,
-        expected: str,
-        remedy: str,
-        *,
-        sheet: str | None = None,
-        row: int | None = None,
-        cell: str | None = None,
-    ) -> None:
-        super().__init__(found)
-        self.problem = Problem(code, None, sheet, row, None, cell, found, expected, remedy)

@@ -18,8 +18,9 @@ from mlg_troubleshoot.records.csvfile import CsvFile
 from mlg_troubleshoot.records.duplicates import settle_duplicates
 from mlg_troubleshoot.records.forms import Form, find_form, read_form
 from mlg_troubleshoot.records.history import history_warnings
-from mlg_troubleshoot.records.layout import HEADER_SEARCH_ROWS, Header, find_header, header_score
-from mlg_troubleshoot.records.model import FileRead, FileRefusedError, Progress, ReadOptions, ReadResult
+from mlg_troubleshoot.records.layout import Header, find_header, header_score
+from mlg_troubleshoot.records.model import FileRead, Progress, ReadOptions, ReadResult
+from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.sniff import sniff
 from mlg_troubleshoot.records.source import NumberedRow, Sheet, Workbook
 from mlg_troubleshoot.records.tables import Collected, read_table
@@ -129,28 +130,16 @@ def load_bytes(source: Source) -> bytes:
         else:
             data = source.read(MAX_FILE_BYTES + 1)
     except FileNotFoundError:
-        raise FileRefusedError(
-            "file_not_found", "there is no such file", "an existing file", "Check the path and the spelling."
-        ) from None
+        raise FileRefusedError("file_not_found", "there is no such file") from None
     except IsADirectoryError:
         raise FileRefusedError(
             "file_not_found", "it is a folder without tables", "a CSV file or a workbook", "Name the file."
         ) from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise FileRefusedError(
-            "file_unreadable",
-            f"it cannot be opened ({reason})",
-            "a readable file",
-            "Check the path and the permissions.",
-        ) from None
+        raise FileRefusedError("file_unreadable", f"it cannot be opened ({reason})") from None
     if len(data) > MAX_FILE_BYTES:
-        raise FileRefusedError(
-            "file_too_large",
-            f"the file is larger than {MAX_FILE_BYTES // 1_000_000} MB",
-            "a table of inspections",
-            "Read the inspection table alone, or split the file.",
-        )
+        raise FileRefusedError("file_too_large", f"the file is larger than {MAX_FILE_BYTES // 1_000_000} MB")
     return data
 
 
@@ -162,12 +151,8 @@ def _regular_file(source: str | Path) -> bytes:
         if stat.S_ISDIR(os.fstat(handle).st_mode):
             raise IsADirectoryError
         if not stat.S_ISREG(os.fstat(handle).st_mode):
-            raise FileRefusedError(
-                "file_kind",
-                "a pipe or a device",
-                "a regular file",
-                "Save the table as a file, or pass it by - (stdin).",
-            )
+            remedy = "Save the table as a file, or pass it by - (stdin)."
+            raise FileRefusedError("file_kind", "a pipe or a device", "a regular file", remedy)
         return file.read(MAX_FILE_BYTES + 1)
 
 
@@ -228,12 +213,7 @@ def _read_book(
         found.layouts += part.layouts
         found.invalid_content |= part.invalid_content
     if not found.rows and not found.problems:
-        raise FileRefusedError(
-            "no_rows",
-            "there is no inspection in it",
-            "at least one row below the header, or a filled-in form",
-            "Enter the inspections and save the file.",
-        )
+        raise FileRefusedError("no_rows", "there is no inspection in it")
 
 
 def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Candidate]:
@@ -276,12 +256,8 @@ def _named(book: Workbook, wanted: str, options: ReadOptions, found: Collected) 
     by_name = by_name or [s for s in book.sheets if (s.name or "").strip().casefold() == wanted.strip().casefold()]
     if not by_name:
         names = ", ".join(repr(s.name) for s in book.sheets)
-        raise FileRefusedError(
-            "sheet_unknown",
-            f"there is no sheet {wanted!r}",
-            f"one of its sheets: {names}",
-            "Correct the name given with --sheet.",
-        )
+        known, remedy = f"one of its sheets: {names}", "Correct the name given with --sheet."
+        raise FileRefusedError("sheet_unknown", f"there is no sheet {wanted!r}", known, remedy)
     sheet = by_name[0]
     if sheet.hidden:
         found.notes.append(f"sheet {sheet.name!r} is hidden; it was read because it was named")
@@ -312,12 +288,7 @@ def _nothing_found(book: Workbook, candidates: Sequence[_Candidate], options: Re
     if len(candidates) == 1:
         return _no_header(candidates[0])
     names = ", ".join(repr(c.sheet.name) for c in candidates)
-    return FileRefusedError(
-        "header_missing",
-        f"no sheet holds a table of inspections (sheets: {names})",
-        f"a header with record_id, tail_no, side and clearances in the first {HEADER_SEARCH_ROWS} rows of a sheet",
-        "Use the workbook that 'mlg template' writes, or name the columns with --map.",
-    )
+    return FileRefusedError("header_missing", f"no sheet holds a table of inspections (sheets: {names})")
 
 
 def _no_header(candidate: _Candidate) -> FileRefusedError:
@@ -326,13 +297,8 @@ def _no_header(candidate: _Candidate) -> FileRefusedError:
     if first is not None:
         texts = [str(cell) for cell in first[1] if isinstance(cell, str)][:8]
         shown = f"row {first[0]} reads: {', '.join(texts)[:120]}" if texts else f"row {first[0]} holds no text"
-    return FileRefusedError(
-        "header_missing",
-        f"no header of inspections was found ({shown})",
-        f"a header with record_id, tail_no, side and clearances in the first {HEADER_SEARCH_ROWS} rows",
-        "Use the workbook that 'mlg template' writes, or name the columns with --map.",
-        sheet=candidate.sheet.name,
-    )
+    found = f"no header of inspections was found ({shown})"
+    return FileRefusedError("header_missing", found, sheet=candidate.sheet.name)
 
 
 def _finish(results: Sequence[_Found]) -> ReadResult:

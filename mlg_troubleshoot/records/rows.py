@@ -23,7 +23,8 @@ from mlg_troubleshoot.decision.inspection import (
 )
 from mlg_troubleshoot.records.cells import Cell, OddCell, OddKind, column_letters, quote, show, writable
 from mlg_troubleshoot.records.columns import CARRIED, LENGTH_RANGE_IN, LENGTHS, VERDICT_BEARING, Field, Kind
-from mlg_troubleshoot.records.model import FileRefusedError, TableInHand
+from mlg_troubleshoot.records.model import TableInHand
+from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.slips import scale_slip
 from mlg_troubleshoot.records.values import (
     NOT_MEASURED,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import PurePath
 
-from mlg_troubleshoot.records.model import FileRefusedError
+from mlg_troubleshoot.records.refusals import FileRefusedError
 
 OLE_MAGIC = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _WORKBOOK_NAMES = frozenset((".xlsx", ".xlsm", ".xls", ".ods", ".xlsb", ".xltx", ".xltm"))
@@ -25,12 +25,7 @@ _OTHERS: tuple[tuple[bytes, str], ...] = (
 
 def sniff(data: bytes, name: str) -> str:
     if not data.strip(b" \t\r\n\0\xef\xbb\xbf"):
-        raise FileRefusedError(
-            "file_empty",
-            "the file is empty" if not data else "the file holds nothing but blanks",
-            "a table of inspections",
-            "Check that the file was saved and copied completely.",
-        )
+        raise FileRefusedError("file_empty", "the file holds nothing but blanks" if data else "the file is empty")
     if data.startswith((b"PK\x03\x04", b"PK\x05\x06", b"PK\x07\x08")):
         return "zip"
     if data.startswith(OLE_MAGIC):
@@ -38,12 +33,12 @@ def sniff(data: bytes, name: str) -> str:
     head = data[:2048].lstrip(b"\xef\xbb\xbf \t\r\n")
     for magic, what in _OTHERS:
         if head.startswith(magic):
-            raise _refused(what)
+            raise FileRefusedError("file_kind", what)
     low = head.lower()
     if low.startswith((b"<!doctype html", b"<html", b"<table", b"<head", b"<body")):
-        raise _refused("a web page (HTML), whatever its name")
+        raise FileRefusedError("file_kind", "a web page (HTML), whatever its name")
     if low.startswith(b"<?xml") or low.startswith(b"<workbook"):
-        raise _refused("an XML file, whatever its name")
+        raise FileRefusedError("file_kind", "an XML file, whatever its name")
     suffix = PurePath(name).suffix.lower()
     if suffix in _WORKBOOK_NAMES:
         raise FileRefusedError(
@@ -53,9 +48,3 @@ def sniff(data: bytes, name: str) -> str:
             "If it is a CSV file, rename it to .csv. Otherwise open it in a spreadsheet program and save it as .xlsx.",
         )
     return "text"
-
-
-def _refused(what: str) -> FileRefusedError:
-    return FileRefusedError(
-        "file_kind", what, "an .xlsx workbook or a CSV file", "Save the table as .xlsx or as CSV (UTF-8) and read that."
-    )

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from mlg_troubleshoot.records.cells import Cell
-from mlg_troubleshoot.records.model import FileRefusedError
+from mlg_troubleshoot.records.refusals import FileRefusedError
 
 NumberedRow = tuple[int, Sequence[Cell]]
 MergedRange = tuple[int, int, int, int]

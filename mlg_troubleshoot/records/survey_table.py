@@ -14,8 +14,9 @@ import numpy as np
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.outputs import write_bytes, write_csv
 from mlg_troubleshoot.records.cells import Cell, column_letters, quote
-from mlg_troubleshoot.records.model import FileRefusedError, ReadOptions
+from mlg_troubleshoot.records.model import ReadOptions
 from mlg_troubleshoot.records.read import load_bytes, open_book
+from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.source import NumberedRow
 from mlg_troubleshoot.records.values import CellFaultError, read_choice, read_number, read_text
 from mlg_troubleshoot.studies.survey_readings import Kind, Reading, SurveyedLinkage, default_u

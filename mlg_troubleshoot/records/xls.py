@@ -20,7 +20,7 @@ from mlg_troubleshoot.records.cells import (
     padding_width,
     show_number,
 )
-from mlg_troubleshoot.records.model import FileRefusedError
+from mlg_troubleshoot.records.refusals import COPY_THE_TABLE, FileRefusedError
 from mlg_troubleshoot.records.source import MergedRange, NumberedRow, SheetFacts
 from mlg_troubleshoot.records.zipguard import damaged, outside_limits, password_protected
 
@@ -40,12 +40,8 @@ class XlsFile:
         if "EncryptedPackage".encode(_UTF16) in data:
             raise password_protected()
         if len(data) > MAX_BYTES:
-            raise FileRefusedError(
-                "file_too_large",
-                f"an .xls workbook of {len(data) / 1e6:.0f} MB",
-                f"at most {MAX_BYTES // 1_000_000} MB",
-                "Copy the inspection table alone into a new workbook and read that.",
-            )
+            found, expected = f"an .xls workbook of {len(data) / 1e6:.0f} MB", f"at most {MAX_BYTES // 1_000_000} MB"
+            raise FileRefusedError("file_too_large", found, expected, COPY_THE_TABLE)
         if "_VBA_PROJECT".encode(_UTF16) in data:
             self.notes.append("the workbook holds macros: they are ignored, the values are read")
         self.sheets = _sheets(data)
@@ -67,12 +63,7 @@ def _sheets(data: bytes) -> tuple[XlsSheet, ...]:
         if "encrypted" in str(error).lower():
             raise password_protected() from None
         if "find workbook" in str(error).lower():
-            raise FileRefusedError(
-                "file_kind",
-                "an old Office file that is no workbook",
-                "an .xlsx workbook or a CSV file",
-                "Save the table as .xlsx or as CSV (UTF-8) and read that.",
-            ) from None
+            raise FileRefusedError("file_kind", "an old Office file that is no workbook") from None
         raise damaged("its records cannot be read") from None
     except _PARSER_ERRORS:
         raise damaged("its records are incomplete") from None

@@ -46,7 +46,7 @@ from mlg_troubleshoot.records.cells import (
     padding_width,
     show_number,
 )
-from mlg_troubleshoot.records.model import FileRefusedError
+from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.source import MergedRange, NumberedRow, SheetFacts
 from mlg_troubleshoot.records.zipguard import MAX_ITEMS, GuardedZip, Stream, damage, damaged, outside_limits, too_large
 
@@ -148,7 +148,7 @@ def _refuse_other_kinds(kinds: str) -> None:
         ("sheet.binary", "a binary workbook (.xlsb)", "Save it as .xlsx and read the copy."),
     ):
         if mark in kinds:
-            raise FileRefusedError("file_kind", what, "an .xlsx workbook or a CSV file", remedy)
+            raise FileRefusedError("file_kind", what, remedy=remedy)
 
 
 def _text(element: Element) -> str | None:

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from xml.etree.ElementTree import ParseError
 
 from mlg_troubleshoot.records.cells import LETTERS, MAX_COLUMNS, MAX_ROWS, column_letters
-from mlg_troubleshoot.records.model import FileRefusedError
+from mlg_troubleshoot.records.refusals import COPY_THE_TABLE, FileRefusedError
 
 MAX_EXPANDED_BYTES = 200_000_000
 MAX_RATIO = 100
@@ -30,13 +30,8 @@ _ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplemented
 _PARSER_ERRORS = (AttributeError, LookupError, OSError, OverflowError, ParseError, TypeError, ValueError)
 
 
-_DAMAGED = "Open it in a spreadsheet program, save it again as .xlsx, and read the copy."
-
-
 def damaged(what: str) -> FileRefusedError:
-    return FileRefusedError(
-        "file_damaged", f"the workbook is cut off or damaged ({what})", "a whole workbook", _DAMAGED
-    )
+    return FileRefusedError("file_damaged", f"the workbook is cut off or damaged ({what})")
 
 
 @contextmanager
@@ -80,12 +75,8 @@ class GuardedZip:
             before = _BEFORE_ROOT.match(head)
             rest = head[before.end() if before is not None else 0 :]
             if rest.startswith((b"<!", b"<?")) or (not rest and len(head) >= _HEAD_BYTES // 2):
-                raise FileRefusedError(
-                    "xml_declaration",
-                    f"{name} declares a document type or entities, which no spreadsheet program writes",
-                    "a workbook as a spreadsheet program writes it",
-                    _DAMAGED,
-                )
+                found = f"{name} declares a document type or entities, which no spreadsheet program writes"
+                raise FileRefusedError("xml_declaration", found)
 
     @property
     def names(self) -> frozenset[str]:
@@ -155,18 +146,13 @@ def too_large(what: str) -> FileRefusedError:
         "file_too_large",
         f"the workbook is far too large or packed to look small: {what}",
         f"at most {MAX_EXPANDED_BYTES // 1_000_000} MB unpacked and {MAX_RATIO} times the packed size",
-        "Copy the inspection table alone into a new workbook and read that.",
+        COPY_THE_TABLE,
     )
 
 
 def password_protected() -> FileRefusedError:
     """Return the refusal of a workbook that cannot be opened without its password."""
-    return FileRefusedError(
-        "password_protected",
-        "the file is password protected",
-        "a workbook without a password",
-        "Save a copy without the password and read the copy.",
-    )
+    return FileRefusedError("password_protected", "the file is password protected")
 
 
 def outside_limits(sheet: str | None, column: int, row: int) -> FileRefusedError:

@@ -17,6 +17,8 @@ from mlg_troubleshoot.units import LengthUnit
 Array = NDArray[np.float64]
 Texts = NDArray[np.str_]
 
+# Width and height of one plot of two side by side. [canvas units]
+_PLOT = (335.0, 236.0)
 _BINS = 8
 _FEWEST_IN_A_BIN = 5
 MOST_TAILS = 36
@@ -172,8 +174,6 @@ def residual_plot(
     *,
     after: bool = False,
     only: NDArray[np.bool_] | None = None,
-    width: float = 335.0,
-    height: float = 236.0,
 ) -> Markup:
     """Draw residuals against a column, with the mean of each stretch or group and twice its standard error."""
     y = residuals.drawn(residuals.after_in if after else residuals.before_in)
@@ -182,7 +182,7 @@ def residual_plot(
     axis = residuals.axis
     groups = sorted({str(g) for g in against.groups if g}) if against.groups is not None else []
     description = f"{axis.label}, against {against.label}"
-    canvas = Canvas(width, height, title, description)
+    canvas = Canvas(*_PLOT, title, description)
     if against.groups is not None:
         x = np.array([groups.index(str(g)) if g else np.nan for g in against.groups], float)
         plot = Plot(canvas, Axis(against.label, -0.6, len(groups) - 0.4), axis, top=24)
@@ -239,7 +239,7 @@ def _mean_mark(plot: Plot, x: float, values: Array) -> None:
     plot.canvas.rectangle(px - 3, py - 3, 6, 6, fill=PAPER, edge=INK, edge_width=1.4)
 
 
-def tail_strips(residuals: Residuals, width: float = 690.0) -> Markup:
+def tail_strips(residuals: Residuals) -> Markup:
     """Draw the residuals of each tail on a line of its own, before and after side by side."""
     tails = residuals.diagnosis.used.tails
     panels = [("before", residuals.drawn(residuals.before_in), False)]
@@ -248,7 +248,7 @@ def tail_strips(residuals: Residuals, width: float = 690.0) -> Markup:
     before = panels[0][1]
     names = sorted(np.unique(tails).tolist(), key=lambda name: -abs(float(np.mean(before[tails == name]))))
     shown = sorted(names[:MOST_TAILS])
-    row, top, left, gap = 13.0, 22.0, 74.0, 16.0
+    width, row, top, left, gap = 690.0, 13.0, 22.0, 74.0, 16.0
     height = top + row * len(shown) + 34
     description = "One line for each aircraft; every point is one inspection, the square is their mean"
     canvas = Canvas(width, height, "Measured less predicted, by tail", description)
@@ -271,12 +271,12 @@ def tail_strips(residuals: Residuals, width: float = 690.0) -> Markup:
     return canvas.svg()
 
 
-def measured_against_predicted(residuals: Residuals, width: float = 335.0, height: float = 236.0) -> Markup:
+def measured_against_predicted(residuals: Residuals) -> Markup:
     d, unit = residuals.diagnosis, residuals.unit
     predicted, measured = residuals.drawn(d.predicted_in), residuals.drawn(d.used.measured_in)
     extended = predicted + residuals.drawn(residuals.effect_in)
     description = "Measured displacement of each inspection against the predicted one; on the line both are equal"
-    canvas = Canvas(width, height, "Measured against predicted", description)
+    canvas = Canvas(*_PLOT, "Measured against predicted", description)
     values = np.concatenate([predicted, extended, measured]).tolist()
     plot = Plot(canvas, Axis.around(f"predicted, {unit}", values), Axis.around(f"measured, {unit}", values), top=24)
     plot.draw_axes(x_ticks=8)
