@@ -52,7 +52,7 @@ _MOST_MISFITS = 0.1
 _SAME, _LEAST_WEIGHT = 0.01, 1e-3
 # A joint's other side is tried where the readings place the joint: to a fifth of its distance from the line between.
 _PLACED = 0.2
-_DRAWS, _DRAW_STEPS, _ALONG, _FAR, _FEW = 150, 8, (0.0, 0.1, 0.3, 1.0), 6.0, 0.6
+_DRAWS, _DRAW_STEPS, _ALONG, _FAR, FEW = 150, 8, (0.0, 0.1, 0.3, 1.0), 6.0, 0.6
 _SLIPS = (
     SLIPS["unit"],
     Slip(MM_PER_IN / 10.0, "centimetres read as inches", "inches read as centimetres"),
@@ -482,7 +482,7 @@ class Fitting:
             pulled = (means - mode.mean) @ prior.whiten.T @ prior.whiten + noise @ g
             # A valley is curved: each draw begins as far along its linear step as that helps.
             steps = [mode.vector + t * pulled @ mode.covariance for t in _ALONG]
-            if mode.parameters < _FEW * n:
+            if mode.parameters < FEW * n:
                 # So little is known that the modes say little: each draw begins at its own draw of the prior.
                 means = steps[0] = np.concatenate([prior.closing(count, rng), means])[:count]
                 del steps[1:]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.studies.survey import Prior
-from mlg_troubleshoot.studies.survey_readings import DEFAULT_U, MINUTES, Kind, Reading, SurveyedLinkage
+from mlg_troubleshoot.studies.survey_readings import DEFAULT_U, MINUTES, Kind, Quantity, Reading, SurveyedLinkage
 
 Array = NDArray[np.float64]
 # Between each two members of the ensemble a template is planned for so many linkages, where they close. An index
@@ -50,17 +50,19 @@ def planned(gear: Gear, distances: int = 24) -> tuple[tuple[Reading, bool], ...]
 class _Design:
     """Slopes of everything that can be read, in variables in which the prior is the unit sphere."""
 
-    def __init__(self, linkage: SurveyedLinkage) -> None:
+    def __init__(
+        self, linkage: SurveyedLinkage, taken: tuple[Reading, ...] = (), quantity: Quantity | None = None
+    ) -> None:
         prior = Prior(linkage)
         members = prior.members
         between = [(1 - t) * a + t * b for i, a in enumerate(members) for b in members[:i] for t in _BETWEEN]
         points = np.array([*members, *between])
         points = points[linkage.closes(points)]
-        self.linkage, self.pool = linkage, linkage.candidates()
+        self.linkage, self.pool = linkage, (*linkage.candidates(), *taken)
         u = np.array([r.u for r in self.pool])
         with np.errstate(all="ignore"):
             slopes = linkage.slopes(self.pool, points)[1] / u[:, None] @ prior.root
-            wanted = linkage.log_slopes(points) @ prior.root
+            wanted = linkage.log_slopes(points, quantity) @ prior.root
         sound = np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(wanted).all(axis=(1, 2))
         self.slopes, self.wanted = slopes[sound], wanted[sound]
         self.given = [i for i, r in enumerate(self.pool) if r.kind is not Kind.DISTANCE]
@@ -79,13 +81,23 @@ class _Design:
         g = self.slopes[:, rows]
         return np.asarray(1.0 - (g @ self.covariance(rows) * g).sum(axis=2))
 
-    def best(self, taken: list[int]) -> int:
-        """The distance to read beside those taken."""
-        rows, others = [*self.given, *taken], [j for j in self.free if j not in taken]
-        covariance, g, known = self.covariance(rows), self.slopes[:, others], self.slopes[:, rows]
+    def after(self, rows: list[int], others: list[int]) -> tuple[Array, Array, Array, Array]:
+        """Variances of the wanted logarithms after these readings and one of the others.
+
+        Returns the variances, shape (n_linkages, n_quantities, n_others), [1] and with what they were found: the
+        covariance, how each other reading moves the variables, and its variance in units of its own.
+        """
+        covariance, g = self.covariance(rows), self.slopes[:, others]
         moved = np.swapaxes(g @ covariance, 1, 2)
         size = 1.0 + (np.swapaxes(g, 1, 2) * moved).sum(axis=1)[:, None, :]
         wanted = (self.wanted @ covariance * self.wanted).sum(axis=2)[:, :, None] - (self.wanted @ moved) ** 2 / size
+        return wanted, covariance, moved, size
+
+    def best(self, taken: list[int]) -> int:
+        """The distance to read beside those taken."""
+        rows, others = [*self.given, *taken], [j for j in self.free if j not in taken]
+        wanted, covariance, moved, size = self.after(rows, others)
+        known = self.slopes[:, rows]
         held = 1.0 - (known @ covariance * known).sum(axis=2)[:, :, None] + (known @ moved) ** 2 / size
         checks = np.log(np.maximum(np.concatenate([held, 1.0 / size], axis=1), 0.0) + _LOOSE).sum(axis=1)
         cost = np.log(np.maximum(wanted, 0.0) + _WELL_KNOWN**2).sum(axis=1) - _BRACING * checks
@@ -102,6 +114,31 @@ class _Design:
             if before == set(taken):
                 break
         return taken
+
+
+def suggested_early(linkage: SurveyedLinkage, taken: tuple[Reading, ...], quantity: Quantity) -> Suggested | None:
+    """The reading that narrows the wanted quantities most per minute while little is known.
+
+    What fits a few readings may be far from any gear that is built, so that it tells little about the next: this is
+    the linear estimate on average over the linkages of the ensemble and between them, as for a template.
+    """
+    design, known = _Design(linkage, taken, quantity), {r.what for r in taken}
+    first = len(design.pool) - len(taken)
+    others = [j for j in range(first) if design.pool[j].what not in known]
+    rows = list(range(first, len(design.pool)))
+    if not others or not len(design.slopes):
+        return None
+    before = (design.wanted @ design.covariance(rows) * design.wanted).sum(axis=(1, 2))[:, None]
+    after = np.maximum(design.after(rows, others)[0].sum(axis=1), 0.0)
+    left = np.divide(after, before, out=np.ones_like(after), where=before > 0.0)
+    narrowing = 1.0 - np.sqrt(left).mean(axis=0)
+    return _worth_most(tuple(design.pool[j] for j in others), narrowing)
+
+
+def _worth_most(candidates: tuple[Reading, ...], narrowing: Array) -> Suggested | None:
+    """The reading that narrows most per minute, None if it hardly does."""
+    best = int(np.argmax(narrowing / np.array([MINUTES[c.kind] for c in candidates])))
+    return Suggested(candidates[best], float(narrowing[best])) if narrowing[best] >= _LEAST_NARROWING else None
 
 
 def suggested(linkage: SurveyedLinkage, draws: Array, wanted: Array, taken: tuple[Reading, ...]) -> Suggested | None:
@@ -128,5 +165,4 @@ def suggested(linkage: SurveyedLinkage, draws: Array, wanted: Array, taken: tupl
     explained = ((q.T @ y) ** 2).sum(axis=0) / ((y * y).sum(axis=0) + len(y) * u * u) / total
     # What chance alone would explain with so many draws.
     narrowing = 1.0 - np.sqrt(1.0 - np.clip(explained - 1.0 / len(y), 0.0, 1.0))
-    best = int(np.argmax(narrowing / np.array([MINUTES[c.kind] for c in candidates])))
-    return Suggested(candidates[best], float(narrowing[best])) if narrowing[best] >= _LEAST_NARROWING else None
+    return _worth_most(candidates, narrowing)

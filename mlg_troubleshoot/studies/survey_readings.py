@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import combinations
@@ -17,6 +18,8 @@ from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, S
 from mlg_troubleshoot.geometry.program import write_program
 
 Array = NDArray[np.float64]
+# Positive quantities of a batch of linkages, shape (n_vectors, n_quantities).
+Quantity = Callable[[Array], Array]
 _STEP = 1e-5
 # Positions over the stroke among which the plunger's least displacement is sought, and plunger positions to read.
 _POSITIONS, _PLUNGER_READINGS = 25, 9
@@ -236,11 +239,15 @@ class SurveyedLinkage:
         ends = [self.kernel.output(at, [*np.moveaxis(sense * link, -1, 0)], numbers) - zero for sense in (1.0, -1.0)]
         return np.asarray(np.max(np.abs(ends), axis=0) * np.abs(rate))
 
-    def log_slopes(self, vectors: Array) -> Array:
-        """Derivatives of the logarithms of the amplification indices, shape (n_vectors, n_joints, n_variables)."""
+    def log_slopes(self, vectors: Array, quantity: Quantity | None = None) -> Array:
+        """Derivatives of the logarithms of quantities, as a rule the amplification indices.
+
+        Returns, shape (n_vectors, n_quantities, n_variables). [1/in, 1/rad]
+        """
         count, n = vectors.shape
         steps = np.concatenate([np.eye(n), -np.eye(n)]) * _STEP * 10.0
-        found = np.log(self.amplification((vectors[:, None, :] + steps).reshape(-1, n))).reshape(count, 2 * n, -1)
+        values = (quantity or self.amplification)((vectors[:, None, :] + steps).reshape(-1, n))
+        found = np.log(np.maximum(values, 1e-9)).reshape(count, 2 * n, -1)
         return np.asarray(((found[:, :n] - found[:, n:]) / (20.0 * _STEP)).swapaxes(1, 2))
 
     def closes(self, vectors: Array) -> NDArray[np.bool_]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import deepcopy
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +35,8 @@ _DECIMALS = 6
 _WORTH_NAMING = 0.02
 # Draws of the prior that stand for a gear of which nothing was read yet.
 _UNREAD = 2000
+# Of many inspections about so many stand for all.
+_STAND_FOR_ALL = 20
 
 
 def write_survey_template(file: Path, gear: str | Path = DEFAULT_GEAR, unit: LengthUnit = LengthUnit.INCH) -> None:
@@ -63,8 +66,8 @@ def survey_gear(
     of their displacement, in place of the indices.
     """
     from mlg_troubleshoot.records.survey_table import read_survey
-    from mlg_troubleshoot.studies.survey import Prior, fit
-    from mlg_troubleshoot.studies.survey_plan import suggested
+    from mlg_troubleshoot.studies.survey import FEW, Prior, fit
+    from mlg_troubleshoot.studies.survey_plan import suggested, suggested_early
     from mlg_troubleshoot.studies.survey_readings import SurveyedLinkage
     from mlg_troubleshoot.studies.survey_result import InspectedGear, SurveyResult
 
@@ -96,7 +99,12 @@ def survey_gear(
     own = linkage.displacement(middle, clearance)
     # Logarithms: a few linkages near a dead centre would else decide alone. Without clearance nothing moves.
     unknown = np.log(np.maximum(moved if cases else linkage.amplification(draws), 1e-9))
-    suggestion = suggested(linkage, draws, unknown, readings)
+    if found is None or found.modes[0].parameters < FEW * len(linkage.names):
+        some = clearance[:: max(1, len(cases) // _STAND_FOR_ALL)]
+        quantity = partial(linkage.displacement, clearance_in=some) if cases else linkage.amplification
+        suggestion = suggested_early(linkage, readings, quantity)
+    else:
+        suggestion = suggested(linkage, draws, unknown, readings)
     judged = tuple(
         InspectedGear(name, float(d), _ends(each), float(np.mean(each <= known.margin.value)))
         for (name, _), d, each in zip(cases, own[0], moved.T, strict=True)

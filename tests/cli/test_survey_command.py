@@ -18,7 +18,7 @@ from mlg_troubleshoot.studies.survey_readings import Kind, Reading, SurveyedLink
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows.survey import survey_gear, survey_values
 
-from .conftest import mlg
+from .conftest import FAILURE, mlg
 
 FOUR_BAR = Path(__file__).parents[1] / "geometry" / "data" / "four-bar.toml"
 HEADER = ["kind", "from", "to", "value_in", "value_mm", "value_deg", "u_in", "extension_in", "extension_mm"]
@@ -173,6 +173,15 @@ def test_the_gear_that_a_survey_starts_from_is_not_replaced(tmp_path: Path) -> N
     run = mlg("gear", "--gear", copy, "survey", rows, "--write", copy)
     assert run.code == 2
     assert copy.read_bytes() == FOUR_BAR.read_bytes()
+
+
+@pytest.mark.parametrize("inspections", [(), ("--for", FAILURE)])
+def test_from_an_empty_survey_the_plunger_is_asked_for_first(tmp_path: Path, inspections: tuple[object, ...]) -> None:
+    run = mlg("gear", "survey", table(tmp_path / "s.csv", []), *inspections, "--json")
+    assert run.code == 3
+    (reading,) = run.json["next"]
+    assert reading["kind"] == "PLUNGER"
+    assert reading["expected_narrowing"] > 0.2
 
 
 def test_a_report_shows_what_was_read_what_follows_and_both_linkages(tmp_path: Path) -> None:

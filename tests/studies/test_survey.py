@@ -13,7 +13,7 @@ from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.studies.survey import Fitting, Prior, Survey, fit
-from mlg_troubleshoot.studies.survey_plan import planned, suggested
+from mlg_troubleshoot.studies.survey_plan import planned, suggested, suggested_early
 from mlg_troubleshoot.studies.survey_readings import Kind, Reading, SurveyedLinkage
 
 FOUR_BAR = Path(__file__).parents[1] / "geometry" / "data" / "four-bar.toml"
@@ -312,6 +312,26 @@ def test_the_next_reading_is_the_one_that_tells_most(four_bar: Gear) -> None:
     assert found is not None
     assert {found.reading.start, found.reading.end} == {"A", "B"}
     assert found.narrowing > 0.8
+
+
+def test_following_the_next_reading_from_an_empty_survey_tells_more_than_the_template_s_order(
+    gear: Gear, truth: np.ndarray, plan: tuple[tuple[Reading, bool], ...]
+) -> None:
+    linkage = SurveyedLinkage(gear)
+    root = Prior(linkage).root
+
+    def left_open(readings: tuple[Reading, ...]) -> float:
+        """Variances of the logarithms of the indices, added, by the linear estimate at the true linkage."""
+        slopes = linkage.slopes(readings, truth[None])[1][0] / np.array([[r.u] for r in readings]) @ root
+        wanted = linkage.log_slopes(truth[None])[0] @ root
+        return float(np.trace(wanted @ np.linalg.inv(np.eye(len(root)) + slopes.T @ slopes) @ wanted.T))
+
+    asked: tuple[Reading, ...] = ()
+    while len(asked) < 12:
+        found = suggested_early(linkage, asked, linkage.amplification)
+        assert found is not None
+        asked = (*asked, found.reading)
+    assert left_open(asked) < 0.6 * left_open(tuple(r for r, _ in plan[:12]))
 
 
 def test_nothing_is_suggested_where_nothing_would_narrow(four_bar: Gear) -> None:
