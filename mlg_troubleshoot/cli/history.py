@@ -57,7 +57,6 @@ class HistoryGroup(TyperGroup):
 
 
 def side_of(text: str) -> str:
-    """Read LH or RH."""
     if text.strip().upper() not in ("LH", "RH"):
         raise UsageError(f"side {text!r} is not LH or RH", "Give LH or RH.")
     return text.strip().upper()
@@ -375,12 +374,10 @@ def ask_tail(tail: str, kept: str) -> bool:
 
 
 def can_ask() -> bool:
-    """True where somebody can answer."""
     return sys.stdin.isatty() and sys.stderr.isatty()
 
 
 def history_app() -> typer.Typer:
-    """The commands under ``mlg history``."""
     app = typer.Typer(
         name="history",
         cls=HistoryGroup,

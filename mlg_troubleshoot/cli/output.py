@@ -92,7 +92,6 @@ class DataConsole(Console):
         super().print(*(text(each) if isinstance(each, str) else each for each in objects), **how)
 
     def on_broken_pipe(self) -> None:
-        """Stop printing."""
         self.quiet = True
         abandon_stdout()
 

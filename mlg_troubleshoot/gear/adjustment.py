@@ -49,7 +49,6 @@ class Adjustment:
         }
 
     def take(self, rows: NDArray[np.intp]) -> Adjustment:
-        """Some of the gears."""
         return Adjustment(
             self.clearance_in[rows],
             {name: np.asarray(values)[rows] for name, values in self.changed.items()},

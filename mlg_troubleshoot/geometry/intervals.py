@@ -75,7 +75,6 @@ class Box:
         return np.asarray(0.5 * (self.low + self.high))
 
     def offsets(self) -> Pair:
-        """Ranges of the distance from the middle."""
         return _out(self.low - self.middle, self.high - self.middle)
 
     def variables(self) -> list[Range]:

@@ -85,7 +85,6 @@ class Kernel:
         return {joint: (np.asarray(values[x]), np.asarray(values[y])) for joint, (x, y) in names.items()}
 
     def no_clearance(self) -> list[float]:
-        """Return virtual links of zero length."""
         return [0.0] * (2 * len(self.mechanism.virtual_links))
 
     def batch(

@@ -124,7 +124,6 @@ def date_cell(serial: float, *, epoch_1904: bool) -> OddCell:
 
 
 def iso_date_cell(text: str) -> OddCell:
-    """Return the cell of a date that the file stores as ISO 8601 text."""
     try:
         return OddCell(OddKind.DATE, text[:10], datetime.fromisoformat(text).date())
     except ValueError:

@@ -54,7 +54,6 @@ def _where(source: RowSource) -> str:
 
 
 def _column(source: RowSource, layouts: Sequence[SheetLayout]) -> tuple[str, str | None]:
-    """Return the header and the cell of a row's record id."""
     for layout in layouts:
         if (layout.file, layout.sheet) == (source.file, source.sheet):
             for column in layout.columns:

@@ -28,7 +28,6 @@ class Form:
     value_column: int
 
     def is_untouched(self, options: ReadOptions) -> bool:
-        """Tell whether nothing has been filled in yet."""
         for _, label, value in self.lines:
             if value is None:
                 continue

@@ -65,7 +65,6 @@ def _mapped(text: str, index: int, options: ReadOptions) -> bool:
 
 
 def header_score(cells: Sequence[Cell], options: ReadOptions) -> int:
-    """Tell how much a row looks like a header."""
     known: set[tuple[Kind, int | None]] = set()
     doubtful = 0
     for index, cell in enumerate(cells):

@@ -83,7 +83,6 @@ class ReadOptions(TableOptions):
 
     @classmethod
     def of(cls, gear: Gear, tables: TableOptions | None = None, **declared: Any) -> ReadOptions:
-        """Return the options by which values of a gear are judged."""
         told = {} if tables is None else {each.name: getattr(tables, each.name) for each in fields(TableOptions)}
         return cls(
             **told,

@@ -47,7 +47,6 @@ class _Candidate:
 
 
 def _ticker(progress: Progress | None) -> Callable[[int], None]:
-    """Add up the rows of all files for the progress display."""
     done = 0
 
     def tick(rows: int) -> None:
@@ -157,7 +156,6 @@ def _regular_file(source: str | Path) -> bytes:
 
 
 def open_book(data: bytes, label: str, options: ReadOptions) -> Workbook:
-    """Open a table of any kind by its content."""
     kind = sniff(data, label)
     if kind == "text":
         return CsvFile(data, lambda cells: header_score(cells, options))

@@ -208,7 +208,6 @@ class RowReader:
         return self._refused_row(row, cells, record_id, *told)
 
     def faulty(self, row: int, cells: Sequence[Cell], why: FileRefusedError) -> InvalidRow:
-        """Refuse a row that could not be taken apart."""
         told = why.problem
         return self._refused_row(row, cells, None, told.code, str(why), told.expected, told.remedy)
 

@@ -144,7 +144,6 @@ class _Table:
             self._out.rows[:] = sorted([*self._out.rows, *self._long.finish()], key=lambda row: row.source.row or 0)
 
     def notes(self) -> list[str]:
-        """Say what was made of the rows."""
         notes = []
         if self._long is not None:
             notes.append("long layout: one row is one joint's reading; rows with one record id are one inspection")

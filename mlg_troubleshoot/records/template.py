@@ -89,7 +89,6 @@ _INSTRUCTIONS = (
 
 
 def write_template(path: str | Path, joints: Sequence[JointLine], *, unit: LengthUnit = LengthUnit.INCH) -> None:
-    """Write the empty inspection workbook."""
     from openpyxl import Workbook
 
     book = Workbook()

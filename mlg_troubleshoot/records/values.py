@@ -68,7 +68,6 @@ def odd_cell_fault(cell: OddCell, expected: str) -> CellFaultError:
 
 
 def plain_text(text: str) -> str:
-    """Return a text without blanks around it and without invisible characters."""
     return text.translate(_INVISIBLE).strip()
 
 

@@ -81,8 +81,6 @@ class _Package(GuardedZip):
 
 
 class XlsxFile:
-    """A workbook in Office Open XML."""
-
     delimiter: str | None = None
 
     def __init__(self, data: bytes) -> None:
@@ -192,7 +190,6 @@ class XlsxSheet:
                     yield number, cells
 
     def elements(self) -> Iterator[Element]:
-        """Walk over the rows and columns as elements."""
         stream = Stream(self.book.archive, self.part)
         for _, element in iterparse(stream):
             if element.tag == ROW_TAG:

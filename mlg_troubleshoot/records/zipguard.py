@@ -91,7 +91,6 @@ class GuardedZip:
             raise damaged(f"{name} cannot be unpacked") from None
 
     def size(self, name: str) -> int:
-        """Return how many bytes a part claims to unpack to."""
         return self._member(name).file_size
 
     def _member(self, name: str) -> zipfile.ZipInfo:
@@ -104,7 +103,6 @@ class GuardedZip:
         return b"".join(self.chunks(name))
 
     def chunks(self, name: str) -> Iterator[bytes]:
-        """Unpack a part piece by piece."""
         member = self._member(name)
         total = 0
         try:
@@ -134,7 +132,6 @@ class Stream:
         return piece
 
     def end_item(self) -> None:
-        """Count a complete row or text."""
         self._open = 0
         self._items += 1
         if self._items > MAX_ITEMS:

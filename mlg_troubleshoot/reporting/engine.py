@@ -21,7 +21,6 @@ _HERE = "https://report.invalid/"
 
 
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:
-    """Answer jobs until the input ends."""
     import plutoprint
 
     class Refuse(plutoprint.ResourceFetcher):

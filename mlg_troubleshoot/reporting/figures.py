@@ -78,7 +78,6 @@ class Canvas:
         self._parts.append(f"<{element}{''.join(written)}{body}")
 
     def line(self, x1: float, y1: float, x2: float, y2: float, **stroke: Unpack[Stroke]) -> None:
-        """Draw a straight line. [canvas units]"""
         self.add("line", x1=x1, y1=y1, x2=x2, y2=y2, **_stroke(stroke))
 
     def rectangle(
@@ -93,14 +92,12 @@ class Canvas:
         edge_width: float = 1.0,
         dash: str | None = None,
     ) -> None:
-        """Draw a rectangle. [canvas units]"""
         outline = _stroke({"colour": edge, "width": edge_width, "dash": dash}) if edge else {}
         self.add("rect", x=x, y=y, width=max(width, 0.0), height=max(height, 0.0), fill=fill, **outline)
 
     def polyline(
         self, points: Sequence[Place], *, fill: str = "none", closed: bool = False, **stroke: Unpack[Stroke]
     ) -> None:
-        """Draw a line through points, or a polygon. [canvas units]"""
         through = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
         drawn = _stroke({"width": 1.5, **stroke})
         self.add("polygon" if closed else "polyline", points=through, fill=fill, **drawn, stroke_linejoin="round")
@@ -164,7 +161,6 @@ class Canvas:
 
 
 def nice_ticks(low: float, high: float, about: int = 5) -> list[float]:
-    """Choose round values between two numbers."""
     span = high - low
     if not math.isfinite(span) or span <= 0.0:
         return [low]
@@ -227,7 +223,6 @@ class Plot:
         self.area = (left, top, canvas.width - right, canvas.height - bottom)
 
     def at(self, x: float, y: float) -> tuple[float, float]:
-        """Return the place of a data point on the canvas."""
         x0, y0, x1, y1 = self.area
         return (
             x0 + (x - self.x.low) / (self.x.high - self.x.low) * (x1 - x0),

@@ -25,7 +25,6 @@ def breakable(text: str) -> str:
 
 @cache
 def font_coverage() -> frozenset[int]:
-    """Return the code points that both bundled fonts can draw."""
     folder = templates_folder()
     normal, bold = (_code_points((folder / name).read_bytes()) for name in FONT_FILES.values())
     return normal & bold

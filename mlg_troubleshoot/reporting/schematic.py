@@ -212,7 +212,6 @@ class _PlaneDrawing:
         return name, canvas.svg("figure panel"), width
 
     def _plain_points(self, canvas: Canvas, at: _At) -> None:
-        """Draw supports, and points that are no joint."""
         numbered = {j.point for j in self.gear.joints if j.point in self.points}
         for point in self.points:
             if point not in self.cut:
@@ -363,7 +362,6 @@ def _ground(canvas: Canvas, x: float, y: float) -> None:
 
 
 def joint_state(finding: JointFinding) -> JointState:
-    """Return whether a joint is over its limit, within it, or not measured."""
     if finding.clearance_in is None:
         return "missing"
     return "over" if finding.over_limit else "fine"

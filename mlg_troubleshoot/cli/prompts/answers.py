@@ -75,7 +75,6 @@ class Answers:
         return {number: reading.radial_in for number, reading in readings.items() if reading is not None}
 
     def inspection(self, gear: Gear, record_id: str) -> Inspection:
-        """Let the gate judge the whole row; `UsageError` if it is refused."""
         from mlg_troubleshoot.records import ReadOptions, admit
 
         values: dict[str, object] = {

@@ -46,7 +46,6 @@ class _Saver:
         self.saved = False
 
     def save(self, answers: Answers) -> None:
-        """Save the answers if they differ from what was saved."""
         changed = answers != self.session.answers
         self.session = replace(self.session, answers=answers)
         if not changed and (self.saved or answers == self._begun_with):

@@ -122,7 +122,6 @@ class Flow:
         return tuple(joint.number for joint in joints)
 
     def open_joints(self, answers: Answers) -> tuple[int, ...]:
-        """Return the joints still to be asked, in order."""
         return tuple(number for number in self.order if number not in answers.joints)
 
     def begin(self, given: Answers) -> Turn:

@@ -49,6 +49,5 @@ def read_more(answers: Answers, typed: str, gear: Gear) -> tuple[Answers, tuple[
 
 
 def plunger_in(answers: Answers, gear: Gear) -> float | None:
-    """Return the measured displacement of the plunger. [in]"""
     typed = answers.more.get("plunger_displacement")
     return None if typed is None else judge_more("plunger_displacement", typed, answers.unit, gear).readings_in[0]

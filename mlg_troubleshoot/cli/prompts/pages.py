@@ -58,13 +58,11 @@ def length(length_in: float, unit: LengthUnit | None) -> str:
 
 
 def rule(title: str, width: int) -> Line:
-    """Return a line across the terminal with a title in it."""
     rest = max(width - len(title) - 6, 0)
     return line(("── ", Tone.QUIET), (title, Tone.STRONG), (f" {'─' * rest}", Tone.QUIET), rigid=True)
 
 
 def identity(answers: Answers) -> str:
-    """Return tail and side as far as they are known."""
     return " ".join(part for part in (answers.tail_no, answers.side) if part)
 
 
@@ -113,7 +111,6 @@ def convention_page(answers: Answers) -> Page:
 
 
 def reread_page(answers: Answers, old: LengthUnit) -> Page:
-    """Return the question whether readings typed so far were in the new unit."""
     count = sum(a.written is not None and a.written.unit is None for a in answers.joints.values())
     new = UNIT_NAMES[answers.unit or old]
     were, they = ("reading was", "it") if count == 1 else ("readings were", "they")
@@ -127,7 +124,6 @@ def reread_page(answers: Answers, old: LengthUnit) -> Page:
 
 
 def offer_page(saved: Session, gear: Gear) -> Page:
-    """Return the question whether an unfinished inspection is resumed."""
     shown = (
         BLANK,
         line(
@@ -166,7 +162,6 @@ def joint_page(
 
 
 def confirm_page(gear: Gear, reading: Reading, number: int, unit: LengthUnit | None) -> Page:
-    """Return the question whether a value is really so large."""
     limit = length(gear.joint(number).limit.value, unit)
     shown = (
         line((f"#{number}  {length(reading.radial_in, unit)} radial is far beyond the limit of {limit}.", Tone.WARN)),
@@ -189,7 +184,6 @@ def refusal_lines(typed: str, number: int, said: str) -> tuple[Line, ...]:
 
 
 def echo_lines(gear: Gear, answers: Answers, number: int) -> tuple[Line, ...]:
-    """Return a joint's answer as it was understood."""
     reading = answers.reading(number)
     if reading is None:
         joint = gear.joint(number)
@@ -261,7 +255,6 @@ def more_page(answers: Answers, gear: Gear, width: int) -> Page:
 
 
 def confirm_more_page(most_in: float, unit: LengthUnit | None) -> Page:
-    """Return the question whether the plunger really stands so far off."""
     most = length(most_in, unit)
     shown = (
         line((f"That is farther than all joints at their limits could push the plunger ({most}).", Tone.WARN)),
@@ -285,7 +278,6 @@ DETAIL_HELP = (
 
 
 def detail_page(answers: Answers, column: str, today: date | None) -> Page:
-    """Return one of the optional questions for the sign-off page."""
     kept = answers.more.get(column)
     enter = _keeps(kept) or " (Enter: not stated)"
     if kept is None and column == "inspection_date" and today is not None:

@@ -27,8 +27,6 @@ class _Chain:
 
 
 class _Canvas:
-    """Rows of characters with tones, written at any column."""
-
     def __init__(self, rows: int, width: int) -> None:
         self._cells = [[(" ", Tone.PLAIN)] * width for _ in range(rows)]
 

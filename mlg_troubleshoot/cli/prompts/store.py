@@ -116,13 +116,11 @@ class SessionStore:
         return own + [draft for draft in found if draft.id not in {each.id for each in own}]
 
     def load(self, session_id: str) -> Session:
-        """Read a session."""
         for draft in self._newest_first(draft_id=session_id):
             return _session(draft)
         raise SessionFileError(f"there is no saved inspection {session_id!r}", "Run mlg check to begin a new one.")
 
     def latest(self) -> Session | None:
-        """Return the unfinished session that was saved last."""
         for draft in self._newest_first(self.owner):
             if not draft.complete:
                 return self._readable(draft)

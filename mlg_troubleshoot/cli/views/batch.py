@@ -81,8 +81,6 @@ def _cells(judgement: Judgement, screen: DataConsole) -> dict[str, Cell]:
 
 
 def show_before_and_after(before: Assessment, after: Assessment, screen: DataConsole) -> None:
-    """Show two inspections of one gear side by side, joint by joint."""
-
     def change(one: float | None, two: float | None) -> tuple[str, str, str]:
         first, second = ("-" if value is None else screen.length(value) for value in (one, two))
         return first, second, "" if one is None or two is None else screen.length(two - one, sign=True)
