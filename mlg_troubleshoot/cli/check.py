@@ -133,7 +133,7 @@ def check(
         sheet=sheet,
         column_map=columns,
         remembered_map=shown.headers,
-        remembered=shown.notes[0] if shown.notes else None,
+        remembered=shown.note or None,
         decimal_comma=decimal_comma,
         seed=seed,
         extension=load_model_extension(extension or (), gear, causes or ()),

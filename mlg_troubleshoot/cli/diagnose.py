@@ -72,7 +72,7 @@ def diagnose(
         decimal_comma=decimal_comma,
         column_map=columns,
         remembered_map=shown.headers,
-        remembered=shown.notes[0] if shown.notes else None,
+        remembered=shown.note or None,
         cause_files=tuple(causes or ()),
         permutations=permutations,
         seed=seed,

@@ -29,7 +29,7 @@ class Settings:
     show: LengthUnit = LengthUnit.INCH
     page: Page = Page.A4
     headers: Mapping[str, str] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    note: str = ""
 
 
 def settings(show: str | None, page: Page | None, headers: Mapping[str, str], *, keep: bool, quiet: bool) -> Settings:
@@ -37,8 +37,8 @@ def settings(show: str | None, page: Page | None, headers: Mapping[str, str], *,
     if keep:
         say(f"Remembered: {_remember(show, page, headers)}")
     found = _recall(show, page)
-    if found.notes and not quiet:
-        say(f"Note: {found.notes[0]}")
+    if found.note and not quiet:
+        say(f"Note: {found.note}")
     return found
 
 
@@ -58,7 +58,7 @@ def _recall(show: str | None, page: Page | None) -> Settings:
         LengthUnit.parse(show) if show else known.show,
         page or known.page,
         known.headers,
-        (f"remembered in {file}: {', '.join(used)}",) if used else (),
+        f"remembered in {file}: {', '.join(used)}" if used else "",
     )
 
 

@@ -21,14 +21,8 @@ class Action(StrEnum):
 
     @property
     def words(self) -> str:
-        return {
-            "MEASURE": "measure",
-            "MEASURE_AGAIN": "measure again",
-            "READ_PLUNGER": "read the plunger",
-            "RESTORE": "restore",
-            "CONTINUE": "go on",
-            "CORRECT": "correct",
-        }[self.value]
+        words = {"READ_PLUNGER": "read the plunger", "CONTINUE": "go on"}
+        return words.get(self.value, self.value.replace("_", " ").lower())
 
 
 class End(StrEnum):

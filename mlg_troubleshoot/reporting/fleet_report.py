@@ -10,7 +10,7 @@ from markupsafe import Markup
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.common import head
 from mlg_troubleshoot.reporting.figures import ACCENT, INK, SOFT, Canvas
-from mlg_troubleshoot.reporting.formats import ABSENT, Lengths
+from mlg_troubleshoot.reporting.formats import ABSENT, Lengths, landings
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.reporting.publish import safe_stem
@@ -25,7 +25,7 @@ def interval_bar(ends: Mapping[str, float | None] | None, horizon: float) -> Mar
         return Markup(ABSENT)
     # A square root scale shows what is near.
     low, middle, high = (_BAR * min((horizon if e is None else e) / horizon, 1.0) ** 0.5 for e in ends.values())
-    canvas = Canvas(_BAR + 8, _HIGH, f"landings left, 5, 50 and 95 %: {landings_words(ends)}")
+    canvas = Canvas(_BAR + 8, _HIGH, f"landings left, 5, 50 and 95 %: {landings(ends)}")
     canvas.line(0, 9, _BAR, 9, colour=SOFT)
     canvas.rectangle(low, 4, max(high - low, 1.0), 10, fill=ACCENT)
     canvas.rectangle(middle, 0, 2.5, 18, fill=INK)
@@ -55,13 +55,6 @@ def _high(value_in: float, top_in: float) -> float:
     return _HIGH - 1.0 - (_HIGH - 3.0) * value_in / top_in
 
 
-def landings_words(ends: Mapping[str, float | None] | None) -> str:
-    """The 5, 50 and 95 % quantiles in words, to two digits: a forecast has no more."""
-    if ends is None:
-        return ABSENT
-    return ", ".join("beyond" if end is None else f"{float(f'{end:.2g}'):.0f}" for end in ends.values())
-
-
 def fleet_document(
     fleet: Mapping[str, Any],
     series: Mapping[tuple[str, str], tuple[Sequence[float | None], float | None]],
@@ -76,8 +69,6 @@ def fleet_document(
         {
             **line,
             "left": interval_bar(line["landings_to_limit"], gear.horizon.value),
-            "words": landings_words(line["landings_to_limit"]),
-            "margin_words": landings_words(line["landings_to_margin"]),
             "spark": sparkline(*series[line["tail_no"], line["side"]], lengths),
             "link": f"{_gear_stem(line['tail_no'], line['side'])}.html",
         }
@@ -100,7 +91,6 @@ def life_document(
 ) -> Document:
     """Make one gear's life: its last inspections side by side, what was restored between, landings left."""
     name = f"{life['tail_no']} {life['side']}"
-    joints = [{**joint, "words": landings_words(joint["landings_to_limit"])} for joint in life["joints"]]
-    shown = {"life": life, "steps": steps, "joints_of": joints}
+    shown = {"life": life, "steps": steps}
     context = {**head(f"Life of {name}", name, gear, provenance, Lengths(unit)), **shown}
     return Document("life.html.j2", context, _gear_stem(life["tail_no"], life["side"]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -76,6 +76,13 @@ def several(count: int, one: str, many: str | None = None) -> str:
 def short(text: str, length: int) -> str:
     """Cut a text that is too long for its place."""
     return text if len(text) <= length else text[: length - 1] + "…"
+
+
+def landings(ends: Mapping[str, float | None] | None) -> str:
+    """Write the quantiles of a forecast, to two digits: it has no more."""
+    if ends is None:
+        return ABSENT
+    return ", ".join("beyond" if end is None else f"{float(f'{end:.2g}'):.0f}" for end in ends.values())
 
 
 def minutes(value: float) -> str:

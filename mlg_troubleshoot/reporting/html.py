@@ -61,6 +61,7 @@ def environment() -> Environment:
         joints=formats.joint_list,
         several=formats.several,
         short=formats.short,
+        landings=formats.landings,
         minutes=formats.minutes,
         moment=formats.moment,
     )

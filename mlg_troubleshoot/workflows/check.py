@@ -337,7 +337,6 @@ def write_template(
     write(file, [(joint.number, joint.name, joint.location) for joint in loaded.joints])
 
 
-# What a reader acts on comes first: on paper the rest is on the page after it.
 # Columns of the verdicts that bear the names of what an assessment holds; margin_used_in is its margin.
 _NUMBERS = (
     *("predicted_displacement_in", "over_travel_in", "under_travel_in", "margin_used_in", "remaining_in"),

@@ -10,7 +10,7 @@ import pytest
 
 from mlg_troubleshoot import Inspection, Side, TroubleshootError, check
 from mlg_troubleshoot.cli.by_hand import Flags, from_flags
-from mlg_troubleshoot.cli.prompts.answers import Answers, JointAnswer, Judgement, judge
+from mlg_troubleshoot.cli.prompts.answers import Answers, JointAnswer, judge
 from mlg_troubleshoot.cli.prompts.more import read_more
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
@@ -73,15 +73,15 @@ def by_prompt(gear: Gear, value: str, margin: str, convention: Convention) -> Fo
     answers = Answers(tail_no="N1", side=Side.LH, unit=LengthUnit.INCH, convention=convention)
     try:
         answers, _ = read_more(answers, f"m {margin}", gear)
-        refused = refused if judged.judgement is Judgement.REFUSE else []
+        refused = refused if judged.refused else []
     except UsageError as error:
-        refused = [*(refused if judged.judgement is Judgement.REFUSE else []), words(error)]
+        refused = [*(refused if judged.refused else []), words(error)]
     if refused:
         return Found(refused=" ".join(refused))
     assert judged.written is not None
     answers = answers.with_joint(3, JointAnswer(judged.written))
     row = answers.inspection(gear, "R1")
-    assert (judged.judgement is Judgement.CONFIRM) == bool(row.warnings)
+    assert bool(judged.said) == bool(row.warnings)
     return Found(row.clearance_in[3], row.margin_in, row.warnings)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from types import MappingProxyType
 
 from mlg_troubleshoot.decision.inspection import Inspection, Side
@@ -113,19 +112,13 @@ class Reading:
         return self.as_read_in / self.convention.per_radial
 
 
-class Judgement(StrEnum):
-    ACCEPT = "accept"
-    CONFIRM = "confirm"
-    REFUSE = "refuse"
-
-
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """What the gate says of a reading: what to do, in which words, and the number if it is one."""
+    """What the gate says of a reading, empty if nothing, and the number it takes; what it said is to be confirmed."""
 
-    judgement: Judgement
     said: str = ""
     written: WrittenLength | None = None
+    refused: bool = False
 
 
 def judge(typed: str, number: int, unit: LengthUnit, convention: ClearanceConvention, gear: Gear) -> Judged:
@@ -135,11 +128,10 @@ def judge(typed: str, number: int, unit: LengthUnit, convention: ClearanceConven
     options = ReadOptions.of(gear, unit=unit, convention=convention)
     read, problems = judge_length(f"clearance_{number}", typed, options)
     if problems or not isinstance(read, Inspection):
-        return Judged(Judgement.REFUSE, " ".join(f"expected {p.expected}. {p.remedy}" for p in problems))
+        return Judged(" ".join(f"expected {p.expected}. {p.remedy}" for p in problems), refused=True)
     if number not in read.entered:
-        return Judged(Judgement.ACCEPT)
-    written = parse_length(read.entered[number].text)
-    return Judged(Judgement.CONFIRM if read.warnings else Judgement.ACCEPT, " ".join(read.warnings), written)
+        return Judged()
+    return Judged(" ".join(read.warnings), parse_length(read.entered[number].text))
 
 
 def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> Inspection:

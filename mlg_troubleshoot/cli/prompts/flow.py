@@ -16,8 +16,6 @@ from mlg_troubleshoot.cli.prompts.answers import (
     SIGN_OFF,
     Answers,
     JointAnswer,
-    Judged,
-    Judgement,
     Reading,
     judge,
     judge_more,
@@ -277,21 +275,17 @@ class Flow:
     def _value(self, state: State, number: int, typed: str) -> Turn:
         answers = state.answers
         judged = judge(typed, number, _known(answers.unit), _known(answers.convention), self.gear)
-        if judged.judgement is Judgement.REFUSE:
+        if judged.refused:
             back = replace(state, ask=Ask.JOINT, pending=None)
             return Turn(back, pages.refusal_lines(typed, number, judged.said))
         if judged.written is None:
             return self._answered(state, number, NOT_MEASURED)
-        written = judged.written
-        reading = self._reading(answers, written)
-        same = state.pending is not None and self._pending(state).radial_in == reading.radial_in
-        match judged.judgement:
-            case Judgement.CONFIRM if not same:
-                return Turn(replace(state, ask=Ask.CONFIRM, pending=written))
-            case Judgement.CONFIRM:
-                return self._answered(state, number, JointAnswer(written, confirmed=True))
-            case Judgement.ACCEPT:
-                return self._answered(state, number, JointAnswer(written))
+        unusual, written = bool(judged.said), judged.written
+        radial_in = self._reading(answers, written).radial_in
+        same = state.pending is not None and self._pending(state).radial_in == radial_in
+        if unusual and not same:
+            return Turn(replace(state, ask=Ask.CONFIRM, pending=written))
+        return self._answered(state, number, JointAnswer(written, confirmed=unusual))
 
     def _answered(self, state: State, number: int, answer: JointAnswer) -> Turn:
         answers = state.answers.with_joint(number, answer)
@@ -418,28 +412,18 @@ class Flow:
                 told.append(line((f"{column.replace('_', ' ')}: {error.message}: left out.", Tone.WARN)))
         for number, answer in answers.joints.items():
             reading = answers.reading(number)
-            judged = self._judged(number, reading)
-            judgement = judged.judgement
-            if (
-                reading is None
-                or judgement is Judgement.ACCEPT
-                or (judgement is Judgement.CONFIRM and answer.confirmed)
-            ):
+            if reading is None:
                 kept[number] = answer
                 continue
-            if judgement is Judgement.REFUSE:
-                told.extend(pages.refusal_lines(reading.written.text, number, judged.said))
-            told.append(
-                line(
-                    (f"#{number}  {reading.written.text} is {reading.radial_in:.4g} in radial: asked again.", Tone.WARN)
-                )
-            )
+            typed = reading.written.text
+            judged = judge(typed, number, reading.unit, reading.convention, self.gear)
+            if not judged.refused and (answer.confirmed or not judged.said):
+                kept[number] = answer
+                continue
+            if judged.refused:
+                told.extend(pages.refusal_lines(typed, number, judged.said))
+            told.append(line((f"#{number}  {typed} is {reading.radial_in:.4g} in radial: asked again.", Tone.WARN)))
         return replace(answers, joints=MappingProxyType(kept)), tuple(told)
-
-    def _judged(self, number: int, reading: Reading | None) -> Judged:
-        if reading is None:
-            return Judged(Judgement.ACCEPT)
-        return judge(reading.written.text, number, reading.unit, reading.convention, self.gear)
 
     def _back(self, state: State) -> Turn:
         if state.ask in (Ask.CONFIRM, Ask.CONFIRM_MORE):
@@ -507,8 +491,8 @@ def _contradictions(saved: Answers, given: Answers) -> str:
     )
 
 
-def _again(state: State, message: str, tone: Tone = Tone.WARN) -> Turn:
-    return Turn(state, (line((message, tone), indent=3),))
+def _again(state: State, message: str) -> Turn:
+    return Turn(state, (line((message, Tone.WARN), indent=3),))
 
 
 def _chosen(typed: str, short: Mapping[str, _T], parse: Callable[[str], _T], before: _T | None) -> _T | None:
