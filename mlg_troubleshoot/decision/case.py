@@ -83,6 +83,12 @@ class Cases:
         over: Mask = self.clearance_in > self.gear.limits_in + ROUNDING_IN
         return over
 
+    @property
+    def critical_missing(self) -> Mask:
+        """True for a gear of which a critical joint was not measured."""
+        missing: Mask = np.any(~self.measured & self.gear.critical, axis=1)
+        return missing
+
     def filled(self, unmeasured: Array | float) -> Array:
         """Clearances with something in place of those not measured. [in]"""
         return np.where(self.measured, self.clearance_in, unmeasured)

@@ -84,11 +84,10 @@ def _assess_valid(
     batch = predict_batch(cases)
     p_lower = batch.lower.probability_within(cases.margin_in, cases.margin_u_in)
     p_upper = batch.upper.probability_within(cases.margin_in, cases.margin_u_in)
-    missing = np.any(~cases.measured & np.array([joint.critical for joint in gear.joints]), axis=1)
     plunger = plunger_reading.compare(cases, batch.upper)
     verdicts = [
         Verdict.OUTSIDE_MARGIN if beyond else verdict(float(low), float(high), critical_missing=bool(absent))
-        for beyond, low, high, absent in zip(plunger.beyond, p_lower, p_upper, missing, strict=True)
+        for beyond, low, high, absent in zip(plunger.beyond, p_lower, p_upper, cases.critical_missing, strict=True)
     ]
     closes = np.isfinite(batch.lower.displacement_in)
     found = calibrated(cases, search(cases, batch.upper.displacement_in, batch.upper.u_clearances_in))

@@ -167,18 +167,16 @@ def advise(one: Cases) -> MeasuringAdvice:
     the worst case grows with every clearance, so nothing between can differ. A joint beyond its limit is found only
     by measuring it.
     """
-    gear, open_joints = one.gear, ~one.measured[0]
-    critical = np.array([joint.critical for joint in gear.joints])
-    ends = np.vstack([one.filled(0.0), one.filled(gear.limits_in)])
+    ends = np.vstack([one.filled(0.0), one.filled(one.gear.limits_in)])
     four = one.take(np.zeros(4, np.intp))
     # As it is, and as if both ends had been read.
-    read = np.vstack([one.measured, one.measured, np.ones((2, len(critical)), bool)])
+    read = np.vstack([one.measured, one.measured, np.ones_like(ends, bool)])
     prediction = four.predict(np.vstack([ends, ends]), read)
     p = prediction.probability_within(four.margin_in, four.margin_u_in)
-    now = verdict(float(p[0]), float(p[1]), critical_missing=bool(np.any(open_joints & critical)))
+    now = verdict(float(p[0]), float(p[1]), critical_missing=bool(one.critical_missing[0]))
     low, high = zone(float(p[2])), zone(float(p[3]))
     settled = low is high
-    if not open_joints.any():
+    if one.measured.all():
         precise = _can_precision_settle(one, now)
         certain = None if now is Verdict.INCONCLUSIVE else now
         return MeasuringAdvice((), not precise, now, float(p[0]), certain, _all_measured(now, precise))

@@ -87,17 +87,16 @@ class _Facts:
     @classmethod
     def of(cls, cases: Cases, judged: Judged, found: Search) -> _Facts:
         gear, measured, over = cases.gear, cases.measured, cases.over_limit
-        critical = np.array([joint.critical for joint in gear.joints])
         complaint = cases.failed | (judged.beyond & ~cases.retracted) | (over.any(axis=1) & ~cases.retracted)
         ahead = _Ahead.of(cases, judged)
-        open_critical = ~measured & critical
+        open_critical = ~measured & gear.critical
         candidates = np.where(open_critical.any(axis=1)[:, None], open_critical, ~measured)
         group = np.where(complaint[:, None], candidates, ahead.group(candidates))
         rest = ~measured & ~group
         read_first = _reading_is_quicker(gear, found, ahead, rest | group) | open_critical.any(axis=1)
         settled = (cases.failed & judged.clears) | judged.unexplained
         by_clearance = (judged.batch.chance_random > _OTHER_CAUSE) | judged.beyond | open_critical.any(axis=1)
-        after_limits = _verdicts_after_limits(cases, judged, critical)
+        after_limits = _verdicts_after_limits(cases, judged)
         again, again_u = _measure_again(cases, judged)
         sets, ends = _expected(cases, judged, ahead, complaint)
         worked_out = (complaint, settled, after_limits, group, rest, read_first, sets, ends, by_clearance)
@@ -254,13 +253,12 @@ class _Ahead:
         outside = 1.0 - below(self.outside_in)
         within = below(self.within_in - open_in)
         between = np.maximum(below(self.outside_in - open_in) - below(self.within_in), 0.0)
-        critical = np.array([joint.critical for joint in self.gear.joints])
-        chance: Array = outside + np.where((rest & critical).any(axis=1), 0.0, within + between)
+        chance: Array = outside + np.where((rest & self.gear.critical).any(axis=1), 0.0, within + between)
         return chance
 
     def group(self, candidates: Mask) -> Mask:
         """The joints to read in one round: the fewest, most telling a minute first, that likely settle the verdict."""
-        reach = self.slopes * self.gear.limits_in / np.array([joint.access.value for joint in self.gear.joints])
+        reach = self.slopes * self.gear.limits_in / self.gear.access_minutes
         # Rounded: both ends of one link tell alike, and rounding noise must not order them.
         order = np.argsort(np.where(candidates, -np.round(reach, 9), np.inf), axis=1, kind="stable")
         chosen, done = np.zeros_like(candidates), ~candidates.any(axis=1)
@@ -288,7 +286,7 @@ def _reading_is_quicker(gear: Gear, found: Search, ahead: _Ahead, unread: Mask) 
         [minutes[found.quickest(at_limit - np.clip(centre + z * scatter, 0.0, at_limit))] for z in _POINTS], axis=0
     )
     areas = [(area, np.array([joint.area == area.name for joint in gear.joints])) for area in gear.areas]
-    to_read = unread @ np.array([joint.access.value for joint in gear.joints])
+    to_read = unread @ gear.access_minutes
     for area, inside in areas:
         shared = np.where(now >= 0, (table.members[now] & inside).any(axis=1), False)
         to_read = to_read + np.where((unread & inside).any(axis=1) & ~shared, area.access.value, 0.0)
@@ -296,20 +294,18 @@ def _reading_is_quicker(gear: Gear, found: Search, ahead: _Ahead, unread: Mask) 
     return quicker
 
 
-def _verdicts_after_limits(cases: Cases, judged: Judged, critical: Mask) -> list[Verdict]:
+def _verdicts_after_limits(cases: Cases, judged: Judged) -> list[Verdict]:
     """The verdicts that stand once what is over its limit is restored."""
     verdicts = list(judged.verdicts)
     rows = np.flatnonzero(cases.over_limit.any(axis=1) & ~judged.beyond)
     if not len(rows):
         return verdicts
     some = cases.take(rows)
-    new = np.array([joint.new_part.value for joint in cases.gear.joints])
     p = []
-    for unread in (np.zeros(len(new)), cases.gear.limits_in):
-        after = np.where(some.over_limit, new, some.filled(unread))
-        found = some.predict(after)
+    for unread in (0.0, cases.gear.limits_in):
+        found = some.predict(np.where(some.over_limit, cases.gear.new_parts_in, some.filled(unread)))
         p.append(found.probability_within(some.margin_in, some.margin_u_in))
-    missing: Mask = np.any(~some.measured & critical, axis=1)
+    missing = some.critical_missing
     for k, row in enumerate(rows):
         verdicts[int(row)] = verdict(float(p[0][k]), float(p[1][k]), critical_missing=bool(missing[k]))
     return verdicts
@@ -334,8 +330,7 @@ def _measure_again(cases: Cases, judged: Judged) -> tuple[Mask, Array]:
     for better in BETTER_GAUGES_IN:
         eligible = some.measured & ~some.own_gauge & (some.gauge_u_in > better)
         worth = np.where(eligible, slopes**2 * (some.gauge_u_in**2 - better**2), 0.0)
-        minutes = np.array([joint.access.value for joint in cases.gear.joints])
-        order = np.argsort(-np.round(worth / minutes, 12), axis=1, kind="stable")
+        order = np.argsort(-np.round(worth / cases.gear.access_minutes, 12), axis=1, kind="stable")
         again = np.zeros_like(eligible)
         for place in range(eligible.shape[1]):
             joint = order[:, place]

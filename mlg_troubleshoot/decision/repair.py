@@ -98,16 +98,14 @@ def _surest(table: Subsets, slack_in: Array, among: Mask) -> NDArray[np.intp]:
 
 def removable(cases: Cases) -> Mask:
     """Joints that can be restored with a gain: measured, and worn beyond a new part."""
-    new = np.array([joint.new_part.value for joint in cases.gear.joints])
-    return cases.measured & (cases.filled(0.0) > new + _AS_NEW_IN)
+    return cases.measured & (cases.filled(0.0) > cases.gear.new_parts_in + _AS_NEW_IN)
 
 
 def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
     """Judge all subsets of all gears by the second-order expansion, anchored at the exact worst case `worst_in`."""
     table, linkages = subsets_of(cases.gear), responses(cases.gear)
-    new = np.array([joint.new_part.value for joint in cases.gear.joints])
     worn, now = removable(cases), cases.filled(cases.gear.limits_in)
-    less = np.where(worn, now - new, 0.0)
+    less = np.where(worn, now - cases.gear.new_parts_in, 0.0)
     over = cases.over_limit
     # A subset may hold no joint that gains nothing and must hold every joint over its limit.
     barred = (~worn).astype(float) @ table.weights.T + over.astype(float) @ (1.0 - table.weights.T) > 0.0
@@ -189,10 +187,9 @@ def calibrated(cases: Cases, found: Search) -> Search:
 
 def _restored(cases: Cases, rows: NDArray[np.intp], places: NDArray[np.intp]) -> tuple[Prediction, Array]:
     """The exact prediction of some gears, each with one subset restored, and its probability."""
-    new = np.array([joint.new_part.value for joint in cases.gear.joints])
     some = cases.take(rows)
     now = some.filled(cases.gear.limits_in)
-    after = np.where(subsets_of(cases.gear).members[places], np.minimum(now, new), now)
+    after = np.where(subsets_of(cases.gear).members[places], np.minimum(now, cases.gear.new_parts_in), now)
     found = some.predict(after)
     return found, found.probability_within(some.margin_in, some.margin_u_in)
 

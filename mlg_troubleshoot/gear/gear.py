@@ -159,6 +159,21 @@ class Gear:
         """Largest allowed radial clearance of each joint, shape (n_joints,). [in]"""
         return np.array([joint.limit.value for joint in self.joints])
 
+    @property
+    def new_parts_in(self) -> np.ndarray:
+        """Radial clearance of each joint with a new part. [in]"""
+        return np.array([joint.new_part.value for joint in self.joints])
+
+    @property
+    def access_minutes(self) -> np.ndarray:
+        """How long each joint takes to reach and measure once its area is open. [min]"""
+        return np.array([joint.access.value for joint in self.joints])
+
+    @property
+    def critical(self) -> np.ndarray:
+        """Which joints no gear can be cleared without."""
+        return np.array([joint.critical for joint in self.joints])
+
     @cached_property
     def alike(self) -> dict[int, tuple[int, ...]]:
         """Joints that act alike with each joint: the other end of the same link, by structure."""

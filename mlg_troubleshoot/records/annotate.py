@@ -17,7 +17,7 @@ from mlg_troubleshoot.records.cells import column_letters, writable
 from mlg_troubleshoot.records.columns import Field, Kind
 from mlg_troubleshoot.records.model import ReadResult, SheetLayout
 from mlg_troubleshoot.records.refusals import FileRefusedError
-from mlg_troubleshoot.records.template import FONT
+from mlg_troubleshoot.records.template import FONT, HEADER_FILL
 from mlg_troubleshoot.units import LengthUnit
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from openpyxl.worksheet.worksheet import Worksheet
 
 _BAD_FILL = "FFFFB3B3"
-_HEADER_FILL = "FFD9E2EC"
 _OVER_FILL = "FFFFD08A"
 _VERDICT_FILLS = {"WITHIN_MARGIN": "FFC9E7CB", "OUTSIDE_MARGIN": "FFF4A3A0", "INVALID": "FFF4A3A0"}
 _UNDECIDED_FILL = "FFFFEB9C"
@@ -231,7 +230,7 @@ def _behind_table(sheet: Worksheet, layout: SheetLayout, free: int, own: Verdict
         cell = sheet.cell(layout.header_row, column)
         _put(cell, header)
         cell.font = Font(name=FONT, bold=True)
-        _fill(cell, _HEADER_FILL)
+        _fill(cell, HEADER_FILL)
         cell.alignment = Alignment(wrap_text=True, vertical="center")
         found = {s.row: v[header] for s, v in own.items() if s.row is not None and v.get(header) is not None}
         longest = max((len(v) for v in found.values() if isinstance(v, str)), default=0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import io
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,12 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mlg_troubleshoot.errors import Problem
-from mlg_troubleshoot.outputs import write_bytes, write_csv
+from mlg_troubleshoot.outputs import write_csv
 from mlg_troubleshoot.records.cells import Cell, column_letters, quote
 from mlg_troubleshoot.records.model import ReadOptions
 from mlg_troubleshoot.records.read import load_bytes, open_book
 from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.source import NumberedRow
+from mlg_troubleshoot.records.template import write_book
 from mlg_troubleshoot.records.values import CellFaultError, read_choice, read_number, read_text
 from mlg_troubleshoot.studies.survey_readings import Kind, Reading, SurveyedLinkage, default_u
 from mlg_troubleshoot.units import LengthUnit
@@ -85,9 +85,7 @@ def write_survey_template(
     sheet.column_dimensions[column_letters(len(COLUMNS) - 1)].width = 100
     sheet.freeze_panes = "D2"
     _sketch(book.create_sheet("Sketch"), linkage)
-    buffer = io.BytesIO()
-    book.save(buffer)
-    write_bytes(path, buffer.getvalue())
+    write_book(path, book)
 
 
 def _sketch(sheet: Worksheet, linkage: SurveyedLinkage) -> None:

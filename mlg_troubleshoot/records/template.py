@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 JointLine = tuple[int, str, str]
 
 _ROWS = 500
-# The font of what this program writes into workbooks.
+# The font and the colour of headers of what this program writes into workbooks.
 FONT = "Calibri"
+HEADER_FILL = "FFD9E2EC"
 _LINE_PT = 15.0
-_HEADER_FILL = "FFD9E2EC"
 _REQUIRED_FILL = "FFFFE9A8"
 _TEXT_KINDS = frozenset({Kind.RECORD_ID, Kind.TAIL_NO, Kind.GAUGE_ID, Kind.TECHNICIAN_ID, *CARRIED})
 _MUST = frozenset({Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE, Kind.CONVENTION})
@@ -97,6 +97,10 @@ def write_template(path: str | Path, joints: Sequence[JointLine], *, unit: Lengt
     _table(book, joints, unit)
     _form(book, joints)
     book.active = 1
+    write_book(path, book)
+
+
+def write_book(path: str | Path, book: Workbook) -> None:
     buffer = io.BytesIO()
     book.save(buffer)
     write_bytes(path, buffer.getvalue())
@@ -175,7 +179,7 @@ def _table(book: Workbook, joints: Sequence[JointLine], unit: LengthUnit) -> Non
         letters = column_letters(index)
         cell = sheet.cell(1, index + 1, field.name)
         cell.font = Font(name=FONT, bold=True)
-        cell.fill = PatternFill("solid", fgColor=_REQUIRED_FILL if field.kind in _MUST else _HEADER_FILL)
+        cell.fill = PatternFill("solid", fgColor=_REQUIRED_FILL if field.kind in _MUST else HEADER_FILL)
         cell.alignment = Alignment(wrap_text=True, vertical="center", horizontal="center")
         cell.border = Border(bottom=line, right=line)
         cell.comment = Comment(_explain(field, joints), "mlg", width=320, height=120)

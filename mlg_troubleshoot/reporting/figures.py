@@ -229,10 +229,10 @@ class Plot:
             y1 - (y - self.y.low) / (self.y.high - self.y.low) * (y1 - y0),
         )
 
-    def draw_axes(self, x_ticks: int = 6, y_ticks: int = 5, names: Sequence[str] = ()) -> None:
+    def draw_axes(self, x_ticks: int = 6, names: Sequence[str] = ()) -> None:
         """Draw grid, ticks, frame and labels; names take the place of numbers on the horizontal axis."""
         x0, y0, x1, y1 = self.area
-        ticks = nice_ticks(self.y.low, self.y.high, y_ticks)
+        ticks = nice_ticks(self.y.low, self.y.high)
         for value in ticks:
             _, y = self.at(self.x.low, value)
             self.canvas.line(x0, y, x1, y, colour=PALE)

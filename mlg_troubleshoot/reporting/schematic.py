@@ -33,6 +33,7 @@ class Schematic:
     exaggeration: int | None
 
 
+_WIDTH = 690.0
 _MARKER = 9.5
 _LONGEST_ARROW = 42.0
 # One scale for most reports, so that their drawings compare.
@@ -53,20 +54,20 @@ Segment = tuple[Place, Place]
 _At = Callable[[str], Place]
 
 
-def schematic(gear: Gear, assessment: Assessment, lengths: Lengths | None = None, width: float = 690.0) -> Schematic:
+def schematic(gear: Gear, assessment: Assessment, lengths: Lengths | None = None, width: float = _WIDTH) -> Schematic:
     """Draw the linkage at mid-position, its joints numbered in place and their clearances exaggerated."""
     over = (assessment.over_travel_in or 0.0) >= -(assessment.under_travel_in or 0.0)
     directions = assessment.over_directions_rad if over else assessment.under_directions_rad
     return _drawn(gear, assessment.joints, directions, lengths or Lengths(), width)
 
 
-def blank_schematic(gear: Gear, width: float = 690.0) -> Schematic:
+def blank_schematic(gear: Gear) -> Schematic:
     """Draw the linkage with its joints numbered and named, none of them measured yet."""
     nothing = tuple(
         JointFinding(j.number, j.name, None, j.limit.value, False, None, 0.0, 0.0, 0.0, j.number, (1, 1), ())
         for j in gear.joints
     )
-    return _drawn(gear, nothing, (), Lengths(), width)
+    return _drawn(gear, nothing, (), Lengths(), _WIDTH)
 
 
 def _drawn(

@@ -197,7 +197,7 @@ def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
     gears = np.repeat(np.arange(2 * TAILS), VISITS)
     day = np.sort(rng.uniform(0.0, 730.0, (2 * TAILS, VISITS)), axis=1).ravel()
     landings = rng.uniform(500.0, 6000.0, 2 * TAILS)[gears] + 2.5 * day
-    limits = np.array([joint.limit.value for joint in gear.joints])
+    limits = gear.limits_in
     wear = rng.lognormal(0.0, 0.4, (2 * TAILS, len(limits)))[gears] * limits * landings[:, None] / 8000.0
     clearance = np.abs(wear + DEFAULT_GAUGE_U_IN * rng.standard_normal(wear.shape))
     clearance[:, [joint not in joints for joint in gear.joint_numbers]] = np.nan

@@ -40,14 +40,9 @@ def line(*parts: str | tuple[str, Tone], indent: int = 1, rigid: bool = False) -
     return Line(tuple((p, Tone.PLAIN) if isinstance(p, str) else p for p in parts), indent, rigid)
 
 
-def key(name: str, meaning: str) -> tuple[tuple[str, Tone], ...]:
-    return ((name, Tone.KEY), (f" = {meaning}", Tone.PLAIN))
-
-
 def keys(*pairs: tuple[str, str]) -> Line:
+    """Make a line of keys and what each does."""
     parts: list[tuple[str, Tone]] = []
-    for i, (name, meaning) in enumerate(pairs):
-        if i:
-            parts.append(("   ", Tone.PLAIN))
-        parts.extend(key(name, meaning))
-    return Line(tuple(parts))
+    for name, meaning in pairs:
+        parts += [(name, Tone.KEY), (f" = {meaning}", Tone.PLAIN), ("   ", Tone.PLAIN)]
+    return Line(tuple(parts[:-1]))

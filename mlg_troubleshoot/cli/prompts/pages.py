@@ -57,6 +57,10 @@ def length(length_in: float, unit: LengthUnit | None) -> str:
     return " = ".join(f"{u.shown(length_in)} {u}" for u in _units_shown(unit))
 
 
+def choice(key: str, meaning: str) -> Line:
+    return line((key, Tone.KEY), f" {meaning}", indent=3)
+
+
 def rule(title: str, width: int) -> Line:
     rest = max(width - len(title) - 6, 0)
     return line(("── ", Tone.QUIET), (title, Tone.STRONG), (f" {'─' * rest}", Tone.QUIET), rigid=True)
@@ -94,18 +98,15 @@ def unit_page(answers: Answers) -> Page:
     shown = (
         BLANK,
         line("Unit of your readings?"),
-        line(("i", Tone.KEY), " inch          for example .013", indent=3),
-        line(("t", Tone.KEY), " thou          for example 13", indent=3),
-        line(("m", Tone.KEY), " millimetre    for example 0.33", indent=3),
+        choice("i", "inch          for example .013"),
+        choice("t", "thou          for example 13"),
+        choice("m", "millimetre    for example 0.33"),
     )
     return Page(shown, f" Unit{_keeps(answers.unit)} > ")
 
 
 def convention_page(answers: Answers) -> Page:
-    choices = (
-        line((c.value[0].lower(), Tone.KEY), f" {c.value.replace('_', ' '):<13} {c.meaning}", indent=3)
-        for c in ClearanceConvention
-    )
+    choices = (choice(c[0].lower(), f"{c.replace('_', ' '):<13} {c.meaning}") for c in ClearanceConvention)
     kept = None if answers.convention is None else CONVENTION_NAMES[answers.convention]
     return Page((BLANK, line("What is your reading?"), *choices, FACTOR_TWO), f" Reading is{_keeps(kept)} > ")
 
@@ -117,8 +118,8 @@ def reread_page(answers: Answers, old: LengthUnit) -> Page:
     shown = (
         BLANK,
         line((f"{count} {were} typed as {UNIT_NAMES[old]}, to be read as {new}?", Tone.WARN)),
-        line(("y", Tone.KEY), f" yes, {they} had {new} all along", indent=3),
-        line(("n", Tone.KEY), f" no, {UNIT_NAMES[old]} stay; only the next readings are {new}", indent=3),
+        choice("y", f"yes, {they} had {new} all along"),
+        choice("n", f"no, {UNIT_NAMES[old]} stay; only the next readings are {new}"),
     )
     return Page(shown, " y or n > ")
 
@@ -131,8 +132,8 @@ def offer_page(saved: Session, gear: Gear) -> Page:
             f"begun {saved.started:%Y-%m-%d %H:%M}, {len(saved.answers.radial_in)} of {len(gear.joints)} joints "
             "measured.",
         ),
-        line(("y", Tone.KEY), " go on with it", indent=3),
-        line(("n", Tone.KEY), " begin a new one and put the old one away", indent=3),
+        choice("y", "go on with it"),
+        choice("n", "begin a new one and put the old one away"),
     )
     return Page(shown, " Go on with it? y or n > ")
 
@@ -163,17 +164,11 @@ def joint_page(
 
 def confirm_page(gear: Gear, reading: Reading, number: int, unit: LengthUnit | None) -> Page:
     limit = length(gear.joint(number).limit.value, unit)
+    said = judge(reading.written.text, number, reading.unit, reading.convention, gear).said
     shown = (
         line((f"#{number}  {length(reading.radial_in, unit)} radial is far beyond the limit of {limit}.", Tone.WARN)),
-        line(
-            in_unit(judge(reading.written.text, number, reading.unit, reading.convention, gear).said, reading.unit),
-            indent=3,
-        ),
-        line(
-            ("y", Tone.KEY),
-            f" yes, it is really {length(reading.as_read_in, unit)} {CONVENTION_NAMES[reading.convention]}",
-            indent=3,
-        ),
+        line(in_unit(said, reading.unit), indent=3),
+        choice("y", f"yes, it is really {length(reading.as_read_in, unit)} {CONVENTION_NAMES[reading.convention]}"),
         line(("or type the value again", Tone.QUIET), indent=3),
     )
     return Page(shown, f" #{number} y, or the value again > ")

@@ -79,19 +79,12 @@ def _numbers(a: Assessment) -> Iterator[str]:
         yield f"Unmeasured joints count as tight in these numbers; with them at their limit the worst case is: {upper}."
 
 
-def _clearance(f: JointFinding, screen: DataConsole) -> str:
-    return "unmeasured" if f.clearance_in is None else screen.length(f.clearance_in)
-
-
 def _short_table(a: Assessment, screen: DataConsole) -> Table:
     table = plain_table(screen)
     for heading in ("", "inspect in this order", f"clearance {screen.unit}", f"limit {screen.unit}", "contributes"):
         table.add_column(heading, justify="left" if heading.startswith("inspect") else "right", no_wrap=True)
     for f in a.ranked[:_JOINTS]:
-        part = "-" if f.contribution_in is None else screen.length(f.contribution_in)
-        name = f"#{f.joint} {f.name}" + (" OVER LIMIT" if f.over_limit else "")
-        style = "bold" if f.over_limit else ""
-        table.add_row(str(f.rank), name, _clearance(f, screen), screen.length(f.limit_in), part, style=style)
+        table.add_row(*_joint_cells(f, screen)[:5], style="bold" if f.over_limit else "")
     return table
 
 
@@ -143,7 +136,7 @@ def _joint_cells(f: JointFinding, screen: DataConsole) -> tuple[str, ...]:
     return (
         str(f.rank),
         f"#{f.joint} {f.name}" + (" OVER LIMIT" if f.over_limit else ""),
-        _clearance(f, screen),
+        "unmeasured" if f.clearance_in is None else screen.length(f.clearance_in),
         screen.length(f.limit_in),
         "-" if f.contribution_in is None else screen.length(f.contribution_in),
         f"{f.first_order:.3f}",
