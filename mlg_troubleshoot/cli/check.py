@@ -213,8 +213,8 @@ def _result(files: Sequence[str], flags: Flags, asked: task.CheckOptions, *, qui
         return task.check_files(
             [Path(name) for name in files],
             asked,
-            on_read=lambda done, total: bar("Reading", done, total),
-            on_judged=lambda done, total: bar("Judging", done, total),
+            on_read=partial(bar, "Reading"),
+            on_judged=partial(bar, "Judging"),
         )
 
 
@@ -290,7 +290,7 @@ def _write_reports(
             directory,
             wanted,
             str(shown.page),
-            on_written=lambda done, total: bar("Writing reports", done, total),
+            on_written=partial(bar, "Writing reports"),
             unit=shown.show,
             before=before,
         )

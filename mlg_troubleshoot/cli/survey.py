@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -73,7 +74,7 @@ def survey(
     options.keep_inputs(gear, [file, inspections], [("--write", write)], report)
     with stages(quiet=quiet) as bar:
         result = task.survey_gear(
-            file, gear, write=write, inspections=inspections, seed=seed, told=lambda *done: bar("Fitting", *done)
+            file, gear, write=write, inspections=inspections, seed=seed, told=partial(bar, "Fitting")
         )
     if as_json:
         output.write_json(task.survey_values(result))

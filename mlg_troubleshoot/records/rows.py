@@ -7,6 +7,7 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import PurePath
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -41,7 +42,7 @@ from mlg_troubleshoot.units import UNIT_SPELLINGS, ClearanceConvention, LengthUn
 _T = TypeVar("_T")
 
 _EPS_IN = 1e-9
-_CACHE_LIMIT = 20_000
+_REMEMBERED = 20_000
 _NO_FLOATS: Mapping[int, float] = MappingProxyType({})
 
 _SIDES = {
@@ -110,20 +111,18 @@ class RowReader:
         self._clearances = sorted(
             (field.number or 0, index, field.unit) for index, field in good if field.kind is Kind.CLEARANCE
         )
-        self._lengths = [
-            (index, field) for index, field in good if field.kind in LENGTHS and field.kind is not Kind.CLEARANCE
-        ]
+        self._lengths = {
+            index: field for index, field in good if field.kind in LENGTHS and field.kind is not Kind.CLEARANCE
+        }
         # The readings of a fleet repeat: what was understood once is not taken apart again.
-        self._known_lengths: dict[tuple[int, LengthUnit | None, Cell], float] = {}
+        self._clearance_of = lru_cache(_REMEMBERED)(self._one_clearance)
+        self._length_of = lru_cache(_REMEMBERED)(self._one_length)
         self._others = [(index, field.kind) for index, field in good if field.kind in _OTHERS]
         # In these cells a word says that nothing was measured; a margin or an identity is never left out by a word.
         self._blankable = [index for index, field in good if field.kind not in _NEVER_BLANK]
         self.not_measured: Counter[str] = Counter()
         self._carried = [(index, field.kind.value) for index, field in good if field.kind in CARRIED]
         self._unknown = self._unknown_names(placed)
-        self._cache: dict[
-            tuple[LengthUnit | None, ClearanceConvention], dict[Cell, tuple[float, EnteredClearance, bool]]
-        ] = {}
         self._without_unit: set[str | None] = set()
         self._row = 0
         self._places: Sequence[tuple[int, str]] | None = None
@@ -314,7 +313,7 @@ class RowReader:
 
     def _check_headers_agree(self, unit: LengthUnit) -> None:
         """Refuse a row whose unit is not the one that a header with something below it states."""
-        stated = [(index, u) for _, index, u in self._clearances] + [(i, f.unit) for i, f in self._lengths]
+        stated = [(index, u) for _, index, u in self._clearances] + [(i, f.unit) for i, f in self._lengths.items()]
         for index, header_unit in stated:
             if header_unit is not None and header_unit is not unit and self._cells[index] is not None:
                 raise CellFaultError(
@@ -335,21 +334,11 @@ class RowReader:
             cell = cells[index]
             if cell is None:
                 continue
-            key = (unit or row_unit, scale)
-            cache = self._cache.get(key)
-            if cache is None:
-                cache = self._cache[key] = {}
-            known = cache.get(cell)
-            if known is None:
-                try:
-                    known = self._one_clearance(cell, unit, row_unit, scale)
-                except CellFaultError as fault:
-                    self._fault(index, fault)
-                    continue
-                if len(cache) > _CACHE_LIMIT:
-                    cache.clear()
-                cache[cell] = known
-            radial_in, text, confirm = known
+            try:
+                radial_in, text, confirm = self._clearance_of(cell, unit, row_unit, scale)
+            except CellFaultError as fault:
+                self._fault(index, fault)
+                continue
             clearance[joint] = radial_in
             entered[joint] = text
             if confirm:
@@ -418,25 +407,19 @@ class RowReader:
         readings: list[tuple[int, float]] = []
         floats: dict[int, float] = {}
         gauge_us: dict[int, float] = {}
-        known = self._known_lengths
-        for index, field in self._lengths:
+        for index, field in self._lengths.items():
             cell = self._cells[index]
             if cell is None:
                 continue
             kind = field.kind
-            value_in = known.get((index, row_unit, cell))
-            if value_in is None:
-                try:
-                    value_in = self._one_length(cell, field, row_unit)
-                except CellFaultError as fault:
-                    if kind in VERDICT_BEARING:
-                        self._fault(index, fault)
-                    else:
-                        self._faults.append((index, fault))
-                    continue
-                if len(known) > _CACHE_LIMIT:
-                    known.clear()
-                known[index, row_unit, cell] = value_in
+            try:
+                value_in = self._length_of(index, cell, row_unit)
+            except CellFaultError as fault:
+                if kind in VERDICT_BEARING:
+                    self._fault(index, fault)
+                else:
+                    self._faults.append((index, fault))
+                continue
             if kind is Kind.PLUNGER_DISPLACEMENT:
                 readings.append((field.number or 1, value_in))
             elif kind is Kind.GAUGE_U and field.number is not None:
@@ -461,7 +444,8 @@ class RowReader:
             warnings.append(f"gauge uncertainty of joint {', '.join(idle)} is not used: the joint has no reading")
         return {joint: u / convention.per_radial for joint, u in gauge_us.items() if joint in clearance}
 
-    def _one_length(self, cell: str | float | OddCell, field: Field, row_unit: LengthUnit | None) -> float:
+    def _one_length(self, index: int, cell: str | float | OddCell, row_unit: LengthUnit | None) -> float:
+        field = self._lengths[index]
         most = self._options.plunger_hard_max_in
         low, high = LENGTH_RANGE_IN.get(field.kind, (-most, most))
         unit = field.unit or row_unit or LengthUnit.INCH
