@@ -98,5 +98,6 @@ def _distinct(shapes: list[tuple[Array, tuple[str, ...]]], catalogue: Array, smo
     centred = (varying - varying.mean(axis=0)) / size[size > 0]
     own = (columns - columns.mean(axis=0)) / np.std(columns, axis=0)
     alike = np.max(np.abs(own.T @ centred) / n, axis=1) if centred.shape[1] else np.zeros(len(kept))
-    use = alike < 0.97
+    # With few rows all may look like a candidate: then the least alike one is asked.
+    use = alike < max(0.97, 1.000001 * float(np.min(alike, initial=1.0)))
     return Bank(columns[:, use], tuple(v for (_, v), u in zip(kept, use, strict=True) if u), smooth)

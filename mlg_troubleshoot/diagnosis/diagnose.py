@@ -12,13 +12,14 @@ from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
+from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.bank import build_bank
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
 from mlg_troubleshoot.diagnosis.extension import Term
-from mlg_troubleshoot.diagnosis.faults import DataFault, screen_faults
+from mlg_troubleshoot.diagnosis.faults import LEAST_ALONG, DataFault, screen_faults
 from mlg_troubleshoot.diagnosis.gain import Gain, measure_gain
 from mlg_troubleshoot.diagnosis.inference import Finding, infer
 from mlg_troubleshoot.diagnosis.noise import (
@@ -34,7 +35,6 @@ from mlg_troubleshoot.diagnosis.screen import shrunk
 from mlg_troubleshoot.diagnosis.simulation.result import Verdict
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.errors import InconclusiveDataError
-from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.units import MM_PER_IN
@@ -81,6 +81,11 @@ class NamedCause(Term):
         return float(np.sqrt(np.mean(self.effect_in**2)))
 
     @property
+    def predicts(self) -> bool:
+        """True if the model can be extended by it: it is about the gear, and some joint's share of it is known."""
+        return self.candidate.cause.extends and bool(self.candidate.setting.get("factors", True))
+
+    @property
     def parameters(self) -> dict[str, float | str]:
         """The parameters as a person reads them, with the date of a change or the exponent of wear."""
         fixed = self.candidate.setting
@@ -115,6 +120,8 @@ class Diagnosis:
         Columns that an effect outside the catalogue moves with.
     not_testable : tuple of (str, str)
         Causes and the column that each lacks.
+    unsaid : tuple of str
+        Statements that so few rows or gears cannot carry.
     ruled_out : tuple of (str, str or None)
         Rivals that explain clearly less.
     faults, corrected : tuple of DataFault
@@ -160,6 +167,7 @@ class Diagnosis:
     also_possible: tuple[NamedCause, ...]
     unlisted_variables: tuple[str, ...]
     not_testable: tuple[tuple[str, str], ...]
+    unsaid: tuple[str, ...]
     ruled_out: tuple[tuple[str, str | None], ...]
     faults: tuple[DataFault, ...]
     corrected: tuple[DataFault, ...]
@@ -238,9 +246,12 @@ def diagnose(
         plain, faults = _without_faults(model, table, where, None)
         catalogue = (*CATALOGUE, *own_causes)
         table = plain.scene.table
-        testable = [cause for cause in catalogue if set(cause.needs) <= set(table.columns)]
+        # What never varies cannot be told from a linkage of other dimensions.
+        same = {name for name, values in table.quantities.items() if len(np.unique(values[np.isfinite(values)])) < 2}
+        told = set(table.columns) - same
+        testable = [cause for cause in catalogue if set(cause.needs) <= told]
         blind = [cause for cause in catalogue if cause not in testable]
-        not_testable = tuple((c.name, next(n for n in c.needs if n not in table.columns)) for c in blind)
+        not_testable = tuple((c.name, next(n for n in c.needs if n not in told)) for c in blind)
         rng = np.random.default_rng(seed)
         case = _infer(plain, (testable, blind), ensemble, permutations, rng, progress)
         if case.finding.fit is not None:
@@ -308,7 +319,7 @@ def _infer(
     candidates = [c for c, keep in zip(candidates, moving, strict=True) if keep]
     columns = columns[:, moving]
     blocks = [b for cause in testable if isinstance(cause, JointFactors) for b in cause.blocks(scene, ensemble)]
-    _comparable(table.measured_in, scene.over_in, blocks)
+    _comparable(table.measured_in, scene.over_in, ~table.along, blocks)
     misfit = table.measured_in - scene.over_in
     rows = Rows(
         scene.over_in,
@@ -317,6 +328,7 @@ def _infer(
         plain.u_filled_in,
         plain.u_shared_in,
         plain.unread_in,
+        plain.along_in,
         plain.u_read_in,
         measured_uncertainty(table),
         plain.drawn_in,
@@ -335,14 +347,15 @@ def _infer(
 
 
 def _answerable(table: DiagnosisTable) -> DiagnosisTable:
-    """Keep the rows with a reading and at least one clearance; refuse a table without them."""
+    """Keep the rows with a reading and, at mid-position, at least one clearance; refuse a table without them."""
     measured = np.isfinite(table.measured_in)
     if not measured.any():
         raise InconclusiveDataError(
             "no row has a measured plunger displacement, so there is nothing to compare the prediction with",
-            "Record plunger_displacement_in at mid-position, twice or three times, with every inspection.",
+            "Record plunger_displacement_in at mid-position, twice or three times, with every inspection, or "
+            "plunger_position_in along the stroke with actuator_extension_in.",
         )
-    some = np.isfinite(table.clearance_in).any(axis=1)
+    some = np.isfinite(table.clearance_in).any(axis=1) | table.along
     if not (measured & some).any():
         raise InconclusiveDataError(
             "no row with a measured displacement has a clearance, so nothing can be predicted",
@@ -362,8 +375,11 @@ def _single_slips(faults: tuple[DataFault, ...], read: int) -> None:
         )
 
 
-def _comparable(measured_in: Array, predicted_in: Array, blocks: Sequence[Block]) -> None:
+def _comparable(measured_in: Array, predicted_in: Array, at_mid: NDArray[np.bool_], blocks: Sequence[Block]) -> None:
     """Refuse measured displacements that cannot be what the prediction is of: sign, unit, or a gauge that is stuck."""
+    measured_in, predicted_in = measured_in[at_mid], predicted_in[at_mid]
+    if not len(measured_in):
+        return
     if np.ptp(measured_in) == 0.0:
         raise InconclusiveDataError(
             "every measured plunger displacement is the same, which no gauge that moves shows",
@@ -373,7 +389,8 @@ def _comparable(measured_in: Array, predicted_in: Array, blocks: Sequence[Block]
     ratio = float(np.median(measured_in[large] / np.maximum(predicted_in[large], 1e-9)))
     if 1.0 / _MOST_RATIO < ratio < _MOST_RATIO or not np.any(predicted_in > 0.0):
         return
-    if blocks and _explained_by_clearances(measured_in, predicted_in, blocks[0].columns, _SIGN_SLIP < ratio < 0.0):
+    contribution_in = blocks[0].columns[at_mid] if blocks else np.empty(0)
+    if blocks and _explained_by_clearances(measured_in, predicted_in, contribution_in, _SIGN_SLIP < ratio < 0.0):
         return
     check = "Check the unit and the convention of the clearances, and that the gauge moves with the plunger."
     if ratio <= -1.0 / _MOST_RATIO:
@@ -406,7 +423,22 @@ def _explained_by_clearances(
     return bool(unexplained < _CLEARLY_LESS * min(np.mean(one**2, axis=0).min(), constant))
 
 
+def _unsaid(table: DiagnosisTable) -> tuple[str, ...]:
+    """What a table cannot say that only a curve along the stroke keeps from being refused."""
+    found = []
+    if len(np.unique(table.tails)) < LEAST_TAILS:
+        found.append(
+            f"With fewer than {LEAST_TAILS} aircraft it cannot be said whether other gears do the same, nor where this "
+            "plunger rod should be rigged; what is gained is told on rows of the same gears."
+        )
+    if len(table) < LEAST_ROWS:
+        found.append(f"With fewer than {LEAST_ROWS} rows small effects stay unseen, and scatter is a rough guess.")
+    return tuple(found)
+
+
 def _enough(table: DiagnosisTable) -> None:
+    if np.count_nonzero(table.along) >= LEAST_ALONG:
+        return
     if len(table) < LEAST_ROWS:
         raise InconclusiveDataError(
             f"{len(table)} usable rows are too few: a cause would be a guess",
@@ -441,7 +473,7 @@ def _report(  # noqa: PLR0913 - everything that a diagnosis says
     read = np.isfinite(table.clearance_in)
     seen = np.asarray(read.any(axis=0))
     latent = np.where(seen, 0.0, case.plain.scene.clearance_in)
-    raw = worst_of_sense(model, np.where(read, table.clearance_in, latent))[0]
+    raw = predicted(model, table, np.where(read, table.clearance_in, latent))[0]
     raw_misfit = table.measured_in - raw
     gain = _gain(case, rng) if finding.verdict is Verdict.NAMED and finding.fit is not None else None
     left = misfit if gain is None else misfit - case.explained
@@ -454,11 +486,12 @@ def _report(  # noqa: PLR0913 - everything that a diagnosis says
         else (),
         unlisted_variables=finding.variables,
         not_testable=not_testable,
+        unsaid=_unsaid(table),
         ruled_out=finding.ruled_out,
         faults=faults,
         corrected=_corrected(model, table, named if finding.verdict is Verdict.NAMED else ()),
         rows_read=rows_read,
-        rows_used=len(table),
+        rows_used=len(set(table.record_id)),
         unread=tuple(n for n, some in zip(model.joint_numbers, seen, strict=True) if not some),
         unread_in=float(np.mean(case.plain.scene.contribution_in[:, ~seen].sum(axis=1))),
         unread_u_in=float(np.sqrt(np.mean(np.sum(case.plain.unread_in**2, axis=1)))),
@@ -468,7 +501,7 @@ def _report(  # noqa: PLR0913 - everything that a diagnosis says
         repeatability_source=source,
         smallest_rms_in=finding.smallest_rms_in,
         gain=gain,
-        terms=() if gain is None else tuple(cause for cause in named if cause.candidate.cause.extends),
+        terms=() if gain is None else tuple(cause for cause in named if cause.predicts),
         residual_u_in=float(np.std(left)),
         expected_scatter_in=_expected_scatter(model, table, repeatability),
         remainder_p=finding.remainder_p,
@@ -486,7 +519,9 @@ def _report(  # noqa: PLR0913 - everything that a diagnosis says
 def _gain(case: _Case, rng: np.random.Generator) -> Gain:
     """What the extension gains on tails that it was not fitted to, on rows if it is about one tail."""
     finding, table = case.finding, case.plain.scene.table
-    by_row = any(case.candidates[k].cause.of_one_tail(case.candidates[k]) for k in finding.chosen)
+    by_row = len(np.unique(table.tails)) < LEAST_TAILS or any(
+        case.candidates[k].cause.of_one_tail(case.candidates[k]) for k in finding.chosen
+    )
     held = case.columns[:, list(finding.chosen)]
     return measure_gain(finding.noise, held, case.misfit, case.predicted, table, by_row, rng, finding.block)
 

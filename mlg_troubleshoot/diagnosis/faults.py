@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.noise import robust_scale
 from mlg_troubleshoot.diagnosis.sides import swapped_sides
-from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.diagnosis.table import ALONG, DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import fleet_history
-from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.units import SLIPS
 
@@ -26,6 +26,9 @@ Array = NDArray[np.float64]
 # Evidence of a slip: set in 2026 on slips in fleets of the study's tuning seeds, at most 0.3 false ones per 1,000 rows;
 # less evidence finds more swaps of joints that are worn alike, and repairs sound rows. Not re-tuned.
 
+# Degree of the curve along the stroke, rounds to fit it without slips, and rows from which there is one.
+_BEND, _BEND_ROUNDS = 6, 4
+LEAST_ALONG = 8
 # Misfit by which a row must stand out, and within which its correction must bring it, in scatters of a row.
 _FAR = 5.5
 _NEAR = 3.0
@@ -46,6 +49,8 @@ _ROW_ALONE = 30.0
 _READING_EVIDENCE = 3.0
 # Readings that repeat each other lie no further apart [in]; no plunger goes further [in]; largest clearance meant [in].
 _AGREE_IN, _FARTHEST_IN, _LARGEST_IN = 0.012, 0.4, 0.03
+# Neither plunger nor actuator goes further than this beyond mid-position. [1]
+_REACH = 1.3
 # Supposed: no joint of a gear that still moves has a radial clearance as large as this, four times its limit. [in]
 _NEVER_WORN_IN = 0.0325
 _LEAST_ROW_ALONE = 3.0
@@ -103,6 +108,7 @@ class _Slip:
     measured: float
     cells: tuple[tuple[str, float, float | None], ...]
     clearance_evidence: float
+    extension: float = np.nan
 
 
 def screen_faults(
@@ -113,7 +119,8 @@ def screen_faults(
     clearance = np.where(np.isfinite(table.clearance_in), table.clearance_in, everything.expected)
     measured = np.nanmedian(table.readings_in, axis=1)
     named = np.zeros(len(table)) if explained is None else explained
-    misfit = measured - worst_of_sense(model, clearance)[0]
+    misfit = measured - predicted(model, table, clearance)[0]
+    named = named + _bend(table, misfit - named)
     known = np.isfinite(misfit)
     left = misfit - named
     centre = float(np.median(left[known])) if known.any() else 0.0
@@ -128,6 +135,7 @@ def screen_faults(
     faults: list[DataFault] = []
     usable = np.ones(len(table), bool)
     new_clearance, new_readings = table.clearance_in.copy(), table.readings_in.copy()
+    extension = table.extension_in.copy()
     for place in np.flatnonzero(far):
         found, slip, isolated = _explain(
             model, table, usual, int(place), misfit, float(local[place]), scale, clearance[place]
@@ -139,15 +147,19 @@ def screen_faults(
         faults += found
         if slip is not None:
             new_clearance[place] = np.where(np.isfinite(table.clearance_in[place]), slip.clearance, np.nan)
+            extension[place] = slip.extension
             for column, _written, right in slip.cells:
-                if column.startswith("plunger"):
+                if table.along[place] and not column.startswith("clearance"):
+                    new_readings[place, 0] = slip.measured
+                elif column.startswith("plunger"):
                     new_readings[place, _reading_index(column)] = np.nan if right is None else right
                 elif right is None:
                     new_clearance[place, model.joint_numbers.index(int(column.split("_")[1]))] = np.nan
             usable[place] = bool(np.isfinite(new_readings[place]).any())
         elif isolated:
             usable[place] = False
-    repaired = replace(table, clearance_in=new_clearance, readings_in=new_readings)
+    quantities = {**table.quantities, ALONG: extension} if ALONG in table.quantities else table.quantities
+    repaired = replace(table, clearance_in=new_clearance, readings_in=new_readings, quantities=quantities)
     swapped = swapped_sides(repaired)
     faults += [
         DataFault(row, int(table.row[row]), table.record_id[row], "side", "swapped_side", own, other)
@@ -166,6 +178,20 @@ def _usual(table: DiagnosisTable, trusted: NDArray[np.bool_]) -> _Usual:
     history = fleet_history(known)[0]
     variance = history.unsure_in2 + history.scatter_in2 + history.reading_in2
     return _Usual(history.expected_in, np.sqrt(variance + _LEAST_SPREAD_IN**2))
+
+
+def _bend(table: DiagnosisTable, left: Array) -> Array:
+    """Smooth curve of the rows along the stroke over their extension, most rows near it: that is an effect. [in]"""
+    at, bend = np.nan_to_num(table.extension_in), np.zeros(len(left))
+    near = table.along & np.isfinite(left)
+    for _ in range(_BEND_ROUNDS):
+        if near.sum() < LEAST_ALONG:
+            break
+        curve = np.polynomial.Polynomial.fit(at[near], left[near], min(_BEND, int(near.sum()) // 4))
+        off = np.abs(left - curve(at))
+        bend = np.where(table.along, curve(at), 0.0)
+        near = table.along & (off <= _FAR * max(float(np.median(off[near])), 1e-9))
+    return bend
 
 
 def _local_level(table: DiagnosisTable, misfit: Array, centre: float, scale: float) -> Array:
@@ -222,11 +248,13 @@ def _explain(
 ) -> tuple[list[DataFault], _Slip | None, bool]:
     """Try every slip on one row; name the best one, or the row as implausible."""
     slips = _slips(model, table, usual, place, clearance)
-    over = worst_of_sense(model, np.array([s.clearance for s in slips]))[0]
+    rows = table.take(np.full(len(slips), place))
+    rows = replace(rows, quantities={**rows.quantities, ALONG: np.array([s.extension for s in slips])})
+    over = predicted(model, rows, np.array([s.clearance for s in slips]))[0]
     before = misfit[place]
     best: tuple[float, _Slip] | None = None
-    for slip, predicted in zip(slips, over, strict=True):
-        after = slip.measured - predicted - level
+    for slip, at in zip(slips, over, strict=True):
+        after = slip.measured - at - level
         if not np.isfinite(after) or abs(after) > _NEAR * scale:
             continue
         was = min(abs(before - level) / scale, 30.0) if np.isfinite(before) else 30.0
@@ -256,6 +284,10 @@ def _explain(
         return [], None, False
     worst = table.readings_in[place]
     cells = [(f"plunger_displacement{_suffix(k)}_in", worst[k]) for k in range(len(worst)) if np.isfinite(worst[k])]
+    if table.along[place]:
+        at = float(table.extension_in[place])
+        position = float(worst[0] + np.nan_to_num(model.plunger(at)))
+        cells = [("plunger_position_in", position), (ALONG, at)]
     found = [
         DataFault(place, int(table.row[place]), table.record_id[place], column, "implausible", f"{value:g}", None)
         for column, value in cells
@@ -321,7 +353,25 @@ def _slips(model: LinkageModel, table: DiagnosisTable, usual: _Usual, place: int
         if len(worn) > 1 and float(np.max(written[worn])) * factor <= _LARGEST_IN
     ]
     slips += [slip("swapped_joints", [a, b], written[[b, a]]) for i, a in enumerate(known) for b in known[i + 1 :]]
-    return slips + _reading_slips(table.readings_in[place], clearance)
+    at = float(table.extension_in[place])
+    if not np.isfinite(at):
+        return slips + _reading_slips(table.readings_in[place], clearance)
+    return [replace(s, extension=at) for s in slips] + _along_slips(model, measured, at, clearance)
+
+
+def _along_slips(model: LinkageModel, measured: float, at: float, clearance: Array) -> list[_Slip]:
+    """Slips in a position, or in an extension, beyond what the linkage reaches; within it either may be wrong."""
+    nominal = float(np.nan_to_num(model.plunger(at)))
+    position, slips = measured + nominal, []
+    for kind, factor in _TOO_LARGE:
+        if abs(position) > _REACH * float(model.plunger(model.stroke[1])):
+            cell = ("plunger_position_in", position, position * factor)
+            slips.append(_Slip(kind, clearance, position * factor - nominal, (cell,), _READING_EVIDENCE, at))
+        if at > model.stroke[1] * _REACH:
+            there, cell = at * factor, (ALONG, at, at * factor)
+            moved = position - float(model.plunger(there))
+            slips.append(_Slip(kind, clearance, moved, (cell,), _READING_EVIDENCE, there))
+    return slips
 
 
 def _reading_slips(readings: Array, clearance: Array) -> list[_Slip]:

@@ -78,7 +78,7 @@ def measure_gain(
     return Gain(
         rms_before_in=float(np.sqrt(np.mean(before**2))),
         rms_after_in=float(np.sqrt(np.mean(after**2))),
-        share_interval=_interval(before, after, groups, rng),
+        share_interval=_interval(before, after, keys if len(np.unique(groups)) == 1 else groups, rng),
         false_within_before=int(np.sum(said_before & outside)),
         false_within_after=int(np.sum(said_after & outside)),
         false_outside_before=int(np.sum(~said_before & ~outside)),

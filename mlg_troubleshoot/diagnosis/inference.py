@@ -158,6 +158,8 @@ class Inference:
         self.signs = np.array([c.cause.sign for c in candidates])
         self.exact = np.array([np.nan if c.cause.exact is None else c.cause.exact for c in candidates])
         counts = Counter(c.cause.name for c in candidates)
+        scales = [k for k, c in enumerate(candidates) if c.cause.one_scale]
+        self.one_scale = columns[:, scales[0]] if scales else rows.predicted_in
         self.prior = np.log([float(counts[c.cause.name]) for c in candidates])
         # What cannot be tested can be a rival, never a name.
         self.penalty = np.where([c.stands_in for c in candidates], np.inf, self.prior)
@@ -176,8 +178,8 @@ class Inference:
         ratio, scale = screen.tail_ratio(self.misfit)
         null = self._null(noise, ratio, scale)
         at_random = screen.largest(null, self.penalty)
-        lead = int(np.argmax(score))
-        p_alarm = _chance(at_random, score[lead])
+        lead = int(np.argmax(score)) if len(score) else -1
+        p_alarm = _chance(at_random, score[lead]) if len(score) else 1.0
         self.progress(0.5)
         smallest = self._smallest(at_random, scale)
         if p_alarm <= ALARM:
@@ -503,10 +505,14 @@ def _possible(whole: Inference, held: Array, blocks: Sequence[Block]) -> list[Bl
 
     Nor a linkage that nobody calibrated, where the scale may be an error of the rate.
     """
-    scale = fit(whole.bare, np.column_stack([held, whole.rows.predicted_in]), whole.misfit)
-    change, error = float(scale.values[-1]), float(scale.errors[-1])
-    kept = [block for block in blocks if not (block.cause.bounded and change > _BEYOND * error)]
-    return [block for block in kept if not block.uncalibrated or abs(change) > MOST_RATE]
+
+    def change(scale: Array) -> tuple[float, float]:
+        found = fit(whole.bare, np.column_stack([held, scale]), whole.misfit)
+        return float(found.values[-1]), float(found.errors[-1])
+
+    (beyond, error), (rate, _error) = change(whole.rows.predicted_in), change(whole.one_scale)
+    kept = [block for block in blocks if not (block.cause.bounded and beyond > _BEYOND * error)]
+    return [block for block in kept if not block.uncalibrated or abs(rate) > MOST_RATE]
 
 
 def _beside_linkage(
@@ -565,7 +571,7 @@ def _single(
     rejected = 1.0
     if len(named) == 1 and named[0].one_scale:
         beside = columns[:, [k for k in plain.chosen if not causes[k].of_joints]]
-        rejected = _one_scale_rejected(noise, beside, whole.rows.predicted_in, block, whole.misfit)
+        rejected = _one_scale_rejected(noise, beside, whole.one_scale, block, whole.misfit)
     instead = bool(chosen) and found.verdict is Verdict.NAMED and len(plain.chosen) > len(chosen)
     instead = instead and {whole.candidates[k].key for k in chosen} <= {whole.candidates[k].key for k in plain.chosen}
     needed, allowed = (PAIR_LEAD if len(named) > 1 else SECOND_LEAD if instead else BLOCK_LEAD), 1.0
@@ -584,16 +590,16 @@ def _single(
     return replace(plain, verdict=Verdict.AMBIGUOUS, rival=block) if near else plain
 
 
-def _one_scale_rejected(noise: NoiseModel, held: Array, predicted: Array, block: Block, misfit: Array) -> float:
+def _one_scale_rejected(noise: NoiseModel, held: Array, scale: Array, block: Block, misfit: Array) -> float:
     """Chance that a regression on all clearances beats one scale by as much if one scale is all (likelihood ratio)."""
-    one = fit(noise, np.column_stack([held, predicted]), misfit).log_likelihood
+    one = fit(noise, np.column_stack([held, scale]), misfit).log_likelihood
     free = fit(noise, np.column_stack([held, block.columns]), misfit).log_likelihood
     return float(chi2.sf(2.0 * (free - one), max(block.columns.shape[1] - 1, 1)))
 
 
 def _held_out(noise: NoiseModel, held: Array, block: Block | None, misfit: Array) -> float:
     """Mean square misfit that a model leaves on tails that it was not fitted to. [in²]"""
-    fold = noise.tails % _FOLDS
+    fold = (noise.tails if noise.tails.max() >= 3 else np.arange(len(misfit))) % _FOLDS
     return float(np.mean((misfit - held_out_part(noise, held, misfit, fold, block)) ** 2))
 
 

@@ -50,6 +50,8 @@ _SHARED = 0.2
 _LEAST_LEVELS = 4
 # Ratios of the scatter between tails to the scatter of a row that are tried.
 TAIL_RATIOS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.4, 2.0)
+# The first estimate of the scatter has all in it that is not known along the stroke.
+_ALONG_ROUNDS = 3
 # With fewer tails none of them can be left out.
 _LEAST_TAILS = 6
 
@@ -64,6 +66,7 @@ class Rows:
         and common to its gear's rows. [in]
     unread_in, shape (n, k): what joints that nobody read may add or lack in all rows together, each at one standard
         deviation. [in]
+    along_in, shape (n, k): what is not known of rows along the stroke, each at one standard deviation. [in]
     u_read_in: standard deviation by the reading of clearances. [in]
     u_measured_in: standard deviation of a row's measured displacement by the plunger gauge alone, 0 if unknown. [in]
     drawn_in, shape (n,): by how much drawing the readings to their expectation changed the prediction. [in]
@@ -77,6 +80,7 @@ class Rows:
     u_filled_in: Array
     u_shared_in: Array
     unread_in: Array
+    along_in: Array
     u_read_in: float
     u_measured_in: float
     drawn_in: Array
@@ -143,8 +147,17 @@ def _levels(table: DiagnosisTable, name: str) -> Array:
 
 
 def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> NoiseModel:
-    """Estimate the noise model from the misfit."""
+    """Estimate the noise model from the misfit; what is not known along the stroke is no scatter of rows."""
     rest = misfit if explained is None else misfit - explained
+    noise = _scatter(rest, rows)
+    if not rows.along_in.size:
+        return noise
+    for _ in range(_ALONG_ROUNDS):
+        noise = _scatter(rest - noise.beside(rows.along_in).share_of(rows.along_in, rest), rows)
+    return noise.beside(rows.along_in)
+
+
+def _scatter(rest: Array, rows: Rows) -> NoiseModel:
     predicted = rows.predicted_in
     numbers = tail_numbers(rows.tails)
     centred = rest.copy()
@@ -166,7 +179,7 @@ def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> No
     room = np.sqrt(max(scale**2 - rows.u_measured_in**2, 0.0))
     read = min(rows.u_read_in, room) / scale
     bias = [
-        np.full(len(misfit), (BIAS_IN + read * READ_BIAS_IN) / scale),
+        np.full(len(rest), (BIAS_IN + read * READ_BIAS_IN) / scale),
         (SLOPE + read * READ_SLOPE) * predicted / scale,
         DRAWN * rows.drawn_in / scale,
     ]

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mlg_troubleshoot.diagnosis.along import displaced, predicted, travel, unknown_along, wear_of_gears
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Scene
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import likely_clearances
 from mlg_troubleshoot.gear.adjustment import Adjustment
-from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 
@@ -30,6 +30,7 @@ class Prediction:
     u_filled_in, u_shared_in, shape (n,): standard uncertainty by clearances that were not read: of each row, and common
         to a gear's rows. [in]
     unread_in, shape (n, n_joints): standard uncertainty by the fleet's wear of each joint that nobody read. [in]
+    along_in, shape (n, k): what is not known of rows along the stroke, each at one standard deviation. [in]
     u_read_in: standard uncertainty by the reading of clearances, root mean square over the rows. [in]
     drawn_in, shape (n,): by how much the prediction from the readings as they are lies above the one with all of them
         drawn to their expectation. [in]
@@ -39,6 +40,7 @@ class Prediction:
     u_filled_in: Array
     u_shared_in: Array
     unread_in: Array
+    along_in: Array
     u_read_in: float
     drawn_in: Array
 
@@ -52,8 +54,8 @@ def build_scene(model: LinkageModel, table: DiagnosisTable, where: Discrepancies
     worn = likely_clearances(table)
     likely = worn.likely_in
     as_read = np.where(np.isfinite(table.clearance_in), table.clearance_in, likely)
-    read = worst_of_sense(model, as_read)[0]
-    drawn = worst_of_sense(model, likely)[0] - read
+    read = predicted(model, table, as_read)[0]
+    drawn = predicted(model, table, likely)[0] - read
     share = _share_of_declared(table.measured_in - read, drawn)
     clearance = as_read + share * (likely - as_read)
     scene = scene_at(model, table, where, clearance, share)
@@ -61,24 +63,27 @@ def build_scene(model: LinkageModel, table: DiagnosisTable, where: Discrepancies
     for j in range(clearance.shape[1]):
         moved = clearance.copy()
         moved[:, j] += 1e-5
-        slopes[:, j] = (model.displacement(links_from(moved, scene.directions)) - scene.over_in) / 1e-5
+        slopes[:, j] = (displaced(model, table, links_from(moved, scene.directions)) - scene.over_in) / 1e-5
     filled_in, shared_in, read_in = (
         np.sqrt(np.sum((slopes * u) ** 2, axis=1)) for u in (worn.u_row_in, worn.u_gear_in, worn.u_read_in)
     )
     u_read = share * float(np.sqrt(np.nanmean(read_in**2)))
-    return Prediction(scene, filled_in, shared_in, slopes * worn.u_fleet_in, u_read, np.nan_to_num(-drawn))
+    along = unknown_along(model, table, clearance, scene.over_in, scene.directions)
+    if not np.isfinite(table.clearance_in).any():
+        along, shared_in = np.hstack([along, wear_of_gears(table, slopes * worn.u_gear_in)]), np.zeros(len(table))
+    return Prediction(scene, filled_in, shared_in, slopes * worn.u_fleet_in, along, u_read, np.nan_to_num(-drawn))
 
 
 def scene_at(
     model: LinkageModel, table: DiagnosisTable, where: Discrepancies, clearance_in: Array, share: float = 1.0
 ) -> Scene:
     """The rows with the clearances that act: worst directions, displacement, and what each joint adds to it."""
-    over, directions = worst_of_sense(model, clearance_in)
+    over, directions = predicted(model, table, clearance_in)
     contribution = np.empty_like(clearance_in)
     for j in range(clearance_in.shape[1]):
         without = clearance_in.copy()
         without[:, j] = 0.0
-        contribution[:, j] = over - model.displacement(links_from(without, directions))
+        contribution[:, j] = over - displaced(model, table, links_from(without, directions))
     return Scene(model, table, clearance_in, model.joint_numbers, where, over, directions, contribution, share)
 
 
@@ -110,9 +115,11 @@ def effect(scene: Scene, adjustment: Adjustment) -> Array:
     moved = scene.over_in
     if adjustment.changed or adjustment.scaled or adjustment.acting_in is not scene.clearance_in:
         links = links_from(adjustment.acting_in, scene.directions)
-        moved = scene.model.displacement(links, adjustment.numbers(scene.model))
+        moved = displaced(scene.model, scene.table, links, adjustment.numbers(scene.model))
     if adjustment.rate_factor is not None:
-        moved = moved * adjustment.rate_factor
+        # A position along the stroke has the whole travel from Down Lock in it.
+        nominal = travel(scene.model, scene.table)
+        moved = (moved + nominal) * adjustment.rate_factor - nominal
     if adjustment.offset_in is not None:
         moved = moved + adjustment.offset_in
     return np.asarray(moved - scene.over_in)

@@ -17,6 +17,7 @@ Texts = NDArray[np.str_]
 
 FACTORS = ("tail_no", "side", "gauge_id", "technician_id", "approach")
 QUANTITIES = ("temperature_c", "hydraulic_pressure_psi", "gear_landings", "day")
+ALONG = "actuator_extension_in"
 
 
 @dataclass(frozen=True)
@@ -30,18 +31,19 @@ class DiagnosisTable:
     clearance_in : ndarray, shape (n, n_joints)
         Radial clearances, NaN where not measured. [in]
     readings_in : ndarray, shape (n, n_readings)
-        Repeat readings of the output, NaN where missing. [in or rad]
+        Repeat readings of the output, NaN where missing; of a row along the stroke the plunger's position less that
+        without clearances. [in or rad]
     record_id : sequence of str
         Identity of each row.
     row : ndarray of int, shape (n,)
         Row in the source, counted from 1.
     margin_in : ndarray, shape (n,)
-        Margin of each row. [in or rad]
+        Margin of each row; infinite along the stroke. [in or rad]
     gauge_u_in : ndarray, shape (n,)
         Standard uncertainty of one radial clearance. [in]
     quantities : mapping of str to ndarray of shape (n,)
         Numbers by name: ``temperature_c`` [°C], ``hydraulic_pressure_psi`` [psi], ``gear_landings``,
-        ``day`` (days since the earliest date), or a user's own.
+        ``day`` (days since the earliest date), ``actuator_extension_in`` (of rows along the stroke), or a user's own.
     factors : mapping of str to ndarray of str of shape (n,)
         Texts by name: ``tail_no``, ``side``, ``gauge_id``, ``technician_id``, ``approach``, or a user's own.
     axial_float_in : ndarray, shape (n, n_joints), or None
@@ -73,6 +75,16 @@ class DiagnosisTable:
         count = np.isfinite(self.readings_in).sum(axis=1)
         total = np.nansum(self.readings_in, axis=1)
         return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+    @property
+    def extension_in(self) -> Array:
+        """Actuator extension from Down Lock of each row along the stroke, shape (n,); NaN at mid-position. [in]"""
+        return np.asarray(self.quantities.get(ALONG, np.full(len(self), np.nan)))
+
+    @property
+    def along(self) -> NDArray[np.bool_]:
+        """Rows along the stroke, shape (n,)."""
+        return np.isfinite(self.extension_in)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -126,7 +138,11 @@ class DiagnosisTable:
         )
 
 
-def table_from_inspections(inspections: Sequence[Inspection], gear: Gear) -> DiagnosisTable:
+def _read_along(inspection: Inspection) -> bool:
+    return inspection.actuator_extension_in is not None and inspection.plunger_position_in is not None
+
+
+def table_from_inspections(inspections: Sequence[Inspection], gear: Gear, *, along: bool = False) -> DiagnosisTable:
     """Put inspections into columns.
 
     Parameters
@@ -135,12 +151,18 @@ def table_from_inspections(inspections: Sequence[Inspection], gear: Gear) -> Dia
         The inspections, with or without measured displacements.
     gear : Gear
         The gear.
+    along : bool
+        True for a further row of each plunger position along the stroke.
 
     Returns
     -------
     DiagnosisTable
         The columns; a covariate that no inspection has is absent.
     """
+    positions = [i for i in inspections if _read_along(i)] if along else []
+    at_mid = [i for i in inspections if i.readings_in or not _read_along(i)] if along else inspections
+    stroke = np.array([*[np.nan] * len(at_mid), *(i.actuator_extension_in for i in positions)], float)
+    inspections = [*at_mid, *positions]
     n, numbers = len(inspections), gear.joint_numbers
     clearance = np.full((n, len(numbers)), np.nan)
     floats = np.full((n, len(numbers)), np.nan)
@@ -150,7 +172,10 @@ def table_from_inspections(inspections: Sequence[Inspection], gear: Gear) -> Dia
         for j, number in enumerate(numbers):
             clearance[row, j] = inspection.clearance_in.get(number, np.nan)
             floats[row, j] = inspection.axial_float_in.get(number, np.nan)
-        readings[row, : len(inspection.readings_in)] = inspection.readings_in
+        if row < len(at_mid):
+            readings[row, : len(inspection.readings_in)] = inspection.readings_in
+    readings[len(at_mid) :, 0] = [i.plunger_position_in for i in positions]
+    readings[len(at_mid) :, 0] -= np.nan_to_num(gear.model.plunger(stroke[len(at_mid) :]))
     days = [None if i.inspection_date is None else i.inspection_date.toordinal() for i in inspections]
     known = [day for day in days if day is not None]
     first = min(known) if known else None
@@ -159,6 +184,7 @@ def table_from_inspections(inspections: Sequence[Inspection], gear: Gear) -> Dia
         "hydraulic_pressure_psi": [i.hydraulic_pressure_psi for i in inspections],
         "gear_landings": [i.gear_landings for i in inspections],
         "day": [None if day is None or first is None else day - first for day in days],
+        ALONG: [None if np.isnan(at) else at for at in stroke.tolist()],
     }
     factors: dict[str, list[str]] = {
         "tail_no": [i.tail_no for i in inspections],
@@ -175,7 +201,9 @@ def table_from_inspections(inspections: Sequence[Inspection], gear: Gear) -> Dia
         readings_in=readings,
         record_id=tuple(i.record_id for i in inspections),
         row=np.array([i.source.row or k + 1 for k, i in enumerate(inspections)], np.int64),
-        margin_in=np.array([gear.margin.value if i.margin_in is None else i.margin_in for i in inspections]),
+        margin_in=np.where(
+            np.isnan(stroke), [gear.margin.value if i.margin_in is None else i.margin_in for i in inspections], np.inf
+        ),
         gauge_u_in=np.array([i.gauge_u_in for i in inspections]),
         quantities={
             name: np.array([np.nan if v is None else v for v in values], float)

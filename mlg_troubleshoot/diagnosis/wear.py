@@ -38,6 +38,8 @@ _MOST_SIGMAS = 2.0
 # Wear of a joint that nobody read over the mean of the read ones: standard deviation between joints of the fleet,
 # between gears, and between inspections of one gear. Supposed, from the read joints of simulated fleets. [1]
 JOINTS_APART, GEARS_APART, ROWS_APART = 0.35, 0.5, 0.4
+# Radial wear of a joint of a fleet of which no clearance was read, supposed. [in]
+UNREAD_IN = 0.003
 # How much of what a gear's read joints are worn beyond the fleet's is to be expected of the others: the variance
 # between gears over that plus a fourth of the variance between the joints of a gear, of the same fleets. [1]
 OWN_GEAR = 0.5
@@ -86,6 +88,11 @@ def likely_clearances(table: DiagnosisTable) -> LikelyClearances:
     in part as those of its own gear, and how far it lies off that is unknown for the fleet, each gear and each row.
     """
     readings = table.clearance_in
+    if not np.nan_to_num(readings).any():
+        none, unread = np.zeros_like(readings), np.where(np.isfinite(readings), 0.0, UNREAD_IN)
+        # The joints of a gear wear together between two inspections.
+        apart = ROWS_APART * np.sqrt(readings.shape[1]) * _read_again(table)[:, None]
+        return LikelyClearances(none, apart * unread, unread, none, none)
     history, kilo, landed = fleet_history(table)
     known, noise = np.isfinite(readings), history.reading_in2
     # What wear is to be expected of an inspection without its landings is not known: its readings stand.
@@ -110,6 +117,22 @@ def likely_clearances(table: DiagnosisTable) -> LikelyClearances:
     return LikelyClearances(np.maximum(likely, 0.0), spread, shared, common, left)
 
 
+def _read_again(table: DiagnosisTable) -> NDArray[np.bool_]:
+    """Rows of gears that were inspected at more than one date or number of landings."""
+    gears, found = gears_of(table), np.zeros(len(table), bool)
+    for name in {"gear_landings", "day"} & set(table.quantities):
+        values = table.quantities[name]
+        for gear in np.unique(gears):
+            own = (gears == gear) & np.isfinite(values)
+            found[gears == gear] |= len(np.unique(values[own])) > 1
+    return found
+
+
+def gears_of(table: DiagnosisTable) -> NDArray[np.intp]:
+    """Number of the single gear of each row."""
+    return np.unique(table.gears, return_inverse=True)[1]
+
+
 def landings_of(landings: Array | None, gears: NDArray[np.intp]) -> tuple[Array, NDArray[np.bool_]]:
     """Fill gaps in the landings by the mean of the gear's other inspections, else of the fleet."""
     if landings is None or not np.isfinite(landings).any():
@@ -123,7 +146,7 @@ def landings_of(landings: Array | None, gears: NDArray[np.intp]) -> tuple[Array,
 
 def fleet_history(table: DiagnosisTable) -> tuple[WearHistory, Array, NDArray[np.bool_]]:
     """Expect every joint in each row, readings rounded to the steps they show; the landings, and which are known."""
-    readings, gears = table.clearance_in, np.unique(table.gears, return_inverse=True)[1]
+    readings, gears = table.clearance_in, gears_of(table)
     kilo, landed = landings_of(table.quantities.get("gear_landings"), gears)
     worn = np.flatnonzero(np.nan_to_num(readings).max(axis=0) > 0.0)
     rounded = np.array([_resolution(column[np.isfinite(column)]) for column in readings[:, worn].T]) ** 2 / 12.0

@@ -54,6 +54,8 @@ LENGTH_RANGE_IN: dict[Kind, tuple[float, float]] = {
 }
 # The gear says how large clearances and plunger displacements can be.
 LENGTHS = frozenset((*LENGTH_RANGE_IN, Kind.CLEARANCE, Kind.PLUNGER_DISPLACEMENT))
+# A reading along the stroke: neither is of use without the other.
+ALONG = (Kind.ACTUATOR_EXTENSION, Kind.PLUNGER_POSITION)
 PER_JOINT = frozenset({Kind.CLEARANCE, Kind.AXIAL_FLOAT})
 NUMBERED = PER_JOINT | {Kind.GAUGE_U, Kind.PLUNGER_DISPLACEMENT}
 REQUIRED = (Kind.TAIL_NO, Kind.SIDE)

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import Cell, column_letters, show, writable
-from mlg_troubleshoot.records.columns import IDENTITY, LENGTHS, PER_JOINT, REQUIRED, Field, Kind
+from mlg_troubleshoot.records.columns import ALONG, IDENTITY, LENGTHS, PER_JOINT, REQUIRED, Field, Kind
 from mlg_troubleshoot.records.headers import Recognition, Standing, near_miss, parse_target, recognise, tidy
 from mlg_troubleshoot.records.model import ReadOptions
 from mlg_troubleshoot.records.refusals import HEADER_SEARCH_ROWS
@@ -314,7 +314,7 @@ class ColumnReader:
         elif Kind.RECORD_ID not in fields:
             columns.ids_made = True
         clearance_refused = any(p.refused for p in columns.placed)
-        if Kind.CLEARANCE not in fields and not clearance_refused:
+        if Kind.CLEARANCE not in fields and not clearance_refused and not fields >= set(ALONG):
             missing.append(("clearance_1_in", "at least one clearance column, such as clearance_3_in"))
         for name, expected in missing:
             close = difflib.get_close_matches(name, [tidy(h).replace(" ", "_") for h in unknown], 1, 0.6)

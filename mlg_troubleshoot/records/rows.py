@@ -23,7 +23,7 @@ from mlg_troubleshoot.decision.inspection import (
     Side,
 )
 from mlg_troubleshoot.records.cells import Cell, OddCell, OddKind, column_letters, quote, show, writable
-from mlg_troubleshoot.records.columns import CARRIED, LENGTH_RANGE_IN, LENGTHS, VERDICT_BEARING, Field, Kind
+from mlg_troubleshoot.records.columns import ALONG, CARRIED, LENGTH_RANGE_IN, LENGTHS, VERDICT_BEARING, Field, Kind
 from mlg_troubleshoot.records.model import TableInHand
 from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.slips import scale_slip
@@ -171,6 +171,10 @@ class RowReader:
             warnings.append(
                 "every clearance is 0: a zero is read as measured; leave a joint blank if it was not measured"
             )
+        alone = [kind for kind in ALONG if kind in lengths]
+        if len(alone) == 1:
+            (other,) = set(ALONG) - set(alone)
+            warnings.append(f"{alone[0].value}_in is not used: the row has no {other.value}_in")
         gauge_u = lengths.pop(Kind.GAUGE_U, None)
         # Columns bear the names of the fields that they fill.
         others.update({f"{kind.value}_in": value for kind, value in lengths.items()})
@@ -276,12 +280,19 @@ class RowReader:
         index = self._at.get(Kind.CONVENTION)
         cell = None if index is None else self._cells[index]
         if cell is None or index is None:
+            if self._options.convention is None and self._is_curve_alone():
+                return ClearanceConvention.RADIAL
             if self._options.convention is None:
                 self._report_missing_convention(index, "RADIAL, DIAMETRAL or TOTAL_PLAY")
             return self._options.convention
         return self._required(
             index, lambda _: read_choice(cell, ClearanceConvention, "convention_unknown", _CONVENTION_HINTS)
         )
+
+    def _is_curve_alone(self) -> bool:
+        """A position along the stroke needs no clearance, and then no convention of one."""
+        filled = [kind in self._at and self._cells[self._at[kind]] is not None for kind in ALONG]
+        return all(filled) and all(self._cells[index] is None for _, index, _unit in self._clearances)
 
     def _report_missing_convention(self, index: int | None, expected: str) -> None:
         remedy = (

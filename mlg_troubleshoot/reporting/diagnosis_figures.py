@@ -9,6 +9,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.diagnosis import Candidate, Diagnosis
+from mlg_troubleshoot.diagnosis.table import ALONG
 from mlg_troubleshoot.reporting.diagnosis_lines import column_words
 from mlg_troubleshoot.reporting.figures import ACCENT, INK, PAPER, SOFT, Axis, Canvas, Plot
 from mlg_troubleshoot.reporting.formats import short
@@ -22,7 +23,7 @@ _PLOT = (335.0, 236.0)
 _BINS = 8
 _FEWEST_IN_A_BIN = 5
 MOST_TAILS = 36
-_UNITS = {"temperature_c": "°C", "hydraulic_pressure_psi": "psi"}
+_UNITS = {"temperature_c": "°C", "hydraulic_pressure_psi": "psi", ALONG: "in"}
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,7 @@ def against_cause(residuals: Residuals, candidate: Candidate, effect_in: Array) 
             return _most_telling_float(residuals, table.axial_float_in, effect_in)
         if need in table.quantities or need in table.factors:
             return against_column(residuals, need)
-    return against_column(residuals, "predicted")
+    return against_column(residuals, ALONG if table.along.any() else "predicted")
 
 
 def against_column(residuals: Residuals, name: str) -> Against:

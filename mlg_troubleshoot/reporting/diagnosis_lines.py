@@ -25,6 +25,7 @@ _COLUMNS = {
     "temperature_c": "temperature",
     "hydraulic_pressure_psi": "hydraulic pressure",
     "gear_landings": "landings since overhaul",
+    "actuator_extension_in": "actuator extension",
     "predicted": "predicted displacement",
     "day": "date",
     "tail_no": "tail",

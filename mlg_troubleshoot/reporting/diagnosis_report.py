@@ -54,7 +54,7 @@ def diagnosis_document(
 ) -> Document:
     context = _context(d, gear, extension, provenance, Lengths(unit))
     stem = safe_stem("diagnosis", *(Path(name).stem for name in provenance.input_sha256))
-    return Document("diagnosis.html.j2", {**context, "problems": list(problems), "notes": list(notes)}, stem)
+    return Document("diagnosis.html.j2", {**context, "problems": list(problems), "notes": [*d.unsaid, *notes]}, stem)
 
 
 def _context(

@@ -162,6 +162,7 @@ def diagnosis_as_json(diagnosis: Diagnosis, extension: ModelExtension | None) ->
         ],
         "unlisted_variables": list(d.unlisted_variables),
         "not_testable": [{"cause": cause, "missing_column": column} for cause, column in d.not_testable],
+        "cannot_say": list(d.unsaid),
         "ruled_out": [{"cause": cause, "target": target} for cause, target in d.ruled_out],
         "smallest_detectable_rms_in": plain(d.smallest_rms_in),
         "extension": None if extension is None else _extension(extension),

@@ -108,7 +108,7 @@ def diagnose_files(
     notes = (*read.notes, *_evidence_notes(once, len(valid) - len(once), gear))
     diagnosis = diagnose(
         gear.model,
-        table_from_inspections(once, gear),
+        table_from_inspections(once, gear, along=True),
         gear.discrepancies,
         own_causes=own,
         ensemble=gear.ensemble_models[1:],
@@ -158,7 +158,9 @@ def _evidence_notes(inspections: Sequence[Inspection], again: int, gear: Gear) -
     if again:
         yield f"inspections that stand twice count once: rows left out: {again}"
     unread = [n for n in gear.model.joint_numbers if all(i.clearance_in.get(n) is None for i in inspections)]
-    if unread:
+    if len(unread) == len(gear.joint_numbers):
+        yield "no clearance was read in any row: what wear adds is left open"
+    elif unread:
         listed = ", ".join(f"#{n}" for n in unread)
         yield f"not measured in any row: {listed}; counted as worn like the others of their gear, and not testable"
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +14,13 @@ from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate
-from mlg_troubleshoot.diagnosis.inference import RULED_OUT
+from mlg_troubleshoot.diagnosis.causes.together import JointFactors
+from mlg_troubleshoot.diagnosis.extension import MOST_IN
+from mlg_troubleshoot.diagnosis.inference import CLASS_APART, RULED_OUT
 from mlg_troubleshoot.diagnosis.noise import TAIL_RATIOS
 from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
 from mlg_troubleshoot.diagnosis.simulation.search import ALIKE, beside
-from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.diagnosis.table import ALONG, DiagnosisTable
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
@@ -44,10 +47,14 @@ FURTHER = {
     "temperature_c": Kind.TEMPERATURE,
     "hydraulic_pressure_psi": Kind.PRESSURE,
     "gear_landings": Kind.LANDINGS,
+    ALONG: Kind.ACTUATOR_EXTENSION,
     "axial_float": Kind.AXIAL_FLOAT,
 }
+# Of what is tried for factors of all joints, the middle one: directions spread by 45°, linkages half as far apart.
+_MIDDLE = 1
 _JOINT = re.compile(r"clearance_(\d+)_in")
-_NAMES = {kind: name for name, kind in FURTHER.items()}
+_NAMES = {kind: name for name, kind in FURTHER.items()} | {Kind.PLUNGER_POSITION: ALONG}
+Key = tuple[str, str | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,9 +92,11 @@ def separable(gear: str = DEFAULT_GEAR, columns: Sequence[str] | None = None) ->
         )
 
     access = sorted((j.access.value, j.number) for j in model.joints if j.number not in joints)
-    further = [name for name in FURTHER if name not in recorded] + [f"clearance_{number}_in" for _min, number in access]
+    further = [name for name in FURTHER if name not in {*recorded, ALONG}]
+    further += [f"clearance_{number}_in" for _min, number in access] + [ALONG] * (ALONG not in recorded)
     with threadpool_limits(1, "blas"):
-        judged = tuple(_judged(here, beside_it, further, key) for key in here.keys if key not in here.stand_ins)
+        keys = [*(key for key in here.keys if key not in here.stand_ins), *here.blocks]
+        judged = tuple(_judged(here, beside_it, further, key) for key in keys)
     return judged + tuple(
         CausePlanned(c.name, None, None, FURTHER[lacks].value, None, None, None, c.separates)
         for c in CATALOGUE
@@ -122,9 +131,14 @@ class _Plan:
         effects = effect_columns(plain.scene, found)
         effects[:, [not _speaks_for_all(c, table) for c in found]] = 0.0
         tails = TAIL_RATIOS[1] * (table.tails[:, None] == np.unique(table.tails))
+        tails = np.hstack([tails, plain.along_in / ROW_IN])
         common = np.linalg.cholesky(np.eye(len(table)) + tails @ tails.T)
         # A slope of the prediction is a cause of its own; a shift of all rows is none.
-        white, level = (np.asarray(np.linalg.solve(common, x), float) for x in (effects, np.ones((len(table), 1))))
+
+        def whitened(x: Array) -> Array:
+            return np.asarray(np.linalg.solve(common, x), float)
+
+        white, level = whitened(effects), whitened(np.ones((len(table), 1)))
         left, seen = beside(white, level)
         size = np.linalg.norm(left, axis=0)
         self.sign = np.array([c.cause.sign for c in found])
@@ -132,14 +146,36 @@ class _Plan:
         # Root mean square of an effect over what of it can be seen.
         self.hidden = np.linalg.norm(effects, axis=0) / np.where(seen, size, np.inf)
         self.candidates = found
-        self.keys: dict[tuple[str, str | None], list[int]] = {}
+        self.keys: dict[Key, list[int]] = {}
         for k in np.flatnonzero(seen):
             self.keys.setdefault(_key(found[k]), []).append(int(k))
         self.stand_ins = {_key(c) for c in found if c.stands_in}
         self.row_in = ROW_IN / float(np.sqrt(len(table)))
+        causes = [c for c in CATALOGUE if isinstance(c, JointFactors)]
+        tried = {(c.name, None): c.blocks(plain.scene, gear.ensemble_models[1:]) for c in causes}
+        # Another linkage is known by an ensemble only.
+        self.blocks: dict[Key, Array] = {}
+        for key, blocks in tried.items() if all(tried.values()) else ():
+            effects = blocks[_MIDDLE].effects_in
+            size = float(np.sqrt(np.sum(effects**2) / len(table)))
+            self.blocks[key] = beside(whitened(effects), level)[0] / size
 
-    def nearest(self, key: tuple[str, str | None]) -> tuple[str | None, float]:
+    def tests(self, key: Key) -> bool:
+        """Tell whether a cause can be tested."""
+        return key in self.keys or key in self.blocks
+
+    def separates(self, key: Key) -> str:
+        """The reading that tells it from others whatever the columns."""
+        if key in self.blocks:
+            return next(c.separates for c in CATALOGUE if c.name == key[0])
+        return self.candidates[self.keys[key][0]].separates
+
+    def nearest(self, key: Key) -> tuple[str | None, float]:
         """The cause that looks most like one, and the size from which they are told apart; infinite if never. [in]"""
+        if key in self.blocks:
+            rival = next(other for other in self.blocks if other != key)
+            lead = partial(_divergence, true=self.blocks[key], other=self.blocks[rival])
+            return rival[0], _size_of(lead, CLASS_APART)
         best, name = 0.0, None
         for other, places in self.keys.items():
             if other != key:
@@ -153,15 +189,42 @@ class _Plan:
         apart = 1.0 - best
         return name, float("inf") if apart < ALIKE else _APART * self._row(key) / float(np.sqrt(apart))
 
-    def found_from(self, key: tuple[str, str | None]) -> float:
+    def found_from(self, key: Key) -> float:
         """Size from which a cause stands out. [in]"""
+        if key in self.blocks:
+            lead = partial(_divergence, true=self.blocks[key], other=np.zeros_like(self.blocks[key]))
+            return _size_of(lead, 0.5 * _FOUND**2)
         return _FOUND * self._row(key)
 
-    def _row(self, key: tuple[str, str | None]) -> float:
+    def _row(self, key: Key) -> float:
         return self.row_in * float(np.min(self.hidden[self.keys[key]]))
 
 
-def _key(candidate: Candidate) -> tuple[str, str | None]:
+def _divergence(size_in: float, true: Array, other: Array) -> float:
+    """Log-likelihood by which factors of all joints of one kind lead those of another, of the size that fits best. [1]
+
+    true, other, shape (n, k): independent effects of one kind, of root mean square 1 together, whitened.
+    """
+    basis = np.linalg.qr(np.hstack([true, other]))[0]
+    one, two = (basis.T @ effects / ROW_IN for effects in (true, other))
+    unit = np.eye(len(one))
+    truth = unit + size_in**2 * one @ one.T
+    least = np.inf
+    for size in size_in * np.geomspace(0.2, 5.0, 15):
+        wrong = unit + size**2 * two @ two.T
+        excess = np.trace(np.linalg.solve(wrong, truth)) - len(one)
+        least = min(least, 0.5 * float(excess + np.linalg.slogdet(wrong)[1] - np.linalg.slogdet(truth)[1]))
+    return least
+
+
+def _size_of(lead: Callable[[float], float], wanted: float) -> float:
+    """Size from which a lead is as large as wanted; infinite if no plunger moves as far. [in]"""
+    sizes = np.geomspace(1e-4, MOST_IN, 128).tolist()
+    first = bisect_left(sizes, wanted, key=lead)
+    return sizes[first] if first < len(sizes) else float("inf")
+
+
+def _key(candidate: Candidate) -> Key:
     target = candidate.target or ""
     return candidate.cause.name, target if target.startswith("joint") else None
 
@@ -175,18 +238,15 @@ def _speaks_for_all(candidate: Candidate, table: DiagnosisTable) -> bool:
     return middle and (not target or target.startswith("joint") or target.split(" ", 1)[-1] in first)
 
 
-def _judged(
-    here: _Plan, beside_it: Callable[[str], _Plan], further: Sequence[str], key: tuple[str, str | None]
-) -> CausePlanned:
+def _judged(here: _Plan, beside_it: Callable[[str], _Plan], further: Sequence[str], key: Key) -> CausePlanned:
     name, apart = here.nearest(key)
     split = None
     if apart > 2.0 * here.found_from(key):
-        better = (c for c in further if key in beside_it(c).keys and beside_it(c).nearest(key)[1] < 0.5 * apart)
+        better = (c for c in further if beside_it(c).tests(key) and beside_it(c).nearest(key)[1] < 0.5 * apart)
         found = next(better, None)
         split = FURTHER[found].value if found in FURTHER else found
-    reading = here.candidates[here.keys[key][0]].separates
     told = max(apart, here.found_from(key)) if np.isfinite(apart) else None
-    return CausePlanned(*key, here.found_from(key), None, name, told, split, reading)
+    return CausePlanned(*key, here.found_from(key), None, name, told, split, here.separates(key))
 
 
 def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
@@ -207,6 +267,8 @@ def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
         "temperature_c": 12.0 - 14.0 * np.cos(2.0 * np.pi * day / 365.25) + 6.0 * rng.standard_normal(n),
         "hydraulic_pressure_psi": rng.choice([1500.0, 2200.0, 2900.0, 3000.0, 3050.0], n),
     }
+    if ALONG in recorded:
+        quantities[ALONG] = np.full(n, np.nan)
     factors = {
         "tail_no": np.array([f"T{k:02d}" for k in tail]),
         "side": np.where(gears % 2 == 0, "LH", "RH"),
@@ -215,7 +277,7 @@ def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
         "technician_id": np.array([f"W{k}" for k in np.where(rng.random(n) < 0.7, tail % 5, rng.integers(0, 5, n))]),
     }
     floats = rng.uniform(0.0, 0.02, clearance.shape) if "axial_float" in recorded else None
-    return DiagnosisTable(
+    planned = DiagnosisTable(
         clearance_in=clearance,
         readings_in=np.full((n, 1), np.nan),
         record_id=tuple(str(k) for k in range(n)),
@@ -226,3 +288,9 @@ def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
         factors={name: texts for name, texts in factors.items() if name in recorded},
         axial_float_in=floats,
     )
+    if ALONG not in recorded:
+        return planned
+    # Beside each reading at mid-position one along the stroke.
+    both = planned.take(np.tile(np.arange(n), 2))
+    stroke = np.r_[np.full(n, np.nan), rng.permutation(np.linspace(0.0, gear.reference.stroke[1], n))]
+    return replace(both, quantities={**both.quantities, ALONG: stroke})

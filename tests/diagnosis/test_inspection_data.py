@@ -56,7 +56,7 @@ def test_the_seeds_in_the_description_are_those_of_the_command() -> None:
     said = {name: int(seed) for name, seed in re.findall(r"\| `(measured_\w+)\.csv` \|.*\| (\d+) \|", SOLUTION)}
     made = {name: seed for name, (_spec, seed) in data_sets.DATA_SETS.items()}
     later = {f"{name}_later": made[name] + 1000 for name in ("measured_pressure", "measured_far_below")}
-    assert said == {**made, **later}
+    assert said == {**made, **later, "measured_rig": data_sets.RIG[1]}
 
 
 def test_the_pressure_is_named() -> None:

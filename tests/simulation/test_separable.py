@@ -14,6 +14,15 @@ from mlg_troubleshoot.workflows.separable import CausePlanned, separable
 
 TWO_JOINTS = ("tail_no", "side", "clearance_3_in", "clearance_5_in")
 
+ONE_POSITION = (
+    *("tail_no", "side", "inspection_date", "technician_id", "gauge_id", "approach", "temperature_c"),
+    *("hydraulic_pressure_psi", "gear_landings"),
+)
+CURVE = (*ONE_POSITION, "actuator_extension_in", "plunger_position_in")
+JOINT_6 = ("direction_not_worst_case", "joint 6")
+# What one position tells apart late or never, and a curve does.
+FALL_APART = (JOINT_6, ("joint_contact", "joints 5,6"), ("unlisted_wear", None), ("calibration_rate", None))
+
 
 @cache
 def planned(*columns: str) -> dict[tuple[str, str | None], CausePlanned]:
@@ -51,6 +60,33 @@ def test_what_is_told_apart_is_no_smaller_than_what_is_found() -> None:
         if cause.told_apart_from_in is not None:
             assert cause.found_from_in is not None
             assert cause.told_apart_from_in >= cause.found_from_in > 0.0
+
+
+def test_a_direction_and_a_contact_beside_it_are_one_to_readings_at_mid_position() -> None:
+    assert (planned(*ONE_POSITION)[JOINT_6].nearest, planned(*ONE_POSITION)[JOINT_6].told_apart_from_in) == (
+        "joint_contact joints 5,6",
+        None,
+    )
+
+
+@pytest.mark.parametrize("key", [*FALL_APART, ("load_directions", None), ("geometry", None)])
+def test_a_curve_tells_apart_what_one_position_cannot_and_is_proposed(key: tuple[str, str | None]) -> None:
+    one, curve = planned(*ONE_POSITION)[key], planned(*CURVE)[key]
+    assert curve.told_apart_from_in is not None
+    assert curve.told_apart_from_in < 0.5 * (one.told_apart_from_in or 1.0)
+    assert one.further_column == "actuator_extension"
+
+
+def test_a_curve_says_no_more_of_how_a_rod_was_rigged() -> None:
+    one, curve = (planned(*columns)["rigging_offset", None].found_from_in for columns in (ONE_POSITION, CURVE))
+    assert one is not None
+    assert curve is not None
+    assert curve > 0.85 * one
+
+
+def test_load_directions_and_another_linkage_are_each_others_nearest() -> None:
+    assert planned(*ONE_POSITION)["load_directions", None].nearest == "geometry"
+    assert planned(*ONE_POSITION)["geometry", None].nearest == "load_directions"
 
 
 def test_a_column_that_no_table_has_is_refused() -> None:

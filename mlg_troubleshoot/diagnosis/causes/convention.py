@@ -38,14 +38,15 @@ class ConventionSlip(Cause):
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield each group whose readings are far off the fleet's share of their prediction."""
+        at_mid = ~scene.table.along
         measured = scene.table.measured_in / np.maximum(scene.over_in, 1e-3)
-        usual = float(np.median(measured))
+        usual = float(np.median(measured[at_mid])) if at_mid.any() else 0.0
         for column, label in _LABELS.items():
             texts = scene.table.factors.get(column)
             if texts is None or usual <= 0.0:
                 continue
-            for value in levels(texts, _LEAST_ROWS):
-                own = float(np.median(measured[texts == value])) / usual
+            for value in levels(texts[at_mid], _LEAST_ROWS):
+                own = float(np.median(measured[at_mid & (texts == value)])) / usual
                 if own * _DOUBT < 1.0 or own > _DOUBT:
                     factor = 2.0 if own < 1.0 else 0.5
                     setting = {"column": column, "value": value, "written_factor": factor}

@@ -121,7 +121,7 @@ class UnlistedWear(Cause):
 
     def stand_ins(self, scene: Scene) -> Iterator[Candidate]:
         """Yield one candidate in which the wear of the joints stands for the landings that nobody recorded."""
-        if scene.where.wear_shift:
+        if scene.where.wear_shift and scene.clearance_in.any():
             yield Candidate(self, stands_in=True)
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:

@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+from numpy.polynomial import legendre
 from scipy.linalg import block_diag
 
+from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.causes.base import Array, Candidate, Cause, Scene
 from mlg_troubleshoot.gear.adjustment import Adjustment
-from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.model import LinkageModel
 
 # Standard deviations of the angle between a pin's resting place and the worst direction that are tried; the last one
@@ -29,6 +30,8 @@ SPREADS_DEG = (25.0, 45.0, 70.0, 180.0)
 LINKAGES = ((1.0, 0.0), (0.5, 0.0), (1.0, 0.5))
 # What a true linkage may differ beside the ensemble's spread, each joint on its own: an eighth of the largest. [1]
 ALONE = 0.03
+# Degree of the polynomials in the extension that stand for the curves of linkages between those of the ensemble.
+_DEGREE = 6
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,9 @@ class Block:
             "low": by_joint(change - 1.96 * error),
             "high": by_joint(change + 1.96 * error),
             "together": tuple(
-                joint for joint, most in zip(self.joints, np.min(together, axis=1), strict=True) if most < _TOGETHER
+                joint
+                for joint, most in zip(self.joints, np.min(together, axis=1, initial=0.0), strict=True)
+                if most < _TOGETHER
             ),
         }
         return Candidate(self.cause, None, setting)
@@ -168,13 +173,14 @@ class OtherGeometry(JointFactors):
             return []
         apart = _apart(scene.model, ensemble)
         bent = [
-            worst_of_sense(other, scene.clearance_in)[0] - scene.over_in - scene.contribution_in @ own
+            predicted(other, scene.table, scene.clearance_in)[0] - scene.over_in - scene.contribution_in @ own
             for other, own in zip(ensemble, apart, strict=True)
         ]
         # A linkage that does not close with clearances that were read is not the one that they were read in.
         bent = [bend for bend in bent if np.isfinite(bend).all()]
-        columns = np.column_stack([found[0].columns, *bent])
-        even = np.eye(len(bent)) / max(len(bent), 1)
+        curves = _curves(scene, ensemble)
+        columns = np.column_stack([found[0].columns, *bent, curves])
+        even = block_diag(np.eye(len(bent)) / max(len(bent), 1), np.eye(curves.shape[1]))
         return [
             replace(
                 block,
@@ -194,3 +200,18 @@ def _apart(model: LinkageModel, ensemble: Sequence[LinkageModel]) -> Array:
     """Change of each joint's amplification by each linkage of an ensemble, shape (n_linkages, n_joints). [1]"""
     drawn = model.plunger_amplification()
     return np.array([other.plunger_amplification() / drawn - 1.0 for other in ensemble])
+
+
+def _curves(scene: Scene, ensemble: Sequence[LinkageModel]) -> Array:
+    """Smooth curves along the stroke that differ as those of an ensemble do, each at one standard deviation. [in]"""
+    if not scene.table.along.any():
+        return np.empty((len(scene.table), 0))
+    most = float(np.nanmax(scene.table.extension_in))
+    stroke = np.linspace(0.0, most, 41)
+    curves = np.array([other.plunger(stroke) - scene.model.plunger(stroke) for other in ensemble])
+    curves = curves[np.isfinite(curves).all(axis=1)]
+    if not len(curves):
+        return np.empty((len(scene.table), 0))
+    size = np.sqrt(np.mean(legendre.legfit(2.0 * stroke / most - 1.0, curves.T, _DEGREE) ** 2, axis=1))
+    at = 2.0 * np.nan_to_num(scene.table.extension_in) / most - 1.0
+    return np.asarray(scene.table.along[:, None] * legendre.legvander(at, _DEGREE) * size)
