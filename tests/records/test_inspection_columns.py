@@ -209,6 +209,51 @@ def test_a_bad_optional_cell_is_reported_and_reads_as_absent(read, table, name, 
     assert (row.outcome, row.approach, row.inspection_date, row.gear_landings) == (None, None, None, None)
 
 
+RANGES = [
+    ("gauge_u_in", 0, 0.02),
+    ("gauge_u_3_in", None, 0.02),
+    ("plunger_gauge_u_in", 0, 0.05),
+    ("plunger_displacement_in", -0.5, 0.5),
+    ("plunger_down_lock_in", -0.2, 0.2),
+    ("actuator_extension_in", 0, 5),
+    ("plunger_position_in", -2, 2),
+    ("axial_float_3_in", 0, 0.5),
+    ("margin_in", None, 0.2),
+    ("margin_u_in", 0, 0.1),
+    ("temperature_c", -60, 60),
+    ("hydraulic_pressure_psi", 0, 4000),
+    ("gear_landings", 0, 1_000_000),
+]
+
+
+@pytest.mark.parametrize(("name", "low", "high"), RANGES)
+def test_a_range_holds_its_ends_and_nothing_beyond(read, table, name, low, high):
+    beyond = 1e-5 * high
+    for end, out in ((low, -beyond), (high, beyond)):
+        if end is not None:
+            inspection(read(with_column(table, name, end)))
+            assert only(read(with_column(table, name, f"{end + out:.9g}"))).column == name
+
+
+@pytest.mark.parametrize(("day", "known"), [("1949-12-31", False), ("1950-01-01", True), ("2100-12-31", True)])
+def test_a_date_is_of_this_century_or_the_one_before(read, table, day, known):
+    assert bool(read(with_column(table, "inspection_date", day)).problems) is not known
+
+
+@pytest.mark.parametrize(
+    ("convention", "column", "words"),
+    [
+        ("RADIAL", "clearance_9_in", "from 0 to 0.05 in"),
+        ("DIAMETRAL", "clearance_9_in", "from 0 to 0.1 in"),
+        ("TOTAL_PLAY", "clearance_9_mm", "from 0 to 2.54 mm"),
+    ],
+)
+@pytest.mark.parametrize("value", ["x", 999])
+def test_what_a_clearance_may_be_is_said_in_its_own_unit_and_convention(read, table, convention, column, words, value):
+    text = table((*HEADER[:4], column), [(*GOOD[:3], convention, value)])
+    assert only(read(text)).expected == f"a clearance {words}"
+
+
 def test_the_optional_columns_are_read(read, table):
     extra = {
         "inspection_date": "2026-03-04T10:15",
