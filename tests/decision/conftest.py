@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Assessment
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.studies.index_table import IndexTable
 from mlg_troubleshoot.units import ClearanceConvention
@@ -33,6 +36,23 @@ def inspected(clearance_in: Mapping[int, float], **more: Any) -> Inspection:
 def every_joint(clearance_in: float, **others: float) -> dict[int, float]:
     """All ten joints at one clearance, some at another: ``every_joint(0.001, j3=0.013)``."""
     return dict.fromkeys(range(1, 11), clearance_in) | {int(name[1:]): value for name, value in others.items()}
+
+
+@dataclass(frozen=True)
+class Shifted:
+    """An extension that shifts the plunger, whose residuals scatter by 1 thou and which needs the gauge."""
+
+    shift_in: float = 0.004
+    residual_u_in: float = 0.001
+
+    def adjust(self, inspections: Sequence[Inspection], clearance_in: np.ndarray) -> Adjustment:
+        return Adjustment(clearance_in, offset_in=np.full(len(inspections), self.shift_in))
+
+    def lacks(self, inspection: Inspection) -> tuple[str, ...]:
+        return () if inspection.gauge_id else ("gauge_id",)
+
+    def describe(self) -> str:
+        return f"plunger shifted by {self.shift_in:g} in"
 
 
 @pytest.fixture(scope="session")

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
+from mlg_troubleshoot.decision.case import Cases, exact_chance
 from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
 from mlg_troubleshoot.decision.sentences import confidence_words, rigging_sentence
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.model import links_from
 from mlg_troubleshoot.reporting.json_form import check_as_json
 from mlg_troubleshoot.studies.index_table import IndexTable
-from tests.decision.conftest import Judge, every_joint, inspected
+from tests.decision.conftest import Judge, Shifted, every_joint, inspected
 
 ADVICE = AssessOptions(advice=True)
 REPAIRS = AssessOptions(advice=True)
@@ -63,6 +66,32 @@ def test_the_own_uncertainty_of_a_joint_is_in_the_monte_carlo_value(
     assert plain is not None
     assert checked.monte_carlo < plain.monte_carlo - 0.02
     assert abs(checked.monte_carlo - checked.analytic) < 0.01
+
+
+@pytest.mark.parametrize(("shift_in", "chance"), [(-0.02, 0.0), (0.02, 1.0)])
+def test_re_rigging_takes_back_what_shifts_the_plunger_already(gear: Gear, shift_in: float, chance: float) -> None:
+    one = Cases.of(gear, [inspected(every_joint(0.0))], Shifted(0.02))
+    assert exact_chance(one, one.filled(0.0), shift_in) == [chance]
+
+
+def test_the_monte_carlo_value_is_off_the_linear_one_by_what_errors_of_the_readings_do_to_the_worst_case(
+    gear: Gear, judge: Judge
+) -> None:
+    found = judge(every_joint(0.001), ADVICE, gauge_u_in=0.004)
+    errors = 0.004 * np.random.default_rng(8).standard_normal((1500, 10))
+    errors, start = np.vstack([errors, -errors]), np.full(10, 0.001)
+    steps = 1e-5 * np.eye(10)
+    slopes = (worst_case(gear.model, start + steps).over_in - worst_case(gear.model, start - steps).over_in) / 2e-5
+    links = np.array(links_from(start + errors, worst_case(gear.model, start[None]).over_directions))
+    assert found.budget is not None
+    assert found.confidence is not None
+    rest = np.hypot(found.budget.geometry_in, found.budget.model_in)
+    level = found.predicted_displacement_in or 0.0
+    curved, linear = gear.model.displacement(list(links)), level + errors @ slopes
+    under = worst_case(gear.model, start[None]).under_directions
+    curved = np.maximum(curved, -gear.model.displacement(links_from(start + errors, under)))
+    moved = norm.cdf((0.03 - curved) / rest) - norm.cdf((0.03 - linear) / rest)
+    assert found.confidence.monte_carlo - found.confidence.analytic == pytest.approx(np.mean(moved), abs=0.001)
 
 
 def test_the_error_stands_beside_the_probability(judge: Judge) -> None:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from mlg_troubleshoot.decision.assessment import Assessment, MeasuringAdvice, Verdict
 from mlg_troubleshoot.decision.case import Cases
@@ -266,6 +267,49 @@ def test_an_inconclusive_gear_that_precision_may_settle_is_told_so(gear: Gear) -
     found = advised(gear, every_joint(0.0019))
     assert (found.stop, found.verdict) == (False, Verdict.INCONCLUSIVE)
     assert "may still settle it" in found.text
+
+
+def test_the_quick_spread_over_the_linkages_is_that_of_the_rule(gear: Gear) -> None:
+    clearance = np.random.default_rng(6).uniform(0.0, 0.004, (50, 10))
+    exact = predict(gear, [inspected({})] * 50, clearance, np.ones((50, 10), bool), np.zeros(50))
+    quick = uncertainty_parts(responses(gear), clearance, 0.0, 0.0)[2]
+    assert np.median(quick / exact.u_geometry_in) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("under_in", [-0.02, -0.04])
+def test_slopes_are_those_of_the_sense_that_governs(gear: Gear, under_in: float) -> None:
+    start, step = np.full(10, 0.005), 1e-5 * np.eye(10)
+    response = responses(gear)[0].anchored(start, 0.03, under_in)
+    numeric = (response.magnitude(start + step) - response.magnitude(start - step)) / 2e-5
+    assert response.slopes(start) == pytest.approx(numeric, rel=1e-6)
+
+
+def test_the_variance_that_a_reading_removes_is_that_of_its_joint_s_wear_through_its_amplification(gear: Gear) -> None:
+    chance, (mean, variance) = level_weights(np.array([0.003 / gear.limits_in[1]])), moments()
+    share = chance @ (variance + mean**2) - (chance @ mean) ** 2
+    moved = gear.model.plunger_amplification() ** 2 * gear.limits_in**2 * share
+    for worth in outlook(gear, inspected({2: 0.003}), MARGIN_IN).worth:
+        assert worth.variance_in2 == pytest.approx(moved[gear.joint_numbers.index(worth.joint)], rel=0.2)
+
+
+@pytest.mark.parametrize("gauge_u_in", [0.0003, 0.0005])
+def test_precision_may_settle_what_two_standard_uncertainties_of_the_readings_would_move_out_of_doubt(
+    gear: Gear, table: IndexTable, gauge_u_in: float
+) -> None:
+    said = []
+    for clearance_in in np.arange(0.00180, 0.0027, 0.00005):
+        row = inspected(every_joint(float(clearance_in)), gauge_u_in=gauge_u_in)
+        (found,) = assess([row], gear, table)
+        assert isinstance(found, Assessment)
+        assert found.budget is not None
+        rest = np.hypot(found.budget.geometry_in, found.budget.model_in)
+        left = MARGIN_IN - (found.predicted_displacement_in or 0.0)
+        near, far = norm.cdf((left + np.array([2.0, -2.0]) * found.budget.clearances_in) / rest)
+        if found.verdict is Verdict.INCONCLUSIVE and min(abs(near - 0.95), abs(far - 0.05)) > 0.02:
+            said.append(near > 0.95 or far < 0.05)
+            assert advise(gear, row, MARGIN_IN).stop is not said[-1]
+    assert any(said)
+    assert gauge_u_in > 0.0004 or not all(said)
 
 
 def test_the_advice_is_the_same_at_every_call(gear: Gear) -> None:

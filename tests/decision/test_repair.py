@@ -16,7 +16,7 @@ from mlg_troubleshoot.decision.plan import minutes_to_measure
 from mlg_troubleshoot.decision.prediction import predict
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
-from tests.decision.conftest import Judge, every_joint, inspected
+from tests.decision.conftest import Judge, Shifted, every_joint, inspected
 
 FAILURE = {3: 0.013, 5: 0.007}
 # The failure with the other joints in good condition.
@@ -160,4 +160,23 @@ def test_the_search_knows_what_every_set_leaves_with_unread_joints_at_their_limi
     exact = predict(gear, cases.inspections * n, rows, np.repeat(cases.measured, n, axis=0), np.full(n, 0.0005))
     slack = 0.045 - exact.displacement_in - 1.645 * exact.standard_uncertainty(np.zeros(n))
     assert n >= 64
+    assert found.slack_in[0, sets] == pytest.approx(slack, abs=0.0005)
+
+
+def test_an_allowance_counts_on_what_an_extension_adds(gear: Gear) -> None:
+    cases = Cases.of(gear, [inspected(every_joint(0.001))], Shifted())
+    found = allowances(cases, predict_batch(cases).lower)[0]
+    rows = 0.001 + np.diag(found)[1:5]
+    assert 0.004 + worst_case(gear.model, rows).over_in == pytest.approx(np.full(4, MARGIN_IN), abs=1e-4)
+
+
+def test_the_search_knows_what_restoring_takes_from_the_uncertainty_of_coarse_readings(gear: Gear) -> None:
+    joints = every_joint(0.003, j1=0.004, j3=0.009, j4=0.005, j5=0.006)
+    cases = Cases.of(gear, [inspected(joints, margin_in=0.045, gauge_u_in=0.003)])
+    upper = predict_batch(cases).upper
+    found = repair.search(cases, upper.displacement_in, upper.u_clearances_in)
+    sets = np.flatnonzero(np.isfinite(found.slack_in[0]))
+    rows = np.where(found.table.members[sets], 0.0005, cases.clearance_in)
+    exact = predict(gear, cases.inspections * len(sets), rows, np.ones(rows.shape, bool), np.full(len(sets), 0.003))
+    slack = 0.045 - exact.displacement_in - 1.645 * exact.standard_uncertainty(np.zeros(len(sets)))
     assert found.slack_in[0, sets] == pytest.approx(slack, abs=0.0005)

@@ -17,7 +17,7 @@ from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.studies.index_table import IndexTable
-from tests.decision.conftest import Judge, every_joint, inspected
+from tests.decision.conftest import Judge, Shifted, every_joint, inspected
 
 WORN = every_joint(0.002, j3=0.005, j8=0.0)
 
@@ -153,21 +153,6 @@ def test_the_upper_prediction_gives_unmeasured_joints_no_reading_uncertainty(gea
     assert found.u_clearances_in[0] == 0.0
 
 
-class Shifted:
-    """An extension that shifts the plunger and whose residuals scatter by 1 thou."""
-
-    residual_u_in = 0.001
-
-    def adjust(self, inspections: Sequence[Inspection], clearance_in: np.ndarray) -> Adjustment:
-        return Adjustment(clearance_in, offset_in=np.full(len(inspections), 0.004))
-
-    def lacks(self, inspection: Inspection) -> tuple[str, ...]:
-        return () if inspection.gauge_id else ("gauge_id",)
-
-    def describe(self) -> str:
-        return "plunger shifted by 0.004 in"
-
-
 def test_an_extension_replaces_the_model_uncertainty_by_its_residual_scatter_and_says_so(judge: Judge) -> None:
     found = budget(judge(WORN, AssessOptions(extension=Shifted())))
     assert found.model_in == 0.001
@@ -224,6 +209,13 @@ def test_a_shift_moves_the_bound_too(judge: Judge) -> None:
     shifted = judge(WORN, AssessOptions(extension=Shifted()), gauge_id="G-1")
     assert shifted.bound_in == shifted.predicted_displacement_in
     assert not shifted.as_loaded
+
+
+def test_where_under_travel_governs_the_part_of_the_readings_is_of_that_sense(gear: Gear) -> None:
+    row, step = np.full((1, 10), 0.005), 1e-4 * np.eye(10)
+    found = predict(gear, [inspected({})], row, np.ones((1, 10), bool), np.array([0.001]), Shifted(-0.03))
+    further = 0.03 - worst_case(gear.model, np.vstack([row + step, row - step])).under_in
+    assert found.u_readings_in[0] == pytest.approx(0.001 * (further[:10] - further[10:]) / 2e-4, rel=2e-3)
 
 
 def test_a_gear_within_its_margin_as_loaded_says_what_other_loads_could_do(loaded: Assessment) -> None:
