@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Verdict
+from mlg_troubleshoot.decision.case import Cases, predict_batch
 from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.plan import Action, Basis, End
+from mlg_troubleshoot.decision.plunger_reading import compare
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.json_form import check_as_json
 from mlg_troubleshoot.studies.index_table import IndexTable
@@ -103,3 +107,58 @@ def test_a_gear_that_retracts_has_only_the_joint_over_its_limit_restored(judge: 
     found = judge(every_joint(0.004, j7=0.008), outcome=Outcome.RETRACTED)
     assert (found.next_action.action, found.next_action.joints) == (Action.RESTORE, (7,))
     assert found.end is End.OUTSIDE_NO_COMPLAINT
+
+
+@pytest.mark.parametrize(("apart", "clears"), [(1.9, False), (2.1, True)])
+def test_a_reading_clears_a_gear_from_two_standard_uncertainties_within_its_margin_on(
+    gear: Gear, apart: float, clears: bool
+) -> None:
+    u_in = math.hypot(0.0005, 0.002)
+    cases = Cases.of(gear, [inspected({}, readings_in=(apart * u_in - 0.03,), margin_u_in=0.002)])
+    assert compare(cases, predict_batch(cases).upper).clears == [clears]
+
+
+@pytest.mark.parametrize(("apart", "explained"), [(1.9, True), (2.1, False)])
+def test_the_joints_explain_a_displacement_up_to_two_standard_uncertainties_beyond_their_worst_case(
+    gear: Gear, judge: Judge, apart: float, explained: bool
+) -> None:
+    found = judge(every_joint(0.0005))
+    u_in = math.hypot(found.standard_uncertainty_in or 0.0, 0.0005)
+    read = inspected(every_joint(0.0005), readings_in=((found.over_travel_in or 0.0) + apart * u_in,))
+    cases = Cases.of(gear, [read])
+    assert compare(cases, predict_batch(cases).upper).explained == [explained]
+
+
+def test_a_failure_that_clearances_likely_caused_is_expected_to_be_repaired(judge: Judge) -> None:
+    found = judge(every_joint(0.001, j3=0.013, j5=0.007), outcome=Outcome.FAILED)
+    assert 0.05 < (found.probability_exceed_random_directions or 0.0) < 0.5
+    assert [step.action for step in found.plan.steps] == [Action.READ_PLUNGER, Action.RESTORE, Action.CONTINUE]
+
+
+def test_a_failure_that_clearances_hardly_cause_is_expected_to_have_another_cause(judge: Judge) -> None:
+    found = judge(every_joint(0.0035), outcome=Outcome.FAILED)
+    assert found.verdict is Verdict.OUTSIDE_MARGIN
+    assert (found.probability_exceed_random_directions or 0.0) < 0.05
+    assert ([step.action for step in found.plan.steps], found.end) == (
+        [Action.READ_PLUNGER, Action.CONTINUE],
+        End.NOT_EXPLAINED,
+    )
+
+
+@pytest.mark.parametrize(
+    ("outcome", "first", "end"),
+    [(None, Action.RESTORE, End.WITHIN), (Outcome.RETRACTED, Action.CONTINUE, End.OUTSIDE_NO_COMPLAINT)],
+)
+def test_a_plunger_beyond_its_margin_is_a_complaint_unless_the_gear_retracted(
+    judge: Judge, outcome: Outcome | None, first: Action, end: End
+) -> None:
+    found = judge(every_joint(0.004), readings_in=(0.035,), outcome=outcome)
+    assert (found.verdict, found.basis) == (Verdict.OUTSIDE_MARGIN, Basis.MEASURED)
+    assert (found.next_action.action, found.end) == (first, end)
+
+
+def test_no_better_gauge_is_asked_for_than_is_needed(judge: Judge) -> None:
+    coarse = judge(every_joint(0.0017), gauge_u_in=0.001).next_action
+    fine = judge(every_joint(0.0018), gauge_u_in=0.0005).next_action
+    assert coarse.action is fine.action is Action.MEASURE_AGAIN
+    assert (coarse.gauge_u_needed_in or 0.0) > (fine.gauge_u_needed_in or 0.0)
