@@ -207,6 +207,13 @@ def test_files_stack_in_their_order(gear: Gear, tmp_path: Path) -> None:
     assert offset_of(gear, both.terms) == pytest.approx(0.004 - 0.01, abs=1e-12)
 
 
+def test_what_nobody_read_for_one_of_stacked_files_is_said(gear: Gear, tmp_path: Path) -> None:
+    files = [tmp_path / "one.toml", tmp_path / "two.toml"]
+    for file, unread in zip(files, ((9,), (10,)), strict=True):
+        save_extension(replace(extension(gear, GAUGE), unread=unread), file)
+    assert load_extension(files, gear).unread == (9, 10)
+
+
 def test_stretches_of_one_link_add_up(gear: Gear) -> None:
     twice = term("elastic_compliance", 4e-6, length="length.F-1")
     assert offset_of(gear, (STRETCH, STRETCH)) == pytest.approx(offset_of(gear, (twice,)), abs=1e-12)

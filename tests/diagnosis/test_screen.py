@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mlg_troubleshoot.diagnosis.covariance import NoiseModel
-from mlg_troubleshoot.diagnosis.screen import Screen
+from mlg_troubleshoot.diagnosis.screen import Screen, fit, shrunk
 
 from .conftest import Array
 
@@ -69,3 +71,47 @@ def test_a_candidate_explains_nothing_with_a_sign_that_it_cannot_have(sign: int,
     column = RNG.standard_normal((N, 1))
     gain = Screen(NOISE, column, np.array([sign])).run(-column + 0.1 * RNG.standard_normal((N, 1))).gain[0, 0]
     assert bool(gain > 1.0) is explains
+
+
+def test_a_fit_is_that_of_generalised_least_squares_with_its_errors() -> None:
+    columns = RNG.standard_normal((N, 3))
+    data = columns @ np.array([1.0, -2.0, 0.5]) + np.linalg.cholesky(dense(0.4)) @ RNG.standard_normal(N)
+    found = fit(NOISE, columns, data)
+    inverse = np.linalg.inv(dense(found.tail_ratio))
+    covariance = np.linalg.inv(columns.T @ inverse @ columns)
+    values = covariance @ columns.T @ inverse @ data
+    left = data - columns @ values
+    assert found.values == pytest.approx(values)
+    assert found.errors == pytest.approx(np.sqrt(np.diag(covariance) * (left @ inverse @ left) / (N - 3)))
+
+
+def test_what_is_known_beforehand_shrinks_a_fit_as_bayes_says() -> None:
+    free, columns, data = RNG.standard_normal((N, 1)), RNG.standard_normal((N, 2)), RNG.standard_normal(N)
+    prior = np.array([[0.02, 0.01], [0.01, 0.03]])
+    values, covariance = shrunk(NOISE, free, columns, prior, data)
+    both, inverse = np.hstack([free, columns]), np.linalg.inv(dense(NOISE.tail_ratios[-1]))
+    precision = both.T @ inverse @ both
+    precision[1:, 1:] += np.linalg.inv(prior)
+    assert covariance == pytest.approx(np.linalg.inv(precision))
+    assert values == pytest.approx(np.linalg.solve(precision, both.T @ inverse @ data))
+
+
+def test_the_gain_of_two_candidates_together_is_that_of_least_squares() -> None:
+    columns, data = RNG.standard_normal((N, 4)), RNG.standard_normal(N)
+    found = Screen(NOISE, columns, np.zeros(4)).pairs(data, np.array([1, 3]))
+    none = likelihood(np.empty((N, 0)), data)
+    for partner, k in ((0, 1), (1, 3)):
+        assert found[0, partner] == pytest.approx(likelihood(columns[:, [0, k]], data) - none, abs=1e-9)
+
+
+def test_data_sets_with_nothing_wrong_have_the_whole_covariance() -> None:
+    drawn = NOISE.draw(RNG.standard_normal(4096), 0.4, 2.0, 40_000, np.random.default_rng(2))
+    assert np.cov(drawn) == pytest.approx(4.0 * dense(0.4), abs=0.5)
+
+
+def test_effects_of_unknown_size_explain_what_is_expected_of_them_given_the_data() -> None:
+    effects, data = 0.6 * RNG.standard_normal((N, 2)), RNG.standard_normal(N)
+    wide = replace(NOISE, scale_in=1.5).beside(effects)
+    low = wide.factors(wide.tail_ratios[-1])
+    whole = 1.5**2 * (np.diag(wide.relative**2) + low @ low.T)
+    assert wide.share_of(effects, data) == pytest.approx(effects @ effects.T @ np.linalg.solve(whole, data))

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
-from scipy.stats import norm
+from scipy.stats import gumbel_r, norm
 
 from mlg_troubleshoot.diagnosis import CATALOGUE, Candidate, Scene, Term
-from mlg_troubleshoot.diagnosis.diagnose import _cause
+from mlg_troubleshoot.diagnosis.causes.convention import as_meant
+from mlg_troubleshoot.diagnosis.causes.together import Block, LoadDirections, OtherGeometry
+from mlg_troubleshoot.diagnosis.diagnose import _cause, _expected_scatter
 from mlg_troubleshoot.diagnosis.extension import adjustment_of
-from mlg_troubleshoot.diagnosis.inference import RULED_OUT, Inference
-from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE
+from mlg_troubleshoot.diagnosis.gain import _interval
+from mlg_troubleshoot.diagnosis.inference import RULED_OUT, Inference, _chance
+from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, measured_uncertainty, robust_scale
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 
 BY_NAME = {cause.name: cause for cause in CATALOGUE}
@@ -53,3 +59,79 @@ def test_the_smallest_effect_would_be_found_four_times_in_five() -> None:
 
 def test_a_rival_is_ruled_out_only_at_odds_of_ten_to_one() -> None:
     assert np.exp(RULED_OUT) > 10.0
+
+
+def test_a_chance_counts_each_of_many_equals_once() -> None:
+    # One of 40 data sets that are alike is as large as the k-th largest of them with a chance of k in 40.
+    values = np.random.default_rng(4).standard_normal(40)
+    chances = sorted(_chance(np.delete(values, k), values[k]) for k in range(40))
+    assert chances[10:] == pytest.approx(np.arange(11, 41) / 40.0)
+
+
+def test_a_chance_beyond_all_draws_is_that_of_the_largest_of_many() -> None:
+    drawn = gumbel_r.rvs(3.0, 0.8, size=20_000, random_state=2)
+    assert _chance(drawn, gumbel_r.isf(1e-4, 3.0, 0.8)) == pytest.approx(1e-4, rel=0.3)
+
+
+def test_the_robust_scale_is_the_standard_deviation_of_a_normal_distribution() -> None:
+    values = 0.7 * np.random.default_rng(1).standard_normal(20_000)
+    values[:200] += 50.0
+    assert robust_scale(values) == pytest.approx(0.7, rel=0.04)
+
+
+def test_the_mean_of_four_readings_is_twice_as_certain_as_one(plain: DiagnosisTable) -> None:
+    readings = 0.001 * np.random.default_rng(1).standard_normal((len(plain), 4))
+    assert measured_uncertainty(replace(plain, readings_in=readings)) == pytest.approx(0.0005, rel=0.1)
+
+
+def test_gauges_alone_leave_what_their_errors_do_through_the_mechanism(gear: Gear, plain: DiagnosisTable) -> None:
+    rng, n = np.random.default_rng(1), 4000
+    clearance = np.tile(plain.clearance_in[0], (n, 1))
+    moved = worst_case(gear.model, clearance + 0.0003 * rng.standard_normal(clearance.shape)).over_in
+    table = replace(plain, gauge_u_in=np.full(len(plain), 0.0003), readings_in=plain.readings_in[:, :1])
+    found = _expected_scatter(gear.model, replace(table, plunger_gauge_u_in=np.full(len(plain), 0.002)), 0.002)
+    assert found == pytest.approx(np.hypot(np.std(moved), 0.002), rel=0.05)
+
+
+def test_the_share_removed_has_an_interval_of_95_percent_over_tails() -> None:
+    rng, tails = np.random.default_rng(1), np.arange(400)
+    before = rng.lognormal(0.0, 0.3, 400)
+    after = before * rng.uniform(0.2, 0.6, 400)
+    share = np.sum(after**2) / np.sum(before**2)
+    error = float(np.std(after**2 - share * before**2) / np.sqrt(400) / np.mean(before**2))
+    low, high = _interval(before, after, tails.astype(str), rng)
+    assert (low, high) == pytest.approx(norm.interval(0.95, 1.0 - share, error), abs=0.3 * error)
+
+
+@pytest.mark.parametrize(("spread_deg", "k"), [(25.0, 0), (45.0, 1), (70.0, 2), (None, 3)])
+def test_resting_places_of_pins_have_the_moments_of_their_angles(gear: Gear, spread_deg: float | None, k: int) -> None:
+    rng = np.random.default_rng(1)
+    n = 400_000
+    angles = rng.uniform(0.0, 2.0 * np.pi, n) if spread_deg is None else np.radians(spread_deg) * rng.standard_normal(n)
+    change = np.cos(angles) - 1.0
+    found = LoadDirections().covariances(gear.model, ())[k]
+    assert found[0, 0] == pytest.approx(np.mean(change**2), abs=0.005)
+    assert found[0, 1] == pytest.approx(np.mean(change) ** 2, abs=0.005)
+
+
+def test_factors_of_all_joints_have_intervals_of_95_percent() -> None:
+    block = Block(OtherGeometry(), (3, 5), np.ones((4, 2)), np.eye(2), 0.0)
+    setting = block.candidate(np.array([0.1, -0.2]), np.diag([0.04, 0.01])).setting
+    for joint, middle, error in (("3", 1.1, 0.2), ("5", 0.8, 0.1)):
+        found = setting["low"][joint], setting["high"][joint]
+        assert found == pytest.approx(norm.interval(0.95, middle, error), abs=1e-3)
+
+
+def test_directions_of_two_extensions_multiply(gear: Gear, scene: Scene) -> None:
+    parts = [{"factors": {"3": 0.5, "5": -0.4}}, {"factors": {"3": 0.6, "4": 0.2}}]
+    terms = [Term(Candidate(LoadDirections(), None, setting), 1.0, (0.0, 1.0)) for setting in parts]
+    found = adjustment_of(terms, gear.model, scene.table, scene.clearance_in, gear.discrepancies).direction_factors
+    assert found is not None
+    assert found[[2, 3, 4]] == pytest.approx([0.3, 0.2, -0.4])
+
+
+def test_what_is_written_twice_as_large_has_twice_the_error(plain: DiagnosisTable) -> None:
+    rows = plain.factors["technician_id"] == "T-2"
+    meant = as_meant(plain, {"column": "technician_id", "value": "T-2", "written_factor": 2.0})
+    assert meant.gauge_u_in == pytest.approx(np.where(rows, 0.5, 1.0) * plain.gauge_u_in)
+    assert meant.clearance_in[rows] == pytest.approx(0.5 * plain.clearance_in[rows])

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.diagnosis.wear import WearHistory, landings_of, wear_history
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.diagnosis.wear import (
+    WearHistory,
+    _lines,
+    _variance,
+    fleet_history,
+    landings_of,
+    likely_clearances,
+    wear_history,
+)
 
 from .conftest import Array
 
@@ -117,3 +126,45 @@ def test_a_joint_that_is_tight_everywhere_stays_so() -> None:
 def test_one_reading_alone_is_its_own_expectation() -> None:
     alone = wear_history(np.array([0.002, np.nan]), np.array([0, 1]), np.array([1.0, 2.0]), np.full(2, DECLARED_IN**2))
     assert alone.expected_in == pytest.approx([0.002, 0.002])
+
+
+def test_a_gear_s_line_is_that_of_a_linear_mixed_model() -> None:
+    rng = np.random.default_rng(2)
+    gears, x = np.repeat(np.arange(3), [1, 4, 6]), rng.uniform(0.2, 2.0, (11, 1))
+    y, weight = rng.normal(1.0, 0.3, (11, 1)), rng.uniform(5.0, 20.0, (11, 1))
+    fleet, spread = np.array([[0.6], [0.4]]), np.array([[0.05], [-0.02], [0.03]])
+    lines, unsure = _lines((np.arange(3)[:, None] == gears).astype(float), x, y, weight, fleet, spread)
+    prior = np.linalg.inv(np.array([[0.05, -0.02], [-0.02, 0.03]]))
+    for gear in range(3):
+        own = gears == gear
+        shape = np.column_stack([np.ones(own.sum()), x[own, 0]])
+        covariance = np.linalg.inv(prior + shape.T @ (weight[own] * shape))
+        values = covariance @ (prior @ fleet[:, 0] + shape.T @ (weight[own] * y[own])[:, 0])
+        assert lines[:, gear, 0] == pytest.approx(values)
+        variance = _variance(unsure, np.full(own.sum(), gear), x[own])[:, 0]
+        assert variance == pytest.approx(np.sum(shape @ covariance * shape, axis=1))
+
+
+def test_readings_on_a_grid_have_the_error_of_rounding(plain: DiagnosisTable) -> None:
+    rounded = np.round(plain.clearance_in, 3)
+    table = replace(plain, clearance_in=rounded, gauge_u_in=np.full(len(plain), 1e-6))
+    errors = np.random.default_rng(1).uniform(-0.0005, 0.0005, 100_000)
+    assert np.sqrt(fleet_history(table)[0].reading_in2) == pytest.approx(
+        np.full(rounded.shape, np.std(errors)), rel=0.01
+    )
+
+
+def test_a_reading_is_overruled_by_two_of_its_standard_errors_at_most(plain: DiagnosisTable) -> None:
+    written = plain.clearance_in.copy()
+    written[5, 2] = 0.02
+    table = replace(plain, clearance_in=written, gauge_u_in=np.full(len(plain), 0.0005))
+    assert 0.02 - 0.0011 < likely_clearances(table).likely_in[5, 2] < 0.02
+
+
+def test_an_unread_joint_is_expected_to_be_worn_more_where_the_joints_of_its_gear_are(plain: DiagnosisTable) -> None:
+    worn_gear = (plain.factors["tail_no"] == "N103") & (plain.factors["side"] == "LH")
+    clearance = plain.clearance_in * np.where(worn_gear, 2.0, 1.0)[:, None]
+    clearance[:, 9] = np.nan
+    likely = likely_clearances(replace(plain, clearance_in=clearance)).likely_in
+    unread, read = likely[worn_gear, 9].mean(), likely[worn_gear, :9].mean()
+    assert likely[~worn_gear, 9].mean() < unread < read
