@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.diagnosis.covariance import NoiseModel
+from mlg_troubleshoot.diagnosis.gain import Gain, measure_gain
+from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE
 from mlg_troubleshoot.diagnosis.screen import Screen, fit, shrunk
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 
 from .conftest import Array
 
@@ -115,3 +118,41 @@ def test_effects_of_unknown_size_explain_what_is_expected_of_them_given_the_data
     low = wide.factors(wide.tail_ratios[-1])
     whole = 1.5**2 * (np.diag(wide.relative**2) + low @ low.T)
     assert wide.share_of(effects, data) == pytest.approx(effects @ effects.T @ np.linalg.solve(whole, data))
+
+
+def gained(predicted: Array, misfit: Array, column: Array, tails: np.ndarray, *, by_row: bool = False) -> Gain:
+    n = len(misfit)
+    tail = np.array([f"N{t}" for t in tails])
+    noise = NoiseModel(np.ones(n), tails, tails, np.empty((n, 0)), 1e-6, 0.1, (0.0,), 0.001)
+    none = np.zeros(n)
+    names = tuple(f"R{k}" for k in range(n))
+    table = DiagnosisTable(none[:, None], none[:, None], names, np.arange(n), none + 0.03, none, {}, {"tail_no": tail})
+    return measure_gain(noise, column[:, None], misfit, predicted, table, by_row, np.random.default_rng(1))
+
+
+def test_decisions_after_are_those_of_the_extended_prediction_in_both_senses() -> None:
+    kind, tails = np.tile(np.arange(4), 20), np.repeat(np.arange(10), 8)
+    # Within and measured beyond; outside and measured within; within and measured short; right already.
+    found = gained(
+        np.array([0.02, 0.04, -0.02, 0.02])[kind], np.array([0.02, -0.02, -0.02, 0.0])[kind],
+        np.array([1.0, -1.0, -1.0, 0.0])[kind], tails,
+    )  # fmt: skip
+    assert (found.false_within_before, found.false_outside_before) == (40, 20)
+    assert (found.false_within_after, found.false_outside_after) == (0, 0)
+    assert found.verdicts_changed == tuple(f"R{k}" for k in range(80) if k % 4 != 3)
+
+
+def test_what_is_true_of_one_tail_only_is_learned_from_its_own_rows_only() -> None:
+    tails = np.repeat(np.arange(10), 8)
+    column = (tails == 3).astype(float)
+    by_tail, by_row = (gained(np.full(80, 0.01), 0.01 * column, column, tails, by_row=way) for way in (False, True))
+    assert (by_tail.held_out_by, by_row.held_out_by) == ("tail", "row")
+    assert by_tail.rms_after_in == pytest.approx(by_tail.rms_before_in)
+    assert by_row.rms_after_in < 0.1 * by_row.rms_before_in
+
+
+def test_what_pins_scatter_is_no_part_of_what_an_extension_corrects() -> None:
+    predicted = np.tile([0.0274, 0.02], 40)
+    found = gained(predicted, (0.1 + EXPECTED_SLOPE) * predicted, predicted, np.repeat(np.arange(10), 8))
+    # 0.0274 in and a tenth of it are beyond the margin; less twice what pins scatter they would be within it.
+    assert (found.false_within_before, found.false_within_after) == (40, 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
@@ -13,12 +14,15 @@ from scipy.stats import gumbel_r, norm
 from mlg_troubleshoot.diagnosis import CATALOGUE, Candidate, Scene, Term
 from mlg_troubleshoot.diagnosis.causes.convention import as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, LoadDirections, OtherGeometry
-from mlg_troubleshoot.diagnosis.diagnose import _cause, _expected_scatter
+from mlg_troubleshoot.diagnosis.diagnose import _cause, _expected_scatter, _single_slips
 from mlg_troubleshoot.diagnosis.extension import adjustment_of
+from mlg_troubleshoot.diagnosis.faults import DataFault
 from mlg_troubleshoot.diagnosis.gain import _interval
-from mlg_troubleshoot.diagnosis.inference import RULED_OUT, Inference, _chance
+from mlg_troubleshoot.diagnosis.inference import ALARM, NAME, RULED_OUT, SECOND, UNLISTED_ALARM, Inference, _chance
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, measured_uncertainty, robust_scale
+from mlg_troubleshoot.diagnosis.scene import build_scene
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 
@@ -135,3 +139,43 @@ def test_what_is_written_twice_as_large_has_twice_the_error(plain: DiagnosisTabl
     meant = as_meant(plain, {"column": "technician_id", "value": "T-2", "written_factor": 2.0})
     assert meant.gauge_u_in == pytest.approx(np.where(rows, 0.5, 1.0) * plain.gauge_u_in)
     assert meant.clearance_in[rows] == pytest.approx(0.5 * plain.clearance_in[rows])
+
+
+def test_healthy_fleets_alarm_at_most_twice_in_a_hundred_and_a_name_needs_more() -> None:
+    assert ALARM + UNLISTED_ALARM <= 0.02
+    assert max(NAME, SECOND) <= ALARM / 4.0
+
+
+def test_a_cause_with_two_targets_pays_for_both_and_what_pins_scatter_is_expected() -> None:
+    predicted = np.linspace(0.0, 0.05, 9)
+    causes = [BY_NAME[name] for name in ("calibration_rate", "gauge_bias", "gauge_bias")]
+    rows = cast(Any, SimpleNamespace(predicted_in=predicted))
+    found = Inference(
+        EXPECTED_SLOPE * predicted, rows, [Candidate(c) for c in causes], np.empty((9, 3)), cast(Any, None), 9,
+        np.random.default_rng(1),
+    )  # fmt: skip
+    assert found.prior == pytest.approx(np.log([1.0, 2.0, 2.0]))
+    assert found.misfit == pytest.approx(np.zeros(9))
+
+
+@pytest.mark.parametrize(("wrong", "refused"), [(15, False), (30, True)])
+def test_a_table_of_which_a_third_looks_wrong_has_no_slips_of_the_pen(wrong: int, refused: bool) -> None:
+    faults = tuple(DataFault(k, k, f"R{k}", "clearance_3_in", "mm_as_in", "0.1", "0.004") for k in range(wrong))
+    with pytest.raises(InconclusiveDataError) if refused else nullcontext():
+        _single_slips(faults, 100)
+
+
+def test_a_reading_that_is_too_large_by_chance_predicts_too_much(gear: Gear, plain: DiagnosisTable) -> None:
+    clearance = plain.clearance_in.copy()
+    clearance[5, 2] += 0.002
+    table = replace(plain, clearance_in=clearance, gauge_u_in=np.full(len(plain), 0.001))
+    found = build_scene(gear.model, table, gear.discrepancies)
+    assert found.drawn_in[5] > 0.0003
+
+
+def test_a_gauge_that_reads_better_than_declared_leaves_little_doubt(gear: Gear, plain: DiagnosisTable) -> None:
+    # The displacements of this fleet follow its readings of clearance exactly.
+    declared = replace(plain, gauge_u_in=np.full(len(plain), 0.0005))
+    found = build_scene(gear.model, declared, gear.discrepancies)
+    through = 0.0005 * float(np.linalg.norm(gear.model.plunger_amplification()))
+    assert found.u_read_in < 0.35 * through

@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.geometry.kernel import Kernel
+from mlg_troubleshoot.geometry.mechanism import Crank, Mechanism, Output, Plane, Point, Slider
 
 CRANK, ROD, OFFSET = 2.0, 5.0, 1.0
 
@@ -48,3 +50,24 @@ def test_the_amplification_is_the_secant_of_the_rod_to_the_axis(model: LinkageMo
 
 def test_a_rod_that_is_too_short_gives_not_a_number(model: LinkageModel) -> None:
     assert math.isnan(model.kernel.output(1.0, [0.0, 3.0, 0.0, 0.0, 0.0, 0.0]))
+
+
+def test_a_rod_out_of_the_plane_of_its_slider_keeps_its_length() -> None:
+    tilt = 0.6
+    mechanism = Mechanism(
+        planes=(Plane("base"), Plane("tilted", "base", "H", 0.0, tilt)),
+        points=(
+            Point("O", "base", 0.0, 0.0, fixed=True),
+            Point("H", "base", 3.0, 0.0, fixed=True),
+            Point("A", "base", 1.0, 0.0),
+            Point("B", "tilted", 1.0, 0.5),
+        ),
+        steps=(Crank("A", "O"), Slider("B", "A", 0.0, 1.0)),
+        output=Output("position", "B"),
+        reference_input=0.0,
+    )
+    angle = np.linspace(-0.5, 0.5, 7)
+    found = Kernel(mechanism).positions(angle, [])
+    u, v = found["B"]
+    apart = (3.0 + u - np.cos(angle), v * np.cos(tilt) - np.sin(angle), v * np.sin(tilt))
+    assert np.sqrt(sum(side**2 for side in apart)) == pytest.approx(np.full(7, np.hypot(3.0, 0.5)))

@@ -454,3 +454,17 @@ def test_a_value_in_a_message_is_cut_and_cannot_steer_a_terminal(read, table):
     problem = only(read(table(rows=[(*GOOD[:4], "\x1b[31m" + "9" * 5000, 0.007)])))
     assert problem.value.startswith("\\x1b[31m999")
     assert len(problem.value) < 400
+
+
+@pytest.mark.parametrize(("value", "said"), [(0.33, "millimetres"), (13, "thou")])
+def test_a_slip_is_suggested_only_where_somebody_would_write_such_a_number(read, table, value, said):
+    remedy = only(read(table(rows=[(*GOOD[:4], value, 0.007)]))).remedy
+    assert [unit for unit in ("thou", "millimetres") if f"read in {unit}" in remedy] == [said]
+
+
+def test_a_margin_of_nothing_is_no_slip_of_the_decimal_point(read, table):
+    assert "slipped" not in only(read(with_column(table, "margin_in", 0))).remedy
+
+
+def test_a_unit_that_contradicts_its_header_is_converted_in_the_remedy(read, table):
+    assert "enter 0.013 (in)" in only(read(table(rows=[(*GOOD[:4], "13 thou", 0.007)]))).remedy

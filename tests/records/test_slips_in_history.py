@@ -55,3 +55,17 @@ def test_only_the_odd_row_is_warned_of(read, table):
 def test_a_jump_that_no_slip_explains_is_not_called_a_slip(read, table):
     odd = (0.0012, 0.0035, 0.0141, 0.0020, 0.0144)
     assert warnings(read(table(HEADER, history(odd)))) == {}
+
+
+def test_two_readings_that_were_exchanged_are_seen_although_they_wore_on(read, table):
+    usual = (0.0012, 0.0035, 0.0105, 0.0020, 0.0044)
+    rows = [(f"L{n}", "N1", "LH", "RADIAL", *usual) for n in range(5)]
+    rows[2:2] = [("ODD", "N1", "LH", "RADIAL", 0.0012, 0.0035, 0.0022, 0.0118, 0.0044)]
+    assert "joints 3 and 4" in warnings(read(table(HEADER, rows)))["ODD"][0]
+
+
+@pytest.mark.parametrize("odd", [RIGHT[:2], tuple(2.1 * c for c in LEFT[:2])])
+def test_two_joints_alone_tell_neither_side_nor_factor(read, table, odd):
+    rows = [(*row[:4], *row[4:6]) for row in history((*odd, 0.0, 0.0, 0.0))]
+    said = warnings(read(table(HEADER[:6], rows))).get("ODD", ())
+    assert not any("side" in text or "all clearances" in text for text in said)

@@ -39,6 +39,20 @@ def test_the_same_inspection_twice_is_one(store: Store) -> None:
     assert (again.new, again.known) == (4, 10)
 
 
+def test_the_same_inspection_twice_in_one_call_is_one(place: Path) -> None:
+    added = Store(place).add([*places.records(1, 3), *places.records(1, 3)], same_inspection)
+    assert (added.new, added.known) == (len(places.records(1, 3)), len(places.records(1, 3)))
+
+
+def test_while_one_writes_no_other_begins_to(store: Store) -> None:
+    with (
+        store.transaction(writing=True),
+        pytest.raises(StoreError, match="locked"),
+        Store(store.place, patience_s=0).transaction(writing=True),
+    ):
+        pass
+
+
 def test_the_same_inspection_from_another_file_is_the_same(store: Store) -> None:
     moved = replace(places.inspection(2), source=places.RowSource("other.xlsx", "Sheet", 9), warnings=("seen",))
     assert store.add([inspection_record(moved)], same_inspection).new == 0

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
 
 from mlg_troubleshoot.wear import WearPath
-from mlg_troubleshoot.wear.filtering import Draws, follow
-from mlg_troubleshoot.wear.model import _gamma_passage, _integrated_passage, _wiener_passage
+from mlg_troubleshoot.wear.filtering import Draws, State, follow
+from mlg_troubleshoot.wear.model import _Ends, _gamma_passage, _integrated_passage, _wiener_passage
 from mlg_troubleshoot.wear.paths import Scale, grid_step, lay_out
 
 AS_IT_IS = Scale(usage=1.0, value=1.0, start=0.0, resolution=0.0)
@@ -94,3 +96,34 @@ def test_a_wandering_drift_passes_when_fine_simulated_steps_do() -> None:
 )
 def test_the_resolution_is_the_step_of_the_grid_that_readings_lie_on(values: list[float], step: float) -> None:
     assert grid_step(np.array(values)) == pytest.approx(step)
+
+
+def test_gamma_increments_scatter_as_simulated_ones_whose_drift_is_not_known() -> None:
+    draws = replace(parameters(start_sd=0.0, increment_sd=0.6, power=1.0, kept=1.0), gamma=np.array([[True]]))
+    steps = lay_out([[WearPath("a", [0.0, 2.0], [0.1, 0.0])]], AS_IT_IS)
+    _likely, state = follow(steps, replace(draws, reading_sd=1e6 * draws.reading_sd))
+    rng = np.random.default_rng(2)
+    drift = rng.normal(0.9, 0.3, 400_000)
+    moved = drift * 0.36 * rng.standard_gamma(2.0 / 0.36, len(drift))
+    assert state.level_var[0, 0] == pytest.approx(np.var(moved), rel=0.01)
+
+
+def test_level_and_drift_are_sampled_together() -> None:
+    one = np.ones((1, 1))
+    state = State(one, one, one, 0.8 * one, one)
+    ends = _Ends.drawn(parameters(), state, 200_000, np.random.default_rng(1))
+    assert np.cov(ends.level.ravel(), ends.drift.ravel()) == pytest.approx(np.array([[1.0, 0.8], [0.8, 1.0]]), abs=0.02)
+
+
+def test_beyond_what_any_unit_has_reached_the_pace_is_a_quarter_uncertain() -> None:
+    zero, one = np.zeros((1, 1)), np.ones((1, 1))
+    sharp = parameters(increment_sd=0.0, power=1.0)
+    ends = _Ends.drawn(sharp, State(one, one, zero, zero, zero), 50_000, np.random.default_rng(1))
+    rng = np.random.default_rng(2)
+    found = ends.follow(np.array([[1.0, 3.0]]), np.array([0.5]), np.array([0.0]), rng, reading=False)
+    assert np.std(found[0, 0], axis=0) == pytest.approx([0.0, 0.25 * 2.0], abs=0.01)
+
+
+def test_a_declared_error_is_scaled_as_the_readings_are() -> None:
+    steps = lay_out([[WearPath("a", [1.0], [2.0], reading_u=0.3)]], Scale(1.0, -4.0, 0.0, 0.0))
+    assert steps.known_r2[0, 0] == pytest.approx((0.3 / 4.0) ** 2)
