@@ -8,6 +8,7 @@ from scipy.stats import norm
 
 from mlg_troubleshoot.decision.case import Cases, exact_chance
 from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.decision.monte_carlo import check_probability
 from mlg_troubleshoot.decision.sentences import confidence_words, rigging_sentence
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
@@ -41,11 +42,14 @@ def test_advice_does_not_change_the_verdict_or_its_probability(judge: Judge) -> 
     assert (plain.verdict, plain.probability_within_margin) == (advised.verdict, advised.probability_within_margin)
 
 
-def test_the_error_of_the_monte_carlo_value_is_its_scatter_between_seeds(judge: Judge) -> None:
-    found = [judge(every_joint(0.002), AssessOptions(advice=True, seed=s), gauge_u_in=0.002) for s in range(12)]
-    checks = [a.confidence for a in found if a.confidence is not None]
-    scatter = np.std([c.monte_carlo for c in checks], ddof=1)
-    assert 0.4 < scatter / np.mean([c.standard_error for c in checks]) < 2.0
+def test_the_error_of_one_monte_carlo_value_is_the_scatter_of_many(gear: Gear, judge: Judge) -> None:
+    found = judge(every_joint(0.002), gauge_u_in=0.004)
+    one = Cases.of(gear, [found.inspection])
+    assert found.budget is not None
+    worst = found.over_travel_in or 0.0, found.under_travel_in or 0.0
+    many = [check_probability(one, worst, found.budget, np.random.default_rng(seed)) for seed in range(150)]
+    scatter = float(np.std([c.monte_carlo for c in many], ddof=1))
+    assert scatter == pytest.approx(np.mean([c.standard_error for c in many]), rel=0.2)
 
 
 def test_a_worse_gauge_is_in_the_monte_carlo_value(judge: Judge) -> None:

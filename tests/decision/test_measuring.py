@@ -30,7 +30,7 @@ from mlg_troubleshoot.decision.wear_levels import (
     tabled_normal_cdf,
     uncertainty_parts,
 )
-from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.gear.directions import random_directions, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import links_from
 from mlg_troubleshoot.studies.index_table import IndexTable
@@ -73,6 +73,21 @@ def test_the_quick_uncertainty_agrees_with_the_rule(gear: Gear) -> None:
     wanted = np.sqrt(exact.u_clearances_in**2 + exact.u_geometry_in**2 + 0.001**2)
     assert worst == pytest.approx(exact.displacement_in, rel=0.005)
     assert u == pytest.approx(wanted, rel=0.03)
+
+
+def test_the_quick_chance_with_random_directions_is_the_share_of_displacements_beyond_the_margin(gear: Gear) -> None:
+    response, clearance = responses(gear)[0], np.array([[0.0] * 2 + [0.015] + [0.0] * 7, [0.0075] * 10])
+    links = np.array(links_from(clearance[:, None, :], random_directions(10, 512)))
+    share = [np.mean(np.abs(response.displacement(links[:, k].T)) > 0.03) for k in range(2)]
+    assert response.chance_beyond(clearance, np.full(2, 0.03), 512) == pytest.approx(np.array(share), abs=1e-12)
+
+
+def test_the_minutes_of_a_reading_are_those_in_an_area_that_is_open_already(gear: Gear) -> None:
+    closed = {w.joint: w.minutes for w in outlook(gear, inspected({}), MARGIN_IN).worth}
+    opened = {w.joint: w.minutes for w in outlook(gear, inspected({4: 0.001}), MARGIN_IN).worth}
+    (area,) = (area for area in gear.areas if area.name == gear.joint(4).area)
+    assert closed[2] - opened[2] == area.access.value
+    assert closed[9] == opened[9]
 
 
 def test_a_wrong_within_costs_nineteen_times_a_wrong_outside() -> None:

@@ -162,3 +162,14 @@ def test_no_better_gauge_is_asked_for_than_is_needed(judge: Judge) -> None:
     fine = judge(every_joint(0.0018), gauge_u_in=0.0005).next_action
     assert coarse.action is fine.action is Action.MEASURE_AGAIN
     assert (coarse.gauge_u_needed_in or 0.0) > (fine.gauge_u_needed_in or 0.0)
+
+
+def test_a_joint_at_its_limit_is_not_restored_even_if_read_in_millimetres(judge: Judge) -> None:
+    at_limit = judge(every_joint(0.0005, j7=0.1905 / 25.4))
+    assert Action.RESTORE not in [step.action for step in at_limit.plan.steps]
+    assert at_limit.end is End.WITHIN
+
+
+def test_what_tells_least_is_left_for_a_second_round_of_readings(judge: Judge) -> None:
+    rounds = [step.joints for step in judge(dict.fromkeys(range(1, 6), 0.0015)).plan.steps if step.joints]
+    assert [set(joints) for joints in rounds] == [{6, 7, 9, 10}, {8}]

@@ -175,6 +175,18 @@ def test_an_inspection_with_all_that_an_extension_needs_says_nothing(judge: Judg
     assert not any("lacks" in warning for warning in found.warnings)
 
 
+class Scaled(Shifted):
+    """An extension whose calibration rate is a tenth larger."""
+
+    def adjust(self, inspections: Sequence[Inspection], clearance_in: np.ndarray) -> Adjustment:
+        return Adjustment(clearance_in, rate_factor=np.full(len(inspections), 1.1))
+
+
+def test_the_part_of_the_readings_grows_with_the_calibration_rate(judge: Judge) -> None:
+    plain, scaled = judge(WORN), judge(WORN, AssessOptions(extension=Scaled()))
+    assert budget(scaled).clearances_in == pytest.approx(1.1 * budget(plain).clearances_in)
+
+
 class Loaded(Shifted):
     """An extension for a fleet whose loads rest every pin beside its worst direction."""
 

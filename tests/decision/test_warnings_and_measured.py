@@ -117,6 +117,12 @@ def test_a_slip_that_would_explain_the_difference_is_suggested(factor: float, wo
     assert words in text
 
 
+def test_a_slip_that_made_a_reading_too_small_is_suggested() -> None:
+    text = disagreement(inspected({}, readings_in=(0.004,)), 0.04, -0.04, 0.001)
+    assert text is not None
+    assert "decimal point" in text
+
+
 def test_a_suggested_slip_is_never_applied(judge: Judge) -> None:
     plain, read = judge(every_joint(0.001)), judge(every_joint(0.001), readings_in=(0.1321,))
     assert said(read.warnings, "decimal point")

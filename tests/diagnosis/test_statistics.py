@@ -126,6 +126,12 @@ def test_factors_of_all_joints_have_intervals_of_95_percent() -> None:
         assert found == pytest.approx(norm.interval(0.95, middle, error), abs=1e-3)
 
 
+def test_two_changes_of_the_calibration_rate_multiply(gear: Gear, scene: Scene) -> None:
+    terms = [Term(Candidate(BY_NAME["calibration_rate"]), value, (0.0, 1.0)) for value in (0.1, 0.2)]
+    found = adjustment_of(terms, gear.model, scene.table, scene.clearance_in, gear.discrepancies).rate_factor
+    assert found == pytest.approx(np.full(len(scene.table), 1.1 * 1.2))
+
+
 def test_directions_of_two_extensions_multiply(gear: Gear, scene: Scene) -> None:
     parts = [{"factors": {"3": 0.5, "5": -0.4}}, {"factors": {"3": 0.6, "4": 0.2}}]
     terms = [Term(Candidate(LoadDirections(), None, setting), 1.0, (0.0, 1.0)) for setting in parts]
