@@ -210,7 +210,7 @@ def test_files_stack_in_their_order(gear: Gear, tmp_path: Path) -> None:
 def test_what_nobody_read_for_one_of_stacked_files_is_said(gear: Gear, tmp_path: Path) -> None:
     files = [tmp_path / "one.toml", tmp_path / "two.toml"]
     for file, unread in zip(files, ((9,), (10,)), strict=True):
-        save_extension(replace(extension(gear, GAUGE), unread=unread), file)
+        write_extension(replace(extension(gear, GAUGE), unread=unread), file)
     assert load_extension(files, gear).unread == (9, 10)
 
 
