@@ -83,8 +83,8 @@ def test_the_quick_chance_with_random_directions_is_the_share_of_displacements_b
 
 
 def test_the_minutes_of_a_reading_are_those_in_an_area_that_is_open_already(gear: Gear) -> None:
-    closed = {w.joint: w.minutes for w in outlook(gear, inspected({}), MARGIN_IN).worth}
-    opened = {w.joint: w.minutes for w in outlook(gear, inspected({4: 0.001}), MARGIN_IN).worth}
+    closed = {w.joint: w.minutes for w in outlook(Cases.of(gear, [inspected({})])).worth}
+    opened = {w.joint: w.minutes for w in outlook(Cases.of(gear, [inspected({4: 0.001})])).worth}
     (area,) = (area for area in gear.areas if area.name == gear.joint(4).area)
     assert closed[2] - opened[2] == area.access.value
     assert closed[9] == opened[9]
@@ -303,7 +303,7 @@ def test_the_variance_that_a_reading_removes_is_that_of_its_joint_s_wear_through
     chance, (mean, variance) = level_weights(np.array([0.003 / gear.limits_in[1]])), moments()
     share = chance @ (variance + mean**2) - (chance @ mean) ** 2
     moved = gear.model.plunger_amplification() ** 2 * gear.limits_in**2 * share
-    for worth in outlook(gear, inspected({2: 0.003}), MARGIN_IN).worth:
+    for worth in outlook(Cases.of(gear, [inspected({2: 0.003})])).worth:
         assert worth.variance_in2 == pytest.approx(moved[gear.joint_numbers.index(worth.joint)], rel=0.2)
 
 
@@ -322,7 +322,7 @@ def test_precision_may_settle_what_two_standard_uncertainties_of_the_readings_wo
         near, far = norm.cdf((left + np.array([2.0, -2.0]) * found.budget.clearances_in) / rest)
         if found.verdict is Verdict.INCONCLUSIVE and min(abs(near - 0.95), abs(far - 0.05)) > 0.02:
             said.append(near > 0.95 or far < 0.05)
-            assert advise(gear, row, MARGIN_IN).stop != said[-1]
+            assert advise(Cases.of(gear, [row])).stop != said[-1]
     assert True in said
     assert gauge_u_in > 0.0004 or False in said
 

@@ -173,3 +173,18 @@ def test_a_joint_at_its_limit_is_not_restored_even_if_read_in_millimetres(judge:
 def test_what_tells_least_is_left_for_a_second_round_of_readings(judge: Judge) -> None:
     rounds = [step.joints for step in judge(dict.fromkeys(range(1, 6), 0.0015)).plan.steps if step.joints]
     assert [set(joints) for joints in rounds] == [{6, 7, 9, 10}, {8}]
+
+
+def test_nothing_is_read_first_that_hardly_spares_a_restoration(judge: Judge) -> None:
+    read = {1: 0.0019, 2: 0.0057, 3: 0.0038, 4: 0.0044, 5: 0.0047, 8: 0.0023, 9: 0.0055}
+    # Three readings take 38 minutes; the same four joints would be restored after them.
+    first = judge(read, readings_in=(0.035,), outcome=Outcome.FAILED).next_action
+    assert (first.action, set(first.joints)) == (Action.RESTORE, {2, 3, 4, 5})
+
+
+def test_reading_in_an_area_that_the_repair_opens_anyway_costs_the_reading_alone(judge: Judge) -> None:
+    read = {1: 0.0029, 2: 0.005, 3: 0.0045, 4: 0.0043, 5: 0.004, 6: 0.0069, 7: 0.0077, 9: 0.0027, 10: 0.0018}
+    steps = judge(read, readings_in=(0.035,), outcome=Outcome.FAILED).plan.steps
+    # Joint 7 is over its limit: the link assembly, in which #8 is read, will be opened in any case.
+    assert [(step.action, step.joints) for step in steps[:1]] == [(Action.MEASURE, (8,))]
+    assert 7 in steps[1].joints

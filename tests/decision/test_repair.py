@@ -180,3 +180,12 @@ def test_the_search_knows_what_restoring_takes_from_the_uncertainty_of_coarse_re
     exact = predict(gear, cases.inspections * len(sets), rows, np.ones(rows.shape, bool), np.full(len(sets), 0.003))
     slack = 0.045 - exact.displacement_in - 1.645 * exact.standard_uncertainty(np.zeros(len(sets)))
     assert found.slack_in[0, sets] == pytest.approx(slack, abs=0.0005)
+
+
+def test_a_set_that_only_just_suffices_is_found(gear: Gear) -> None:
+    read = {1: 0.0042, 2: 0.0094, 3: 0.0031, 5: 0.0081, 6: 0.0029, 7: 0.009, 8: 0.0022, 9: 0.0084, 10: 0.0081}
+    restored = np.array([[0.0005 if j in read else 0.0075 for j in range(1, 11)]])
+    measured = np.array([[j in read for j in range(1, 11)]])
+    exact = predict(gear, [inspected({})], restored, measured, np.array([0.0005]))
+    assert 0.95 < exact.probability_within(np.array([MARGIN_IN]), np.zeros(1))[0] < 0.96
+    assert [found.joints for found in repair_sets(gear, inspected(read))] == [tuple(read)]

@@ -18,7 +18,16 @@ from mlg_troubleshoot.diagnosis.diagnose import _cause, _expected_scatter, _sing
 from mlg_troubleshoot.diagnosis.extension import adjustment_of
 from mlg_troubleshoot.diagnosis.faults import DataFault
 from mlg_troubleshoot.diagnosis.gain import _interval
-from mlg_troubleshoot.diagnosis.inference import ALARM, NAME, RULED_OUT, SECOND, UNLISTED_ALARM, Inference, _chance
+from mlg_troubleshoot.diagnosis.inference import (
+    ALARM,
+    CLASS_APART,
+    NAME,
+    RULED_OUT,
+    SECOND,
+    UNLISTED_ALARM,
+    Inference,
+    _chance,
+)
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, measured_uncertainty, robust_scale
 from mlg_troubleshoot.diagnosis.scene import build_scene
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
@@ -63,6 +72,10 @@ def test_the_smallest_effect_would_be_found_four_times_in_five() -> None:
 
 def test_a_rival_is_ruled_out_only_at_odds_of_ten_to_one() -> None:
     assert np.exp(RULED_OUT) > 10.0
+
+
+def test_directions_and_linkage_are_told_apart_only_at_odds_of_a_hundred_to_one() -> None:
+    assert np.exp(CLASS_APART) > 100.0
 
 
 def test_a_chance_counts_each_of_many_equals_once() -> None:

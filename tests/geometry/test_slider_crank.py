@@ -71,3 +71,10 @@ def test_a_rod_out_of_the_plane_of_its_slider_keeps_its_length() -> None:
     u, v = found["B"]
     apart = (3.0 + u - np.cos(angle), v * np.cos(tilt) - np.sin(angle), v * np.sin(tilt))
     assert np.sqrt(sum(side**2 for side in apart)) == pytest.approx(np.full(7, np.hypot(3.0, 0.5)))
+
+
+def test_a_plane_is_turned_out_of_its_parent_by_the_right_hand() -> None:
+    planes = (Plane("base"), Plane("tilted", "base", "H", 0.0, 0.6))
+    points = (Point("H", "base", 3.0, 0.0, fixed=True), Point("K", "tilted", 0.0, 1.0, fixed=True))
+    mechanism = Mechanism(planes, points, (), Output("angle", "K", "H"), 0.0)
+    assert mechanism.reference_in_space("K") == pytest.approx([3.0, np.cos(0.6), np.sin(0.6)])

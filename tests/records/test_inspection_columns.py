@@ -468,3 +468,9 @@ def test_a_margin_of_nothing_is_no_slip_of_the_decimal_point(read, table):
 
 def test_a_unit_that_contradicts_its_header_is_converted_in_the_remedy(read, table):
     assert "enter 0.013 (in)" in only(read(table(rows=[(*GOOD[:4], "13 thou", 0.007)]))).remedy
+
+
+def test_a_header_with_nothing_below_it_does_not_contradict_the_unit_of_the_row(read, table):
+    header = (*HEADER[:4], "unit", "clearance_3_in", "clearance_5")
+    row = inspection(read(table(header, [(*GOOD[:4], "mm", None, 0.127)])))
+    assert row.clearance_in == {5: pytest.approx(0.005)}

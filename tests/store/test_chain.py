@@ -7,9 +7,11 @@ import sqlite3
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.store import Kind, Record, Store, StoreError, inspection_from, inspection_record, same_inspection
 
@@ -198,3 +200,32 @@ def test_a_store_of_each_schema_version_can_be_read_and_added_to(version: Path, 
 def test_a_repair_kept_twice_is_one(store: Store) -> None:
     repair = Record(Kind.REPAIR, "", "N1", "LH", "2026-03-01", places.packed({"joints": [3]}))
     assert [store.add([repair]).new for _ in range(2)] == [1, 0]
+
+
+@pytest.mark.parametrize(("written", "instead"), [('"day":"2026-01-04"', '"day":"2026-01-05"'), ("größer", "kleiner")])
+def test_an_export_whose_columns_or_content_alone_were_changed_is_refused(
+    store: Store, tmp_path: Path, written: str, instead: str
+) -> None:
+    told = [json.dumps(part)[1:-1] if part.isalpha() else part for part in (written, instead)]
+    lines = [line.replace(*told, 1) if line.startswith('{"body"') else line for line in store.export()]
+    assert lines != list(store.export())
+    with pytest.raises(StoreError, match="line"):
+        Store(tmp_path / "other.sqlite").restore(lines, "chain")
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        {"readings_in": (0.01,)},
+        {"axial_float_in": {3: 0.02}},
+        {"gauge_u_by_joint_in": {3: 0.001}},
+        {"margin_in": 0.04},
+        {"outcome": Outcome.FAILED},
+        {"carried": {}},
+    ],
+)
+def test_what_was_found_otherwise_is_another_inspection_and_comes_back_so(found: dict[str, Any], place: Path) -> None:
+    kept, other = places.inspection(2), replace(places.inspection(2), **found)
+    assert not same_inspection(inspection_record(kept), inspection_record(other))
+    Store(place).add([inspection_record(other)])
+    assert inspection_from(Store(place).all(Kind.INSPECTION)[0]) == other

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from mlg_troubleshoot.wear import WearPath
+from mlg_troubleshoot.wear import Samples, WearPath
 from mlg_troubleshoot.wear.filtering import Draws, State, follow
 from mlg_troubleshoot.wear.model import _Ends, _gamma_passage, _integrated_passage, _wiener_passage
 from mlg_troubleshoot.wear.paths import Scale, grid_step, lay_out
+from mlg_troubleshoot.wear.posterior import members
 
 AS_IT_IS = Scale(usage=1.0, value=1.0, start=0.0, resolution=0.0)
 FIRST, SECOND = [0.2, 0.5, 0.9], [0.3, 0.4]
@@ -127,3 +128,59 @@ def test_beyond_what_any_unit_has_reached_the_pace_is_a_quarter_uncertain() -> N
 def test_a_declared_error_is_scaled_as_the_readings_are() -> None:
     steps = lay_out([[WearPath("a", [1.0], [2.0], reading_u=0.3)]], Scale(1.0, -4.0, 0.0, 0.0))
     assert steps.known_r2[0, 0] == pytest.approx((0.3 / 4.0) ** 2)
+
+
+def ends(level: float, drift: float, draws: Draws, n: int) -> _Ends:
+    """Paths that are known exactly at their last reading, their pace beyond it too."""
+    shape = (1, 1, n)
+    return _Ends(draws, np.full(shape, level), np.full(shape, drift), np.ones(shape))
+
+
+@pytest.mark.parametrize(("increment_sd", "wander_sd"), [(0.4, 0.0), (0.0, 0.7), (0.3, 0.5)])
+def test_a_path_is_followed_with_the_variance_of_its_increments_and_of_its_wandering_drift(
+    increment_sd: float, wander_sd: float
+) -> None:
+    draws = parameters(increment_sd=increment_sd, wander_sd=wander_sd, power=1.0)
+    found = ends(0.3, 0.8, draws, 100_000).follow(
+        np.array([[2.5]]), np.array([0.5]), np.array([0.0]), np.random.default_rng(1), reading=False
+    )
+    assert np.mean(found) == pytest.approx(0.3 + 0.8 * 2.0, abs=0.02)
+    assert np.var(found) == pytest.approx(increment_sd**2 * 2.0 + wander_sd**2 * 2.0**3 / 3.0, rel=0.02)
+
+
+def test_a_gamma_path_is_followed_with_the_moments_of_its_increments_and_a_reading_with_its_error() -> None:
+    draws = replace(parameters(increment_sd=0.6, power=1.0), gamma=np.array([[True]]))
+    wear, read = (
+        ends(0.3, 0.8, draws, 200_000).follow(
+            np.array([[2.5]]), np.array([0.5]), np.array([0.5**2]), np.random.default_rng(1), reading=reading
+        )
+        for reading in (False, True)
+    )
+    assert np.mean(wear) == pytest.approx(0.3 + 0.8 * 2.0, abs=0.02)
+    assert np.var(wear) == pytest.approx(0.8**2 * 0.6**2 * 2.0, rel=0.02)
+    assert np.var(read) == pytest.approx(np.var(wear) + 0.5**2, rel=0.02)
+
+
+def test_what_never_goes_back_has_crossed_its_limit_where_it_stands_above_it() -> None:
+    draws = replace(parameters(increment_sd=0.6, power=1.5), gamma=np.array([[True]]))
+    level = np.zeros((1, 1, 100_000))
+    pace = np.maximum(1.0 + 0.25 * np.random.default_rng(3).standard_normal(level.shape), 0.1)
+    paths = _Ends(draws, level, np.full(level.shape, 0.8), pace)
+    last, usage = np.array([0.5]), np.array([[0.9, 1.6, 2.5]])
+    wear = paths.follow(usage, last, np.array([0.0]), np.random.default_rng(1), reading=False)
+    crossed = paths.crossing(np.array([1.2]), last, np.random.default_rng(2))
+    for k in range(3):
+        assert np.mean(crossed <= usage[0, k]) == pytest.approx(np.mean(wear[..., k] >= 1.2), abs=0.015)
+
+
+def test_no_reading_is_better_than_the_rounding_to_its_resolution() -> None:
+    member = members(estimate_reading=True, restored=False)[0]
+    theta = np.full((1, len(member.names)), -30.0)
+    rounding = np.random.default_rng(1).uniform(-0.3, 0.3, 100_000)
+    assert member.draws(theta, 0.6).reading_sd[0, 0] == pytest.approx(np.std(rounding), rel=0.01)
+
+
+def test_quantiles_of_samples_are_those_of_numpy() -> None:
+    samples = np.random.default_rng(1).standard_normal((3, 40))
+    chances = [0.0, 0.05, 0.5, 0.77, 1.0]
+    assert Samples(samples).quantile(chances) == pytest.approx(np.quantile(samples, chances, axis=1).T)
