@@ -86,8 +86,8 @@ def test_a_chance_counts_each_of_many_equals_once() -> None:
 
 
 def test_a_chance_beyond_all_draws_is_that_of_the_largest_of_many() -> None:
-    drawn = gumbel_r.rvs(3.0, 0.8, size=20_000, random_state=2)
-    assert _chance(drawn, gumbel_r.isf(1e-4, 3.0, 0.8)) == pytest.approx(1e-4, rel=0.3)
+    drawn = gumbel_r.rvs(3.0, 0.8, size=2000, random_state=2)
+    assert _chance(drawn, gumbel_r.isf(1e-5, 3.0, 0.8)) == pytest.approx(1e-5, rel=0.5)
 
 
 def test_the_robust_scale_is_the_standard_deviation_of_a_normal_distribution() -> None:
