@@ -133,6 +133,7 @@ def test_a_failure_that_clearances_likely_caused_is_expected_to_be_repaired(judg
     found = judge(every_joint(0.001, j3=0.013, j5=0.007), outcome=Outcome.FAILED)
     assert 0.05 < (found.probability_exceed_random_directions or 0.0) < 0.5
     assert [step.action for step in found.plan.steps] == [Action.READ_PLUNGER, Action.RESTORE, Action.CONTINUE]
+    assert (set(found.plan.steps[1].joints), found.end) == ({3, 5}, End.WITHIN)
 
 
 def test_a_failure_that_clearances_hardly_cause_is_expected_to_have_another_cause(judge: Judge) -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import datetime
+from dataclasses import replace
 
 import pytest
 
 from mlg_troubleshoot.decision.inspection import Approach, Inspection, InvalidRow, Outcome, Side
+from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 HEADER = ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in")
@@ -474,3 +476,37 @@ def test_a_header_with_nothing_below_it_does_not_contradict_the_unit_of_the_row(
     header = (*HEADER[:4], "unit", "clearance_3_in", "clearance_5")
     row = inspection(read(table(header, [(*GOOD[:4], "mm", None, 0.127)])))
     assert row.clearance_in == {5: pytest.approx(0.005)}
+
+
+@pytest.mark.parametrize(("value", "codes"), [(0.08, 1), (0.12, 2)])
+def test_without_its_convention_a_reading_may_be_as_large_as_total_play(read, table, value, codes):
+    found = read(table(rows=[("R1", "N1", "LH", None, value, 0.007)])).problems
+    assert [p.code for p in found] == ["convention_missing", "clearance_out_of_range"][:codes]
+
+
+def test_a_limit_is_met_in_millimetres_whatever_a_computer_makes_of_them(read, table):
+    header = (*HEADER[:4], "clearance_3_mm", "clearance_5_mm")
+    result = read(table(header, [(*GOOD[:4], 0.1905, 0.1)]), clearance_hard_max_in=0.0075)
+    assert 0.1905 / 25.4 > 0.0075
+    assert not result.problems
+
+
+def test_a_slip_is_suggested_for_the_number_as_it_was_entered(read, table):
+    assert "0.66 mm would be" in only(read(table(rows=[(*GOOD[:3], "TOTAL_PLAY", 0.66, 0.007)]))).remedy
+
+
+def test_a_year_of_two_digits_is_of_this_century(read, table):
+    row = inspection(read(with_column(table, "inspection_date", "4 Mar 26")))
+    assert row.inspection_date == datetime.date(2026, 3, 4)
+
+
+def test_one_id_with_two_plunger_readings_is_two_inspections(read, table):
+    header = (*HEADER, "plunger_displacement_in")
+    result = read(table(header, [(*GOOD, 0.01), (*GOOD, 0.02)]))
+    assert {p.code for p in result.problems} == {"record_id_duplicate"}
+    assert not read(table(header, [(*GOOD, 0.01), (*GOOD, 0.01)])).problems
+
+
+def test_what_is_confirmed_is_what_the_gear_file_says(gear):
+    other = replace(gear, confirm_above=replace(gear.confirm_above, value=0.01))
+    assert ReadOptions.of(other).clearance_confirm_above_in == 0.01
