@@ -17,6 +17,7 @@ from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records.survey_table import read_survey, write_survey_template
 from mlg_troubleshoot.studies.survey_readings import Kind, Reading, SurveyedLinkage
 from tests.cli.conftest import ROOT, mlg
+from tests.keys import interrupt
 
 pexpect = pytest.importorskip("pexpect")
 FOUR_BAR = ROOT / "tests" / "geometry" / "data" / "four-bar.toml"
@@ -105,8 +106,7 @@ def test_an_interrupt_at_the_line_loses_nothing_and_says_how_to_go_on(tmp_path: 
     child.sendline("1.5")
     child.expect_exact("2 of")
     child.expect_exact("> ")
-    child.sendintr()
-    child.expect_exact("mlg gear survey ask s.csv")
+    interrupt(child, r"mlg gear survey ask s\.csv")
     child.expect(pexpect.EOF)
     child.close()
     assert child.exitstatus == 130

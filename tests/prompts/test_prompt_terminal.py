@@ -15,6 +15,7 @@ import pytest
 from mlg_troubleshoot.cli.output import speaks_utf8
 from mlg_troubleshoot.cli.prompts.lines import line
 from mlg_troubleshoot.cli.prompts.terminal import RichTerminal
+from tests.keys import interrupt
 from tests.prompts.scripted import ENTERS
 
 pexpect = pytest.importorskip("pexpect")
@@ -68,7 +69,7 @@ def start(tmp_path: Path) -> Iterator[Start]:
             env=variables,
             encoding="utf-8",
             codec_errors="replace",
-            timeout=10,
+            timeout=60,
         )
         child.delaybeforesend = None
         child.ptyproc.delayafterclose = child.ptyproc.delayafterterminate = 0.01
@@ -126,8 +127,7 @@ def test_ctrl_c_saves_and_resume_goes_on(start: Start) -> None:
     child = start()
     type_lines(child, *_HEADING, ".004", ".005")
     child.expect_exact(_PROMPT)
-    child.sendintr()
-    child.expect_exact("mlg check --resume")
+    interrupt(child, "mlg check --resume")
     assert exit_code(child) == 130
     child = start("--resume")
     child.expect_exact("joint 3 of 10")
