@@ -58,6 +58,7 @@ PLAN: dict[str, int] = {
     "blank 50 %": 40,
     "convention": 40,
     "one group": 36,
+    "nothing hidden": 240,
 }
 
 
@@ -224,6 +225,11 @@ LINES: dict[str, tuple[str, Callable[[Record], bool], str]] = {
     "50 % of the clearances blank, nothing hidden: a cause named": ("blank 50", lambda r: bool(r["named"]), "≤ 2 %"),
     "other convention of 8 rows and more: named with its target": ("convention", _right, "≥ 90 %"),
     "other convention of 8 rows and more: something else named": ("convention", _false, "≤ 2 %"),
+    "nothing hidden: the other convention named": (
+        "nothing",
+        lambda r: any(n[0] == "convention_slip" for n in r["named"]),
+        "≤ 0.5 %",
+    ),
     "effect within one group, S ≥ 10: flagged": (
         "one group",
         lambda r: r["verdict"] not in {"NONE", "INCONCLUSIVE"},
@@ -260,6 +266,14 @@ def result_of(records: list[Record], first_seed: int) -> dict[str, Any]:
     return {"fleets": len(records), "first_seed": first_seed, "of_each": count, **summarise(records)}
 
 
+def renewed(committed: dict[str, Any], run_now: dict[str, Any]) -> dict[str, Any]:
+    """A committed result with the lines of some fleets run again, the others left as they are."""
+    lines = {name: rate if rate["n"] else committed["lines"][name] for name, rate in run_now["lines"].items()}
+    of_each = dict(sorted({**committed["of_each"], **run_now["of_each"]}.items()))
+    said = dict(sorted({**committed["said"], **run_now["said"]}.items()))
+    return {**committed, "fleets": sum(of_each.values()), "of_each": of_each, "lines": lines, "said": said}
+
+
 def markdown(result: dict[str, Any]) -> str:
     """The table of a result."""
     rows = (study.rate_line(name, aim, result["lines"][name]) for name, (_group, _hit, aim) in LINES.items())
@@ -280,6 +294,8 @@ def main() -> None:
     listed = [(task[2], task) for task in tasks(plan, arguments.first_seed)]
     result = result_of(study.mapped(run, listed, arguments.workers, arguments.keep), arguments.first_seed)
     print(markdown(result), json.dumps(result["said"], indent=1), sep="\n")
+    if arguments.write and arguments.only:
+        result = renewed(json.loads(RESULT.read_text(encoding="utf-8")), result)
     if arguments.write:
         RESULT.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
 

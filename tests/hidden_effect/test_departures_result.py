@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.hidden_effect.departures import LINES, RESULT, markdown, run, summarise
+from tests.hidden_effect.departures import LINES, RESULT, markdown, renewed, result_of, run
 
 COMMITTED: dict[str, Any] = json.loads(RESULT.read_text(encoding="utf-8"))
 
@@ -19,7 +19,7 @@ def record(group: str, named: list[list[str | None]], truth: list[list[str | Non
 
 
 def rate(line: str, *records: dict[str, Any]) -> float:
-    return float(summarise(list(records))["lines"][line]["rate"])
+    return float(result_of(list(records), 0)["lines"][line]["rate"])
 
 
 def test_the_figures_show_the_table_of_the_committed_result() -> None:
@@ -62,6 +62,20 @@ def test_directions_are_asked_for_only_where_a_regression_beats_one_scale() -> N
     line = "load directions, spread 40°: named (or their class), where a regression beats one scale"
     told, dull = (record("loads:40", named, loads, beats=bool(named)) for named in (loads, []))
     assert rate(line, told, dull) == 1.0
+
+
+def test_a_convention_that_is_named_where_nothing_is_hidden_is_counted() -> None:
+    slip = record("nothing hidden", [["convention_slip", "gauge G-1"]], [])
+    other = record("nothing hidden", [["gauge_bias", "gauge G-1"]], [])
+    assert rate("nothing hidden: the other convention named", slip, other) == 0.5
+
+
+def test_fleets_that_are_run_again_renew_their_own_lines_only() -> None:
+    line = "nothing hidden: the other convention named"
+    now = result_of([record("nothing hidden", [["convention_slip", "gauge G-1"]], [])], 0)
+    after = renewed(COMMITTED, now)
+    assert {name for name in LINES if after["lines"][name] != COMMITTED["lines"].get(name)} == {line}
+    assert after["fleets"] == COMMITTED["fleets"] - COMMITTED["of_each"].get("nothing hidden", 0) + 1
 
 
 def test_a_table_that_is_refused_counts_as_not_named() -> None:

@@ -6,7 +6,7 @@ is compared after the diagnosis, which reads the CSV file that the simulator wro
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,12 +15,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension
+from mlg_troubleshoot import load_gear
+from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension, diagnose
 from mlg_troubleshoot.workflows.check import CheckOptions, CheckResult, check_files
 from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions, diagnose_files
 
+from .as_table import as_table
 from .data_sets import later_rows
-from .simulator import CATALOGUE, NULLS, Fleet, draw_fleet, write_csv
+from .simulator import CATALOGUE, NULLS, EffectSpec, Fleet, draw_fleet, draw_spec, simulate_fleet, write_csv
 from .simulator.records import write_csv as write_columns
 
 FIRST_SEED, STRENGTH, PERMUTATIONS = 40_000, 20.0, 199
@@ -166,3 +168,13 @@ def test_two_named_causes_gain_on_rows_that_the_fit_never_saw() -> None:
     gain = case("double").diagnosis.gain
     assert gain is not None
     assert gain.rms_after_in < 0.7 * gain.rms_before_in
+
+
+def test_two_causes_of_single_joints_are_taken_neither_for_another_linkage_nor_for_directions_of_all_joints() -> None:
+    seed = 3_460_014
+    effects = (EffectSpec("oval_wear", strength=18.0), EffectSpec("direction_not_worst_case", strength=18.0))
+    fleet = simulate_fleet(replace(draw_spec(seed, "null", null="iid"), effects=effects), seed)
+    gear = load_gear()
+    ensemble = gear.ensemble_models[1:]
+    found = diagnose(gear.model, as_table(fleet.table), gear.discrepancies, ensemble=ensemble, permutations=99)
+    assert {(c.candidate.cause.name, c.candidate.target) for c in found.causes} == set(fleet.label.causes)
