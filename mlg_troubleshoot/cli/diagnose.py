@@ -19,7 +19,10 @@ EPILOG = (
     "Example: [b]mlg diagnose fleet.csv --write-extension EXT.toml[/b], then [b]mlg check FILE --extension EXT.toml[/b]"
 )
 Files = Annotated[
-    list[str], typer.Argument(metavar="FILE...", help="Tables with measured plunger displacements, or -.")
+    list[str],
+    typer.Argument(
+        metavar="FILE...", help="Tables with the plunger measured at mid-position or along the stroke, or -."
+    ),
 ]
 WriteExtension = Annotated[
     Path | None, typer.Option("--write-extension", metavar="EXT.toml", help="Keep the extended model.")

@@ -19,6 +19,7 @@ from scipy.stats import chi2
 from mlg_troubleshoot.diagnosis.bank import WITHIN, Bank
 from mlg_troubleshoot.diagnosis.causes.base import Candidate
 from mlg_troubleshoot.diagnosis.causes.together import Block
+from mlg_troubleshoot.diagnosis.chance import Chance
 from mlg_troubleshoot.diagnosis.covariance import NoiseModel
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, Rows, build_noise
 from mlg_troubleshoot.diagnosis.screen import Fit, Screen, fit, held_out_part
@@ -81,7 +82,6 @@ _FOLDS = 5
 # By how many standard errors, and by how much at the least, a value may lie off the only one that it can have.
 _OFF, _OFF_SHARE = 3.5, 0.15
 _PAIR_POOL = 24
-_COUNTED = 10
 
 
 @dataclass(frozen=True)
@@ -175,19 +175,16 @@ class Inference:
         screen = Screen(noise, self.columns, self.signs, exact=self.exact)
         gain = screen.run(self.misfit[:, None]).gain[:, 0]
         score = gain - self.penalty
-        ratio, scale = screen.tail_ratio(self.misfit)
-        null = self._null(noise, ratio, scale)
+        null = self._null(noise, screen)
         at_random = screen.largest(null, self.penalty)
         lead = int(np.argmax(score)) if len(score) else -1
-        p_alarm = _chance(at_random, score[lead]) if len(score) else 1.0
+        p_alarm = Chance(at_random).of(score[lead]) if len(score) else 1.0
         self.progress(0.5)
-        smallest = self._smallest(at_random, scale)
+        smallest = self._smallest(at_random, screen.tail_ratio(self.misfit)[1])
         if p_alarm <= ALARM:
             return self._named(lead, p_alarm, smallest)
-        bank_screen = Screen(noise, self.bank.columns, np.zeros(self.bank.columns.shape[1]))
-        bank_gain = bank_screen.run(self.misfit[:, None]).gain[:, 0]
-        bank_p = _chance(bank_screen.largest(null, np.zeros(len(bank_gain))), float(np.max(bank_gain)))
-        variables = self.bank.variables[int(np.argmax(bank_gain))] if bank_p <= UNLISTED_ALARM else ()
+        top, bank_p = self._strongest(_of_shapes(noise, self.bank.columns), null)
+        variables = self.bank.variables[top] if bank_p <= UNLISTED_ALARM else ()
         verdict = Verdict.UNLISTED if variables else Verdict.NONE
         return Finding(verdict, (), (), (), variables, min(bank_p, p_alarm), noise, None, smallest, ())
 
@@ -197,18 +194,18 @@ class Inference:
         return self._noise()
 
     def _noise(self, explained: Array | None = None) -> NoiseModel:
-        """Noise of the rows; with a block, what that explains is no scatter, and its doubt is part of the noise."""
-        noise = build_noise(self.misfit, self.rows, explained)
-        if self.block is None:
-            return noise
-        effects, known = self.block.effects_in, np.zeros(len(self.misfit)) if explained is None else explained
-        for _ in range(_BLOCK_ROUNDS):
-            part = noise.beside(effects).share_of(effects, self.misfit - known)
-            noise = build_noise(self.misfit, self.rows, known + part)
-        return noise.beside(effects)
+        return build_noise(self.misfit, self.rows, explained, None if self.block is None else self.block.effects_in)
 
-    def _null(self, noise: NoiseModel, ratio: float, scale: float, aside: bool = False) -> Array:
+    def _strongest(self, screen: Screen, null: Array, barred: Array | None = None) -> tuple[int, float]:
+        """Place of the shape that stands out most, of those that are not barred, and its chance if nothing is wrong."""
+        barred = np.zeros(screen.columns.shape[1]) if barred is None else barred
+        gain = screen.run(self.misfit[:, None]).gain[:, 0] - barred
+        top = int(np.argmax(gain))
+        return top, Chance(screen.largest(null, barred)).of(float(gain[top]))
+
+    def _null(self, noise: NoiseModel, screen: Screen, aside: bool = False) -> Array:
         """Draw data sets with nothing wrong; aside from the stream that the rest of the diagnosis draws from."""
+        ratio, scale = screen.tail_ratio(self.misfit)
         rng = self.rng.spawn(1)[0] if aside else self.rng
         normal = rng.standard_normal(4096)
         # Bias and slope are lengths: a scatter below what any row has would shrink them with it.
@@ -278,12 +275,9 @@ class Inference:
         gain = both.run(self.misfit[:, None]).gain[:, 0]
         if gain[0] < gain[1] - self.penalty[lead] + CONSTANT:
             return None
-        screen = Screen(noise, self.bank.columns, np.zeros(self.bank.columns.shape[1]), everywhere)
-        shapes = screen.run(self.misfit[:, None]).gain[:, 0]
-        ratio, scale = screen.tail_ratio(self.misfit)
-        at_random = screen.largest(self._null(noise, ratio, scale), np.zeros(len(shapes)))
-        p = _chance(at_random, float(np.max(shapes)))
-        variables = self.bank.variables[int(np.argmax(shapes))] if p <= ALARM else ("all rows",)
+        screen = _of_shapes(noise, self.bank.columns, everywhere)
+        top, p = self._strongest(screen, self._null(noise, screen))
+        variables = self.bank.variables[top] if p <= ALARM else ("all rows",)
         return min(p, ALARM), variables
 
     def _refit(self, chosen: Sequence[int]) -> tuple[NoiseModel, Fit]:
@@ -330,11 +324,7 @@ class Inference:
         if min(sizes) < least_share * max(sizes):
             return None
         held = Screen(noise, self.columns, self.signs, self.columns[:, [pair[0]]], self.exact)
-        ratio, scale = held.tail_ratio(self.misfit)
-        null = self._null(noise, ratio, scale)
-        at_random = held.largest(null, self.penalty)
-        observed = best - float(np.max(single))
-        p = _chance(at_random, observed)
+        p = Chance(held.largest(self._null(noise, held), self.penalty)).of(best - float(np.max(single)))
         return (pair, p) if p <= SECOND else None
 
     def _rivals(self, lead: int, others: Sequence[int], clear: bool) -> tuple[int, list[int], dict[Key, float]]:
@@ -382,12 +372,9 @@ class Inference:
         A large remainder of any shape does; a smaller one does if it moves with the named cause's own variable.
         """
         held = self.columns[:, list(chosen)]
-        screen = Screen(noise, self.bank.columns, np.zeros(self.bank.columns.shape[1]), held)
-        gain = screen.run(self.misfit[:, None]).gain[:, 0]
-        ratio, scale = screen.tail_ratio(self.misfit)
-        null = self._null(noise, ratio, scale)
-        top = int(np.argmax(gain))
-        p = _chance(screen.largest(null, np.zeros(len(gain))), float(gain[top]))
+        screen = _of_shapes(noise, self.bank.columns, held)
+        null = self._null(noise, screen)
+        top, p = self._strongest(screen, null)
         self.progress(0.9)
         named = float(np.sqrt(np.mean((held @ fitted.values) ** 2)))
         if p <= REFUTED and self._size(noise, held, top) >= SECOND_SHARE * named:
@@ -398,8 +385,7 @@ class Inference:
         needs = {name for k in chosen for name in self.candidates[k].cause.needs}
         others = np.array([0.0 if set(names) <= needs else np.inf for names in self.bank.variables])
         if not others.all():
-            strongest = int(np.argmax(gain - others))
-            p_own = _chance(screen.largest(null, others), float(gain[strongest]))
+            strongest, p_own = self._strongest(screen, null, others)
             if p_own <= REFUTED and self._size(noise, held, strongest) >= OWN_SHARE * named:
                 return min(p, p_own), self.bank.variables[strongest], True
         return p, self.bank.variables[top], False
@@ -420,12 +406,8 @@ class Inference:
             own, rows = float(np.std(column * fitted.values[place])), column != 0.0
             names = [name for name in WITHIN if name in self.bank.smooth]
             shapes = np.column_stack([rows * (self.bank.smooth[n] - np.mean(self.bank.smooth[n][rows])) for n in names])
-            screen = Screen(noise, shapes, np.zeros(len(names)), held)
-            ratio, scale = screen.tail_ratio(self.misfit)
-            gain = screen.run(self.misfit[:, None]).gain[:, 0]
-            most = int(np.argmax(gain))
-            null = self._null(noise, ratio, scale, aside=True)
-            p = _chance(screen.largest(null, np.zeros(len(names))), float(gain[most]))
+            screen = _of_shapes(noise, shapes, held)
+            most, p = self._strongest(screen, self._null(noise, screen, aside=True))
             both = fit(noise, np.column_stack([held, shapes[:, most]]), self.misfit)
             if p <= REFUTED and float(np.std(shapes[:, most])) * abs(float(both.values[-1])) >= OWN_SHARE * own:
                 found = p, (cause.acts_in, names[most])
@@ -435,6 +417,11 @@ class Inference:
         """Standard deviation over the rows of a fitted shape, what is named fitted with it. [in]"""
         both = fit(noise, np.column_stack([held, self.bank.columns[:, shape]]), self.misfit)
         return float(np.std(self.bank.columns[:, shape])) * abs(float(both.values[-1]))
+
+
+def _of_shapes(noise: NoiseModel, shapes: Array, held: Array | None = None) -> Screen:
+    """Screen of shapes that may have any sign, beside columns that are always fitted."""
+    return Screen(noise, shapes, np.zeros(shapes.shape[1]), held)
 
 
 def infer(  # noqa: PLR0913 - all that a search for causes looks at
@@ -647,24 +634,7 @@ def _block_chance(whole: Inference, blocks: Sequence[Block]) -> float:
     noise = build_noise(whole.misfit, whole.rows)
     none = np.empty((len(whole.misfit), 0))
     bare = Screen(noise, none, np.empty(0))
-    ratio, scale = bare.tail_ratio(whole.misfit)
-    null = whole._null(noise, ratio, scale, aside=True)
-    sets = np.column_stack([whole.misfit, null])
+    sets = np.column_stack([whole.misfit, whole._null(noise, bare, aside=True)])
     gain = np.max([Screen(noise.beside(b.effects_in), none, np.empty(0)).run(sets).null for b in blocks], axis=0)
     gain -= bare.run(sets).null
-    return _chance(gain[1:], float(gain[0]))
-
-
-def _chance(at_random: Array, observed: float) -> float:
-    """Chance that the largest of many gains is as large by chance.
-
-    Counted where enough drawn maxima lie beyond; further out from the extreme-value distribution (Gumbel) that
-    fits them, so that a small chance needs no more drawn sets than a large one.
-    """
-    beyond = int(np.sum(at_random >= observed))
-    if beyond >= _COUNTED:
-        return (1 + beyond) / (1 + len(at_random))
-    width = max(float(np.std(at_random)) * np.sqrt(6.0) / np.pi, 1e-9)
-    place = float(np.mean(at_random)) - np.euler_gamma * width
-    fitted = float(-np.expm1(-np.exp(-(observed - place) / width)))
-    return max(min(fitted, (1 + beyond) / (1 + len(at_random))), 1e-12)
+    return Chance(gain[1:]).of(float(gain[0]))

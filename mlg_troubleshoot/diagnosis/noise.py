@@ -50,8 +50,8 @@ _SHARED = 0.2
 _LEAST_LEVELS = 4
 # Ratios of the scatter between tails to the scatter of a row that are tried.
 TAIL_RATIOS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.4, 2.0)
-# The first estimate of the scatter has all in it that is not known along the stroke.
-_ALONG_ROUNDS = 3
+# The first estimate of the scatter has all in it that effects of unknown size explain.
+_ROUNDS = 2
 # With fewer tails none of them can be left out.
 _LEAST_TAILS = 6
 
@@ -146,15 +146,18 @@ def _levels(table: DiagnosisTable, name: str) -> Array:
     return np.asarray(texts[:, None] == levels[levels != ""], float)
 
 
-def build_noise(misfit: Array, rows: Rows, explained: Array | None = None) -> NoiseModel:
-    """Estimate the noise model from the misfit; what is not known along the stroke is no scatter of rows."""
+def build_noise(
+    misfit: Array, rows: Rows, explained: Array | None = None, effects_in: Array | None = None
+) -> NoiseModel:
+    """Estimate the noise from the misfit; effects of unknown size, and of the curve, are no scatter but its doubt."""
     rest = misfit if explained is None else misfit - explained
+    wide = rows.along_in if effects_in is None else np.hstack([rows.along_in, effects_in])
     noise = _scatter(rest, rows)
-    if not rows.along_in.size:
+    if not wide.size:
         return noise
-    for _ in range(_ALONG_ROUNDS):
-        noise = _scatter(rest - noise.beside(rows.along_in).share_of(rows.along_in, rest), rows)
-    return noise.beside(rows.along_in)
+    for _ in range(_ROUNDS):
+        noise = _scatter(rest - noise.beside(wide).share_of(wide, rest), rows)
+    return noise.beside(wide)
 
 
 def _scatter(rest: Array, rows: Rows) -> NoiseModel:

@@ -14,6 +14,7 @@ from scipy.stats import gumbel_r, norm
 from mlg_troubleshoot.diagnosis import CATALOGUE, Candidate, Scene, Term
 from mlg_troubleshoot.diagnosis.causes.convention import as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, LoadDirections, OtherGeometry
+from mlg_troubleshoot.diagnosis.chance import Chance
 from mlg_troubleshoot.diagnosis.diagnose import _cause, _expected_scatter, _single_slips
 from mlg_troubleshoot.diagnosis.extension import adjustment_of
 from mlg_troubleshoot.diagnosis.faults import DataFault
@@ -26,7 +27,6 @@ from mlg_troubleshoot.diagnosis.inference import (
     SECOND,
     UNLISTED_ALARM,
     Inference,
-    _chance,
 )
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, measured_uncertainty, robust_scale
 from mlg_troubleshoot.diagnosis.scene import build_scene
@@ -81,13 +81,13 @@ def test_directions_and_linkage_are_told_apart_only_at_odds_of_a_hundred_to_one(
 def test_a_chance_counts_each_of_many_equals_once() -> None:
     # One of 40 data sets that are alike is as large as the k-th largest of them with a chance of k in 40.
     values = np.random.default_rng(4).standard_normal(40)
-    chances = sorted(_chance(np.delete(values, k), values[k]) for k in range(40))
+    chances = sorted(Chance(np.delete(values, k)).of(values[k]) for k in range(40))
     assert chances[10:] == pytest.approx(np.arange(11, 41) / 40.0)
 
 
 def test_a_chance_beyond_all_draws_is_that_of_the_largest_of_many() -> None:
     drawn = gumbel_r.rvs(3.0, 0.8, size=2000, random_state=2)
-    assert _chance(drawn, gumbel_r.isf(1e-5, 3.0, 0.8)) == pytest.approx(1e-5, rel=0.5)
+    assert Chance(drawn).of(gumbel_r.isf(1e-5, 3.0, 0.8)) == pytest.approx(1e-5, rel=0.5)
 
 
 def test_the_robust_scale_is_the_standard_deviation_of_a_normal_distribution() -> None:

@@ -96,56 +96,53 @@ class TechnicianBias(_Level):
     separates: ClassVar[str] = "one gear measured by this technician and by another with the same gauge on one day"
 
 
-class SideDifference(Cause):
+class _Contrast(Cause):
+    """Rows of two kinds shifted against each other, or those of one kind alone."""
+
+    trial: ClassVar[float] = 0.001
+    shares: ClassVar[tuple[dict[str, float], ...]]
+
+    def candidates(self, scene: Scene) -> Iterator[Candidate]:
+        """Yield the difference, and each kind alone, where both kinds occur."""
+        if len(levels(scene.table.factors[self.needs[0]])) == 2:
+            for shares in self.shares:
+                yield Candidate(self, None, {"shares": shares})
+
+    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
+        """Shift the kinds by their shares."""
+        kinds = scene.table.factors[self.needs[0]]
+        where = sum((kinds == kind) * share for kind, share in candidate.setting["shares"].items())
+        return offset(scene, where, value)
+
+
+class SideDifference(_Contrast):
     """Left and right gear differ."""
 
     name: ClassVar[str] = "side_difference"
     needs: ClassVar[tuple[str, ...]] = ("side",)
     parameter: ClassVar[str] = "rh_minus_lh_in"
-    trial: ClassVar[float] = 0.001
+    shares: ClassVar[tuple[dict[str, float], ...]] = ({"RH": 1.0}, {"LH": -1.0}, {"RH": 0.5, "LH": -0.5})
     sentence: ClassVar[str] = "Right-hand and left-hand gears differ"
     inspect: ClassVar[str] = "Rigging of one right-hand gear against its left-hand neighbour"
     separates: ClassVar[str] = "both gears of one aircraft, same technician, same gauge, same day"
 
-    def candidates(self, scene: Scene) -> Iterator[Candidate]:
-        """Yield the difference, and each side alone, where both sides occur."""
-        if len(levels(scene.table.factors["side"])) == 2:
-            yield Candidate(self, None, {"shares": {"RH": 1.0}})
-            yield Candidate(self, None, {"shares": {"LH": -1.0}})
-            yield Candidate(self, None, {"shares": {"RH": 0.5, "LH": -0.5}})
 
-    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
-        """Shift the sides against each other."""
-        shares, sides = candidate.setting["shares"], scene.table.factors["side"]
-        where = sum(((sides == side) * share for side, share in shares.items()), np.zeros(len(sides)))
-        return offset(scene, where, value)
-
-
-class ApproachHysteresis(Cause):
+class ApproachHysteresis(_Contrast):
     """Lost motion: the reading depends on the direction of approach."""
 
     name: ClassVar[str] = "approach_hysteresis"
     needs: ClassVar[tuple[str, ...]] = ("approach",)
     parameter: ClassVar[str] = "extending_minus_retracting_in"
-    trial: ClassVar[float] = 0.001
+    shares: ClassVar[tuple[dict[str, float], ...]] = (
+        {"EXTENDING": 0.5, "RETRACTING": -0.5},
+        {"EXTENDING": 1.0},
+        {"RETRACTING": -1.0},
+    )
     sentence: ClassVar[str] = "Lost motion: the reading depends on the direction of approach"
     inspect: ClassVar[str] = (
         "Approach mid-position always in the same direction; look for friction in the link assembly"
     )
     separates: ClassVar[str] = "one gear read twice, approached extending and retracting"
-
-    def candidates(self, scene: Scene) -> Iterator[Candidate]:
-        """Yield the difference, and each direction alone, where both directions occur."""
-        if len(levels(scene.table.factors["approach"])) == 2:
-            yield Candidate(self, None, {"shares": {"EXTENDING": 0.5, "RETRACTING": -0.5}})
-            yield Candidate(self, None, {"shares": {"EXTENDING": 1.0}})
-            yield Candidate(self, None, {"shares": {"RETRACTING": -1.0}})
-
-    def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
-        """Shift the two directions of approach against each other."""
-        shares, ways = candidate.setting["shares"], scene.table.factors["approach"]
-        where = sum(((ways == way) * share for way, share in shares.items()), np.zeros(len(ways)))
-        return offset(scene, where, value)
 
 
 class DateStep(Cause):

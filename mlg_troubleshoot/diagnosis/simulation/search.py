@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import t as student
 from threadpoolctl import threadpool_limits
 
+from mlg_troubleshoot.diagnosis.chance import Chance
 from mlg_troubleshoot.diagnosis.simulation import scatter
 from mlg_troubleshoot.diagnosis.simulation.held_out import folds_of, held_out
 from mlg_troubleshoot.diagnosis.simulation.inputs import checked
@@ -49,8 +50,6 @@ _ACTS = 0.05
 # named against the pattern, and to be named although the pattern could take its form (without groups, in which it
 # must hold anew: all of it).
 _BESIDE, _LARGE = 0.25, 0.57
-# Draws beyond an observed statistic from which they are counted.
-_TAIL = 10
 # Change of a suspect, in its trials, beyond which a fit of all of them says nothing about the noise.
 _MOST_TRIALS = 50.0
 # Draws that a pattern is compared with.
@@ -102,28 +101,6 @@ def design_of(columns: Array, nuisance: Array, size: Array) -> Design:
                 members += [i for i in testable if alike[i, j] and i not in members]
             classes.append(tuple(sorted(members)))
     return Design(testable, tuple(classes))
-
-
-@dataclass(frozen=True)
-class Chance:
-    """Largest statistic of each of many data sets with nothing wrong."""
-
-    largest: Array
-
-    def surprise(self, observed: ArrayLike) -> Array:
-        """Minus the logarithm of the chance of as much; beyond the draws by the exponential tail of the largest."""
-        seen = np.asarray(observed, float)
-        count = np.sum(self.largest >= seen[..., None], axis=-1)
-        counted = np.log1p(len(self.largest)) - np.log1p(count)
-        if len(self.largest) < _TAIL * 4:
-            return np.asarray(counted)
-        bar = float(np.quantile(self.largest, 0.9))
-        over = max(float(np.mean(self.largest[self.largest >= bar] - bar)), 1e-300)
-        return np.asarray(np.where(count >= _TAIL, counted, np.log(10.0) + (seen - bar) / over))
-
-    def of(self, observed: float) -> float:
-        """Chance of as much. [1]"""
-        return float(np.exp(-self.surprise(observed)))
 
 
 @dataclass(frozen=True)

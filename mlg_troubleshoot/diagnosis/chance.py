@@ -1,0 +1,35 @@
+"""How likely a statistic is if nothing is wrong, from the largest of all candidates in data sets drawn so."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+# Draws beyond an observed statistic from which they are counted.
+_TAIL = 10
+
+
+@dataclass(frozen=True)
+class Chance:
+    """Largest statistic of each of many data sets with nothing wrong: the error rate holds for all that is tried."""
+
+    largest: Array
+
+    def surprise(self, observed: ArrayLike) -> Array:
+        """Minus the logarithm of the chance of as much; beyond the draws by the exponential tail of the largest."""
+        seen = np.asarray(observed, float)
+        count = np.sum(self.largest >= seen[..., None], axis=-1)
+        counted = np.log1p(len(self.largest)) - np.log1p(count)
+        if len(self.largest) < _TAIL * 4 or np.all(count >= _TAIL):
+            return np.asarray(counted)
+        bar = float(np.quantile(self.largest, 0.9))
+        over = max(float(np.mean(self.largest[self.largest >= bar] - bar)), 1e-300)
+        return np.asarray(np.where(count >= _TAIL, counted, np.log(10.0) + (seen - bar) / over))
+
+    def of(self, observed: float) -> float:
+        """Chance of as much. [1]"""
+        return float(np.exp(-self.surprise(observed)))
