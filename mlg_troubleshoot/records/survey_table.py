@@ -36,7 +36,7 @@ COLUMNS = (
     "how",
 )
 _HEADER_WITHIN = 30
-_KINDS = {kind: kind for kind in Kind if kind is not Kind.TRAVEL}
+_KINDS = {kind: kind for kind in Kind if kind not in (Kind.TRAVEL, Kind.ORDER)}
 # No linkage of a landing gear is longer than this; angles are read within one turn.
 _LONGEST_IN, _WIDEST_DEG = 500.0, 360.0
 _HOW = {

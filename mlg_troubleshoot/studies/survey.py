@@ -52,7 +52,9 @@ _MOST_MISFITS = 0.1
 _SAME, _LEAST_WEIGHT = 0.01, 1e-3
 # A joint's other side is tried where the readings place the joint: to a fifth of its distance from the line between.
 _PLACED = 0.2
-_DRAWS, _DRAW_STEPS, _ALONG, _FAR, FEW = 150, 8, (0.0, 0.1, 0.3, 1.0), 6.0, 0.6
+# With fewer readings than this share of the numbers of the linkage few of them are determined.
+FEW = 0.6
+_DRAWS, _DRAW_STEPS, _BEGUN, _ALONG, _FAR = 150, 8, 3, (0.0, 0.1, 0.3, 1.0), 6.0
 _SLIPS = (
     SLIPS["unit"],
     Slip(MM_PER_IN / 10.0, "centimetres read as inches", "inches read as centimetres"),
@@ -170,6 +172,8 @@ class Prior:
             around = np.cov(members.T)
             covariance = _BELIEVED * around + (1.0 - _BELIEVED) * np.diag(np.diag(around))
         self.mean = members.mean(axis=0)
+        order = float(np.log(linkage.amplification(members)).mean())
+        self.order = Reading(Kind.ORDER, value=order, u=DEFAULT_U[Kind.ORDER])
         self.root = np.linalg.cholesky(covariance + np.diag(least**2))
         self.whiten = np.linalg.inv(self.root)
 
@@ -185,7 +189,9 @@ class Prior:
             slopes = self.linkage.slopes(own, self.mean[None])[1][0] @ self.root
             gain = np.linalg.solve(slopes @ slopes.T + np.diag([r.u**2 for r in own]), slopes) @ self.root.T
             found = found + ([r.value for r in own] - self.linkage.predicted(own, found)) @ gain
-        return found[self.linkage.closes(found)][:n]
+        apart = (self.linkage.predicted((self.order,), found)[:, 0] - self.order.value) / self.order.u
+        likely = np.exp(-0.5 * apart * apart) > rng.random(len(found))
+        return found[likely & self.linkage.closes(found)][:n]
 
 
 class Fitting:
@@ -195,7 +201,6 @@ class Fitting:
         self.linkage, self.prior, self.readings = linkage, prior, readings
         self.value = np.array([r.value for r in readings])
         self.u = np.array([r.u for r in readings])
-        self.must_close = False
 
     def residuals(self, points: Array) -> Array:
         with np.errstate(all="ignore"):
@@ -207,8 +212,7 @@ class Fitting:
         r = np.where(open_, 0.0, r)
         data = np.where(open_, _OPEN, _robust(r)[0] if robust else r * r)
         z = (points - means) @ self.prior.whiten.T
-        loss = np.asarray(data.sum(axis=1) + (z * z).sum(axis=1))
-        return np.where(self.linkage.closes(points), loss, np.inf) if self.must_close else loss
+        return np.asarray(data.sum(axis=1) + (z * z).sum(axis=1))
 
     def descend(
         self, points: Array, kept: Mask, widened: float, steps: int, robust: bool, means: Any = None, noise: Any = 0.0
@@ -227,7 +231,7 @@ class Fitting:
             r = np.where(kept, ((found - self.value) / self.u - noise[moving]) / widened, 0.0)
             weight = _robust(r)[1] if robust else np.ones_like(r)
             g = np.where(kept[:, None], slopes / (self.u * widened)[:, None], 0.0) @ self.prior.root
-            # A position that does not close pulls nowhere; that it must close stands in the loss.
+            # A position that does not close pulls nowhere.
             bad = ~(np.isfinite(g).all(axis=2) & np.isfinite(r))
             r, g = np.where(bad, 0.0, r), np.where(bad[..., None], 0.0, g)
             gram = np.swapaxes(g, 1, 2) @ (weight[..., None] * g) + np.eye(n)
@@ -256,7 +260,7 @@ class Fitting:
         does not tell stays as the start has it, so that starts which also move are among them.
         """
         everything = np.ones(len(self.readings), dtype=bool)
-        still = tuple(r for r in self.readings if r.extension is None and r.kind is not Kind.PLUNGER)
+        still = tuple(r for r in self.readings if r.extension is None and r.kind not in (Kind.PLUNGER, Kind.ORDER))
         starts = points
         if len(still) > 2:
             standing = Fitting(self.linkage, self.prior, still)
@@ -472,7 +476,7 @@ class Fitting:
     def draws(self, modes: tuple[Mode, ...], kept: Mask, rng: Generator) -> Array:
         """Draws from the posterior, all of which close: of each mode its share."""
         prior, n = self.prior, len(self.prior.mean)
-        found = []
+        begun = []
         for mode in modes:
             count = max(1, round(_DRAWS * mode.weight))
             means = mode.mean + rng.standard_normal((count, n)) @ prior.root.T
@@ -487,17 +491,28 @@ class Fitting:
                 means = steps[0] = np.concatenate([prior.closing(count, rng), means])[:count]
                 del steps[1:]
             losses = [self.loss(x, means, 1.0, kept, False, noise) for x in steps]
-            points = np.choose(np.argmin(losses, axis=0)[:, None], steps)
-            points, loss = self.descend(points, kept, 1.0, _DRAW_STEPS, robust=False, means=means, noise=noise)
-            # What is left of the loss of a draw that arrived is chi-squared, with as many degrees as readings.
-            arrived = loss < kept.sum() + _FAR * np.sqrt(2.0 * kept.sum())
-            found.append(points[arrived & self.linkage.closes(points)])
-        everything = np.concatenate(found)
-        if len(everything) < 2:
+            begun.append((np.choose(np.argmin(losses, axis=0)[:, None], steps), means, noise))
+        points, means, noise = (np.concatenate(parts) for parts in zip(*begun, strict=True))
+        # What is left of the loss of a draw that arrived is chi-squared, with as many degrees as readings.
+        enough = kept.sum() + _FAR * np.sqrt(2.0 * kept.sum())
+        loss, late = np.full(len(points), np.inf), np.arange(len(points))
+        for _ in range(_BEGUN):
+            points[late], loss[late] = self.descend(
+                points[late], kept, 1.0, _DRAW_STEPS, robust=False, means=means[late], noise=noise[late]
+            )
+            late = np.flatnonzero(loss > enough)
+            if not len(late):
+                break
+            # One that is held up in another valley begins again at the nearest that is in the right one.
+            sound = np.concatenate([[mode.vector for mode in modes], points[loss <= enough]])
+            apart = (((means[late][:, None] - sound) @ prior.whiten.T) ** 2).sum(axis=2)
+            points[late] = sound[np.argmin(apart, axis=1)]
+        arrived = points[(loss <= enough) & self.linkage.closes(points)]
+        if len(arrived) < 2:
             raise InconclusiveDataError(
                 "no linkage near the fitted one moves over its whole stroke", "Check the extensions and their unit."
             )
-        return np.asarray(rng.permutation(everything))
+        return np.asarray(rng.permutation(arrived))
 
 
 def _robust(r: Array) -> tuple[Array, Array]:
@@ -519,6 +534,8 @@ def fit(
     prior = Prior(linkage)
     if linkage.travel is not None:
         readings = (*readings, Reading(Kind.TRAVEL, value=linkage.travel, u=DEFAULT_U[Kind.TRAVEL]))
+    if len(readings) < FEW * len(linkage.names):
+        readings = (*readings, prior.order)
     fitting = Fitting(linkage, prior, readings)
     points = prior.members[:0]
     for attempt in range(_ATTEMPTS):
@@ -530,15 +547,6 @@ def fit(
         if kept.all():
             break
     modes = fitting.modes(points, np.broadcast_to(prior.mean, points.shape), kept)
-    if not modes:
-        # Few readings are fitted best by what does not move over its stroke: search among what does.
-        fitting.must_close = True
-        points = prior.closing(_AROUND, rng, readings)
-        if len(points):
-            points, loss = fitting.descend(points, np.ones_like(kept), 1.0, _LAST_STEPS, robust=True)
-            points = points[np.argsort(loss)[: 2 * _KEPT]]
-            kept = np.abs(fitting.residuals(points[:1])[0]) < _TRUSTED
-        modes = fitting.modes(points, np.broadcast_to(prior.mean, points.shape), kept)
     if not modes:
         raise InconclusiveDataError(
             "no linkage of this type has these dimensions: none of the starts can be assembled with them",

@@ -34,15 +34,19 @@ class Kind(StrEnum):
     EXTENSION = "EXTENSION"
     # Not a row of a table: the travel that the technical order prescribes (section 4.2) counts as one more reading.
     TRAVEL = "TRAVEL"
+    # Nor this, the mean of the logarithms of the amplification indices: most of what fits a few readings would stand
+    # near a dead centre.
+    ORDER = "ORDER"
 
 
-# Standard uncertainties where a reading states none: in, in, rad, in and, for the prescribed travel, in.
+# Standard uncertainties where a reading states none: in, in, rad, in; for the travel, in, and the order of the indices.
 DEFAULT_U = {
     Kind.DISTANCE: 0.01,
     Kind.PLUNGER: 0.0015,
     Kind.ANGLE: float(np.radians(1.0)),
     Kind.EXTENSION: 0.005,
     Kind.TRAVEL: 0.005,
+    Kind.ORDER: 1.0,
 }
 
 
@@ -200,6 +204,8 @@ class SurveyedLinkage:
                     found[:, i] = reference[:, 0] - self.low
                 case Kind.TRAVEL:
                     found[:, i] = vectors[:, -1]
+                case Kind.ORDER:
+                    found[:, i] = np.log(self.amplification(vectors)).mean(axis=1)
         return found
 
     def slopes(self, readings: tuple[Reading, ...], vectors: Array) -> tuple[Array, Array]:

@@ -182,6 +182,7 @@ def test_from_an_empty_survey_the_plunger_is_asked_for_first(tmp_path: Path, ins
     (reading,) = run.json["next"]
     assert reading["kind"] == "PLUNGER"
     assert reading["expected_narrowing"] > 0.2
+    assert all(each["interval_90"][1] < 1.0 for each in run.json.get("inspections", []))
 
 
 def test_a_report_shows_what_was_read_what_follows_and_both_linkages(tmp_path: Path) -> None:
