@@ -58,6 +58,8 @@ def survey(
 
     shown = settings(show, page, {}, keep=False, quiet=quiet)
     gear = context.obj or options.DEFAULT_GEAR
+    if file in ("template", "ask") and template is None and not Path(file).exists():
+        raise UsageError(f"{file} needs the name of a file", f"Give for example: mlg gear survey {file} survey.csv")
     if file == "template" and template is not None:
         if template.exists() and not force:
             raise OutputError(f"{template} exists already", "Give another name, or --force to replace it.")

@@ -75,6 +75,12 @@ def surveyed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, 
     return folder / "mine.toml", run.json
 
 
+@pytest.mark.parametrize("word", ["template", "ask"])
+def test_a_word_without_its_file_says_what_to_give(word: str) -> None:
+    run = survey(word)
+    assert (run.code, f"mlg gear survey {word} survey.csv" in run.err) == (2, True)
+
+
 def test_the_json_has_the_keys_of_the_contract(surveyed: tuple[Path, dict[str, object]]) -> None:
     values = surveyed[1]
     assert {"schema_version", "gear_file", "joints", "next", "misfits", "chi2", "degrees_of_freedom"} <= set(values)
