@@ -20,7 +20,7 @@ from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_mean
 from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
 from mlg_troubleshoot.diagnosis.extension import Term
 from mlg_troubleshoot.diagnosis.faults import LEAST_ALONG, DataFault, screen_faults
-from mlg_troubleshoot.diagnosis.gain import Gain, measure_gain
+from mlg_troubleshoot.diagnosis.gain import LEAST_TAILS, Gain, measure_gain
 from mlg_troubleshoot.diagnosis.inference import Finding, infer
 from mlg_troubleshoot.diagnosis.noise import (
     EXPECTED_SLOPE,
@@ -42,7 +42,6 @@ from mlg_troubleshoot.units import MM_PER_IN
 Array = NDArray[np.float64]
 
 LEAST_ROWS = 20
-LEAST_TAILS = 4
 # Share of rows from which data faults are no slips of single cells. [1]
 _MANY_FAULTS = 0.15
 # Measured over predicted displacement: further from 1 than this, or negative, is no misfit. [1]
@@ -519,11 +518,8 @@ def _report(  # noqa: PLR0913 - everything that a diagnosis says
 def _gain(case: _Case, rng: np.random.Generator) -> Gain:
     """What the extension gains on tails that it was not fitted to, on rows if it is about one tail."""
     finding, table = case.finding, case.plain.scene.table
-    by_row = len(np.unique(table.tails)) < LEAST_TAILS or any(
-        case.candidates[k].cause.of_one_tail(case.candidates[k]) for k in finding.chosen
-    )
     held = case.columns[:, list(finding.chosen)]
-    return measure_gain(finding.noise, held, case.misfit, case.predicted, table, by_row, rng, finding.block)
+    return measure_gain(finding.noise, held, case.misfit, case.predicted, table, rng, finding.block)
 
 
 def _corrected(model: LinkageModel, table: DiagnosisTable, named: Sequence[NamedCause]) -> tuple[DataFault, ...]:

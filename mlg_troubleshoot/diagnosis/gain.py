@@ -11,11 +11,13 @@ from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.covariance import NoiseModel
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE
 from mlg_troubleshoot.diagnosis.screen import held_out_part
+from mlg_troubleshoot.diagnosis.simulation.held_out import folds_of
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 
 Array = NDArray[np.float64]
 
-_FOLDS = 10
+# With fewer tails none can be held out.
+LEAST_TAILS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,19 +57,13 @@ def measure_gain(
     misfit: Array,
     predicted: Array,
     table: DiagnosisTable,
-    by_row: bool,
     rng: np.random.Generator,
     block: Block | None = None,
 ) -> Gain:
-    """Cross-validate an extension; rows of one tail are never on both sides.
-
-    An extension that concerns one tail cannot be learned from the others: for it single rows are held out.
-    """
-    groups = table.tails
-    keys = np.arange(len(misfit)).astype(str) if by_row else groups
-    names = np.unique(keys)
-    fold_of = dict(zip(rng.permutation(names).tolist(), np.arange(len(names)) % _FOLDS, strict=True))
-    fold = np.array([fold_of[str(key)] for key in keys])
+    """Cross-validate an extension; rows of one tail are never on both sides, unless the others cannot teach it."""
+    tails = np.unique(table.tails, return_inverse=True)[1]
+    group = tails if tails.max() + 1 >= LEAST_TAILS else None
+    fold, held_out_by = folds_of(np.arange(len(misfit)), group, columns, rng.permutation(len(misfit)))
     expected = misfit - EXPECTED_SLOPE * predicted
     correction = held_out_part(noise, columns, expected, fold, block)
     before, after = misfit, misfit - correction
@@ -78,17 +74,17 @@ def measure_gain(
     return Gain(
         rms_before_in=float(np.sqrt(np.mean(before**2))),
         rms_after_in=float(np.sqrt(np.mean(after**2))),
-        share_interval=_interval(before, after, keys if len(np.unique(groups)) == 1 else groups, rng),
+        share_interval=_interval(before, after, np.arange(len(misfit)) if group is None else tails, rng),
         false_within_before=int(np.sum(said_before & outside)),
         false_within_after=int(np.sum(said_after & outside)),
         false_outside_before=int(np.sum(~said_before & ~outside)),
         false_outside_after=int(np.sum(~said_after & ~outside)),
         verdicts_changed=tuple(table.record_id[int(i)] for i in np.flatnonzero(said_before != said_after)),
-        held_out_by="row" if by_row else "tail",
+        held_out_by="tail" if held_out_by == "group" else "row",
     )
 
 
-def _interval(before: Array, after: Array, groups: NDArray[np.str_], rng: np.random.Generator) -> tuple[float, float]:
+def _interval(before: Array, after: Array, groups: NDArray[np.intp], rng: np.random.Generator) -> tuple[float, float]:
     """Bootstrap over tails of the share of mean square misfit removed."""
     number = np.unique(groups, return_inverse=True)[1]
     square_before = np.bincount(number, before**2)

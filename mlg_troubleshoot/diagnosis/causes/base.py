@@ -189,10 +189,6 @@ class Cause(ABC):
             What differs from the plain model, row by row.
         """
 
-    def of_one_tail(self, candidate: Candidate) -> bool:
-        """Tell whether it concerns one tail, so that others cannot teach it: the gain is measured on held-out rows."""
-        return False
-
     def family(self, target: str | None) -> str | None:
         """Return the target under which variants of one name are gathered."""
         return target

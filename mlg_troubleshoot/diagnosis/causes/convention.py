@@ -52,10 +52,6 @@ class ConventionSlip(Cause):
                     setting = {"column": column, "value": value, "written_factor": factor}
                     yield Candidate(self, f"{label} {value}", setting)
 
-    def of_one_tail(self, candidate: Candidate) -> bool:
-        """It does if the group is an aircraft."""
-        return bool(candidate.setting["column"] == "tail_no")
-
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Take the group's clearances as they were meant, and what wear makes expect of all rows with them."""
         meant = as_meant(scene.table, candidate.setting)

@@ -218,10 +218,6 @@ class RiggingOffset(Cause):
             where = where & (table.factors["side"] == setting["side"])
         return offset(scene, where & _from_day_on(scene, setting), value)
 
-    def of_one_tail(self, candidate: Candidate) -> bool:
-        """It always does."""
-        return True
-
     def family(self, target: str | None) -> str | None:
         """Gather an aircraft and its single gears under one name."""
         if target is None:
