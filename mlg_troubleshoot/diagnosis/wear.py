@@ -35,6 +35,9 @@ _FAR = 3.0
 
 # A reading is overruled by at most this many standard deviations of its error.
 _MOST_SIGMAS = 2.0
+# Single gears wear further off the fleet than a normal distribution has it: at 1, three more of 400 fleets with 30 or
+# 50 % of the clearances blank (seeds 2,001,555 and on) had a worn gear named as re-rigged; 2 gains nothing more. [1]
+_HEAVY_TAILS = 1.5
 # Wear of a joint that nobody read over the mean of the read ones: standard deviation between joints of the fleet,
 # between gears, and between inspections of one gear. Supposed, from the read joints of simulated fleets. [1]
 JOINTS_APART, GEARS_APART, ROWS_APART = 0.35, 0.5, 0.4
@@ -104,7 +107,7 @@ def likely_clearances(table: DiagnosisTable) -> LikelyClearances:
     reach = _MOST_SIGMAS * np.sqrt(noise)
     likely = np.where(known, np.clip(drawn, read - reach, read + reach), drawn)
     spread = np.where(known, 0.0, np.sqrt(history.scatter_in2))
-    shared = np.where(known, 0.0, np.sqrt(history.unsure_in2))
+    shared = np.where(known, 0.0, _HEAVY_TAILS * np.sqrt(history.unsure_in2))
     left = np.where(known, np.sqrt(trust * noise + (1.0 - trust) ** 2 * history.unsure_in2), 0.0)
     common = np.zeros_like(readings)
     seen = np.isfinite(readings).any(axis=0)

@@ -71,6 +71,17 @@ def worn_where_nobody_reads(gear: Gear) -> DiagnosisTable:
     return replace(table, readings_in=table.readings_in + more.reshape(-1, *[1] * (table.readings_in.ndim - 1)))
 
 
+def worn_when_not_read(gear: Gear) -> DiagnosisTable:
+    """One aircraft whose last three inspections read further out, and leave joints 2 and 3 unread."""
+    table = worn_with_landings(gear)
+    values, own = table.clearance_in.copy(), np.flatnonzero(table.factors["tail_no"] == "N103")
+    last = own[np.argsort(table.quantities["day"][own])[-3:]]
+    values[np.ix_(last, [1, 2])] = np.nan
+    more = np.zeros(len(table))
+    more[last] = 0.02
+    return replace(table, clearance_in=values, readings_in=table.readings_in + more[:, None])
+
+
 def pressure_on_one_tail(table: DiagnosisTable, _over: Array) -> Array:
     pressure = table.quantities["hydraulic_pressure_psi"]
     return np.where(table.factors["tail_no"] == "N103", (3000.0 - pressure) / 1e5, 0.0)
@@ -95,6 +106,7 @@ FLEETS: dict[str, Callable[[Gear], DiagnosisTable]] = {
     "convention": lambda gear: one_technician_twice(fleet(gear.model, rows=200)),
     "unread": lambda gear: unread(worn_with_landings(gear)),
     "worn unread": worn_where_nobody_reads,
+    "worn when not read": worn_when_not_read,
     "oval on another linkage": lambda _gear: on_another_linkage(5, worn_further=1.5),
     "a linkage that nobody calibrated": lambda _gear: on_another_linkage(2, all_further=1.7),
     "all readings 1.7 times as large": lambda gear: fleet(gear.model, lambda _t, over: 0.7 * over, rows=200),
@@ -255,6 +267,10 @@ def test_joints_that_nobody_read_are_no_cause() -> None:
 
 def test_an_aircraft_whose_unread_joints_may_be_worn_is_not_named_as_re_rigged() -> None:
     assert not {name for name, _target in named("worn unread")} & {"rigging_offset", "unlisted_wear"}
+
+
+def test_an_aircraft_is_not_named_as_re_rigged_from_a_day_on_from_which_joints_were_not_read() -> None:
+    assert "rigging_offset" not in {cause for cause, _target in named("worn when not read")}
 
 
 def test_joints_that_nobody_read_are_said_with_what_they_add() -> None:

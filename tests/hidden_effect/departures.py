@@ -45,19 +45,19 @@ STILL = ("gauge_bias", "elastic_compliance", "thermal_growth")
 WITHIN = tuple(name for name in simulator.DEPARTURES if "_of_one_" in name)
 
 PLAN: dict[str, int] = {
-    "loads:40": 40,
-    "loads:90": 40,
-    "loads:180": 40,
-    "loads and gauge_bias": 20,
-    "loads and elastic_compliance": 20,
-    "linkage, nothing hidden": 36,
-    "linkage, one cause": 36,
-    "read #2-#5, nothing hidden": 40,
-    "read #2-#5, one cause": 39,
-    "blank 30 %": 40,
-    "blank 50 %": 40,
-    "convention": 40,
-    "one group": 36,
+    "loads:40": 200,
+    "loads:90": 200,
+    "loads:180": 200,
+    "loads and gauge_bias": 200,
+    "loads and elastic_compliance": 200,
+    "linkage, nothing hidden": 200,
+    "linkage, one cause": 200,
+    "read #2-#5, nothing hidden": 200,
+    "read #2-#5, one cause": 201,
+    "blank 30 %": 200,
+    "blank 50 %": 200,
+    "convention": 200,
+    "one group": 200,
     "nothing hidden": 240,
 }
 

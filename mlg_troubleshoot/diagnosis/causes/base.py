@@ -223,9 +223,9 @@ def offset(scene: Scene, where: ArrayLike, value: float) -> Adjustment:
     return Adjustment(scene.clearance_in, offset_in=np.asarray(where, float) * value)
 
 
-def share_never_read(scene: Scene) -> float:
-    """Share of joints that no row has in what all joints could move the plunger by. [1]"""
-    never = ~np.isfinite(scene.table.clearance_in).any(axis=0)
+def share_never_read(scene: Scene, rows: NDArray[np.bool_] | slice = slice(None)) -> float:
+    """Share of joints that none of these rows has in what all joints could move the plunger by. [1]"""
+    never = ~np.isfinite(scene.table.clearance_in[rows]).any(axis=0)
     moved = np.abs(scene.model.plunger_amplification())
     return float(moved[never].sum() / moved.sum())
 

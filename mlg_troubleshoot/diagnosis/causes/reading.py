@@ -167,13 +167,6 @@ class DateStep(Cause):
         return offset(scene, _from_day_on(scene, candidate.setting), value)
 
 
-def _unread_share(scene: Scene, rows: NDArray[np.bool_]) -> float:
-    """Share of the predicted displacement by joints that were never read in these rows, though in others. [1]"""
-    read = np.isfinite(scene.table.clearance_in)
-    never = ~read[rows].any(axis=0) & read.any(axis=0)
-    return float(np.sum(scene.contribution_in[rows][:, never]) / max(float(np.sum(scene.over_in[rows])), 1e-9))
-
-
 class RiggingOffset(Cause):
     """The plunger rod of one aircraft, or of one of its gears, was re-rigged."""
 
@@ -204,11 +197,11 @@ class RiggingOffset(Cause):
                 if np.unique(gears[tails == tails[gears == v][0]]).size > 1
             ]
         for label, setting, rows in groups:
-            if max(_unread_share(scene, rows), share_never_read(scene)) > MOST_UNREAD:
-                continue
-            yield Candidate(self, label, {**setting, "day": None, "since": None})
-            for day in _change_days(days[rows], 1, 12):
-                yield Candidate(self, label, {**setting, "day": day, "since": _date(scene, day)})
+            for day in (None, *_change_days(days[rows], 1, 12)):
+                # What was not read in any of its rows may be worn instead.
+                if share_never_read(scene, rows if day is None else rows & (days >= day)) <= MOST_UNREAD:
+                    since = None if day is None else _date(scene, day)
+                    yield Candidate(self, label, {**setting, "day": day, "since": since})
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Shift the rows of that aircraft or gear from that day on."""
