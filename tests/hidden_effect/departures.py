@@ -2,7 +2,7 @@
 
     python -m tests.hidden_effect.departures --workers 2
 
-Its seeds begin at 2,000,000; those from 3,000,000 were used for tuning.
+Its seeds begin at 2,100,000; those from 2,000,000 and from 3,000,000 were used for tuning.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from tests.hidden_effect.as_table import as_table
 Array = NDArray[np.float64]
 Record = dict[str, Any]
 
-FIRST_SEED = 2_000_000
+FIRST_SEED = 2_100_000
 # Chance below which a regression on the clearances beats one scale by more than chance.
 BEATS = 0.01
 RESULT = Path(__file__).with_name("departures_result.json")
