@@ -31,6 +31,7 @@ from mlg_troubleshoot.reporting.html import render
 from mlg_troubleshoot.studies.index_table import IndexTable
 from mlg_troubleshoot.studies.targets import load_targets, targets_file
 from mlg_troubleshoot.units import ClearanceConvention
+from tests.machine import SLOWER
 
 # Printable and short, so that no check of names keeps them from the generators.
 HOSTILE = (
@@ -183,11 +184,11 @@ def edited(gear: Gear, tmp_path: Path) -> Edit:
 def test_what_no_gear_can_have_is_refused_with_file_key_and_expectation(
     edited: Edit, old: str, new: str, words: str
 ) -> None:
-    began = time.monotonic()
+    began = time.process_time()
     with pytest.raises(GearFileError, match=words) as caught:
         load_gear(edited(old, new))
     assert "hawker-800xp.toml" in caught.value.message
-    assert time.monotonic() - began < 5.0
+    assert time.process_time() - began < 5 * SLOWER
 
 
 @pytest.mark.parametrize(

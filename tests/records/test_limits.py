@@ -28,6 +28,7 @@ from mlg_troubleshoot.records import (
     zipguard,
 )
 from mlg_troubleshoot.reporting import pdf
+from tests.machine import SLOWER
 
 HEADER = "record_id,tail_no,side,clearance_convention,clearance_3_in,clearance_5_in\n"
 GOOD = "R1,N1,LH,RADIAL,0.013,0.007\n"
@@ -54,7 +55,7 @@ def test_a_monster_is_refused_within_10_s_and_500_mb(made: str) -> None:
     done = subprocess.run(run, input=(HEADER + GOOD).encode(), capture_output=True, check=True)
     problems, seconds, megabytes = map(float, done.stdout.split())
     assert problems
-    assert seconds < 10
+    assert seconds < 10 * SLOWER
     assert megabytes < 500
 
 
@@ -64,7 +65,7 @@ def test_a_stray_quotation_mark_in_every_row_is_named_within_10_s() -> None:
     done = subprocess.run(run, input=HEADER.encode(), capture_output=True, check=True)
     problems, seconds, _ = map(float, done.stdout.split())
     assert problems >= 1
-    assert seconds < 10
+    assert seconds < 10 * SLOWER
 
 
 @pytest.fixture
@@ -143,7 +144,7 @@ def test_a_comment_full_of_the_names_of_elements_costs_no_time(read, package):
         package(after=comment, sheet_data='<row r="1"><c r="A1" t="inlineStr"><is><t>x</t></is></c></row>'), "t.xlsx"
     )
     assert result.problems
-    assert time.process_time() - start < 5
+    assert time.process_time() - start < 5 * SLOWER
 
 
 def test_the_page_on_trust_states_the_limits_that_hold() -> None:
@@ -182,4 +183,4 @@ def test_what_would_pile_up_while_a_sheet_is_read_is_refused_within_10_s(read, p
     (problem,) = read(data, "t.xlsx").problems
     assert problem.code == "file_too_large"
     assert "rows or texts" in problem.value or "one row or text" in problem.value
-    assert time.process_time() - start < 10
+    assert time.process_time() - start < 10 * SLOWER

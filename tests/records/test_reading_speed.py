@@ -10,6 +10,8 @@ import zipfile
 
 import pytest
 
+from tests.machine import SLOWER
+
 MEASURE = """
 import json, sys, time
 start = time.process_time()
@@ -91,7 +93,7 @@ def test_fifty_thousand_rows_of_forty_columns_are_read_in_time_and_memory(tmp_pa
     judged, peak, raw, library, rows, problems = measure(path)
     print(f"read and checked {judged:.1f} s, {peak:.0f} MB; reading alone {raw:.1f} s, openpyxl alone {library:.1f} s")
     assert (rows, problems) == (50_000, 0)
-    assert judged < 60
+    assert judged < 4 * library
     assert peak < 400
     assert raw < library
 
@@ -105,7 +107,7 @@ def test_ten_thousand_rows_of_csv_are_read_in_time(tmp_path):
     judged, peak, _, _, rows, problems = measure(path)
     print(f"read and checked {judged:.1f} s, {peak:.0f} MB")
     assert (rows, problems) == (10_000, 0)
-    assert judged < 6
+    assert judged < 6 * SLOWER
 
 
 def test_reading_a_table_loads_no_spreadsheet_library():

@@ -13,6 +13,7 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.records.cells import LETTERS
+from tests.machine import SLOWER
 
 HEADER = ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in")
 GOOD = ("R1", "N100AB", "LH", "RADIAL", 0.013, 0.007)
@@ -609,10 +610,10 @@ def test_36_an_empty_formatted_cell_far_outside_is_no_error(read, package):
 def test_37_a_zip_bomb_is_refused_at_once(read, package):
     bomb = package(sheet_xml=b"<worksheet>" + b" " * 150_000_000)
     assert len(bomb) < 1_000_000
-    start = time.perf_counter()
+    start = time.process_time()
     problem = only(read(bomb, "t.xlsx"))
     assert problem.code == "file_too_large"
-    assert time.perf_counter() - start < 2.0
+    assert time.process_time() - start < 2 * SLOWER
 
 
 def test_37_a_workbook_that_lies_about_its_size_is_refused(read, package):
