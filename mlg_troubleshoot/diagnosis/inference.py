@@ -72,6 +72,9 @@ JOINT_LEAD, DIRECTION_LEAD, PAIR_RIVAL = 4.0, 10.0, -3.0
 # Standard errors by which readings are beyond a bound for certain; change of all predictions that is no error of the
 # rate alone: those of the study's fleets end at 0.2, linkages that nobody calibrated begin at 0.7. [1]
 _BEYOND, MOST_RATE = 2.0, 0.4
+# Loss of all predictions that no linkage brings: those of the departures' fleets end at 0.15, where directions lie all
+# around and another linkage was named it was 1.2 to 1.6. [1]
+MOST_LOSS = 0.6
 # Mean square on held-out tails over that of two causes of single joints, up to which factors of all are preferred. [1]
 PAIR_WORSE = 1.08
 # Chance below which one scale for all joints is rejected, and below which it is doubted.
@@ -490,7 +493,8 @@ def infer(  # noqa: PLR0913 - all that a search for causes looks at
 def _possible(whole: Inference, held: Array, blocks: Sequence[Block]) -> list[Block]:
     """Factors of all joints that one scale for all allows: none below a bound that readings are beyond.
 
-    Nor a linkage that nobody calibrated, where the scale may be an error of the rate.
+    Nor a linkage where readings are hardly as large as predicted, or against it; nor one that nobody calibrated, where
+    the scale may be an error of the rate.
     """
 
     def change(scale: Array) -> tuple[float, float]:
@@ -498,7 +502,8 @@ def _possible(whole: Inference, held: Array, blocks: Sequence[Block]) -> list[Bl
         return float(found.values[-1]), float(found.errors[-1])
 
     (beyond, error), (rate, _error) = change(whole.rows.predicted_in), change(whole.one_scale)
-    kept = [block for block in blocks if not (block.cause.bounded and beyond > _BEYOND * error)]
+    surely = _BEYOND * error
+    kept = [b for b in blocks if not (beyond > surely if b.cause.bounded else beyond < -MOST_LOSS - surely)]
     return [block for block in kept if not block.uncalibrated or abs(rate) > MOST_RATE]
 
 

@@ -166,6 +166,10 @@ def test_readings_against_the_prediction_are_no_slip_of_the_sign_where_the_clear
     assert named("loads against") == {("load_directions", None), ("gauge_bias", "gauge G-2")}
 
 
+def test_readings_against_the_prediction_are_no_other_linkage() -> None:
+    assert "geometry" not in {a.cause.name for c in found("loads against").causes for a in c.aliases}
+
+
 def test_a_scale_and_one_direction_are_not_told_from_directions_of_all_joints() -> None:
     rivals = {c.candidate.cause.name for c in found("one pin turned").also_possible}
     assert rivals == {"calibration_rate", "direction_not_worst_case", "load_directions"}
