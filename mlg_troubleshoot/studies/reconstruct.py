@@ -223,6 +223,7 @@ class _Search:
         return Reconstruction(linkage, tuple(met), len(vector), determined, loosest, self.tried, seed)
 
     def _binding_slopes(self, vector: Array, met: list[Met]) -> Array:
+        """Slopes of what binds; a target that moves with nothing, or has no value nearby, determines nothing."""
         binding = [each.target for each in met if each.binds]
         columns = []
         for i in range(len(vector)):
@@ -233,7 +234,8 @@ class _Search:
                 facts = Facts(self.gear, self.gear.model_of(self.space.linkage(moved)), quick=True)
                 ends.append(np.array([facts.measure(target) for target in binding]))
             columns.append((ends[0] - ends[1]) / 2e-4)
-        return np.array(columns).T
+        rows = np.array(columns).T
+        return rows[np.isfinite(rows).all(axis=1) & rows.any(axis=1)]
 
 
 def _miss(target: Target, computed: float) -> float:

@@ -73,6 +73,13 @@ def test_targets_that_cannot_be_met_end_with_a_message(gear: Gear, targets: tupl
         reconstruct(gear, targets, np.random.default_rng(0), 0, minutes=0.01)
 
 
+def test_a_target_that_moves_with_nothing_determines_nothing(gear: Gear, targets: tuple[Target, ...]) -> None:
+    case = next(t for t in targets if t.clearance_in)
+    nothing = replace(case, clearance_in=dict.fromkeys(case.clearance_in, 0.0), low=-0.001, high=0.001, search=True)
+    found = reconstruct(gear, (nothing,), np.random.default_rng(0), 0, start=gear.reference, minutes=0.0)
+    assert found.determined == 0
+
+
 def test_a_file_without_numbers_to_search_is_refused(gear: Gear, targets: tuple[Target, ...]) -> None:
     with pytest.raises(UsageError):
         reconstruct(gear, tuple(replace(t, search=False) for t in targets), np.random.default_rng(0), 0)
