@@ -234,7 +234,7 @@ class _Search:
                 facts = Facts(self.gear, self.gear.model_of(self.space.linkage(moved)), quick=True)
                 ends.append(np.array([facts.measure(target) for target in binding]))
             columns.append((ends[0] - ends[1]) / 2e-4)
-        rows = np.array(columns).T
+        rows: Array = np.array(columns).T
         return rows[np.isfinite(rows).all(axis=1) & rows.any(axis=1)]
 
 

@@ -77,6 +77,8 @@ def _target(entry: DataTable) -> Target:
     if entry.has("value"):
         value, width = entry.number("value"), entry.number("tolerance")
         low, high, tolerance = value - width, value + width, f"± {width:g}"
+        if not low < high:
+            raise entry.fail("tolerance", "a number above 0 that the value can be told from")
     elif entry.has("at_least"):
         low = entry.number("at_least")
         tolerance = f"≥ {low:g}"

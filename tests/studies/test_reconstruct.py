@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 import tomli_w
 
-from mlg_troubleshoot.errors import InconclusiveDataError, UsageError
+from mlg_troubleshoot.errors import GearFileError, InconclusiveDataError, UsageError
 from mlg_troubleshoot.gear.design import member_values
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
@@ -71,6 +72,14 @@ def test_a_linkage_written_as_a_member_reads_back_from_the_ensemble(gear: Gear, 
 def test_targets_that_cannot_be_met_end_with_a_message(gear: Gear, targets: tuple[Target, ...]) -> None:
     with pytest.raises(InconclusiveDataError, match="no linkage met"):
         reconstruct(gear, targets, np.random.default_rng(0), 0, minutes=0.01)
+
+
+@pytest.mark.parametrize("width", ["0.0", "-0.1", "1e-30"])
+def test_a_target_without_a_tolerance_is_refused(gear: Gear, tmp_path: Path, width: str) -> None:
+    text = targets_file(gear).read_text(encoding="utf-8")
+    (tmp_path / "t.toml").write_text(re.sub(r"tolerance = \S+", f"tolerance = {width}", text, count=1))
+    with pytest.raises(GearFileError, match="tolerance: expected a number above 0"):
+        load_targets(tmp_path / "t.toml")
 
 
 def test_a_target_that_moves_with_nothing_determines_nothing(gear: Gear, targets: tuple[Target, ...]) -> None:
