@@ -63,7 +63,8 @@ class Scene:
         return bool(np.isfinite(self.table.clearance_in[:, self.place(joint)]).any())
 
 
-# Where joints that nobody read make more than this share of the prediction, or could, their wear may be the effect. [1]
+# Where joints that were not read are more than this share of what all could move the plunger by, their wear may be the
+# effect. [1]
 MOST_UNREAD = 0.15
 
 
