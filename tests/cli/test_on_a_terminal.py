@@ -147,10 +147,10 @@ def test_a_joint_that_was_just_skipped_is_not_asked_for_next(start: Start) -> No
 
 
 def test_a_large_batch_shows_its_progress(start: Start, tmp_path: Path) -> None:
-    write_inspections(tmp_path / "batch.csv", 600)
+    write_inspections(tmp_path / "batch.csv", 4000)
     child = start("check", tmp_path / "batch.csv")
-    child.expect(r"Judging .*/600")
-    child.expect_exact("600 inspections:")
+    child.expect(r"Judging .*/4000")
+    child.expect_exact("4000 inspections:")
     assert finish(child) == 1
 
 
