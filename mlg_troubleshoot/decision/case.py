@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.inspection import Inspection, Outcome
 from mlg_troubleshoot.decision.prediction import (
     DEFAULT_PLUNGER_U_IN,
@@ -25,9 +25,6 @@ from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.directions import chance_beyond
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.joints import ROUNDING_IN
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,14 +77,12 @@ class Cases:
 
     @property
     def over_limit(self) -> Mask:
-        over: Mask = self.clearance_in > self.gear.limits_in + ROUNDING_IN
-        return over
+        return self.clearance_in > self.gear.limits_in + ROUNDING_IN
 
     @property
     def critical_missing(self) -> Mask:
         """True for a gear of which a critical joint was not measured."""
-        missing: Mask = np.any(~self.measured & self.gear.critical, axis=1)
-        return missing
+        return np.asarray((~self.measured & self.gear.critical).any(axis=1))
 
     def filled(self, unmeasured: Array | float) -> Array:
         """Clearances with something in place of those not measured. [in]"""
@@ -98,7 +93,7 @@ class Cases:
         known = self.measured if measured is None else measured
         return predict(self.gear, self.inspections, clearance_in, known, self.gauge_u_in, self.extension)
 
-    def take(self, rows: NDArray[np.intp]) -> Cases:
+    def take(self, rows: Places) -> Cases:
         arrays = {
             f.name: getattr(self, f.name)[rows]
             for f in fields(self)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision import plunger_reading, sentences
 from mlg_troubleshoot.decision.assessment import (
     Assessment,
@@ -39,8 +39,6 @@ from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import verdict
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.studies.index_table import IndexTable
-
-Array = NDArray[np.float64]
 
 _CHUNK = 1024
 

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.decision.assessment import ClearanceInterval, GroupChance, Posterior
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.prediction import model_uncertainty
@@ -21,8 +21,6 @@ from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.studies.groups import link_groups
-
-Array = NDArray[np.float64]
 
 _QUANTILES = (0.05, 0.5, 0.95)
 # Below this chance no joint is named as likely worn. [1]
@@ -102,7 +100,7 @@ def _reading_with_error(found: float, u: float, rng: np.random.Generator, n: int
     return np.maximum(drawn, 0.0)
 
 
-def _summary(gear: Gear, drawn: Array, worn: NDArray[np.bool_], weight: Array, not_clearance: float) -> Posterior:
+def _summary(gear: Gear, drawn: Array, worn: Mask, weight: Array, not_clearance: float) -> Posterior:
     index = {number: j for j, number in enumerate(gear.joint_numbers)}
     chances = [
         GroupChance(group, min(float(weight[worn[:, [index[n] for n in group]].any(axis=1)].sum()), 1.0))

@@ -9,14 +9,11 @@ mean is known, so that only the difference carries an error.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mlg_troubleshoot.decision.assessment import Confidence, UncertaintyBudget
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.wear_levels import normal_cdf
-
-Array = NDArray[np.float64]
 
 _DRAWS = 4096
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.assessment import MeasuringAdvice, ReadingWorth, Verdict
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.plan import minutes_to_measure
@@ -23,8 +23,6 @@ from mlg_troubleshoot.decision.wear_levels import (
     tabled_normal_cdf,
     uncertainty_parts,
 )
-
-Array = NDArray[np.float64]
 
 # At a conformance probability of 95 % one wrong WITHIN weighs as much as this many wrong OUTSIDE.
 COST_OF_WRONG_WITHIN = CONFORMANCE / (1.0 - CONFORMANCE)
@@ -43,8 +41,7 @@ _SPOT_WEIGHTS = np.exp(-0.5 * _SPOTS**2) / np.exp(-0.5 * _SPOTS**2).sum()
 def decision_risk(probability: Array | float) -> Array:
     """Expected cost of the better of WITHIN and OUTSIDE. [1]"""
     p = np.asarray(probability, float)
-    risk: Array = np.minimum(COST_OF_WRONG_WITHIN * (1.0 - p), p)
-    return risk
+    return np.asarray(np.minimum(COST_OF_WRONG_WITHIN * (1.0 - p), p))
 
 
 def enough(within: float, too_close: float = 0.0) -> Verdict | None:

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision import sentences
 from mlg_troubleshoot.decision.assessment import RepairSet, Verdict
 from mlg_troubleshoot.decision.case import Cases
@@ -24,9 +24,6 @@ from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import verdict
 from mlg_troubleshoot.decision.wear_levels import level_chances, moments, tabled_normal_cdf
 from mlg_troubleshoot.gear.gear import Gear
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 # Standard uncertainties that a better gauge can reach: those of bore gauges and micrometers. [in]
 BETTER_GAUGES_IN = (0.0004, 0.0003)
@@ -58,7 +55,7 @@ class Judged:
     beyond: Mask
     clears: Mask
     unexplained: Mask
-    order: NDArray[np.intp]
+    order: Places
 
 
 def plans(cases: Cases, judged: Judged, found: Search, sets: Sequence[tuple[RepairSet, ...]]) -> list[Plan]:
@@ -90,7 +87,7 @@ class _Facts:
         complaint = cases.failed | (judged.beyond & ~cases.retracted) | (over.any(axis=1) & ~cases.retracted)
         ahead = _Ahead.of(cases, judged)
         open_critical = ~measured & gear.critical
-        candidates = np.where(open_critical.any(axis=1)[:, None], open_critical, ~measured)
+        candidates = np.where(open_critical.any(axis=1, keepdims=True), open_critical, ~measured)
         group = np.where(complaint[:, None], candidates, ahead.group(candidates))
         rest = ~measured & ~group
         read_first = _reading_is_quicker(gear, found, ahead, rest | group) | open_critical.any(axis=1)
@@ -231,8 +228,7 @@ class _Ahead:
     @property
     def mean_in(self) -> Array:
         """Expected clearance of each joint, if it is not measured. [in]"""
-        mean: Array = (self.weight @ moments()[0])[:, None] * self.gear.limits_in
-        return mean
+        return (self.weight @ moments()[0])[:, None] * self.gear.limits_in
 
     def total(self, joints: Mask) -> tuple[Array, Array]:
         """Mean and standard deviation, at each level, of what some joints add to the worst case. [in]"""
@@ -247,14 +243,12 @@ class _Ahead:
 
         def below(bound_in: Array) -> Array:
             scores = (bound_in[:, None] - self.worst_in[:, None] - mean) / np.maximum(spread, 1e-9)
-            chance: Array = np.sum(self.weight * tabled_normal_cdf(scores), axis=1)
-            return chance
+            return np.asarray(np.sum(self.weight * tabled_normal_cdf(scores), axis=1))
 
         outside = 1.0 - below(self.outside_in)
         within = below(self.within_in - open_in)
         between = np.maximum(below(self.outside_in - open_in) - below(self.within_in), 0.0)
-        chance: Array = outside + np.where((rest & self.gear.critical).any(axis=1), 0.0, within + between)
-        return chance
+        return outside + np.where((rest & self.gear.critical).any(axis=1), 0.0, within + between)
 
     def group(self, candidates: Mask) -> Mask:
         """The joints to read in one round: the fewest, most telling a minute first, that likely settle the verdict."""
@@ -290,8 +284,7 @@ def _reading_is_quicker(gear: Gear, found: Search, ahead: _Ahead, unread: Mask) 
     for area, inside in areas:
         shared = np.where(now >= 0, (table.members[now] & inside).any(axis=1), False)
         to_read = to_read + np.where((unread & inside).any(axis=1) & ~shared, area.access.value, 0.0)
-    quicker: Mask = unread.any(axis=1) & ((now < 0) | (to_read + after < minutes[now]))
-    return quicker
+    return np.asarray(unread.any(axis=1) & ((now < 0) | (to_read + after < minutes[now])))
 
 
 def _verdicts_after_limits(cases: Cases, judged: Judged) -> list[Verdict]:

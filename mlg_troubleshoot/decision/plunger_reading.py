@@ -6,15 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.decision.case import Cases, plunger_u
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.prediction import Prediction
 from mlg_troubleshoot.units import SLIPS
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

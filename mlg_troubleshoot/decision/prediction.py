@@ -7,8 +7,8 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.wear_levels import normal_cdf
@@ -16,8 +16,6 @@ from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
 from mlg_troubleshoot.gear.directions import WorstCase
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
-
-Array = NDArray[np.float64]
 
 DIRECTION_SETS = 4096
 DEFAULT_PLUNGER_U_IN = 0.0005
@@ -83,8 +81,7 @@ class Prediction:
     @property
     def u_clearances_in(self) -> Array:
         """What the uncertainty of all readings adds. [in]"""
-        total: Array = np.sqrt(np.sum(self.u_readings_in**2, axis=1))
-        return total
+        return np.asarray(np.sqrt(np.sum(self.u_readings_in**2, axis=1)))
 
     def standard_uncertainty(self, margin_u_in: Array) -> Array:
         """Combined standard uncertainty of the prediction against the margin. [in]"""
@@ -112,7 +109,7 @@ def predict(
     gear: Gear,
     inspections: Sequence[Inspection],
     clearance_in: Array,
-    measured: NDArray[np.bool_],
+    measured: Mask,
     gauge_u_in: Array,
     extension: Extension | None = None,
 ) -> Prediction:
@@ -176,7 +173,7 @@ class BatchPrediction:
     chance_random: Array
 
 
-def with_rows(whole: Prediction, part: Prediction, rows: NDArray[np.intp]) -> Prediction:
+def with_rows(whole: Prediction, part: Prediction, rows: Places) -> Prediction:
     def put(a: Array, b: Array) -> Array:
         merged = a.copy()
         merged[rows] = b

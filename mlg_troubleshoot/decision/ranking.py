@@ -5,14 +5,12 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.assessment import JointFinding
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.joints import ROUNDING_IN
 from mlg_troubleshoot.studies.index_table import IndexTable
-
-Array = NDArray[np.float64]
 
 
 @lru_cache(maxsize=4)
@@ -65,7 +63,7 @@ def rank_joints(
     return findings
 
 
-def _places(over: NDArray[np.bool_], contribution: Array, total_order: Array) -> NDArray[np.intp]:
+def _places(over: Mask, contribution: Array, total_order: Array) -> Places:
     """Place of each joint on each linkage, from 1."""
     # Rounded: both ends of one link contribute alike, and rounding noise must not order them.
     keys = (-np.round(total_order, 6), -np.round(contribution, 9), ~over)

@@ -8,8 +8,8 @@ from functools import lru_cache
 from statistics import NormalDist
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.assessment import RepairSet, Rigging, UncertaintyBudget
 from mlg_troubleshoot.decision.case import Cases, exact_chance
 from mlg_troubleshoot.decision.plan import minutes_to_measure, minutes_to_restore
@@ -18,9 +18,6 @@ from mlg_troubleshoot.decision.second_order import Response, responses
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.decision.wear_levels import normal_cdf
 from mlg_troubleshoot.gear.gear import Gear
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _SHOWN = 5
 _ROWS = 256
@@ -44,11 +41,11 @@ class Subsets:
     members: Mask
     weights: Array
     minutes: Array
-    alike: NDArray[np.intp]
+    alike: Places
     pairs: Array
 
     @property
-    def upper_triangle(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def upper_triangle(self) -> tuple[Places, Places]:
         """Pairs of joints, each joint with itself included."""
         return np.triu_indices(self.members.shape[1])
 
@@ -81,13 +78,13 @@ class Search:
     table: Subsets
     slack_in: Array
 
-    def quickest(self, relief_in: Array | float = 0.0) -> NDArray[np.intp]:
+    def quickest(self, relief_in: Array | float = 0.0) -> Places:
         """Place of the quickest sufficient subset if the worst case is less by `relief_in`; −1 if none is."""
         enough = self.slack_in >= -np.broadcast_to(relief_in, len(self.slack_in))[:, None]
         return _surest(self.table, self.slack_in, enough)
 
 
-def _surest(table: Subsets, slack_in: Array, among: Mask) -> NDArray[np.intp]:
+def _surest(table: Subsets, slack_in: Array, among: Mask) -> Places:
     """The quickest of some subsets; of equally many joints in equal minutes the one with most slack; −1 if none."""
     first, rows = np.argmax(among, axis=1), np.arange(len(among))
     alike = among & (table.alike[first][:, None] == table.alike)
@@ -136,10 +133,7 @@ def _bend(linkage: Response, table: Subsets, clearance_in: Array, less_in: Array
     """What the curvature adds to the worst case with each subset restored. [in]"""
     first, second = table.upper_triangle
     curved = linkage.worst_curvature[first, second] * np.where(first == second, 0.5, 1.0)
-    bend: Array = linkage.sense(clearance_in)[:, None] * (
-        (less_in[:, first] * less_in[:, second] * curved) @ table.pairs.T
-    )
-    return bend
+    return linkage.sense(clearance_in)[:, None] * ((less_in[:, first] * less_in[:, second] * curved) @ table.pairs.T)
 
 
 def _third_order(cases: Cases, least_in: Array, expanded_in: Array) -> Array:
@@ -156,8 +150,7 @@ def _third_order(cases: Cases, least_in: Array, expanded_in: Array) -> Array:
 def _calmer(linkage: Response, table: Subsets, clearance_in: Array, less_in: Array, variance_in2: Array) -> Array:
     """What restoring each subset takes from the variance that the readings cause, to first order. [in²]"""
     turned = (variance_in2 * linkage.slopes(clearance_in)) @ linkage.worst_curvature
-    taken: Array = 2.0 * linkage.sense(clearance_in)[:, None] * ((less_in * turned) @ table.weights.T)
-    return taken
+    return 2.0 * linkage.sense(clearance_in)[:, None] * ((less_in * turned) @ table.weights.T)
 
 
 def _variance(members: Sequence[Array]) -> Array:
@@ -167,8 +160,7 @@ def _variance(members: Sequence[Array]) -> Array:
         off = member - members[0]
         total += off
         square += off * off
-    variance: Array = np.maximum(square - total * total / n, 0.0) / max(n - 1, 1)
-    return variance
+    return np.maximum(square - total * total / n, 0.0) / max(n - 1, 1)
 
 
 def calibrated(cases: Cases, found: Search) -> Search:
@@ -185,7 +177,7 @@ def calibrated(cases: Cases, found: Search) -> Search:
     return Search(found.table, found.slack_in + shift[:, None])
 
 
-def _restored(cases: Cases, rows: NDArray[np.intp], places: NDArray[np.intp]) -> tuple[Prediction, Array]:
+def _restored(cases: Cases, rows: Places, places: Places) -> tuple[Prediction, Array]:
     """The exact prediction of some gears, each with one subset restored, and its probability."""
     some = cases.take(rows)
     now = some.filled(cases.gear.limits_in)
@@ -218,7 +210,7 @@ def repair_sets(cases: Cases, found: Search, wanted: Mask) -> list[tuple[RepairS
     return [tuple(sets) for sets in result]
 
 
-def _least(table: Subsets, slack_in: Array) -> Sequence[NDArray[np.intp]]:
+def _least(table: Subsets, slack_in: Array) -> Sequence[Places]:
     """Places of the quickest sufficient subsets of each gear, none within another; none where none is needed."""
     open_sets = slack_in >= 0.0
     members = table.weights

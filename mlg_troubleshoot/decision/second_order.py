@@ -11,13 +11,11 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.directions import random_directions
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
-
-Array = NDArray[np.float64]
 
 _STEP_IN = 1e-3
 
@@ -42,8 +40,7 @@ class Response:
 
     def displacement(self, links: Array) -> Array:
         """Displacement by the components of the virtual links. [in]"""
-        moved: Array = links @ self.gradient + 0.5 * np.sum((links @ self.curvature) * links, axis=-1)
-        return moved
+        return np.asarray(links @ self.gradient + 0.5 * np.sum((links @ self.curvature) * links, axis=-1))
 
     def worst(self, clearance_in: Array) -> tuple[Array, Array]:
         """Worst displacement of both senses. [in]"""
@@ -58,8 +55,7 @@ class Response:
 
     def slopes(self, clearance_in: Array) -> Array:
         """Slope of the worst displacement by each clearance, in the governing sense. [1]"""
-        slopes: Array = self.amplification + self.sense(clearance_in)[..., None] * (clearance_in @ self.worst_curvature)
-        return slopes
+        return self.amplification + self.sense(clearance_in)[..., None] * (clearance_in @ self.worst_curvature)
 
     def sense(self, clearance_in: Array) -> Array:
         """Which sense governs: +1 for over-travel, −1 for under-travel. [1]"""

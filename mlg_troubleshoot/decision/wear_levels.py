@@ -11,11 +11,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.decision.second_order import Response
-
-Array = NDArray[np.float64]
 
 _LEVELS = np.geomspace(0.05, 5.0, 24)
 
@@ -23,17 +21,15 @@ _LEVELS = np.geomspace(0.05, 5.0, 24)
 def level_weights(measured_share: Array) -> Array:
     """Chances of the levels of wear of one gear, given what was measured on it. [1]"""
     total = np.array([np.minimum(measured_share, 1.0).sum()])
-    chances: Array = level_chances(total, np.array([len(measured_share)]))[0]
-    return chances
+    return np.asarray(level_chances(total, np.array([len(measured_share)]))[0])
 
 
-def level_chances(total_share: Array, count: NDArray[np.intp]) -> Array:
+def level_chances(total_share: Array, count: Places) -> Array:
     """The same for many gears, from the sum of the shares of each and their number: shape (n, n_levels)."""
     log_norm = np.log(_LEVELS) + np.log1p(-np.exp(-1.0 / _LEVELS))
     log_weight = -total_share[:, None] / _LEVELS - count[:, None] * log_norm
     weight = np.exp(log_weight - log_weight.max(axis=1, keepdims=True))
-    chances: Array = weight / weight.sum(axis=1, keepdims=True)
-    return chances
+    return np.asarray(weight / weight.sum(axis=1, keepdims=True))
 
 
 def moments() -> tuple[Array, Array]:
@@ -48,14 +44,12 @@ def quantiles(n: int) -> Array:
     """Wear at evenly spaced chances, for each level. [1]"""
     chance = (np.arange(n) + 0.5) / n
     level = _LEVELS[:, None]
-    shares: Array = -level * np.log1p(chance * np.expm1(-1.0 / level))
-    return shares
+    return -level * np.log1p(chance * np.expm1(-1.0 / level))
 
 
 def level_likelihood(share: Array) -> Array:
     """Density of a joint's wear at each level. [1]"""
-    density: Array = np.exp(-share[:, None] / _LEVELS) / (_LEVELS * -np.expm1(-1.0 / _LEVELS))
-    return density
+    return np.exp(-share[:, None] / _LEVELS) / (_LEVELS * -np.expm1(-1.0 / _LEVELS))
 
 
 def normal_cdf(z: Array) -> Array:

@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +46,7 @@ class Adjustment:
             for name in names
         }
 
-    def take(self, rows: NDArray[np.intp]) -> Adjustment:
+    def take(self, rows: Places) -> Adjustment:
         return Adjustment(
             self.clearance_in[rows],
             {name: np.asarray(values)[rows] for name, values in self.changed.items()},

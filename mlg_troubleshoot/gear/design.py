@@ -6,12 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.gear import Linkage
 from mlg_troubleshoot.geometry.mechanism import Dyad, Mechanism, Point, Slider, Step
-
-Array = NDArray[np.float64]
 
 
 class DesignSpace:

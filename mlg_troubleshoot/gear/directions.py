@@ -13,11 +13,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.model import LinkageModel
-
-Array = NDArray[np.float64]
 
 _ANGLES = 2.0 * np.pi * np.arange(8) / 8
 _ROOT_HALF = np.sqrt(0.5)
@@ -134,8 +132,7 @@ def random_directions(n_joints: int, n: int) -> Array:
     for _ in range(60):
         root = (1.0 + root) ** (1.0 / (n_joints + 1))
     steps = root ** -np.arange(1.0, n_joints + 1)
-    turns: Array = 2.0 * np.pi * np.mod(0.5 + np.outer(np.arange(1, n + 1), steps), 1.0)
-    return turns
+    return 2.0 * np.pi * np.mod(0.5 + np.outer(np.arange(1, n + 1), steps), 1.0)
 
 
 def chance_beyond(

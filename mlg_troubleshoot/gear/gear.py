@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.gear.cycle import RetractionCycle
 from mlg_troubleshoot.gear.joints import JointSpec
 from mlg_troubleshoot.gear.model import Calibration, LinkageModel
@@ -155,22 +156,22 @@ class Gear:
         return tuple(joint.number for joint in self.joints)
 
     @property
-    def limits_in(self) -> np.ndarray:
+    def limits_in(self) -> Array:
         """Largest allowed radial clearance of each joint, shape (n_joints,). [in]"""
         return np.array([joint.limit.value for joint in self.joints])
 
     @property
-    def new_parts_in(self) -> np.ndarray:
+    def new_parts_in(self) -> Array:
         """Radial clearance of each joint with a new part. [in]"""
         return np.array([joint.new_part.value for joint in self.joints])
 
     @property
-    def access_minutes(self) -> np.ndarray:
+    def access_minutes(self) -> Array:
         """How long each joint takes to reach and measure once its area is open. [min]"""
         return np.array([joint.access.value for joint in self.joints])
 
     @property
-    def critical(self) -> np.ndarray:
+    def critical(self) -> Mask:
         """Which joints no gear can be cleared without."""
         return np.array([joint.critical for joint in self.joints])
 

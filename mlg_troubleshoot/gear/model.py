@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.errors import MechanismError
 from mlg_troubleshoot.geometry.kernel import Kernel
 from mlg_troubleshoot.geometry.mechanism import Mechanism
 
-Array = NDArray[np.float64]
 # Step of central differences. [in]
 _STEP_IN = 1e-5
 

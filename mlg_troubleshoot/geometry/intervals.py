@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mlg_troubleshoot.arrays import Array, Mask
+
 Pair = tuple[Array, Array]
 _ROUNDS = 2
 _GUESSES = (4.0, 2.0, 1.4, 1.15)
@@ -269,7 +269,7 @@ def _first_guess(c: tuple[Range, ...], a: tuple[Range, ...], b: tuple[Range, ...
             part._narrowed()
 
 
-def _where(known: NDArray[np.bool_], bounds: Pair) -> Pair:
+def _where(known: Mask, bounds: Pair) -> Pair:
     return np.where(known, bounds[0], np.nan), np.where(known, bounds[1], np.nan)
 
 
@@ -287,8 +287,7 @@ def _implicit_slopes(
 
 
 def _bounds(part: Any) -> Pair:
-    pair: Pair = part.value if isinstance(part, Range) else part
-    return pair
+    return part.value if isinstance(part, Range) else part
 
 
 def _as_range(part: Any, like: Range) -> Range:

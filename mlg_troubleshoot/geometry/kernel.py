@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import frozen
 from mlg_troubleshoot.geometry.intervals import narrowed_by_links
 from mlg_troubleshoot.geometry.mechanism import Mechanism
 from mlg_troubleshoot.geometry.program import Program, write_program
@@ -40,8 +41,7 @@ class Kernel:
         program = write_program(mechanism)
         self._program = program
         self.parameter_names = tuple(program.parameters)
-        self.parameters = np.array(list(program.parameters.values()), float)
-        self.parameters.flags.writeable = False
+        self.parameters = frozen(list(program.parameters.values()))
         self._output = _function(program, (program.output,))
         self._loop: Callable[..., None] | None = None
         self._joints: Callable[..., tuple[Any, ...]] | None = None
@@ -172,5 +172,4 @@ def _compiled_loop(body: str, layout: tuple[int, int, str]) -> Callable[..., Non
     lines.append(f"        out[i] = {result}")
     namespace: dict[str, Any] = dict(_NUMPY)
     exec(compile("\n".join(lines), "<mechanism>", "exec"), namespace)
-    compiled: Callable[..., None] = numba.njit(error_model="numpy", nogil=True)(namespace["loop"])
-    return compiled
+    return numba.njit(error_model="numpy", nogil=True)(namespace["loop"])

@@ -11,12 +11,10 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.datafile import LONGEST_NAME, is_name
 from mlg_troubleshoot.errors import MechanismError
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,8 +148,8 @@ class Mechanism:
     output: Output
     reference_input: float
     virtual_links: tuple[int, ...] = field(init=False)
-    _frames: dict[str, tuple[Vector, Vector]] = field(init=False, repr=False, compare=False, default_factory=dict)
-    _places: dict[str, Vector] = field(init=False, repr=False, compare=False, default_factory=dict)
+    _frames: dict[str, tuple[Array, Array]] = field(init=False, repr=False, compare=False, default_factory=dict)
+    _places: dict[str, Array] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         names = [point.name for point in self.points]
@@ -214,7 +212,7 @@ class Mechanism:
     def step(self, joint: str) -> Step | None:
         return next((step for step in self.steps if step.joint == joint), None)
 
-    def frame(self, plane: str) -> tuple[Vector, Vector]:
+    def frame(self, plane: str) -> tuple[Array, Array]:
         """Origin and axes of a plane in space.
 
         A plane is turned about its hinge line, which lies in its parent: Rodrigues' bracket of Eq. 6 maps what is
@@ -228,7 +226,7 @@ class Mechanism:
             self._frames[plane] = self._frame(plane)
         return self._frames[plane]
 
-    def _frame(self, plane: str) -> tuple[Vector, Vector]:
+    def _frame(self, plane: str) -> tuple[Array, Array]:
         found = next(p for p in self.planes if p.name == plane)
         if found.parent is None:
             return np.zeros(3), np.eye(3)
@@ -243,7 +241,7 @@ class Mechanism:
         new = np.broadcast_arrays(first, turned * flat + tilted * normal, turned * normal - tilted * flat)
         return origin + _column(hinge.x) * x + _column(hinge.y) * y, np.stack(new, axis=-2)
 
-    def reference_in_space(self, name: str) -> Vector:
+    def reference_in_space(self, name: str) -> Array:
         """Reference position of a point in the frame of the base plane, shape (..., 3). [in]"""
         if name not in self._places:
             point = self.point(name)
@@ -267,7 +265,7 @@ class Mechanism:
         return base[0] * arm[1] - base[1] * arm[0]
 
 
-def _column(value: Any) -> Vector:
+def _column(value: Any) -> Array:
     return np.asarray(value)[..., None]
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis import Candidate, Diagnosis
 from mlg_troubleshoot.diagnosis.table import ALONG
 from mlg_troubleshoot.reporting.diagnosis_lines import column_words
@@ -15,7 +16,6 @@ from mlg_troubleshoot.reporting.figures import ACCENT, INK, PAPER, SOFT, Axis, C
 from mlg_troubleshoot.reporting.formats import short
 from mlg_troubleshoot.units import LengthUnit
 
-Array = NDArray[np.float64]
 Texts = NDArray[np.str_]
 
 # Width and height of one plot of two side by side. [canvas units]
@@ -78,7 +78,7 @@ class Against:
     label: str
     values: Array | None = None
     groups: Texts | None = None
-    marked: NDArray[np.bool_] | None = None
+    marked: Mask | None = None
     marked_label: str = ""
 
 
@@ -126,7 +126,7 @@ def _axis_label(name: str) -> str:
     return column_words(name) + (f", {unit}" if unit else "")
 
 
-def split_by(residuals: Residuals, name: str, other: Against) -> tuple[NDArray[np.bool_], str, str] | None:
+def split_by(residuals: Residuals, name: str, other: Against) -> tuple[Mask, str, str] | None:
     """Split the rows by a column, so that what moves with two columns together can be seen."""
     column = against_column(residuals, name)
     if column.values is not None:
@@ -174,7 +174,7 @@ def residual_plot(
     title: str,
     *,
     after: bool = False,
-    only: NDArray[np.bool_] | None = None,
+    only: Mask | None = None,
 ) -> Markup:
     """Draw residuals against a column, with the mean of each stretch or group and twice its standard error."""
     y = residuals.drawn(residuals.after_in if after else residuals.before_in)

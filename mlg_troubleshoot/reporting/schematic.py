@@ -10,8 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot, needs
@@ -48,7 +48,6 @@ _TURNS = np.arange(24) * np.pi / 12 + 1e-6
 _COSINES, _SINES = np.cos(_TURNS), np.sin(_TURNS)
 _RINGS = np.array([0.0, 5.0, 10.0, 16.0, 24.0, 34.0, 46.0])
 
-Array = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 Segment = tuple[Place, Place]
 _At = Callable[[str], Place]

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.figures import INK, PALE, RULE, SOFT, Axis, Bar, Canvas, Plot, Series, Style, draw_bar
 from mlg_troubleshoot.reporting.formats import Lengths, number
 
-Array = NDArray[np.float64]
 _POINTS = 81
 _BAR_HEIGHT = 9.0
 _GAP = 7.0

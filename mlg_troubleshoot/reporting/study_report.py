@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import study_figures as drawn
 from mlg_troubleshoot.reporting.common import head
@@ -26,7 +26,6 @@ from mlg_troubleshoot.studies.statements import Outcome
 from mlg_troubleshoot.studies.study import Directions
 from mlg_troubleshoot.units import LengthUnit
 
-Array = NDArray[np.float64]
 # A reason that explains less than a third of an excess is not its reason.
 _CLEARLY = 3.0
 _DIRECTIONS = {

@@ -17,13 +17,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, frozen
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot, Step
 
-Array = NDArray[np.float64]
 STROKES = 2001
 _STEP_IN = 1e-5
 
@@ -97,21 +96,12 @@ def amplification(gear: Gear, model: LinkageModel | None = None, n_strokes: int 
     return Amplification(
         numbers,
         chain.stroke,
-        _frozen(np.array(stage)),
-        _frozen(np.array(onward)),
-        _frozen(np.array(of_maxima)),
+        frozen(stage),
+        frozen(onward),
+        frozen(of_maxima),
         abs(linkage.rate) * chain.output_factor(),
-        _frozen(linkage.plunger_amplification()),
+        frozen(linkage.plunger_amplification()),
     )
-
-
-def max_amplification_index(gear: Gear, model: LinkageModel | None = None) -> Array:
-    """Largest stage-wise amplification index of each joint over the release (section 4.3).
-
-    model: another linkage of the same gear, else the reference.
-    Returns, shape (n_joints,): indices: 0.84 and 1.488 for joints 1 and 2 of the shipped gear. [1]
-    """
-    return amplification(gear, model).max_stage
 
 
 def csc(first: Array, second: Array) -> Array:
@@ -129,7 +119,7 @@ class _Chain:
         self.mechanism: Mechanism = model.mechanism
         self.points = points
         self.numbers = {point: number for number, point in points.items()}
-        self.stroke = _frozen(np.linspace(*model.stroke, n_strokes))
+        self.stroke = frozen(np.linspace(*model.stroke, n_strokes))
         flat = model.kernel.positions(self.stroke, model.kernel.no_clearance())
         self.place: dict[str, Array] = {}
         for point in self.mechanism.points:
@@ -278,9 +268,3 @@ def _product(factors: Iterable[Array]) -> Array:
 
 def _unit(vectors: Array) -> Array:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
-
-
-def _frozen(array: Array) -> Array:
-    array = np.ascontiguousarray(array)
-    array.flags.writeable = False
-    return array

@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.gear.model import Calibration, LinkageModel
 from mlg_troubleshoot.geometry.kernel import numba_is_installed
@@ -30,7 +30,6 @@ from mlg_troubleshoot.studies.displacement import HeldDirections
 from mlg_troubleshoot.studies.indices import failed_note
 from mlg_troubleshoot.studies.inputs import Inputs
 
-Array = NDArray[np.float64]
 LEVELS_PER_BLOCK = 50
 Sizes = tuple[int, int, int]
 
@@ -180,7 +179,7 @@ def _built(study: BlockStudy) -> tuple[HeldDirections, Inputs]:
 
 
 @lru_cache(maxsize=2)
-def _levels(study: BlockStudy, iteration: int) -> NDArray[np.int64]:
+def _levels(study: BlockStudy, iteration: int) -> Wholes:
     stream = np.random.SeedSequence(study.seed, spawn_key=(iteration,))
     return replicated_levels(study.n, study.n1, study.n2, np.random.default_rng(stream))
 

@@ -14,13 +14,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 from mlg_troubleshoot.geometry.intervals import Box, Range, cosine_range
 
-Array = NDArray[np.float64]
 _STROKES = 64
 _BATCH = 64
 _MOST_BOXES = 4000

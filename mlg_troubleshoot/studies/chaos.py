@@ -13,12 +13,10 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.studies.displacement import Response
 from mlg_troubleshoot.studies.indices import Indices, failed_note, without_numbers
-
-Array = NDArray[np.float64]
 
 _HELD_OUT = 48
 _CORNERS = 16
@@ -38,7 +36,7 @@ class ChaosFit:
     corner_miss: largest residual at corners of the range over the standard deviation. [1]
     """
 
-    exponents: NDArray[np.int64]
+    exponents: Wholes
     coefficients: Array
     residual: float
     corner_miss: float
@@ -155,7 +153,7 @@ def _indices(fit: ChaosFit, design: str, seed: int, used: int, mean: float) -> I
 
 
 @lru_cache(maxsize=64)
-def total_degree(n: int, degree: int) -> NDArray[np.int64]:
+def total_degree(n: int, degree: int) -> Wholes:
     """Exponents of all polynomials up to a total degree, shape (n_terms, n), the constant first. [1]"""
     rows = []
     for total in range(degree + 1):
@@ -169,7 +167,7 @@ def total_degree(n: int, degree: int) -> NDArray[np.int64]:
     return exponents
 
 
-def legendre_terms(unit: Array, exponents: NDArray[np.int64]) -> Array:
+def legendre_terms(unit: Array, exponents: Wholes) -> Array:
     """Orthonormal Legendre polynomials at points of the unit cube, shape (n_points, n_terms). [1]"""
     x = 2.0 * unit - 1.0
     degree = int(exponents.max(initial=0))
@@ -190,7 +188,7 @@ def legendre_terms(unit: Array, exponents: NDArray[np.int64]) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _factors(raw: bytes, shape: tuple[int, int]) -> list[NDArray[np.int64]]:
+def _factors(raw: bytes, shape: tuple[int, int]) -> list[Wholes]:
     """Rows of the table of one-variable polynomials that each term multiplies; absent ones are constant."""
     exponents = np.frombuffer(raw, dtype=np.int64).reshape(shape)
     n = shape[1]

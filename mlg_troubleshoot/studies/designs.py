@@ -12,11 +12,9 @@ from itertools import product
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.errors import UsageError
-
-Array = NDArray[np.float64]
 
 # Resolution V fractions of the two-level factorial: the columns whose product each further column is. No
 # word of their defining relations is shorter than five letters.
@@ -38,7 +36,7 @@ class Replicated:
     """
 
     points: Array
-    places: NDArray[np.int64]
+    places: Wholes
 
 
 def central_composite(n: int, count: int | None = None) -> Array:
@@ -92,7 +90,7 @@ def _corners(n: int) -> Array:
     return np.asarray((np.concatenate(columns, axis=1) + 1) / 2.0)
 
 
-def replicated_levels(n: int, n1: int, n2: int, rng: Generator) -> NDArray[np.int64]:
+def replicated_levels(n: int, n1: int, n2: int, rng: Generator) -> Wholes:
     """Levels of a modified Latin hypercube: every level once in every replicate.
 
     Returns, shape (n1, n2, n): levels from 0. [1]
@@ -101,7 +99,7 @@ def replicated_levels(n: int, n1: int, n2: int, rng: Generator) -> NDArray[np.in
     return np.ascontiguousarray(rng.permuted(levels, axis=2).transpose(0, 2, 1))
 
 
-def middle_of_level(levels: NDArray[np.int64], n2: int) -> Array:
+def middle_of_level(levels: Wholes, n2: int) -> Array:
     """Point of the unit interval in the middle of a level. [1]"""
     return np.asarray((levels + 0.5) / n2)
 

@@ -6,12 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.model import LinkageModel
 
-Array = NDArray[np.float64]
 Response = Callable[[Array], Array]
 
 

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.errors import InconclusiveDataError
 
-Array = NDArray[np.float64]
 _FEWEST = 20
 
 
@@ -29,8 +28,8 @@ class GivenDataIndices:
 
     first_order: Array
     interval: Array
-    rows: NDArray[np.int64]
-    classes: NDArray[np.int64]
+    rows: Wholes
+    classes: Wholes
 
 
 def given_data_indices(

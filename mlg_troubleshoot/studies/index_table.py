@@ -9,15 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.datafile import MOST_ENTRIES, DataTable, read_json
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
 from mlg_troubleshoot.outputs import write_text
 
-Array = NDArray[np.float64]
 SCHEMA_VERSION = 1
 # A sampled index may lie a little outside 0 to 1, its interval further.
 _INDEX = {"least": -2.0, "most": 3.0}
@@ -104,7 +103,7 @@ class IndexTable:
         }
 
 
-def ranks(first_order: Array) -> NDArray[np.int64]:
+def ranks(first_order: Array) -> Wholes:
     """Place of each joint by first-order index, 1 the largest; joints closer than 1e-4 share a place."""
     above = first_order[None, :] > first_order[:, None] + _SAME_RANK
     return np.asarray(1 + above.sum(axis=1), dtype=np.int64)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mlg_troubleshoot.arrays import Array
+
 Estimate = tuple[Array, Array]
 
 

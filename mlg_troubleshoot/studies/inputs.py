@@ -6,13 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, frozen
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 from mlg_troubleshoot.studies.displacement import Response
-
-Array = NDArray[np.float64]
 
 
 def _half_normal(u: Array) -> Array:
@@ -53,8 +51,7 @@ class Inputs:
         limits = np.array(self.limits_in, float)
         if limits.ndim != 1 or not np.all(np.isfinite(limits) & (limits > 0.0)):
             raise UsageError(f"limits {limits.tolist()} in", "Every limit is a positive length.")
-        limits.flags.writeable = False
-        object.__setattr__(self, "limits_in", limits)
+        object.__setattr__(self, "limits_in", frozen(limits))
 
     def at(self, unit: Array) -> Array:
         """Clearances at probabilities, points of the unit cube, shape (n, n_joints). [in]"""

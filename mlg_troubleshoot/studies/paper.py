@@ -11,13 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.studies.designs import central_composite, first_order_design
 from mlg_troubleshoot.studies.displacement import Response
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +121,7 @@ def replicated_first_order(
     )
 
 
-def _group_shares(values: Array, places: NDArray[np.int64]) -> Array:
+def _group_shares(values: Array, places: Wholes) -> Array:
     """Variance of group means over the whole variance, for every variable."""
     n1, rows, n = places.shape
     centred = values - values.mean()

@@ -14,8 +14,8 @@ from time import monotonic
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.errors import InconclusiveDataError, MechanismError, UsageError
 from mlg_troubleshoot.gear.design import DesignSpace
 from mlg_troubleshoot.gear.gear import Gear, Linkage
@@ -23,7 +23,6 @@ from mlg_troubleshoot.geometry.mechanism import Dyad
 from mlg_troubleshoot.studies.targets import Target
 from mlg_troubleshoot.studies.verification import Facts
 
-Array = NDArray[np.float64]
 Told = Callable[[str, int, int | None], None]
 
 _FAR = 50.0

@@ -11,13 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.studies.compat import seeded
 from mlg_troubleshoot.studies.displacement import Response
 from mlg_troubleshoot.studies.indices import Indices, failed_note, student_half, without_numbers
 
-Array = NDArray[np.float64]
 SCRAMBLES = 8
 _ROWS = 1 << 14
 _FIRST_POWER = 8

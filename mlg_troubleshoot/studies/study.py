@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
@@ -27,7 +27,6 @@ from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
 if TYPE_CHECKING:
     from mlg_troubleshoot.studies.paper import PaperDesign, ReplicatedIndices
 
-Array = NDArray[np.float64]
 Progress = Callable[[str, int, int | None], None]
 Stages = Callable[[str], Callable[[int, int | None], None]]
 

@@ -9,12 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.studies.displacement import Response
 
-Array = NDArray[np.float64]
 _MOST_POINTS = 2_000_000
 _ROWS = 1 << 16
 

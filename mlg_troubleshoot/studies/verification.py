@@ -8,8 +8,8 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
@@ -19,7 +19,6 @@ from mlg_troubleshoot.studies.displacement import HeldDirections, worst_directio
 from mlg_troubleshoot.studies.targets import Target, load_targets, targets_file
 from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
 
-Array = NDArray[np.float64]
 _CURVE = 401
 _QUICK_CURVE = 61
 _CORNERS = (np.array([0.0, 1.0]), np.array([0.5, 0.5]))

@@ -12,14 +12,12 @@ from typing import Any
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 from mlg_troubleshoot.studies.certified import CertifiedBound, certified_bound
 from mlg_troubleshoot.studies.compat import seeded
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

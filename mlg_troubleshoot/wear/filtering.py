@@ -17,9 +17,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mlg_troubleshoot.wear.paths import Array, Steps
+from mlg_troubleshoot.arrays import Array, Mask, Places
+from mlg_troubleshoot.wear.paths import Steps
 
 _LOG_2PI = float(np.log(2.0 * np.pi))
 # A level is never known better than this share of the whole rise. [1]
@@ -30,7 +30,7 @@ _LEAST_VARIANCE = 1e-12
 class Draws:
     """Parameters, each of shape (draws, 1), in the units of ``Scale``; ``gamma`` says that increments are gamma."""
 
-    gamma: NDArray[np.bool_]
+    gamma: Mask
     start: Array
     start_sd: Array
     drift: Array
@@ -41,7 +41,7 @@ class Draws:
     power: Array
     kept: Array
 
-    def take(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> Draws:
+    def take(self, chosen: Places | Mask) -> Draws:
         """Return some of the draws."""
         return Draws(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
 

@@ -6,11 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.wear.filtering import Draws, State, clock, follow
-from mlg_troubleshoot.wear.paths import Array, Scale, WearPath, lay_out, scale_of
+from mlg_troubleshoot.wear.paths import Scale, WearPath, lay_out, scale_of
 from mlg_troubleshoot.wear.posterior import members, posterior
 
 # Posterior draws that every forecast is averaged over. [1]
@@ -61,21 +62,6 @@ class Samples:
         share = at - np.floor(at)
         with np.errstate(invalid="ignore"):
             return np.where((share == 0.0) | (low == high), low, low + share * (high - low))
-
-    def chance_up_to(self, value: ArrayLike) -> Array:
-        """Return the probability of the value or less.
-
-        Parameters
-        ----------
-        value : float or array_like of shape (...)
-            Value to stay at or below. [as asked]
-
-        Returns
-        -------
-        ndarray, shape (...)
-            Share of the samples. [1]
-        """
-        return np.asarray(np.mean(self.samples <= np.asarray(value)[..., None], axis=-1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -320,7 +306,7 @@ def _last_axis(found: Array) -> Array:
     return np.moveaxis(found, 1, 0).reshape(found.shape[1], -1)
 
 
-def _chunks(units: int) -> Iterator[tuple[NDArray[np.intp], int]]:
+def _chunks(units: int) -> Iterator[tuple[Places, int]]:
     size, count = (_MANY, _PATHS) if units <= _MANY else (250, _PATHS_OF_MANY)
     for first in range(0, units, size):
         yield np.arange(first, min(first + size, units)), count

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mlg_troubleshoot.arrays import Array, Mask, frozen
 from mlg_troubleshoot.errors import UsageError
 
-Array = NDArray[np.float64]
 # Decimals beyond which a difference between two readings is taken for rounding in the computer. [1]
 _DECIMALS = 9
 # Readings lie on a grid if it has at least this many readings to a step of their range, and not by chance. [1]
@@ -56,10 +56,8 @@ class WearPath:
             )
         if self.reading_u is not None and not (np.isfinite(self.reading_u) and self.reading_u >= 0.0):
             raise UsageError(f"path of {self.unit}: reading_u is {self.reading_u:g}", "Give zero or more, or None.")
-        for numbers in (usage, value):
-            numbers.flags.writeable = False
-        object.__setattr__(self, "usage", usage)
-        object.__setattr__(self, "value", value)
+        object.__setattr__(self, "usage", frozen(usage))
+        object.__setattr__(self, "value", frozen(value))
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +77,8 @@ class Steps:
     ``begins`` marks the first step of a path, ``seen`` a reading; ``known_r2`` is NaN where it is to be estimated.
     """
 
-    begins: NDArray[np.bool_]
-    seen: NDArray[np.bool_]
+    begins: Mask
+    seen: Mask
     usage: Array
     value: Array
     known_r2: Array

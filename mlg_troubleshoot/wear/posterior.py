@@ -14,8 +14,9 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.special import gammaln, logsumexp
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.wear.filtering import Draws, follow
-from mlg_troubleshoot.wear.paths import Array, Scale, Steps
+from mlg_troubleshoot.wear.paths import Scale, Steps
 
 # Mean and standard deviation of the normal prior of each parameter, logarithms where it is a scale, in units of the
 # whole usage and the whole rise that was read: weak on purpose, and the same for all kinds so that evidence compares.

@@ -13,8 +13,8 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.order import WORST_FIRST
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
     from mlg_troubleshoot.reporting import WrittenReport
 
-Array = NDArray[np.float64]
 GearKey = tuple[str, str]
 # Chance of being over a limit or outside the margin at which the next inspection is due, and the landings beyond
 # which nothing is forecast: assumed, no source states them. [1, landings]
@@ -77,8 +76,7 @@ class Seen:
     @cached_property
     def result(self) -> Mapping[str, Any]:
         """What the check said, in the form of its JSON; empty if it was never judged."""
-        found: Mapping[str, Any] = {} if self.assessed is None else self.assessed.body["result"]
-        return found
+        return {} if self.assessed is None else self.assessed.body["result"]
 
 
 @dataclass(frozen=True, slots=True)

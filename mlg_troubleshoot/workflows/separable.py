@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate
 from mlg_troubleshoot.diagnosis.causes.together import JointFactors
@@ -26,8 +26,6 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
 from mlg_troubleshoot.records.columns import Kind
 from mlg_troubleshoot.records.headers import parse_canonical
-
-Array = NDArray[np.float64]
 
 # The planned fleet: two years of twenty aircraft (assumed), and what one row scatters, tail by tail [in]
 # (docs/explanation/diagnosis.md: a gauge that repeats to 1.5 thou, and what clearances and pins add).
