@@ -20,7 +20,6 @@ from mlg_troubleshoot.decision.prediction import model_uncertainty
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.studies.groups import link_groups
 
 _QUANTILES = (0.05, 0.5, 0.95)
 # Below this chance no joint is named as likely worn. [1]
@@ -73,7 +72,7 @@ def _draw_clearances(one: Cases, rng: np.random.Generator, n: int, prior: Prior)
     gear, found, limits = one.gear, one.clearance_in[0], one.gear.limits_in
     drawn = np.empty((n, len(found)))
     log_weight = np.zeros(n)
-    for group in link_groups(gear):
+    for group in gear.link_groups:
         for number in group:
             j = gear.joint_numbers.index(number)
             if np.isfinite(found[j]):
@@ -104,7 +103,7 @@ def _summary(gear: Gear, drawn: Array, worn: Mask, weight: Array, not_clearance:
     index = {number: j for j, number in enumerate(gear.joint_numbers)}
     chances = [
         GroupChance(group, min(float(weight[worn[:, [index[n] for n in group]].any(axis=1)].sum()), 1.0))
-        for group in link_groups(gear)
+        for group in gear.link_groups
     ]
     chances.sort(key=lambda chance: -chance.probability)
     intervals = []

@@ -175,14 +175,15 @@ class Gear:
         """Which joints no gear can be cleared without."""
         return np.array([joint.critical for joint in self.joints])
 
+    @property
+    def link_groups(self) -> tuple[tuple[int, ...], ...]:
+        """Joints at both ends of one link together, which the plunger cannot tell apart, the others one by one."""
+        return self.reference.mechanism.alike
+
     @cached_property
     def alike(self) -> dict[int, tuple[int, ...]]:
         """Joints that act alike with each joint: the other end of the same link, by structure."""
-        groups: dict[int, tuple[int, ...]] = dict.fromkeys(self.joint_numbers, ())
-        for step in self.reference.mechanism.steps:
-            for number in step.virtual_links:
-                groups[number] = tuple(other for other in step.virtual_links if other != number)
-        return groups
+        return {n: tuple(other for other in group if other != n) for group in self.link_groups for n in group}
 
     def joint(self, number: int) -> JointSpec:
         """Return the joint of that number; `KeyError` if the gear has none."""

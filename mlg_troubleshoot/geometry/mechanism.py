@@ -212,6 +212,12 @@ class Mechanism:
     def step(self, joint: str) -> Step | None:
         return next((step for step in self.steps if step.joint == joint), None)
 
+    @property
+    def alike(self) -> tuple[tuple[int, ...], ...]:
+        """Virtual links that displace the same link, together, and the others one by one, in order."""
+        ends = {number: tuple(sorted(step.virtual_links)) for step in self.steps for number in step.virtual_links}
+        return tuple(dict.fromkeys(ends.get(number, (number,)) for number in self.virtual_links))
+
     def frame(self, plane: str) -> tuple[Array, Array]:
         """Origin and axes of a plane in space.
 
@@ -270,15 +276,15 @@ def _column(value: Any) -> Array:
 
 
 def needs(step: Step) -> tuple[str, ...]:
-    """The points that a step locates its joint from."""
+    """The points that a step locates its joint from, the one that drives it first."""
     match step:
         case Crank():
             return (step.pivot,)
         case Dyad():
             return (step.upstream, step.downstream)
         case Lever():
-            return (step.pivot, step.follows)
+            return (step.follows, step.pivot)
         case Slot():
-            return (step.pivot, step.pin)
+            return (step.pin, step.pivot)
         case Slider():
             return (step.upstream,)

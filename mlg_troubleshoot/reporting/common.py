@@ -8,7 +8,6 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.sources import SourceKind
 from mlg_troubleshoot.reporting.formats import Lengths, digest
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
-from mlg_troubleshoot.studies.groups import link_groups
 
 Facts = list[tuple[str, str]]
 DISCLAIMER = (
@@ -29,7 +28,7 @@ def head(title: str, footer: str, gear: Gear, provenance: ReportProvenance, leng
         "disclaimer": DISCLAIMER,
         "source_counts": [(sum(n.kind is kind for n in gear.numbers), kind.value) for kind in SourceKind],
         "limits_of": sorted({(j.limit.value, j.limit.kind, j.limit.source) for j in gear.joints}),
-        "alike": [" = ".join(map("#{}".format, pair)) for pair in link_groups(gear) if len(pair) > 1],
+        "alike": [" = ".join(map("#{}".format, pair)) for pair in gear.link_groups if len(pair) > 1],
         "made": provenance,
         "made_on": provenance.created.date().isoformat(),
         "lengths": lengths,

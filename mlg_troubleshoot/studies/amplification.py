@@ -13,7 +13,6 @@ of the angle between link and axis.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +20,7 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, frozen
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
-from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot, Step
+from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot, Step, needs
 
 STROKES = 2001
 _STEP_IN = 1e-5
@@ -86,15 +85,14 @@ def amplification(gear: Gear, model: LinkageModel | None = None, n_strokes: int 
     """
     linkage = gear.model if model is None else model
     chain = _Chain(linkage, {joint.number: joint.point for joint in gear.joints}, n_strokes)
-    numbers = gear.joint_numbers
     stage, onward, of_maxima = [], [], []
-    for number in numbers:
+    for number in gear.joint_numbers:
         own, later = chain.stage_and_later(number)
         stage.append(own)
-        onward.append(np.prod(later, axis=0) if later else np.ones(n_strokes))
+        onward.append(np.prod([np.ones(n_strokes), *later], axis=0))
         of_maxima.append(float(np.prod([factor.max() for factor in later])))
     return Amplification(
-        numbers,
+        gear.joint_numbers,
         chain.stroke,
         frozen(stage),
         frozen(onward),
@@ -130,14 +128,14 @@ class _Chain:
 
     def stage_and_later(self, number: int) -> tuple[Array, list[Array]]:
         """Index of the stage of a joint, and the index of every later stage, each over the release."""
-        first = min(self._ends_of_link(number))
+        first = next(group[0] for group in self.mechanism.alike if number in group)
         entry = self._entry(first)
         path = self._path(entry)
         end = next((i for i, step in enumerate(path) if self.numbers.get(step.joint, 0) > first), len(path) - 1)
         if self.mechanism.point(self.points[first]).fixed:
             own = self._derivative(first, path[end].joint)
         else:
-            own = self._current(entry) * _product(self._previous(step) for step in path[1 : end + 1])
+            own = self._current(entry) * np.prod([self._previous(step) for step in path[1 : end + 1]], axis=0)
         return own, [self._previous(step) for step in path[end + 1 :]]
 
     def output_factor(self) -> float:
@@ -147,19 +145,13 @@ class _Chain:
         arm = self.place[output.joint][-1] - self.place[output.pivot][-1]
         return float(1.0 / np.linalg.norm(arm))
 
-    def _ends_of_link(self, number: int) -> tuple[int, ...]:
-        for step in self.mechanism.steps:
-            if number in step.virtual_links:
-                return step.virtual_links
-        return (number,)
-
     def _entry(self, number: int) -> Step:
-        for step in self.mechanism.steps:
-            pivot = step.downstream if isinstance(step, Dyad) else getattr(step, "pivot", "")
-            point = self.mechanism.point(pivot) if pivot else None
-            if number in step.virtual_links or (point is not None and point.virtual_link == number):
-                return step
-        raise KeyError(f"no step has the virtual link {number}")
+        """Return the step whose link or pivot the clearance displaces."""
+        return next(
+            step
+            for step in self.mechanism.steps
+            if number in (*step.virtual_links, *(self.mechanism.point(name).virtual_link for name in needs(step)))
+        )
 
     def _path(self, entry: Step) -> list[Step]:
         """Return the steps from one step to the output, each driven by the one before."""
@@ -171,22 +163,18 @@ class _Chain:
             if step is None:
                 return path
             back.append(step)
-            joint = _driver(step)
+            joint = needs(step)[0]
         return path + back[::-1]
 
     def _tangent(self, step: Step) -> Array:
         """Unit vector along which a step's joint moves when only the mechanism's input changes."""
+        axes, place = self._axes(step), self.place[step.joint]
         if isinstance(step, Slider):
-            _, axes = self._axes(step)
-            return np.broadcast_to(
-                np.cos(step.axis) * axes[0] + np.sin(step.axis) * axes[1], self.place[step.joint].shape
-            )
-        pivot = step.downstream if isinstance(step, Dyad) else step.pivot
-        _, axes = self._axes(step)
-        return _unit(np.cross(axes[2], self.place[step.joint] - self.place[pivot]))
+            return np.broadcast_to(np.cos(step.axis) * axes[0] + np.sin(step.axis) * axes[1], place.shape)
+        return _unit(np.cross(axes[2], place - self.place[needs(step)[-1]]))
 
-    def _axes(self, step: Step) -> tuple[Array, Array]:
-        return self.mechanism.frame(self.mechanism.point(step.joint).plane)
+    def _axes(self, step: Step) -> Array:
+        return self.mechanism.frame(self.mechanism.point(step.joint).plane)[1]
 
     def _link(self, step: Dyad | Slider) -> Array:
         return self.place[step.joint] - self.place[step.upstream]
@@ -195,7 +183,7 @@ class _Chain:
         """Current clearance: csc θ; on a slot's pin, which is a rigid body, L2/L1 (Eq. 10 with sin φ = 1)."""
         match step:
             case Dyad() | Slider():
-                _, axes = self._axes(step)
+                axes = self._axes(step)
                 in_plane = self._link(step) @ axes[:2].T
                 tangent = self._tangent(step) @ axes[:2].T
                 # The joint moves across its second link: the sine of θ is the cosine between link and path.
@@ -245,25 +233,6 @@ class _Chain:
                 ends.append(np.stack([x, y], axis=-1))
             moved.append((ends[0] - ends[1]) / (2 * _STEP_IN))
         return np.linalg.svd(np.stack(moved, axis=-1), compute_uv=False)[..., 0]
-
-
-def _driver(step: Step) -> str:
-    match step:
-        case Dyad() | Slider():
-            return step.upstream
-        case Slot():
-            return step.pin
-        case Lever():
-            return step.follows
-        case Crank():
-            return step.pivot
-
-
-def _product(factors: Iterable[Array]) -> Array:
-    result = np.ones(1)
-    for factor in factors:
-        result = result * factor
-    return result
 
 
 def _unit(vectors: Array) -> Array:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.gear.gear import Gear
 
 Estimate = tuple[Array, Array]
 
@@ -47,6 +49,29 @@ class Indices:
         """Largest half width of all intervals; NaN if there are none. [1]"""
         widths = [np.diff(i, axis=1) for i in (self.first_order_interval, self.total_order_interval)]
         return float(np.max(np.abs(np.concatenate(widths)))) / 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class GroupIndices:
+    """Indices of both ends of one link taken as one joint.
+
+    closed: what the group explains alone, interactions within it included. [1]
+    total: what the group takes part in. [1]
+    """
+
+    joints: tuple[int, ...]
+    closed: float
+    total: float
+
+
+def group_indices(gear: Gear, closed: Callable[[tuple[int, ...]], float]) -> tuple[GroupIndices, ...]:
+    """Indices of every link, from the share of the variance that joints at some places explain alone."""
+    places = {number: i for i, number in enumerate(gear.joint_numbers)}
+    found = []
+    for group in gear.link_groups:
+        others = tuple(i for number, i in places.items() if number not in group)
+        found.append(GroupIndices(group, closed(tuple(places[n] for n in group)), 1.0 - closed(others)))
+    return tuple(found)
 
 
 def _interval(values: Array, half: Array) -> Array:

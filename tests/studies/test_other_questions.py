@@ -10,7 +10,7 @@ from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.studies.displacement import HeldDirections
 from mlg_troubleshoot.studies.given_data import given_data_indices
-from mlg_troubleshoot.studies.groups import group_indices, link_groups
+from mlg_troubleshoot.studies.indices import group_indices
 from mlg_troubleshoot.studies.inputs import DISTRIBUTIONS, Inputs, beyond_margin
 from mlg_troubleshoot.studies.statements import Outcome, Statement, check_statements
 from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
@@ -40,11 +40,11 @@ def test_a_gear_that_does_not_close_counts_as_beyond_the_margin() -> None:
 
 
 def test_the_groups_are_the_links_of_the_linkage(gear: Gear) -> None:
-    assert link_groups(gear) == ((1,), (2,), (3, 5), (4,), (6, 7), (8,), (9, 10))
+    assert gear.link_groups == ((1,), (2,), (3, 5), (4,), (6, 7), (8,), (9, 10))
 
 
 def test_a_group_of_both_ends_of_a_link_has_the_sum_of_their_shares(gear: Gear, exact: TensorIndices) -> None:
-    found = {group.joints: group for group in group_indices(gear, exact, link_groups(gear))}
+    found = {group.joints: group for group in group_indices(gear, exact.closed)}
     assert found[3, 5].closed == pytest.approx(exact.first_order[2] + exact.first_order[4], abs=1e-4)
     assert found[3, 5].total >= found[3, 5].closed
 
