@@ -155,14 +155,8 @@ def _indices(fit: ChaosFit, design: str, seed: int, used: int, mean: float) -> I
 @lru_cache(maxsize=64)
 def total_degree(n: int, degree: int) -> Wholes:
     """Exponents of all polynomials up to a total degree, shape (n_terms, n), the constant first. [1]"""
-    rows = []
-    for total in range(degree + 1):
-        for chosen in combinations_with_replacement(range(n), total):
-            row = [0] * n
-            for place in chosen:
-                row[place] += 1
-            rows.append(row)
-    exponents = np.array(rows, dtype=np.int64)
+    chosen = (c for total in range(degree + 1) for c in combinations_with_replacement(range(n), total))
+    exponents = np.array([np.bincount(np.array(c, int), minlength=n) for c in chosen], dtype=np.int64)
     exponents.flags.writeable = False
     return exponents
 
@@ -191,10 +185,6 @@ def legendre_terms(unit: Array, exponents: Wholes) -> Array:
 def _factors(raw: bytes, shape: tuple[int, int]) -> list[Wholes]:
     """Rows of the table of one-variable polynomials that each term multiplies; absent ones are constant."""
     exponents = np.frombuffer(raw, dtype=np.int64).reshape(shape)
-    n = shape[1]
     most = max(1, int((exponents > 0).sum(axis=1).max(initial=0)))
-    places = np.zeros((most, shape[0]), dtype=np.int64)
-    for term, row in enumerate(exponents):
-        for slot, variable in enumerate(np.flatnonzero(row)):
-            places[slot, term] = row[variable] * n + variable
-    return list(places)
+    present = np.argsort(exponents == 0, axis=1, kind="stable")[:, :most]
+    return list((np.take_along_axis(exponents, present, axis=1) * shape[1] + present).T)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.random import Generator
 
 from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.studies.chaos import ChaosFit, chaos_indices
 from mlg_troubleshoot.studies.compat import seeded
 from mlg_troubleshoot.studies.displacement import Response
 from mlg_troubleshoot.studies.indices import Indices, failed_note, student_half, without_numbers
@@ -142,11 +143,10 @@ def fast_indices(
     accuracy: float = 1e-3,
     most: int = 1 << 24,
     progress: Callable[[int, float], None] | None = None,
-) -> Indices:
-    """Compute indices by polynomial chaos, or by sampling where the response is not smooth."""
-    from mlg_troubleshoot.studies.chaos import chaos_indices
-
+) -> tuple[Indices, ChaosFit | None]:
+    """Compute indices by polynomial chaos, or by sampling where the response is not smooth: there is then no fit."""
     found, fit = chaos_indices(response, n, rng, seed, accuracy, most=min(2048, most))
-    if fit is not None or found.failed:
-        return found
-    return saltelli_indices(response, n, rng, seed, accuracy, most, None, progress, found.note, used=found.evaluations)
+    if fit is None and not found.failed:
+        spent = found.note, found.evaluations
+        found = saltelli_indices(response, n, rng, seed, accuracy, most, None, progress, *spent)
+    return found, fit

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -15,11 +15,9 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.studies.amplification import Amplification, amplification
-from mlg_troubleshoot.studies.chaos import chaos_indices
 from mlg_troubleshoot.studies.displacement import HeldDirections, Response, worst_directions, worst_sense
-from mlg_troubleshoot.studies.groups import GroupIndices, group_indices, link_groups
 from mlg_troubleshoot.studies.index_table import IndexTable, JointIndices, rank_ranges, ranks
-from mlg_troubleshoot.studies.indices import Indices, student_half
+from mlg_troubleshoot.studies.indices import GroupIndices, Indices, group_indices, student_half
 from mlg_troubleshoot.studies.inputs import Inputs, beyond_margin, joint_groups, with_random_directions
 from mlg_troubleshoot.studies.saltelli import fast_indices, saltelli_indices
 from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
@@ -132,7 +130,7 @@ class StudyResult:
 
 @dataclass(slots=True)
 class _Run:
-    """One linkage's response, and what the design found on it."""
+    """What the design found on one linkage."""
 
     indices: Indices
     plain: Array | None = None
@@ -144,32 +142,33 @@ def run_study(gear: Gear, options: StudyOptions, progress: Progress | None = Non
     """Run a study of a gear: its reference by the chosen design, its ensemble by the fast route."""
     if not options.accuracy > 0.0:
         raise UsageError(f"accuracy {options.accuracy}", "Give a positive number, for example 0.001.")
-    inputs = Inputs(gear.limits_in if options.limits_in is None else options.limits_in, options.distribution)
+    inputs = _inputs(gear, options)
     if len(inputs.limits_in) != len(gear.joints):
         raise UsageError(f"{len(inputs.limits_in)} limits for {len(gear.joints)} joints", "Give one for each joint.")
 
     def told(name: str) -> Callable[[int, int | None], None]:
         return lambda done, total: None if progress is None else progress(name, done, total)
 
-    run = _reference(gear, inputs, options, told)
-    first, total = [run.indices.first_order], [run.indices.total_order]
-    evaluations, failed = run.indices.evaluations, run.indices.failed
-    advance = told("ensemble")
+    if options.design in (Design.LHS, Design.LHS_CCD, Design.CCD):
+        run = _paper(gear, inputs, options, told)
+    else:
+        run = _on_linkage(gear, inputs, options, 0, told("samples"))
+    found, advance = [run.indices], told("ensemble")
     finished = run.finished and "interrupted" not in run.indices.note
-    for k, model in enumerate(gear.ensemble_models[1:], start=1):
+    for k in range(1, len(gear.ensemble)):
         try:
-            found = _on_linkage(gear, model, inputs, options, k)
+            found.append(_on_linkage(gear, inputs, options, k).indices)
             advance(k, len(gear.ensemble) - 1)
         except KeyboardInterrupt:
             finished = False
             break
-        first.append(found.first_order)
-        total.append(found.total_order)
-        evaluations, failed = evaluations + found.evaluations, failed + found.failed
     growth = amplification(gear)
-    orders = np.array([first, total])
-    table = _table(gear, inputs, options, run.indices, growth, orders, (evaluations, failed))
+    table = _table(gear, inputs, options, found, growth)
     return StudyResult(table, run.indices, run.plain, run.groups, growth, finished)
+
+
+def _inputs(gear: Gear, options: StudyOptions) -> Inputs:
+    return Inputs(gear.limits_in if options.limits_in is None else options.limits_in, options.distribution)
 
 
 def _response(gear: Gear, model: LinkageModel, inputs: Inputs, options: StudyOptions) -> tuple[Response, int]:
@@ -195,68 +194,54 @@ def _held(model: LinkageModel, inputs: Inputs, options: StudyOptions) -> HeldDir
     return worst_sense(model, inputs.limits_in, 1.0 if options.directions is Directions.OVER else -1.0)
 
 
-def _stream(options: StudyOptions, linkage: int) -> np.random.Generator:
-    return np.random.default_rng(np.random.SeedSequence(options.seed, spawn_key=(linkage,)))
-
-
-def _on_linkage(gear: Gear, model: LinkageModel, inputs: Inputs, options: StudyOptions, k: int) -> Indices:
-    cube, n = _response(gear, model, inputs, options)
+def _on_linkage(
+    gear: Gear, inputs: Inputs, options: StudyOptions, k: int, told: Callable[[int, int | None], None] | None = None
+) -> _Run:
+    """Indices of linkage k of the ensemble; of the reference, which is the first, by the design that was asked for."""
+    cube, n = _response(gear, gear.ensemble_models[k], inputs, options)
+    stream = np.random.default_rng(np.random.SeedSequence(options.seed, spawn_key=(k,)))
+    accuracy, most = options.accuracy, options.most
+    advance = None if told is None else (lambda done, _width: told(done, None))
     if options.directions is Directions.RANDOM:
+        if k:
+            accuracy, most = max(accuracy, 3e-3), 1 << 20
         sets = joint_groups(len(inputs.limits_in))
-        return saltelli_indices(cube, n, _stream(options, k), options.seed, max(options.accuracy, 3e-3), 1 << 20, sets)
+        return _Run(saltelli_indices(cube, n, stream, options.seed, accuracy, most, sets, advance))
     if options.design is Design.TENSOR:
-        return _of_tensor(tensor_indices(cube, np.ones(n)), None, options.seed)
-    most = 1 << 18 if options.beyond_margin else options.most
-    return fast_indices(cube, n, _stream(options, k), options.seed, options.accuracy, most)
-
-
-def _reference(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _Run:
-    cube, n = _response(gear, gear.model, inputs, options)
-    if options.design in (Design.LHS, Design.LHS_CCD, Design.CCD):
-        if options.directions is Directions.RANDOM:
-            raise UsageError(
-                f"design {options.design} with random directions", "The paper's designs hold directions; use sampled."
-            )
-        return _paper(gear, cube, inputs, options, told)
-    if options.directions is Directions.RANDOM:
-        sets = joint_groups(len(inputs.limits_in))
-        advance = told("samples")
-        sampling = _stream(options, 0), options.seed, options.accuracy, options.most
-        return _Run(saltelli_indices(cube, n, *sampling, sets, lambda done, _width: advance(done, None)))
-    if options.design is Design.TENSOR:
-        tensor, coarse = tensor_indices(cube, np.ones(n)), tensor_indices(cube, np.ones(n), order=2)
-        groups = group_indices(gear, tensor, link_groups(gear))
-        return _Run(_of_tensor(tensor, coarse, options.seed), groups=groups)
-    advance = told("samples")
-    if options.design is Design.FAST:
-        indices, fit = chaos_indices(cube, n, _stream(options, 0), options.seed, options.accuracy)
-        if fit is not None or indices.failed:
-            return _Run(indices, groups=() if fit is None else group_indices(gear, fit, link_groups(gear)))
-        note, extra = indices.note, indices.evaluations
-    else:
-        note, extra = "", 0
-    more = _stream(options, 0), options.seed, options.accuracy, options.most
-    return _Run(saltelli_indices(cube, n, *more, None, lambda done, _width: advance(done, None), note, used=extra))
+        tensor = tensor_indices(cube, np.ones(n))
+        coarse = None if k else tensor_indices(cube, np.ones(n), order=2)
+        return _Run(_of_tensor(tensor, coarse, options.seed), groups=group_indices(gear, tensor.closed))
+    if options.design is Design.SAMPLED and not k:
+        return _Run(saltelli_indices(cube, n, stream, options.seed, accuracy, most, None, advance))
+    if k and options.beyond_margin:
+        most = 1 << 18
+    indices, fit = fast_indices(cube, n, stream, options.seed, accuracy, most, advance)
+    return _Run(indices, groups=() if fit is None else group_indices(gear, fit.closed))
 
 
 def _of_tensor(tensor: TensorIndices, coarse: TensorIndices | None, seed: int) -> Indices:
-    wide = np.zeros_like(tensor.first_order)
-    first = wide if coarse is None else np.abs(tensor.first_order - coarse.first_order)
-    total = wide if coarse is None else np.abs(tensor.total_order - coarse.total_order)
-    design = f"tensor of {len(tensor.weights)} Gauss points a joint"
-    note = "intervals are the difference to two Gauss points a joint" if coarse is not None else ""
-    evaluations = tensor.evaluations + (0 if coarse is None else coarse.evaluations)
-    estimates = (tensor.first_order, first), (tensor.total_order, total)
-    moments = tensor.mean, tensor.variance
-    return Indices.around(design, seed, *estimates, *moments, evaluations, tensor.failed, note)
+    first, total, evaluations, note = tensor.first_order, tensor.total_order, tensor.evaluations, ""
+    half = np.zeros((2, len(first)))
+    if coarse is not None:
+        half = np.abs([first - coarse.first_order, total - coarse.total_order])
+        evaluations, note = (
+            evaluations + coarse.evaluations,
+            "intervals are the difference to two Gauss points a joint",
+        )
+    design, estimates = f"tensor of {len(tensor.weights)} Gauss points a joint", ((first, half[0]), (total, half[1]))
+    return Indices.around(design, seed, *estimates, tensor.mean, tensor.variance, evaluations, tensor.failed, note)
 
 
-def _paper(gear: Gear, cube: Response, inputs: Inputs, options: StudyOptions, told: Stages) -> _Run:
+def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _Run:
     """Run the paper's design for the first order and, for ``lhs``, its study of the total order."""
     from mlg_troubleshoot.studies.blocks import block_study, total_order_study
     from mlg_troubleshoot.studies.paper import ITERATIONS, PAPER_DESIGNS, replicated_first_order
 
-    n = len(inputs.limits_in)
+    if options.directions is Directions.RANDOM:
+        raise UsageError(
+            f"design {options.design} with random directions", "The paper's designs hold directions; use sampled."
+        )
+    cube, n = _response(gear, gear.model, inputs, options)
     design = _sized(PAPER_DESIGNS[str(options.design)], n, options)
     n1, n2 = design.n1, design.n2
     iterations = ITERATIONS if options.iterations is None else options.iterations
@@ -302,8 +287,7 @@ def compare_designs(
 
     if options.directions is Directions.RANDOM:
         return ()
-    inputs = Inputs(gear.limits_in if options.limits_in is None else options.limits_in, options.distribution)
-    cube, n = _response(gear, gear.model, inputs, options)
+    cube, n = _response(gear, gear.model, _inputs(gear, options), options)
     iterations = ITERATIONS if options.iterations is None else options.iterations
     found = []
     for k, paper in enumerate(PAPER_DESIGNS.values(), start=1):
@@ -314,35 +298,30 @@ def compare_designs(
 
 
 def _table(
-    gear: Gear,
-    inputs: Inputs,
-    options: StudyOptions,
-    reference: Indices,
-    growth: Amplification,
-    orders: Array,
-    counts: tuple[int, int],
+    gear: Gear, inputs: Inputs, options: StudyOptions, found: Sequence[Indices], growth: Amplification
 ) -> IndexTable:
-    first, total = orders
-    evaluations, failed = counts
-    places, spans = ranks(first[0]), rank_ranges(first)
-    joints = []
-    for i, joint in enumerate(gear.joints):
-        joints.append(
-            JointIndices(
-                joint=joint.number,
-                limit_in=float(inputs.limits_in[i]),
-                first_order=float(first[0, i]),
-                first_order_interval=_pair(reference.first_order_interval[i]),
-                total_order=float(total[0, i]),
-                total_order_interval=_pair(reference.total_order_interval[i]),
-                plunger_amplification=float(growth.exact[i]),
-                max_amplification_index=float(growth.max_stage[i]),
-                rank=int(places[i]),
-                rank_range=spans[i],
-                first_order_spread=(float(first[:, i].min()), float(first[:, i].max())),
-                total_order_spread=(float(total[:, i].min()), float(total[:, i].max())),
-            )
+    """The table of the reference, the first that was found, with the spread over all."""
+    reference = found[0]
+    orders = np.array([[each.first_order, each.total_order] for each in found])
+    places, spans = ranks(orders[0, 0]), rank_ranges(orders[:, 0])
+    ends = np.array([orders.min(axis=0), orders.max(axis=0)])
+    joints = tuple(
+        JointIndices(
+            joint=joint.number,
+            limit_in=float(inputs.limits_in[i]),
+            first_order=float(reference.first_order[i]),
+            first_order_interval=_pair(reference.first_order_interval[i]),
+            total_order=float(reference.total_order[i]),
+            total_order_interval=_pair(reference.total_order_interval[i]),
+            plunger_amplification=float(growth.exact[i]),
+            max_amplification_index=float(growth.max_stage[i]),
+            rank=int(places[i]),
+            rank_range=spans[i],
+            first_order_spread=_pair(ends[:, 0, i]),
+            total_order_spread=_pair(ends[:, 1, i]),
         )
+        for i, joint in enumerate(gear.joints)
+    )
     return IndexTable(
         gear_id=gear.id,
         geometry_sha256=gear.geometry_sha256,
@@ -350,9 +329,9 @@ def _table(
         provenance=gear.provenance,
         seed=options.seed,
         design=reference.design,
-        evaluations=evaluations,
-        failed=failed,
-        joints=tuple(joints),
+        evaluations=sum(each.evaluations for each in found),
+        failed=sum(each.failed for each in found),
+        joints=joints,
     )
 
 

@@ -72,7 +72,7 @@ def test_a_refused_response_is_sampled_and_the_note_says_so(on_cube: Response) -
     def kinked(unit: np.ndarray) -> np.ndarray:
         return np.maximum(on_cube(unit), 0.045)
 
-    found = fast_indices(kinked, 10, _rng(), 0, accuracy=0.01)
+    found, _ = fast_indices(kinked, 10, _rng(), 0, accuracy=0.01)
     reference = tensor_indices(kinked, np.ones(10), order=4)
     assert "not smooth" in found.note
     assert "Saltelli" in found.design
@@ -89,7 +89,7 @@ def test_samples_that_fail_are_counted_and_make_the_indices_undefined(on_cube: R
     def failing(unit: np.ndarray) -> np.ndarray:
         return np.where(unit[:, 0] > 0.9, np.nan, on_cube(unit))
 
-    found = fast_indices(failing, 10, _rng(), 0)
+    found, _ = fast_indices(failing, 10, _rng(), 0)
     assert found.failed > 0
     assert np.all(np.isnan(found.first_order))
     assert "do not close" in found.note

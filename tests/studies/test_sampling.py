@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.studies.displacement import Response
+from mlg_troubleshoot.studies.indices import Indices
 from mlg_troubleshoot.studies.inputs import Inputs, joint_groups, with_random_directions
 from mlg_troubleshoot.studies.saltelli import fast_indices, saltelli_indices
 from mlg_troubleshoot.studies.tensor import TensorIndices
@@ -15,14 +18,14 @@ from .conftest import Oracle
 
 
 @pytest.mark.parametrize("name", ["ishigami", "sobol_g"])
-@pytest.mark.parametrize("route", [fast_indices, saltelli_indices])
+@pytest.mark.parametrize("route", [lambda *asked: fast_indices(*asked)[0], saltelli_indices])
 def test_analytic_indices_are_met_within_0_002(
     request: pytest.FixtureRequest,
     name: str,
-    route: type[fast_indices],  # type: ignore[valid-type]
+    route: Callable[..., Indices],
 ) -> None:
     oracle: Oracle = request.getfixturevalue(name)
-    found = route(oracle.function, oracle.n, np.random.default_rng(1), 1)  # type: ignore[operator]
+    found = route(oracle.function, oracle.n, np.random.default_rng(1), 1)
     assert np.abs(found.first_order - oracle.first_order).max() < 0.002
     assert np.abs(found.total_order - oracle.total_order).max() < 0.002
 
