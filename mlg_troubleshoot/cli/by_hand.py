@@ -7,35 +7,16 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING
 
+from mlg_troubleshoot.cli.check import Flags
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from mlg_troubleshoot.records.model import TableOptions
+from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.cli.prompts import Terminal
-
-
-@dataclass(frozen=True, slots=True)
-class Flags:
-    """What the flags say of one gear, as it was typed."""
-
-    values: tuple[str, ...]
-    tail: str | None
-    side: str | None
-    record_id: str | None
-    outcome: str | None
-    measured: str | None
-    margin: str | None
-    unit: LengthUnit | None
-    convention: ClearanceConvention | None
-
-    @property
-    def describe_a_gear(self) -> bool:
-        """True if any of them belongs to one gear; unit and convention go with files, too."""
-        single = (self.values, self.tail, self.side, self.record_id, self.outcome, self.measured, self.margin)
-        return any(single)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,13 +27,10 @@ class Ending:
     report: Callable[[], None] | None
 
 
-def from_flags(flags: Flags, gear: Gear) -> Inspection:
-    missing = [
-        flag
-        for flag, value in (("--tail", flags.tail), ("--side", flags.side), ("--convention", flags.convention))
-        if value is None
-    ]
-    if missing or flags.tail is None or flags.side is None or flags.convention is None:
+def from_flags(flags: Flags, declared: TableOptions, gear: Gear) -> Inspection:
+    needed = (("--tail", flags.tail), ("--side", flags.side), ("--convention", declared.convention))
+    missing = [flag for flag, value in needed if value is None]
+    if missing or flags.side is None:
         raise UsageError(
             f"--set needs {', '.join(missing)}",
             "Say which gear (--tail N123 --side LH) and what a clearance reading is (--convention RADIAL, DIAMETRAL "
@@ -65,7 +43,7 @@ def from_flags(flags: Flags, gear: Gear) -> Inspection:
         "side": flags.side,
     }
     labels: dict[str, str] = {}
-    for text in flags.values:
+    for text in flags.values or ():
         name, sign, written = text.partition("=")
         number = name.strip().lstrip("#")
         if not sign or not number.isdecimal() or not written.strip():
@@ -74,10 +52,12 @@ def from_flags(flags: Flags, gear: Gear) -> Inspection:
         if column in values:
             raise UsageError(f"--set gives joint {int(number)} twice", "Give each joint once.")
         values[column], labels[column] = written, f"--set {text!r}"
-    return _judged(values, labels, flags, gear)
+    return _judged(values, labels, flags, declared, gear)
 
 
-def _judged(values: Mapping[str, object], labels: Mapping[str, str], flags: Flags, gear: Gear) -> Inspection:
+def _judged(
+    values: Mapping[str, object], labels: Mapping[str, str], flags: Flags, declared: TableOptions, gear: Gear
+) -> Inspection:
     """Let the judge of table rows judge the flags; a refusal names the flag."""
     from mlg_troubleshoot.records import ReadOptions, admit
 
@@ -85,12 +65,13 @@ def _judged(values: Mapping[str, object], labels: Mapping[str, str], flags: Flag
     typed = {"record_id": flags.record_id, "tail_no": flags.tail, "side": flags.side, **more}
     names = {"tail_no": "tail", "plunger_displacement": "measured"}
     named = {column: f"--{names.get(column, column).replace('_', '-')} {text!r}" for column, text in typed.items()}
-    options = ReadOptions.of(gear, unit=flags.unit, convention=flags.convention)
+    options = ReadOptions.of(gear, unit=declared.unit, convention=declared.convention)
     return admit({**values, **more}, options, {**named, **labels})
 
 
 def ask(
     flags: Flags,
+    declared: TableOptions,
     gear: Gear,
     publish: Callable[[Inspection, LengthUnit], Ending],
     keep: Callable[[task.CheckResult], None],
@@ -106,14 +87,14 @@ def ask(
     if resume and saved is None:
         raise UsageError("there is no unfinished entry to resume", "Start a new one: mlg check")
     nobody = {"record_id": "-", "tail_no": "-", "side": flags.side or "LH", "clearance_convention": "RADIAL"}
-    judged = _judged(nobody, {}, flags, gear)
-    unit = flags.unit or LengthUnit.INCH
+    judged = _judged(nobody, {}, flags, declared, gear)
+    unit = declared.unit or LengthUnit.INCH
     lengths = {"plunger_displacement": flags.measured, "margin": flags.margin}
     given = Answers(
         tail_no=flags.tail,
         side=None if flags.side is None else judged.side,
-        unit=flags.unit,
-        convention=flags.convention,
+        unit=declared.unit,
+        convention=declared.convention,
         record_id=flags.record_id,
     ).with_more(
         outcome=judged.outcome,

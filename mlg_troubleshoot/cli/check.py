@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import astuple, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,7 +17,7 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.units import LengthUnit
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.cli.by_hand import Ending, Flags
+    from mlg_troubleshoot.cli.by_hand import Ending
     from mlg_troubleshoot.cli.remembered import Settings
     from mlg_troubleshoot.decision.inspection import Inspection
     from mlg_troubleshoot.store import Store
@@ -31,18 +31,6 @@ Files = Annotated[
     list[str] | None,
     typer.Argument(metavar="[FILE|-]...", help="Inspection tables (CSV, xlsx, xls, ods), folders, or - for stdin."),
 ]
-Values = Annotated[
-    list[str] | None, typer.Option("--set", metavar="JOINT=VALUE", help="One clearance, e.g. 3=0.013in.")
-]
-Tail = Annotated[str | None, typer.Option("--tail", help="Tail number, with --set or the prompts.")]
-Side = Annotated[str | None, typer.Option("--side", metavar="LH|RH", help="Which gear.")]
-RecordId = Annotated[str | None, typer.Option("--record-id", help="Identity of the record.")]
-OutcomeFlag = Annotated[str | None, typer.Option("--outcome", metavar="RETRACTED|FAILED", help="What the gear did.")]
-Measured = Annotated[
-    str | None,
-    typer.Option("--measured", metavar="VALUE", help="Measured plunger displacement at mid-position, e.g. 0.041in."),
-]
-Margin = Annotated[str | None, typer.Option("--margin", metavar="VALUE", help="This gear's own margin, e.g. 0.028in.")]
 Formats = Annotated[
     list[ReportFormat] | None,
     typer.Option(
@@ -70,21 +58,36 @@ Every = Annotated[bool, typer.Option("--all", help="A batch: every inspection, n
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the Monte Carlo draws of a gear looked at alone.")]
 
 
+@dataclass(frozen=True, slots=True)
+class Flags:
+    """What the flags say of one gear, as it was typed."""
+
+    values: Annotated[
+        list[str] | None, typer.Option("--set", metavar="JOINT=VALUE", help="One clearance, e.g. 3=0.013in.")
+    ] = None
+    tail: Annotated[str | None, typer.Option("--tail", help="Tail number, with --set or the prompts.")] = None
+    side: Annotated[str | None, typer.Option("--side", metavar="LH|RH", help="Which gear.")] = None
+    record_id: Annotated[str | None, typer.Option("--record-id", help="Identity of the record.")] = None
+    outcome: Annotated[str | None, typer.Option("--outcome", metavar="RETRACTED|FAILED", help="What the gear did.")] = (
+        None
+    )
+    measured: Annotated[
+        str | None,
+        typer.Option(
+            "--measured", metavar="VALUE", help="Measured plunger displacement at mid-position, e.g. 0.041in."
+        ),
+    ] = None
+    margin: Annotated[
+        str | None, typer.Option("--margin", metavar="VALUE", help="This gear's own margin, e.g. 0.028in.")
+    ] = None
+
+
+@options.flat
 def check(
+    *,
     files: Files = None,
-    values: Values = None,
-    tail: Tail = None,
-    side: Side = None,
-    record_id: RecordId = None,
-    outcome: OutcomeFlag = None,
-    measured: Measured = None,
-    margin: Margin = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
-    unit: options.Unit = None,
-    convention: options.Convention = None,
-    sheet: options.Sheet = None,
-    column_map: options.ColumnMap = None,
-    decimal_comma: options.DecimalComma = False,
+    flags: Flags,
+    tables: options.Tables,
     report: options.Report = None,
     formats: Formats = None,
     page: options.Paper = None,
@@ -111,7 +114,7 @@ def check(
     Without FILE on a terminal it asks, joint by joint. Exit codes: 0 every gear within margin · 1 something needs
     attention · 3 no row could be judged · 2 usage.
     """
-    from mlg_troubleshoot.cli.by_hand import Ending, Flags
+    from mlg_troubleshoot.cli.by_hand import Ending
     from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.store import Store
     from mlg_troubleshoot.workflows import check as task
@@ -123,25 +126,17 @@ def check(
     if formats and report is None:
         output.say("Note: --format is for reports: without --report DIR none is written.")
     inputs = [*given, *(extension or ()), *(causes or ())]
-    options.keep_inputs(gear, inputs, [("--csv", csv), ("--annotate", annotate)], report)
-    columns = options.columns_by_header(column_map)
-    shown = settings(show, page, columns, keep=remember, quiet=quiet)
+    options.keep_inputs(tables.gear, inputs, [("--csv", csv), ("--annotate", annotate)], report)
+    shown = settings(show, page, tables.columns, keep=remember, quiet=quiet)
     asked = task.CheckOptions(
-        gear=gear,
-        unit=unit,
-        convention=convention,
-        sheet=sheet,
-        column_map=columns,
-        remembered_map=shown.headers,
+        **tables.declared(shown.headers),
         remembered=shown.note or None,
-        decimal_comma=decimal_comma,
         seed=seed,
-        extension=load_model_extension(extension or (), gear, causes or ()),
+        extension=load_model_extension(extension or (), tables.gear, causes or ()),
     )
-    flags = Flags(tuple(values or ()), tail, side, record_id, outcome, measured, margin, unit, convention)
     reader_unit = shown.show if show or shown.show is not LengthUnit.INCH else None
 
-    place = Store(store) if keep or not (given or values) else None
+    place = Store(store) if keep or not (given or flags.values) else None
     kept = partial(_keep, asked=asked, place=place, tails=tails, quiet=quiet)
 
     def publish(result: task.CheckResult, entered_in: LengthUnit = LengthUnit.INCH) -> None:
@@ -168,7 +163,7 @@ def check(
         write = partial(_write_reports, result, asked, Path("report"), formats, seen, place, quiet=quiet)
         return Ending(result, write if offered else None)
 
-    if given or values:
+    if given or flags.values:
         result = _result(given, flags, asked, quiet=quiet)
         publish(result)
         kept(result)
@@ -201,14 +196,14 @@ def _result(files: Sequence[str], flags: Flags, asked: task.CheckOptions, *, qui
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.workflows import check as task
 
-    if files and flags.describe_a_gear:
+    if files and any(astuple(flags)):
         raise UsageError(
             "--set, --tail, --side, --record-id, --outcome, --measured and --margin describe one gear entered by "
             "hand, and a FILE was given as well",
             "Give either a FILE or the values of one gear.",
         )
     if not files:
-        return task.check_inspection(by_hand.from_flags(flags, load_gear(asked.gear)), asked)
+        return task.check_inspection(by_hand.from_flags(flags, asked, load_gear(asked.gear)), asked)
     with stages(quiet=quiet) as bar:
         return task.check_files(
             [Path(name) for name in files],
@@ -235,7 +230,7 @@ def _ask(
             "nothing to check: no FILE was given, and this is not a terminal to ask on",
             "Pass a FILE, - for standard input, or --set JOINT=VALUE with --tail, --side and --convention.",
         )
-    return by_hand.ask(flags, load_gear(asked.gear), publish, keep, resume=resume, place=place)
+    return by_hand.ask(flags, asked, load_gear(asked.gear), publish, keep, resume=resume, place=place)
 
 
 def _show(result: task.CheckResult, unit: LengthUnit, *, detail: bool, every: bool, quiet: bool) -> None:

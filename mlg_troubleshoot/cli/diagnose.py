@@ -33,7 +33,9 @@ Permutations = Annotated[
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of all randomness.")]
 
 
+@options.flat
 def diagnose(
+    *,
     files: Files,
     write_extension: WriteExtension = None,
     report: options.Report = None,
@@ -41,12 +43,7 @@ def diagnose(
     causes: options.Causes = None,
     permutations: Permutations = 999,
     seed: Seed = 0,
-    gear: options.Gear = options.DEFAULT_GEAR,
-    unit: options.Unit = None,
-    convention: options.Convention = None,
-    sheet: options.Sheet = None,
-    column_map: options.ColumnMap = None,
-    decimal_comma: options.DecimalComma = False,
+    tables: options.Tables,
     show: options.Show = None,
     remember: options.Remember = False,
     as_json: options.Json = False,
@@ -64,17 +61,10 @@ def diagnose(
     from mlg_troubleshoot.reporting.json_form import SCHEMA_VERSION, diagnosis_as_json
     from mlg_troubleshoot.workflows import diagnose as task
 
-    options.keep_inputs(gear, [*files, *(causes or ())], [("--write-extension", write_extension)], report)
-    columns = options.columns_by_header(column_map)
-    shown = settings(show, page, columns, keep=remember, quiet=quiet)
+    options.keep_inputs(tables.gear, [*files, *(causes or ())], [("--write-extension", write_extension)], report)
+    shown = settings(show, page, tables.columns, keep=remember, quiet=quiet)
     asked = task.DiagnoseOptions(
-        gear=gear,
-        unit=unit,
-        convention=convention,
-        sheet=sheet,
-        decimal_comma=decimal_comma,
-        column_map=columns,
-        remembered_map=shown.headers,
+        **tables.declared(shown.headers),
         remembered=shown.note or None,
         cause_files=tuple(causes or ()),
         permutations=permutations,

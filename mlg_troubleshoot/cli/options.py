@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
 from enum import StrEnum
+from functools import wraps
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, get_type_hints
 
 import typer
 
@@ -74,17 +77,58 @@ Json = Annotated[bool, typer.Option("--json", help="Write the result as JSON to 
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no notes.")]
 
 
-def columns_by_header(pairs: Sequence[str] | None) -> dict[str, str]:
-    """Read what ``--map`` was given."""
-    mapped = {}
-    for pair in pairs or ():
-        header, sign, column = pair.rpartition("=")
-        if not sign or not header.strip() or not column.strip():
-            raise UsageError(
-                f"--map {pair!r} is not HEADER=COLUMN", "Write for example --map 'Spiel 3=clearance_3_mm'."
-            )
-        mapped[header.strip()] = column.strip()
-    return mapped
+@dataclass(frozen=True, slots=True)
+class Tables:
+    """The gear, and what is declared about the tables that are read."""
+
+    gear: Gear = DEFAULT_GEAR
+    unit: Unit = None
+    convention: Convention = None
+    sheet: Sheet = None
+    column_map: ColumnMap = None
+    decimal_comma: DecimalComma = False
+
+    def declared(self, remembered: Mapping[str, str]) -> dict[str, Any]:
+        """What a task is told of them, with the headers that are remembered."""
+        told = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {**told, "column_map": self.columns, "remembered_map": remembered}
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """What ``--map`` was given, by header."""
+        mapped = {}
+        for pair in self.column_map or ():
+            header, sign, column = pair.rpartition("=")
+            if not sign or not header.strip() or not column.strip():
+                raise UsageError(
+                    f"--map {pair!r} is not HEADER=COLUMN", "Write for example --map 'Spiel 3=clearance_3_mm'."
+                )
+            mapped[header.strip()] = column.strip()
+        return mapped
+
+
+def flat(command: Callable[..., None]) -> Callable[..., None]:
+    """Let a command take options as dataclasses: on the command line each field of one is an option."""
+    hints = get_type_hints(command, include_extras=True)
+    groups: dict[str, Any] = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
+    shown: list[Parameter] = []
+    for name, parameter in signature(command).parameters.items():
+        if name in groups:
+            own, named = get_type_hints(groups[name], include_extras=True), Parameter.KEYWORD_ONLY
+            options = [(each.name, each.default) for each in fields(groups[name])]
+            shown += [Parameter(name, named, default=default, annotation=own[name]) for name, default in options]
+        else:
+            shown.append(parameter.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[name]))
+
+    @wraps(command)
+    def run(**given: Any) -> None:
+        for name, group in groups.items():
+            given[name] = group(**{each.name: given.pop(each.name) for each in fields(group)})
+        command(**given)
+
+    run.__annotations__ = {each.name: each.annotation for each in shown}
+    run.__dict__["__signature__"] = Signature(shown)
+    return run
 
 
 def keep_inputs(

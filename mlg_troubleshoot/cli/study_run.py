@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import fields, replace
 from importlib import import_module
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -18,6 +17,7 @@ from mlg_troubleshoot.cli import output
 from mlg_troubleshoot.cli.boundary import INTERRUPTED
 from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.remembered import Settings
+from mlg_troubleshoot.cli.study import StudyFlags
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
@@ -31,84 +31,61 @@ _BAR = 16
 _Choice = TypeVar("_Choice", Design, Directions)
 
 
-@dataclass(frozen=True, slots=True)
-class Beside:
-    """What ``mlg study`` shows and writes beside the indices."""
-
-    statements: bool
-    bound: bool
-    given: Path | None
-    report: Path | None
-    shown: Settings
-    csv: Path | None
-    write_table: bool
-    as_json: bool
-    quiet: bool
-
-
 @contextmanager
-def asked(
-    gear: str,
-    design: str,
-    directions: str,
-    fixed_deg: str | None,
-    limit: float | None,
-    scheduler: str | None,
-    **plain: Any,
-) -> Iterator[tuple[Gear, StudyOptions]]:
-    """Read what the command line asks of the study itself, and hold its cluster while it runs."""
-    known = load_gear(gear)
+def asked(flags: StudyFlags) -> Iterator[tuple[Gear, StudyOptions]]:
+    """Read what the flags ask of the study itself, and hold its cluster while it runs."""
+    known = load_gear(flags.gear)
     fixed = None
-    if fixed_deg is not None:
+    if flags.fixed is not None:
         try:
-            fixed = np.radians([float(part) for part in fixed_deg.split(",")])
+            fixed = np.radians([float(part) for part in flags.fixed.split(",")])
         except ValueError:
             raise UsageError(
-                f"directions {fixed_deg!r}", "Give degrees with commas between, one for each joint."
+                f"directions {flags.fixed!r}", "Give degrees with commas between, one for each joint."
             ) from None
-    wanted = StudyOptions(
-        design=_choice(Design, design, "design"),
-        directions=_choice(Directions, directions, "directions") if fixed is None else Directions.FIXED,
-        fixed_rad=fixed,
-        limits_in=None if limit is None else np.full(len(known.joints), limit),
-        **plain,
-    )
-    with nullcontext() if scheduler is None else _client(scheduler) as client:
-        yield known, replace(wanted, scheduler=client)
+    plain = {each.name: getattr(flags, each.name) for each in fields(StudyOptions) if hasattr(flags, each.name)}
+    read = {
+        "design": _choice(Design, flags.design, "design"),
+        "directions": _choice(Directions, flags.directions, "directions") if fixed is None else Directions.FIXED,
+        "fixed_rad": fixed,
+        "limits_in": None if flags.limit is None else np.full(len(known.joints), flags.limit),
+    }
+    with nullcontext() if flags.scheduler is None else _client(flags.scheduler) as client:
+        yield known, StudyOptions(**{**plain, **read, "scheduler": client})
 
 
-def run(gear: Gear, options: StudyOptions, beside: Beside) -> None:
+def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings) -> None:
     """Run a study and show, write and return what was asked for; exit 130 if it was interrupted."""
-    wants_report = beside.report is not None
-    given = None if beside.given is None else task.given_data_study(beside.given, gear, options.seed)
-    if beside.write_table:
+    wants_report = flags.report is not None
+    given = None if flags.given is None else task.given_data_study(flags.given, gear, options.seed)
+    if flags.write_table:
         task.refuse_other_tables(options)
-    with stages(quiet=beside.quiet) as progress:
+    with stages(quiet=flags.quiet) as progress:
         findings = task.run_study(
             gear,
             options,
-            statements=beside.statements or (wants_report and targets_file(gear).exists()),
-            bound=beside.bound or wants_report,
+            statements=flags.statements or (wants_report and targets_file(gear).exists()),
+            bound=flags.bound or wants_report,
             designs=wants_report,
             progress=progress,
         )
     shown = replace(
         findings,
-        statements=findings.statements if beside.statements else (),
-        searches=findings.searches if beside.bound else (),
+        statements=findings.statements if flags.statements else (),
+        searches=findings.searches if flags.bound else (),
     )
-    if beside.as_json:
+    if flags.as_json:
         output.write_json(task.study_values(shown, given))
     else:
-        _show(shown, beside.shown.show)
+        _show(shown, settings.show)
         if given is not None:
             _show_given(gear, given)
-    if beside.csv is not None:
-        task.write_study_csv(findings, beside.csv)
-    if beside.report is not None:
-        written = task.write_study_report(findings, beside.report, beside.shown.page.value, unit=beside.shown.show)
+    if flags.csv is not None:
+        task.write_study_csv(findings, flags.csv)
+    if flags.report is not None:
+        written = task.write_study_report(findings, flags.report, settings.page.value, unit=settings.show)
         output.say_written([written])
-    if beside.write_table:
+    if flags.write_table:
         output.say(f"Table written: {task.write_study_table(findings)}")
     if not findings.result.finished:
         output.say("Interrupted: the numbers above are of what was done.")

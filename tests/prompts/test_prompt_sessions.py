@@ -12,6 +12,7 @@ from time import monotonic
 import pytest
 
 from mlg_troubleshoot.cli import by_hand
+from mlg_troubleshoot.cli.check import Flags
 from mlg_troubleshoot.cli.prompts import (
     Answers,
     EntryInterruptedError,
@@ -463,7 +464,8 @@ def test_an_entry_whose_result_could_not_be_kept_stays_unfinished(
     asked = CheckOptions()
     with pytest.raises(StoreError):
         by_hand.ask(
-            by_hand.Flags((), *[None] * 8),
+            Flags(),
+            asked,
             gear,
             lambda inspection, _unit: by_hand.Ending(check_inspection(inspection, asked), None),
             refused,

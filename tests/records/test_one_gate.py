@@ -9,12 +9,14 @@ from dataclasses import dataclass, replace
 import pytest
 
 from mlg_troubleshoot import Inspection, Side, TroubleshootError, check
-from mlg_troubleshoot.cli.by_hand import Flags, from_flags
+from mlg_troubleshoot.cli.by_hand import from_flags
+from mlg_troubleshoot.cli.check import Flags
 from mlg_troubleshoot.cli.prompts.answers import Answers, JointAnswer, judge
 from mlg_troubleshoot.cli.prompts.more import read_more
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records import ReadOptions, judge_again, read_inspections
+from mlg_troubleshoot.records.model import TableOptions
 from mlg_troubleshoot.units import ClearanceConvention as Convention
 from mlg_troubleshoot.units import LengthUnit
 
@@ -53,9 +55,10 @@ def by_cell(gear: Gear, value: object, margin: str, convention: Convention) -> F
 
 
 def by_flag(gear: Gear, value: str, margin: str, convention: Convention) -> Found:
-    flags = Flags((f"3={value}",), "N1", "LH", "R1", None, None, margin, LengthUnit.INCH, convention)
+    flags = Flags([f"3={value}"], "N1", "LH", "R1", margin=margin)
+    declared = TableOptions(unit=LengthUnit.INCH, convention=convention)
     try:
-        row = from_flags(flags, gear)
+        row = from_flags(flags, declared, gear)
     except UsageError as error:
         return Found(refused=words(error))
     return Found(row.clearance_in[3], row.margin_in, row.warnings)
