@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from mlg_troubleshoot.records.cells import MAX_COLUMNS, MAX_ROWS, Cell
 from mlg_troubleshoot.records.refusals import FileRefusedError
-from mlg_troubleshoot.records.source import MergedRange, NumberedRow, SheetFacts
+from mlg_troubleshoot.records.source import NumberedRow, Sheet, Workbook
 
 # A quoted field may be as long as a line; the module's own limit would make it a fault.
 csv.field_size_limit(1_000_000)
@@ -63,20 +63,14 @@ def not_text() -> FileRefusedError:
     return FileRefusedError("not_a_table", "the file is neither text nor a spreadsheet")
 
 
-class CsvSheet:
-    name: str | None = None
-    hidden = False
-
+class _CsvSheet(Sheet):
     def __init__(self, text: str, delimiter: str) -> None:
+        super().__init__()
         self._text = text
         self._delimiter = delimiter
-        self.facts = SheetFacts()
         self._budget = _QUOTE_BUDGET
 
-    def merged(self) -> Sequence[MergedRange]:
-        return ()
-
-    def rows(self) -> Iterator[NumberedRow]:
+    def _read(self) -> Iterator[NumberedRow]:
         for number, fields in enumerate(self._records(), 1):
             cells: list[Cell] = [field if field and not field.isspace() else None for field in fields]
             if not any(cells):
@@ -135,29 +129,24 @@ class CsvSheet:
         return parsed[0] if len(parsed) == 1 else None
 
 
-class CsvFile:
-    kind = "csv"
-
-    def __init__(self, data: bytes, header_score: Callable[[Sequence[Cell]], int]) -> None:
-        if len(data) > _MAX_BYTES:
-            raise _too_large(f"a text of {len(data) / 1e6:.0f} MB")
-        lines = data.count(b"\n") or data.count(b"\r")
-        if lines > _MAX_LINES:
-            raise _too_large(f"{lines} lines")
-        text, notes = decode(data)
-        self.notes: list[str] = notes
-        head = text[:65536]
-        strange = len(_CONTROL.findall(head)) + head.count("\0")
-        if strange > 20 and strange > len(head) * 0.02:
-            raise not_text()
-        match = _SEP_LINE.match(text)
-        if match is not None:
-            self.delimiter: str | None = match[1]
-            text = text[match.end() :]
-            self.notes.append(f"the first line names the separator {match[1]!r} and is not counted as a row")
-        else:
-            self.delimiter = _find_delimiter(head, header_score)
-        self.sheets = (CsvSheet(text, self.delimiter or ","),)
+def csv_book(data: bytes, header_score: Callable[[Sequence[Cell]], int]) -> Workbook:
+    if len(data) > _MAX_BYTES:
+        raise _too_large(f"a text of {len(data) / 1e6:.0f} MB")
+    lines = data.count(b"\n") or data.count(b"\r")
+    if lines > _MAX_LINES:
+        raise _too_large(f"{lines} lines")
+    text, notes = decode(data)
+    head = text[:65536]
+    strange = len(_CONTROL.findall(head)) + head.count("\0")
+    if strange > 20 and strange > len(head) * 0.02:
+        raise not_text()
+    match = _SEP_LINE.match(text)
+    if match is None:
+        delimiter = _find_delimiter(head, header_score)
+    else:
+        delimiter, text = match[1], text[match.end() :]
+        notes.append(f"the first line names the separator {delimiter!r} and is not counted as a row")
+    return Workbook("csv", (_CsvSheet(text, delimiter),), notes, delimiter)
 
 
 def _find_delimiter(head: str, header_score: Callable[[Sequence[Cell]], int]) -> str:

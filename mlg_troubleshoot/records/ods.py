@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from xml.etree.ElementTree import Element, iterparse
 
 from mlg_troubleshoot.records.cells import MAX_COLUMNS, MAX_ROWS, NO_VALUE_TEXT, Cell, OddCell, OddKind, iso_date_cell
-from mlg_troubleshoot.records.source import MergedRange, NumberedRow, SheetFacts
+from mlg_troubleshoot.records.source import MergedRange, NumberedRow, Sheet, Workbook
 from mlg_troubleshoot.records.zipguard import GuardedZip, Stream, damage, outside_limits, password_protected
 
 _CONTENT = "content.xml"
@@ -19,29 +19,23 @@ _EXTENDED = "{urn:org:documentfoundation:names:experimental:calc:xmlns:calcext:1
 _BREAKS = {f"{_TEXT}tab": "\t", f"{_TEXT}line-break": "\n"}
 
 
-class OdsFile:
-    kind = "ods"
-    delimiter: str | None = None
-
-    def __init__(self, data: bytes) -> None:
-        self._zip = GuardedZip(data)
-        self.notes: list[str] = []
-        names = self._zip.names
-        manifest = self._zip.read("meta-inf/manifest.xml") if "meta-inf/manifest.xml" in names else b""
-        if b"encryption-data" in manifest or "encrypted-package" in names:
-            raise password_protected()
-        hidden: set[str] = set()
-        found: list[tuple[str, str]] = []
-        for event, element in _elements(self._zip):
-            if event == "start" and element.tag == f"{_TABLE}table":
-                found.append((element.get(f"{_TABLE}name", ""), element.get(f"{_TABLE}style-name", "")))
-            elif event == "end" and element.tag == f"{_STYLE}style":
-                shown = element.find(f"{_STYLE}table-properties")
-                if shown is not None and shown.get(f"{_TABLE}display") == "false":
-                    hidden.add(element.get(f"{_STYLE}name", ""))
-        self.sheets = tuple(
-            OdsSheet(self._zip, index, name, style in hidden) for index, (name, style) in enumerate(found)
-        )
+def ods_book(data: bytes) -> Workbook:
+    archive = GuardedZip(data)
+    names = archive.names
+    manifest = archive.read("meta-inf/manifest.xml") if "meta-inf/manifest.xml" in names else b""
+    if b"encryption-data" in manifest or "encrypted-package" in names:
+        raise password_protected()
+    hidden: set[str] = set()
+    found: list[tuple[str, str]] = []
+    for event, element in _elements(archive):
+        if event == "start" and element.tag == f"{_TABLE}table":
+            found.append((element.get(f"{_TABLE}name", ""), element.get(f"{_TABLE}style-name", "")))
+        elif event == "end" and element.tag == f"{_STYLE}style":
+            shown = element.find(f"{_STYLE}table-properties")
+            if shown is not None and shown.get(f"{_TABLE}display") == "false":
+                hidden.add(element.get(f"{_STYLE}name", ""))
+    sheets = [_OdsSheet(archive, index, name, style in hidden) for index, (name, style) in enumerate(found)]
+    return Workbook("ods", sheets)
 
 
 def _elements(archive: GuardedZip) -> Iterator[tuple[str, Element]]:
@@ -55,11 +49,9 @@ def _elements(archive: GuardedZip) -> Iterator[tuple[str, Element]]:
                 stream.end_item()
 
 
-class OdsSheet:
+class _OdsSheet(Sheet):
     def __init__(self, archive: GuardedZip, index: int, name: str, hidden: bool) -> None:
-        self.name: str | None = name
-        self.hidden = hidden
-        self.facts = SheetFacts()
+        super().__init__(name, hidden=hidden)
         self._zip = archive
         self._index = index
         self._merged: list[MergedRange] = []
@@ -68,8 +60,7 @@ class OdsSheet:
         """Return those of the rows read so far."""
         return tuple(self._merged)
 
-    def rows(self) -> Iterator[NumberedRow]:
-        self.facts.__init__()  # type: ignore[misc]
+    def _read(self) -> Iterator[NumberedRow]:
         self._merged.clear()
         table, last = -1, 0
         with damage(f"sheet {self.name!r} cannot be read"):

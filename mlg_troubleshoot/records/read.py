@@ -14,7 +14,7 @@ from typing import BinaryIO
 
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import writable
-from mlg_troubleshoot.records.csvfile import CsvFile
+from mlg_troubleshoot.records.csvfile import csv_book
 from mlg_troubleshoot.records.duplicates import settle_duplicates
 from mlg_troubleshoot.records.forms import Form, find_form, read_form
 from mlg_troubleshoot.records.history import history_warnings
@@ -158,15 +158,15 @@ def _regular_file(source: str | Path) -> bytes:
 def open_book(data: bytes, label: str, options: ReadOptions) -> Workbook:
     kind = sniff(data, label)
     if kind == "text":
-        return CsvFile(data, lambda cells: header_score(cells, options))
+        return csv_book(data, lambda cells: header_score(cells, options))
     if kind == "ole":
-        from mlg_troubleshoot.records.xls import XlsFile
+        from mlg_troubleshoot.records.xls import xls_book
 
-        return XlsFile(data)
+        return xls_book(data)
     if b"opendocument.spreadsheet" in data[:200]:
-        from mlg_troubleshoot.records.ods import OdsFile
+        from mlg_troubleshoot.records.ods import ods_book
 
-        return OdsFile(data)
+        return ods_book(data)
     from mlg_troubleshoot.records.xlsx import XlsxFile
 
     return XlsxFile(data)

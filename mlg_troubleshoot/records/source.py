@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 from mlg_troubleshoot.records.cells import Cell
 from mlg_troubleshoot.records.refusals import FileRefusedError
 
 NumberedRow = tuple[int, Sequence[Cell]]
 MergedRange = tuple[int, int, int, int]
+# Said of a workbook that holds some.
+MACROS = "the workbook holds macros: they are ignored, the values are read"
 
 
 @dataclass(slots=True)
@@ -30,41 +31,36 @@ class SheetFacts:
     faulty: dict[int, FileRefusedError] = field(default_factory=dict)
 
 
-class Sheet(Protocol):
-    @property
-    def name(self) -> str | None:
-        """Name of the worksheet, None for CSV."""
+class Sheet:
+    """A table of cells; its name is None in CSV."""
 
-    @property
-    def hidden(self) -> bool:
-        """True if the worksheet is hidden."""
-
-    @property
-    def facts(self) -> SheetFacts:
-        """What was noticed beside the values."""
+    def __init__(self, name: str | None = None, *, hidden: bool = False) -> None:
+        self.name = name
+        self.hidden = hidden
+        self.facts = SheetFacts()
 
     def rows(self) -> Iterator[NumberedRow]:
-        """Read the rows that are not blank, with their numbers counted from 1."""
+        """Read the rows that are not blank, with their numbers counted from 1; the facts begin anew."""
+        self.facts = SheetFacts()
+        yield from self._read()
+
+    def _read(self) -> Iterator[NumberedRow]:
+        raise NotImplementedError
 
     def merged(self) -> Sequence[MergedRange]:
         """Return merged ranges as first row, first column, last row, last column (rows from 1, columns from 0)."""
+        return ()
 
 
-class Workbook(Protocol):
-    """A file with one or more tables of cells."""
+@dataclass
+class Workbook:
+    """A file with one or more tables of cells.
 
-    @property
-    def kind(self) -> str:
-        """``csv``, ``xlsx``, ``xlsm``, ``xls`` or ``ods``."""
+    kind: ``csv``, ``xlsx``, ``xlsm``, ``xls`` or ``ods``.
+    delimiter: what separates the fields of a CSV file.
+    """
 
-    @property
-    def sheets(self) -> Sequence[Sheet]:
-        """Its sheets, in their order."""
-
-    @property
-    def notes(self) -> Sequence[str]:
-        """What was noticed about the file."""
-
-    @property
-    def delimiter(self) -> str | None:
-        """What separates the fields of a CSV file."""
+    kind: str
+    sheets: Sequence[Sheet]
+    notes: list[str] = field(default_factory=list)
+    delimiter: str | None = None

@@ -21,7 +21,7 @@ from mlg_troubleshoot.records.cells import (
     show_number,
 )
 from mlg_troubleshoot.records.refusals import COPY_THE_TABLE, FileRefusedError
-from mlg_troubleshoot.records.source import MergedRange, NumberedRow, SheetFacts
+from mlg_troubleshoot.records.source import MACROS, MergedRange, NumberedRow, Sheet, Workbook
 from mlg_troubleshoot.records.zipguard import damaged, outside_limits, password_protected
 
 MAX_BYTES = 20_000_000
@@ -29,25 +29,16 @@ _BOF, _EOF, _FORMULA = 0x0809, 0x000A, 0x0006
 _UTF16 = "utf-16-le"
 
 
-class XlsFile:
-    """An old Excel workbook; a `FileRefusedError` if it is damaged, password protected or something else."""
-
-    kind = "xls"
-    delimiter: str | None = None
-
-    def __init__(self, data: bytes) -> None:
-        self.notes: list[str] = []
-        if "EncryptedPackage".encode(_UTF16) in data:
-            raise password_protected()
-        if len(data) > MAX_BYTES:
-            found, expected = f"an .xls workbook of {len(data) / 1e6:.0f} MB", f"at most {MAX_BYTES // 1_000_000} MB"
-            raise FileRefusedError("file_too_large", found, expected, COPY_THE_TABLE)
-        if "_VBA_PROJECT".encode(_UTF16) in data:
-            self.notes.append("the workbook holds macros: they are ignored, the values are read")
-        self.sheets = _sheets(data)
+def xls_book(data: bytes) -> Workbook:
+    if "EncryptedPackage".encode(_UTF16) in data:
+        raise password_protected()
+    if len(data) > MAX_BYTES:
+        found, expected = f"an .xls workbook of {len(data) / 1e6:.0f} MB", f"at most {MAX_BYTES // 1_000_000} MB"
+        raise FileRefusedError("file_too_large", found, expected, COPY_THE_TABLE)
+    return Workbook("xls", _sheets(data), [MACROS] if "_VBA_PROJECT".encode(_UTF16) in data else [])
 
 
-def _sheets(data: bytes) -> tuple[XlsSheet, ...]:
+def _sheets(data: bytes) -> tuple[_XlsSheet, ...]:
     """Read the sheets: the one place where what xlrd raises becomes a problem.
 
     On damaged bytes xlrd raises almost anything; what its parser was seen to raise is listed in `_PARSER_ERRORS`.
@@ -55,7 +46,7 @@ def _sheets(data: bytes) -> tuple[XlsSheet, ...]:
     try:
         book = xlrd.open_workbook(file_contents=data, formatting_info=True, logfile=_Silent(), on_demand=True)
         sheets = tuple(
-            XlsSheet(book, book.sheet_by_index(i), _formulas(book.mem, book._sh_abs_posn[i]))
+            _XlsSheet(book, book.sheet_by_index(i), _formulas(book.mem, book._sh_abs_posn[i]))
             for i in range(book.nsheets)
         )
         book.release_resources()
@@ -95,21 +86,18 @@ class _Silent(io.StringIO):
         return len(text)
 
 
-class XlsSheet:
+class _XlsSheet(Sheet):
     def __init__(self, book: xlrd.Book, sheet: xlrd.sheet.Sheet, formulas: Counter[int]) -> None:
+        super().__init__(sheet.name, hidden=bool(sheet.visibility))
         self._book = book
         self._sheet = sheet
         self._formulas = formulas
-        self.name: str | None = sheet.name
-        self.hidden = bool(sheet.visibility)
-        self.facts = SheetFacts()
 
     def merged(self) -> Sequence[MergedRange]:
         return [(top + 1, left, bottom, right - 1) for top, bottom, left, right in self._sheet.merged_cells]
 
-    def rows(self) -> Iterator[NumberedRow]:
+    def _read(self) -> Iterator[NumberedRow]:
         sheet = self._sheet
-        self.facts.__init__()  # type: ignore[misc]
         self.facts.formulas.update(self._formulas)
         for column, info in sheet.colinfo_map.items():
             if info.hidden:

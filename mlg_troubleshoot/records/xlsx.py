@@ -47,7 +47,7 @@ from mlg_troubleshoot.records.cells import (
     show_number,
 )
 from mlg_troubleshoot.records.refusals import FileRefusedError
-from mlg_troubleshoot.records.source import MergedRange, NumberedRow, SheetFacts
+from mlg_troubleshoot.records.source import MACROS, MergedRange, NumberedRow, Sheet, Workbook
 from mlg_troubleshoot.records.zipguard import MAX_ITEMS, GuardedZip, Stream, damage, damaged, outside_limits, too_large
 
 _MERGE = re.compile(rb'<(?:\w+:)?mergeCell\s[^<>]*?ref="([A-Z]{1,3}\d{1,7}:[A-Z]{1,3}\d{1,7})"')
@@ -80,14 +80,13 @@ class _Package(GuardedZip):
         return super().read(name)
 
 
-class XlsxFile:
-    delimiter: str | None = None
+class XlsxFile(Workbook):
+    sheets: Sequence[XlsxSheet]
 
     def __init__(self, data: bytes) -> None:
         self.archive = _Package(data)
         macros = any(name.endswith("vbaproject.bin") for name in self.archive.names)
-        self.kind = "xlsm" if macros else "xlsx"
-        self.notes = ["the workbook holds macros: they are ignored, the values are read"] if macros else []
+        super().__init__("xlsm" if macros else "xlsx", (), [MACROS] if macros else [])
         with damage("its list of sheets cannot be read"), warnings.catch_warnings(action="ignore"):
             reader = ExcelReader(io.BytesIO(data), read_only=True, data_only=True, keep_links=False)
             reader.archive = cast(Any, self.archive)
@@ -160,11 +159,9 @@ def _shown(text: str) -> str | None:
     return text if text and not text.isspace() else None
 
 
-class XlsxSheet:
+class XlsxSheet(Sheet):
     def __init__(self, name: str, part: str, hidden: bool, book: XlsxFile) -> None:
-        self.name: str | None = name
-        self.hidden = hidden
-        self.facts = SheetFacts()
+        super().__init__(name, hidden=hidden)
         self.part = part
         self.book = book
 
@@ -182,8 +179,7 @@ class XlsxSheet:
             tail = piece[piece.rfind(b"<") :] if piece.rfind(b"<") > piece.rfind(b">") else b""
         return found
 
-    def rows(self) -> Iterator[NumberedRow]:
-        self.facts.__init__()  # type: ignore[misc]
+    def _read(self) -> Iterator[NumberedRow]:
         with damage(f"sheet {self.name!r} cannot be read"):
             for number, cells in _Rows(self).parse():
                 if cells:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import secrets
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -68,14 +69,13 @@ class SessionStore:
     owner: str = field(default_factory=lambda: os.environ.get("USER") or os.environ.get("USERNAME") or "")
     away: str = ""
 
-    @property
-    def _drafts(self) -> Drafts:
-        return Drafts(Store(self.place, patience_s=_PATIENCE_S))
+    _kept: Drafts = field(init=False)
+    # What waits on this machine for a server.
+    _waiting: tuple[Drafts, ...] = field(init=False)
 
-    @property
-    def _own_drafts(self) -> tuple[Drafts, ...]:
-        """What waits on this machine for a server."""
-        return (Drafts(Store(own_file())),) if "://" in self._drafts.store.place else ()
+    def __post_init__(self) -> None:
+        self._kept = Drafts(Store(self.place, patience_s=_PATIENCE_S))
+        self._waiting = (Drafts(Store(own_file())),) if "://" in self._kept.store.place else ()
 
     def save(self, session: Session) -> Session:
         """Write a session whole or not at all; `SessionTakenError` if another run has written it meanwhile."""
@@ -93,22 +93,23 @@ class SessionStore:
 
     def _save(self, draft: Draft, writers: tuple[str, ...]) -> bool:
         try:
-            saved = self._drafts.save(draft, writers)
+            saved = self._kept.save(draft, writers)
         except OutputError:
-            for own in self._own_drafts:
-                saved = own.save(draft, writers)
-                self.away = f"the server cannot be reached; until it can, answers are saved here: {own.store.place}"
-                return saved
-            raise
-        for own in self._own_drafts if saved else ():
+            if not self._waiting:
+                raise
+            (own,) = self._waiting
+            saved = own.save(draft, writers)
+            self.away = f"the server cannot be reached; until it can, answers are saved here: {own.store.place}"
+            return saved
+        for own in self._waiting if saved else ():
             own.discard(draft.id)
         return saved
 
     def _newest_first(self, owner: str | None = None, draft_id: str | None = None) -> list[Draft]:
         """Drafts of the store; what waits on this machine is newer than its like there."""
-        own = [draft for drafts in self._own_drafts for draft in drafts.newest_first(owner, draft_id)]
+        own = [draft for drafts in self._waiting for draft in drafts.newest_first(owner, draft_id)]
         try:
-            found = self._drafts.newest_first(owner, draft_id)
+            found = self._kept.newest_first(owner, draft_id)
         except OutputError:
             if not own:
                 raise
@@ -121,10 +122,8 @@ class SessionStore:
         raise SessionFileError(f"there is no saved inspection {session_id!r}", "Run mlg check to begin a new one.")
 
     def latest(self) -> Session | None:
-        for draft in self._newest_first(self.owner):
-            if not draft.complete:
-                return self._readable(draft)
-        return None
+        open_ones = (draft for draft in self._newest_first(self.owner) if not draft.complete)
+        return next(map(self._readable, open_ones), None)
 
     def unfinished(self, gear_id: str) -> tuple[tuple[Session, ...], tuple[str, ...]]:
         """Return the unfinished sessions of a gear, the last one first, and what could not be read on the way."""
@@ -161,7 +160,7 @@ class SessionStore:
 
     def discard(self, session_id: str) -> None:
         """Delete a session; nothing happens if there is none."""
-        for drafts in (*self._own_drafts, self._drafts):
+        for drafts in (*self._waiting, self._kept):
             with suppress(OutputError):
                 drafts.discard(session_id)
 
@@ -181,10 +180,10 @@ def _session(draft: Draft) -> Session:
         )
     try:
         session = replace(_from_json(raw), writer=draft.writer, complete=draft.complete)
+        if session.id != draft.id:
+            raise ValueError(f"it holds the session {session.id!r}")
     except (KeyError, TypeError, ValueError, OverflowError, AttributeError, UsageError) as error:
         raise _damaged(draft.id, f"{type(error).__name__}: {error}") from error
-    if session.id != draft.id:
-        raise _damaged(draft.id, f"it holds the session {session.id!r}")
     return session
 
 
@@ -196,27 +195,22 @@ def _damaged(session_id: str, why: str) -> DamagedSessionError:
 
 
 def _as_json(session: Session) -> dict[str, Any]:
-    answers = session.answers
+    joints = sorted(session.answers.joints.items())
     return {
         "schema_version": _SCHEMA,
         "program": version("mlg-troubleshoot"),
         "id": session.id,
         "gear": session.gear_id,
         "started": session.started.isoformat(timespec="seconds"),
-        "record_id": answers.record_id,
-        "tail_no": answers.tail_no,
-        "side": answers.side,
-        "unit": answers.unit,
-        "convention": answers.convention,
-        "joints": {str(number): _joint_as_json(answer) for number, answer in sorted(answers.joints.items())},
-        "more": dict(answers.more),
+        **{name: getattr(session.answers, name) for name in _HEADING},
+        "joints": {str(number): _joint_as_json(answer) for number, answer in joints},
+        "more": dict(session.answers.more),
     }
 
 
 def _joint_as_json(answer: JointAnswer) -> dict[str, Any] | None:
-    if answer.written is None:
-        return None
-    return {"text": answer.written.text, "unit": answer.written.unit, "confirmed": answer.confirmed}
+    written = answer.written
+    return None if written is None else {"text": written.text, "unit": written.unit, "confirmed": answer.confirmed}
 
 
 def _from_json(raw: Any) -> Session:
@@ -229,20 +223,13 @@ def _from_json(raw: Any) -> Session:
         raise ValueError(f"schema_version {_SCHEMA} was expected")
     if not set(more) <= set(MORE):
         raise ValueError(f"{sorted(set(more) - set(MORE))[0]!r} is no column of an entry")
-    unit, side, convention = raw["unit"], raw["side"], raw["convention"]
-    return Session(
-        id=_text(raw["id"]) or "",
-        gear_id=_text(raw["gear"]) or "",
-        started=datetime.fromisoformat(raw["started"]),
-        answers=Answers(
-            record_id=_text(raw["record_id"]),
-            tail_no=_text(raw["tail_no"]),
-            side=None if side is None else Side(side),
-            unit=None if unit is None else LengthUnit(unit),
-            convention=None if convention is None else ClearanceConvention(convention),
-            joints=MappingProxyType({int(n): _joint_from_json(answer) for n, answer in dict(raw["joints"]).items()}),
-        ).with_more(**{name: _text(text) for name, text in more.items()}),
-    )
+    heading: dict[str, Any] = {n: None if raw[n] is None else read(raw[n]) for n, read in _HEADING.items()}
+    answers = Answers(
+        **heading,
+        joints=MappingProxyType({int(n): _joint_from_json(answer) for n, answer in dict(raw["joints"]).items()}),
+    ).with_more(**{name: _text(text) for name, text in more.items()})
+    started = datetime.fromisoformat(raw["started"])
+    return Session(_text(raw["id"]) or "", _text(raw["gear"]) or "", started, answers)
 
 
 def _joint_from_json(raw: Any) -> JointAnswer:
@@ -259,3 +246,10 @@ def _text(raw: Any) -> str | None:
     if raw is not None and not (isinstance(raw, str) and raw.isprintable()):
         raise TypeError(f"{raw!r} is not a text")
     return raw
+
+
+# The heading of an entry: a text or a choice, or nothing yet.
+_HEADING: dict[str, Callable[[Any], Any]] = {
+    **dict.fromkeys(("record_id", "tail_no"), _text),
+    **{"side": Side, "unit": LengthUnit, "convention": ClearanceConvention},
+}
