@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import Cell, column_letters
 from mlg_troubleshoot.records.columns import IDENTITY, Kind
 from mlg_troubleshoot.records.headers import Standing, recognise
@@ -81,17 +80,15 @@ def read_form(form: Form, options: ReadOptions, *, file: str | None, sheet: str 
     labels = [label for _, label, _ in form.lines]
     label_places = [(row, f"{letters}{row}") for row, _, _ in form.lines]
     value_places = [(row, f"{values}{row}") for row, _, _ in form.lines]
-    columns = ColumnReader(options, file, sheet).place(labels, form.lines[0][0], places=label_places)
-    out.problems += columns.problems
+    table = TableInHand(options, file, sheet, out.problems.append, options.decimal_comma)
+    columns = ColumnReader(table).place(labels, form.lines[0][0], places=label_places)
     out.notes += columns.notes()
-    row_problems: list[Problem] = []
-    reader = RowReader(columns.placed, TableInHand(options, file, sheet, row_problems.append, options.decimal_comma))
+    reader = RowReader(columns.placed, table)
     named = list(zip((row for row, _, _ in form.lines), columns.placed, strict=True))
     ids = [row for row, p in named if p.field is not None and p.field.kind is Kind.RECORD_ID]
     start = ids[0] if ids else form.lines[0][0]
     out.rows.append(reader.read(start, [value for _, _, value in form.lines], value_places))
     out.invalid_content[out.rows[0].source] = hash(tuple(value for _, _, value in form.lines))
-    out.problems += row_problems
     read = tuple(ColumnReading(form.value_column, p.header, p.read_as, row) for row, p in named)
     ends = form.lines[0][0], form.lines[-1][0]
     out.layouts.append(SheetLayout(file, sheet, "form", *ends, form.value_column + 1, read))

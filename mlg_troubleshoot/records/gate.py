@@ -29,16 +29,16 @@ def judge_row(values: Mapping[str, object], options: ReadOptions) -> tuple[Inspe
     """Judge values by column name as a table with these headers and one row would be."""
     if not any(name.startswith("clearance_") and name != Kind.CONVENTION for name in values):
         values = {**values, f"clearance_{options.joint_numbers[0]}": None}
-    columns = ColumnReader(options, None, None, by_hand=True).place(list(values), 1)
-    problems = [replace(p, row=None, cell=None) for p in columns.problems]
+    problems: list[Problem] = []
+    table = TableInHand(
+        options, None, None, lambda p: problems.append(replace(p, row=None, cell=None)), options.decimal_comma
+    )
+    columns = ColumnReader(table, by_hand=True).place(list(values), 1)
     problems += [
         Problem("column_unknown", None, None, None, p.header, None, p.header, "a column of the inspection table", "")
         for p in columns.placed
         if p.field is None and not p.refused
     ]
-    table = TableInHand(
-        options, None, None, lambda p: problems.append(replace(p, row=None, cell=None)), options.decimal_comma
-    )
     reader = RowReader(columns.placed, table)
     return replace(reader.read(1, [_cell(value) for value in values.values()]), source=RowSource()), problems
 

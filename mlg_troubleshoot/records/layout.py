@@ -7,11 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import Cell, column_letters, show, writable
-from mlg_troubleshoot.records.columns import ALONG, IDENTITY, LENGTHS, PER_JOINT, REQUIRED, Field, Kind
+from mlg_troubleshoot.records.columns import ALONG, CARRIED, IDENTITY, LENGTHS, PER_JOINT, REQUIRED, Kind
 from mlg_troubleshoot.records.headers import Recognition, Standing, near_miss, parse_target, recognise, tidy
-from mlg_troubleshoot.records.model import ReadOptions
+from mlg_troubleshoot.records.model import ReadOptions, TableInHand
 from mlg_troubleshoot.records.refusals import HEADER_SEARCH_ROWS
 from mlg_troubleshoot.records.rows import PlacedField
 from mlg_troubleshoot.records.source import MergedRange, NumberedRow
@@ -37,7 +36,7 @@ class Header:
 
 @dataclass(slots=True)
 class Columns:
-    """The columns of a table, with what was wrong with its header.
+    """The columns of a table.
 
     mapped, carried: headers that are not canonical with what they were read as; headers of what is only carried.
     ids_made: True if there is no column of record ids.
@@ -45,7 +44,6 @@ class Columns:
     """
 
     placed: list[PlacedField]
-    problems: list[Problem] = field(default_factory=list)
     mapped: list[str] = field(default_factory=list)
     carried: list[str] = field(default_factory=list)
     ids_made: bool = False
@@ -171,12 +169,11 @@ def _unit_row(header: Header, cells: Sequence[Cell], options: ReadOptions) -> tu
 
 
 class ColumnReader:
-    def __init__(self, options: ReadOptions, file: str | None, sheet: str | None, *, by_hand: bool = False) -> None:
-        self._options = options
+    def __init__(self, table: TableInHand, *, by_hand: bool = False) -> None:
+        self._table = table
+        self._options = table.options
         # True if the program named the columns: then none can be renamed or mapped.
         self._by_hand = by_hand
-        self._file = file
-        self._sheet = sheet
 
     def _recognise(self, text: str, index: int) -> tuple[Recognition, bool]:
         """Read one header; True if the caller mapped it."""
@@ -205,12 +202,12 @@ class ColumnReader:
             found, mapped = self._recognise(text, index)
             known = found.field
             if known is not None and index < len(units) and units[index] is not None:
-                known = self._with_unit(known, units[index])
+                known = replace(known, unit=known.unit or units[index])
             readings.append((found, mapped))
             placed = PlacedField(index, text, known, found.standing is Standing.DOUBTFUL, cell, header_row)
             columns.placed.append(placed)
             if placed.refused:
-                columns.problems.append(self._doubtful(placed, found))
+                self._doubt(placed, found)
         self._joint_columns(columns)
         self._duplicates(columns)
         for placed, (found, mapped) in zip(columns.placed, readings, strict=True):
@@ -219,10 +216,6 @@ class ColumnReader:
         self._missing(columns, row)
         self._unused_map(columns, row)
         return columns
-
-    @staticmethod
-    def _with_unit(known: Field, unit: LengthUnit | None) -> Field:
-        return known if known.unit is not None else replace(known, unit=unit)
 
     def _note(self, columns: Columns, placed: PlacedField, found: Recognition, mapped: bool, *, in_form: bool) -> None:
         if placed.field is None:
@@ -233,28 +226,24 @@ class ColumnReader:
         elif mapped or (placed.header != placed.field.label if in_form else placed.header != placed.field.name):
             columns.mapped.append(f'"{placed.header}" {placed.field.name}')
 
-    def _problem(self, code: str, placed: PlacedField, expected: str, remedy: str) -> Problem:
-        where = placed.header_row, placed.header, placed.header_cell
-        return Problem(code, self._file, self._sheet, *where, placed.header, expected, remedy)
+    def _tell(self, code: str, placed: PlacedField, expected: str, remedy: str) -> None:
+        self._table.tell(code, placed.header, expected, remedy, placed.header_row, placed.header, placed.header_cell)
 
-    def _doubtful(self, placed: PlacedField, found: Recognition) -> Problem:
+    def _doubt(self, placed: PlacedField, found: Recognition) -> None:
         target = found.nearest or "clearance_3_in"
         if found.code == "joint_unknown":
-            low, high = min(self._options.joint_numbers), max(self._options.joint_numbers)
-            return self._problem(
-                found.code,
-                placed,
-                f"a joint from {low} to {high}",
-                f"{found.reason[:1].upper()}{found.reason[1:]}."
-                + ("" if self._by_hand else f' The nearest names are {target}: pass --map "{placed.header}=COLUMN".'),
+            joints = self._options.joint_numbers
+            expected = f"a joint from {min(joints)} to {max(joints)}"
+            remedy = f"{found.reason[:1].upper()}{found.reason[1:]}."
+            if not self._by_hand:
+                remedy += f' The nearest names are {target}: pass --map "{placed.header}=COLUMN".'
+        else:
+            expected = "a header that can be understood, such as clearance_3_mm"
+            remedy = (
+                f'The header is doubtful: {found.reason}. If {target} is meant, pass --map "{placed.header}={target}" '
+                f'(a length with its unit); to leave the column unread, pass --map "{placed.header}=carry".'
             )
-        return self._problem(
-            found.code,
-            placed,
-            "a header that can be understood, such as clearance_3_mm",
-            f'The header is doubtful: {found.reason}. If {target} is meant, pass --map "{placed.header}={target}" '
-            f'(a length with its unit); to leave the column unread, pass --map "{placed.header}=carry".',
-        )
+        self._tell(found.code, placed, expected, remedy)
 
     def _joint_columns(self, columns: Columns) -> None:
         """Tell a long table from a wide one; a clearance without its joint is doubtful in a wide one."""
@@ -277,7 +266,7 @@ class ColumnReader:
 
     def _refuse(self, columns: Columns, placed: PlacedField, code: str, expected: str, remedy: str) -> None:
         columns.placed[placed.index] = replace(placed, refused=True)
-        columns.problems.append(self._problem(code, placed, expected, remedy))
+        self._tell(code, placed, expected, remedy)
 
     def _duplicates(self, columns: Columns) -> None:
         seen: dict[tuple[Kind, int | None], PlacedField] = {}
@@ -293,6 +282,10 @@ class ColumnReader:
                 other = placed if plain[0] is first else first
                 columns.placed[other.index] = replace(other, field=None)
                 seen[placed.field.quantity] = plain[0]
+                continue
+            if placed.field.kind in CARRIED:
+                # A second column of remarks is a column of its own.
+                columns.placed[placed.index] = replace(placed, field=None)
                 continue
             columns.placed[first.index] = replace(columns.placed[first.index], refused=True)
             self._refuse(
@@ -321,14 +314,12 @@ class ColumnReader:
             hint = next((h for h in unknown if close and tidy(h).replace(" ", "_") == close[0]), None)
             like = f' If "{hint}" is meant, pass --map "{hint}={name}".' if hint else ""
             remedy = f"Add the column, or name the one that is meant with --map.{like}"
-            place = self._file, self._sheet, row, name, None
-            columns.problems.append(Problem("column_missing", *place, None, expected, remedy))
+            self._table.tell("column_missing", None, expected, remedy, row, name)
 
     def _unused_map(self, columns: Columns, row: int) -> None:
         for key in self._options.column_map:
-            used = any(tidy(key) == tidy(p.header) or key == column_letters(p.index) for p in columns.placed)
-            if not used:
+            if not any(tidy(key) == tidy(p.header) or key == column_letters(p.index) for p in columns.placed):
                 headers = ", ".join(p.header for p in columns.placed if p.header)
-                place, expected = (self._file, self._sheet, row), f"one of the headers of the table: {headers[:200]}"
+                expected = f"one of the headers of the table: {headers[:200]}"
                 remedy = "Correct the header named in --map."
-                columns.problems.append(Problem("map_header_unknown", *place, key, None, key, expected, remedy))
+                self._table.tell("map_header_unknown", key, expected, remedy, row, key)

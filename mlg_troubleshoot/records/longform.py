@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.records.cells import Cell, OddCell, column_letters, quote, show
 from mlg_troubleshoot.records.columns import PER_JOINT, Field, Kind
 from mlg_troubleshoot.records.headers import tidy
@@ -150,10 +150,7 @@ class LongReader:
             warnings = (*read.warnings, *group.warnings)
             if group.bad:
                 correct = (*group.bad, *(read.correct if isinstance(read, InvalidRow) else ()))
-                source = RowSource(self._table.file, self._table.sheet, group.row)
-                done.append(
-                    InvalidRow(read.record_id, read.tail_no, read.side, tuple(dict.fromkeys(correct)), warnings, source)
-                )
-            else:
-                done.append(replace(read, warnings=warnings))
+                named, source = tuple(dict.fromkeys(correct)), self._table.source(group.row)
+                read = InvalidRow(read.record_id, read.tail_no, read.side, named, source=source)
+            done.append(replace(read, warnings=warnings))
         return done

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
@@ -103,6 +103,9 @@ class TableInHand:
     sheet: str | None
     report: Callable[[Problem], None]
     decimal_comma: bool
+
+    def source(self, row: int) -> RowSource:
+        return RowSource(self.file, self.sheet, row)
 
     def tell(
         self,

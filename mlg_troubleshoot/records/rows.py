@@ -19,7 +19,6 @@ from mlg_troubleshoot.decision.inspection import (
     Inspection,
     InvalidRow,
     Outcome,
-    RowSource,
     Side,
 )
 from mlg_troubleshoot.records.cells import Cell, OddCell, OddKind, column_letters, quote, show, writable
@@ -61,6 +60,11 @@ _CONVENTION_HINTS = {
     **dict.fromkeys(("play", "total", "tir", "dial"), "TOTAL_PLAY"),
 }
 
+_MISSING_CONVENTION = (
+    "RADIAL, DIAMETRAL or TOTAL_PLAY",
+    "Say how the clearances were taken, in the column clearance_convention or with --convention: RADIAL is "
+    "the offset of the centres, DIAMETRAL is bore minus pin, TOTAL_PLAY is the dial reading.",
+)
 _NEVER_BLANK = (VERDICT_BEARING - {Kind.CLEARANCE}) | {*CARRIED, Kind.GAUGE_ID, Kind.TECHNICIAN_ID}
 _SIGNED = frozenset({Kind.PLUNGER_DOWN_LOCK, Kind.PLUNGER_POSITION, Kind.PLUNGER_DISPLACEMENT})
 # What else a row may say, read cell by cell; the flag says whether a comma is the decimal mark.
@@ -133,7 +137,7 @@ class RowReader:
     @staticmethod
     def _unknown_names(placed: Sequence[PlacedField]) -> list[tuple[int, str]]:
         names: list[tuple[int, str]] = []
-        seen: set[str] = set()
+        seen = {p.field.kind.value for p in placed if p.field is not None and p.field.kind in CARRIED}
         for p in placed:
             if p.field is None and not p.refused:
                 name = p.header or f"column {column_letters(p.index)}"
@@ -162,7 +166,7 @@ class RowReader:
 
         for place, found in sorted(self._faults, key=lambda fault: fault[0]):
             self._tell(place, found)
-        source = RowSource(self._table.file, self._table.sheet, row)
+        source = self._table.source(row)
         if self._bad or record_id is None or tail_no is None or side is None or convention is None:
             return InvalidRow(record_id, tail_no, side, self._correct(), tuple(warnings), source)
         if self._clearances and not clearance:
@@ -219,7 +223,7 @@ class RowReader:
     ) -> InvalidRow:
         shown = quote(",".join(show(c) for c in cells), 80)
         self._table.tell(code, f"{found}: {shown}", expected, remedy, row)
-        return InvalidRow(record_id, None, None, ("row",), (), RowSource(self._table.file, self._table.sheet, row))
+        return InvalidRow(record_id, None, None, ("row",), (), self._table.source(row))
 
     def _begin(self, row: int, cells: Sequence[Cell], places: Sequence[tuple[int, str]] | None) -> None:
         """Take up a row: fill it to the width of the header, and leave out what was not measured."""
@@ -277,50 +281,39 @@ class RowReader:
         return self._required(self._at.get(Kind.SIDE), read)
 
     def _read_convention(self) -> ClearanceConvention | None:
-        index = self._at.get(Kind.CONVENTION)
+        index, declared = self._at.get(Kind.CONVENTION), self._options.convention
         cell = None if index is None else self._cells[index]
-        if cell is None or index is None:
-            if self._options.convention is None and self._is_curve_alone():
-                return ClearanceConvention.RADIAL
-            if self._options.convention is None:
-                self._report_missing_convention(index, "RADIAL, DIAMETRAL or TOTAL_PLAY")
-            return self._options.convention
-        return self._required(
-            index, lambda _: read_choice(cell, ClearanceConvention, "convention_unknown", _CONVENTION_HINTS)
-        )
+        if cell is not None:
+            return self._required(
+                index, lambda _: read_choice(cell, ClearanceConvention, "convention_unknown", _CONVENTION_HINTS)
+            )
+        if declared is None and self._is_curve_alone():
+            return ClearanceConvention.RADIAL
+        if declared is None and index is not None:
+            self._fault(index, CellFaultError("convention_missing", *_MISSING_CONVENTION))
+        elif declared is None:
+            self._bad.add(-1)
+            self._table.tell("convention_missing", None, *_MISSING_CONVENTION, self._row, Kind.CONVENTION.value)
+        return declared
 
     def _is_curve_alone(self) -> bool:
         """A position along the stroke needs no clearance, and then no convention of one."""
         filled = [kind in self._at and self._cells[self._at[kind]] is not None for kind in ALONG]
         return all(filled) and all(self._cells[index] is None for _, index, _unit in self._clearances)
 
-    def _report_missing_convention(self, index: int | None, expected: str) -> None:
-        remedy = (
-            "Say how the clearances were taken, in the column clearance_convention or with --convention: RADIAL is "
-            "the offset of the centres, DIAMETRAL is bore minus pin, TOTAL_PLAY is the dial reading."
-        )
-        fault = CellFaultError("convention_missing", expected, remedy)
-        if index is not None:
-            self._fault(index, fault)
-            return
-        self._bad.add(-1)
-        self._table.tell(fault.code, None, expected, remedy, self._row, Kind.CONVENTION.value)
-
     def _read_row_unit(self) -> LengthUnit | None:
-        default, index = self._options.unit, self._at.get(Kind.UNIT)
+        index = self._at.get(Kind.UNIT)
         if index is None or self._cells[index] is None:
-            return default
-        cell = self._cells[index]
-        try:
-            if isinstance(cell, str):
-                unit = UNIT_SPELLINGS.get(plain_text(cell).lower())
-                if unit is not None:
-                    self._check_headers_agree(unit)
-                    return unit
-            raise CellFaultError("unit_unknown", "in, thou or mm", "Enter in, thou or mm.")
-        except CellFaultError as fault:
-            self._fault(index, fault)
-            return default
+            return self._options.unit
+
+        def read(cell: Cell) -> LengthUnit:
+            unit = UNIT_SPELLINGS.get(plain_text(cell).lower()) if isinstance(cell, str) else None
+            if unit is None:
+                raise CellFaultError("unit_unknown", "in, thou or mm", "Enter in, thou or mm.")
+            self._check_headers_agree(unit)
+            return unit
+
+        return self._required(index, read) or self._options.unit
 
     def _check_headers_agree(self, unit: LengthUnit) -> None:
         """Refuse a row whose unit is not the one that a header with something below it states."""
@@ -363,29 +356,24 @@ class RowReader:
         row_unit: LengthUnit | None,
         scale: ClearanceConvention,
     ) -> tuple[float, EnteredClearance, bool]:
-        limit = self._options.clearance_hard_max_in
-        high = (unit or row_unit or LengthUnit.INCH).from_inches(limit * scale.per_radial)
-        shown = (unit or row_unit or LengthUnit.INCH).value
-        expected = f"a clearance from 0 to {high:.4g} {shown}"
+        limit, usual = self._options.clearance_hard_max_in, self._options.clearance_confirm_above_in
+        stated = unit or row_unit or LengthUnit.INCH
+
+        def expected(shown: LengthUnit) -> str:
+            return f"a clearance from 0 to {shown.from_inches(limit * scale.per_radial):.4g} {shown.value}"
+
         try:
-            value_in, found, text = self._length(cell, unit, row_unit, signed=False, expected=expected)
+            value_in, found, text = self._length(cell, unit, row_unit, signed=False, expected=expected(stated))
         except CellFaultError as fault:
             if fault.code == "length_negative":
-                raise CellFaultError("clearance_negative", fault.expected, fault.remedy) from None
+                fault.code = "clearance_negative"
             raise
         radial_in = value_in / scale.per_radial
         if radial_in > limit + _EPS_IN:
-            slip = scale_slip(radial_in, found, scale, self._options.clearance_confirm_above_in)
-            raise CellFaultError(
-                "clearance_out_of_range",
-                f"a clearance from 0 to {found.from_inches(limit * scale.per_radial):.4g} {found.value}",
-                slip or "Measure again, or check the unit and the decimal point.",
-            )
-        return (
-            radial_in + 0.0,
-            EnteredClearance(text, found),
-            radial_in > self._options.clearance_confirm_above_in + _EPS_IN,
-        )
+            slip = scale_slip(radial_in, found, scale, usual)
+            remedy = slip or "Measure again, or check the unit and the decimal point."
+            raise CellFaultError("clearance_out_of_range", expected(found), remedy)
+        return radial_in + 0.0, EnteredClearance(text, found), radial_in > usual + _EPS_IN
 
     def _length(
         self,

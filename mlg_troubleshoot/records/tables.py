@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import Cell, column_letters, quote
-from mlg_troubleshoot.records.columns import CARRIED, Kind
+from mlg_troubleshoot.records.columns import Kind
 from mlg_troubleshoot.records.layout import ColumnReader, Columns, Header
 from mlg_troubleshoot.records.longform import LongReader
 from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout, TableInHand
@@ -44,11 +44,9 @@ def read_table(
     tick: Callable[[int], None],
 ) -> Collected:
     out = Collected()
-    columns = ColumnReader(options, file, sheet.name).place(header.texts, header.row, units=header.units)
-    _spare_carried(columns)
-    out.problems += columns.problems
     comma = options.decimal_comma or delimiter == ";"
     in_hand = TableInHand(options, file, sheet.name, out.problems.append, comma)
+    columns = ColumnReader(in_hand).place(header.texts, header.row, units=header.units)
     table = _Table(sheet, header, columns, in_hand, delimiter, out)
     pending = 0
     for number, cells in rows:
@@ -148,11 +146,8 @@ class _Table:
         if self._long is not None:
             notes.append("long layout: one row is one joint's reading; rows with one record id are one inspection")
         if self._repeated:
-            notes.append(
-                f"{self._repeated} repeated header rows were skipped"
-                if self._repeated > 1
-                else "a repeated header row was skipped"
-            )
+            again = f"{self._repeated} repeated header rows were" if self._repeated > 1 else "a repeated header row was"
+            notes.append(f"{again} skipped")
         if self._aside:
             count = f"{len(self._aside)} rows are" if len(self._aside) > 1 else "1 row is"
             shown = ", ".join(self._aside[:5]) + (", …" if len(self._aside) > 5 else "")
@@ -176,42 +171,16 @@ def _header_test(header: Header) -> Callable[[Sequence[Cell]], bool]:
     return is_header
 
 
-def _spare_carried(columns: Columns) -> None:
-    """Keep a second column of remarks as a column of its own instead of refusing it."""
-    kept: list[Problem] = []
-    for problem in columns.problems:
-        placed = next((p for p in columns.placed if p.header_cell == problem.cell), None)
-        spared = (
-            problem.code == "header_duplicate"
-            and placed is not None
-            and placed.field is not None
-            and placed.field.kind in CARRIED
-        )
-        if not spared or placed is None or placed.field is None:
-            kept.append(problem)
-            continue
-        quantity = placed.field.quantity
-        first = next(p for p in columns.placed if p.field is not None and p.field.quantity == quantity)
-        columns.placed[first.index] = replace(first, refused=False)
-        columns.placed[placed.index] = replace(placed, field=None, refused=False)
-    columns.problems[:] = kept
-
-
 def _hidden_notes(sheet: Sheet, columns: Columns, header_row: int) -> list[str]:
     notes: list[str] = []
-    facts = sheet.facts
+    facts, width = sheet.facts, len(columns.placed)
     hidden = sum(1 for row in facts.hidden_rows if row > header_row)
     if hidden:
         notes.append(f"{hidden} hidden or filtered {'rows were' if hidden > 1 else 'row was'} read too")
-    width = len(columns.placed)
-    blocks = [(a, min(b, width - 1)) for a, b in facts.hidden_columns if a < width]
-    for first, last in blocks:
-        letters = column_letters(first) if first == last else f"{column_letters(first)} to {column_letters(last)}"
-        notes.append(f"hidden column {letters} was read too")
-    if facts.formulas:
-        counts = ", ".join(
-            f"{column_letters(index)} ({count})" for index, count in sorted(facts.formulas.items()) if index < width
-        )
-        if counts:
-            notes.append(f"formulas were read by their last calculated values: column {counts}")
+    for first, last in facts.hidden_columns:
+        ends = dict.fromkeys(column_letters(index) for index in (first, min(last, width - 1)))
+        notes += [f"hidden column {' to '.join(ends)} was read too"] * (first < width)
+    counts = [f"{column_letters(index)} ({n})" for index, n in sorted(facts.formulas.items()) if index < width]
+    if counts:
+        notes.append(f"formulas were read by their last calculated values: column {', '.join(counts)}")
     return notes

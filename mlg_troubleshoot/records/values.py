@@ -16,11 +16,37 @@ from mlg_troubleshoot.units import LengthUnit, parse_length
 class CellFaultError(Exception):
     """A cell that does not hold what its column needs; caught by the row reader and made a `Problem`."""
 
-    def __init__(self, code: str, expected: str, remedy: str) -> None:
+    def __init__(self, code: str, expected: str, remedy: str = "") -> None:
         super().__init__(code)
         self.code = code
         self.expected = expected
-        self.remedy = remedy
+        self.remedy = remedy or _USUAL[code]
+
+
+# The remedy by the code of a fault; a fault that knows better says so itself.
+_USUAL = {
+    "cell_is_boolean": "The cell holds TRUE or FALSE. Enter the value.",
+    "cell_is_date": "The cell is formatted as a date or time; a fraction such as 1/8 is turned into one. Format the "
+    "cell as a number (or text) and enter the value again.",
+    "date_ambiguous": "Which number is the day and which the month is not guessed. Enter year-month-day, for example "
+    "2026-03-04.",
+    "date_invalid": "Enter year-month-day, for example 2026-03-04.",
+    "date_out_of_range": "Check the year.",
+    "date_serial": "The cell holds a bare number. Format it as a date, or enter year-month-day as text.",
+    "formula_without_value": "The formula has never been calculated. Open the file in a spreadsheet program, save it, "
+    "read it again.",
+    "fraction": "Fractions are not read. Enter a decimal number, for example 0.125.",
+    "length_negative": "It cannot be less than zero. Enter the value as measured, or leave it blank if it was not "
+    "measured.",
+    "not_a_number": "Enter a plain number, or leave it blank if it is not known.",
+    "not_finite": "Enter a number, or leave it blank if it was not measured.",
+    "number_lost_digits": "A spreadsheet keeps 15 digits of a number. Format the cell as text and enter it again.",
+    "out_of_range": "Check the number and the unit, or leave it blank if it is not known.",
+    "text_control_character": "It holds a line break or an invisible character. Enter it again.",
+    "text_unwritable": "It holds a character that no file can carry. Enter the text again.",
+    "unit_missing": "Nothing says the unit. Write it with the value (0.013 in, 13 thou, 0.33 mm) or in the header "
+    "(_in, _thou, _mm), or pass --unit.",
+}
 
 
 _MINUS = "-\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"
@@ -43,28 +69,17 @@ _E = TypeVar("_E", bound=StrEnum)
 _CHOICES: dict[type[StrEnum], dict[str, StrEnum]] = {}
 
 
-_ODD_CELLS = {
-    OddKind.ERROR: (
-        "cell_error",
-        "The cell shows the error {text}, which is not the same as not measured. Enter the value, or empty the cell if "
-        "it was not measured.",
-    ),
-    OddKind.NO_VALUE: (
-        "formula_without_value",
-        "The formula has never been calculated. Open the file in a spreadsheet program, save it, read it again.",
-    ),
-    OddKind.DATE: (
-        "cell_is_date",
-        "The cell is formatted as a date or time; a fraction such as 1/8 is turned into one. Format the cell as a "
-        "number (or text) and enter the value again.",
-    ),
-}
+_ODD_CELLS = {OddKind.NO_VALUE: "formula_without_value", OddKind.DATE: "cell_is_date"}
 
 
 def odd_cell_fault(cell: OddCell, expected: str) -> CellFaultError:
     """Return the fault of a cell that holds an error, a date, a truth value or nothing that was computed."""
-    code, remedy = _ODD_CELLS.get(cell.kind, ("cell_is_boolean", "The cell holds TRUE or FALSE. Enter the value."))
-    return CellFaultError(code, expected, remedy.replace("{text}", cell.text))
+    if cell.kind is OddKind.ERROR:
+        said = f"The cell shows the error {cell.text}, which is not the same as not measured."
+        return CellFaultError(
+            "cell_error", expected, f"{said} Enter the value, or empty the cell if it was not measured."
+        )
+    return CellFaultError(_ODD_CELLS.get(cell.kind, "cell_is_boolean"), expected)
 
 
 def plain_text(text: str) -> str:
@@ -85,13 +100,9 @@ def read_length(
     else:
         raise odd_cell_fault(cell, expected)
     if not math.isfinite(value):
-        raise _not_finite(expected)
+        raise CellFaultError("not_finite", expected)
     if value < 0 and not signed:
-        raise CellFaultError(
-            "length_negative",
-            expected,
-            "It cannot be less than zero. Enter the value as measured, or leave it blank if it was not measured.",
-        )
+        raise CellFaultError("length_negative", expected)
     if written is not None and unit is not None and written is not unit:
         same = f"{unit.from_inches(written.to_inches(value)):.6g}"
         raise CellFaultError(
@@ -102,24 +113,15 @@ def read_length(
         )
     found = written or unit
     if found is None:
-        raise CellFaultError(
-            "unit_missing",
-            f"{expected} with its unit",
-            "Nothing says the unit. Write it with the value (0.013 in, 13 thou, 0.33 mm) or in the header (_in, _thou, "
-            "_mm), or pass --unit.",
-        )
+        raise CellFaultError("unit_missing", f"{expected} with its unit")
     return found.to_inches(value), found, text
-
-
-def _not_finite(expected: str) -> CellFaultError:
-    return CellFaultError("not_finite", expected, "Enter a number, or leave it blank if it was not measured.")
 
 
 def _written_length(
     text: str, decimal_comma: bool, expected: str, unit: LengthUnit | None
 ) -> tuple[float, LengthUnit | None]:
     if _NOT_FINITE.fullmatch(text):
-        raise _not_finite(expected)
+        raise CellFaultError("not_finite", expected)
     sign = _SIGNED.match(text)
     body = text[sign.end() :] if sign is not None else text
     if decimal_comma and _COMMA_NUMBER.fullmatch(body):
@@ -135,22 +137,20 @@ def _written_length(
 _EXAMPLES = {LengthUnit.INCH: "0.013", LengthUnit.THOU: "13", LengthUnit.MILLIMETRE: "0.33"}
 
 
+def _comma_fault(text: str, expected: str) -> CellFaultError:
+    remedy = f"If the comma is the decimal mark, enter {text.replace(',', '.')} or pass --decimal-comma."
+    return CellFaultError("decimal_comma", f"{expected}, with a decimal point", remedy)
+
+
 def _length_fault(text: str, body: str, expected: str, unit: LengthUnit | None) -> CellFaultError:
     if _COMMA_NUMBER.fullmatch(body):
-        return CellFaultError(
-            "decimal_comma",
-            f"{expected}, with a decimal point",
-            f"If the comma is the decimal mark, enter {text.replace(',', '.')} or pass --decimal-comma.",
-        )
+        return _comma_fault(text, expected)
     if re.fullmatch(r"\d+\s*/\s*\d+.*", body):
-        return CellFaultError(
-            "fraction", expected, "Fractions are not read. Enter a decimal number, for example 0.125."
-        )
+        return CellFaultError("fraction", expected)
     # A unit beside the number is refused where the header states another: the example is in the header's.
     example = f"{_EXAMPLES[unit]} ({unit.value})" if unit is not None else "0.013 in, 13 thou or 0.33 mm"
-    return CellFaultError(
-        "not_a_length", expected, f"Enter a number, for example {example}, or leave it blank if it was not measured."
-    )
+    remedy = f"Enter a number, for example {example}, or leave it blank if it was not measured."
+    return CellFaultError("not_a_length", expected, remedy)
 
 
 def read_number(
@@ -165,11 +165,9 @@ def read_number(
     else:
         value = _written_number(plain_text(cell), decimal_comma, expected, suffix)
     if not math.isfinite(value):
-        raise _not_finite(expected)
+        raise CellFaultError("not_finite", expected)
     if not low <= value <= high:
-        raise CellFaultError(
-            "out_of_range", expected, "Check the number and the unit, or leave it blank if it is not known."
-        )
+        raise CellFaultError("out_of_range", expected)
     return value
 
 
@@ -181,23 +179,16 @@ def _written_number(text: str, decimal_comma: bool, expected: str, suffix: str) 
         text = ("" if sign[1] == "+" else "-") + text[sign.end() :]
     if "," in text or decimal_comma:
         if _UNCLEAR_GROUP.fullmatch(text):
-            raise CellFaultError(
-                "ambiguous_number",
-                expected,
-                f"{text!r} may be a thousand or a fraction. Enter it without a separator for thousands.",
-            )
+            remedy = f"{text!r} may be a thousand or a fraction. Enter it without a separator for thousands."
+            raise CellFaultError("ambiguous_number", expected, remedy)
         if decimal_comma and _COMMA_NUMBER.fullmatch(text):
             text = text.replace(",", ".")
         elif _COMMA_NUMBER.fullmatch(text):
-            raise CellFaultError(
-                "decimal_comma",
-                f"{expected}, with a decimal point",
-                f"If the comma is the decimal mark, enter {text.replace(',', '.')} or pass --decimal-comma.",
-            )
+            raise _comma_fault(text, expected)
     if _NOT_FINITE.fullmatch(text):
-        raise _not_finite(expected)
+        raise CellFaultError("not_finite", expected)
     if not _PLAIN.fullmatch(text):
-        raise CellFaultError("not_a_number", expected, "Enter a plain number, or leave it blank if it is not known.")
+        raise CellFaultError("not_a_number", expected)
     return float(text)
 
 
@@ -206,21 +197,13 @@ def read_text(cell: str | float | OddCell, expected: str, *, required: bool = Fa
     if isinstance(cell, str):
         text = plain_text(cell)
         if UNWRITABLE.search(text):
-            raise CellFaultError(
-                "text_unwritable", expected, "It holds a character that no file can carry. Enter the text again."
-            )
+            raise CellFaultError("text_unwritable", expected)
         if required and any(ord(c) < 32 or 127 <= ord(c) < 160 for c in text):
-            raise CellFaultError(
-                "text_control_character", expected, "It holds a line break or an invisible character. Enter it again."
-            )
+            raise CellFaultError("text_control_character", expected)
         return text
     if isinstance(cell, float):
         if not math.isfinite(cell) or abs(cell) >= 1e15:
-            raise CellFaultError(
-                "number_lost_digits",
-                expected,
-                "A spreadsheet keeps 15 digits of a number. Format the cell as text and enter it again.",
-            )
+            raise CellFaultError("number_lost_digits", expected)
         return show_number(cell)
     if cell.kind is OddKind.PADDED:
         return cell.text
@@ -252,11 +235,7 @@ def read_date(cell: str | float | OddCell) -> date:
     """Read a day: ISO 8601 text, a text with the month as a word, or a cell that is formatted as a date."""
     expected = "a date as 2026-03-04 (year-month-day) or 4 Mar 2026"
     if isinstance(cell, float):
-        raise CellFaultError(
-            "date_serial",
-            expected,
-            "The cell holds a bare number. Format it as a date, or enter year-month-day as text.",
-        )
+        raise CellFaultError("date_serial", expected)
     if isinstance(cell, OddCell):
         if cell.kind is not OddKind.DATE:
             raise odd_cell_fault(cell, expected)
@@ -264,7 +243,7 @@ def read_date(cell: str | float | OddCell) -> date:
     else:
         day = _iso_day(plain_text(cell), expected)
     if day is None or not 1950 <= day.year <= 2100:
-        raise CellFaultError("date_out_of_range", expected, "Check the year.")
+        raise CellFaultError("date_out_of_range", expected)
     return day
 
 
@@ -282,23 +261,15 @@ _WORDED_DAY = re.compile(
 
 def _iso_day(text: str, expected: str) -> date:
     match = re.fullmatch(r"(\d{4}-\d{2}-\d{2})(?:[T ]\d{2}:\d{2}(?::\d{2}(?:\.\d+)?)?(?:Z|[+\-]\d{2}:?\d{2})?)?", text)
-    if match is not None:
-        try:
-            return date.fromisoformat(match[1])
-        except ValueError:
-            raise CellFaultError("date_invalid", expected, "There is no such day in the calendar.") from None
     worded = _WORDED_DAY.fullmatch(text)
-    if worded is not None:
-        year = int(worded["year"])
-        try:
+    try:
+        if match is not None:
+            return date.fromisoformat(match[1])
+        if worded is not None:
+            year = int(worded["year"])
             month = _MONTHS.index((worded["month"] or worded["first"])[:3].lower()) + 1
             return date(year + (2000 if year < 100 else 0), month, int(worded["day"] or worded["second"]))
-        except ValueError:
-            raise CellFaultError("date_invalid", expected, "There is no such day in the calendar.") from None
-    if re.fullmatch(r"\d{1,4}[./\-]\d{1,2}[./\-]\d{1,4}", text):
-        raise CellFaultError(
-            "date_ambiguous",
-            expected,
-            "Which number is the day and which the month is not guessed. Enter year-month-day, for example 2026-03-04.",
-        )
-    raise CellFaultError("date_invalid", expected, "Enter year-month-day, for example 2026-03-04.")
+    except ValueError:
+        raise CellFaultError("date_invalid", expected, "There is no such day in the calendar.") from None
+    numbers = re.fullmatch(r"\d{1,4}[./\-]\d{1,2}[./\-]\d{1,4}", text)
+    raise CellFaultError("date_invalid" if numbers is None else "date_ambiguous", expected)

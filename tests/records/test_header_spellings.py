@@ -128,6 +128,11 @@ def test_two_columns_of_remarks_are_both_kept(read, table):
     assert result.rows[0].carried == {"remarks": "a", "Comments": "b"}
 
 
+def test_two_columns_of_remarks_of_one_name_are_both_kept(read, table):
+    result = read(table((*HEADER, "clearance_3_in", "remarks", "remarks"), [(*GOOD, 0.013, "a", "b")]))
+    assert result.rows[0].carried == {"remarks": "a", "remarks (again)": "b"}
+
+
 def test_the_names_of_another_gear_are_known_when_given(read, table):
     text = table((*HEADER, "Clearance #3 – drag strut knuckle (in)"), [(*GOOD, 0.013)])
     assert read(text).problems
