@@ -57,6 +57,10 @@ class LinkageModel:
         if calibration.travel_in is not None:
             self.rate = self._calibrated_rate(calibration.travel_in)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """What it is made from travels to another process, where its formulas are written anew."""
+        return LinkageModel, (self.mechanism, self.stroke, self.calibration)
+
     def _calibrated_rate(self, travel_in: float) -> float:
         """Rate k that makes the travel from the least displacement to mid-position as prescribed."""
         direction = np.sign(self._mid - self._down_lock)

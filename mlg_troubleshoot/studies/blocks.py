@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
-from dataclasses import asdict, dataclass
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib import import_module
 from multiprocessing import get_context
@@ -22,16 +22,13 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.errors import OutputError, UsageError
-from mlg_troubleshoot.gear.model import Calibration, LinkageModel
 from mlg_troubleshoot.geometry.kernel import numba_is_installed
-from mlg_troubleshoot.geometry.mechanism import Mechanism
 from mlg_troubleshoot.studies.designs import middle_of_level, replicated_levels
 from mlg_troubleshoot.studies.displacement import HeldDirections
 from mlg_troubleshoot.studies.indices import failed_note
 from mlg_troubleshoot.studies.inputs import Inputs
 
 LEVELS_PER_BLOCK = 50
-Sizes = tuple[int, int, int]
 
 
 class Block(NamedTuple):
@@ -57,25 +54,20 @@ class BlockSums(NamedTuple):
     failed: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class BlockStudy:
     """Everything that a block depends on; it travels to other processes.
 
     n1, n2: repetitions and levels; `iterations` of them are averaged.
     """
 
-    mechanism: Mechanism
-    stroke: tuple[float, float]
-    calibration: Calibration
-    directions: tuple[float, ...]
-    sense: float
-    limits_in: tuple[float, ...]
-    distribution: str
-    n1: int
-    n2: int
-    iterations: int
-    seed: int
+    response: HeldDirections
+    inputs: Inputs
     geometry_sha256: str
+    seed: int
+    n1: int = 100
+    n2: int = 1000
+    iterations: int = 10
 
     def __post_init__(self) -> None:
         if self.n1 < 2 or self.n2 < 1 or self.iterations < 1:
@@ -86,7 +78,7 @@ class BlockStudy:
 
     @property
     def n(self) -> int:
-        return len(self.limits_in)
+        return len(self.inputs.limits_in)
 
     @property
     def evaluations(self) -> int:
@@ -103,11 +95,15 @@ class BlockStudy:
 
     def key(self) -> dict[str, Any]:
         """What must agree for blocks to be of one study; the hash stands for the linkage and its calibration."""
-        values = asdict(self)
-        kept = {k: v for k, v in values.items() if k not in ("mechanism", "stroke", "calibration")}
-        return json.loads(  # type: ignore[no-any-return]
-            json.dumps({**kept, "levels_per_block": LEVELS_PER_BLOCK, "compiled": numba_is_installed()})
-        )
+        return {
+            "directions": self.response.directions.tolist(),
+            "sense": self.response.sense,
+            "limits_in": self.inputs.limits_in.tolist(),
+            "distribution": self.inputs.distribution,
+            **{name: getattr(self, name) for name in ("n1", "n2", "iterations", "seed", "geometry_sha256")},
+            "levels_per_block": LEVELS_PER_BLOCK,
+            "compiled": numba_is_installed(),
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,40 +124,26 @@ class TotalOrder:
     note: str
 
 
-def block_study(
-    response: HeldDirections,
-    inputs: Inputs,
-    geometry_sha256: str,
-    seed: int,
-    sizes: tuple[int, int, int] = (100, 1000, 10),
-) -> BlockStudy:
-    """Describe a total-order study of a displacement of n1, n2 and iterations; else the paper's."""
-    model = response.model
-    turned, limits = tuple(response.directions.tolist()), tuple(np.asarray(inputs.limits_in, float).tolist())
-    what = model.mechanism, model.stroke, model.calibration, turned, response.sense, limits, inputs.distribution
-    return BlockStudy(*what, *sizes, seed, geometry_sha256)
-
-
 def compute_block(study: BlockStudy, block: Block) -> BlockSums:
-    response, inputs = _built(study)
-    levels = _levels(study, block.iteration)
-    n, n1 = study.n, study.n1
+    response = replace(study.response, compiled=numba_is_installed())
+    n, n1, n2 = study.n, study.n1, study.n2
+    levels = _levels(n, n1, n2, study.seed, block.iteration)
     within = np.zeros(n)
     total = squares = 0.0
     failed = 0
-    wide = np.empty((n, n1 * n1))
+    wide = np.empty((n, n1, n1))
     for level in range(block.start, block.stop):
-        clearance = inputs.at(middle_of_level(levels[:, level, :], study.n2))
+        clearance = study.inputs.at(middle_of_level(levels[:, level, :], n2))
         base = response(clearance)
         total += float(base.sum())
         squares += float((base * base).sum())
         failed += int(np.count_nonzero(~np.isfinite(base)))
         columns = clearance.T
-        wide.reshape(n, n1, n1)[:] = columns[:, :, None]
+        wide[:] = columns[:, :, None]
         for i in range(n):
-            wide.reshape(n, n1, n1)[i] = columns[i][None, :]
-            values = response.by_rows(wide).reshape(n1, n1)
-            wide.reshape(n, n1, n1)[i] = columns[i][:, None]
+            wide[i] = columns[i][None, :]
+            values = response.by_rows(wide.reshape(n, -1)).reshape(n1, n1)
+            wide[i] = columns[i][:, None]
             spread = values - values.mean(axis=1, keepdims=True)
             variance = float(np.einsum("ij,ij->", spread, spread)) / (n1 - 1)
             within[i] += variance
@@ -171,17 +153,10 @@ def compute_block(study: BlockStudy, block: Block) -> BlockSums:
     return BlockSums(tuple(within.tolist()), total, squares, count, count * (n1 * n + 1), failed)
 
 
-@lru_cache(maxsize=4)
-def _built(study: BlockStudy) -> tuple[HeldDirections, Inputs]:
-    model = LinkageModel(study.mechanism, study.stroke, study.calibration)
-    response = HeldDirections(model, np.array(study.directions), study.sense, compiled=numba_is_installed())
-    return response, Inputs(np.array(study.limits_in), study.distribution)
-
-
 @lru_cache(maxsize=2)
-def _levels(study: BlockStudy, iteration: int) -> Wholes:
-    stream = np.random.SeedSequence(study.seed, spawn_key=(iteration,))
-    return replicated_levels(study.n, study.n1, study.n2, np.random.default_rng(stream))
+def _levels(n: int, n1: int, n2: int, seed: int, iteration: int) -> Wholes:
+    stream = np.random.SeedSequence(seed, spawn_key=(iteration,))
+    return replicated_levels(n, n1, n2, np.random.default_rng(stream))
 
 
 def total_order_study(
@@ -227,19 +202,11 @@ def _on_this_machine(study: BlockStudy, blocks: list[Block], workers: int) -> It
     else:
         # Forking a process that has threads of its own can hang; a fresh interpreter cannot.
         pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
-    waiting: dict[Future[BlockSums], Block] = {}
-    with pool:
-        try:
-            for block in blocks:
-                waiting[pool.submit(compute_block, study, block)] = block
-                if len(waiting) == 2 * workers:
-                    finished, _ = wait(waiting, return_when=FIRST_COMPLETED)
-                    yield from [(waiting.pop(future), future.result()) for future in finished]
-            for future in list(waiting):
-                yield waiting.pop(future), future.result()
-        finally:
-            for future in waiting:
-                future.cancel()
+    try:
+        waiting = {pool.submit(compute_block, study, block): block for block in blocks}
+        yield from ((waiting[future], future.result()) for future in as_completed(waiting))
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def _summed(study: BlockStudy, done: dict[Block, BlockSums]) -> TotalOrder:

@@ -234,7 +234,7 @@ def _of_tensor(tensor: TensorIndices, coarse: TensorIndices | None, seed: int) -
 
 def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _Run:
     """Run the paper's design for the first order and, for ``lhs``, its study of the total order."""
-    from mlg_troubleshoot.studies.blocks import block_study, total_order_study
+    from mlg_troubleshoot.studies.blocks import BlockStudy, total_order_study
     from mlg_troubleshoot.studies.paper import ITERATIONS, PAPER_DESIGNS, replicated_first_order
 
     if options.directions is Directions.RANDOM:
@@ -252,7 +252,7 @@ def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _
     note = f"first order corrected for the bias (1 - S)/{n1}"
     if options.design is Design.LHS and finished and not options.beyond_margin:
         response = _held(gear.model, inputs, options)
-        study = block_study(response, inputs, gear.geometry_sha256, options.seed, (n1, n2, iterations))
+        study = BlockStudy(response, inputs, gear.geometry_sha256, options.seed, n1, n2, iterations)
         totals = total_order_study(study, options.workers, options.state, options.scheduler, told("total order"))
         total, spread = totals.total_order, student_half(totals.scatter, totals.iterations)
         evaluations, failed = evaluations + totals.evaluations, failed + totals.failed

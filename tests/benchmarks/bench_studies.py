@@ -323,10 +323,10 @@ def paper_study(response: HeldDirections) -> list[Line]:
     """The paper-size total-order study on two cores."""
     import resource
 
-    from mlg_troubleshoot.studies.blocks import block_study, total_order_study
+    from mlg_troubleshoot.studies.blocks import BlockStudy, total_order_study
 
     gear = load_gear()
-    study = block_study(response, Inputs(gear.limits_in), gear.geometry_sha256, 0)
+    study = BlockStudy(response, Inputs(gear.limits_in), gear.geometry_sha256, 0)
     start = time.perf_counter()
     total_order_study(study, workers=2)
     seconds = time.perf_counter() - start

@@ -10,7 +10,7 @@ import pytest
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.studies.blocks import BlockStudy, block_study, compute_block, total_order_study
+from mlg_troubleshoot.studies.blocks import BlockStudy, compute_block, total_order_study
 from mlg_troubleshoot.studies.displacement import HeldDirections
 from mlg_troubleshoot.studies.inputs import Inputs
 from mlg_troubleshoot.studies.tensor import TensorIndices
@@ -18,16 +18,16 @@ from mlg_troubleshoot.studies.tensor import TensorIndices
 
 @pytest.fixture
 def study(gear: Gear, response: HeldDirections) -> BlockStudy:
-    return block_study(response, Inputs(gear.limits_in), gear.geometry_sha256, 5, (8, 120, 2))
+    return BlockStudy(response, Inputs(gear.limits_in), gear.geometry_sha256, 5, 8, 120, 2)
 
 
 def test_the_papers_study_has_a_thousand_million_solutions(gear: Gear, response: HeldDirections) -> None:
-    paper = block_study(response, Inputs(gear.limits_in), gear.geometry_sha256, 0)
+    paper = BlockStudy(response, Inputs(gear.limits_in), gear.geometry_sha256, 0)
     assert paper.evaluations == 10 * 100 * 1000 * (100 * 10 + 1)
 
 
 def test_total_order_indices_are_the_exact_ones(gear: Gear, response: HeldDirections, exact: TensorIndices) -> None:
-    study = block_study(response, Inputs(gear.limits_in), gear.geometry_sha256, 0, (20, 300, 3))
+    study = BlockStudy(response, Inputs(gear.limits_in), gear.geometry_sha256, 0, 20, 300, 3)
     found = total_order_study(study)
     assert found.total_order == pytest.approx(exact.total_order, abs=0.01)
     assert found.evaluations == study.evaluations
@@ -71,7 +71,7 @@ def test_a_state_file_of_another_study_is_refused(
 ) -> None:
     state = tmp_path / "state.jsonl"
     total_order_study(study, state=state)
-    other = block_study(response, Inputs(gear.limits_in), gear.geometry_sha256, 6, (8, 120, 2))
+    other = BlockStudy(response, Inputs(gear.limits_in), gear.geometry_sha256, 6, 8, 120, 2)
     with pytest.raises(UsageError, match="another study"):
         total_order_study(other, state=state)
 
@@ -82,7 +82,7 @@ def test_two_workers_give_the_same_bits_as_one(study: BlockStudy) -> None:
 
 def test_solutions_that_do_not_close_are_counted(gear: Gear, response: HeldDirections) -> None:
     wide = Inputs(np.full(10, 0.08))
-    found = total_order_study(block_study(response, wide, gear.geometry_sha256, 0, (10, 60, 1)))
+    found = total_order_study(BlockStudy(response, wide, gear.geometry_sha256, 0, 10, 60, 1))
     assert found.failed > 0
     assert np.any(np.isnan(found.total_order))
     assert "do not close" in found.note
