@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 import typer
@@ -12,6 +11,7 @@ from mlg_troubleshoot.cli import options, output
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
+    from mlg_troubleshoot.studies.targets import Computed
 
 
 def show(
@@ -94,9 +94,9 @@ def verify(context: typer.Context, as_json: options.Json = False, _version: opti
 
     gear = load_gear(context.obj)
     numbers = verification.verify(gear)
-    failed = [n for n in numbers if n.should_hold and not n.holds]
+    failed = [n for n in numbers if n.target.expected and not n.holds]
     if as_json:
-        output.write_json({"gear": gear.id, "numbers": [asdict(n) for n in numbers]})
+        output.write_json({"gear": gear.id, "numbers": [_number(n) for n in numbers]})
         raise typer.Exit(1 if failed else 0)
     console = output.console()
     console.print(f"{gear.name}: geometry {gear.provenance}", style="bold")
@@ -106,11 +106,11 @@ def verify(context: typer.Context, as_json: options.Json = False, _version: opti
     table.add_column("model", justify="right")
     table.add_column("status", no_wrap=True)
     for n in numbers:
-        mark = "" if n.holds else (": DOES NOT HOLD" if n.should_hold else ", known")
+        mark = "" if n.holds else (": DOES NOT HOLD" if n.target.expected else ", known")
         table.add_row(
-            f"{n.quantity} ({n.section})",
-            n.printed,
-            f"{n.computed:.4g} {n.unit}".strip(),
+            f"{n.target.quantity} ({n.target.section})",
+            n.target.printed,
+            f"{n.computed:.4g} {n.target.unit}".strip(),
             n.status + mark,
             style="bold red" if n in failed else "",
         )
@@ -118,3 +118,15 @@ def verify(context: typer.Context, as_json: options.Json = False, _version: opti
     verdict = "all that should hold do" if not failed else f"{len(failed)} that should hold do not"
     console.print(f"{len(numbers)} numbers: {verdict}.")
     raise typer.Exit(1 if failed else 0)
+
+
+def _number(n: Computed) -> dict[str, object]:
+    from mlg_troubleshoot.reporting.json_form import chosen
+
+    return {
+        **chosen(n.target, "quantity", "section", "printed"),
+        **chosen(n, "computed"),
+        **chosen(n.target, "unit", "tolerance"),
+        **chosen(n, "status", "holds"),
+        "should_hold": n.target.expected,
+    }

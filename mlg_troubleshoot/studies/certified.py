@@ -103,15 +103,10 @@ class _Search:
         self.model = model
         self.clearance = clearance
         self.sense = sense
-        numbers = model.joint_numbers
-        groups: dict[tuple[int, ...], list[int]] = {}
-        for j in np.flatnonzero(clearance > 0.0):
-            step = next(
-                (s.virtual_links for s in model.mechanism.steps if numbers[j] in s.virtual_links), (numbers[j],)
-            )
-            groups.setdefault(step, []).append(int(j))
+        worn = {number: j for j, number in enumerate(model.joint_numbers) if clearance[j] > 0.0}
         # Links at both ends of one rigid link displace it by their sum: one disc of the summed length.
-        self.groups = tuple(tuple(group) for group in groups.values())
+        groups = (tuple(worn[n] for n in group if n in worn) for group in model.mechanism.alike)
+        self.groups = tuple(group for group in groups if group)
         self.reach = np.array([clearance[list(group)].sum() for group in self.groups])
         self.over_stroke = not mid_only
         self.stroke = model.stroke[1]

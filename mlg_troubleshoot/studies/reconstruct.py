@@ -20,32 +20,17 @@ from mlg_troubleshoot.errors import InconclusiveDataError, MechanismError, Usage
 from mlg_troubleshoot.gear.design import DesignSpace
 from mlg_troubleshoot.gear.gear import Gear, Linkage
 from mlg_troubleshoot.geometry.mechanism import Dyad
-from mlg_troubleshoot.studies.targets import Target
+from mlg_troubleshoot.studies.targets import INSIDE, Computed, Target
 from mlg_troubleshoot.studies.verification import Facts
 
 Told = Callable[[str, int, int | None], None]
 
 _FAR = 50.0
-_INSIDE = 0.02
 _DECIMALS = 4
 _WAVE = 150
 _POLISHED = 4
 _DAMPINGS = 12
 _SMALL_LENGTH_IN, _LARGE_IN = 0.4, 22.0
-
-
-@dataclass(frozen=True, slots=True)
-class Met:
-    """One target on a reconstructed linkage.
-
-    holds: true if it is accepted.
-    binds: true if it determines the linkage: a printed value, or a limit that the linkage lies at.
-    """
-
-    target: Target
-    computed: float
-    holds: bool
-    binds: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +44,7 @@ class Reconstruction:
     """
 
     linkage: Linkage
-    met: tuple[Met, ...]
+    met: tuple[Computed, ...]
     numbers: int
     determined: int
     loosest: tuple[tuple[str, float], ...]
@@ -207,10 +192,7 @@ class _Search:
         vector = np.round(vector, _DECIMALS)
         linkage = self.space.linkage(vector)
         facts = Facts(self.gear, self.gear.model_of(linkage))
-        met = []
-        for target in self.targets:
-            computed = facts.measure(target)
-            met.append(Met(target, computed, target.holds(computed), _binds(target, computed)))
+        met = tuple(Computed(target, facts.measure(target)) for target in self.targets)
         rows = self._binding_slopes(vector, met)
         determined, loosest = 0, tuple((name, 1.0) for name in self.space.names[:5])
         if len(rows):
@@ -219,9 +201,9 @@ class _Search:
             free = np.linalg.norm(turned[determined:], axis=0)
             order = np.argsort(-free)[:5]
             loosest = tuple((self.space.names[int(i)], float(free[int(i)])) for i in order)
-        return Reconstruction(linkage, tuple(met), len(vector), determined, loosest, self.tried, seed)
+        return Reconstruction(linkage, met, len(vector), determined, loosest, self.tried, seed)
 
-    def _binding_slopes(self, vector: Array, met: list[Met]) -> Array:
+    def _binding_slopes(self, vector: Array, met: tuple[Computed, ...]) -> Array:
         """Slopes of what binds; a target that moves with nothing, or has no value nearby, determines nothing."""
         binding = [each.target for each in met if each.binds]
         columns = []
@@ -244,13 +226,6 @@ def _miss(target: Target, computed: float) -> float:
         return (computed - middle) / half
     bound = target.low if np.isfinite(target.low) else target.high
     unit = max(abs(bound), 0.05)
-    spare = bound + (1.0 if np.isfinite(target.low) else -1.0) * _INSIDE * unit
+    spare = bound + (1.0 if np.isfinite(target.low) else -1.0) * INSIDE * unit
     short = spare - computed if np.isfinite(target.low) else computed - spare
-    return max(0.0, short) / (_INSIDE * unit)
-
-
-def _binds(target: Target, computed: float) -> bool:
-    if np.isfinite(target.low) and np.isfinite(target.high):
-        return True
-    bound = target.low if np.isfinite(target.low) else target.high
-    return abs(computed - bound) <= 2.5 * _INSIDE * max(abs(bound), 0.05)
+    return max(0.0, short) / (INSIDE * unit)

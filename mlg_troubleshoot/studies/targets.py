@@ -11,6 +11,8 @@ from mlg_troubleshoot.datafile import DataTable, read_toml
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
 
+# A limit is met with this share of it, or of 0.05, to spare. [1]
+INSIDE = 0.02
 KINDS = ("fitted", "calibrated", "reproduced", "not reproduced")
 
 
@@ -50,6 +52,34 @@ class Target:
     def holds(self, computed: float) -> bool:
         """Tell whether a computed number is in the accepted range."""
         return self.low <= computed <= self.high
+
+
+@dataclass(frozen=True, slots=True)
+class Computed:
+    """A printed number beside the computed one. [unit of the target]"""
+
+    target: Target
+    computed: float
+
+    @property
+    def holds(self) -> bool:
+        """True if the computed number is accepted."""
+        return self.target.holds(self.computed)
+
+    @property
+    def status(self) -> str:
+        """Fitted, calibrated, reproduced or not reproduced, as it turned out."""
+        kind = "reproduced" if self.target.kind == KINDS[-1] else self.target.kind
+        return kind if self.holds else KINDS[-1]
+
+    @property
+    def binds(self) -> bool:
+        """True if it determines the linkage: a printed value, or a limit that the linkage lies at."""
+        low, high = self.target.low, self.target.high
+        if np.isfinite(low) and np.isfinite(high):
+            return True
+        bound = low if np.isfinite(low) else high
+        return abs(self.computed - bound) <= 2.5 * INSIDE * max(abs(bound), 0.05)
 
 
 def targets_file(gear: Gear) -> Path:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.studies.amplification import STROKES, Amplification, amplification
 from mlg_troubleshoot.studies.displacement import HeldDirections, worst_directions
-from mlg_troubleshoot.studies.targets import Target, load_targets, targets_file
+from mlg_troubleshoot.studies.targets import Computed, Target, load_targets, targets_file
 from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
 
 _CURVE = 401
@@ -24,39 +23,11 @@ _QUICK_CURVE = 61
 _CORNERS = (np.array([0.0, 1.0]), np.array([0.5, 0.5]))
 
 
-@dataclass(frozen=True, slots=True)
-class VerifiedNumber:
-    """One printed number beside the computed one.
-
-    status: fitted, calibrated, reproduced or not reproduced, as it turned out.
-    holds: true if the computed number is accepted.
-    should_hold: false if it is known not to hold.
-    """
-
-    quantity: str
-    section: str
-    printed: str
-    computed: float
-    unit: str
-    tolerance: str
-    status: str
-    holds: bool
-    should_hold: bool
-
-
-def verify(gear: Gear, targets: Path | None = None) -> tuple[VerifiedNumber, ...]:
+def verify(gear: Gear, targets: Path | None = None) -> tuple[Computed, ...]:
     """Compare every printed number with what the gear's reference linkage gives."""
-    path = targets_file(gear) if targets is None else targets
     facts = Facts(gear, gear.model)
-    rows = []
-    for target in load_targets(path):
-        computed = facts.measure(target)
-        holds = target.holds(computed)
-        kind = "reproduced" if target.kind == "not reproduced" else target.kind
-        printed, accepted = (target.quantity, target.section, target.printed), (target.unit, target.tolerance)
-        status = kind if holds else "not reproduced"
-        rows.append(VerifiedNumber(*printed, computed, *accepted, status, holds, target.expected))
-    return tuple(rows)
+    wanted = load_targets(targets_file(gear) if targets is None else targets)
+    return tuple(Computed(target, facts.measure(target)) for target in wanted)
 
 
 class Facts:

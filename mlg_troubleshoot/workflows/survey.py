@@ -186,9 +186,11 @@ def _left_targets(before: Gear, path: Path) -> tuple[str, ...]:
     targets = targets_file(before)
     if not targets.exists():
         return ()
-    left = [n for n in verify(load_gear(path), targets) if n.should_hold and not n.holds]
+    left = [n for n in verify(load_gear(path), targets) if n.target.expected and not n.holds]
     return tuple(
-        f"{n.quantity}: the paper prints {n.printed}, this gear has {n.computed:.4g} {n.unit}".rstrip() for n in left
+        f"{t.quantity}: the paper prints {t.printed}, this gear has {n.computed:.4g} {t.unit}".rstrip()
+        for n in left
+        for t in [n.target]
     )
 
 

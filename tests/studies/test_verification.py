@@ -8,12 +8,12 @@ import pytest
 
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.studies.targets import load_targets, targets_file
-from mlg_troubleshoot.studies.verification import VerifiedNumber, verify
+from mlg_troubleshoot.studies.targets import Computed, load_targets, targets_file
+from mlg_troubleshoot.studies.verification import verify
 
 
 @pytest.fixture(scope="module")
-def rows(gear: Gear) -> tuple[VerifiedNumber, ...]:
+def rows(gear: Gear) -> tuple[Computed, ...]:
     return verify(gear)
 
 
@@ -25,20 +25,20 @@ def _changed(gear: Gear, tmp_path: Path, old: str, new: str) -> Path:
     return path
 
 
-def test_everything_that_should_hold_holds(rows: tuple[VerifiedNumber, ...]) -> None:
-    assert [row.quantity for row in rows if row.should_hold and not row.holds] == []
+def test_everything_that_should_hold_holds(rows: tuple[Computed, ...]) -> None:
+    assert [row.target.quantity for row in rows if row.target.expected and not row.holds] == []
 
 
-def test_what_is_known_not_to_hold_does_not(rows: tuple[VerifiedNumber, ...]) -> None:
-    assert [row.quantity for row in rows if row.holds and not row.should_hold] == []
+def test_what_is_known_not_to_hold_does_not(rows: tuple[Computed, ...]) -> None:
+    assert [row.target.quantity for row in rows if row.holds and not row.target.expected] == []
 
 
-def test_the_failure_case_gives_the_printed_displacement(rows: tuple[VerifiedNumber, ...]) -> None:
+def test_the_failure_case_gives_the_printed_displacement(rows: tuple[Computed, ...]) -> None:
     assert rows[0].computed == pytest.approx(0.0472, abs=5e-5)
     assert rows[0].status == "fitted"
 
 
-def test_the_size_of_the_interactions_is_reported_as_not_reproduced(rows: tuple[VerifiedNumber, ...]) -> None:
+def test_the_size_of_the_interactions_is_reported_as_not_reproduced(rows: tuple[Computed, ...]) -> None:
     assert rows[-1].status == "not reproduced"
     assert rows[-1].computed < 1e-3
 
@@ -46,7 +46,7 @@ def test_the_size_of_the_interactions_is_reported_as_not_reproduced(rows: tuple[
 def test_a_number_that_is_off_is_said_not_to_hold(gear: Gear, tmp_path: Path) -> None:
     path = _changed(gear, tmp_path, "value = 0.0472", "value = 0.0572")
     row = verify(gear, path)[0]
-    assert (row.holds, row.status, row.should_hold) == (False, "not reproduced", True)
+    assert (row.holds, row.status, row.target.expected) == (False, "not reproduced", True)
 
 
 def test_an_unknown_measure_is_named_with_the_known_ones(gear: Gear, tmp_path: Path) -> None:
