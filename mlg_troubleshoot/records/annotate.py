@@ -7,23 +7,27 @@ import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile
+
+from openpyxl import Workbook, load_workbook
+from openpyxl.cell import Cell, MergedCell
+from openpyxl.comments import Comment
+from openpyxl.styles import Alignment, Font, PatternFill
+from openpyxl.worksheet.pagebreak import Break
+from openpyxl.worksheet.worksheet import Worksheet
+from openpyxl.writer.excel import ExcelWriter
 
 from mlg_troubleshoot.decision.inspection import RowSource
 from mlg_troubleshoot.errors import OutputError, Problem, UsageError
 from mlg_troubleshoot.outputs import write_bytes
+from mlg_troubleshoot.records.cachedvalues import restore_results
 from mlg_troubleshoot.records.cells import column_letters, writable
 from mlg_troubleshoot.records.columns import Field, Kind
 from mlg_troubleshoot.records.model import ReadResult, SheetLayout
 from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.template import FONT, HEADER_FILL
+from mlg_troubleshoot.records.xlsx import XlsxFile
 from mlg_troubleshoot.units import LengthUnit
-
-if TYPE_CHECKING:
-    from openpyxl import Workbook
-    from openpyxl.cell import Cell, MergedCell
-    from openpyxl.worksheet.worksheet import Worksheet
 
 _BAD_FILL = "FFFFB3B3"
 _OVER_FILL = "FFFFD08A"
@@ -54,11 +58,6 @@ def annotate_workbook(
     """
     label = writable(name if name is not None else str(source))
     data = _load(source, out)
-    from openpyxl import load_workbook
-    from openpyxl.writer.excel import ExcelWriter
-
-    from mlg_troubleshoot.records.cachedvalues import restore_results
-
     buffer = io.BytesIO()
     try:
         # What the library drops is said below, in the user's words.
@@ -134,8 +133,6 @@ def _shapes(archive: ZipFile) -> int:
 
 
 def _load(source: str | Path, out: str | Path) -> bytes:
-    from mlg_troubleshoot.records.xlsx import XlsxFile
-
     path = Path(source)
     if Path(out).resolve() == path.resolve():
         raise UsageError(f"{out} is the workbook itself", "Name another file for the annotated copy.")
@@ -162,8 +159,6 @@ def _free_column(sheet: Worksheet, layout: SheetLayout) -> int:
 
 
 def _mark(sheet: Worksheet, layout: SheetLayout, problem: Problem) -> None:
-    from openpyxl.cell import MergedCell
-
     place = problem.cell
     if place is None:
         row = problem.row or layout.header_row
@@ -180,9 +175,6 @@ def _mark(sheet: Worksheet, layout: SheetLayout, problem: Problem) -> None:
 
 def _fill(cell: Cell | MergedCell, colour: str, said: str = "") -> None:
     """Colour a cell and add to its comment."""
-    from openpyxl.comments import Comment
-    from openpyxl.styles import PatternFill
-
     cell.fill = PatternFill("solid", fgColor=colour)
     if said:
         before = f"{cell.comment.text}\n" if cell.comment is not None else ""
@@ -191,8 +183,6 @@ def _fill(cell: Cell | MergedCell, colour: str, said: str = "") -> None:
 
 def _mark_over_limit(sheet: Worksheet, layout: SheetLayout, over_limit: OverLimit) -> None:
     """Mark the clearances of a wide table or a form that are over their limit."""
-    from openpyxl.cell import Cell as OrdinaryCell
-
     for source, limits in over_limit.items():
         for joint, limit_in in limits.items():
             names = {Field(Kind.CLEARANCE, joint, unit).name for unit in (None, *LengthUnit)}
@@ -201,15 +191,13 @@ def _mark_over_limit(sheet: Worksheet, layout: SheetLayout, over_limit: OverLimi
             if read is None or row is None:
                 continue
             cell = sheet.cell(row, read.index + 1)
-            if isinstance(cell, OrdinaryCell):
+            if isinstance(cell, Cell):
                 _fill(cell, _OVER_FILL, f"over the limit of joint {joint}, {limit_in:.4f} in radial.")
 
 
 def _put(cell: Cell | MergedCell, value: str | float | None) -> None:
     """Put a value into a cell; a text stays a text even if it begins like a formula."""
-    from openpyxl.cell import Cell as OrdinaryCell
-
-    if not isinstance(cell, OrdinaryCell):
+    if not isinstance(cell, Cell):
         return
     cell.value = value
     if isinstance(value, str):
@@ -223,8 +211,6 @@ def _headers(own: VerdictColumns) -> list[str]:
 
 
 def _behind_table(sheet: Worksheet, layout: SheetLayout, free: int, own: VerdictColumns) -> None:
-    from openpyxl.styles import Alignment, Font
-
     sheet.row_dimensions[layout.header_row].height = None
     for column, header in enumerate(_headers(own), free):
         cell = sheet.cell(layout.header_row, column)
@@ -251,8 +237,6 @@ def _behind_table(sheet: Worksheet, layout: SheetLayout, free: int, own: Verdict
 
 def _print_well(sheet: Worksheet, layout: SheetLayout, free: int) -> None:
     """Put the verdicts on pages of their own behind the readings, where the user has not set up his pages himself."""
-    from openpyxl.worksheet.pagebreak import Break
-
     pages = sheet.sheet_properties.pageSetUpPr
     if sheet.print_area or sheet.print_title_rows or sheet.col_breaks.brk or (pages is not None and pages.fitToPage):
         return
@@ -265,8 +249,6 @@ def _print_well(sheet: Worksheet, layout: SheetLayout, free: int) -> None:
 
 
 def _beside_form(sheet: Worksheet, layout: SheetLayout, free: int, own: VerdictColumns) -> None:
-    from openpyxl.styles import Font
-
     for values in own.values():
         for offset, (header, value) in enumerate(values.items()):
             label = sheet.cell(layout.header_row + offset, free)

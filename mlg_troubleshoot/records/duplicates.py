@@ -16,17 +16,14 @@ def settle_duplicates(
     rows: list[Inspection | InvalidRow], layouts: Sequence[SheetLayout], invalid_content: Mapping[RowSource, int]
 ) -> list[Problem]:
     """Warn of rows that are the same inspection again, and refuse rows that share an id and differ."""
-    first: dict[tuple[str | None, str], int] = {}
-    groups: dict[tuple[str | None, str], list[int]] = {}
+    named: dict[tuple[str | None, str], list[int]] = {}
     for place, row in enumerate(rows):
-        if row.record_id is None:
-            continue
-        key = (row.source.file, row.record_id)
-        earlier = first.setdefault(key, place)
-        if earlier != place:
-            groups.setdefault(key, [earlier]).append(place)
+        if row.record_id is not None:
+            named.setdefault((row.source.file, row.record_id), []).append(place)
     problems: list[Problem] = []
-    for (_, record_id), places in groups.items():
+    for (_, record_id), places in named.items():
+        if len(places) == 1:
+            continue
         found = [rows[place] for place in places]
         bare = [_content(row, invalid_content) for row in found]
         if all(b is not None and b == bare[0] for b in bare):
@@ -57,7 +54,7 @@ def _column(source: RowSource, layouts: Sequence[SheetLayout]) -> tuple[str, str
     for layout in layouts:
         if (layout.file, layout.sheet) == (source.file, source.sheet):
             for column in layout.columns:
-                if column.read_as == Kind.RECORD_ID.value:
+                if column.read_as == Kind.RECORD_ID:
                     return column.header, f"{column_letters(column.index)}{source.row}"
     return Kind.RECORD_ID.value, None
 

@@ -82,7 +82,7 @@ def read_form(form: Form, options: ReadOptions, *, file: str | None, sheet: str 
     value_places = [(row, f"{values}{row}") for row, _, _ in form.lines]
     table = TableInHand(options, file, sheet, out.problems.append, options.decimal_comma)
     columns = ColumnReader(table).place(labels, form.lines[0][0], places=label_places)
-    out.notes += columns.notes()
+    out.notes += filter(None, columns.notes())
     reader = RowReader(columns.placed, table)
     named = list(zip((row for row, _, _ in form.lines), columns.placed, strict=True))
     ids = [row for row, p in named if p.field is not None and p.field.kind is Kind.RECORD_ID]

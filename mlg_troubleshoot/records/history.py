@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from statistics import median
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Side
@@ -74,7 +75,7 @@ def _slip(own: Clearances, usual: Clearances, other: Clearances, other_side: Sid
     off = [joint for joint in common if abs(own[joint] - usual[joint]) > _CLEARLY_OFF * _tolerance(usual[joint])]
     if not off:
         return ""
-    for first, second in zip(sorted(common), sorted(common)[1:], strict=False):
+    for first, second in pairwise(sorted(common)):
         if off == [first, second] and _near(own[first], usual[second]) and _near(own[second], usual[first]):
             return (
                 f"joints {first} and {second} do not fit this gear's other inspections, but would if they were "
@@ -92,15 +93,12 @@ def _near(value_in: float, expected_in: float) -> bool:
 def _scale(own: Clearances, usual: Clearances, common: list[int], off: list[int]) -> str:
     measurable = [joint for joint in common if usual[joint] > _FIT_IN]
     for factor, meaning in _SCALES:
-        all_off = len(measurable) >= 3 and all(
-            abs(own[joint] / factor - usual[joint]) <= 0.15 * usual[joint] for joint in measurable
-        )
-        if all_off:
-            return f"all clearances of this row are {_times(factor)} this gear's other inspections: {meaning}?"
-        if len(off) == 1 and off[0] in measurable and factor not in (2.0, 0.5):
-            joint = off[0]
-            if abs(own[joint] / factor - usual[joint]) <= 0.15 * usual[joint]:
-                return f"joint {joint} is {_times(factor)} this gear's other inspections: {meaning}?"
+        fits = {j for j in measurable if abs(own[j] / factor - usual[j]) <= 0.15 * usual[j]}
+        said = f"{_times(factor)} this gear's other inspections: {meaning}?"
+        if len(measurable) >= 3 and len(fits) == len(measurable):
+            return f"all clearances of this row are {said}"
+        if len(off) == 1 and off[0] in fits and factor not in (2.0, 0.5):
+            return f"joint {off[0]} is {said}"
     return ""
 
 

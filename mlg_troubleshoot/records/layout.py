@@ -5,11 +5,11 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 
 from mlg_troubleshoot.records.cells import Cell, column_letters, show, writable
 from mlg_troubleshoot.records.columns import ALONG, CARRIED, IDENTITY, LENGTHS, PER_JOINT, REQUIRED, Kind
-from mlg_troubleshoot.records.headers import Recognition, Standing, near_miss, parse_target, recognise, tidy
+from mlg_troubleshoot.records.headers import UNKNOWN, Recognition, Standing, near_miss, parse_target, recognise, tidy
 from mlg_troubleshoot.records.model import ReadOptions, TableInHand
 from mlg_troubleshoot.records.refusals import HEADER_SEARCH_ROWS
 from mlg_troubleshoot.records.rows import PlacedField
@@ -49,13 +49,13 @@ class Columns:
     ids_made: bool = False
     is_long: bool = False
 
-    def notes(self) -> list[str]:
-        """Say how the headers were read, all in one note, and what is only carried, in another."""
-        read = ["each header was read as: " + ", ".join(self.mapped)] if self.mapped else []
+    def notes(self) -> tuple[str, str]:
+        """Say how the headers were read, all in one note, and what is only carried, in another; empty if nothing."""
+        read = ["each header was read as: " + ", ".join(self.mapped)] * bool(self.mapped)
         if self.ids_made:
             read.append("there is no record_id: each inspection is named after the file, its row and its content")
         carried = "not used, only carried to the report: " + ", ".join(self.carried)
-        return ["; ".join(read), carried] if self.carried else read and ["; ".join(read)]
+        return "; ".join(read), carried if self.carried else ""
 
 
 def _mapped(text: str, index: int, options: ReadOptions) -> bool:
@@ -67,18 +67,14 @@ def header_score(cells: Sequence[Cell], options: ReadOptions) -> int:
     doubtful = 0
     for index, cell in enumerate(cells):
         if isinstance(cell, str):
-            if _mapped(cell, index, options):
-                doubtful += 1
-                continue
-            found = recognise(cell, options.joint_numbers, options.joint_names)
-            if found.field is not None:
-                known.add(found.field.quantity)
-            elif found.standing is Standing.DOUBTFUL:
-                doubtful += 1
+            mapped = _mapped(cell, index, options)
+            found = UNKNOWN if mapped else recognise(cell, options.joint_numbers, options.joint_names)
+            known |= set() if found.field is None else {found.field.quantity}
+            doubtful += mapped or found.standing is Standing.DOUBTFUL
     kinds = {kind for kind, _ in known}
-    core = len(kinds & {*IDENTITY}) + (1 if Kind.CLEARANCE in kinds else 0) + (1 if doubtful else 0)
+    core = len(kinds & {*IDENTITY, Kind.CLEARANCE}) + bool(doubtful)
     # A table of clearances alone is a table, too: what it lacks is then named column by column.
-    clearances = sum(1 for kind, number in known if kind is Kind.CLEARANCE and number is not None)
+    clearances = sum(kind is Kind.CLEARANCE and number is not None for kind, number in known)
     if clearances < 2 and (core < 2 or len(known) + doubtful < 3):
         return 0
     return 2 * len(known) + doubtful
@@ -88,20 +84,15 @@ def find_header(
     rows: Sequence[NumberedRow], options: ReadOptions, merged: Callable[[], Sequence[MergedRange]]
 ) -> Header | None:
     near = [(number, cells) for number, cells in rows if number <= HEADER_SEARCH_ROWS]
-    best: tuple[int, int] | None = None
-    for place, (_, cells) in enumerate(near):
-        score = header_score(cells, options)
-        if score and (best is None or score > best[0]):
-            best = (score, place)
-    two_rows = _two_row_header(near, options, merged, best[0] if best else 0)
-    if two_rows is not None:
+    scores = [header_score(cells, options) for _, cells in near]
+    score = max(scores, default=0)
+    two_rows = _two_row_header(near, options, merged, score)
+    if two_rows is not None or not score:
         return two_rows
-    if best is None:
-        return None
-    number, cells = near[best[1]]
+    place = scores.index(score)
+    number, cells = near[place]
     header = Header(number, tuple(_text(c) for c in cells), len(cells), (number,))
-    if best[1] + 1 < len(near):
-        below, units = near[best[1] + 1]
+    for below, units in near[place + 1 : place + 2]:
         found = _unit_row(header, units, options) if below == number + 1 else None
         if found is not None:
             return replace(header, units=found, row=below, rows_used=(number, below))
@@ -116,21 +107,19 @@ def _two_row_header(
     near: Sequence[NumberedRow], options: ReadOptions, merged: Callable[[], Sequence[MergedRange]], single: int
 ) -> Header | None:
     """Join a header of two rows, where merged cells say which columns the upper one covers."""
-    ranges: Sequence[MergedRange] | None = None
-    best: tuple[int, Header] | None = None
-    for (upper, above), (lower, below) in pairwise(near):
-        if lower != upper + 1 or not _may_be_upper(above, below):
-            continue
-        if ranges is None:
-            ranges = merged()
+    best: Header | None = None
+    pairs = [
+        (upper, above, below)
+        for (upper, above), (lower, below) in pairwise(near)
+        if lower == upper + 1 and _may_be_upper(above, below)
+    ]
+    ranges = merged() if pairs else ()
+    for upper, above, below in pairs:
         texts = _joined(upper, above, below, ranges)
-        if texts is None:
-            continue
         score = header_score(texts, options)
-        if score > single and (best is None or score > best[0]):
-            header = Header(lower, tuple(texts), len(texts), (upper, lower))
-            best = (score, header)
-    return best[1] if best is not None else None
+        if score > single:
+            single, best = score, Header(upper + 1, tuple(texts), len(texts), (upper, upper + 1))
+    return best
 
 
 def _may_be_upper(above: Sequence[Cell], below: Sequence[Cell]) -> bool:
@@ -138,21 +127,14 @@ def _may_be_upper(above: Sequence[Cell], below: Sequence[Cell]) -> bool:
     return bool(texts) and all(isinstance(c, str) for c in texts) and sum(c is not None for c in below) >= 2
 
 
-def _joined(
-    upper: int, above: Sequence[Cell], below: Sequence[Cell], ranges: Sequence[MergedRange]
-) -> list[str] | None:
-    width = max(len(above), len(below))
-    covering: list[str] = [_text(above[i]) if i < len(above) else "" for i in range(width)]
-    across = False
-    for first_row, first, last_row, last in ranges:
-        if first_row == upper and last_row == upper and last > first:
-            across = True
-            for index in range(first + 1, min(last + 1, width)):
-                covering[index] = covering[first] if first < width else ""
-    if not across:
-        return None
-    lower_texts = [_text(below[i]) if i < len(below) else "" for i in range(width)]
-    return [f"{top} {bottom}".strip() for top, bottom in zip(covering, lower_texts, strict=True)]
+def _joined(upper: int, above: Sequence[Cell], below: Sequence[Cell], ranges: Sequence[MergedRange]) -> list[str]:
+    """Return each header of two rows; none if nothing is merged across columns."""
+    across = [(first, last) for top, first, bottom, last in ranges if top == bottom == upper and last > first]
+    joined = [[_text(cell), _text(under)] for cell, under in zip_longest(above, below)]
+    for first, last in across:
+        for covered in joined[first + 1 : last + 1]:
+            covered[0] = joined[first][0]
+    return [" ".join(texts).strip() for texts in joined] if across else []
 
 
 def _unit_row(header: Header, cells: Sequence[Cell], options: ReadOptions) -> tuple[LengthUnit | None, ...] | None:

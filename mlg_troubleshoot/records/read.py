@@ -97,16 +97,14 @@ def _read_file(source: Source, options: ReadOptions, name: str | None, ticker: C
     digest: str | None = None
     kind = "unreadable"
     found = Collected()
+    suffix = Path(label).suffix.lower()
     try:
         data = load_bytes(source)
         digest = hashlib.sha256(data).hexdigest()
         book = open_book(data, label, options)
         del data
         kind = book.kind
-        if kind != Path(label).suffix.lower().removeprefix(".") and Path(label).suffix.lower() in _SUFFIXES - {
-            ".tsv",
-            ".txt",
-        }:
+        if suffix != f".{kind}" and suffix in _SUFFIXES - {".tsv", ".txt"}:
             found.notes.append(f"the file is of kind {kind}, whatever its name")
         found.notes += book.notes
         _read_book(book, options, label, ticker, found)
@@ -175,11 +173,9 @@ def open_book(data: bytes, label: str, options: ReadOptions) -> Workbook:
 def _candidate(sheet: Sheet, options: ReadOptions) -> _Candidate:
     rows = sheet.rows()
     peeked = list(islice(rows, _PEEKED_ROWS))
-    header: Header | None = None
-    form: Form | None = None
-    if not _is_instructions(peeked):
-        header = find_header(peeked, options, sheet.merged)
-        form = None if header is not None else find_form(peeked, options)
+    told = _is_instructions(peeked)
+    header = None if told else find_header(peeked, options, sheet.merged)
+    form = None if told or header is not None else find_form(peeked, options)
     has_rows = header is not None and any(number > header.row for number, _ in peeked)
     return _Candidate(sheet, chain(peeked, rows), header, form, has_rows)
 
@@ -236,7 +232,9 @@ def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Can
             f'Name the sheet, for example --sheet "{filled[0].sheet.name}", or --sheet "*" for all of them.',
         )
     chosen = [c for c in candidates if c in filled or c in forms]
-    _note_hidden(book, found)
+    hidden = ", ".join(repr(sheet.name) for sheet in book.sheets if sheet.hidden)
+    if hidden:
+        found.notes.append(f"hidden sheets were not read: {hidden}")
     if chosen:
         if len(visible) > 1:
             names = ", ".join(repr(c.sheet.name) for c in chosen)
@@ -265,24 +263,17 @@ def _named(book: Workbook, wanted: str, options: ReadOptions, found: Collected) 
     return candidate
 
 
-def _note_hidden(book: Workbook, found: Collected) -> None:
-    hidden = [repr(sheet.name) for sheet in book.sheets if sheet.hidden]
-    if hidden:
-        found.notes.append(f"hidden sheets were not read: {', '.join(hidden)}")
-
-
 def _nothing_found(book: Workbook, candidates: Sequence[_Candidate], options: ReadOptions) -> FileRefusedError:
-    for sheet in book.sheets:
-        if sheet.hidden:
-            candidate = _candidate(sheet, options)
-            if candidate.header is not None or candidate.form is not None:
-                return FileRefusedError(
-                    "sheet_hidden",
-                    f"the inspections stand on the hidden sheet {sheet.name!r}",
-                    "inspections on a sheet that can be seen",
-                    f'Unhide the sheet, or name it: --sheet "{sheet.name}".',
-                    sheet=sheet.name,
-                )
+    hidden = [_candidate(sheet, options) for sheet in book.sheets if sheet.hidden]
+    name = next((c.sheet.name for c in hidden if c.header is not None or c.form is not None), None)
+    if name is not None:
+        return FileRefusedError(
+            "sheet_hidden",
+            f"the inspections stand on the hidden sheet {name!r}",
+            "inspections on a sheet that can be seen",
+            f'Unhide the sheet, or name it: --sheet "{name}".',
+            sheet=name,
+        )
     if len(candidates) == 1:
         return _no_header(candidates[0])
     names = ", ".join(repr(c.sheet.name) for c in candidates)
@@ -308,8 +299,7 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
     problems += settle_duplicates(rows, layouts, contents)
     for place, warnings in history_warnings(rows).items():
         rows[place] = replace(rows[place], warnings=(*rows[place].warnings, *warnings))
-    order = _places(results)
-    problems.sort(key=order)
+    problems.sort(key=_places(results))
     return ReadResult(
         tuple(rows),
         tuple(problems),
@@ -320,17 +310,7 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
 
 
 def _places(results: Sequence[_Found]) -> Callable[[Problem], tuple[int, int, int]]:
-    files = {file.name: i for i, (file, _) in enumerate(reversed(results))}
-    sheets: dict[tuple[str | None, str | None], int] = {}
-    for _, found in results:
-        for layout in found.layouts:
-            sheets.setdefault((layout.file, layout.sheet), len(sheets))
-
-    def key(problem: Problem) -> tuple[int, int, int]:
-        return (
-            len(results) - files.get(problem.file or "", 0),
-            sheets.get((problem.file, problem.sheet), -1),
-            problem.row or 0,
-        )
-
-    return key
+    files = {file.name: i for i, (file, _) in reversed(list(enumerate(results)))}
+    layouts = (layout for _, found in results for layout in found.layouts)
+    sheets = {sheet: i for i, sheet in enumerate(dict.fromkeys((layout.file, layout.sheet) for layout in layouts))}
+    return lambda p: (files.get(p.file or "", len(results)), sheets.get((p.file, p.sheet), -1), p.row or 0)

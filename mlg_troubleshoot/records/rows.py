@@ -126,26 +126,19 @@ class RowReader:
         self._blankable = [index for index, field in good if field.kind not in _NEVER_BLANK]
         self.not_measured: Counter[str] = Counter()
         self._carried = [(index, field.kind.value) for index, field in good if field.kind in CARRIED]
-        self._unknown = self._unknown_names(placed)
+        self._unknown: dict[str, int] = {}
+        for p in placed:
+            if p.field is None and not p.refused:
+                name = p.header or f"column {column_letters(p.index)}"
+                while name in self._unknown or any(name == carried for _, carried in self._carried):
+                    name = f"{name} (again)"
+                self._unknown[name] = p.index
         self._without_unit: set[str | None] = set()
         self._row = 0
         self._places: Sequence[tuple[int, str]] | None = None
         self._cells: Sequence[Cell] = ()
         self._bad: set[int] = set()
         self._faults: list[tuple[int, CellFaultError]] = []
-
-    @staticmethod
-    def _unknown_names(placed: Sequence[PlacedField]) -> list[tuple[int, str]]:
-        names: list[tuple[int, str]] = []
-        seen = {p.field.kind.value for p in placed if p.field is not None and p.field.kind in CARRIED}
-        for p in placed:
-            if p.field is None and not p.refused:
-                name = p.header or f"column {column_letters(p.index)}"
-                while name in seen:
-                    name = f"{name} (again)"
-                seen.add(name)
-                names.append((p.index, name))
-        return names
 
     def read(
         self, row: int, cells: Sequence[Cell], places: Sequence[tuple[int, str]] | None = None
@@ -363,7 +356,9 @@ class RowReader:
             return f"a clearance from 0 to {shown.from_inches(limit * scale.per_radial):.4g} {shown.value}"
 
         try:
-            value_in, found, text = self._length(cell, unit, row_unit, signed=False, expected=expected(stated))
+            value_in, found, text = read_length(
+                cell, unit, row_unit, signed=False, decimal_comma=self._comma, expected=expected(stated)
+            )
         except CellFaultError as fault:
             if fault.code == "length_negative":
                 fault.code = "clearance_negative"
@@ -374,23 +369,6 @@ class RowReader:
             remedy = slip or "Measure again, or check the unit and the decimal point."
             raise CellFaultError("clearance_out_of_range", expected(found), remedy)
         return radial_in + 0.0, EnteredClearance(text, found), radial_in > usual + _EPS_IN
-
-    def _length(
-        self,
-        cell: str | float | OddCell,
-        unit: LengthUnit | None,
-        row_unit: LengthUnit | None,
-        *,
-        signed: bool,
-        expected: str,
-    ) -> tuple[float, LengthUnit, str]:
-        """Read a length whose unit may stand in the header, in the cell, or be declared for the row."""
-        try:
-            return read_length(cell, unit, signed=signed, decimal_comma=self._comma, expected=expected)
-        except CellFaultError as fault:
-            if fault.code != "unit_missing" or row_unit is None:
-                raise
-        return read_length(cell, row_unit, signed=signed, decimal_comma=self._comma, expected=expected)
 
     def _confirm_text(self, joint: int, radial_in: float, text: EnteredClearance, scale: ClearanceConvention) -> str:
         slip = scale_slip(radial_in, text.unit, scale, self._options.clearance_confirm_above_in)
@@ -450,7 +428,10 @@ class RowReader:
         unit = field.unit or row_unit or LengthUnit.INCH
         what = field.kind.value.replace("_", " ")
         expected = f"{what} from {unit.from_inches(low):.4g} to {unit.from_inches(high):.4g} {unit.value}"
-        value_in, found, _ = self._length(cell, field.unit, row_unit, signed=field.kind in _SIGNED, expected=expected)
+        signed, comma = field.kind in _SIGNED, self._comma
+        value_in, found, _ = read_length(
+            cell, field.unit, row_unit, signed=signed, decimal_comma=comma, expected=expected
+        )
         above_zero = field.kind is Kind.MARGIN or (field.kind is Kind.GAUGE_U and field.number is not None)
         if not low - _EPS_IN <= value_in <= high + _EPS_IN or (above_zero and value_in <= 0.0):
             if above_zero:
@@ -474,7 +455,7 @@ class RowReader:
                 carried[name] = read_text(cell, "text")
             except CellFaultError as fault:
                 self._faults.append((index, fault))
-        for index, name in self._unknown:
+        for name, index in self._unknown.items():
             cell = self._cells[index]
             if cell is not None:
                 carried[name] = writable(show(cell))

@@ -6,9 +6,13 @@ import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from openpyxl import Workbook
+from openpyxl.chart import Reference, ScatterChart, Series
+from openpyxl.chart.label import DataLabelList
+from openpyxl.styles import Font
+from openpyxl.worksheet.worksheet import Worksheet
 
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.outputs import write_csv
@@ -21,9 +25,6 @@ from mlg_troubleshoot.records.template import write_book
 from mlg_troubleshoot.records.values import CellFaultError, read_choice, read_number, read_text
 from mlg_troubleshoot.studies.survey_readings import Kind, Reading, SurveyedLinkage, default_u
 from mlg_troubleshoot.units import LengthUnit
-
-if TYPE_CHECKING:
-    from openpyxl.worksheet.worksheet import Worksheet
 
 _UNITS = ("in", "mm", "deg")
 COLUMNS = (
@@ -72,9 +73,6 @@ def write_survey_template(
     if path.suffix.lower() == ".csv":
         write_csv(path, COLUMNS, rows)
         return
-    from openpyxl import Workbook
-    from openpyxl.styles import Font
-
     book = Workbook()
     sheet = book.worksheets[0]
     sheet.title = "Survey"
@@ -90,9 +88,6 @@ def write_survey_template(
 
 def _sketch(sheet: Worksheet, linkage: SurveyedLinkage) -> None:
     """The pins of each plane at the reference position, with their names, and the parts between them."""
-    from openpyxl.chart import Reference, ScatterChart, Series
-    from openpyxl.chart.label import DataLabelList
-
     mechanism = linkage.space.mechanism
     sheet.append(["point", "plane", "x in", "y in", "", "part", "x in", "y in"])
     for point in mechanism.points:

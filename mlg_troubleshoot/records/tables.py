@@ -58,16 +58,13 @@ def read_table(
                 pending = 0
     tick(pending)
     table.finish()
-    placed = (header.row > 1) * [f"the header stands in row {' and '.join(map(str, header.rows_used))}"]
-    said = columns.notes()
-    first = [*placed, *(said[:1] if not columns.carried or len(said) > 1 else [])]
-    out.notes += ["; ".join(first)] if first else []
-    out.notes += said[-1:] if columns.carried else []
-    about = [*table.notes(), *_hidden_notes(sheet, columns, header.row)]
-    out.notes += ["; ".join(about)] if about else []
+    placed = f"the header stands in row {' and '.join(map(str, header.rows_used))}" if header.row > 1 else ""
+    read, carried = columns.notes()
+    about = "; ".join([*table.notes(), *_hidden_notes(sheet, columns, header.row)])
+    out.notes += filter(None, ("; ".join(filter(None, (placed, read))), carried, about))
     kind = "long" if columns.is_long else "wide"
-    read = tuple(ColumnReading(p.index, p.header, p.read_as) for p in columns.placed)
-    out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, table.last, len(header.texts), read))
+    readings = tuple(ColumnReading(p.index, p.header, p.read_as) for p in columns.placed)
+    out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, table.last, len(header.texts), readings))
     return out
 
 

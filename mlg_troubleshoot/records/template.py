@@ -5,17 +5,20 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+from openpyxl import Workbook
+from openpyxl.comments import Comment
+from openpyxl.styles import Alignment, Border, Font, PatternFill, Side
+from openpyxl.worksheet.datavalidation import DataValidation
+from openpyxl.worksheet.pagebreak import Break
+from openpyxl.worksheet.properties import PageSetupProperties
+from openpyxl.worksheet.worksheet import Worksheet
 
 from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.records.cells import column_letters
 from mlg_troubleshoot.records.columns import CARRIED, LENGTHS, Field, Kind
 from mlg_troubleshoot.records.forms import FORM_TITLE
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
-
-if TYPE_CHECKING:
-    from openpyxl import Workbook
-    from openpyxl.worksheet.worksheet import Worksheet
 
 JointLine = tuple[int, str, str]
 
@@ -24,6 +27,7 @@ _ROWS = 500
 FONT = "Calibri"
 HEADER_FILL = "FFD9E2EC"
 _LINE_PT = 15.0
+_LINE = Side(style="thin", color="FF9AA5B1")
 _REQUIRED_FILL = "FFFFE9A8"
 _TEXT_KINDS = frozenset({Kind.RECORD_ID, Kind.TAIL_NO, Kind.GAUGE_ID, Kind.TECHNICIAN_ID, *CARRIED})
 _MUST = frozenset({Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE, Kind.CONVENTION})
@@ -89,8 +93,6 @@ _INSTRUCTIONS = (
 
 
 def write_template(path: str | Path, joints: Sequence[JointLine], *, unit: LengthUnit = LengthUnit.INCH) -> None:
-    from openpyxl import Workbook
-
     book = Workbook()
     book.properties.title = "Main landing gear: joint clearance inspections"
     _instructions(book, joints)
@@ -107,24 +109,18 @@ def write_book(path: str | Path, book: Workbook) -> None:
 
 
 def _fields(joints: Sequence[JointLine], unit: LengthUnit | None) -> list[Field]:
-    def length(kind: Kind, number: int | None = None) -> Field:
-        return Field(kind, number, unit)
-
     numbers = [number for number, _, _ in joints]
-    return [
-        *(Field(kind) for kind in (Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE, Kind.CONVENTION)),
-        *(length(Kind.CLEARANCE, n) for n in numbers),
-        *(Field(kind) for kind in (Kind.DATE, Kind.OUTCOME, Kind.LANDINGS)),
-        length(Kind.GAUGE_U),
-        *(length(Kind.PLUNGER_DISPLACEMENT, n) for n in (1, 2, 3)),
-        length(Kind.PLUNGER_DOWN_LOCK),
-        length(Kind.PLUNGER_GAUGE_U),
-        length(Kind.MARGIN),
-        length(Kind.MARGIN_U),
-        *(Field(kind) for kind in (Kind.TEMPERATURE, Kind.PRESSURE, Kind.APPROACH, Kind.GAUGE_ID, Kind.TECHNICIAN_ID)),
-        *(Field(kind) for kind in CARRIED),
-        *(length(Kind.AXIAL_FLOAT, n) for n in numbers),
+    columns: list[tuple[Kind, Sequence[int | None]]] = [
+        *((kind, (None,)) for kind in (Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE, Kind.CONVENTION)),
+        (Kind.CLEARANCE, numbers),
+        *((kind, (None,)) for kind in (Kind.DATE, Kind.OUTCOME, Kind.LANDINGS, Kind.GAUGE_U)),
+        (Kind.PLUNGER_DISPLACEMENT, (1, 2, 3)),
+        *((kind, (None,)) for kind in (Kind.PLUNGER_DOWN_LOCK, Kind.PLUNGER_GAUGE_U, Kind.MARGIN, Kind.MARGIN_U)),
+        *((kind, (None,)) for kind in (Kind.TEMPERATURE, Kind.PRESSURE, Kind.APPROACH, Kind.GAUGE_ID)),
+        *((kind, (None,)) for kind in (Kind.TECHNICIAN_ID, *CARRIED)),
+        (Kind.AXIAL_FLOAT, numbers),
     ]
+    return [Field(kind, n, unit if kind in LENGTHS else None) for kind, each in columns for n in each]
 
 
 def _explain(field: Field, joints: Sequence[JointLine]) -> str:
@@ -136,8 +132,6 @@ def _explain(field: Field, joints: Sequence[JointLine]) -> str:
 
 
 def _instructions(book: Workbook, joints: Sequence[JointLine]) -> None:
-    from openpyxl.styles import Alignment, Font
-
     sheet = book.worksheets[0]
     sheet.title = "Instructions"
     sheet.column_dimensions["A"].width = 74
@@ -159,8 +153,6 @@ def _as_high_as(sheet: Worksheet, row: int, text: str, on_a_line: int) -> None:
 
 
 def _fit_to_width(sheet: Worksheet) -> None:
-    from openpyxl.worksheet.properties import PageSetupProperties
-
     sheet.page_setup.paperSize = 9
     sheet.page_setup.fitToWidth = 1
     sheet.page_setup.fitToHeight = 0
@@ -168,12 +160,7 @@ def _fit_to_width(sheet: Worksheet) -> None:
 
 
 def _table(book: Workbook, joints: Sequence[JointLine], unit: LengthUnit) -> None:
-    from openpyxl.comments import Comment
-    from openpyxl.styles import Alignment, Border, Font, PatternFill, Side
-    from openpyxl.worksheet.pagebreak import Break
-
     sheet = book.create_sheet("Inspections")
-    line = Side(style="thin", color="FF9AA5B1")
     fields = _fields(joints, unit)
     for index, field in enumerate(fields):
         letters = column_letters(index)
@@ -181,13 +168,12 @@ def _table(book: Workbook, joints: Sequence[JointLine], unit: LengthUnit) -> Non
         cell.font = Font(name=FONT, bold=True)
         cell.fill = PatternFill("solid", fgColor=_REQUIRED_FILL if field.kind in _MUST else HEADER_FILL)
         cell.alignment = Alignment(wrap_text=True, vertical="center", horizontal="center")
-        cell.border = Border(bottom=line, right=line)
+        cell.border = Border(bottom=_LINE, right=_LINE)
         cell.comment = Comment(_explain(field, joints), "mlg", width=320, height=120)
         sheet.column_dimensions[letters].width = 30 if field.kind is Kind.REMARKS else 13
         number_format = _number_format(field.kind)
-        for row in range(2, _ROWS + 2):
-            if number_format is not None:
-                sheet.cell(row, index + 1).number_format = number_format
+        for row in range(2, _ROWS + 2) if number_format is not None else ():
+            sheet.cell(row, index + 1).number_format = number_format
         _validate(sheet, field.kind, f"{letters}2:{letters}{_ROWS + 1}")
     sheet.row_dimensions[1].height = 45
     sheet.freeze_panes = "D2"
@@ -205,8 +191,6 @@ def _number_format(kind: Kind) -> str | None:
 
 
 def _validate(sheet: Worksheet, kind: Kind, cells: str) -> None:
-    from openpyxl.worksheet.datavalidation import DataValidation
-
     if kind in _CHOICES:
         rule = DataValidation("list", formula1='"' + ",".join(_CHOICES[kind]) + '"', allow_blank=True)
         rule.errorTitle, rule.error = "Not in the list", "Choose one of: " + ", ".join(_CHOICES[kind])
@@ -224,8 +208,6 @@ def _validate(sheet: Worksheet, kind: Kind, cells: str) -> None:
 
 
 def _form(book: Workbook, joints: Sequence[JointLine]) -> None:
-    from openpyxl.styles import Alignment, Border, Font, PatternFill, Side
-
     sheet = book.create_sheet("Form")
     sheet["A1"] = FORM_TITLE
     sheet["A1"].font = Font(name=FONT, bold=True, size=14)
@@ -234,13 +216,11 @@ def _form(book: Workbook, joints: Sequence[JointLine]) -> None:
         sheet.column_dimensions[letters].width = width
     fields = _fields(joints, None)
     fields.insert(4, Field(Kind.UNIT))
-    line = Side(style="thin", color="FF9AA5B1")
-    row = 4
-    for field in fields:
+    for row, field in enumerate(fields, 4):
         label, value, hint = sheet.cell(row, 1, field.label), sheet.cell(row, 2), sheet.cell(row, 3)
         must = field.kind in _MUST or field.kind is Kind.UNIT
         value.fill = PatternFill("solid", fgColor=_REQUIRED_FILL if must else "FFFFFFFF")
-        value.border = Border(left=line, right=line, top=line, bottom=line)
+        value.border = Border(left=_LINE, right=_LINE, top=_LINE, bottom=_LINE)
         value.number_format = _number_format(field.kind) or "General"
         value.alignment = label.alignment = Alignment(horizontal="left", vertical="top")
         label.font = Font(name=FONT, bold=must)
@@ -250,7 +230,6 @@ def _form(book: Workbook, joints: Sequence[JointLine]) -> None:
         hint.font = Font(name=FONT, size=9, color="FF52606D")
         _as_high_as(sheet, row, hint.value, 94)
         _validate(sheet, field.kind, f"B{row}")
-        row += 1
     sheet.freeze_panes = "B4"
     sheet.print_title_rows = "1:2"
     _fit_to_width(sheet)

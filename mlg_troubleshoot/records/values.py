@@ -87,8 +87,15 @@ def plain_text(text: str) -> str:
 
 
 def read_length(
-    cell: str | float | OddCell, unit: LengthUnit | None, *, signed: bool, decimal_comma: bool, expected: str
+    cell: str | float | OddCell,
+    unit: LengthUnit | None,
+    declared: LengthUnit | None = None,
+    *,
+    signed: bool,
+    decimal_comma: bool,
+    expected: str,
 ) -> tuple[float, LengthUnit, str]:
+    """Read a length in its own unit or that of its column, which must agree, or else in the declared one."""
     if isinstance(cell, float):
         text = show_number(cell)
         value, written = cell, None
@@ -111,7 +118,7 @@ def read_length(
             f"The cell says {written.value}, the column says {unit.value}. If the cell is right, enter {same} "
             f"({unit.value}); if the column is right, enter the number without a unit.",
         )
-    found = written or unit
+    found = written or unit or declared
     if found is None:
         raise CellFaultError("unit_missing", f"{expected} with its unit")
     return found.to_inches(value), found, text

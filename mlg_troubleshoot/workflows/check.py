@@ -332,7 +332,7 @@ def write_template(
 
         write_form(file, loaded, page=page, unit=unit)
         return
-    from mlg_troubleshoot.records import write_template as write
+    from mlg_troubleshoot.records.template import write_template as write
 
     write(file, [(joint.number, joint.name, joint.location) for joint in loaded.joints])
 
@@ -370,7 +370,7 @@ def write_verdicts(result: CheckResult, file: Path) -> None:
 
 def annotate(result: CheckResult, source: Path, out: Path) -> tuple[str, ...]:
     """Write a copy of the user's workbook with bad cells marked and verdict columns added."""
-    from mlg_troubleshoot.records import annotate_workbook
+    from mlg_troubleshoot.records.annotate import annotate_workbook
 
     if result.read is None:
         raise UsageError("there is no workbook to annotate", "Give the workbook as FILE.")

@@ -16,7 +16,8 @@ from openpyxl.worksheet.datavalidation import DataValidation
 
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.outputs import write_csv
-from mlg_troubleshoot.records import ReadOptions, annotate_workbook, read_inspections
+from mlg_troubleshoot.records import ReadOptions, read_inspections
+from mlg_troubleshoot.records.annotate import annotate_workbook
 
 HEADER = ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in", "inspection_date")
 ROWS = [
@@ -192,7 +193,7 @@ def test_macros_are_kept_in_a_macro_workbook(tmp_path, xlsx):
 
 
 def test_a_form_gets_its_verdict_beside_it(tmp_path):
-    from mlg_troubleshoot.records import write_template
+    from mlg_troubleshoot.records.template import write_template
 
     path, out = tmp_path / "t.xlsx", tmp_path / "o.xlsx"
     write_template(path, [(n, "n", "p") for n in range(1, 11)])

@@ -10,7 +10,8 @@ import zipfile
 import openpyxl
 import pytest
 
-from mlg_troubleshoot.records import ReadOptions, read_inspections, write_template
+from mlg_troubleshoot.records import ReadOptions, read_inspections
+from mlg_troubleshoot.records.template import write_template
 
 JOINTS = [(n, f"name {n}", f"place {n}") for n in range(1, 11)]
 
@@ -128,7 +129,7 @@ def test_csv_written_by_libreoffice_is_read(tmp_path, xlsx, charset, separator, 
 
 @pytest.mark.slow
 def test_libreoffice_opens_an_annotated_workbook_and_calculates_it(tmp_path, samples):
-    from mlg_troubleshoot.records import annotate_workbook
+    from mlg_troubleshoot.records.annotate import annotate_workbook
 
     out = tmp_path / "annotated.xlsx"
     result = read_inspections(samples / "sample.xlsx", ReadOptions())

@@ -9,7 +9,9 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.errors import OutputError
-from mlg_troubleshoot.records import ReadOptions, annotate_workbook, read_inspections, write_template
+from mlg_troubleshoot.records import ReadOptions, read_inspections
+from mlg_troubleshoot.records.annotate import annotate_workbook
+from mlg_troubleshoot.records.template import write_template
 from mlg_troubleshoot.units import LengthUnit
 
 JOINTS = [(n, f"name {n}", f"place {n}") for n in range(1, 11)]

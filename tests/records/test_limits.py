@@ -16,17 +16,8 @@ import pytest
 
 from mlg_troubleshoot import datafile
 from mlg_troubleshoot.decision.inspection import Inspection
-from mlg_troubleshoot.records import (
-    ReadOptions,
-    annotate_workbook,
-    cells,
-    csvfile,
-    read,
-    read_inspections,
-    read_many,
-    xls,
-    zipguard,
-)
+from mlg_troubleshoot.records import ReadOptions, cells, csvfile, read, read_inspections, read_many, xls, zipguard
+from mlg_troubleshoot.records.annotate import annotate_workbook
 from mlg_troubleshoot.reporting import pdf
 from tests.machine import SLOWER
 

@@ -772,7 +772,8 @@ def test_44_an_exported_text_is_no_formula(tmp_path, text):
 
 
 def test_44_a_text_in_an_annotated_workbook_is_no_formula(tmp_path, read, xlsx):
-    from mlg_troubleshoot.records import ReadOptions, annotate_workbook, read_inspections
+    from mlg_troubleshoot.records import ReadOptions, read_inspections
+    from mlg_troubleshoot.records.annotate import annotate_workbook
 
     source, out = tmp_path / "in.xlsx", tmp_path / "out.xlsx"
     source.write_bytes(xlsx())
