@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -43,11 +43,17 @@ class Answers:
     def with_joint(self, number: int, answer: JointAnswer) -> Answers:
         return replace(self, joints=MappingProxyType({**self.joints, number: answer}))
 
+    def with_each(self, change: Callable[[JointAnswer], JointAnswer]) -> Answers:
+        return replace(self, joints=MappingProxyType({n: change(answer) for n, answer in self.joints.items()}))
+
+    @property
+    def heading(self) -> tuple[str | None, Side | None, LengthUnit | None, ClearanceConvention | None]:
+        return self.tail_no, self.side, self.unit, self.convention
+
     def with_more(self, **columns: str | None) -> Answers:
         """Return the answers with optional columns set, or taken away where they are None."""
         merged: dict[str, str | None] = {**self.more, **columns}
-        kept = {name: merged[name] for name in MORE if merged.get(name)}
-        return replace(self, more=MappingProxyType({name: text for name, text in kept.items() if text is not None}))
+        return replace(self, more=MappingProxyType({name: text for name in MORE if (text := merged.get(name))}))
 
     def beside(self, given: Answers) -> Answers:
         """Return the answers with what is missing filled from flags; only the record id is taken from these first."""

@@ -102,6 +102,9 @@ class Turn:
 
 _WORDS = {"b": "b", "back": "b", "?": "?", "help": "?", "q": "q", "quit": "q"}
 _YES, _NO = ("y", "yes"), ("n", "no")
+_SIDES = {**dict.fromkeys(("l", "lh", "left"), Side.LH), **dict.fromkeys(("r", "rh", "right"), Side.RH)}
+_UNITS = {"i": LengthUnit.INCH, "t": LengthUnit.THOU, "m": LengthUnit.MILLIMETRE}
+_CONVENTIONS = {c.value[0].lower(): c for c in ClearanceConvention}
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,22 +145,7 @@ class Flow:
         return self._go_on(answers, told=self._resumed(answers))
 
     def page(self, state: State, width: int) -> Page:
-        answers = state.answers
-        shown: dict[Ask, Callable[[], Page]] = {
-            Ask.TAIL: lambda: pages.tail_page(answers),
-            Ask.SIDE: lambda: pages.side_page(answers),
-            Ask.UNIT: lambda: pages.unit_page(answers),
-            Ask.CONVENTION: lambda: pages.convention_page(answers),
-            Ask.OFFER: lambda: pages.offer_page(_known(state.saved), self.gear),
-            Ask.REREAD: lambda: pages.reread_page(answers, _known(state.old_unit)),
-            Ask.JOINT: lambda: pages.joint_page(self.gear, answers, self.order, state.joint, width, state.suggested),
-            Ask.CONFIRM: lambda: pages.confirm_page(self.gear, self._pending(state), state.joint, answers.unit),
-            Ask.MORE: lambda: pages.more_page(answers, self.gear, width),
-            Ask.CONFIRM_MORE: lambda: pages.confirm_more_page(self._most_in, answers.unit),
-            Ask.DETAIL: lambda: pages.detail_page(answers, str(state.at), self.today),
-            Ask.REVIEW: lambda: pages.review_page(self.gear, answers, width),
-        }
-        return shown[state.ask]()
+        return _QUESTIONS[state.ask].page(self, state, width)
 
     def answer(self, state: State, text: str) -> Turn:
         typed = text.strip()
@@ -170,8 +158,7 @@ class Flow:
             return self._back(state)
         if word == "?":
             return Turn(state, self._help(state))
-        take, _ = _QUESTIONS[state.ask]
-        turn = take(self, state, typed)
+        turn = _QUESTIONS[state.ask].take(self, state, typed)
         here, passing = (state.ask, state.at), (Ask.OFFER, Ask.REREAD, Ask.CONFIRM, Ask.CONFIRM_MORE)
         moved = (turn.state.ask, turn.state.at) != here and state.ask not in passing
         return replace(turn, state=replace(turn.state, trail=(*state.trail, here) if moved else state.trail))
@@ -179,7 +166,7 @@ class Flow:
     def _help(self, state: State) -> tuple[Line, ...]:
         if state.ask in (Ask.JOINT, Ask.CONFIRM):
             return pages.joint_help(self.gear, state.answers, state.joint)
-        return _QUESTIONS[state.ask][1]
+        return _QUESTIONS[state.ask].help
 
     def _tail(self, state: State, typed: str) -> Turn:
         answers = state.answers
@@ -188,20 +175,14 @@ class Flow:
         return self._offer_or_go_on(replace(answers, tail_no=typed or answers.tail_no), state.from_review)
 
     def _side(self, state: State, typed: str) -> Turn:
-        answers = state.answers
-        side = {"l": Side.LH, "lh": Side.LH, "left": Side.LH, "r": Side.RH, "rh": Side.RH, "right": Side.RH}.get(
-            typed.lower()
-        )
-        if not typed:
-            side = answers.side
+        side = _SIDES.get(typed.lower()) if typed else state.answers.side
         if side is None:
             return _again(state, _not_taken(typed, "Type l for the left gear or r for the right."))
-        return self._offer_or_go_on(replace(answers, side=side), state.from_review)
+        return self._offer_or_go_on(replace(state.answers, side=side), state.from_review)
 
     def _unit(self, state: State, typed: str) -> Turn:
         answers = state.answers
-        short = {"i": LengthUnit.INCH, "t": LengthUnit.THOU, "m": LengthUnit.MILLIMETRE}
-        unit = _chosen(typed, short, LengthUnit.parse, answers.unit)
+        unit = _chosen(typed, _UNITS, LengthUnit.parse, answers.unit)
         if unit is None:
             return _again(state, _not_taken(typed, "Type i for inch, t for thou or m for millimetre."))
         changed = replace(answers, unit=unit)
@@ -212,21 +193,19 @@ class Flow:
 
     def _reread(self, state: State, typed: str) -> Turn:
         old = _known(state.old_unit)
-        answers = state.answers
-        if typed.lower() in _YES:
-            return self._go_on(_unconfirmed(answers), state.from_review)
-        if typed.lower() in _NO:
-            kept = {
-                number: replace(a, written=replace(a.written, unit=a.written.unit or old)) if a.written else a
-                for number, a in answers.joints.items()
-            }
-            return self._go_on(replace(answers, joints=MappingProxyType(kept)), state.from_review)
-        return _again(state, _not_taken(typed, "Type y or n."))
+
+        def in_old(answer: JointAnswer) -> JointAnswer:
+            written = answer.written
+            return answer if written is None else replace(answer, written=replace(written, unit=written.unit or old))
+
+        if typed.lower() not in (*_YES, *_NO):
+            return _again(state, _not_taken(typed, "Type y or n."))
+        change = _unconfirmed if typed.lower() in _YES else in_old
+        return self._go_on(state.answers.with_each(change), state.from_review)
 
     def _convention(self, state: State, typed: str) -> Turn:
         answers = state.answers
-        short = {c.value[0].lower(): c for c in ClearanceConvention}
-        convention = _chosen(typed, short, ClearanceConvention.parse, answers.convention)
+        convention = _chosen(typed, _CONVENTIONS, ClearanceConvention.parse, answers.convention)
         if convention is None:
             return _again(state, _not_taken(typed, "Type r, d or t; ? explains them."))
         if convention is answers.convention:
@@ -235,7 +214,8 @@ class Flow:
         if answers.convention is not None and answers.radial_in:
             name = pages.CONVENTION_NAMES[convention]
             told = (line((f"The readings stay as typed and are now read as {name}.", Tone.WARN)),)
-        return self._go_on(_unconfirmed(replace(answers, convention=convention)), state.from_review, told)
+        changed = replace(answers, convention=convention).with_each(_unconfirmed)
+        return self._go_on(changed, state.from_review, told)
 
     def _offer(self, state: State, typed: str) -> Turn:
         saved = _known(state.saved)
@@ -253,12 +233,11 @@ class Flow:
         jump = re.fullmatch(r"#\s*(\d{1,4})", typed)
         if jump is not None:
             return self._jump(state, int(jump[1]))
-        if not typed and number not in answers.joints:
-            return _again(state, "Enter alone enters nothing. Type the clearance, or s if it was not measured.")
+        here = NOT_MEASURED if typed.lower() in ("s", "skip") else None if typed else answers.joints.get(number)
+        if here is not None:
+            return self._answered(state, number, here)
         if not typed:
-            return self._answered(state, number, answers.joints[number])
-        if typed.lower() in ("s", "skip"):
-            return self._answered(state, number, NOT_MEASURED)
+            return _again(state, "Enter alone enters nothing. Type the clearance, or s if it was not measured.")
         if typed.lower() == "done":
             return self._done(state)
         return self._value(state, number, typed)
@@ -392,8 +371,7 @@ class Flow:
         """Go to the first open question; readings that have become impossible are open again."""
         answers, settled = self._settled(answers)
         told = (*told, *settled)
-        given = (answers.tail_no, answers.side, answers.unit, answers.convention)
-        for ask, value in zip(_HEADING, given, strict=True):
+        for ask, value in zip(_HEADING, answers.heading, strict=True):
             if value is None:
                 return Turn(State(ask, answers), told)
         still_open = self.open_joints(answers)
@@ -478,15 +456,9 @@ def _known(value: _T | None) -> _T:
 
 def _contradictions(saved: Answers, given: Answers) -> str:
     """Say where what is given contradicts what is saved; empty if nowhere."""
-    pairs = (
-        ("tail", saved.tail_no, given.tail_no),
-        ("side", saved.side, given.side),
-        ("unit", saved.unit, given.unit),
-        ("reading", saved.convention, given.convention),
-    )
     return ", ".join(
-        f"{name} {kept}, not {new}"
-        for name, kept, new in pairs
+        f"{ask.value} {kept}, not {new}"
+        for ask, kept, new in zip(_HEADING, saved.heading, given.heading, strict=True)
         if kept is not None and new is not None and kept.casefold() != new.casefold()
     )
 
@@ -509,23 +481,42 @@ def _not_taken(typed: str, remedy: str) -> str:
     return f"{typed!r} is not an answer here. {remedy}" if typed else f"Enter alone enters nothing. {remedy}"
 
 
-def _unconfirmed(answers: Answers) -> Answers:
-    joints = {number: replace(answer, confirmed=False) for number, answer in answers.joints.items()}
-    return replace(answers, joints=MappingProxyType(joints))
+def _unconfirmed(answer: JointAnswer) -> JointAnswer:
+    return replace(answer, confirmed=False)
 
 
-# What takes the answer to a question, and its help; that of a joint is the joint's own.
-_QUESTIONS: dict[Ask, tuple[Callable[[Flow, State, str], Turn], tuple[Line, ...]]] = {
-    Ask.TAIL: (Flow._tail, pages.TAIL_HELP),
-    Ask.SIDE: (Flow._side, pages.SIDE_HELP),
-    Ask.UNIT: (Flow._unit, pages.UNIT_HELP),
-    Ask.CONVENTION: (Flow._convention, pages.CONVENTION_HELP),
-    Ask.OFFER: (Flow._offer, pages.OFFER_HELP),
-    Ask.REREAD: (Flow._reread, pages.REREAD_HELP),
-    Ask.JOINT: (Flow._joint, ()),
-    Ask.CONFIRM: (Flow._confirm, ()),
-    Ask.MORE: (Flow._more, pages.MORE_HELP),
-    Ask.CONFIRM_MORE: (Flow._confirm_more, pages.MORE_HELP),
-    Ask.DETAIL: (Flow._detail, pages.DETAIL_HELP),
-    Ask.REVIEW: (Flow._review, pages.REVIEW_HELP),
+@dataclass(frozen=True, slots=True)
+class _Question:
+    """What takes the answer to a question, how it is shown, and its help; that of a joint is the joint's own."""
+
+    take: Callable[[Flow, State, str], Turn]
+    page: Callable[[Flow, State, int], Page]
+    help: tuple[Line, ...] = ()
+
+
+_QUESTIONS: dict[Ask, _Question] = {
+    Ask.TAIL: _Question(Flow._tail, lambda _, s, __: pages.tail_page(s.answers), pages.TAIL_HELP),
+    Ask.SIDE: _Question(Flow._side, lambda _, s, __: pages.side_page(s.answers), pages.SIDE_HELP),
+    Ask.UNIT: _Question(Flow._unit, lambda _, s, __: pages.unit_page(s.answers), pages.UNIT_HELP),
+    Ask.CONVENTION: _Question(
+        Flow._convention, lambda _, s, __: pages.convention_page(s.answers), pages.CONVENTION_HELP
+    ),
+    Ask.OFFER: _Question(Flow._offer, lambda f, s, _: pages.offer_page(_known(s.saved), f.gear), pages.OFFER_HELP),
+    Ask.REREAD: _Question(
+        Flow._reread, lambda _, s, __: pages.reread_page(s.answers, _known(s.old_unit)), pages.REREAD_HELP
+    ),
+    Ask.JOINT: _Question(
+        Flow._joint, lambda f, s, w: pages.joint_page(f.gear, s.answers, f.order, s.joint, w, s.suggested)
+    ),
+    Ask.CONFIRM: _Question(
+        Flow._confirm, lambda f, s, _: pages.confirm_page(f.gear, f._pending(s), s.joint, s.answers.unit)
+    ),
+    Ask.MORE: _Question(Flow._more, lambda f, s, w: pages.more_page(s.answers, f.gear, w), pages.MORE_HELP),
+    Ask.CONFIRM_MORE: _Question(
+        Flow._confirm_more, lambda f, s, _: pages.confirm_more_page(f._most_in, s.answers.unit), pages.MORE_HELP
+    ),
+    Ask.DETAIL: _Question(
+        Flow._detail, lambda f, s, _: pages.detail_page(s.answers, str(s.at), f.today), pages.DETAIL_HELP
+    ),
+    Ask.REVIEW: _Question(Flow._review, lambda f, s, w: pages.review_page(f.gear, s.answers, w), pages.REVIEW_HELP),
 }

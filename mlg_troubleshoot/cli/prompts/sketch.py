@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import zip_longest
 
 from mlg_troubleshoot.cli.prompts.lines import Line, Tone
 from mlg_troubleshoot.gear.gear import Gear
@@ -26,28 +28,8 @@ class _Chain:
     slides: bool
 
 
-class _Canvas:
-    def __init__(self, rows: int, width: int) -> None:
-        self._cells = [[(" ", Tone.PLAIN)] * width for _ in range(rows)]
-
-    def write(self, row: int, column: int, text: str, tone: Tone = Tone.PLAIN) -> None:
-        for i, character in enumerate(text):
-            self._cells[row][column + i] = (character, tone)
-
-    def lines(self) -> tuple[Line, ...]:
-        drawn = []
-        for cells in self._cells:
-            parts: list[tuple[str, Tone]] = []
-            while cells and cells[-1][0] == " ":
-                cells.pop()
-            for character, tone in cells:
-                if parts and parts[-1][1] is tone:
-                    parts[-1] = (parts[-1][0] + character, tone)
-                else:
-                    parts.append((character, tone))
-            if parts:
-                drawn.append(Line(tuple(parts), rigid=True))
-        return tuple(drawn)
+# What stands in a row of the drawing: its column, its text and its tone.
+_Mark = tuple[int, str, Tone]
 
 
 def sketch(gear: Gear, current: int, width: int) -> tuple[Line, ...]:
@@ -58,13 +40,10 @@ def sketch(gear: Gear, current: int, width: int) -> tuple[Line, ...]:
     """
     numbers = {joint.point: joint.number for joint in gear.joints}
     chain = _chain(gear.reference.mechanism.steps)
-    if chain is not None:
-        shown = {*chain.points, *(bar.pivot for bar in chain.bars)}
-        if not set(numbers) <= shown:
-            chain = None
-    drawn = () if chain is None else _draw(gear, chain, numbers, current, width - 3)
+    whole = chain is not None and set(numbers) <= {*chain.points, *(bar.pivot for bar in chain.bars)}
+    drawn = _draw(gear, chain, current, width - 3) if chain is not None and whole else ()
     row = _Chain(tuple(numbers), (_Bar("·", None),) * (len(numbers) - 1), False)
-    return drawn or _draw(gear, row, numbers, current, width - 3)
+    return drawn or _draw(gear, row, current, width - 3)
 
 
 def _chain(steps: tuple[Step, ...]) -> _Chain | None:
@@ -97,57 +76,52 @@ def _chain(steps: tuple[Step, ...]) -> _Chain | None:
     return _Chain(tuple(points), tuple(bars), slides)
 
 
-def _draw(gear: Gear, chain: _Chain, numbers: dict[str, int], current: int, width: int) -> tuple[Line, ...]:
-    def label(point: str) -> str:
-        number = numbers.get(point)
-        if number is None:
-            return "○"
-        return f"[{number}]" if number == current else f"({number})"
+def _draw(gear: Gear, chain: _Chain, current: int, width: int) -> tuple[Line, ...]:
+    joints = {joint.point: joint for joint in gear.joints}
 
-    labels = [label(point) for point in chain.points]
+    def shown(point: str, unnamed: str, tone: Tone) -> tuple[str, Tone]:
+        if point not in joints:
+            return unnamed, tone
+        number = joints[point].number
+        return (f"[{number}]", Tone.CURRENT) if number == current else (f"({number})", Tone.PLAIN)
+
+    labels = [shown(point, "○", Tone.PLAIN) for point in chain.points]
     arrow = "═▶" if chain.slides else ""
-    space = width - sum(map(len, labels)) - len(arrow)
+    space = width - sum(len(text) for text, _ in labels) - len(arrow)
     bar_length = min(_LONGEST_BAR, space // max(len(chain.bars), 1))
     if bar_length < 1 or (bar_length < 3 and any(bar.pivot for bar in chain.bars)):
         return ()
-    canvas = _Canvas(4, width)
+    above, across, below, lowest = rows = [list[_Mark]() for _ in range(4)]
     column = 0
     spans: list[tuple[str, int, int]] = []
-    areas = {joint.number: joint.area for joint in gear.joints}
-    for i, text in enumerate(labels):
-        number = numbers.get(chain.points[i])
-        marked = number == current
-        canvas.write(1, column, text, Tone.CURRENT if marked else Tone.PLAIN)
-        if marked:
-            canvas.write(2, column + len(text) // 2, "▲", Tone.STRONG)
-        if number is not None:
-            last = column + len(text) - 1
-            if spans and spans[-1][0] == areas[number]:
-                spans[-1] = (spans[-1][0], spans[-1][1], last)
-            else:
-                spans.append((areas[number], column, last))
+    for point, (text, tone), bar in zip_longest(chain.points, labels, chain.bars):
+        across.append((column, text, tone))
+        if tone is Tone.CURRENT:
+            below.append((column + len(text) // 2, "▲", Tone.STRONG))
+        if point in joints:
+            area = joints[point].area
+            first = spans.pop()[1] if spans and spans[-1][0] == area else column
+            spans.append((area, first, column + len(text)))
         column += len(text)
-        if i < len(chain.bars):
-            bar = chain.bars[i]
-            canvas.write(1, column, bar.sign * bar_length)
+        if bar is not None:
+            across.append((column, bar.sign * bar_length, Tone.PLAIN))
             if bar.pivot is not None:
-                _pivot(canvas, column + bar_length // 2, numbers.get(bar.pivot), current)
+                pivot, mark = shown(bar.pivot, "△", Tone.QUIET)
+                middle = column + bar_length // 2
+                below.append((middle - len(pivot) // 2, pivot, mark))
+                lowest += [(middle, "▲", Tone.STRONG)] * (mark is Tone.CURRENT)
             column += bar_length
-    canvas.write(1, column, arrow)
-    for area, first, last in spans:
-        name = f" {area} "
-        length = last - first + 1
-        if length >= len(name) + 4:
-            canvas.write(0, first, f"╭{name.center(length - 2, '─')}╮", Tone.QUIET)
-    return canvas.lines()
+    across.append((column, arrow, Tone.PLAIN))
+    for area, first, end in spans:
+        if end - first >= len(area) + 6:
+            above.append((first, f"╭{f' {area} '.center(end - first - 2, '─')}╮", Tone.QUIET))
+    return tuple(_line(row) for row in rows if row)
 
 
-def _pivot(canvas: _Canvas, middle: int, number: int | None, current: int) -> None:
-    if number is None:
-        canvas.write(2, middle, "△", Tone.QUIET)
-        return
-    marked = number == current
-    text = f"[{number}]" if marked else f"({number})"
-    canvas.write(2, middle - len(text) // 2, text, Tone.CURRENT if marked else Tone.PLAIN)
-    if marked:
-        canvas.write(3, middle, "▲", Tone.STRONG)
+def _line(marks: Iterable[_Mark]) -> Line:
+    parts: list[tuple[str, Tone]] = []
+    at = 0
+    for column, text, tone in sorted(marks):
+        parts += [(" " * (column - at), Tone.PLAIN), (text, tone)]
+        at = column + len(text)
+    return Line(tuple(parts), rigid=True)
