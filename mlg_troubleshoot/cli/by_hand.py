@@ -11,7 +11,7 @@ from mlg_troubleshoot.cli.check import Flags
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.records.model import TableOptions
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 
@@ -27,7 +27,7 @@ class Ending:
     report: Callable[[], None] | None
 
 
-def from_flags(flags: Flags, declared: TableOptions, gear: Gear) -> Inspection:
+def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
     needed = (("--tail", flags.tail), ("--side", flags.side), ("--convention", declared.convention))
     missing = [flag for flag, value in needed if value is None]
     if missing or flags.side is None:
@@ -52,11 +52,11 @@ def from_flags(flags: Flags, declared: TableOptions, gear: Gear) -> Inspection:
         if column in values:
             raise UsageError(f"--set gives joint {int(number)} twice", "Give each joint once.")
         values[column], labels[column] = written, f"--set {text!r}"
-    return _judged(values, labels, flags, declared, gear)
+    return _judged(values, labels, flags, declared)
 
 
 def _judged(
-    values: Mapping[str, object], labels: Mapping[str, str], flags: Flags, declared: TableOptions, gear: Gear
+    values: Mapping[str, object], labels: Mapping[str, str], flags: Flags, declared: task.CheckOptions
 ) -> Inspection:
     """Let the judge of table rows judge the flags; a refusal names the flag."""
     from mlg_troubleshoot.records import ReadOptions, admit
@@ -65,14 +65,13 @@ def _judged(
     typed = {"record_id": flags.record_id, "tail_no": flags.tail, "side": flags.side, **more}
     names = {"tail_no": "tail", "plunger_displacement": "measured"}
     named = {column: f"--{names.get(column, column).replace('_', '-')} {text!r}" for column, text in typed.items()}
-    options = ReadOptions.of(gear, unit=declared.unit, convention=declared.convention)
+    options = ReadOptions.of(load_gear(declared.gear), unit=declared.unit, convention=declared.convention)
     return admit({**values, **more}, options, {**named, **labels})
 
 
 def ask(
     flags: Flags,
-    declared: TableOptions,
-    gear: Gear,
+    declared: task.CheckOptions,
     publish: Callable[[Inspection, LengthUnit], Ending],
     keep: Callable[[task.CheckResult], None],
     *,
@@ -82,12 +81,12 @@ def ask(
     """Ask on the terminal and show the result; the entry stays open until it was shown and kept."""
     from mlg_troubleshoot.cli.prompts import Answers, RichTerminal, SessionStore, ask_inspection
 
-    store, terminal = SessionStore(place), RichTerminal()
+    store, terminal, gear = SessionStore(place), RichTerminal(), load_gear(declared.gear)
     saved = store.latest() if resume else None
     if resume and saved is None:
         raise UsageError("there is no unfinished entry to resume", "Start a new one: mlg check")
     nobody = {"record_id": "-", "tail_no": "-", "side": flags.side or "LH", "clearance_convention": "RADIAL"}
-    judged = _judged(nobody, {}, flags, declared, gear)
+    judged = _judged(nobody, {}, flags, declared)
     unit = declared.unit or LengthUnit.INCH
     lengths = {"plunger_displacement": flags.measured, "margin": flags.margin}
     given = Answers(

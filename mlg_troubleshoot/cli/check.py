@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -17,7 +16,7 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.units import LengthUnit
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.cli.by_hand import Ending
+    from mlg_troubleshoot.cli import by_hand
     from mlg_troubleshoot.cli.remembered import Settings
     from mlg_troubleshoot.decision.inspection import Inspection
     from mlg_troubleshoot.store import Store
@@ -114,7 +113,7 @@ def check(
     Without FILE on a terminal it asks, joint by joint. Exit codes: 0 every gear within margin · 1 something needs
     attention · 3 no row could be judged · 2 usage.
     """
-    from mlg_troubleshoot.cli.by_hand import Ending
+    from mlg_troubleshoot.cli import by_hand
     from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.store import Store
     from mlg_troubleshoot.workflows import check as task
@@ -155,20 +154,26 @@ def check(
             seen = replace(shown, show=reader_unit or entered_in)
             _write_reports(result, asked, report, formats, seen, place, quiet=quiet)
 
-    def publish_entry(inspection: Inspection, entered_in: LengthUnit) -> Ending:
+    def publish_entry(inspection: Inspection, entered_in: LengthUnit) -> by_hand.Ending:
         result = task.check_inspection(inspection, asked)
         publish(result, entered_in)
-        offered = report is None and not as_json
+        if report is not None or as_json:
+            return by_hand.Ending(result, None)
         seen = replace(shown, show=reader_unit or entered_in)
         write = partial(_write_reports, result, asked, Path("report"), formats, seen, place, quiet=quiet)
-        return Ending(result, write if offered else None)
+        return by_hand.Ending(result, write)
 
     if given or flags.values:
         result = _result(given, flags, asked, quiet=quiet)
         publish(result)
         kept(result)
     else:
-        result = _ask(flags, asked, publish_entry, kept, resume=resume, place=store)
+        if not output.can_ask():
+            raise UsageError(
+                "nothing to check: no FILE was given, and this is not a terminal to ask on",
+                "Pass a FILE, - for standard input, or --set JOINT=VALUE with --tail, --side and --convention.",
+            )
+        result = by_hand.ask(flags, asked, publish_entry, kept, resume=resume, place=store)
     if result.problems and not as_json and not result.judgements:
         output.say("No row could be judged.")
     raise typer.Exit(result.exit_code)
@@ -184,7 +189,7 @@ def _keep(
 
     if tails not in (None, "same", "apart"):
         raise UsageError(f"--tails {tails!r} is not same or apart", "Give same (one aircraft) or apart (two).")
-    same_tail = history.ask_tail if history.can_ask() else None
+    same_tail = history.ask_tail if output.can_ask() else None
     added = keep(result, asked, place, same_tail if tails is None else lambda _new, _kept: tails == "same")
     if not quiet:
         output.say(f"Kept in {place.place}: {added.new} new records, {added.known} known already.")
@@ -193,7 +198,6 @@ def _keep(
 def _result(files: Sequence[str], flags: Flags, asked: task.CheckOptions, *, quiet: bool) -> task.CheckResult:
     from mlg_troubleshoot.cli import by_hand
     from mlg_troubleshoot.cli.progress import stages
-    from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.workflows import check as task
 
     if files and any(astuple(flags)):
@@ -203,7 +207,7 @@ def _result(files: Sequence[str], flags: Flags, asked: task.CheckOptions, *, qui
             "Give either a FILE or the values of one gear.",
         )
     if not files:
-        return task.check_inspection(by_hand.from_flags(flags, asked, load_gear(asked.gear)), asked)
+        return task.check_inspection(by_hand.from_flags(flags, asked), asked)
     with stages(quiet=quiet) as bar:
         return task.check_files(
             [Path(name) for name in files],
@@ -211,26 +215,6 @@ def _result(files: Sequence[str], flags: Flags, asked: task.CheckOptions, *, qui
             on_read=partial(bar, "Reading"),
             on_judged=partial(bar, "Judging"),
         )
-
-
-def _ask(
-    flags: Flags,
-    asked: task.CheckOptions,
-    publish: Callable[[Inspection, LengthUnit], Ending],
-    keep: Callable[[task.CheckResult], None],
-    *,
-    resume: bool,
-    place: str | None,
-) -> task.CheckResult:
-    from mlg_troubleshoot.cli import by_hand
-    from mlg_troubleshoot.gear.gear_file import load_gear
-
-    if not (sys.stdin.isatty() and sys.stderr.isatty()):
-        raise UsageError(
-            "nothing to check: no FILE was given, and this is not a terminal to ask on",
-            "Pass a FILE, - for standard input, or --set JOINT=VALUE with --tail, --side and --convention.",
-        )
-    return by_hand.ask(flags, asked, load_gear(asked.gear), publish, keep, resume=resume, place=place)
 
 
 def _show(result: task.CheckResult, unit: LengthUnit, *, detail: bool, every: bool, quiet: bool) -> None:

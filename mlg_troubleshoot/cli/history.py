@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
@@ -371,10 +370,6 @@ def import_chain(file: Chain, store: Place = None) -> None:
 def ask_tail(tail: str, kept: str) -> bool:
     """Ask whether two spellings mean one aircraft."""
     return typer.confirm(f"Tail {tail!r} differs from {kept!r} only in spelling. Is it the same aircraft?", err=True)
-
-
-def can_ask() -> bool:
-    return sys.stdin.isatty() and sys.stderr.isatty()
 
 
 def history_app() -> typer.Typer:

@@ -66,6 +66,10 @@ def speaks_utf8() -> bool:
     return re.search(r"utf-?8", chosen, re.IGNORECASE) is not None
 
 
+def can_ask() -> bool:
+    return sys.stdin.isatty() and sys.stderr.isatty()
+
+
 def abandon_stdout() -> None:
     """Drop what is still to be written to stdout: the reader of the pipe went away, the work goes on."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -20,7 +20,7 @@ def stages(*, quiet: bool) -> Iterator[Advance]:
         return
     start = time.monotonic()
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
     bar = Progress(
         TextColumn("{task.description}"),
@@ -30,16 +30,13 @@ def stages(*, quiet: bool) -> Iterator[Advance]:
         console=Console(stderr=True),
         transient=True,
     )
-    tasks = {}
-    running = False
+    tasks: dict[str, TaskID] = {}
 
     def advance(name: str, done: int, total: int | None) -> None:
-        nonlocal running
-        if not running and time.monotonic() - start < _WORTH_SHOWING_AFTER_S:
-            return
-        if not running:
+        if not tasks:
+            if time.monotonic() - start < _WORTH_SHOWING_AFTER_S:
+                return
             bar.start()
-            running = True
         if name not in tasks:
             tasks[name] = bar.add_task(name, total=total)
         bar.update(tasks[name], completed=done, total=total)
@@ -47,5 +44,5 @@ def stages(*, quiet: bool) -> Iterator[Advance]:
     try:
         yield advance
     finally:
-        if running:
+        if tasks:
             bar.stop()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -95,7 +94,7 @@ def _asked(file: Path, gear: str, unit: LengthUnit) -> str:
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.workflows.survey import write_survey_template
 
-    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+    if not output.can_ask():
         raise UsageError("this is not a terminal to ask on", "Fill in a template: mlg gear survey template FILE.csv")
     options.keep_inputs(gear, (), [("the survey", file)])
     if not file.exists():

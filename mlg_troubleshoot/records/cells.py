@@ -112,15 +112,14 @@ def padding_width(code: str | None) -> int:
 def date_cell(serial: float, *, epoch_1904: bool) -> OddCell:
     # 25569 is 1970-01-01 in the 1900 system, 24107 in the 1904 system.
     days = serial - (24107 if epoch_1904 else 25569)
-    whole = int(days // 1) if abs(days) < 4e6 else None
-    if whole is None or serial < 0 or (serial < 61 and not epoch_1904):
-        # Before March 1900 the 1900 system counts a day that never was; no inspection is that old.
-        return OddCell(OddKind.DATE, f"{show_number(serial)} shown as a date or time", None, serial)
+    # Before March 1900 the 1900 system counts a day that never was; no inspection is that old.
+    is_real = serial >= (0 if epoch_1904 else 61)
     try:
-        day = date.fromordinal(date(1970, 1, 1).toordinal() + whole)
+        day = date.fromordinal(date(1970, 1, 1).toordinal() + int(days // 1)) if is_real else None
     except (ValueError, OverflowError):
-        return OddCell(OddKind.DATE, f"{show_number(serial)} shown as a date or time", None, serial)
-    return OddCell(OddKind.DATE, day.isoformat(), day, serial)
+        day = None
+    text = f"{show_number(serial)} shown as a date or time" if day is None else day.isoformat()
+    return OddCell(OddKind.DATE, text, day, serial)
 
 
 def iso_date_cell(text: str) -> OddCell:

@@ -466,7 +466,6 @@ def test_an_entry_whose_result_could_not_be_kept_stays_unfinished(
         by_hand.ask(
             Flags(),
             asked,
-            gear,
             lambda inspection, _unit: by_hand.Ending(check_inspection(inspection, asked), None),
             refused,
             resume=False,

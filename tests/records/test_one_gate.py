@@ -16,9 +16,9 @@ from mlg_troubleshoot.cli.prompts.more import read_more
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records import ReadOptions, judge_again, read_inspections
-from mlg_troubleshoot.records.model import TableOptions
 from mlg_troubleshoot.units import ClearanceConvention as Convention
 from mlg_troubleshoot.units import LengthUnit
+from mlg_troubleshoot.workflows.check import CheckOptions
 
 VALUES = (
     *("0", "0.0", ".013", "0.013", "0.013 in", "13 thou", "0.33 mm", '.007"', "0.381 mm", "15 thou", "0.015", "0.0151"),
@@ -56,9 +56,9 @@ def by_cell(gear: Gear, value: object, margin: str, convention: Convention) -> F
 
 def by_flag(gear: Gear, value: str, margin: str, convention: Convention) -> Found:
     flags = Flags([f"3={value}"], "N1", "LH", "R1", margin=margin)
-    declared = TableOptions(unit=LengthUnit.INCH, convention=convention)
+    asked = CheckOptions(unit=LengthUnit.INCH, convention=convention)
     try:
-        row = from_flags(flags, declared, gear)
+        row = from_flags(flags, asked)
     except UsageError as error:
         return Found(refused=words(error))
     return Found(row.clearance_in[3], row.margin_in, row.warnings)
