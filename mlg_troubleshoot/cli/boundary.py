@@ -65,7 +65,11 @@ def _explain(error: Exception) -> int:
     if isinstance(error, OSError) and error.errno in _CANNOT_WRITE:
         say(f"Error: {error.filename or 'the output'} cannot be written: {error.strerror}")
         say("What to do: Make room, or write to another place.")
-        _settle_stdout()
+        try:
+            # What is still to be written to stdout is written now or dropped: the interpreter must not fail on it.
+            sys.stdout.flush()
+        except OSError:
+            abandon_stdout()
         return OUTPUT
     say(
         f"Internal error: {type(error).__name__}: {error}\n"
@@ -73,11 +77,3 @@ def _explain(error: Exception) -> int:
         "send the output to the maintainers."
     )
     return INTERNAL
-
-
-def _settle_stdout() -> None:
-    """Write what is still to be written to stdout, or drop it: the interpreter must not fail on it at the end."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        abandon_stdout()

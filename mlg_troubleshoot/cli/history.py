@@ -16,6 +16,7 @@ from mlg_troubleshoot.units import LengthUnit, in_unit
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
+    from mlg_troubleshoot.store import Store
     from mlg_troubleshoot.workflows.history import Forecast, GearLife
 
 EPILOG = (
@@ -55,6 +56,12 @@ class HistoryGroup(TyperGroup):
         return super().parse_args(ctx, args)
 
 
+def _kept_in(place: str | None) -> Store:
+    from mlg_troubleshoot.store import Store
+
+    return Store(place)
+
+
 def side_of(text: str) -> str:
     if text.strip().upper() not in ("LH", "RH"):
         raise UsageError(f"side {text!r} is not LH or RH", "Give LH or RH.")
@@ -75,10 +82,9 @@ def show(
     """Show what was kept: the gears and their latest state, or one gear's life with the forecast of each joint."""
     from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.store import Store
     from mlg_troubleshoot.workflows import history as task
 
-    place, known = Store(store), load_gear(gear)
+    place, known = _kept_in(store), load_gear(gear)
     shown = settings(show_in, page, {}, keep=False, quiet=as_json)
     if tail is None and report is not None:
         raise UsageError("--report needs a gear", "Give TAIL, or write the page of all gears: mlg fleet --report DIR")
@@ -135,15 +141,9 @@ def _show_gears(found: Sequence[GearLife], place: str) -> None:
             str(len(life.repairs)),
         )
     console.print(table)
-    _show_advice(found)
-
-
-def _show_advice(found: Sequence[GearLife]) -> None:
-    from mlg_troubleshoot.workflows import history as task
-
     advice = task.advice(found)
     if advice.asked:
-        output.console().print(advice.words)
+        console.print(advice.words)
 
 
 def span(samples: Any, gear: Gear) -> str:
@@ -182,11 +182,8 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
     if ahead.limit is None and life.latest is not None and life.latest.inspection.gear_landings is None:
         console.print("No forecast: the last inspection does not state its landings (gear_landings).")
     elif ahead.limit is not None:
-        due = (
-            "beyond the horizon"
-            if ahead.next_inspection is None
-            else f"in {landings_shown(ahead.next_inspection, gear)} landings"
-        )
+        after = ahead.next_inspection
+        due = "beyond the horizon" if after is None else f"in {landings_shown(after, gear)} landings"
         console.print(
             f"Landings left from the last inspection: to a joint's limit {span(ahead.limit, gear)}, to the margin "
             f"{span(ahead.margin, gear)}. Next inspection due {due} (accepted chance "
@@ -209,7 +206,9 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
     console.print(joints)
     if unread:
         console.print(f"Not read since new or restored: {', '.join(unread)}; never read counts as 0 above.")
-    _show_advice([life])
+    advice = task.advice([life])
+    if advice.asked:
+        console.print(advice.words)
 
 
 def _what(event: dict[str, Any], unit: LengthUnit) -> str:
@@ -217,20 +216,16 @@ def _what(event: dict[str, Any], unit: LengthUnit) -> str:
         case "assessment":
             found = event["predicted_displacement_in"]
             worst = "" if found is None else in_unit(f", worst case {found:.4f} in", unit)
-            said = f"assessed {event['verdict']}{worst}"
+            return f"assessed {event['verdict']}{worst}"
         case "repair":
-            said = "restored " + ", ".join(f"#{joint}" for joint in event["joints"])
-        case "rerig":
-            said = "re-rigged"
+            return "restored " + ", ".join(f"#{joint}" for joint in event["joints"])
         case "void":
-            said = f"void: {event['why']}"
+            return f"void: {event['why']}"
         case "outcome":
-            said = f"found: {event['found']}" + ("" if event["joint"] is None else f" (#{event['joint']})")
-        case "inspection" if not event["counts"]:
-            said = "inspection (corrected or void)"
+            return f"found: {event['found']}" + ("" if event["joint"] is None else f" (#{event['joint']})")
         case kind:
-            said = str(kind)
-    return said
+            corrected = kind == "inspection" and not event["counts"]
+            return f"{kind} (corrected or void)" if corrected else "re-rigged" if kind == "rerig" else str(kind)
 
 
 def repair(
@@ -245,12 +240,11 @@ def repair(
 ) -> None:
     """Record joints that were restored: their wear starts again."""
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.store import Store
     from mlg_troubleshoot.workflows import history as task
 
     known = load_gear(gear)
     _refuse_unknown(joints, known)
-    record = task.repair(Store(store), (tail, side_of(side)), joints, _day(day), landings, work_order)
+    record = task.repair(_kept_in(store), (tail, side_of(side)), joints, _day(day), landings, work_order)
     output.say(f"Kept: repair of {tail} {record.side}, {', '.join(f'#{j}' for j in record.body['joints'])}.")
 
 
@@ -258,10 +252,9 @@ def rerig(
     tail: Tail, side: Side, day: Day, landings: Landings = None, work_order: WorkOrder = None, store: Place = None
 ) -> None:
     """Record that the reversing valve was re-rigged; the wear of the joints goes on."""
-    from mlg_troubleshoot.store import Store
     from mlg_troubleshoot.workflows import history as task
 
-    record = task.rerig(Store(store), (tail, side_of(side)), _day(day), landings, work_order)
+    record = task.rerig(_kept_in(store), (tail, side_of(side)), _day(day), landings, work_order)
     output.say(f"Kept: re-rigging of {tail} {record.side}.")
 
 
@@ -292,23 +285,21 @@ def correct(
 ) -> None:
     """Append the right inspection for a wrong one; both stay in the chain, the right one counts."""
     from mlg_troubleshoot.cli.views import notes
-    from mlg_troubleshoot.store import Store
     from mlg_troubleshoot.workflows import history as task
     from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 
     asked = CheckOptions(gear=gear, unit=unit, convention=convention, sheet=sheet)
     result = check_files([file], asked)
     notes.show_problems(result.problems)
-    added = task.correct(Store(store), record, result, asked)
+    added = task.correct(_kept_in(store), record, result, asked)
     output.say(f"Kept: correction of {record} ({added.tail_no} {added.side}).")
 
 
 def void(record: RecordId, why: Why, store: Place = None) -> None:
     """Append that a record does not count; it stays in the chain."""
-    from mlg_troubleshoot.store import Store
     from mlg_troubleshoot.workflows import history as task
 
-    added = task.void(Store(store), record, why)
+    added = task.void(_kept_in(store), record, why)
     output.say(f"Kept: {record} ({added.tail_no} {added.side}) does not count.")
 
 
@@ -321,20 +312,18 @@ def outcome(
 ) -> None:
     """Record what was found after the advice; mlg history then says how often it was right."""
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.store import Store
     from mlg_troubleshoot.workflows import history as task
 
     if joint is not None:
         _refuse_unknown([joint], load_gear(gear))
-    added = task.outcome(Store(store), record, found, joint)
+    added = task.outcome(_kept_in(store), record, found, joint)
     output.say(f"Kept: outcome of {record} ({added.tail_no} {added.side}).")
 
 
 def verify(store: Place = None) -> None:
     """Walk the chain; the first record that does not fit is named (exit code 1). It proves no identity."""
-    from mlg_troubleshoot.store import Store
 
-    place = Store(store)
+    place = _kept_in(store)
     count, broken = place.verify()
     if broken is not None:
         output.write(
@@ -348,9 +337,8 @@ def verify(store: Place = None) -> None:
 def export(file: Chain, store: Place = None) -> None:
     """Write the whole chain as JSON Lines."""
     from mlg_troubleshoot.outputs import refuse_inputs_as_outputs, write_text
-    from mlg_troubleshoot.store import Store
 
-    place = Store(store)
+    place = _kept_in(store)
     if "://" not in place.place:
         refuse_inputs_as_outputs([place.place], [("the export", file)])
     lines = list(place.export())
@@ -360,10 +348,9 @@ def export(file: Chain, store: Place = None) -> None:
 
 def import_chain(file: Chain, store: Place = None) -> None:
     """Read an exported chain into an empty store, or the rest of it into a store that holds its beginning."""
-    from mlg_troubleshoot.store import Store
     from mlg_troubleshoot.workflows import history as task
 
-    added = task.import_file(Store(store), file)
+    added = task.import_file(_kept_in(store), file)
     output.say(f"Imported: {added.new} records; {added.known} were there already.")
 
 

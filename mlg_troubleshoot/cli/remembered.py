@@ -101,9 +101,8 @@ def _judged(file: Path, raw: Mapping[str, object]) -> Settings:
     if not isinstance(headers, dict) or len(headers) > _MOST_HEADERS:
         raise UsageError(f"{file}: headers is no table of at most {_MOST_HEADERS} entries", "Mend or delete it.")
     for header, column in headers.items():
-        if not (
-            isinstance(column, str) and all(len(t) <= _MOST_CHARACTERS and t.isprintable() for t in (header, column))
-        ):
+        texts = (header, column)
+        if not all(isinstance(t, str) and len(t) <= _MOST_CHARACTERS and t.isprintable() for t in texts):
             raise UsageError(f"{file}: headers: {header!r} = {column!r} is no text", "Mend or delete it.")
         if _TURNS_A_VERDICT.search(column):
             raise UsageError(

@@ -69,11 +69,8 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
             designs=wants_report,
             progress=progress,
         )
-    shown = replace(
-        findings,
-        statements=findings.statements if flags.statements else (),
-        searches=findings.searches if flags.bound else (),
-    )
+    said, searched = findings.statements if flags.statements else (), findings.searches if flags.bound else ()
+    shown = replace(findings, statements=said, searches=searched)
     if flags.as_json:
         output.write_json(task.study_values(shown, given))
     else:

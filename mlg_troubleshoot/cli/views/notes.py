@@ -34,11 +34,10 @@ def show_problems(problems: Sequence[Problem]) -> None:
     else:
         for problem in shown:
             _show_problem(console, problem)
-    if len(problems) > _LINES_OF_PROBLEMS:
-        rest = len(problems) - _LINES_OF_PROBLEMS
-        _message(
-            console, f"… and {rest} more; --json lists all of them, --annotate marks them in your workbook.", indent=2
-        )
+    rest = len(problems) - len(shown)
+    if rest:
+        more = f"… and {rest} more; --json lists all of them, --annotate marks them in your workbook."
+        _message(console, more, indent=2)
 
 
 def _show_problem(console: Console, problem: Problem) -> None:
@@ -50,10 +49,10 @@ def _show_problem_tables(console: Console, problems: Sequence[Problem]) -> None:
     """One table for each sheet; what is wrong with a file as a whole stands before its tables."""
     for (file, sheet), found in groupby(problems, key=lambda p: (p.file, p.sheet)):
         group = list(found)
+        placed = [problem for problem in group if problem.row is not None]
         for problem in group:
             if problem.row is None:
                 _show_problem(console, problem)
-        placed = [problem for problem in group if problem.row is not None]
         if not placed:
             continue
         place = ", ".join(part for part in (file, None if sheet is None else f"sheet {sheet!r}") if part is not None)
@@ -81,8 +80,6 @@ def _message(console: Console, text: str, indent: int = 0) -> None:
 
 
 def _what(problem: Problem) -> str:
-    if problem.value is None:
-        return f"expected {problem.expected}."
-    if problem.row is None and problem.column is None:
-        return f"{problem.value}; expected {problem.expected}."
-    return f"found {problem.value!r}; expected {problem.expected}."
+    about_all = problem.row is None and problem.column is None
+    found = "" if problem.value is None else f"{problem.value}; " if about_all else f"found {problem.value!r}; "
+    return f"{found}expected {problem.expected}."
