@@ -67,7 +67,7 @@ class NamedCause(Term):
     p_value : float or None
         Chance of as much if nothing is wrong. [1]
     aliases : tuple of Candidate
-        Causes that these rows cannot tell from it: the class is named, this one as its likeliest member.
+        What these rows cannot tell from it, one cause or two together: the class is named by its likeliest member.
     """
 
     effect_in: Array
@@ -547,17 +547,21 @@ def _named(case: _Case) -> tuple[NamedCause, ...]:
         change, covariance = case.values[k:], case.covariance[k:, k:]
         found.append(
             _cause(
-                block.candidate(change, covariance), block.columns @ change, finding.block_p, 1.0, 0.0, finding.alias
+                block.candidate(change, covariance), block.columns @ change, finding.block_p, 1.0, 0.0, finding.aliases
             )
         )
     return tuple(sorted(found, key=lambda c: -c.effect_rms_in))
 
 
 def _cause(
-    candidate: Candidate, effect: Array, p_value: float | None, value: float, error: float, alias: Block | None = None
+    candidate: Candidate,
+    effect: Array,
+    p_value: float | None,
+    value: float,
+    error: float,
+    aliases: tuple[Candidate, ...] = (),
 ) -> NamedCause:
     interval = value - 1.96 * error, value + 1.96 * error
-    aliases = () if alias is None else (Candidate(alias.cause),)
     return NamedCause(candidate, value, interval, effect, p_value, aliases)
 
 

@@ -70,7 +70,7 @@ def cause_words(cause: NamedCause) -> str:
     candidate = cause.candidate
     words = candidate.cause.words(candidate.target)
     if cause.aliases:
-        others = " or ".join(name_words(other.cause.name) for other in cause.aliases)
+        others = " with ".join(name_words(other.cause.name) for other in cause.aliases)
         words += f" (these rows cannot tell it from {others})"
     if not candidate.stands_in:
         return words

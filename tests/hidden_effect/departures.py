@@ -2,8 +2,7 @@
 
     python -m tests.hidden_effect.departures --workers 2
 
-Its seeds begin at 2,100,000; those from 2,000,000 and from 3,000,000 were used for tuning, and 18 of directions all
-around (2,100,400 to 2,100,599) for the rule that rules out another linkage there.
+Its seeds begin at 5,100,000; all below were used for tuning, or looked at.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ from tests.hidden_effect.as_table import as_table
 Array = NDArray[np.float64]
 Record = dict[str, Any]
 
-FIRST_SEED = 2_100_000
+FIRST_SEED = 5_100_000
 # Chance below which a regression on the clearances beats one scale by more than chance.
 BEATS = 0.01
 RESULT = Path(__file__).with_name("departures_result.json")
