@@ -93,61 +93,47 @@ def _assess_valid(
     sets = repair_sets(cases, found, wanted)
     findings = rank_joints(gear, table, cases.clearance_in, allowances(cases, batch.lower))
     order = np.array([[f.rank for f in row] for row in findings]).argsort(axis=1)
-    judged = Judged(verdicts, batch, plunger.beyond, plunger.clears, ~plunger.explained, order)
+    judged = Judged(verdicts, batch, plunger, order, p_lower, batch.lower.standard_uncertainty(cases.margin_u_in))
     courses = plans(cases, judged, found, sets)
-    numbers = _Numbers(batch, p_lower, batch.lower.standard_uncertainty(cases.margin_u_in), plunger)
-    return [
-        _assessment(cases, i, verdicts[i], findings[i], courses[i], sets[i], numbers, options)
-        for i in range(len(cases))
-    ]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Numbers:
-    batch: BatchPrediction
-    p_within: Array
-    u_in: Array
-    plunger: plunger_reading.Compared
+    return [_assessment(cases, judged, i, findings[i], courses[i], sets[i], options) for i in range(len(cases))]
 
 
 def _assessment(
     cases: Cases,
+    judged: Judged,
     i: int,
-    found: Verdict,
     findings: tuple[JointFinding, ...],
     plan: Plan,
     sets: tuple[RepairSet, ...],
-    numbers: _Numbers,
     options: AssessOptions,
 ) -> Assessment:
     """Everything about one gear of a batch as one result."""
-    inspection, lower, plunger = cases.inspections[i], numbers.batch.lower, numbers.plunger
+    inspection, found, lower, plunger = cases.inspections[i], judged.verdicts[i], judged.batch.lower, judged.plunger
     margin = float(cases.margin_in[i])
-    # Adding zero turns a minus zero into zero.
-    displacement = float(lower.displacement_in[i]) + 0.0
-    closes = bool(np.isfinite(displacement))
-    u = float(numbers.u_in[i])
+    closes = bool(np.isfinite(lower.displacement_in[i]))
     # A linkage of the ensemble may not close where the reference does: the uncertainty is then unknown.
-    known = closes and bool(np.isfinite(u))
-    over, under = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
-    upper = float(numbers.batch.upper.displacement_in[i])
-    chance = float(numbers.batch.chance_random[i])
-    budget = _budget(numbers.batch, cases, i) if known else None
-    explained = closes and bool(np.isfinite(cases.mean_in[i]))
+    known = closes and bool(np.isfinite(judged.u_in[i]))
+
+    def told(value: Any, when: bool = closes) -> float | None:
+        return float(value) if when and np.isfinite(value) else None
+
+    worst = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
+    budget = _budget(judged.batch, cases, i) if known else None
     beyond = bool(plunger.beyond[i])
-    detail = _detail(cases, i, found, (over, under), budget, options) if options.advice and closes else {}
+    detail = _detail(cases, i, found, worst, budget, options) if options.advice and closes else {}
     return Assessment(
         inspection=inspection,
         verdict=found,
-        predicted_displacement_in=displacement if closes else None,
-        over_travel_in=over if closes else None,
-        under_travel_in=under if closes else None,
-        predicted_upper_in=upper if np.isfinite(upper) else None,
+        # Adding zero turns a minus zero into zero.
+        predicted_displacement_in=told(lower.displacement_in[i] + 0.0),
+        over_travel_in=told(worst[0]),
+        under_travel_in=told(worst[1]),
+        predicted_upper_in=told(judged.batch.upper.displacement_in[i], True),
         margin_in=margin,
-        remaining_in=margin - displacement if closes else None,
-        standard_uncertainty_in=u if known else None,
-        probability_within_margin=float(numbers.p_within[i]),
-        probability_exceed_random_directions=chance if closes else None,
+        remaining_in=told(margin - lower.displacement_in[i]),
+        standard_uncertainty_in=told(judged.u_in[i]),
+        probability_within_margin=float(judged.p_within[i]),
+        probability_exceed_random_directions=told(judged.batch.chance_random[i]),
         geometry_spread_in=(float(lower.spread_low_in[i]) + 0.0, float(lower.spread_high_in[i]) + 0.0)
         if known
         else None,
@@ -157,15 +143,15 @@ def _assessment(
         joints=findings,
         plan=plan,
         basis=Basis.MEASURED if beyond else Basis.PREDICTED,
-        bound_in=float(lower.bound_in[i]) + 0.0 if np.isfinite(lower.bound_in[i]) else None,
-        explained_at_most_in=float(plunger.explained_at_most_in[i]) if explained else None,
-        unexplained_in=float(plunger.unexplained_in[i]) if explained else None,
-        headline=_headline(cases, i, found, numbers),
+        bound_in=told(lower.bound_in[i] + 0.0, True),
+        explained_at_most_in=told(plunger.explained_at_most_in[i]),
+        unexplained_in=told(plunger.unexplained_in[i]),
+        headline=_headline(cases, judged, i),
         measured_statement=None
         if beyond or not inspection.readings_in
         else sentences.measured(float(cases.mean_in[i]), margin, "within"),
         repair_sets=sets if closes else None,
-        warnings=_warnings(inspection, cases.gear, findings, (over, under), u, cases.extension),
+        warnings=_warnings(inspection, cases.gear, findings, worst, float(judged.u_in[i]), cases.extension),
         **detail,
     )
 
@@ -209,13 +195,11 @@ def _detail(
     return detail
 
 
-def _headline(cases: Cases, i: int, found: Verdict, numbers: _Numbers) -> str:
-    margin, mean, plunger = float(cases.margin_in[i]), float(cases.mean_in[i]), numbers.plunger
-    lower = numbers.batch.lower
+def _headline(cases: Cases, judged: Judged, i: int) -> str:
+    margin, mean, plunger = float(cases.margin_in[i]), float(cases.mean_in[i]), judged.plunger
+    lower, found, chance = judged.batch.lower, judged.verdicts[i], float(judged.batch.chance_random[i])
     # Adding zero turns a minus zero into zero.
-    said = sentences.Predicted(
-        float(lower.displacement_in[i]) + 0.0, float(lower.bound_in[i]) + 0.0, float(numbers.batch.chance_random[i])
-    )
+    said = sentences.Predicted(float(lower.displacement_in[i]) + 0.0, float(lower.bound_in[i]) + 0.0, chance)
     closes = np.isfinite(said.displacement_in)
     if plunger.beyond[i]:
         explained = sentences.explained(float(plunger.explained_at_most_in[i]), float(plunger.unexplained_in[i]))
@@ -230,7 +214,7 @@ def _headline(cases: Cases, i: int, found: Verdict, numbers: _Numbers) -> str:
     if found is Verdict.INCOMPLETE:
         open_joints = [n for n, read in zip(cases.gear.joint_numbers, cases.measured[i], strict=True) if not read]
         return sentences.incomplete(open_joints, said)
-    return sentences.inconclusive(margin, said, float(numbers.p_within[i]))
+    return sentences.inconclusive(margin, said, float(judged.p_within[i]))
 
 
 def _warnings(

@@ -18,6 +18,7 @@ from mlg_troubleshoot.decision.assessment import RepairSet, Verdict
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import InvalidRow
 from mlg_troubleshoot.decision.plan import Action, End, Plan, Step, minutes_to_measure, minutes_to_restore
+from mlg_troubleshoot.decision.plunger_reading import Compared
 from mlg_troubleshoot.decision.prediction import BatchPrediction, model_uncertainty
 from mlg_troubleshoot.decision.repair import SCORE, Search, search, subsets_of
 from mlg_troubleshoot.decision.second_order import responses
@@ -43,19 +44,18 @@ NOT_CLOSING = Plan((Step(Action.CORRECT, (), 0.0, None, sentences.CHECK_ENTRIES)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judged:
-    """What the verdict found about n gears, for the plan.
+    """What the verdict found about n gears.
 
-    beyond, clears, unexplained: the plunger was measured beyond its margin; within it by two standard uncertainties;
-        beyond what joints explain.
     order: places of the joints in the order of their rank.
+    p_within, u_in: chance that the worst case is within the margin, its uncertainty against the margin. [1, in]
     """
 
     verdicts: Sequence[Verdict]
     batch: BatchPrediction
-    beyond: Mask
-    clears: Mask
-    unexplained: Mask
+    plunger: Compared
     order: Places
+    p_within: Array
+    u_in: Array
 
 
 def plans(cases: Cases, judged: Judged, found: Search, sets: Sequence[tuple[RepairSet, ...]]) -> list[Plan]:
@@ -84,15 +84,15 @@ class _Facts:
     @classmethod
     def of(cls, cases: Cases, judged: Judged, found: Search) -> _Facts:
         gear, measured, over = cases.gear, cases.measured, cases.over_limit
-        complaint = cases.failed | (judged.beyond & ~cases.retracted) | (over.any(axis=1) & ~cases.retracted)
+        complaint = cases.failed | (judged.plunger.beyond & ~cases.retracted) | (over.any(axis=1) & ~cases.retracted)
         ahead = _Ahead.of(cases, judged)
         open_critical = ~measured & gear.critical
         candidates = np.where(open_critical.any(axis=1, keepdims=True), open_critical, ~measured)
         group = np.where(complaint[:, None], candidates, ahead.group(candidates))
         rest = ~measured & ~group
         read_first = _reading_is_quicker(gear, found, ahead, rest | group) | open_critical.any(axis=1)
-        settled = (cases.failed & judged.clears) | judged.unexplained
-        by_clearance = (judged.batch.chance_random > _OTHER_CAUSE) | judged.beyond | open_critical.any(axis=1)
+        settled = (cases.failed & judged.plunger.clears) | ~judged.plunger.explained
+        by_clearance = (judged.batch.chance_random > _OTHER_CAUSE) | judged.plunger.beyond | open_critical.any(axis=1)
         after_limits = _verdicts_after_limits(cases, judged)
         again, again_u = _measure_again(cases, judged)
         sets, ends = _expected(cases, judged, ahead, complaint)
@@ -290,7 +290,7 @@ def _reading_is_quicker(gear: Gear, found: Search, ahead: _Ahead, unread: Mask) 
 def _verdicts_after_limits(cases: Cases, judged: Judged) -> list[Verdict]:
     """The verdicts that stand once what is over its limit is restored."""
     verdicts = list(judged.verdicts)
-    rows = np.flatnonzero(cases.over_limit.any(axis=1) & ~judged.beyond)
+    rows = np.flatnonzero(cases.over_limit.any(axis=1) & ~judged.plunger.beyond)
     if not len(rows):
         return verdicts
     some = cases.take(rows)

@@ -46,7 +46,7 @@ def write_reports(  # noqa: PLR0913 - what a batch is, and how and for whom it i
     """Write a report for each inspection, in parallel, and for a batch the summary that links them.
 
     Lengths stand in `unit`; `before` is what each gear was like before, side by side with what it is now. `progress`
-    is called with the number of reports done and the total, from worker threads, one at a time. Returns the summary if
+    is called with the number of reports done and the total. Returns the summary if
     there is not exactly one inspection, then one report for each, in the order of the input; raises `OutputError` if a
     file cannot be written.
     """

@@ -6,8 +6,8 @@ import hashlib
 import os
 import queue
 import re
-import threading
 import unicodedata
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -140,8 +140,8 @@ def publish_all(
 ) -> list[WrittenReport]:
     """Write many documents, the PDFs in several child processes."""
     count = max(1, workers or min(4, os.cpu_count() or 1))
-    engines: queue.SimpleQueue[PdfEngine] = queue.SimpleQueue()
     started = [PdfEngine() for _ in range(count)]
+    engines: queue.SimpleQueue[PdfEngine] = queue.SimpleQueue()
     for engine in started:
         engines.put(engine)
 
@@ -152,33 +152,25 @@ def publish_all(
         finally:
             engines.put(engine)
 
-    # Documents are handed out a few at a time, so that a long batch does not stand in memory.
-    ahead = threading.BoundedSemaphore(2 * count)
-    written: list[Future[WrittenReport]] = []
-    done = 0
-    lock = threading.Lock()
+    written: list[WrittenReport] = []
+    waiting: deque[Future[WrittenReport]] = deque()
 
-    def finished(_: Future[WrittenReport]) -> None:
-        nonlocal done
-        ahead.release()
-        with lock:
-            done += 1
-            if progress is not None:
-                progress(done, total)
+    def take() -> None:
+        written.append(waiting.popleft().result())
+        if progress is not None:
+            progress(len(written), total)
 
+    pool = ThreadPoolExecutor(count)
     try:
-        with ThreadPoolExecutor(count) as pool:
-            try:
-                for document in documents:
-                    ahead.acquire()
-                    future = pool.submit(one, document)
-                    future.add_done_callback(finished)
-                    written.append(future)
-                    if any(f.done() and f.exception() for f in written[-2 * count :]):
-                        break
-                return [future.result() for future in written]
-            finally:
-                pool.shutdown(wait=True, cancel_futures=True)
+        for document in documents:
+            waiting.append(pool.submit(one, document))
+            # Documents are handed out a few at a time, so that a long batch does not stand in memory.
+            if len(waiting) > 2 * count:
+                take()
+        while waiting:
+            take()
+        return written
     finally:
+        pool.shutdown(cancel_futures=True)
         for engine in started:
             engine.close()

@@ -32,26 +32,7 @@ _ADVISORY_LOCK = 0x6D6C675F73746F72
 _AT_ONCE = 500
 
 # What records of this schema version often say, given to zlib in advance: it belongs to the version, as columns do.
-_OFTEN = (
-    b'{"extension":null,"geometry_sha256":"bbeb1f4831cad27bd0464bcc3778cbad7161f4c644e08ae37f34d43d8434856'
-    b'2","program_version":"0.1.0","result":{"confidence":null,"geometry_spread_in":[0.0,0.0],"headline":"'
-    b"Clearances could push the plunger outside its margin of 0.0300 in (worst case 0.0300 in, chance with"
-    b" random directions 0 % from the measured joints alone). Even the worst case stays within the margin."
-    b' Cannot clear: not measured #6, #7, #8, #9, #10","joints":[{"allowance_in":null,"clearance_in":null,'
-    b'"contribution_in":null,"joint":1,"over_limit":false,"rank":1,"rank_range":[1,1]}],"margin_in":0.03,"'
-    b'measured_displacement_in":null,"measuring":null,"next_action":{"action":"MEASURE","joints":[1],"minu'
-    b'tes":0.0,"text":"Measure next."},"plan":[{"action":"RESTORE","gauge_u_needed_in":null,"joints":[1],"'
-    b'minutes":0.0,"text":"Restore"}],"end":"WITHIN","over_travel_in":0.0,"posterior":null,"predicted_disp'
-    b'lacement_in":0.0,"predicted_upper_in":0.0,"probability_exceed_random_directions":0.0,"probability_wi'
-    b'thin_margin":0.0,"record_id":"","remaining_in":0.0,"repair_sets":null,"rigging":null,"side":"LH","st'
-    b'andard_uncertainty_in":0.0,"tail_no":"N","under_travel_in":-0.0,"verdict":"WITHIN_MARGIN","warnings"'
-    b':["Gauge uncertainty not stated: 0.00050 in radial taken as the default."]}}{"inspection":{"approach'
-    b'":"EXTENDING","carried":{},"clearance_in":{"1":0.001,"2":0.001,"3":0.001,"10":0.001},"convention":"R'
-    b'ADIAL","entered":{"1":["0.001","in"],"2":["0.001","in"],"10":["0.001","in"]},"gauge_id":"G-01","gaug'
-    b'e_u_in":0.0005,"gauge_u_is_default":false,"gear_landings":1000.0,"hydraulic_pressure_psi":3000.0,"in'
-    b'spection_date":"2026-01-01","outcome":"RETRACTED","readings_in":[0.0],"record_id":"R","side":"RH","s'
-    b'ource":["inspections.csv",null,1],"tail_no":"N","technician_id":"T-01","temperature_c":20.0}}'
-)
+_OFTEN = Path(__file__).with_name(f"often-{SCHEMA_VERSION}.txt").read_bytes()
 
 _tables = sql.MetaData()
 _meta = sql.Table("mlg_meta", _tables, sql.Column("schema_version", sql.Integer, nullable=False))

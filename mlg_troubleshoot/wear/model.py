@@ -44,17 +44,9 @@ class Samples:
     samples: Array
 
     def quantile(self, probability: ArrayLike) -> Array:
-        """Return quantiles of the samples.
+        """Quantiles of the samples, at a probability or several, shape (p,). [1]
 
-        Parameters
-        ----------
-        probability : float or array_like of shape (p,)
-            Probabilities from 0 to 1. [1]
-
-        Returns
-        -------
-        ndarray, shape (..., p)
-            Quantiles; infinite, never NaN, where a quantile lies among samples that never happen. [as asked]
+        Returns, shape (..., p): infinite, never NaN, where a quantile lies among samples that never happen. [as asked]
         """
         ordered = np.sort(self.samples, axis=-1)
         at = np.asarray(probability, float) * (ordered.shape[-1] - 1)
@@ -89,22 +81,13 @@ class WearModel:
     seed: int
 
     def forecast(self, unit: str | Sequence[str], usage: ArrayLike, *, reading: bool = True) -> Samples:
-        """Forecast readings of the current path of a unit, or of many units at once.
+        """Forecast readings of the current path of a unit, or of n units at once.
 
-        Parameters
-        ----------
-        unit : str or sequence of str
-            The unit or n units; one that is not known is a new one of the same population.
-        usage : array_like of shape (m,) or (n, m)
-            Usage since the last restoration, the same for all units or one row a unit. Before the last reading the
-            path is followed back along its drift. [usage]
-        reading : bool
-            Of a new reading, with its error; otherwise of the wear itself. Along the usages each sample is one path.
-
-        Returns
-        -------
-        Samples
-            Of shape (m, n_samples) or (n, m, n_samples). [value]
+        unit: one that is not known is a new one of the same population.
+        usage, shape (m,) or (n, m): usage since the last restoration, the same for all units or one row a unit; before
+          the last reading the path is followed back along its drift. [usage]
+        reading: of a new reading, with its error; otherwise of the wear itself. Along the usages a sample is one path.
+        Returns samples of shape (m, n_samples) or (n, m, n_samples). [value]
         """
         units = [unit] if isinstance(unit, str) else list(unit)
         asked = np.asarray(usage, float)
@@ -116,20 +99,11 @@ class WearModel:
         return Samples(found[0] if isinstance(unit, str) else found)
 
     def usage_to_limit(self, unit: str | Sequence[str], limit: ArrayLike) -> Samples:
-        """Forecast the usage at which the wear itself, not a reading of it, crosses a limit.
+        """Forecast the usage at which the wear itself of one unit or n, not a reading of it, crosses a limit.
 
-        Parameters
-        ----------
-        unit : str or sequence of str
-            The unit or n units.
-        limit : float or array_like of shape (n,)
-            The limit, for all units or for each. [value]
-
-        Returns
-        -------
-        Samples
-            Of shape (n_samples,) or (n, n_samples): usage since the last restoration at the crossing, infinite where
-            there never is one; at the last reading where the limit is passed already. [usage]
+        limit, one for all or shape (n,): the limit. [value]
+        Returns samples of shape (n_samples,) or (n, n_samples): usage since the last restoration at the crossing,
+          infinite where there never is one; at the last reading where the limit is passed already. [usage]
         """
         units = [unit] if isinstance(unit, str) else list(unit)
         limits = np.broadcast_to((np.asarray(limit, float) - self.scale.start) / self.scale.value, (len(units),))
