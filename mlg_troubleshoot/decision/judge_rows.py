@@ -107,7 +107,6 @@ def _assessment(
     sets: tuple[RepairSet, ...],
     options: AssessOptions,
 ) -> Assessment:
-    """Everything about one gear of a batch as one result."""
     inspection, found, lower, plunger = cases.inspections[i], judged.verdicts[i], judged.batch.lower, judged.plunger
     margin = float(cases.margin_in[i])
     closes = bool(np.isfinite(lower.displacement_in[i]))

@@ -30,19 +30,15 @@ class Extension(Protocol):
     @property
     def residual_u_in(self) -> float:
         """Standard uncertainty of the extended model: the scatter that it leaves. [in]"""
-        ...
 
     def adjust(self, inspections: Sequence[Inspection], clearance_in: Array) -> Adjustment:
         """Return what differs from the plain model for these inspections."""
-        ...
 
     def describe(self) -> str:
         """Return the extension in one sentence."""
-        ...
 
     def lacks(self, inspection: Inspection) -> tuple[str, ...]:
         """Return the columns that the extension needs and an inspection lacks."""
-        ...
 
 
 def model_uncertainty(displacement_in: Array, residual_u_in: float | None) -> Array:
@@ -96,7 +92,6 @@ class Prediction:
 
 
 def clearances(inspections: Sequence[Inspection], gear: Gear, unmeasured: Array) -> Array:
-    """Clearance matrix of a batch. [in]"""
     filled = np.tile(np.asarray(unmeasured, float), (len(inspections), 1))
     place = {number: j for j, number in enumerate(gear.joint_numbers)}
     for row, inspection in enumerate(inspections):

@@ -125,5 +125,4 @@ def expand(model: LinkageModel) -> Response:
 
 @lru_cache(maxsize=4)
 def responses(gear: Gear) -> tuple[Response, ...]:
-    """Expand each linkage of a gear's ensemble."""
     return tuple(expand(model) for model in gear.ensemble_models)

@@ -50,14 +50,12 @@ class Discrepancies:
     wear_shift: the number that wear of a part outside the joints shifts.
     contact: pairs of neighbouring joints.
     tilt: links that end float tilts.
-    bearing_span_in: length over which end float tilts a link, nominal. [in]
     """
 
     elastic: tuple[str, ...] = ()
     wear_shift: str | None = None
     contact: tuple[tuple[int, int], ...] = ()
     tilt: tuple[TiltedLink, ...] = ()
-    bearing_span_in: float = 1.5
 
 
 @dataclass(frozen=True)

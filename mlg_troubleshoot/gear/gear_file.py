@@ -359,9 +359,8 @@ def _area(t: DataTable, numbers: _Numbers) -> Area:
 
 
 def _discrepancies(table: DataTable, mechanism: Mechanism, numbers: _Numbers) -> Discrepancies:
-    span = table.table("bearing_span").number("value")
     if not table.has("diagnosis"):
-        return Discrepancies(bearing_span_in=span)
+        return Discrepancies()
     entry = table.table("diagnosis")
     numbers.source(entry)
     known = write_program(mechanism).parameters
@@ -370,7 +369,6 @@ def _discrepancies(table: DataTable, mechanism: Mechanism, numbers: _Numbers) ->
         wear_shift=entry.text("wear_shift") if entry.has("wear_shift") else None,
         contact=entry.pairs("contact"),
         tilt=tuple(TiltedLink(t.text("length"), t.wholes("floats")) for t in entry.tables("tilt")),
-        bearing_span_in=span,
     )
     used = (*found.elastic, *(t.length for t in found.tilt), *((found.wear_shift,) if found.wear_shift else ()))
     for name in used:

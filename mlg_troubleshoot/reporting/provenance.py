@@ -6,6 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import version
 
 from mlg_troubleshoot.errors import UsageError
@@ -38,7 +39,7 @@ def provenance_of(
     remembered: str | None = None,
 ) -> ReportProvenance:
     return ReportProvenance(
-        version("mlg-troubleshoot"),
+        program_version(),
         moment_of_report(),
         gear.geometry_sha256,
         dict(input_sha256),
@@ -46,6 +47,11 @@ def provenance_of(
         extension,
         remembered,
     )
+
+
+@cache
+def program_version() -> str:
+    return version("mlg-troubleshoot")
 
 
 def moment_of_report() -> datetime:

@@ -56,7 +56,6 @@ def inspection_record(inspection: Inspection, kind: Kind = Kind.INSPECTION, **mo
 
 
 def inspection_from(record: Record) -> Inspection:
-    """Return the inspection of a record."""
     body = dict(record.body["inspection"])
     for name in _BY_JOINT:
         if name in body:

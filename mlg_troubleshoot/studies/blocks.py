@@ -87,7 +87,6 @@ class BlockStudy:
 
     @property
     def blocks(self) -> tuple[Block, ...]:
-        """Blocks of the study in order."""
         starts = range(0, self.n2, LEVELS_PER_BLOCK)
         return tuple(
             Block(i, start, min(start + LEVELS_PER_BLOCK, self.n2)) for i in range(self.iterations) for start in starts

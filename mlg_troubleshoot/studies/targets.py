@@ -50,7 +50,6 @@ class Target:
     why: str
 
     def holds(self, computed: float) -> bool:
-        """Tell whether a computed number is in the accepted range."""
         return self.low <= computed <= self.high
 
 
@@ -63,7 +62,6 @@ class Computed:
 
     @property
     def holds(self) -> bool:
-        """True if the computed number is accepted."""
         return self.target.holds(self.computed)
 
     @property

@@ -42,7 +42,6 @@ class Draws:
     kept: Array
 
     def take(self, chosen: Places | Mask) -> Draws:
-        """Return some of the draws."""
         return Draws(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
 
 

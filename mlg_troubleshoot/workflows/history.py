@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from datetime import date
-from functools import cache, cached_property
-from importlib.metadata import version
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,8 +41,6 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.reporting import WrittenReport
 
 GearKey = tuple[str, str]
-# Chance of being over a limit or outside the margin at which the next inspection is due, and the landings beyond
-# which nothing is forecast: assumed, no source states them. [1, landings]
 # Where a forecast stands between the last inspection and the horizon. [1]
 _AHEAD = np.concatenate([[0.0], np.geomspace(0.00125, 1.0, 28)])
 # Where the gear's model is asked about the worst case of clearances that go on to wear. [landings]
@@ -70,7 +67,6 @@ class Seen:
 
     @cached_property
     def inspection(self) -> Inspection:
-        """What was found."""
         return inspection_from(self.record)
 
     @cached_property
@@ -91,7 +87,6 @@ class GearLife:
 
     @property
     def latest(self) -> Seen | None:
-        """The last inspection."""
         return self.inspections[-1] if self.inspections else None
 
 
@@ -114,7 +109,6 @@ class Advice:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Ends of the interval of the hit rate."""
         from scipy.special import betaincinv
 
         a, b = self.right + 0.5, self.asked - self.right + 0.5
@@ -123,7 +117,6 @@ class Advice:
 
     @property
     def words(self) -> str:
-        """The hit rate in a sentence."""
         if not self.asked:
             return "No outcome was recorded against the advice yet."
         low, high = self.interval
@@ -136,9 +129,6 @@ class Advice:
         """The hit rate as JSON; its interval is null where no outcome names a joint."""
         low, high = self.interval if self.asked else (None, None)
         return {"right": self.right, "outcomes": self.asked, "p05": low, "p95": high}
-
-
-# --- keeping
 
 
 def keep(
@@ -169,21 +159,13 @@ def _agrees(store: Store, kept: Record, new: Record) -> bool:
 
 def _assessment(gear: Gear, options: CheckOptions, assessment: Assessment, of: Record) -> Record:
     from mlg_troubleshoot.reporting.json_form import kept_as_json
+    from mlg_troubleshoot.reporting.provenance import program_version
 
     extension = None if options.extension is None else options.extension.describe()
-    by = {
-        "program_version": _program_version(),
-        "geometry_sha256": gear.geometry_sha256,
-        "extension": extension,
-    }
+    by = {"program_version": program_version(), "geometry_sha256": gear.geometry_sha256, "extension": extension}
     body = packed({**by, "result": kept_as_json(assessment)})
     identity = (of.identity_hash.hex(), *(str(value) for value in by.values()), of.packed.hex())
     return replace(of, kind=Kind.ASSESSMENT, packed=body, identity=identity)
-
-
-@cache
-def _program_version() -> str:
-    return version("mlg-troubleshoot")
 
 
 def _settled_tails(
@@ -211,9 +193,6 @@ def _settled_tails(
 
 def _tail_key(tail: str) -> str:
     return re.sub(r"[\s_‐-―−-]+", "", tail).casefold()
-
-
-# --- reading back
 
 
 def lives(store: Store, tail: str | None = None, side: str | None = None) -> dict[GearKey, GearLife]:
@@ -290,23 +269,22 @@ def find(store: Store, record_id: str) -> Record:
     raise UsageError(f"{len(found)} records are called {record_id!r}: {named}", "Name one by the start of its hash.")
 
 
-# --- what is added later
-
-
 def repair(
     store: Store, key: GearKey, joints: Sequence[int], day: date, landings: float | None, work_order: str | None
 ) -> Record:
     """Record that joints were restored."""
-    life_of(store, *key)
-    body = {"joints": sorted(set(joints)), "landings": landings, "work_order": work_order}
-    return _added(store, Record(Kind.REPAIR, work_order or "", *key, day.isoformat(), packed(body)))
+    return _work(store, Kind.REPAIR, key, day, work_order, joints=sorted(set(joints)), landings=landings)
 
 
 def rerig(store: Store, key: GearKey, day: date, landings: float | None, work_order: str | None) -> Record:
     """Record that the reversing valve was re-rigged: the joints wear on, the plunger stands elsewhere."""
+    return _work(store, Kind.RERIG, key, day, work_order, landings=landings)
+
+
+def _work(store: Store, kind: Kind, key: GearKey, day: date, work_order: str | None, **done: Any) -> Record:
     life_of(store, *key)
-    body = {"landings": landings, "work_order": work_order}
-    return _added(store, Record(Kind.RERIG, work_order or "", *key, day.isoformat(), packed(body)))
+    body = packed({**done, "work_order": work_order})
+    return _added(store, Record(kind, work_order or "", *key, day.isoformat(), body))
 
 
 def correct(store: Store, record_id: str, result: CheckResult, options: CheckOptions) -> Record:
@@ -367,9 +345,6 @@ def advice(found: Iterable[GearLife]) -> Advice:
                 advised = set((result.get("next_action") or {}).get("joints") or ()) | first
                 asked, right = asked + 1, right + (joint in advised)
     return Advice(right, asked)
-
-
-# --- forecasts
 
 
 def _landings_of(record: Record, life: GearLife) -> float | None:
@@ -458,7 +433,7 @@ def forecast(
 
 def _forecast_some(part: Sequence[GearLife], model: WearModel, gear: Gear) -> Iterator[Forecast]:
     numbers = gear.joint_numbers
-    now = np.array([_latest_landings(life) for life in part])
+    now = np.array([life.inspections[-1].inspection.gear_landings for life in part], float)
     begun = np.array([[start for _own, start in wear_paths(life, numbers).values()] for life in part])
     ahead = gear.horizon.value * _AHEAD
     usage = np.maximum(now[:, None, None] + ahead - begun[:, :, None], 0.0)
@@ -478,8 +453,7 @@ def _forecast_some(part: Sequence[GearLife], model: WearModel, gear: Gear) -> It
     # A linkage that does not close is outside any margin.
     ratio = np.where(np.isnan(predicted), _NOT_CLOSING_IN, predicted).reshape(summed.shape) / np.maximum(summed, 1e-12)
     for g, life in enumerate(part):
-        latest = life.latest
-        stated = None if latest is None else latest.inspection.margin_in
+        stated = life.inspections[-1].inspection.margin_in
         margin = gear.margin.value if stated is None else stated
         displacement = straight[g] * np.interp(_AHEAD, _ASKED, ratio[g])[:, None]
         to_limit = np.stack([_first_passage(ahead, wear[g, j], gear.limits_in[j]) for j in range(len(numbers))])
@@ -487,17 +461,8 @@ def _forecast_some(part: Sequence[GearLife], model: WearModel, gear: Gear) -> It
         to_margin = _first_passage(ahead, displacement, margin)
         first = Samples(np.minimum(to_limit.min(axis=0), to_margin))
         due = float(first.quantile(gear.accepted_chance.value))
-        yield Forecast(
-            of_joints,
-            Samples(to_limit.min(axis=0)),
-            Samples(to_margin),
-            due if np.isfinite(due) else None,
-        )
-
-
-def _latest_landings(life: GearLife) -> float:
-    landings = None if life.latest is None else life.latest.inspection.gear_landings
-    return 0.0 if landings is None else landings
+        limit, margins = Samples(to_limit.min(axis=0)), Samples(to_margin)
+        yield Forecast(of_joints, limit, margins, due if np.isfinite(due) else None)
 
 
 def _first_passage(ahead: Array, paths: Array, limit: float) -> Array:
@@ -512,14 +477,10 @@ def _first_passage(ahead: Array, paths: Array, limit: float) -> Array:
     return np.where(over.any(axis=0), np.where(k == 0, 0.0, at), np.inf)
 
 
-# --- slips that the wear shows
-
-
 def suggestions(found: Sequence[GearLife], model: WearModel | None, gear: Gear) -> list[str]:
     """Name last inspections that look like a restoration nobody recorded, or like two gears exchanged."""
     if model is None:
         return []
-
     kept = [life for life in found if _can_be_compared(life)]
     off = _departures([(life, life) for life in kept], model, gear)
     said: list[str] = []
@@ -592,9 +553,6 @@ def _departures(pairs: Sequence[tuple[GearLife, GearLife]], model: WearModel, ge
         samples = replace(model, paths=paths).forecast(list(paths), np.array(ahead)[:, None]).samples[:, 0]
         scores[tuple(np.array(at).T)] = (np.array(read) - samples.mean(axis=1)) / samples.std(axis=1)
     return list(scores)
-
-
-# --- as JSON
 
 
 def quantiles(samples: Samples | None) -> dict[str, float | None] | None:
@@ -691,8 +649,6 @@ def import_file(store: Store, file: Path) -> Added:
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(f"{file} cannot be read: {error}", "Give a file written by: mlg history export") from error
 
-
-# --- pages
 
 # Inspections that stand side by side on the page of a gear's life.
 _SIDE_BY_SIDE = 4

@@ -159,7 +159,6 @@ class _Plan:
             self.blocks[key] = beside(whitened(effects), level)[0] / size
 
     def tests(self, key: Key) -> bool:
-        """Tell whether a cause can be tested."""
         return key in self.keys or key in self.blocks
 
     def separates(self, key: Key) -> str:
