@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -100,23 +100,16 @@ class DesignSpace:
     def linkage(self, vector: Array, name: str = "N") -> Linkage:
         """The linkage of one vector, in plain numbers."""
         m = self.assembled(vector)
-        plain = replace(
-            m,
-            points=tuple(replace(p, x=float(p.x), y=float(p.y)) for p in m.points),
-            planes=tuple(
-                replace(p, hinge_direction=float(p.hinge_direction), dihedral=float(p.dihedral)) for p in m.planes
-            ),
-            steps=tuple(_plain_step(s) for s in m.steps),
-            reference_input=float(m.reference_input),
-        )
+        points, planes, steps = (tuple(map(_plain, parts)) for parts in (m.points, m.planes, m.steps))
+        plain = replace(m, points=points, planes=planes, steps=steps, reference_input=float(m.reference_input))
         low, high = self.given.stroke
         return Linkage(name, plain, (low, high + plain.reference_input - self.mechanism.reference_input))
 
 
-def _plain_step(step: Step) -> Step:
-    if isinstance(step, Slider):
-        return replace(step, axis=float(step.axis), sign=float(step.sign))
-    return replace(step, sign=float(step.sign)) if isinstance(step, Dyad) else step
+def _plain(part: Any) -> Any:
+    """A part of a mechanism with a number in place of each array of one."""
+    values = {field.name: getattr(part, field.name) for field in fields(part)}
+    return replace(part, **{name: v.item() for name, v in values.items() if isinstance(v, np.ndarray | np.generic)})
 
 
 def _apart(a: Point, b: Point) -> float:

@@ -34,6 +34,7 @@ from mlg_troubleshoot.geometry.mechanism import (
 from mlg_troubleshoot.geometry.program import write_program
 
 DEFAULT_GEAR = "hawker-800xp"
+_DATA = Path(str(files("mlg_troubleshoot.gear"))) / "data"
 # Nothing of a landing gear is longer, and no angle needs more than two turns; far beyond, formulas overflow.
 _LENGTH, _ANGLE = {"least": -1e4, "most": 1e4}, {"least": -720.0, "most": 720.0}
 _LARGEST = {"in": 1e4, "min": 1e5, "landings": 1e6, "1": 0.5}
@@ -44,8 +45,7 @@ _GEOMETRY_KEYS = ("input", "planes", "points", "steps", "output", "calibration")
 
 def shipped_gears() -> tuple[str, ...]:
     """Return the names of the gears that ship with the program, for :func:`load_gear`."""
-    folder = Path(str(files("mlg_troubleshoot.gear"))) / "data"
-    names = {p.stem for p in folder.glob("*.toml")}
+    names = {p.stem for p in _DATA.glob("*.toml")}
     return tuple(sorted(n for n in names if not n.endswith(("-ensemble", "-targets"))))
 
 
@@ -85,7 +85,7 @@ def load_gear(name_or_path: str | Path = DEFAULT_GEAR) -> Gear:
 
 @lru_cache(maxsize=8)
 def _shipped(name: str) -> Gear:
-    return _read(Path(str(files("mlg_troubleshoot.gear"))) / "data" / f"{name}.toml")
+    return _read(_DATA / f"{name}.toml")
 
 
 def _read(path: Path) -> Gear:
@@ -186,10 +186,8 @@ def _sources(table: DataTable) -> dict[str, Source]:
     sources = {}
     for name in table.names:
         entry = table.table(name)
-        kind = entry.text("kind")
-        if kind not in set(SourceKind):
-            raise entry.fail("kind", "one of " + ", ".join(SourceKind))
-        sources[name] = Source(name, SourceKind(kind), entry.text("text"))
+        kind = SourceKind(entry.one_of("kind", tuple(SourceKind)))
+        sources[name] = Source(name, kind, entry.text("text"))
         entry.finish()
     return sources
 
@@ -216,15 +214,8 @@ def _linkage(table: DataTable, name: str, numbers: _Numbers | None) -> Linkage:
     for entry in table.tables("planes"):
         if entry.has("parent"):
             direction, dihedral = entry.number("hinge_direction_deg", **_ANGLE), entry.number("dihedral_deg", **_ANGLE)
-            planes.append(
-                Plane(
-                    entry.name("name"),
-                    entry.name("parent"),
-                    entry.name("hinge_point"),
-                    float(np.radians(direction)),
-                    float(np.radians(dihedral)),
-                )
-            )
+            names = entry.name("name"), entry.name("parent"), entry.name("hinge_point")
+            planes.append(Plane(*names, float(np.radians(direction)), float(np.radians(dihedral))))
             sourced(entry, (direction, "deg"), (dihedral, "deg"))
         else:
             planes.append(Plane(entry.name("name")))

@@ -154,7 +154,7 @@ class Range:
     def __mul__(self, other: Any) -> Range:
         twice = other is self
         if twice:
-            return self._square()
+            return self._through(_squared)
         if isinstance(other, Range):
             crossed = _outer(self.slope, other.slope)
             turned = crossed[0].swapaxes(0, 1), crossed[1].swapaxes(0, 1)
@@ -189,9 +189,6 @@ class Range:
         return Range(
             value, _times(self.slope, rate), bend, middle, _times(self.slope_at_middle, middle_rate), self.offsets
         )._narrowed()
-
-    def _square(self) -> Range:
-        return self._through(_squared)
 
     def sqrt(self) -> Range:
         """Square root; NaN in a box where the argument may be negative."""
@@ -319,9 +316,7 @@ def _squared(x: Pair) -> tuple[Pair, Pair, Pair]:
 
 
 def _inverse(x: Pair) -> tuple[Pair, Pair, Pair]:
-    low, high = x
-    unbounded = (low <= 0.0) & (high >= 0.0)
-    inverse = _out(np.where(unbounded, np.nan, 1.0 / high), np.where(unbounded, np.nan, 1.0 / low))
+    inverse = _inverse_or_nothing(x)
     square = _times(inverse, inverse)
     square = np.maximum(square[0], 0.0), square[1]
     cube = _times(square, inverse)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any, Literal, TypedDict, Unpack
 
 from markupsafe import Markup, escape
@@ -269,9 +270,10 @@ class Plot:
         self.canvas.text((x0 + x1) / 2, y1 + 27, self.x.label, size=10, anchor="middle")
 
     def draw(self, series: Series) -> None:
-        for run in _runs(series):
-            places = [self.at(x, y) for x, y in run]
-            self.canvas.polyline(places, colour=series.colour, width=series.width, dash=series.dash)
+        for known, run in groupby(zip(series.x, series.y, strict=True), lambda at: all(map(math.isfinite, at))):
+            if known:
+                places = [self.at(x, y) for x, y in run]
+                self.canvas.polyline(places, colour=series.colour, width=series.width, dash=series.dash)
 
     def draw_legend(
         self, series: Sequence[Series], x: float, y: float, markers: Sequence[tuple[Marker, str]] = ()
@@ -285,16 +287,6 @@ class Plot:
             self.canvas.marker(shape, x + 6, y, 4.5)
             self.canvas.text(x + 15, y + 3.5, label, size=9.5)
             x += 27 + text_width(label, 9.5)
-
-
-def _runs(series: Series) -> list[list[tuple[float, float]]]:
-    runs: list[list[tuple[float, float]]] = [[]]
-    for point in zip(series.x, series.y, strict=True):
-        if math.isfinite(point[0]) and math.isfinite(point[1]):
-            runs[-1].append(point)
-        elif runs[-1]:
-            runs.append([])
-    return [run for run in runs if run]
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cache
@@ -53,9 +53,7 @@ def environment() -> Environment:
     made.filters.update(
         css_string=css_string,
         address=address,
-        length=_length,
-        bare=_bare,
-        said=_said,
+        **{name: _in_its_unit(how) for name, how in (("length", "full"), ("bare", "bare"), ("said", "said"))},
         number=formats.number,
         percent=formats.percent,
         joints=formats.joint_list,
@@ -68,20 +66,14 @@ def environment() -> Environment:
     return made
 
 
-@pass_context
-def _length(context: Context, value_in: float | None, signed: bool = False, fine: int = 0) -> str:
-    """A length with its unit, in the document's; a list is counted by ``count``."""
-    return str(context["lengths"].full(value_in, signed, fine))
+def _in_its_unit(how: str) -> Callable[..., str]:
+    """A filter that writes a length, or says a sentence, in the unit of the document."""
 
+    @pass_context
+    def written(context: Context, value: float | str | None, *more: Any, **options: Any) -> str:
+        return str(getattr(context["lengths"], how)(value, *more, **options))
 
-@pass_context
-def _bare(context: Context, value_in: float | None, signed: bool = False, fine: int = 0) -> str:
-    return str(context["lengths"].bare(value_in, signed, fine))
-
-
-@pass_context
-def _said(context: Context, sentence: str) -> str:
-    return str(context["lengths"].said(sentence))
+    return written
 
 
 def _readable(value: Any) -> Any:

@@ -10,6 +10,7 @@ import unicodedata
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,7 +76,9 @@ def publish(
     instead = f"Open {web.name} in a web browser and print it; it is laid out for {page} paper."
     try:
         if "pdf" in wanted:
-            _warm_up(running)
+            # The child starts while the HTML is being made; if it cannot, the job says so.
+            with suppress(PdfError):
+                running.start()
         if "pdf-ua" in wanted:
             try:
                 tagged = make_tagged_pdf(render(document, page, for_pdf=True))
@@ -102,14 +105,6 @@ def publish(
 def _written(file: Path, data: bytes) -> Path:
     write_bytes(file, data)
     return file
-
-
-def _warm_up(engine: PdfEngine) -> None:
-    """Start the child while the HTML is being made; if it cannot start, the job says so."""
-    try:
-        engine.start()
-    except PdfError:
-        return
 
 
 def _pdf(document: Document, page: str, engine: PdfEngine) -> tuple[bytes, list[str]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from hashlib import sha256
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from mlg_troubleshoot.reporting.figures import INK, RULE, SOFT, Canvas
 from mlg_troubleshoot.reporting.formats import Lengths, number
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
-from mlg_troubleshoot.reporting.publish import WrittenReport, publish, safe_stem
+from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.studies.survey import Survey
 from mlg_troubleshoot.studies.survey_result import SurveyResult
 from mlg_troubleshoot.units import LengthUnit
@@ -23,20 +22,12 @@ from mlg_troubleshoot.units import LengthUnit
 _WIDTH, _EDGE = 330.0, 26.0
 
 
-def write_survey_report(
-    result: SurveyResult,
-    found: Survey,
-    directory: Path,
-    *,
-    provenance: ReportProvenance,
-    page: str = "A4",
-    unit: LengthUnit = LengthUnit.INCH,
-) -> WrittenReport:
-    """Write the report of a survey as HTML and, where the engine can, as PDF."""
+def survey_document(
+    result: SurveyResult, found: Survey, provenance: ReportProvenance, unit: LengthUnit = LengthUnit.INCH
+) -> Document:
     mark = sha256(repr([(r.words, r.value, r.u) for r in found.readings]).encode()).hexdigest()[:8]
-    stem = safe_stem("survey", result.gear.id, mark)
-    document = Document("survey.html.j2", _context(result, found, provenance, Lengths(unit)), stem)
-    return publish(document, directory, page=page)
+    context = _context(result, found, provenance, Lengths(unit))
+    return Document("survey.html.j2", context, safe_stem("survey", result.gear.id, mark))
 
 
 def _context(result: SurveyResult, found: Survey, provenance: ReportProvenance, lengths: Lengths) -> dict[str, Any]:

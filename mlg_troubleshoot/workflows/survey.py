@@ -109,20 +109,9 @@ def survey_gear(
         InspectedGear(name, float(d), _ends(each), float(np.mean(each <= known.margin.value)))
         for (name, _), d, each in zip(cases, own[0], moved.T, strict=True)
     )
-    return SurveyResult(
-        known,
-        found,
-        problems,
-        before,
-        interval,
-        linkage.amplification(middle)[0],
-        suggestion,
-        judged,
-        warnings,
-        path,
-        digest,
-        seed,
-    )
+    own_index = linkage.amplification(middle)[0]
+    read = known, found, problems, before, interval, own_index
+    return SurveyResult(*read, suggestion, judged, warnings, path, digest, seed)
 
 
 def _ends(values: Array) -> tuple[float, float]:
@@ -315,10 +304,10 @@ def write_survey_report(
     result: SurveyResult, file: Path, directory: Path, page: str = "A4", unit: LengthUnit = LengthUnit.INCH
 ) -> WrittenReport | None:
     """Write the report of a survey; None if nothing follows from the table."""
-    from mlg_troubleshoot.reporting import provenance_of
-    from mlg_troubleshoot.reporting.survey_report import write_survey_report as write
+    from mlg_troubleshoot.reporting import provenance_of, publish
+    from mlg_troubleshoot.reporting.survey_report import survey_document
 
     if result.survey is None:
         return None
     provenance = provenance_of(result.gear, {file.name: result.input_sha256}, seed=result.seed)
-    return write(result, result.survey, directory, provenance=provenance, page=page, unit=unit)
+    return publish(survey_document(result, result.survey, provenance, unit), directory, page=page)
