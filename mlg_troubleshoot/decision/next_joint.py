@@ -79,7 +79,7 @@ def outlook(one: Cases, anchor: tuple[float, float] | None = None) -> Outlook:
     linkages = responses(gear)
     if anchor is not None:
         linkages = (linkages[0].anchored(one.filled(0.0)[0], *anchor), *linkages[1:])
-    belief = _Belief.of(one, linkages)
+    belief = _Belief(one, linkages)
     drops = np.array([belief.risk_drop(int(j)) for j in missing])
     variances = np.array([belief.variance(int(j)) for j in missing])
     worth = [
@@ -92,33 +92,22 @@ def outlook(one: Cases, anchor: tuple[float, float] | None = None) -> Outlook:
     return Outlook(ordered, belief.within(), belief.too_close())
 
 
-@dataclass(frozen=True, slots=True)
 class _Belief:
     """One gear with its unmeasured joints distributed, level of wear by level of wear.
 
-    At each level the worst case is taken as normal: a sum over several joints, of which none dominates.
+    At each level the worst case is taken as normal: a sum over several joints, of which none dominates. The unmeasured
+    joints are at their mean there, and the worst case is linearised.
     """
 
-    weight: Array
-    worst: Array
-    slopes: Array
-    mean: Array
-    spread: Array
-    u_rest: Array
-    limits: Array
-    margin_in: float
-    residual_u_in: float | None
-
-    @classmethod
-    def of(cls, one: Cases, linkages: Sequence[Response]) -> _Belief:
-        """Take the unmeasured joints at their mean for each level, and linearise there."""
-        limits, known, found = one.gear.limits_in, one.measured[0], one.filled(0.0)[0]
+    def __init__(self, one: Cases, linkages: Sequence[Response]) -> None:
+        self.limits, self.residual_u_in = one.gear.limits_in, one.residual_u_in
+        known, found, self.margin_in = one.measured[0], one.filled(0.0)[0], float(one.margin_in[0])
         share, variance = moments()
-        mean = np.where(known, found, share[:, None] * limits)
-        worst, slopes, u_rest = uncertainty_parts(linkages, mean, one.gauge_u_in[0], float(one.margin_u_in[0]))
-        spread = np.where(known, 0.0, variance[:, None] * limits**2)
-        weight = level_weights((found / limits)[known])
-        return cls(weight, worst, slopes, mean, spread, u_rest, limits, float(one.margin_in[0]), one.residual_u_in)
+        self.mean = np.where(known, found, share[:, None] * self.limits)
+        parts = uncertainty_parts(linkages, self.mean, one.gauge_u_in[0], float(one.margin_u_in[0]))
+        self.worst, self.slopes, self.u_rest = parts
+        self.spread = np.where(known, 0.0, variance[:, None] * self.limits**2)
+        self.weight = level_weights((found / self.limits)[known])
 
     def _chance(self, worst: Array, variance: Array, u_rest: Array | None = None) -> Array:
         """Chance of being within the margin, from the worst case expected and the variance of what is open."""

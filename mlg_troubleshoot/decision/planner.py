@@ -59,45 +59,29 @@ class Judged:
 
 
 def plans(cases: Cases, judged: Judged, found: Search, sets: Sequence[tuple[RepairSet, ...]]) -> list[Plan]:
-    facts = _Facts.of(cases, judged, found)
+    facts = _Facts(cases, judged, found)
     return [_Course(facts, i, sets[i]).plan() for i in range(len(cases))]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class _Facts:
     """What the plans of a batch are made from, worked out for all gears at once."""
 
-    cases: Cases
-    judged: Judged
-    complaint: Mask
-    settled_by_plunger: Mask
-    after_limits: Sequence[Verdict]
-    group: Mask
-    rest: Mask
-    read_first: Mask
-    expected_set: Mask
-    expected_end: Sequence[Verdict]
-    by_clearance: Mask
-    again: Mask
-    again_u_in: Array
-
-    @classmethod
-    def of(cls, cases: Cases, judged: Judged, found: Search) -> _Facts:
+    def __init__(self, cases: Cases, judged: Judged, found: Search) -> None:
         gear, measured, over = cases.gear, cases.measured, cases.over_limit
-        complaint = cases.failed | (judged.plunger.beyond & ~cases.retracted) | (over.any(axis=1) & ~cases.retracted)
-        ahead = _Ahead.of(cases, judged)
+        plunger, ahead = judged.plunger, _Ahead(cases, judged)
+        self.cases, self.judged = cases, judged
+        self.complaint = cases.failed | ((plunger.beyond | over.any(axis=1)) & ~cases.retracted)
         open_critical = ~measured & gear.critical
-        candidates = np.where(open_critical.any(axis=1, keepdims=True), open_critical, ~measured)
-        group = np.where(complaint[:, None], candidates, ahead.group(candidates))
-        rest = ~measured & ~group
-        read_first = _reading_is_quicker(gear, found, ahead, rest | group) | open_critical.any(axis=1)
-        settled = (cases.failed & judged.plunger.clears) | ~judged.plunger.explained
-        by_clearance = (judged.batch.chance_random > _OTHER_CAUSE) | judged.plunger.beyond | open_critical.any(axis=1)
-        after_limits = _verdicts_after_limits(cases, judged)
-        again, again_u = _measure_again(cases, judged)
-        sets, ends = _expected(cases, judged, ahead, complaint)
-        worked_out = (complaint, settled, after_limits, group, rest, read_first, sets, ends, by_clearance)
-        return cls(cases, judged, *worked_out, again, again_u)
+        missing = np.asarray(open_critical.any(axis=1))
+        candidates = np.where(missing[:, None], open_critical, ~measured)
+        self.group = np.where(self.complaint[:, None], candidates, ahead.group(candidates))
+        self.rest = ~measured & ~self.group
+        self.read_first = _reading_is_quicker(gear, found, ahead, self.rest | self.group) | missing
+        self.settled_by_plunger = (cases.failed & plunger.clears) | ~plunger.explained
+        self.by_clearance = (judged.batch.chance_random > _OTHER_CAUSE) | plunger.beyond | missing
+        self.after_limits = _verdicts_after_limits(cases, judged)
+        self.again, self.again_u_in = _measure_again(cases, judged)
+        self.expected_set, self.expected_end = _expected(cases, judged, ahead, self.complaint)
 
 
 class _Course:
@@ -195,35 +179,20 @@ class _Course:
         return self._joints(np.isin(self.gear.joint_numbers, joints))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class _Ahead:
     """What to expect of the joints that are not measured, gear by gear and level of wear by level of wear."""
 
-    gear: Gear
-    weight: Array
-    worst_in: Array
-    slopes: Array
-    within_in: Array
-    outside_in: Array
-    measured: Mask
-
-    @classmethod
-    def of(cls, cases: Cases, judged: Judged) -> _Ahead:
-        limits = cases.gear.limits_in
-        share = np.where(cases.measured, np.minimum(cases.filled(0.0) / limits, 1.0), 0.0)
-        weight = level_chances(share.sum(axis=1), cases.measured.sum(axis=1))
-        slopes = responses(cases.gear)[0].slopes(cases.filled(0.5 * limits))
-        readings = np.sqrt(np.sum((slopes * cases.gauge_u_in) ** 2, axis=1))
-        u = np.sqrt(
-            readings**2
-            + np.nan_to_num(judged.batch.lower.u_geometry_in) ** 2
-            + cases.margin_u_in**2
-            + model_uncertainty(cases.margin_in, cases.residual_u_in) ** 2
-        )
-        worst = np.nan_to_num(judged.batch.lower.displacement_in)
-        return cls(
-            cases.gear, weight, worst, slopes, cases.margin_in - SCORE * u, cases.margin_in + SCORE * u, cases.measured
-        )
+    def __init__(self, cases: Cases, judged: Judged) -> None:
+        self.gear, self.measured = cases.gear, cases.measured
+        limits, lower = self.gear.limits_in, judged.batch.lower
+        share = np.where(self.measured, np.minimum(cases.filled(0.0) / limits, 1.0), 0.0)
+        self.weight = level_chances(share.sum(axis=1), self.measured.sum(axis=1))
+        self.worst_in = np.nan_to_num(lower.displacement_in)
+        self.slopes = responses(self.gear)[0].slopes(cases.filled(0.5 * limits))
+        readings = np.sqrt(np.sum((self.slopes * cases.gauge_u_in) ** 2, axis=1))
+        model = model_uncertainty(cases.margin_in, cases.residual_u_in)
+        u = np.sqrt(readings**2 + np.nan_to_num(lower.u_geometry_in) ** 2 + cases.margin_u_in**2 + model**2)
+        self.within_in, self.outside_in = cases.margin_in - SCORE * u, cases.margin_in + SCORE * u
 
     @property
     def mean_in(self) -> Array:

@@ -19,18 +19,7 @@ from mlg_troubleshoot.gear.gear import Area, Discrepancies, Gear, Linkage, Tilte
 from mlg_troubleshoot.gear.joints import JointSpec
 from mlg_troubleshoot.gear.model import Calibration
 from mlg_troubleshoot.gear.sources import Source, Sourced, SourceKind
-from mlg_troubleshoot.geometry.mechanism import (
-    Crank,
-    Dyad,
-    Lever,
-    Mechanism,
-    Output,
-    Plane,
-    Point,
-    Slider,
-    Slot,
-    Step,
-)
+from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Output, Plane, Point, Slider, Slot, Step
 from mlg_troubleshoot.geometry.program import write_program
 
 DEFAULT_GEAR = "hawker-800xp"

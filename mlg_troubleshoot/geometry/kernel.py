@@ -87,23 +87,14 @@ class Kernel:
     def no_clearance(self) -> list[float]:
         return [0.0] * (2 * len(self.mechanism.virtual_links))
 
-    def batch(
-        self,
-        position: float,
-        clearance_in: Array,
-        directions: Array,
-        *,
-        compiled: bool = False,
-        out: Array | None = None,
-    ) -> Array:
+    def batch(self, position: float, clearance_in: Array, directions: Array, *, compiled: bool = False) -> Array:
         """Output for a large batch of clearances in fixed directions, as fast as this machine allows.
 
         clearance_in, shape (n_virtual_links, n): lengths of the virtual links, one row a joint. [in]
-        out, shape (n,): where to write the result. [in or rad]
         Returns, shape (n,): output; NaN where the mechanism does not close. [in or rad]
         """
         clearance = np.ascontiguousarray(clearance_in, float)
-        result = np.empty(clearance.shape[1]) if out is None else out
+        result = np.empty(clearance.shape[1])
         unit = np.column_stack([np.cos(directions), np.sin(directions)])
         if compiled:
             if self._loop is None:

@@ -38,15 +38,8 @@ def provenance_of(
     extension: str | None = None,
     remembered: str | None = None,
 ) -> ReportProvenance:
-    return ReportProvenance(
-        program_version(),
-        moment_of_report(),
-        gear.geometry_sha256,
-        dict(input_sha256),
-        seed,
-        extension,
-        remembered,
-    )
+    made = program_version(), moment_of_report(), gear.geometry_sha256
+    return ReportProvenance(*made, dict(input_sha256), seed, extension, remembered)
 
 
 @cache

@@ -55,23 +55,14 @@ def central_composite(n: int, count: int | None = None) -> Array:
     """
     if not 2 <= n <= max(_FRACTIONS):
         raise UsageError(f"a central composite design in {n} variables", f"It has 2 to {max(_FRACTIONS)}.")
-    corners = _corners(n)
-    alternate = np.full((n, n), 0.5)
-    np.fill_diagonal(alternate, np.arange(1, n + 1) % 2)
-    upper, lower = np.full((n, n), 0.5), np.full((n, n), 0.5)
-    np.fill_diagonal(upper, 1.0)
-    np.fill_diagonal(lower, 0.0)
-    centre = np.full((1, n), 0.5)
+    corners, centre = _corners(n), np.full((1, n), 0.5)
+    alternate, upper, lower = (
+        np.where(np.eye(n, dtype=bool), ends, 0.5) for ends in (np.arange(1, n + 1) % 2, 1.0, 0.0)
+    )
     designs = [
-        np.concatenate(parts)
-        for parts in (
-            (corners,),
-            (corners, centre),
-            (corners, alternate),
-            (corners, alternate, centre),
-            (corners, upper, lower),
-            (corners, upper, lower, centre),
-        )
+        np.concatenate([corners, *axial, *middle])
+        for axial in ((), (alternate,), (upper, lower))
+        for middle in ((), (centre,))
     ]
     wanted = len(corners) + n if count is None else count
     for design in designs:

@@ -69,12 +69,6 @@ class IndexTable:
     failed: int
     joints: tuple[JointIndices, ...]
 
-    def joint(self, number: int) -> JointIndices:
-        for entry in self.joints:
-            if entry.joint == number:
-                return entry
-        raise KeyError(f"the table has no joint {number}")
-
     @property
     def first_order(self) -> Array:
         """First-order index of every joint, shape (n_joints,). [1]"""
