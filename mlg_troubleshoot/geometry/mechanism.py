@@ -7,6 +7,7 @@ This module knows no aircraft; a joint's clearance is a *virtual link* with a nu
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -153,58 +154,53 @@ class Mechanism:
 
     def __post_init__(self) -> None:
         names = [point.name for point in self.points]
-        self._check_planes_and_points(names)
-        known = {point.name for point in self.points if point.fixed}
-        used = [point.virtual_link for point in self.points if point.virtual_link is not None]
-        for step in self.steps:
-            for needed in needs(step):
-                if needed not in known:
-                    raise MechanismError(
-                        f"Step {step.joint!r} needs {needed!r}, which is neither fixed nor located before it."
-                    )
-            if step.joint not in names:
-                raise MechanismError(f"Step {step.joint!r} locates a point that has no coordinates.")
-            if step.joint in known:
-                raise MechanismError(f"Step {step.joint!r} locates a point that is fixed or located before it.")
-            known.add(step.joint)
-            used += step.virtual_links
-        if len(set(used)) != len(used):
-            raise MechanismError(f"A virtual link is used twice: {sorted(used)}.")
-        self._check_all_known(names, known)
-        object.__setattr__(self, "virtual_links", tuple(sorted(used)))
-
-    def _check_planes_and_points(self, names: list[str]) -> None:
         for name in (*names, *(plane.name for plane in self.planes)):
             if not is_name(name):
-                raise MechanismError(
-                    f"{name[:60]!r} cannot be the name of a part.",
-                    f"Give names of 1 to {LONGEST_NAME} printable characters.",
-                )
+                remedy = f"Give names of 1 to {LONGEST_NAME} printable characters."
+                raise MechanismError(f"{name[:60]!r} cannot be the name of a part.", remedy)
+        used = [point.virtual_link for point in self.points if point.virtual_link is not None]
+        used += [number for step in self.steps for number in step.virtual_links]
+        if len(set(used)) != len(used):
+            raise MechanismError(f"A virtual link is used twice: {sorted(used)}.")
+        for fault in (*self._misplaced(names), *self._unlocated(names)):
+            raise MechanismError(fault)
+        object.__setattr__(self, "virtual_links", tuple(sorted(used)))
+
+    def _misplaced(self, names: list[str]) -> Iterator[str]:
+        """Planes and points that refer to what is not there, or stand twice."""
         planes: set[str] = set()
         for plane in self.planes:
-            if plane.parent is not None:
-                if plane.parent not in planes:
-                    raise MechanismError(f"Plane {plane.name!r} is hinged to {plane.parent!r}, not defined before it.")
-                if plane.hinge_point not in names:
-                    raise MechanismError(
-                        f"Plane {plane.name!r} is hinged at {plane.hinge_point!r}, which has no coordinates."
-                    )
+            if plane.parent is not None and plane.parent not in planes:
+                yield f"Plane {plane.name!r} is hinged to {plane.parent!r}, not defined before it."
+            if plane.parent is not None and plane.hinge_point not in names:
+                yield f"Plane {plane.name!r} is hinged at {plane.hinge_point!r}, which has no coordinates."
             planes.add(plane.name)
         for name in names:
             if names.count(name) > 1:
-                raise MechanismError(f"Point {name!r} is defined {names.count(name)} times.")
+                yield f"Point {name!r} is defined {names.count(name)} times."
         for point in self.points:
             if point.plane not in planes:
-                raise MechanismError(f"Point {point.name!r} lies in plane {point.plane!r}, which is not defined.")
+                yield f"Point {point.name!r} lies in plane {point.plane!r}, which is not defined."
 
-    def _check_all_known(self, names: list[str], known: set[str]) -> None:
+    def _unlocated(self, names: list[str]) -> Iterator[str]:
+        """Points that are located never or twice."""
+        known = {point.name for point in self.points if point.fixed}
+        for step in self.steps:
+            for needed in needs(step):
+                if needed not in known:
+                    yield f"Step {step.joint!r} needs {needed!r}, which is neither fixed nor located before it."
+            if step.joint not in names:
+                yield f"Step {step.joint!r} locates a point that has no coordinates."
+            if step.joint in known:
+                yield f"Step {step.joint!r} locates a point that is fixed or located before it."
+            known.add(step.joint)
         for name in names:
             if name not in known:
-                raise MechanismError(f"Point {name!r} is neither fixed nor located by a step.")
+                yield f"Point {name!r} is neither fixed nor located by a step."
         if self.output.joint not in known:
-            raise MechanismError(f"The output reads {self.output.joint!r}, which no step locates.")
+            yield f"The output reads {self.output.joint!r}, which no step locates."
         if self.output.kind == "angle" and self.output.pivot not in known:
-            raise MechanismError(f"The output is an angle about {self.output.pivot!r}, which no step locates.")
+            yield f"The output is an angle about {self.output.pivot!r}, which no step locates."
 
     def point(self, name: str) -> Point:
         return next(point for point in self.points if point.name == name)

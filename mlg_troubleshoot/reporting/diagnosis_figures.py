@@ -108,7 +108,8 @@ def against_column(residuals: Residuals, name: str) -> Against:
     if name == "day" and "day" in table.quantities:
         return Against(_day_label(residuals), table.quantities["day"])
     if name in table.quantities:
-        return Against(_axis_label(name), table.quantities[name])
+        label = ", ".join(filter(None, (column_words(name), _UNITS.get(name))))
+        return Against(label, table.quantities[name])
     if name in table.factors:
         return Against(column_words(name), groups=table.factors[name])
     kind, _, joint = name.rpartition("_")
@@ -119,11 +120,6 @@ def against_column(residuals: Residuals, name: str) -> Against:
             values = table.axial_float_in[:, residuals.joints.index(int(joint))]
             return Against(f"{column_words(name)}, {unit}", residuals.drawn(values))
     return Against(f"predicted displacement, {unit}", residuals.drawn(residuals.diagnosis.predicted_in))
-
-
-def _axis_label(name: str) -> str:
-    unit = _UNITS.get(name)
-    return column_words(name) + (f", {unit}" if unit else "")
 
 
 def split_by(residuals: Residuals, name: str, other: Against) -> tuple[Mask, str, str] | None:
@@ -169,12 +165,7 @@ def _day_label(residuals: Residuals) -> str:
 
 
 def residual_plot(
-    residuals: Residuals,
-    against: Against,
-    title: str,
-    *,
-    after: bool = False,
-    only: Mask | None = None,
+    residuals: Residuals, against: Against, title: str, *, after: bool = False, only: Mask | None = None
 ) -> Markup:
     """Draw residuals against a column, with the mean of each stretch or group and twice its standard error."""
     y = residuals.drawn(residuals.after_in if after else residuals.before_in)

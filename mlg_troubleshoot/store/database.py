@@ -151,16 +151,8 @@ def _chained(before: bytes, row: Mapping[str, Any]) -> bytes:
 
 
 def _record(row: Any) -> Record:
-    return Record(
-        Kind(row.kind),
-        row.record_id,
-        row.tail_no,
-        row.side,
-        row.day,
-        bytes(row.body),
-        seq=row.seq,
-        digest=bytes(row.hash).hex(),
-    )
+    texts = row.record_id, row.tail_no, row.side, row.day
+    return Record(Kind(row.kind), *texts, bytes(row.body), seq=row.seq, digest=bytes(row.hash).hex())
 
 
 def own_file() -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from datetime import date
 from enum import Enum
@@ -55,32 +55,21 @@ def inspection_record(inspection: Inspection, kind: Kind = Kind.INSPECTION, **mo
     )
 
 
+# How a field is read back where it does not stand in JSON as it is.
+_READ: dict[str, Callable[[Any], Any]] = {
+    **dict.fromkeys(_BY_JOINT, lambda found: {int(number): value for number, value in found.items()}),
+    "entered": lambda found: {int(n): EnteredClearance(text, LengthUnit(unit)) for n, (text, unit) in found.items()},
+    "source": lambda found: RowSource(*found),
+    "inspection_date": date.fromisoformat,
+    **{"side": Side, "convention": ClearanceConvention, "outcome": Outcome, "approach": Approach},
+    **dict.fromkeys(("readings_in", "warnings"), tuple),
+}
+
+
 def inspection_from(record: Record) -> Inspection:
-    body = dict(record.body["inspection"])
-    for name in _BY_JOINT:
-        if name in body:
-            body[name] = {int(number): value for number, value in body[name].items()}
-    if "entered" in body:
-        body["entered"] = {
-            int(n): EnteredClearance(text, LengthUnit(unit)) for n, (text, unit) in body["entered"].items()
-        }
-    if "source" in body:
-        body["source"] = RowSource(*body["source"])
-    for name, kind in (
-        ("side", Side),
-        ("convention", ClearanceConvention),
-        ("outcome", Outcome),
-        ("approach", Approach),
-    ):
-        if name in body:
-            body[name] = kind(body[name])
-    if "inspection_date" in body:
-        body["inspection_date"] = date.fromisoformat(body["inspection_date"])
-    for name in ("readings_in", "warnings"):
-        if name in body:
-            body[name] = tuple(body[name])
-    body.setdefault("clearance_in", {})
-    return Inspection(**body)
+    body = record.body["inspection"]
+    read = {name: _READ[name](value) if name in _READ else value for name, value in body.items()}
+    return Inspection(**{"clearance_in": {}, **read})
 
 
 def same_inspection(one: Record, two: Record) -> bool:

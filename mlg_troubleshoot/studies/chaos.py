@@ -81,7 +81,7 @@ def chaos_indices(
         if failed:
             return without_numbers(design, seed, n, used, failed, failed_note(failed, used), (np.nan, np.nan)), None
         before = np.inf if best is None else best.residual
-        best = _best_fit(points, values, checks, check_values, before, best)
+        best = _best_fit(points, values, checks, check_values, best)
         if best is not None:
             found = _indices(best, design, seed, used, float(best.coefficients[0]))
             if found.half_width <= accuracy and best.corner_miss <= _CORNER_MISS:
@@ -106,15 +106,14 @@ def _latin(rng: Generator, count: int, n: int) -> Array:
 
 
 def _best_fit(
-    points: Array, values: Array, checks: Array, check_values: Array, before: float, best: ChaosFit | None
+    points: Array, values: Array, checks: Array, check_values: Array, found: ChaosFit | None
 ) -> ChaosFit | None:
     """Try degrees upward as long as the held-out residual falls."""
     n = points.shape[1]
     spread = float(np.concatenate([values, check_values[:_HELD_OUT]]).var())
     if spread <= 1e-24 * float(np.mean(values)) ** 2 or spread == 0.0:
         return None
-    last = before
-    found = best
+    last = np.inf if found is None else found.residual
     for degree in range(2, 21):
         exponents = total_degree(n, degree)
         if len(exponents) * _PER_TERM > len(points) or len(exponents) > _MOST_TERMS:
