@@ -169,16 +169,12 @@ class BatchPrediction:
 
 
 def with_rows(whole: Prediction, part: Prediction, rows: Places) -> Prediction:
-    def put(a: Array, b: Array) -> Array:
-        merged = a.copy()
-        merged[rows] = b
-        return merged
-
-    def merged(one: Any, other: Any) -> Any:
-        return replace(one, **{f.name: join(getattr(one, f.name), getattr(other, f.name)) for f in fields(one)})
-
-    def join(a: Any, b: Any) -> Any:
-        return put(a, b) if isinstance(a, np.ndarray) else merged(a, b)
+    def merged(a: Any, b: Any) -> Any:
+        if not isinstance(a, np.ndarray):
+            return replace(a, **{f.name: merged(getattr(a, f.name), getattr(b, f.name)) for f in fields(a)})
+        both = a.copy()
+        both[rows] = b
+        return both
 
     found: Prediction = merged(whole, part)
     return found

@@ -35,7 +35,7 @@ class Subsets:
 
     weights: the same as 0 and 1, for sums. [1]
     alike: the same number for subsets of equally many joints in equal minutes.
-    pairs: 1 where both joints of a pair are members, the pairs in the order of `upper_triangle`. [1]
+    pairs: 1 where both joints of a pair are members, the pairs as in an upper triangle. [1]
     """
 
     members: Mask
@@ -43,11 +43,6 @@ class Subsets:
     minutes: Array
     alike: Places
     pairs: Array
-
-    @property
-    def upper_triangle(self) -> tuple[Places, Places]:
-        """Pairs of joints, each joint with itself included."""
-        return np.triu_indices(self.members.shape[1])
 
 
 @lru_cache(maxsize=4)
@@ -131,7 +126,7 @@ def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
 
 def _bend(linkage: Response, table: Subsets, clearance_in: Array, less_in: Array) -> Array:
     """What the curvature adds to the worst case with each subset restored. [in]"""
-    first, second = table.upper_triangle
+    first, second = np.triu_indices(less_in.shape[1])
     curved = linkage.worst_curvature[first, second] * np.where(first == second, 0.5, 1.0)
     return linkage.sense(clearance_in)[:, None] * ((less_in[:, first] * less_in[:, second] * curved) @ table.pairs.T)
 

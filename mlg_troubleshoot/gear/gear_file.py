@@ -269,18 +269,14 @@ def _members(raw: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:
         member = members.table(name)
         new: dict[str, Any] = deepcopy({k: raw.get(k) for k in _GEOMETRY_KEYS})
         new["input"].update(range=list(member.pair("range")), reference=member.number("reference"))
-        if member.has("planes"):
-            planes = member.table("planes")
-            for plane in planes.names:
-                change = planes.table(plane)
-                _entry(new["planes"], "name", plane, planes).update({k: change.number(k) for k in change.names})
         points = member.table("points")
         for point in points.names:
             _entry(new["points"], "name", point, points)["at"] = list(points.pair(point))
-        steps = member.table("steps")
-        for joint in steps.names:
-            change = steps.table(joint)
-            _entry(new["steps"], "joint", joint, steps).update({k: change.number(k) for k in change.names})
+        for part, key in (("planes", "name"), ("steps", "joint")):
+            changes = member.table(part) if member.has(part) or part == "steps" else DataTable({}, path)
+            for name_of in changes.names:
+                change = changes.table(name_of)
+                _entry(new[part], key, name_of, changes).update({k: change.number(k) for k in change.names})
         member.finish()
         full[name] = new
     table.finish()

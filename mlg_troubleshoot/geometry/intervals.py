@@ -38,6 +38,10 @@ def _plus(a: Pair, b: Pair) -> Pair:
     return _out(a[0] + b[0], a[1] + b[1])
 
 
+def _minus(a: Pair, b: Pair) -> Pair:
+    return _out(a[0] - b[1], a[1] - b[0])
+
+
 def _negated(a: Pair) -> Pair:
     return -a[1], -a[0]
 
@@ -226,12 +230,10 @@ def narrowed_by_links(joint: Joint, start: Joint, end: Joint, square: Any, area:
         slopes = _implicit_slopes(u, v, inverse, a, b, grown)
         for part, slope in zip(c, slopes, strict=True):
             part.slope = _common(part.slope, slope)
-        turned_u = [_plus(p.slope, _negated(q.slope)) for p, q in zip(c, a, strict=True)]
-        turned_v = [_plus(p.slope, _negated(q.slope)) for p, q in zip(c, b, strict=True)]
-        first = _plus(_dot(u, (a[0].bend, a[1].bend)), grown.bend)
-        first = _plus(first, _negated(_plus(_outer(turned_u[0], turned_u[0]), _outer(turned_u[1], turned_u[1]))))
-        second = _dot(v, (b[0].bend, b[1].bend))
-        second = _plus(second, _negated(_plus(_outer(turned_v[0], turned_v[0]), _outer(turned_v[1], turned_v[1]))))
+        turned = [[_minus(p.slope, q.slope) for p, q in zip(c, far, strict=True)] for far in (a, b)]
+        bent = [_plus(_outer(x, x), _outer(y, y)) for x, y in turned]
+        first = _minus(_plus(_dot(u, (a[0].bend, a[1].bend)), grown.bend), bent[0])
+        second = _minus(_dot(v, (b[0].bend, b[1].bend)), bent[1])
         for part, bend in zip(c, _solved(u, v, inverse, first, second), strict=True):
             part.bend = _common(part.bend, bend)
             part._narrowed()
@@ -252,9 +254,9 @@ def _first_guess(c: tuple[Range, ...], a: tuple[Range, ...], b: tuple[Range, ...
             (p.at_middle[0] - factor * (w + widest) - 1e-12, p.at_middle[1] + factor * (w + widest) + 1e-12)
             for p, w in zip(c, swing, strict=True)
         ]
-        u = [_plus(g, _negated(p.value)) for g, p in zip(guess, a, strict=True)]
-        v = [_plus(g, _negated(p.value)) for g, p in zip(guess, b, strict=True)]
-        across = _common(cross, _plus(_times(u[0], v[1]), _negated(_times(u[1], v[0]))))
+        u = [_minus(g, p.value) for g, p in zip(guess, a, strict=True)]
+        v = [_minus(g, p.value) for g, p in zip(guess, b, strict=True)]
+        across = _common(cross, _minus(_times(u[0], v[1]), _times(u[1], v[0])))
         slopes = _implicit_slopes(u, v, _inverse_or_nothing(across), a, b, grown)
         inside = np.ones(len(guess[0][0]), dtype=bool)
         for part, slope, bound in zip(c, slopes, guess, strict=True):
@@ -301,8 +303,8 @@ def _dot(u: Sequence[Any], slopes: tuple[Pair, Pair]) -> Pair:
 
 def _solved(u: Sequence[Any], v: Sequence[Any], inverse: Pair, first: Pair, second: Pair) -> tuple[Pair, Pair]:
     """Solve u · x = first, v · x = second."""
-    x = _plus(_times(first, _bounds(v[1])), _negated(_times(second, _bounds(u[1]))))
-    y = _plus(_times(second, _bounds(u[0])), _negated(_times(first, _bounds(v[0]))))
+    x = _minus(_times(first, _bounds(v[1])), _times(second, _bounds(u[1])))
+    y = _minus(_times(second, _bounds(u[0])), _times(first, _bounds(v[0])))
     return _times(x, inverse), _times(y, inverse)
 
 

@@ -228,7 +228,7 @@ def _mean_mark(plot: Plot, x: float, values: Array) -> None:
     plot.canvas.line(px, ends[0], px, ends[1], width=1.6)
     for end in ends:
         plot.canvas.line(px - 3, end, px + 3, end, width=1.6)
-    plot.canvas.rectangle(px - 3, py - 3, 6, 6, fill=PAPER, edge=INK, edge_width=1.4)
+    plot.canvas.rectangle(px - 3, py - 3, 6, 6, fill=PAPER, colour=INK, width=1.4)
 
 
 def tail_strips(residuals: Residuals) -> Markup:
@@ -259,7 +259,7 @@ def tail_strips(residuals: Residuals) -> Markup:
             for value in own:
                 _point(canvas, plot.at(float(value), 0.0)[0], y, after=is_after)
             x = plot.at(float(np.mean(own)), 0.0)[0]
-            canvas.rectangle(x - 3, y - 3, 6, 6, fill=PAPER, edge=INK, edge_width=1.4)
+            canvas.rectangle(x - 3, y - 3, 6, 6, fill=PAPER, colour=INK, width=1.4)
     return canvas.svg()
 
 

@@ -82,19 +82,10 @@ class Canvas:
         self.add("line", x1=x1, y1=y1, x2=x2, y2=y2, **_stroke(stroke))
 
     def rectangle(
-        self,
-        x: float,
-        y: float,
-        width: float,
-        height: float,
-        *,
-        fill: str = "none",
-        edge: str | None = None,
-        edge_width: float = 1.0,
-        dash: str | None = None,
+        self, x: float, y: float, across: float, down: float, *, fill: str = "none", **edge: Unpack[Stroke]
     ) -> None:
-        outline = _stroke({"colour": edge, "width": edge_width, "dash": dash}) if edge else {}
-        self.add("rect", x=x, y=y, width=max(width, 0.0), height=max(height, 0.0), fill=fill, **outline)
+        outline = _stroke(edge) if edge else {}
+        self.add("rect", x=x, y=y, width=max(across, 0.0), height=max(down, 0.0), fill=fill, **outline)
 
     def polyline(
         self, points: Sequence[Place], *, fill: str = "none", closed: bool = False, **stroke: Unpack[Stroke]
@@ -304,7 +295,7 @@ def draw_bar(canvas: Canvas, bar: Bar, x: float, y: float, height: float, per_va
         return x
     length = max(bar.value * per_value, 0.8)
     fill, edge, dash = {"solid": (INK, INK, None), "mid": (RULE, SOFT, None), "open": (PAPER, SOFT, "3 2")}[bar.style]
-    canvas.rectangle(x, y, length, height, fill=fill, edge=edge, dash=dash)
+    canvas.rectangle(x, y, length, height, fill=fill, colour=edge, dash=dash)
     end = x + length
     if bar.low is not None and bar.high is not None:
         low, high, middle = x + bar.low * per_value, x + bar.high * per_value, y + height / 2

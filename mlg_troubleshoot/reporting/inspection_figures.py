@@ -51,7 +51,7 @@ def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
         bold=True,
     )
     canvas.line(gauge.px(under), y, gauge.px(over), y, width=4)
-    canvas.rectangle(gauge.px(sense * worst - u2), y - 6, gauge.px(2 * u2) - gauge.px(0.0), 12, edge=INK)
+    canvas.rectangle(gauge.px(sense * worst - u2), y - 6, gauge.px(2 * u2) - gauge.px(0.0), 12, colour=INK)
     for value in (under, over):
         canvas.marker("diamond", gauge.px(value), y, 5.5)
     if upper is not None:
@@ -185,7 +185,7 @@ def plunger_curve(
         plot.draw(one)
     px, high = plot.at(end * per_inch, margin)
     _, low = plot.at(end * per_inch, -margin)
-    canvas.rectangle(px, high, 7, low - high, fill=PALE, edge=INK, edge_width=1.2)
+    canvas.rectangle(px, high, 7, low - high, fill=PALE, colour=INK, width=1.2)
     marks = [(0.0, f"margin ±{shown.bare(a.margin_in)}", False)]
     marks += [(v, shown.bare(v, True), True) for v in (a.over_travel_in, a.under_travel_in) if v is not None]
     heights = [plot.at(0.0, value * per_inch)[1] for value, _, _ in marks]

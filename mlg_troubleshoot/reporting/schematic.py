@@ -370,7 +370,7 @@ def joint_state(finding: JointFinding) -> JointState:
 def _mark(canvas: Canvas, x: float, y: float, text: str, state: str, faded: bool = False) -> None:
     size = _MARKER
     if state == "over":
-        canvas.rectangle(x - size, y - size, 2 * size, 2 * size, fill=SOFT if faded else INK, edge=PAPER)
+        canvas.rectangle(x - size, y - size, 2 * size, 2 * size, fill=SOFT if faded else INK, colour=PAPER)
         canvas.text(x, y + 4, text, bold=True, colour=PAPER, anchor="middle")
         return
     missing, pale = state == "missing", state == "missing" or faded
@@ -426,7 +426,7 @@ def _callout(
         ux, uy = _unit(joint, edge)
         canvas.line(joint[0] + (_MARKER + 1) * ux, joint[1] + (_MARKER + 1) * uy, *edge, colour=SOFT, width=0.8)
     if framed:
-        canvas.rectangle(box[0], box[1], width, height, fill=PAPER, edge=INK, edge_width=1.4)
+        canvas.rectangle(box[0], box[1], width, height, fill=PAPER, colour=INK, width=1.4)
     base, middle = box[1] + 0.5, (box[0] + box[2]) / 2
     for line in lines:
         base += line.size + 2.0

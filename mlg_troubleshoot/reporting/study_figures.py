@@ -91,7 +91,7 @@ def release_curve(gear: Gear, lengths: Lengths, width: float = 430.0, height: fl
         plot.draw(one)
     px, high = plot.at(1.0, mid + margin)
     _, low = plot.at(1.0, mid - margin)
-    canvas.rectangle(px, high, 7, low - high, fill=PALE, edge=INK, edge_width=1.2)
+    canvas.rectangle(px, high, 7, low - high, fill=PALE, colour=INK, width=1.2)
     for i, text in enumerate(("margin", f"±{lengths.bare(gear.margin.value)}")):
         canvas.text(px + 11, (high + low) / 2 + 1 + 10 * i, text, size=9)
     plot.draw_legend([reference, others[0]] if others else [reference], plot.area[0], 8)

@@ -84,15 +84,14 @@ def check_statements(
     names = tuple(linkage.name for linkage in gear.ensemble)
     found = []
     for claim, places in by_claim.items():
-        evidence = tuple(_evidence(entries[i], [column[i] for column in columns]) for i in places)
+        evidence = tuple(_evidence(entries[i], tuple(column[i] for column in columns)) for i in places)
         outcome = _outcome(evidence, by_reading=len({entries[i].reading for i in places}) > 1)
         found.append(Statement(claim, entries[places[0]].section, outcome, names, evidence))
     return tuple(found)
 
 
-def _evidence(target: Target, values: list[float]) -> Evidence:
-    holds = tuple(target.holds(value) for value in values)
-    return Evidence(target.quantity, target.tolerance, target.unit, tuple(values), holds, target.why)
+def _evidence(t: Target, values: tuple[float, ...]) -> Evidence:
+    return Evidence(t.quantity, t.tolerance, t.unit, values, tuple(map(t.holds, values)), t.why)
 
 
 def _outcome(evidence: tuple[Evidence, ...], *, by_reading: bool) -> Outcome:
