@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from mlg_troubleshoot.diagnosis import Diagnosis, NamedCause
@@ -79,12 +79,21 @@ def cause_words(cause: NamedCause) -> str:
 
 def seven_lines(d: Diagnosis, unit: LengthUnit = LengthUnit.THOU) -> tuple[Line, ...]:
     """Say what a diagnosis found: data, misfit, cause, model, gain, what is left, what to do."""
+    # Blanks of every kind break a line of the terminal, and long words where they must.
+    texts = [" ".join(text.split()) for text in _said(d, unit, *_WORDS)]
+    return tuple(Line(k, word, text) for k, (word, text) in enumerate(zip(_WORDS, texts, strict=True), 1))
+
+
+def headline(d: Diagnosis, unit: LengthUnit) -> str:
+    """Say the verdict of a diagnosis in one or two sentences."""
+    return next(_said(d, unit, "HEADLINE")).strip()
+
+
+def _said(d: Diagnosis, unit: LengthUnit, *parts: str) -> Iterator[str]:
     words = {"kind_words": kind_words, "chance_words": chance_words, "fitted_numbers": fitted_numbers}
     context = {**words, "d": d, "by_slip": by_slip, "noise_above": NOISE_ABOVE, "lengths": Lengths(unit)}
     said = environment().get_template("diagnosis.txt.j2").make_module(context)
-    # Blanks of every kind break a line of the terminal, and long words where they must.
-    texts = [" ".join(str(getattr(said, word)).replace("\u200b", "").split()) for word in _WORDS]
-    return tuple(Line(k, word, text) for k, (word, text) in enumerate(zip(_WORDS, texts, strict=True), 1))
+    return (str(getattr(said, part)).replace("\u200b", "") for part in parts)
 
 
 def by_slip(faults: Sequence[DataFault]) -> list[list[DataFault]]:

@@ -20,11 +20,12 @@ from mlg_troubleshoot.reporting.diagnosis_lines import (
     chance_words,
     column_words,
     fitted_numbers,
+    headline,
     kind_words,
     name_words,
     seven_lines,
 )
-from mlg_troubleshoot.reporting.formats import Lengths, several, short
+from mlg_troubleshoot.reporting.formats import Lengths, short
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.reporting.publish import safe_stem
@@ -73,7 +74,7 @@ def _context(
         "g": d.gain,
         "words": words,
         "tone": tone,
-        "headline": _headline(d, lengths),
+        "headline": headline(d, lengths.unit),
         "action": seven_lines(d, lengths.unit)[-1].text,
         "chance": None if chance is None else chance_words(chance, d.permutations),
         "plots": _plots(residuals),
@@ -99,28 +100,6 @@ def _days(d: Diagnosis) -> int | None:
     if d.used.first_day is None or days is None or not np.isfinite(days).any():
         return None
     return int(np.nanmax(days) - np.nanmin(days))
-
-
-def _headline(d: Diagnosis, lengths: Lengths) -> str:
-    match d.verdict:
-        case "NAMED":
-            each = "; ".join(f"{cause_words(c)}: {lengths.full(c.effect_rms_in, fine=1)} rms" for c in d.causes)
-            return f"{each}. Every rival is ruled out."
-        case "AMBIGUOUS" if len(d.also_possible) == 1:
-            return f"{cause_words(d.also_possible[0])}? Too faint to be named. The model is unchanged."
-        case "AMBIGUOUS":
-            count = several(len(d.also_possible), "cause")
-            return f"{count} explain the misfit alike. None is named, the model is unchanged."
-        case "UNLISTED":
-            moves = " and ".join(column_words(v) for v in d.unlisted_variables)
-            return (
-                f"The misfit is no chance and none of the listed causes. It moves with {moves}. The model is unchanged."
-            )
-        case _:
-            return (
-                f"Nothing stands out beyond chance. An effect of {lengths.full(d.smallest_rms_in, fine=1)} rms would "
-                "have been found 4 times in 5; smaller ones may be there."
-            )
 
 
 def _plots(residuals: Residuals) -> list[PlotPair]:

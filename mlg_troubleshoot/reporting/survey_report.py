@@ -31,21 +31,16 @@ def survey_document(
 
 
 def _context(result: SurveyResult, found: Survey, provenance: ReportProvenance, lengths: Lengths) -> dict[str, Any]:
-    gear, mode, suggestion = result.gear, found.modes[0], result.suggestion
+    gear, mode = result.gear, found.modes[0]
     fitted = found.linkage.predicted(found.read, mode.vector[None])[0]
     width = np.log(result.interval[:, 1] / result.interval[:, 0])
     return {
         **head(f"Survey – {gear.name}", f"Survey · {gear.id}", gear, provenance, lengths),
         "result": result,
         "found": found,
-        "summary": found.words,
-        "written": None if result.gear_file is None else result.gear_file.name,
         "determined": f"{mode.parameters:.1f} of {len(mode.vector)}",
         "widest": f"± {100 * float(np.expm1(width.max() / 2)):.1f} %",
         "rows": list(zip(gear.joints, result.amplification, result.interval, result.before, strict=True)),
-        "next": "No further reading would narrow this by 1 %."
-        if suggestion is None
-        else f"{suggestion.reading.words}; narrows this by about {100 * suggestion.narrowing:.0f} %.",
         "panels": _panels(gear.reference, found),
         "readings": [
             (r, number((value - r.value) / r.u, 1, True), value)
