@@ -35,8 +35,8 @@ class LinkageModel:
     mechanism: the linkage, given at mid-position.
     stroke: input at Down Lock and at mid-position, the release stroke. [in]
     calibration: what the plunger does without clearance.
+    mid: output of the mechanism at mid-position without clearance. [in]
     rate: calibration rate k of P(s) = P(0) + k (p(s) − p(0)); its sign makes over-travel positive. [1]
-    stroke: the release stroke. [in]
     Raises `MechanismError` if the linkage does not close over the whole stroke without clearance.
     """
 
@@ -46,7 +46,7 @@ class LinkageModel:
         self.stroke = stroke
         self.calibration = calibration
         self.joint_numbers = mechanism.virtual_links
-        self._down_lock, self._mid = (
+        self._down_lock, self.mid = (
             float(self.kernel.output(s, self.kernel.no_clearance())) for s in (stroke[0], stroke[1])
         )
         curve = self.kernel.output(np.linspace(*stroke, 201), self.kernel.no_clearance())
@@ -63,7 +63,7 @@ class LinkageModel:
 
     def _calibrated_rate(self, travel_in: float) -> float:
         """Rate k that makes the travel from the least displacement to mid-position as prescribed."""
-        direction = np.sign(self._mid - self._down_lock)
+        direction = np.sign(self.mid - self._down_lock)
         if direction == 0:
             raise MechanismError("The plunger is at the same place at Down Lock and at mid-position.")
         low, high = self.stroke
@@ -72,7 +72,7 @@ class LinkageModel:
             along = direction * self.kernel.output(strokes, self.kernel.no_clearance())
             least = int(np.argmin(along))
             low, high = strokes[max(least - 1, 0)], strokes[min(least + 1, 100)]
-        return float(direction * travel_in / (direction * self._mid - along[least]))
+        return float(direction * travel_in / (direction * self.mid - along[least]))
 
     def numbers(self, changed: Mapping[str, Any] | None) -> Sequence[Any] | None:
         """The linkage's numbers with some changed by name, for the kernel; arrays broadcast with the virtual links."""
@@ -92,7 +92,7 @@ class LinkageModel:
         Returns: displacement, over-travel positive; NaN where the linkage does not close. [in]
         """
         at = self.stroke[1] if stroke is None else stroke
-        zero = self._mid if stroke is None else self.kernel.output(at, self.kernel.no_clearance())
+        zero = self.mid if stroke is None else self.kernel.output(at, self.kernel.no_clearance())
         return np.asarray(self.rate * (self.kernel.output(at, links, self.numbers(changed)) - zero))
 
     def plunger(self, stroke: Any, links: Sequence[Any] | None = None) -> Array:

@@ -51,10 +51,8 @@ class Residuals:
     @property
     def effect_in(self) -> Array:
         """What the named causes add to the prediction, shape (n,); zero if none is named. [in]"""
-        total = np.zeros(len(self.before_in))
-        for cause in self.diagnosis.causes:
-            total = total + cause.effect_in
-        return total
+        none = np.zeros(len(self.before_in))
+        return np.asarray(np.sum([none, *(cause.effect_in for cause in self.diagnosis.causes)], axis=0))
 
     @property
     def after_in(self) -> Array:

@@ -223,15 +223,13 @@ class _Chain:
     def _derivative(self, number: int, joint: str) -> Array:
         """Largest movement of a joint per unit of one clearance over all directions."""
         at = 2 * self.model.joint_numbers.index(number)
-        moved = []
-        for axis in (0, 1):
-            ends = []
-            for sign in (1.0, -1.0):
-                links = self.model.kernel.no_clearance()
-                links[at + axis] = sign * _STEP_IN
-                x, y = self.model.kernel.positions(self.stroke, links)[joint]
-                ends.append(np.stack([x, y], axis=-1))
-            moved.append((ends[0] - ends[1]) / (2 * _STEP_IN))
+
+        def place(axis: int, step: float) -> Array:
+            links = self.model.kernel.no_clearance()
+            links[at + axis] = step
+            return np.stack(self.model.kernel.positions(self.stroke, links)[joint], axis=-1)
+
+        moved = [(place(axis, _STEP_IN) - place(axis, -_STEP_IN)) / (2 * _STEP_IN) for axis in (0, 1)]
         return np.linalg.svd(np.stack(moved, axis=-1), compute_uv=False)[..., 0]
 
 

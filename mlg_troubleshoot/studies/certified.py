@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 from mlg_troubleshoot.geometry.intervals import Box, Range, cosine_range
 
@@ -111,10 +111,8 @@ class _Search:
         self.over_stroke = not mid_only
         self.stroke = model.stroke[1]
         # The sequential rule is a good start: what it reaches drops most boxes at once.
-        worst = worst_case(model, clearance[None])
-        over = sense > 0.0
-        self.directions = (worst.over_directions if over else worst.under_directions)[0]
-        self.best = float(sense * (worst.over_in if over else worst.under_in)[0])
+        moved, directions = worst_of_sense(model, clearance[None], sense)
+        self.directions, self.best = directions[0], float(sense * moved[0])
         if not np.isfinite(self.best):
             self.best = -np.inf
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.gear.directions import worst_case, worst_of_sense
 from mlg_troubleshoot.gear.model import LinkageModel
 
 Response = Callable[[Array], Array]
@@ -25,12 +25,6 @@ class HeldDirections:
     directions: Array
     sense: float = 1.0
     compiled: bool = False
-    _zero: float = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        kernel = self.model.kernel
-        zero = float(kernel.output(self.model.stroke[1], kernel.no_clearance()))
-        object.__setattr__(self, "_zero", zero)
 
     def __call__(self, clearance_in: Array) -> Array:
         """Displacement for a batch of clearances.
@@ -47,7 +41,7 @@ class HeldDirections:
         """
         model = self.model
         moved = model.kernel.batch(model.stroke[1], clearance_in, self.directions, compiled=self.compiled)
-        moved -= self._zero
+        moved -= model.mid
         moved *= self.sense * model.rate
         return moved
 
@@ -69,5 +63,4 @@ def worst_directions(model: LinkageModel, limits_in: Array, *, compiled: bool = 
 
 def worst_sense(model: LinkageModel, limits_in: Array, sense: float) -> HeldDirections:
     """Worst directions of one sense at the limits, then held."""
-    worst = worst_case(model, limits_in[None, :])
-    return HeldDirections(model, (worst.over_directions if sense > 0.0 else worst.under_directions)[0], sense)
+    return HeldDirections(model, worst_of_sense(model, limits_in[None, :], sense)[1][0], sense)

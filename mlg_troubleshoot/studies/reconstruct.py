@@ -181,11 +181,7 @@ class _Search:
         return vector
 
     def _slopes(self, vector: Array, value: Array, step: float = 1e-5) -> Array:
-        columns = []
-        for i in range(len(vector)):
-            moved = vector.copy()
-            moved[i] += step
-            columns.append((self.residuals(moved) - value) / step)
+        columns = [(self.residuals(vector + moved) - value) / step for moved in step * np.eye(len(vector))]
         return np.clip(np.array(columns).T, -1e6, 1e6)
 
     def report(self, vector: Array, seed: int) -> Reconstruction:
@@ -206,15 +202,13 @@ class _Search:
     def _binding_slopes(self, vector: Array, met: tuple[Computed, ...]) -> Array:
         """Slopes of what binds; a target that moves with nothing, or has no value nearby, determines nothing."""
         binding = [each.target for each in met if each.binds]
-        columns = []
-        for i in range(len(vector)):
-            ends = []
-            for sign in (1.0, -1.0):
-                moved = vector.copy()
-                moved[i] += sign * 1e-4
-                facts = Facts(self.gear, self.gear.model_of(self.space.linkage(moved)), quick=True)
-                ends.append(np.array([facts.measure(target) for target in binding]))
-            columns.append((ends[0] - ends[1]) / 2e-4)
+
+        def measured(place: Array) -> Array:
+            facts = Facts(self.gear, self.gear.model_of(self.space.linkage(place)), quick=True)
+            return np.array([facts.measure(target) for target in binding])
+
+        steps = 1e-4 * np.eye(len(vector))
+        columns = [(measured(vector + step) - measured(vector - step)) / 2e-4 for step in steps]
         rows: Array = np.array(columns).T
         return rows[np.isfinite(rows).all(axis=1) & rows.any(axis=1)]
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.random import Generator
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 from mlg_troubleshoot.studies.certified import CertifiedBound, certified_bound
 from mlg_troubleshoot.studies.compat import seeded
@@ -42,8 +42,7 @@ def search_worst(
 ) -> WorstSearch:
     """Find the worst displacement by the sequential rule, by differential evolution and by proof."""
     clearance = np.asarray(clearance_in, float)
-    worst = worst_case(model, clearance[None])
-    sequential = float((worst.over_in if sense > 0.0 else -worst.under_in)[0])
+    sequential = sense * float(worst_of_sense(model, clearance[None], sense)[0][0])
     searched, evaluations = _evolved(model, clearance, sense, rng, generations)
     return WorstSearch(sense, seed, sequential, searched, evaluations, certified_bound(model, clearance, sense))
 

@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,8 +37,6 @@ from mlg_troubleshoot.wear import Samples, WearModel, WearPath, fit_wear
 from mlg_troubleshoot.workflows.check import CheckOptions, CheckResult
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from mlg_troubleshoot.reporting import WrittenReport
 
 GearKey = tuple[str, str]
