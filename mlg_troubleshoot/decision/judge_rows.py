@@ -65,11 +65,9 @@ def assess(
         part = rows[start : start + _CHUNK]
         valid = [row for row in part if isinstance(row, Inspection)]
         assessed = iter(_assess_valid(valid, gear, table, options) if valid else ())
-        for row in part:
-            if isinstance(row, Inspection):
-                judged.append(next(assessed))
-            else:
-                judged.append(Rejected(row, correct(row), row.warnings))
+        judged += [
+            next(assessed) if isinstance(row, Inspection) else Rejected(row, correct(row), row.warnings) for row in part
+        ]
         if progress is not None:
             progress(len(judged), len(rows))
     return tuple(judged)

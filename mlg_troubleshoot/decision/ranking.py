@@ -36,31 +36,27 @@ def rank_joints(
     ranks, known, above = places[:, 0].tolist(), clearance_in.tolist(), over.tolist()
     room = np.full(clearance_in.shape, np.nan) if allowance_in is None else allowance_in
     allowed = np.where(np.isfinite(room), room, np.nan).tolist()
-    findings = []
-    for i in range(len(clearance_in)):
-        row = []
-        for j, joint in enumerate(gear.joints):
-            indices = table.joints[j]
-            clearance = known[i][j] if measured[i, j] else None
-            row.append(
-                JointFinding(
-                    joint=joint.number,
-                    name=joint.name,
-                    clearance_in=clearance,
-                    limit_in=joint.limit.value,
-                    over_limit=above[i][j],
-                    contribution_in=None if clearance is None else indices.plunger_amplification * clearance,
-                    first_order=indices.first_order,
-                    total_order=indices.total_order,
-                    plunger_amplification=indices.plunger_amplification,
-                    rank=ranks[i][j],
-                    rank_range=(best[i][j], worst[i][j]),
-                    alike=gear.alike[joint.number],
-                    allowance_in=None if allowed[i][j] != allowed[i][j] else allowed[i][j],
-                )
-            )
-        findings.append(tuple(row))
-    return findings
+
+    def finding(i: int, j: int) -> JointFinding:
+        joint, indices = gear.joints[j], table.joints[j]
+        clearance = known[i][j] if measured[i, j] else None
+        return JointFinding(
+            joint=joint.number,
+            name=joint.name,
+            clearance_in=clearance,
+            limit_in=joint.limit.value,
+            over_limit=above[i][j],
+            contribution_in=None if clearance is None else indices.plunger_amplification * clearance,
+            first_order=indices.first_order,
+            total_order=indices.total_order,
+            plunger_amplification=indices.plunger_amplification,
+            rank=ranks[i][j],
+            rank_range=(best[i][j], worst[i][j]),
+            alike=gear.alike[joint.number],
+            allowance_in=None if allowed[i][j] != allowed[i][j] else allowed[i][j],
+        )
+
+    return [tuple(finding(i, j) for j in range(len(gear.joints))) for i in range(len(clearance_in))]
 
 
 def _places(over: Mask, contribution: Array, total_order: Array) -> Places:

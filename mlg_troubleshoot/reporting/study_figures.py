@@ -18,7 +18,7 @@ _POINTS = 81
 _BAR_HEIGHT = 9.0
 _GAP = 7.0
 _TOP = 20.0
-_LABEL_WIDTH = 30.0
+_WIDTH, _LABEL_WIDTH = 430.0, 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,12 +31,10 @@ class BarSeries:
     spread: Array | None = None
 
 
-def grouped_bars(
-    labels: Sequence[str], series: Sequence[BarSeries], title: str, description: str, width: float = 430.0
-) -> Markup:
+def grouped_bars(labels: Sequence[str], series: Sequence[BarSeries], title: str, description: str) -> Markup:
     """Draw horizontal bars in groups: a group for each label, in it a bar of each series with its value."""
     row = _BAR_HEIGHT * len(series) + _GAP
-    canvas = Canvas(width, _TOP + row * len(labels) + 2, title, description)
+    canvas = Canvas(_WIDTH, _TOP + row * len(labels) + 2, title, description)
     x = _LABEL_WIDTH
     for one in series:
         draw_bar(canvas, Bar(1.0, style=one.style), x, 3, 9, 18)
@@ -44,7 +42,7 @@ def grouped_bars(
         x += 36 + 5.6 * len(one.label)
     ends = [one.values for one in series] + [one.spread for one in series if one.spread is not None]
     longest = max((float(v) for part in ends for v in part.ravel() if math.isfinite(v)), default=0.0)
-    per_value = (width - _LABEL_WIDTH - 46) / longest if longest > 0.0 else 0.0
+    per_value = (_WIDTH - _LABEL_WIDTH - 46) / longest if longest > 0.0 else 0.0
     for i, label in enumerate(labels):
         top = _TOP + row * i
         canvas.text(_LABEL_WIDTH - 5, top + row / 2 + 1, label, size=10, anchor="end", bold=True)
@@ -61,7 +59,7 @@ def grouped_bars(
     return canvas.svg()
 
 
-def release_curve(gear: Gear, lengths: Lengths, width: float = 430.0, height: float = 262.0) -> Markup:
+def release_curve(gear: Gear, lengths: Lengths) -> Markup:
     """Draw the plunger over the release of the Down Lock (Fig. 12), on the reference and on the other linkages."""
     share = np.linspace(0.0, 1.0, _POINTS)
     curves = []
@@ -72,8 +70,8 @@ def release_curve(gear: Gear, lengths: Lengths, width: float = 430.0, height: fl
     others = [Series("other linkages", x, tuple(c.tolist()), colour=RULE, width=1.0) for c in curves[1:]]
     reference = Series(f"linkage {gear.reference.name}", x, tuple(curves[0].tolist()), width=2.4)
     canvas = Canvas(
-        width,
-        height,
+        _WIDTH,
+        262.0,
         "Plunger over the release of the Down Lock, without clearance",
         "Plunger position against the share of the release stroke, on the reference linkage and on the others; "
         "the margin around mid-position is marked",

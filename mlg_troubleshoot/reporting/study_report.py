@@ -12,7 +12,6 @@ import numpy as np
 from markupsafe import Markup
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import study_figures as drawn
 from mlg_troubleshoot.reporting.common import head
 from mlg_troubleshoot.reporting.figures import Style
@@ -80,8 +79,8 @@ def _tiny(value: float) -> str:
     return f"{value:.0e}".replace("-", MINUS) if math.isfinite(value) else ABSENT
 
 
-def _labels(gear: Gear) -> list[str]:
-    return [f"#{n}" for n in gear.joint_numbers]
+def _bars(f: StudyFindings, series: list[BarSeries], title: str, said: str) -> Markup:
+    return drawn.grouped_bars([f"#{n}" for n in f.gear.joint_numbers], series, title, said)
 
 
 def _span(joints: Iterable[int]) -> str:
@@ -94,8 +93,8 @@ def _span(joints: Iterable[int]) -> str:
 def _orders(f: StudyFindings) -> Markup:
     joints = f.result.table.joints
     spread = np.array([e.first_order_spread for e in joints])
-    return drawn.grouped_bars(
-        _labels(f.gear),
+    return _bars(
+        f,
         [
             BarSeries("first order", f.result.table.first_order, "solid", spread),
             BarSeries("total order", f.result.table.total_order, "mid"),
@@ -130,8 +129,8 @@ def _methods(f: StudyFindings) -> Markup | None:
     if not _compares_methods(f):
         return None
     by_maxima, local, _ = _shares(f)
-    return drawn.grouped_bars(
-        _labels(f.gear),
+    return _bars(
+        f,
         [
             BarSeries("computed", f.result.table.first_order, "solid"),
             BarSeries("amplification, maxima", by_maxima, "mid"),
@@ -172,8 +171,8 @@ def _designs(f: StudyFindings) -> Markup | None:
     if not f.designs:
         return None
     styles: tuple[Style, ...] = ("solid", "mid", "open")
-    return drawn.grouped_bars(
-        _labels(f.gear),
+    return _bars(
+        f,
         [
             BarSeries(found.design.name.upper(), found.shares, style)
             for found, style in zip(f.designs, styles, strict=True)
