@@ -414,14 +414,18 @@ class Inference:
                     return REFUTED, (str(self.candidates[k].setting["column"]), "predicted")
             if cause.acts_in is None:
                 continue
-            own, rows = float(np.std(column * fitted.values[place])), column != 0.0
+            own = float(np.std(column * fitted.values[place]))
             names = [name for name in WITHIN if name in self.bank.smooth]
-            shapes = np.column_stack([rows * (self.bank.smooth[n] - np.mean(self.bank.smooth[n][rows])) for n in names])
+            # Of what acts from a day on, the rows before it are of the same group.
+            variants = [i for i, c in enumerate(self.candidates) if c.key == self.candidates[k].key]
+            groups = [column != 0.0, np.any(self.columns[:, variants] != 0.0, axis=1)]
+            smooth = [(rows, self.bank.smooth[name]) for rows in groups for name in names]
+            shapes = np.column_stack([rows * (z - np.mean(z[rows])) for rows, z in smooth])
             screen = _of_shapes(noise, shapes, held)
             most, p = self._strongest(screen, self._null(noise, screen, aside=True))
             both = fit(noise, np.column_stack([held, shapes[:, most]]), self.misfit)
             if p <= REFUTED and float(np.std(shapes[:, most])) * abs(float(both.values[-1])) >= OWN_SHARE * own:
-                found = p, (cause.acts_in, names[most])
+                found = p, (cause.acts_in, names[most % len(names)])
         return found
 
     def _explained(self, noise: NoiseModel, known: Array) -> float:
