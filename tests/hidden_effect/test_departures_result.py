@@ -91,3 +91,9 @@ def test_on_another_linkage_a_cause_is_named_although_a_single_joint_would_expla
 def test_a_pin_that_rests_far_off_its_worst_direction_is_not_named_beside_another_linkage() -> None:
     one = run(("loads:40", 27, 34_400_027))
     assert rate("load directions: something else named", one) == 0.0
+
+
+def test_what_moves_with_temperature_on_one_aircraft_is_no_re_rigging_of_its_last_two_rows() -> None:
+    # Fleet 49 of those that the rule was set on; its other rows show what moves.
+    found = run(("one group", 49, 6_300_049))
+    assert (found["named"], found["variables"]) == ([], ["tail_no", "temperature_c"])
