@@ -529,9 +529,8 @@ def _corrected(model: LinkageModel, table: DiagnosisTable, named: Sequence[Named
         meant = as_meant(table, candidate.setting).clearance_in
         for place, j in np.argwhere(np.isfinite(meant) & (meant != table.clearance_in)).tolist():
             column = f"clearance_{model.joint_numbers[j]}_in"
-            values = (f"{values[place, j]:.4g}" for values in (table.clearance_in, meant))
-            row, record = int(table.row[place]), table.record_id[place]
-            cells.append(DataFault(place, row, record, column, "other_convention", *values))
+            entered, right = (f"{values[place, j]:.4g}" for values in (table.clearance_in, meant))
+            cells.append(DataFault.at(table, place, column, "other_convention", entered, right))
     return tuple(cells)
 
 

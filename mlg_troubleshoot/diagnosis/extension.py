@@ -80,19 +80,9 @@ class ModelExtension:
     unread: tuple[int, ...] = ()
 
     def adjust(self, inspections: Sequence[Inspection], clearance_in: Array) -> Adjustment:
-        """Return what differs from the plain model for these inspections.
+        """Return what all terms change for n inspections.
 
-        Parameters
-        ----------
-        inspections : sequence of Inspection
-            The inspections, for the columns that the terms need.
-        clearance_in : ndarray, shape (n, n_joints)
-            Radial clearances, unmeasured joints filled. [in]
-
-        Returns
-        -------
-        Adjustment
-            The changes of all terms.
+        clearance_in, shape (n, n_joints): radial clearances, unmeasured joints filled. [in]
         """
         table = table_from_inspections(inspections, self.gear)
         return adjustment_of(self.terms, self.gear.model, table, clearance_in, self.gear.discrepancies)
@@ -105,18 +95,7 @@ class ModelExtension:
         return f"{terms}; fitted to {self.rows} measured rows{unread}"
 
     def lacks(self, inspection: Inspection) -> tuple[str, ...]:
-        """Return the columns that the terms need and an inspection lacks.
-
-        Parameters
-        ----------
-        inspection : Inspection
-            One inspection.
-
-        Returns
-        -------
-        tuple of str
-            Columns; a term does nothing where its column is missing.
-        """
+        """Return the columns that the terms need and an inspection lacks: a term does nothing where one is missing."""
         known = table_from_inspections([inspection], self.gear).columns
         needed = dict.fromkeys(name for term in self.terms for name in term.candidate.cause.needs)
         return tuple(name for name in needed if name not in known)

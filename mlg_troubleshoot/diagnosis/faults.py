@@ -77,6 +77,13 @@ class DataFault:
     value: str
     suggested: str | None
 
+    @classmethod
+    def at(
+        cls, table: DiagnosisTable, place: int, column: str, kind: str, value: str, suggested: str | None = None
+    ) -> DataFault:
+        """The fault of one row of a table."""
+        return cls(place, int(table.row[place]), table.record_id[place], column, kind, value, suggested)
+
 
 @dataclass(frozen=True)
 class _Usual:
@@ -161,10 +168,7 @@ def screen_faults(
     quantities = {**table.quantities, ALONG: extension} if ALONG in table.quantities else table.quantities
     repaired = replace(table, clearance_in=new_clearance, readings_in=new_readings, quantities=quantities)
     swapped = swapped_sides(repaired)
-    faults += [
-        DataFault(row, int(table.row[row]), table.record_id[row], "side", "swapped_side", own, other)
-        for row, own, other in swapped
-    ]
+    faults += [DataFault.at(table, row, "side", "swapped_side", own, other) for row, own, other in swapped]
     if swapped:
         side = repaired.factors["side"].copy()
         side[[row for row, _own, _other in swapped]] = [other for _row, _own, other in swapped]
@@ -268,15 +272,7 @@ def _explain(
     if best is not None:
         slip = best[1]
         found = [
-            DataFault(
-                place,
-                int(table.row[place]),
-                table.record_id[place],
-                column,
-                slip.kind,
-                f"{written:g}",
-                None if right is None else f"{right:.4g}",
-            )
+            DataFault.at(table, place, column, slip.kind, f"{written:g}", None if right is None else f"{right:.4g}")
             for column, written, right in slip.cells
         ]
         return found, slip, True
@@ -288,11 +284,7 @@ def _explain(
         at = float(table.extension_in[place])
         position = float(worst[0] + np.nan_to_num(model.plunger(at)))
         cells = [("plunger_position_in", position), (ALONG, at)]
-    found = [
-        DataFault(place, int(table.row[place]), table.record_id[place], column, "implausible", f"{value:g}", None)
-        for column, value in cells
-    ]
-    return found, None, True
+    return [DataFault.at(table, place, column, "implausible", f"{value:g}") for column, value in cells], None, True
 
 
 def _convincing(row_evidence: float, slip: _Slip) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import date
 from typing import Any
 
 import numpy as np
@@ -110,18 +111,7 @@ class DiagnosisTable:
         return np.array([str(i) for i in range(len(self))]) if tail is None else tail
 
     def take(self, rows: Any) -> DiagnosisTable:
-        """Return some of the rows.
-
-        Parameters
-        ----------
-        rows : index array
-            Rows to take, by place or as a mask.
-
-        Returns
-        -------
-        DiagnosisTable
-            The rows.
-        """
+        """Return some of the rows, by place or as a mask."""
         places = np.arange(len(self))[rows]
         return replace(
             self,
@@ -194,8 +184,6 @@ def table_from_inspections(inspections: Sequence[Inspection], gear: Gear, *, alo
         "approach": ["" if i.approach is None else str(i.approach) for i in inspections],
     }
     declared = [np.nan if i.plunger_gauge_u_in is None else i.plunger_gauge_u_in for i in inspections]
-    from datetime import date
-
     return DiagnosisTable(
         clearance_in=clearance,
         readings_in=readings,

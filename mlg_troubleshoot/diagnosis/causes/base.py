@@ -140,55 +140,20 @@ class Cause(ABC):
     """The one reading that would separate it from its rivals."""
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
-        """Yield the cause with each target and setting that the table allows.
-
-        Parameters
-        ----------
-        scene : Scene
-            Model and rows.
-
-        Yields
-        ------
-        Candidate
-            One for each target and setting.
-        """
+        """Yield the cause with each target and setting that the table allows."""
         yield Candidate(self)
 
     def stand_ins(self, scene: Scene) -> Iterator[Candidate]:
         """Yield what the cause would look like although a column that it needs is missing.
 
-        Such a candidate is never named, but keeps a cause that looks like it from being named alone.
-
-        Parameters
-        ----------
-        scene : Scene
-            Model and rows.
-
-        Yields
-        ------
-        Candidate
-            None unless something else in the table moves as the missing column would.
+        Such a candidate is never named, but keeps a cause that looks like it from being named alone; none unless
+        something else in the table moves as the missing column would.
         """
         yield from ()
 
     @abstractmethod
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
-        """Change the model.
-
-        Parameters
-        ----------
-        scene : Scene
-            Model and rows.
-        candidate : Candidate
-            Target and setting.
-        value : float
-            The parameter. [unit of `parameter`]
-
-        Returns
-        -------
-        Adjustment
-            What differs from the plain model, row by row.
-        """
+        """Return what differs from the plain model, row by row, at a value of the parameter. [unit of `parameter`]"""
 
     def family(self, target: str | None) -> str | None:
         """Return the target under which variants of one name are gathered."""
@@ -199,18 +164,7 @@ class Cause(ABC):
         return self.sentence.format(target=target or "")
 
     def shown(self, value: float) -> dict[str, float]:
-        """Return the parameters as a person reads them.
-
-        Parameters
-        ----------
-        value : float
-            The fitted parameter. [unit of `parameter`]
-
-        Returns
-        -------
-        dict of str to float
-            Parameters by name, the unit as the last word.
-        """
+        """Return the parameters of a fitted value as a person reads them: by name, the unit as the last word."""
         return {self.parameter: value}
 
 
