@@ -10,15 +10,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.noise import robust_scale
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import gears_of, landings_of
 from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
-
-Array = NDArray[np.float64]
 
 # Standard deviation of the plunger at Down Lock where 0.01 to 0.05 in are allowed, each as likely. [in]
 RIGGED_IN = 0.04 / np.sqrt(12.0)

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.causes.base import Scene, levels
-
-Array = NDArray[np.float64]
 
 # What the rows of one aircraft, gauge or technician may move with alone.
 WITHIN = ("hydraulic_pressure_psi", "temperature_c", "gear_landings", "predicted")

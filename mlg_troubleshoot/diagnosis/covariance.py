@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-Array = NDArray[np.float64]
+from mlg_troubleshoot.arrays import Array, Mask, Wholes
 
 
 @dataclass(frozen=True)
@@ -26,8 +25,8 @@ class NoiseModel:
     """
 
     relative: Array
-    tails: NDArray[np.int64]
-    gears: NDArray[np.int64]
+    tails: Wholes
+    gears: Wholes
     loadings: Array
     floor_in: float
     gear_ratio: float
@@ -39,7 +38,7 @@ class NoiseModel:
         """Add what no row can be better than to a residual sum of squares."""
         return np.maximum(square, 0.0) + len(self.relative) * self.floor_in**2
 
-    def take(self, rows: NDArray[np.bool_]) -> NoiseModel:
+    def take(self, rows: Mask) -> NoiseModel:
         """Return the noise of some of the rows."""
         return replace(
             self,

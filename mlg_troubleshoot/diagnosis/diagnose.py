@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
+from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.bank import build_bank
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE
@@ -38,8 +38,6 @@ from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.units import MM_PER_IN
-
-Array = NDArray[np.float64]
 
 LEAST_ROWS = 20
 # Share of rows from which data faults are no slips of single cells. [1]
@@ -374,7 +372,7 @@ def _single_slips(faults: tuple[DataFault, ...], read: int) -> None:
         )
 
 
-def _comparable(measured_in: Array, predicted_in: Array, at_mid: NDArray[np.bool_], blocks: Sequence[Block]) -> None:
+def _comparable(measured_in: Array, predicted_in: Array, at_mid: Mask, blocks: Sequence[Block]) -> None:
     """Refuse measured displacements that cannot be what the prediction is of: sign, unit, or a gauge that is stuck."""
     measured_in, predicted_in = measured_in[at_mid], predicted_in[at_mid]
     if not len(measured_in):

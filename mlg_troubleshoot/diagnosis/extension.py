@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import tomli_w
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.datafile import DataTable, read_toml
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE
@@ -23,7 +23,6 @@ from mlg_troubleshoot.gear.gear import Discrepancies, Gear
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.outputs import write_text
 
-Array = NDArray[np.float64]
 SCHEMA = 1
 # No plunger moves further; a larger scatter would clear nothing and reject nothing. [in]
 MOST_IN = 1.0

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.noise import robust_scale
 from mlg_troubleshoot.diagnosis.sides import swapped_sides
@@ -20,8 +20,6 @@ from mlg_troubleshoot.diagnosis.table import ALONG, DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import fleet_history
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.units import SLIPS
-
-Array = NDArray[np.float64]
 
 # Evidence of a slip: set in 2026 on slips in fleets of the study's tuning seeds, at most 0.3 false ones per 1,000 rows;
 # less evidence finds more swaps of joints that are worn alike, and repairs sound rows. Not re-tuned.
@@ -120,7 +118,7 @@ class _Slip:
 
 def screen_faults(
     model: LinkageModel, table: DiagnosisTable, explained: Array | None = None
-) -> tuple[DiagnosisTable, tuple[DataFault, ...], NDArray[np.bool_]]:
+) -> tuple[DiagnosisTable, tuple[DataFault, ...], Mask]:
     """Find data faults, and repair them for the analysis where one slip explains them."""
     everything = _usual(table, np.ones(len(table), bool))
     clearance = np.where(np.isfinite(table.clearance_in), table.clearance_in, everything.expected)
@@ -176,7 +174,7 @@ def screen_faults(
     return repaired, tuple(faults), usable
 
 
-def _usual(table: DiagnosisTable, trusted: NDArray[np.bool_]) -> _Usual:
+def _usual(table: DiagnosisTable, trusted: Mask) -> _Usual:
     """Expect each row's clearances from what the trusted rows say about the wear of its gear and of the fleet."""
     known = replace(table, clearance_in=np.where(trusted[:, None], table.clearance_in, np.nan))
     history = fleet_history(known)[0]

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.covariance import NoiseModel
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE
 from mlg_troubleshoot.diagnosis.screen import held_out_part
 from mlg_troubleshoot.diagnosis.simulation.held_out import folds_of
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-
-Array = NDArray[np.float64]
 
 # With fewer tails none can be held out.
 LEAST_TAILS = 4
@@ -76,7 +74,7 @@ def measure_gain(
     )
 
 
-def _interval(before: Array, after: Array, groups: NDArray[np.intp], rng: np.random.Generator) -> tuple[float, float]:
+def _interval(before: Array, after: Array, groups: Places, rng: np.random.Generator) -> tuple[float, float]:
     """Bootstrap over tails of the share of mean square misfit removed."""
     number = np.unique(groups, return_inverse=True)[1]
     square_before = np.bincount(number, before**2)

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.bank import WITHIN, Bank
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.causes.together import Block
@@ -25,7 +25,6 @@ from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, Rows, build_noise
 from mlg_troubleshoot.diagnosis.screen import Fit, Screen, fit, held_out_part
 from mlg_troubleshoot.diagnosis.simulation.result import Verdict
 
-Array = NDArray[np.float64]
 Key = tuple[str, str | None]
 
 # Thresholds: set in 2026 on the tuning seeds of the study of hidden effects (200 and 500 rows, S 5 to 25, one cause,

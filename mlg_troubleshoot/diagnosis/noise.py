@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
+from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.diagnosis.covariance import NoiseModel
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-
-Array = NDArray[np.float64]
 
 # What is no cause yet: set in 2026 on healthy fleets of the study's tuning seeds (iid, heavy tails, scatter between
 # tails, confounded, growing noise) so that at most 2 % alarm; more of it costs power at S below 10. Not re-tuned.
@@ -117,7 +116,7 @@ def robust_scale(values: Array) -> float:
     return float(1.4826 * np.median(np.abs(values - np.median(values))))
 
 
-def tail_numbers(tails: Sequence[str] | NDArray[np.str_]) -> NDArray[np.int64]:
+def tail_numbers(tails: Sequence[str] | NDArray[np.str_]) -> Wholes:
     """Number the tails in order of their names."""
     return np.unique(np.asarray(tails), return_inverse=True)[1].astype(np.int64)
 
@@ -204,7 +203,7 @@ def _scatter(rest: Array, rows: Rows) -> NoiseModel:
     return replace(noise, loadings=loadings, gear_ratio=_ratio(alike, each, standard, gear_ratio, GEAR_SPREAD))
 
 
-def _shared(relative: Array, gears: NDArray[np.int64]) -> tuple[Array, Array]:
+def _shared(relative: Array, gears: Wholes) -> tuple[Array, Array]:
     """Loadings of gears whose unread joints make all their rows wrong alike, and what is left to single rows. [1]"""
     largest = np.zeros(gears.max() + 1)
     np.maximum.at(largest, gears, relative)
@@ -246,7 +245,7 @@ def _apart(inner: Array, along: Array, free: int) -> tuple[Array, Array]:
     return inner[np.ix_(kept, kept)] - np.outer(share, inner[free, kept]), along[kept] - share * along[free]
 
 
-def _tail_ratios(standard: Array, tails: NDArray[np.int64], gear_ratio: float) -> tuple[float, ...]:
+def _tail_ratios(standard: Array, tails: Wholes, gear_ratio: float) -> tuple[float, ...]:
     """Scatter between tails that is likely, over that of a row: from none to its estimate. [1]
 
     By moments, about the fleet's level, without the tail that stands out most, which may be an effect, and
@@ -267,7 +266,7 @@ def _tail_ratios(standard: Array, tails: NDArray[np.int64], gear_ratio: float) -
     return (*(ratio for ratio in TAIL_RATIOS if ratio < most), most) if most > 0.0 else (0.0,)
 
 
-def _companion(values: Array, tails: NDArray[np.int64]) -> Array:
+def _companion(values: Array, tails: Wholes) -> Array:
     """Distance of each row to the nearest other row of its tail: rows that stand out together are no outliers. [in]"""
     nearest = np.full(len(values), np.inf)
     for tail in range(tails.max() + 1):

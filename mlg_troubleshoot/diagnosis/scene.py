@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.along import displaced, predicted, travel, unknown_along, wear_of_gears
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Scene
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
@@ -15,8 +15,6 @@ from mlg_troubleshoot.diagnosis.wear import likely_clearances
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
-
-Array = NDArray[np.float64]
 
 # Doubt whether clearances were read as well as declared: standard deviation of the share of the declared error. [1]
 _SHARE_DOUBT = 0.35

@@ -6,12 +6,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Places, Wholes
 from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.covariance import NoiseModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -63,7 +61,7 @@ class Screen:
         return root, along, square, log_determinant
 
     def _levels(
-        self, data: Array, which: NDArray[np.intp] | slice = slice(None)
+        self, data: Array, which: Places | slice = slice(None)
     ) -> Iterator[tuple[Array, Array, Array, Callable[..., Array]]]:
         """For each tail ratio: residual sums of squares without candidates, the products and squared lengths of the
         candidates, and the log-likelihood when something is taken off those sums."""
@@ -103,7 +101,7 @@ class Screen:
             best = np.maximum(best, likelihood(most) - values[:, None])
         return np.asarray(best.max(axis=0) - null)
 
-    def _drop(self, along: Array, square: Array, which: NDArray[np.intp] | slice = slice(None)) -> Array:
+    def _drop(self, along: Array, square: Array, which: Places | slice = slice(None)) -> Array:
         """What each candidate takes off the residual sum of squares, from its products with the data."""
         signs, only = self.signs[which], self.exact[which]
         usable = square > 1e-9 * self.length[which]
@@ -116,7 +114,7 @@ class Screen:
         drop[fixed] = np.maximum(2.0 * value * along[fixed] - value**2 * square[fixed, None], 0.0)
         return np.asarray(drop)
 
-    def pairs(self, data: Array, pool: NDArray[np.intp]) -> Array:
+    def pairs(self, data: Array, pool: Places) -> Array:
         """Gain in log-likelihood of each candidate together with each of a few partners."""
         best, null = np.full((self.columns.shape[1], len(pool)), -np.inf), -np.inf
         levels = zip(self._parts, self._levels(data[:, None]), strict=True)
@@ -172,9 +170,7 @@ def shrunk(noise: NoiseModel, free: Array, columns: Array, covariance: Array, da
     return inverse @ (both.T @ product[:, -1]) / scale**2, np.asarray(inverse, float)
 
 
-def held_out_part(
-    noise: NoiseModel, columns: Array, data: Array, fold: NDArray[np.int64], block: Block | None = None
-) -> Array:
+def held_out_part(noise: NoiseModel, columns: Array, data: Array, fold: Wholes, block: Block | None = None) -> Array:
     """What a model explains of each row that was fitted to the rows of the other folds alone. [in]"""
     explained = np.zeros(len(data))
     for k in np.unique(fold):

@@ -9,12 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.diagnosis.noise import robust_scale
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-
-Array = NDArray[np.float64]
 
 # Spread of the logarithm of a clearance about its gear's median. [1]
 _LOG_SPREAD = 0.55
@@ -69,12 +67,12 @@ def _landings_a_day(table: DiagnosisTable) -> float:
     return float(np.median((landings[later] - landings[earlier])[again] / (day[later] - day[earlier])[again]))
 
 
-def _pairs(table: DiagnosisTable, rows: NDArray[np.intp], rate: float) -> tuple[int, int | None]:
+def _pairs(table: DiagnosisTable, rows: Places, rate: float) -> tuple[int, int | None]:
     """Days on which a tail was inspected on both sides, and the row that was most likely written to the wrong side."""
     side, day = table.factors["side"], table.quantities["day"]
     days = [float(d) for d in np.unique(day[rows][np.isfinite(day[rows])])]
     pairs = 0
-    suspects: list[NDArray[np.intp]] = []
+    suspects: list[Places] = []
     for d in days:
         same = rows[day[rows] == d]
         if len(same) == 2:
@@ -95,7 +93,7 @@ def _pairs(table: DiagnosisTable, rows: NDArray[np.intp], rate: float) -> tuple[
     return pairs, int(two[0] if near[0] > near[1] else two[1])
 
 
-def _nearness_to_other_side(table: DiagnosisTable, others: NDArray[np.intp], row: int, rate: float) -> float:
+def _nearness_to_other_side(table: DiagnosisTable, others: Places, row: int, rate: float) -> float:
     """How much nearer a row is to the other side's landings and wear than to its own side's. [1]"""
     side, day = table.factors["side"], table.quantities["day"]
     landings = table.quantities["gear_landings"]
@@ -113,7 +111,7 @@ def _nearness_to_other_side(table: DiagnosisTable, others: NDArray[np.intp], row
     return total
 
 
-def _on_the_other_line(day: Array, landings: Array, row: int, own: NDArray[np.intp], other: NDArray[np.intp]) -> bool:
+def _on_the_other_line(day: Array, landings: Array, row: int, own: Places, other: Places) -> bool:
     mine = own[own != row]
     at_own, u_own = _line(day[mine], landings[mine], float(day[row]))
     at_other, u_other = _line(day[other], landings[other], float(day[row]))

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Mask, Wholes
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.gear.gear import Gear
 
-Array = NDArray[np.float64]
 Texts = NDArray[np.str_]
 
 FACTORS = ("tail_no", "side", "gauge_id", "technician_id", "approach")
@@ -58,7 +58,7 @@ class DiagnosisTable:
     clearance_in: Array
     readings_in: Array
     record_id: tuple[str, ...]
-    row: NDArray[np.int64]
+    row: Wholes
     margin_in: Array
     gauge_u_in: Array
     quantities: Mapping[str, Array] = field(default_factory=dict)
@@ -83,7 +83,7 @@ class DiagnosisTable:
         return np.asarray(self.quantities.get(ALONG, np.full(len(self), np.nan)))
 
     @property
-    def along(self) -> NDArray[np.bool_]:
+    def along(self) -> Mask:
         """Rows along the stroke, shape (n,)."""
         return np.isfinite(self.extension_in)
 

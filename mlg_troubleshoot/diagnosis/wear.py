@@ -10,11 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-
-Array = NDArray[np.float64]
 
 # Set in 2026 on simulated wear (tests/diagnosis/test_wear.py and the study's tuning seeds); not re-tuned.
 _ROUNDS = 25
@@ -120,7 +118,7 @@ def likely_clearances(table: DiagnosisTable) -> LikelyClearances:
     return LikelyClearances(np.maximum(likely, 0.0), spread, shared, common, left)
 
 
-def _read_again(table: DiagnosisTable) -> NDArray[np.bool_]:
+def _read_again(table: DiagnosisTable) -> Mask:
     """Rows of gears that were inspected at more than one date or number of landings."""
     gears, found = gears_of(table), np.zeros(len(table), bool)
     for name in {"gear_landings", "day"} & set(table.quantities):
@@ -131,12 +129,12 @@ def _read_again(table: DiagnosisTable) -> NDArray[np.bool_]:
     return found
 
 
-def gears_of(table: DiagnosisTable) -> NDArray[np.intp]:
+def gears_of(table: DiagnosisTable) -> Places:
     """Number of the single gear of each row."""
     return np.unique(table.gears, return_inverse=True)[1]
 
 
-def landings_of(landings: Array | None, gears: NDArray[np.intp]) -> tuple[Array, NDArray[np.bool_]]:
+def landings_of(landings: Array | None, gears: Places) -> tuple[Array, Mask]:
     """Fill gaps in the landings by the mean of the gear's other inspections, else of the fleet."""
     if landings is None or not np.isfinite(landings).any():
         return np.zeros(len(gears)), np.ones(len(gears), bool)
@@ -147,7 +145,7 @@ def landings_of(landings: Array | None, gears: NDArray[np.intp]) -> tuple[Array,
     return np.where(known, landings, mean[gears]) / 1000.0, known
 
 
-def fleet_history(table: DiagnosisTable) -> tuple[WearHistory, Array, NDArray[np.bool_]]:
+def fleet_history(table: DiagnosisTable) -> tuple[WearHistory, Array, Mask]:
     """Expect every joint in each row, readings rounded to the steps they show; the landings, and which are known."""
     readings, gears = table.clearance_in, gears_of(table)
     kilo, landed = landings_of(table.quantities.get("gear_landings"), gears)
@@ -172,7 +170,7 @@ def _resolution(values: Array) -> float:
     return step if step >= 1e-4 and bool(np.mean(on_grid) > 0.9) else 0.0
 
 
-def wear_history(reading_in: Array, gears: NDArray[np.intp], kilo: Array, reading_in2: Array) -> WearHistory:
+def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Array) -> WearHistory:
     """Expect joints in each row from what was read of them, of its gear and of the fleet; each joint on its own.
 
     reading_in, shape (n,) or (n, n_joints): readings, NaN where there is none. [in]
@@ -253,7 +251,7 @@ def _lines(by_gear: Array, x: Array, y: Array, weight: Array, fleet: Array, spre
     return lines, unsure
 
 
-def _variance(unsure: Array, gears: NDArray[np.intp], x: Array) -> Array:
+def _variance(unsure: Array, gears: Places, x: Array) -> Array:
     """Variance of each row's expectation by its gear's level and rate. [in²]"""
     own = unsure[:, gears]
     return np.asarray(own[0] + 2.0 * x * own[1] + x * x * own[2])

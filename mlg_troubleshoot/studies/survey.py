@@ -15,16 +15,14 @@ from typing import Any
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Slider
 from mlg_troubleshoot.studies.survey_readings import DEFAULT_U, Kind, Reading, SurveyedLinkage
 from mlg_troubleshoot.units import MM_PER_IN, SLIPS, Slip
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # The share of the ensemble's covariances that is believed.
 _BELIEVED = 0.5
 # A gear file without an ensemble: half of the linkage's size, thirty degrees.

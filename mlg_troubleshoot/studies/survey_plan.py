@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.studies.survey import Prior
 from mlg_troubleshoot.studies.survey_readings import DEFAULT_U, MINUTES, Kind, Quantity, Reading, SurveyedLinkage
 
-Array = NDArray[np.float64]
 # Between each two members of the ensemble a template is planned for so many linkages, where they close. An index
 # known to two percent needs no better reading.
 _BETWEEN, _WELL_KNOWN = (0.25, 0.5, 0.75), 0.02

@@ -9,15 +9,14 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.gear.design import DesignSpace
 from mlg_troubleshoot.gear.gear import Gear, Linkage
 from mlg_troubleshoot.geometry.kernel import Kernel
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot
 from mlg_troubleshoot.geometry.program import write_program
 
-Array = NDArray[np.float64]
 # Positive quantities of a batch of linkages, shape (n_vectors, n_quantities).
 Quantity = Callable[[Array], Array]
 _STEP = 1e-5
@@ -256,7 +255,7 @@ class SurveyedLinkage:
         found = np.log(np.maximum(values, 1e-9)).reshape(count, 2 * n, -1)
         return np.asarray(((found[:, :n] - found[:, n:]) / (20.0 * _STEP)).swapaxes(1, 2))
 
-    def closes(self, vectors: Array) -> NDArray[np.bool_]:
+    def closes(self, vectors: Array) -> Mask:
         """Tell which vectors make a linkage that moves over its stroke and moves its plunger as prescribed."""
         mechanism, reference = self._assembled(vectors)
         at = self.low + (reference + self._beyond - self.low) * np.linspace(0.0, 1.0, _POSITIONS)

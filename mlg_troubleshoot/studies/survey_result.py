@@ -5,15 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.studies.survey import Survey
 from mlg_troubleshoot.studies.survey_plan import Suggested
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

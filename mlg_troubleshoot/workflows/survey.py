@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tomli_w
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.datafile import LONGEST_NAME, is_name, read_toml
 from mlg_troubleshoot.errors import GearFileError, MechanismError, UsageError
 from mlg_troubleshoot.gear.design import member_values
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.studies.survey import Survey
     from mlg_troubleshoot.studies.survey_result import SurveyResult
 
-Array = NDArray[np.float64]
 # Members of the ensemble that a surveyed gear file gets beside its reference: their range holds most of the posterior.
 _MEMBERS = 11
 _DECIMALS = 6

@@ -10,12 +10,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -178,7 +177,7 @@ def offset(scene: Scene, where: ArrayLike, value: float) -> Adjustment:
     return Adjustment(scene.clearance_in, offset_in=np.asarray(where, float) * value)
 
 
-def share_never_read(scene: Scene, rows: NDArray[np.bool_] | slice = slice(None)) -> float:
+def share_never_read(scene: Scene, rows: Mask | slice = slice(None)) -> float:
     """Share of joints that none of these rows has in what all joints could move the plunger by. [1]"""
     never = ~np.isfinite(scene.table.clearance_in[rows]).any(axis=0)
     moved = np.abs(scene.model.plunger_amplification())

@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mlg_troubleshoot.diagnosis.causes.base import Array, Candidate, Cause, Scene, levels
+from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, levels
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import likely_clearances
 from mlg_troubleshoot.gear.adjustment import Adjustment

@@ -9,9 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.causes.base import (
     MOST_UNREAD,
-    Array,
     Candidate,
     Cause,
     Scene,

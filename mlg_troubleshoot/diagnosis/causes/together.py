@@ -16,8 +16,9 @@ import numpy as np
 from numpy.polynomial import legendre
 from scipy.linalg import block_diag
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.along import predicted
-from mlg_troubleshoot.diagnosis.causes.base import Array, Candidate, Cause, Scene
+from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.model import LinkageModel
 

@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.diagnosis.simulation.runner import least_squares
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 _FOLDS = 10
 # Share of what a cause does that must remain in the rows it is learned from. [1]
@@ -19,7 +16,7 @@ _LEARNED = 0.1
 _KNOWN = 1e-5
 
 
-def folds_of(row: Indices, group: Indices | None, columns: Array, shuffled: Indices) -> tuple[Indices, str]:
+def folds_of(row: Wholes, group: Wholes | None, columns: Array, shuffled: Wholes) -> tuple[Wholes, str]:
     """Number the fold in which each reading is held out: whole groups, or rows where a cause acts in one group only."""
     if group is not None and group.max() > 0:
         numbers = (
@@ -35,7 +32,7 @@ def folds_of(row: Indices, group: Indices | None, columns: Array, shuffled: Indi
     return shuffled[row] % min(_FOLDS, len(shuffled)), "row"
 
 
-def held_out(columns: Array, rest: Array, causes: Sequence[int], nuisance: Sequence[int], part: Indices) -> Array:
+def held_out(columns: Array, rest: Array, causes: Sequence[int], nuisance: Sequence[int], part: Wholes) -> Array:
     """Misfit of each reading, fitted on the other folds.
 
     What only the held-out readings know of the nuisance parameters (the place of their own socket) is fitted there.

@@ -6,12 +6,11 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.diagnosis.simulation.result import Suspect
 from mlg_troubleshoot.errors import UsageError
-
-Array = NDArray[np.float64]
 
 _LEAST_PERMUTATIONS = 19
 
@@ -23,7 +22,7 @@ def checked(
     groups: ArrayLike | None,
     reading_u: ArrayLike | None,
     permutations: int,
-) -> tuple[Array, Array | None, NDArray[np.int64] | None]:
+) -> tuple[Array, Array | None, Wholes | None]:
     """Readings as (n, m), declared uncertainty likewise, groups as numbers."""
     data = _numbers(measured, "measured")
     data = data[:, None] if data.ndim == 1 else data
@@ -82,7 +81,7 @@ def _declared(reading_u: ArrayLike | None, data: Array) -> Array | None:
     return np.array(declared)
 
 
-def _groups(groups: ArrayLike | None, n: int) -> NDArray[np.int64] | None:
+def _groups(groups: ArrayLike | None, n: int) -> Wholes | None:
     if groups is None:
         return None
     labels = np.asarray(groups)

@@ -6,12 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.simulation.result import Suspect
 from mlg_troubleshoot.errors import UsageError
 
-Array = NDArray[np.float64]
 Predict = Callable[[Mapping[str, float]], Any]
 
 # Share of the trial by which a derivative is taken; all of it where so little does nothing.

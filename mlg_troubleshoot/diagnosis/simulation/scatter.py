@@ -10,12 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.diagnosis.simulation.runner import least_squares
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 # Readings further out than this many standard deviations count less.
 _FAR = 3.0
@@ -38,7 +35,7 @@ class Whitener:
     """
 
     scale: Array
-    parts: Sequence[tuple[Indices, Array, Array]]
+    parts: Sequence[tuple[Wholes, Array, Array]]
     log_determinant: float
 
     def __call__(self, columns: Array) -> Array:
@@ -49,7 +46,7 @@ class Whitener:
         return np.asarray(white)
 
 
-def build_whitener(scale: Array, outputs: Sequence[Indices], row: Indices, factor: Array | None) -> Whitener:
+def build_whitener(scale: Array, outputs: Sequence[Wholes], row: Wholes, factor: Array | None) -> Whitener:
     """Build a whitener from each reading's own scatter and the rows' common factors in units of it."""
     log_determinant = 2.0 * float(np.sum(np.log(scale)))
     if factor is None or not factor.shape[1]:
@@ -86,7 +83,7 @@ def basis_of(columns: Array, tolerance: float = 1e-7) -> Array:
     return np.asarray(left[:, values > tolerance * values[0]])
 
 
-def robust_scale(columns: Array, data: Array, declared: Array | None, outputs: Sequence[Indices]) -> Array:
+def robust_scale(columns: Array, data: Array, declared: Array | None, outputs: Sequence[Wholes]) -> Array:
     """Standard deviation of each reading by itself, what all columns explain taken out; far ones count less."""
     relative = np.ones(len(data)) if declared is None else declared.copy()
     level = np.ones(len(data))
@@ -129,7 +126,7 @@ class GroupRatios:
 
 
 def group_ratios(
-    scale: Array, outputs: Sequence[Indices], row: Indices, group: Indices, columns: Array, data: Array
+    scale: Array, outputs: Sequence[Wholes], row: Wholes, group: Wholes, columns: Array, data: Array
 ) -> GroupRatios:
     """Judge the scatter between groups: restricted likelihood times what is expected of it."""
     indicator = (group[:, None] == np.arange(group.max() + 1)).astype(float)
@@ -144,7 +141,7 @@ def group_ratios(
     return GroupRatios(chance / chance.sum())
 
 
-def smooth_shapes(predicted: Array, sensitivities: Array, group: Indices | None) -> list[Array]:
+def smooth_shapes(predicted: Array, sensitivities: Array, group: Wholes | None) -> list[Array]:
     """Shapes in which a discrepancy may move with the rows, each as factors of a covariance, shape (n, r).
 
     Near in prediction, near in all sensitivities, near in the order of the rows; the same in every group or not.
@@ -172,12 +169,12 @@ def smooth_shapes(predicted: Array, sensitivities: Array, group: Indices | None)
     return shapes
 
 
-def _distances(z: Array, landmarks: Indices) -> Array:
+def _distances(z: Array, landmarks: Wholes) -> Array:
     square = np.sum(z**2, axis=1)
     return np.asarray(np.sqrt(np.maximum(square[:, None] + square[landmarks] - 2.0 * z @ z[landmarks].T, 0.0)))
 
 
-def _factor(alike: Array, landmarks: Indices) -> Array:
+def _factor(alike: Array, landmarks: Wholes) -> Array:
     """L with L Lᵀ near the covariance of which some columns are given (Nyström)."""
     values, vectors = np.linalg.eigh(alike[landmarks])
     kept = values > 1e-6 * values[-1]
@@ -186,8 +183,8 @@ def _factor(alike: Array, landmarks: Indices) -> Array:
 
 def smooth_factor(
     scale: Array,
-    outputs: Sequence[Indices],
-    row: Indices,
+    outputs: Sequence[Wholes],
+    row: Wholes,
     fixed: Array,
     shapes: Sequence[Array],
     columns: Array,

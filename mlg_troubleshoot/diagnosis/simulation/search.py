@@ -8,10 +8,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import t as student
 from threadpoolctl import threadpool_limits
 
+from mlg_troubleshoot.arrays import Array, Mask, Wholes
 from mlg_troubleshoot.diagnosis.chance import Chance
 from mlg_troubleshoot.diagnosis.simulation import scatter
 from mlg_troubleshoot.diagnosis.simulation.held_out import folds_of, held_out
@@ -25,9 +26,6 @@ from mlg_troubleshoot.diagnosis.simulation.result import (
 )
 from mlg_troubleshoot.diagnosis.simulation.runner import Runner, least_squares
 from mlg_troubleshoot.diagnosis.simulation.scatter import Whitener, basis_of, build_whitener
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 # Thresholds: set in 2026 on five simulated rigs (tests/simulation/rigs.py; groups, far readings, gaps; other seeds than
 # the benchmark's) and the three sets of measured data in docs/tutorial/data; lower ones name more, and name patterns.
@@ -67,7 +65,7 @@ class Design:
     testable: tuple[int, ...]
     classes: tuple[tuple[int, ...], ...]
 
-    def within(self, testable: Indices) -> Design:
+    def within(self, testable: Wholes) -> Design:
         """Leave out what cannot be tested after all."""
         kept = tuple(k for k in self.testable if k in testable)
         classes = (tuple(k for k in members if k in kept) for members in self.classes)
@@ -78,7 +76,7 @@ class Design:
         return next(members for members in self.classes if k in members)
 
 
-def beside(columns: Array, fixed: Array, size: Array | None = None) -> tuple[Array, NDArray[np.bool_]]:
+def beside(columns: Array, fixed: Array, size: Array | None = None) -> tuple[Array, Mask]:
     """Whitened columns less what fixed ones absorb, and whether enough of their size is left to be tested."""
     basis = basis_of(fixed)
     left = columns - basis @ (basis.T @ columns)
@@ -108,7 +106,7 @@ class Evidence:
     """Surprise of each suspect, the metric that shows it most, squared t by metric, and the chances of each."""
 
     surprise: Array
-    by: Indices
+    by: Wholes
     score: Array
     chances: tuple[Chance, ...]
 
@@ -221,7 +219,7 @@ class Point:
         degrees = max(len(rest) - basis.shape[1], 1)
         return drawn, basis, degrees
 
-    def pattern(self, fitted: Array) -> tuple[float, Indices]:
+    def pattern(self, fitted: Array) -> tuple[float, Wholes]:
         """Chance of as much pattern as there is in what some columns leave, and the shapes that show it, most first."""
         study, run = self.study, self.study.runner
         if not study.shapes:
@@ -304,7 +302,7 @@ class Study:
         runner: Runner,
         count: int,
         declared: Array | None,
-        group: Indices | None,
+        group: Wholes | None,
         permutations: int,
         rng: np.random.Generator,
     ) -> None:
