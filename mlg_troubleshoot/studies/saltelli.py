@@ -14,7 +14,6 @@ from numpy.random import Generator
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.studies.chaos import ChaosFit, chaos_indices
-from mlg_troubleshoot.studies.compat import seeded
 from mlg_troubleshoot.studies.displacement import Response
 from mlg_troubleshoot.studies.indices import Indices, failed_note, student_half, without_numbers
 
@@ -73,7 +72,7 @@ class _Stream:
     def __init__(self, rng: Generator, n: int) -> None:
         from scipy.stats import qmc
 
-        self._engine = qmc.Sobol(2 * n, scramble=True, **seeded(rng))
+        self._engine = qmc.Sobol(2 * n, scramble=True, rng=rng)
         self._n = n
         self._drawn = 0
 

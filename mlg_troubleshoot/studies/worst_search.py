@@ -17,7 +17,6 @@ from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 from mlg_troubleshoot.studies.certified import CertifiedBound, certified_bound
-from mlg_troubleshoot.studies.compat import seeded
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +67,6 @@ def _evolved(
     # The population moves as one: a generation is a batch.
     found = differential_evolution(
         lost, bounds, popsize=12, maxiter=generations, tol=1e-10, atol=1e-12, polish=False, vectorized=True,
-        updating="deferred", **seeded(rng),
+        updating="deferred", rng=rng,
     )  # fmt: skip
     return -float(found.fun), count
