@@ -90,6 +90,5 @@ def read_form(form: Form, options: ReadOptions, *, file: str | None, sheet: str 
     out.rows.append(reader.read(start, [value for _, _, value in form.lines], value_places))
     out.invalid_content[out.rows[0].source] = hash(tuple(value for _, _, value in form.lines))
     read = tuple(ColumnReading(form.value_column, p.header, p.read_as, row) for row, p in named)
-    ends = form.lines[0][0], form.lines[-1][0]
-    out.layouts.append(SheetLayout(file, sheet, "form", *ends, form.value_column + 1, read))
+    out.layouts.append(SheetLayout(file, sheet, "form", form.lines[0][0], form.value_column + 1, read))
     return out

@@ -22,14 +22,13 @@ class Header:
     """A header as found.
 
     row: its row (the lower one of two), counted from 1.
-    width: number of fields in the header row, trailing blanks included.
+    texts: one for each field, trailing blanks included.
     rows_used: the rows that belong to it: one, or two where the header has two rows or a row of units below.
     units: unit of each column from a row of units; empty if there is none.
     """
 
     row: int
     texts: tuple[str, ...]
-    width: int
     rows_used: tuple[int, ...]
     units: tuple[LengthUnit | None, ...] = ()
 
@@ -91,7 +90,7 @@ def find_header(
         return two_rows
     place = scores.index(score)
     number, cells = near[place]
-    header = Header(number, tuple(_text(c) for c in cells), len(cells), (number,))
+    header = Header(number, tuple(_text(c) for c in cells), (number,))
     for below, units in near[place + 1 : place + 2]:
         found = _unit_row(header, units, options) if below == number + 1 else None
         if found is not None:
@@ -118,7 +117,7 @@ def _two_row_header(
         texts = _joined(upper, above, below, ranges)
         score = header_score(texts, options)
         if score > single:
-            single, best = score, Header(upper + 1, tuple(texts), len(texts), (upper, upper + 1))
+            single, best = score, Header(upper + 1, tuple(texts), (upper, upper + 1))
     return best
 
 

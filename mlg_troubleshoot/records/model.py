@@ -139,14 +139,13 @@ class ColumnReading:
 class SheetLayout:
     """Where the parts of a table were found.
 
-    header_row, last_row: the lower row of the header, and the last that was read, counted from 1.
+    header_row: the lower row of the header, counted from 1.
     """
 
     file: str | None
     sheet: str | None
     kind: str
     header_row: int
-    last_row: int
     width: int
     columns: tuple[ColumnReading, ...]
 

@@ -48,15 +48,14 @@ def read_table(
     in_hand = TableInHand(options, file, sheet.name, out.problems.append, comma)
     columns = ColumnReader(in_hand).place(header.texts, header.row, units=header.units)
     table = _Table(sheet, header, columns, in_hand, delimiter, out)
-    pending = 0
+    taken = 0
     for number, cells in rows:
         if number > header.row:
             table.take(number, cells)
-            pending += 1
-            if pending == _PROGRESS_ROWS:
-                tick(pending)
-                pending = 0
-    tick(pending)
+            taken += 1
+            if taken % _PROGRESS_ROWS == 0:
+                tick(_PROGRESS_ROWS)
+    tick(taken % _PROGRESS_ROWS)
     table.finish()
     placed = f"the header stands in row {' and '.join(map(str, header.rows_used))}" if header.row > 1 else ""
     read, carried = columns.notes()
@@ -64,7 +63,7 @@ def read_table(
     out.notes += filter(None, ("; ".join(filter(None, (placed, read))), carried, about))
     kind = "long" if columns.is_long else "wide"
     readings = tuple(ColumnReading(p.index, p.header, p.read_as) for p in columns.placed)
-    out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, table.last, len(header.texts), readings))
+    out.layouts.append(SheetLayout(file, sheet.name, kind, header.row, len(header.texts), readings))
     return out
 
 
@@ -88,21 +87,19 @@ class _Table:
         self._long = LongReader(columns.placed, table) if columns.is_long else None
         self._faulty = sheet.facts.faulty
         self._is_header = _header_test(header)
-        self._width = header.width if delimiter is not None else None
+        self._width = len(header.texts) if delimiter is not None else None
         self._out = out
         self._repeated = 0
         self._aside: list[str] = []
-        kinds = {p.index: p.field.kind for p in columns.placed if p.field is not None}
         self._telling = [
-            [i for i, kind in kinds.items() if kind is k] for k in (Kind.TAIL_NO, Kind.SIDE, Kind.CLEARANCE)
+            [p.index for p in columns.placed if p.field is not None and p.field.kind is kind]
+            for kind in (Kind.TAIL_NO, Kind.SIDE, Kind.CLEARANCE)
         ]
-        self.last = header.row
 
     def take(self, number: int, cells: Sequence[Cell]) -> None:
         if self._is_header(cells):
             self._repeated += 1
             return
-        self.last = number
         if self._stands_aside(number, cells):
             return
         width, collect = self._width, self._out.rows.append

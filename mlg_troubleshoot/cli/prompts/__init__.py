@@ -1,16 +1,13 @@
 """The questions of ``mlg check`` on a terminal: one inspection, joint by joint."""
 
 from mlg_troubleshoot.cli.prompts.answers import Answers
-from mlg_troubleshoot.cli.prompts.ask import Entry, EntryInterruptedError, ask_inspection
-from mlg_troubleshoot.cli.prompts.flow import Advice
-from mlg_troubleshoot.cli.prompts.lines import Line, Tone
+from mlg_troubleshoot.cli.prompts.ask import EntryInterruptedError, ask_inspection
+from mlg_troubleshoot.cli.prompts.lines import Line
 from mlg_troubleshoot.cli.prompts.store import Session, SessionFileError, SessionStore
 from mlg_troubleshoot.cli.prompts.terminal import RichTerminal, Terminal
 
 __all__ = [
-    "Advice",
     "Answers",
-    "Entry",
     "EntryInterruptedError",
     "Line",
     "RichTerminal",
@@ -18,6 +15,5 @@ __all__ = [
     "SessionFileError",
     "SessionStore",
     "Terminal",
-    "Tone",
     "ask_inspection",
 ]

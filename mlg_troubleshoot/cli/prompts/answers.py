@@ -66,18 +66,20 @@ class Answers:
             record_id=given.record_id or self.record_id,
         ).with_more(**{**given.more, **self.more})
 
-    def reading(self, number: int) -> Reading | None:
-        answer = self.joints.get(number)
-        if answer is None or answer.written is None or self.convention is None:
+    def read(self, written: WrittenLength | None) -> Reading | None:
+        """Return a clearance as read; None if it was not measured, or its unit or convention is still to be asked."""
+        unit = None if written is None else written.unit or self.unit
+        if written is None or unit is None or self.convention is None:
             return None
-        unit = answer.written.unit or self.unit
-        return None if unit is None else Reading(answer.written, unit, self.convention)
+        return Reading(written, unit, self.convention)
+
+    def reading(self, number: int) -> Reading | None:
+        return self.read(self.joints.get(number, NOT_MEASURED).written)
 
     @property
     def radial_in(self) -> dict[int, float]:
         """Radial clearance of each measured joint. [in]"""
-        readings = {number: self.reading(number) for number in sorted(self.joints)}
-        return {number: reading.radial_in for number, reading in readings.items() if reading is not None}
+        return {number: reading.radial_in for number in sorted(self.joints) if (reading := self.reading(number))}
 
     def inspection(self, gear: Gear, record_id: str) -> Inspection:
         from mlg_troubleshoot.records import ReadOptions, admit

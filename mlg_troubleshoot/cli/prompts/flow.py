@@ -260,7 +260,7 @@ class Flow:
         if judged.written is None:
             return self._answered(state, number, NOT_MEASURED)
         unusual, written = bool(judged.said), judged.written
-        radial_in = self._reading(answers, written).radial_in
+        radial_in = _known(answers.read(written)).radial_in
         same = state.pending is not None and self._pending(state).radial_in == radial_in
         if unusual and not same:
             return Turn(replace(state, ask=Ask.CONFIRM, pending=written))
@@ -424,14 +424,10 @@ class Flow:
         ask, at = course[place - 1]
         return Turn(State(ask, state.answers, at))
 
-    def _reading(self, answers: Answers, written: WrittenLength) -> Reading:
-        unit, convention = _known(answers.unit), _known(answers.convention)
-        return Reading(written, written.unit or unit, convention)
-
     def _pending(self, state: State) -> Reading:
         if not isinstance(state.pending, WrittenLength):
             raise TypeError("no clearance waits for a confirmation")
-        return self._reading(state.answers, state.pending)
+        return _known(state.answers.read(state.pending))
 
     def _heading(self, answers: Answers) -> str:
         skipped = len(answers.joints) - len(answers.radial_in)

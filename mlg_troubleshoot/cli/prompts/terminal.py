@@ -31,15 +31,12 @@ class Terminal(Protocol):
     @property
     def width(self) -> int:
         """Width at this moment. [columns]"""
-        ...
 
     def say(self, lines: Iterable[Line]) -> None:
         """Show lines."""
-        ...
 
     def ask(self, prompt: str) -> str:
         """Ask for one line; EOFError or KeyboardInterrupt if the user ends it."""
-        ...
 
 
 class RichTerminal:
