@@ -18,31 +18,27 @@ NOTHING_FOUND, SOMETHING_FOUND = 0, 1
 EPILOG = (
     "Example: [b]mlg diagnose fleet.csv --write-extension EXT.toml[/b], then [b]mlg check FILE --extension EXT.toml[/b]"
 )
-Files = Annotated[
-    list[str],
-    typer.Argument(
-        metavar="FILE...", help="Tables with the plunger measured at mid-position or along the stroke, or -."
-    ),
-]
-WriteExtension = Annotated[
-    Path | None, typer.Option("--write-extension", metavar="EXT.toml", help="Keep the extended model.")
-]
-Permutations = Annotated[
-    int, typer.Option("--permutations", min=99, max=99999, help="Data sets drawn with nothing wrong.")
-]
-Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of all randomness.")]
 
 
 @options.flat
 def diagnose(
     *,
-    files: Files,
-    write_extension: WriteExtension = None,
+    files: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="FILE...", help="Tables with the plunger measured at mid-position or along the stroke, or -."
+        ),
+    ],
+    write_extension: Annotated[
+        Path | None, typer.Option("--write-extension", metavar="EXT.toml", help="Keep the extended model.")
+    ] = None,
     report: options.Report = None,
     page: options.Paper = None,
     causes: options.Causes = None,
-    permutations: Permutations = 999,
-    seed: Seed = 0,
+    permutations: Annotated[
+        int, typer.Option("--permutations", min=99, max=99999, help="Data sets drawn with nothing wrong.")
+    ] = 999,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all randomness.")] = 0,
     tables: options.Tables,
     show: options.Show = None,
     remember: options.Remember = False,

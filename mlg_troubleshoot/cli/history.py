@@ -33,16 +33,10 @@ Place = Annotated[
 Tail = Annotated[str, typer.Argument(metavar="TAIL", help="Tail number.")]
 Side = Annotated[str, typer.Argument(metavar="LH|RH", help="Which gear.")]
 RecordId = Annotated[str, typer.Argument(metavar="RECORD", help="Record id, or the start of its hash.")]
-Joints = Annotated[list[int], typer.Option("--joint", metavar="N", help="A joint that was restored; may repeat.")]
 Day = Annotated[str, typer.Option("--date", metavar="YYYY-MM-DD", help="Day of the repair.")]
 Landings = Annotated[float | None, typer.Option("--landings", min=0, help="Landings at the repair.")]
 WorkOrder = Annotated[str | None, typer.Option("--work-order", help="Work order.")]
-Right = Annotated[Path, typer.Argument(metavar="FILE", help="A table with the one right inspection.")]
-Why = Annotated[str, typer.Option("--why", metavar="TEXT", help="Why the record does not count.")]
-Found = Annotated[str, typer.Option("--found", metavar="TEXT", help="What was found.")]
-FoundJoint = Annotated[int | None, typer.Option("--joint", metavar="N", help="The joint that it was.")]
 Chain = Annotated[Path, typer.Argument(metavar="FILE", help="JSON Lines, one record a line.")]
-
 NoForecast = Annotated[bool, typer.Option("--no-forecast", help="What was kept only, without looking ahead: faster.")]
 
 
@@ -231,7 +225,7 @@ def _what(event: dict[str, Any], unit: LengthUnit) -> str:
 def repair(
     tail: Tail,
     side: Side,
-    joints: Joints,
+    joints: Annotated[list[int], typer.Option("--joint", metavar="N", help="A joint that was restored; may repeat.")],
     day: Day,
     landings: Landings = None,
     work_order: WorkOrder = None,
@@ -276,7 +270,7 @@ def _day(text: str) -> date:
 
 def correct(
     record: RecordId,
-    file: Right,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A table with the one right inspection.")],
     store: Place = None,
     gear: options.Gear = options.DEFAULT_GEAR,
     unit: options.Unit = None,
@@ -295,7 +289,11 @@ def correct(
     output.say(f"Kept: correction of {record} ({added.tail_no} {added.side}).")
 
 
-def void(record: RecordId, why: Why, store: Place = None) -> None:
+def void(
+    record: RecordId,
+    why: Annotated[str, typer.Option("--why", metavar="TEXT", help="Why the record does not count.")],
+    store: Place = None,
+) -> None:
     """Append that a record does not count; it stays in the chain."""
     from mlg_troubleshoot.workflows import history as task
 
@@ -305,8 +303,8 @@ def void(record: RecordId, why: Why, store: Place = None) -> None:
 
 def outcome(
     record: RecordId,
-    found: Found,
-    joint: FoundJoint = None,
+    found: Annotated[str, typer.Option("--found", metavar="TEXT", help="What was found.")],
+    joint: Annotated[int | None, typer.Option("--joint", metavar="N", help="The joint that it was.")] = None,
     store: Place = None,
     gear: options.Gear = options.DEFAULT_GEAR,
 ) -> None:

@@ -10,16 +10,13 @@ import typer
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import OutputError, UsageError
 
-File = Annotated[
-    Path, typer.Argument(metavar="FILE.xlsx|FILE.pdf", help="Where to write it: a workbook, or a form to print.")
-]
-Force = Annotated[bool, typer.Option("--force", help="Replace a file that exists.")]
-
 
 def template(
-    file: File,
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE.xlsx|FILE.pdf", help="Where to write it: a workbook, or a form to print.")
+    ],
     gear: options.Gear = options.DEFAULT_GEAR,
-    force: Force = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that exists.")] = False,
     page: options.Paper = None,
     show: options.Show = None,
     _version: options.Version = False,

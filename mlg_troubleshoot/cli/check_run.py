@@ -1,0 +1,157 @@
+"""``mlg check``: judges tables or a gear entered by hand; shows, writes and keeps what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import astuple, replace
+from functools import partial
+from pathlib import Path
+
+from mlg_troubleshoot.cli import by_hand, history, options, output
+from mlg_troubleshoot.cli.check import Flags, Wanted
+from mlg_troubleshoot.cli.progress import stages
+from mlg_troubleshoot.cli.remembered import Settings, settings
+from mlg_troubleshoot.cli.views import batch, notes, one_gear
+from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.store import Store
+from mlg_troubleshoot.units import LengthUnit
+from mlg_troubleshoot.workflows import check as task
+from mlg_troubleshoot.workflows.diagnose import load_model_extension
+
+
+class Run:
+    """One run of the command: what was asked for, read once."""
+
+    def __init__(self, files: Sequence[str], flags: Flags, tables: options.Tables, wanted: Wanted) -> None:
+        if wanted.annotate is not None and (len(files) != 1 or files[0] == "-"):
+            raise UsageError("--annotate needs exactly one workbook", "Give one .xlsx FILE.")
+        if wanted.formats and wanted.report is None:
+            output.say("Note: --format is for reports: without --report DIR none is written.")
+        extensions, causes = wanted.extension or (), wanted.causes or ()
+        outputs = [("--csv", wanted.csv), ("--annotate", wanted.annotate)]
+        options.keep_inputs(tables.gear, [*files, *extensions, *causes], outputs, wanted.report)
+        self._shown = settings(wanted.show, wanted.page, tables.columns, keep=wanted.remember, quiet=wanted.quiet)
+        self._asked = task.CheckOptions(
+            **tables.declared(self._shown.headers),
+            remembered=self._shown.note or None,
+            seed=wanted.seed,
+            extension=load_model_extension(extensions, tables.gear, causes),
+        )
+        self._files, self._flags, self._wanted = files, flags, wanted
+        self._asks = not (files or flags.values)
+        self._place = Store(wanted.store) if wanted.keep or self._asks else None
+
+    def run(self) -> int:
+        """Judge, show and keep; the exit code is returned."""
+        if self._asks:
+            result = self._ask()
+        else:
+            result = self._judged()
+            self._publish(result, LengthUnit.INCH)
+            self._keep(result)
+        if result.problems and not self._wanted.as_json and not result.judgements:
+            output.say("No row could be judged.")
+        return result.exit_code
+
+    def _judged(self) -> task.CheckResult:
+        if self._files and any(astuple(self._flags)):
+            raise UsageError(
+                "--set, --tail, --side, --record-id, --outcome, --measured and --margin describe one gear entered by "
+                "hand, and a FILE was given as well",
+                "Give either a FILE or the values of one gear.",
+            )
+        if not self._files:
+            return task.check_inspection(by_hand.from_flags(self._flags, self._asked), self._asked)
+        with stages(quiet=self._wanted.quiet) as bar:
+            files = [Path(name) for name in self._files]
+            return task.check_files(
+                files, self._asked, on_read=partial(bar, "Reading"), on_judged=partial(bar, "Judging")
+            )
+
+    def _ask(self) -> task.CheckResult:
+        if not output.can_ask():
+            raise UsageError(
+                "nothing to check: no FILE was given, and this is not a terminal to ask on",
+                "Pass a FILE, - for standard input, or --set JOINT=VALUE with --tail, --side and --convention.",
+            )
+
+        def publish(inspection: Inspection, entered_in: LengthUnit) -> by_hand.Ending:
+            result = task.check_inspection(inspection, self._asked)
+            self._publish(result, entered_in)
+            if self._wanted.report is not None or self._wanted.as_json:
+                return by_hand.Ending(result, None)
+            return by_hand.Ending(result, partial(self._write_reports, result, Path("report"), self._seen(entered_in)))
+
+        wanted = self._wanted
+        return by_hand.ask(self._flags, self._asked, publish, self._keep, resume=wanted.resume, place=wanted.store)
+
+    def _seen(self, entered_in: LengthUnit) -> Settings:
+        """Lengths are shown in the unit that a flag or the memory says, or else in that of the entry."""
+        said = self._wanted.show or self._shown.show is not LengthUnit.INCH
+        return self._shown if said else replace(self._shown, show=entered_in)
+
+    def _publish(self, result: task.CheckResult, entered_in: LengthUnit) -> None:
+        wanted, seen = self._wanted, self._seen(entered_in)
+        if wanted.as_json:
+            from mlg_troubleshoot.reporting.json_form import check_as_json, check_json_pieces
+
+            found = (result.gear, result.judgements, result.problems, result.notes, result.seed)
+            output.write_json(check_json_pieces(*found) if len(result.judgements) > 1 else check_as_json(*found))
+        else:
+            self._show(result, seen.show)
+        if wanted.csv is not None:
+            task.write_verdicts(result, wanted.csv)
+        if wanted.annotate is not None:
+            self._annotate(result, wanted.annotate)
+        if wanted.report is not None:
+            self._write_reports(result, wanted.report, seen)
+
+    def _show(self, result: task.CheckResult, unit: LengthUnit) -> None:
+        if not self._wanted.quiet:
+            notes.show_notes(result.notes)
+        notes.show_problems(result.problems)
+        screen = output.console(unit=unit)
+        if len(result.judgements) == 1:
+            one_gear.show(result.judgements[0], result.gear, screen, detail=self._wanted.detail)
+        elif result.judgements:
+            batch.show(result, screen, every=self._wanted.every)
+            both = task.before_and_after(result.judgements)
+            if both is not None:
+                batch.show_before_and_after(*both, screen)
+
+    def _annotate(self, result: task.CheckResult, out: Path) -> None:
+        if result.read is not None and not result.read.layouts:
+            output.say(f"{out} was not written: no table was found to annotate.")
+            return
+        for loss in task.annotate(result, Path(self._files[0]), out):
+            output.say(f"Note: {loss}.")
+        if not self._wanted.quiet:
+            output.say(f"Annotated workbook: {out}")
+
+    def _write_reports(self, result: task.CheckResult, directory: Path, seen: Settings) -> None:
+        before = []
+        if self._place is not None:
+            from mlg_troubleshoot.workflows.history import seen_before
+
+            before = seen_before(result.judgements, self._place)
+        formats = tuple(str(f) for f in self._wanted.formats or (options.ReportFormat.HTML, options.ReportFormat.PDF))
+        with stages(quiet=self._wanted.quiet) as bar:
+            told = partial(bar, "Writing reports")
+            written = task.write_reports(
+                result, self._asked, directory, formats, str(seen.page), on_written=told, unit=seen.show, before=before
+            )
+        output.say_written(written, quiet=self._wanted.quiet)
+
+    def _keep(self, result: task.CheckResult) -> None:
+        if self._place is None:
+            return
+        from mlg_troubleshoot.workflows.history import keep
+
+        tails = self._wanted.tails
+        if tails not in (None, "same", "apart"):
+            raise UsageError(f"--tails {tails!r} is not same or apart", "Give same (one aircraft) or apart (two).")
+        asked = history.ask_tail if output.can_ask() else None
+        added = keep(result, self._asked, self._place, asked if tails is None else lambda _new, _kept: tails == "same")
+        if not self._wanted.quiet:
+            output.say(f"Kept in {self._place.place}: {added.new} new records, {added.known} known already.")
