@@ -30,7 +30,6 @@ class Program(TyperGroup):
     """All commands behind one boundary; without a command the help is shown."""
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **named: Any) -> Any:
-        """Run the command and leave with the exit code of the contract."""
         given = list(sys.argv[1:] if args is None else args)
         with Boundary():
             code = super().main(given or ["--help"], *more, **{**named, "standalone_mode": False})

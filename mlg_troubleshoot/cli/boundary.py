@@ -53,7 +53,6 @@ class Boundary:
 
 
 def _explain(error: Exception) -> int:
-    """Say what went wrong and what to do; the exit code is returned."""
     if isinstance(error, TroubleshootError):
         say(f"Error: {error.message}" + (f"\nWhat to do: {error.remedy}" if error.remedy else ""))
         if isinstance(error, OutputError):

@@ -44,7 +44,6 @@ class HistoryGroup(TyperGroup):
     """``mlg history`` without the name of a command shows: all gears, an aircraft, or one gear."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Put the command that shows in front, where none is named."""
         if not (args and (args[0] in self.commands or args[0] in ("-h", "--help"))):
             args = [_SHOW, *args]
         return super().parse_args(ctx, args)
@@ -353,7 +352,6 @@ def import_chain(file: Chain, store: Place = None) -> None:
 
 
 def ask_tail(tail: str, kept: str) -> bool:
-    """Ask whether two spellings mean one aircraft."""
     return typer.confirm(f"Tail {tail!r} differs from {kept!r} only in spelling. Is it the same aircraft?", err=True)
 
 

@@ -84,7 +84,6 @@ class DataConsole(Console):
     unit = LengthUnit.INCH
 
     def length(self, value_in: float, *, sign: bool = False) -> str:
-        """Write a length as a number in the unit that the user reads."""
         return self.unit.shown(value_in, sign=sign)
 
     def sentence(self, said: str, style: str = "") -> None:

@@ -174,7 +174,6 @@ def _mark(sheet: Worksheet, layout: SheetLayout, problem: Problem) -> None:
 
 
 def _fill(cell: Cell | MergedCell, colour: str, said: str = "") -> None:
-    """Colour a cell and add to its comment."""
     cell.fill = PatternFill("solid", fgColor=colour)
     if said:
         before = f"{cell.comment.text}\n" if cell.comment is not None else ""

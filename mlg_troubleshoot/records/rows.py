@@ -7,7 +7,7 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import PurePath
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -68,22 +68,27 @@ _MISSING_CONVENTION = (
 _NEVER_BLANK = (VERDICT_BEARING - {Kind.CLEARANCE}) | {*CARRIED, Kind.GAUGE_ID, Kind.TECHNICIAN_ID}
 _SIGNED = frozenset({Kind.PLUNGER_DOWN_LOCK, Kind.PLUNGER_POSITION, Kind.PLUNGER_DISPLACEMENT})
 # What else a row may say, read cell by cell; the flag says whether a comma is the decimal mark.
-_OTHERS: dict[Kind, Callable[[str | float | OddCell, bool], object]] = {
-    Kind.LANDINGS: lambda cell, comma: read_number(
+_OTHERS: dict[Kind, Callable[[bool, str | float | OddCell], object]] = {
+    Kind.LANDINGS: lambda comma, cell: read_number(
         cell, 0.0, 1e6, decimal_comma=comma, expected="landings since overhaul, 0 or more"
     ),
-    Kind.TEMPERATURE: lambda cell, comma: read_number(
+    Kind.TEMPERATURE: lambda comma, cell: read_number(
         cell, -60.0, 60.0, decimal_comma=comma, expected="a temperature from -60 to 60 degrees Celsius", suffix="C"
     ),
-    Kind.PRESSURE: lambda cell, comma: read_number(
+    Kind.PRESSURE: lambda comma, cell: read_number(
         cell, 0.0, 4000.0, decimal_comma=comma, expected="a pressure from 0 to 4000 psi", suffix="psi"
     ),
-    Kind.DATE: lambda cell, _: read_date(cell),
-    Kind.APPROACH: lambda cell, _: read_choice(cell, Approach, "approach_unknown", _APPROACH_HINTS),
-    Kind.OUTCOME: lambda cell, _: read_choice(cell, Outcome, "outcome_unknown", _OUTCOME_HINTS),
-    Kind.GAUGE_ID: lambda cell, _: read_text(cell, "a gauge id (text)", required=True),
-    Kind.TECHNICIAN_ID: lambda cell, _: read_text(cell, "a technician id (text)", required=True),
+    Kind.DATE: lambda _, cell: read_date(cell),
+    Kind.APPROACH: lambda _, cell: read_choice(cell, Approach, "approach_unknown", _APPROACH_HINTS),
+    Kind.OUTCOME: lambda _, cell: read_choice(cell, Outcome, "outcome_unknown", _OUTCOME_HINTS),
+    Kind.GAUGE_ID: lambda _, cell: read_text(cell, "a gauge id (text)", required=True),
+    Kind.TECHNICIAN_ID: lambda _, cell: read_text(cell, "a technician id (text)", required=True),
 }
+
+
+def _taken(lengths: dict[tuple[Kind, int | None], float], kind: Kind) -> dict[int, float]:
+    """Take the lengths of one kind out, by number; one without a number stands under 0."""
+    return {number or 0: lengths.pop((kind, number)) for each, number in list(lengths) if each is kind}
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +158,7 @@ class RowReader:
         convention = self._read_convention()
         row_unit = self._read_row_unit()
         clearance, entered = self._read_clearances(convention, row_unit, warnings)
-        lengths, readings, floats, gauge_us = self._read_lengths(row_unit)
+        lengths = self._read_lengths(row_unit)
         others = self._read_others()
         carried = self._read_carried()
 
@@ -168,13 +173,16 @@ class RowReader:
             warnings.append(
                 "every clearance is 0: a zero is read as measured; leave a joint blank if it was not measured"
             )
-        alone = [kind for kind in ALONG if kind in lengths]
+        alone = [kind for kind in ALONG if (kind, None) in lengths]
         if len(alone) == 1:
             (other,) = set(ALONG) - set(alone)
             warnings.append(f"{alone[0].value}_in is not used: the row has no {other.value}_in")
-        gauge_u = lengths.pop(Kind.GAUGE_U, None)
+        gauge_us = _taken(lengths, Kind.GAUGE_U)
+        gauge_u = gauge_us.pop(0, None)
+        readings = sorted(_taken(lengths, Kind.PLUNGER_DISPLACEMENT).items())
+        floats = _taken(lengths, Kind.AXIAL_FLOAT)
         # Columns bear the names of the fields that they fill.
-        others.update({f"{kind.value}_in": value for kind, value in lengths.items()})
+        others.update({f"{kind.value}_in": value for (kind, _), value in lengths.items()})
         return Inspection(
             record_id=record_id,
             tail_no=tail_no,
@@ -185,8 +193,8 @@ class RowReader:
             gauge_u_in=DEFAULT_GAUGE_U_IN if gauge_u is None else gauge_u / convention.per_radial,
             gauge_u_is_default=gauge_u is None,
             gauge_u_by_joint_in=self._own_uncertainties(gauge_us, clearance, convention, warnings),
-            readings_in=readings,
-            axial_float_in=floats,
+            readings_in=tuple(value for _, value in readings),
+            axial_float_in=floats or _NO_FLOATS,
             carried=carried,
             warnings=tuple(warnings),
             source=source,
@@ -231,23 +239,24 @@ class RowReader:
         self._faults = []
 
     def _read_others(self) -> dict[str, Any]:
-        found: dict[str, Any] = {}
-        for index, kind in self._others:
-            cell = self._cells[index]
-            if cell is not None:
-                try:
-                    found[kind.value] = _OTHERS[kind](cell, self._comma)
-                except CellFaultError as fault:
-                    self._faults.append((index, fault))
-        return found
+        found = {
+            kind.value: self._noted(index, partial(_OTHERS[kind], self._comma), bearing=False)
+            for index, kind in self._others
+            if self._cells[index] is not None
+        }
+        return {name: value for name, value in found.items() if value is not None}
 
-    def _required(self, index: int | None, read: Callable[[Cell], _T]) -> _T | None:
-        """Read what a row cannot be judged without."""
+    def _noted(self, index: int, read: Callable[[Any], _T], *, bearing: bool = True) -> _T | None:
+        """Read a cell and note its fault; where the cell bears the verdict, the row cannot be judged then."""
         try:
-            return None if index is None else read(self._cells[index])
+            return read(self._cells[index])
         except CellFaultError as fault:
-            self._fault(index or 0, fault)
+            self._fault(index, fault, bearing=bearing)
             return None
+
+    def _required(self, kind: Kind, read: Callable[[Cell], _T]) -> _T | None:
+        index = self._at.get(kind)
+        return None if index is None else self._noted(index, read)
 
     def _identity(self, kind: Kind, expected: str) -> str | None:
         def read(cell: Cell) -> str:
@@ -257,7 +266,7 @@ class RowReader:
                 raise CellFaultError(f"{kind.value}_missing", expected, "Enter it; a row without it cannot be used.")
             return read_text(cell, expected, required=True)
 
-        return self._required(self._at.get(kind), read)
+        return self._required(kind, read)
 
     def _made_id(self) -> str:
         content = zlib.crc32("\x1f".join(map(show, self._cells)).encode("utf-8", "replace"))
@@ -271,14 +280,13 @@ class RowReader:
             bare = cell.lower().removesuffix("side").removesuffix("gear") if isinstance(cell, str) else ""
             return _SIDES.get(re.sub(r"[^a-z]", "", bare)) or read_choice(cell, Side, "side_unknown", {})
 
-        return self._required(self._at.get(Kind.SIDE), read)
+        return self._required(Kind.SIDE, read)
 
     def _read_convention(self) -> ClearanceConvention | None:
         index, declared = self._at.get(Kind.CONVENTION), self._options.convention
-        cell = None if index is None else self._cells[index]
-        if cell is not None:
-            return self._required(
-                index, lambda _: read_choice(cell, ClearanceConvention, "convention_unknown", _CONVENTION_HINTS)
+        if index is not None and self._cells[index] is not None:
+            return self._noted(
+                index, lambda cell: read_choice(cell, ClearanceConvention, "convention_unknown", _CONVENTION_HINTS)
             )
         if declared is None and self._is_curve_alone():
             return ClearanceConvention.RADIAL
@@ -306,7 +314,7 @@ class RowReader:
             self._check_headers_agree(unit)
             return unit
 
-        return self._required(index, read) or self._options.unit
+        return self._noted(index, read) or self._options.unit
 
     def _check_headers_agree(self, unit: LengthUnit) -> None:
         """Refuse a row whose unit is not the one that a header with something below it states."""
@@ -377,36 +385,15 @@ class RowReader:
             f"{self._options.clearance_confirm_above_in:g} in: check the reading. {slip}"
         ).rstrip()
 
-    def _read_lengths(
-        self, row_unit: LengthUnit | None
-    ) -> tuple[dict[Kind, float], tuple[float, ...], Mapping[int, float], dict[int, float]]:
-        lengths: dict[Kind, float] = {}
-        readings: list[tuple[int, float]] = []
-        floats: dict[int, float] = {}
-        gauge_us: dict[int, float] = {}
+    def _read_lengths(self, row_unit: LengthUnit | None) -> dict[tuple[Kind, int | None], float]:
+        found: dict[tuple[Kind, int | None], float] = {}
         for index, field in self._lengths.items():
-            cell = self._cells[index]
-            if cell is None:
-                continue
-            kind = field.kind
-            try:
-                value_in = self._length_of(index, cell, row_unit)
-            except CellFaultError as fault:
-                if kind in VERDICT_BEARING:
-                    self._fault(index, fault)
-                else:
-                    self._faults.append((index, fault))
-                continue
-            if kind is Kind.PLUNGER_DISPLACEMENT:
-                readings.append((field.number or 1, value_in))
-            elif kind is Kind.GAUGE_U and field.number is not None:
-                gauge_us[field.number] = value_in
-            elif kind is Kind.AXIAL_FLOAT:
-                floats[field.number or 0] = value_in
-            else:
-                lengths[kind] = value_in
-        readings.sort()
-        return lengths, tuple(value for _, value in readings), floats or _NO_FLOATS, gauge_us
+            if self._cells[index] is not None:
+                read = partial(self._length_of, index, row_unit)
+                value_in = self._noted(index, read, bearing=field.kind in VERDICT_BEARING)
+                if value_in is not None:
+                    found[field.quantity] = value_in
+        return found
 
     @staticmethod
     def _own_uncertainties(
@@ -421,7 +408,7 @@ class RowReader:
             warnings.append(f"gauge uncertainty of joint {', '.join(idle)} is not used: the joint has no reading")
         return {joint: u / convention.per_radial for joint, u in gauge_us.items() if joint in clearance}
 
-    def _one_length(self, index: int, cell: str | float | OddCell, row_unit: LengthUnit | None) -> float:
+    def _one_length(self, index: int, row_unit: LengthUnit | None, cell: str | float | OddCell) -> float:
         field = self._lengths[index]
         most = self._options.plunger_hard_max_in
         low, high = LENGTH_RANGE_IN.get(field.kind, (-most, most))
@@ -443,28 +430,24 @@ class RowReader:
         return value_in + 0.0
 
     def _read_carried(self) -> dict[str, str]:
-        carried: dict[str, str] = {}
-        for index, name in self._carried:
-            cell = self._cells[index]
-            if cell is None:
-                continue
-            if isinstance(cell, OddCell) and cell.kind in (OddKind.DATE, OddKind.BOOLEAN):
-                carried[name] = cell.text
-                continue
-            try:
-                carried[name] = read_text(cell, "text")
-            except CellFaultError as fault:
-                self._faults.append((index, fault))
-        for name, index in self._unknown.items():
-            cell = self._cells[index]
-            if cell is not None:
-                carried[name] = writable(show(cell))
-        return carried
+        def read(cell: str | float | OddCell) -> str:
+            is_shown = isinstance(cell, OddCell) and cell.kind in (OddKind.DATE, OddKind.BOOLEAN)
+            return show(cell) if is_shown else read_text(cell, "text")
 
-    def _fault(self, index: int, fault: CellFaultError) -> None:
-        """Note a fault that makes the row impossible to judge."""
-        self._bad.add(index)
+        carried = {
+            name: self._noted(index, read, bearing=False)
+            for index, name in self._carried
+            if self._cells[index] is not None
+        }
+        for name, index in self._unknown.items():
+            if self._cells[index] is not None:
+                carried[name] = writable(show(self._cells[index]))
+        return {name: text for name, text in carried.items() if text is not None}
+
+    def _fault(self, index: int, fault: CellFaultError, *, bearing: bool = True) -> None:
         self._faults.append((index, fault))
+        if bearing:
+            self._bad.add(index)
 
     def _tell(self, index: int, fault: CellFaultError) -> None:
         placed = self._placed[index]

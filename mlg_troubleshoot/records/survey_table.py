@@ -158,8 +158,7 @@ class _Rows:
         self, file: str, sheet: str | None, header: list[str], linkage: SurveyedLinkage, *, comma: bool
     ) -> None:
         self.file, self.sheet, self.header, self.linkage, self.comma = file, sheet, header, linkage, comma
-        mechanism = linkage.space.mechanism
-        self.points = [p.name for p in mechanism.points]
+        self.points = [p.name for p in linkage.space.mechanism.points]
         self.problems: list[Problem] = []
         for i, name in enumerate(header):
             if name and header.index(name) != i:
@@ -175,35 +174,32 @@ class _Rows:
         self.column = "kind"
         try:
             kind = read_choice(row.get("kind", ""), Kind, "kind_unknown", {})
-            if kind not in _KINDS:
-                raise CellFaultError("kind_unknown", "one of " + ", ".join(_KINDS), "Correct the word.")
-            wanted = ("value_deg",) if self._is_angle(kind) else ("value_in", "value_mm")
-            self.column = given[-1]
-            if len(given) > 1 or given[0] not in wanted:
-                raise CellFaultError(
-                    "value_columns", f"one value, in {' or '.join(wanted)}", "Leave the other columns blank."
-                )
-            value = self._quantity(row[self.column], signed=kind in (Kind.PLUNGER, Kind.ANGLE))
-            u = default_u(kind, is_angle=self._is_angle(kind))
+            is_angle = self._is_angle(kind)
+            self._require(kind in _KINDS, "kind", "one of " + ", ".join(_KINDS), "Correct the word.", "kind_unknown")
+            wanted = ("value_deg",) if is_angle else ("value_in", "value_mm")
+            one, expected = given[1:] == [] and given[0] in wanted, f"one value, in {' or '.join(wanted)}"
+            self._require(one, given[-1], expected, "Leave the other columns blank.", "value_columns")
+            value = self._quantity(row, given[0], signed=kind in (Kind.PLUNGER, Kind.ANGLE))
+            u = default_u(kind, is_angle=is_angle)
             for unit in _UNITS:
-                self.column = f"u_{unit}"
-                if self.column in row:
-                    if (unit == "deg") != self._is_angle(kind):
-                        raise CellFaultError("unit_of_u", "an uncertainty in the unit of the value", "Move the number.")
-                    u = self._quantity(row[self.column], signed=False)
+                column, expected = f"u_{unit}", "an uncertainty in the unit of the value"
+                if column in row:
+                    self._require((unit == "deg") == is_angle, column, expected, "Move the number.", "unit_of_u")
+                    u = self._quantity(row, column, signed=False)
             extension = self._extension(row)
             start, end = self._ends(kind, row)
         except CellFaultError as fault:
             self._fault(number, self.column, row.get(self.column), fault.code, fault.expected, fault.remedy)
             return None
-        return Reading(kind, start, end, value, u, extension, number, self._is_angle(kind), self.linkage.driven_in)
+        return Reading(kind, start, end, value, u, extension, number, is_angle, self.linkage.driven_in)
 
     def _is_angle(self, kind: Kind) -> bool:
         turns = self.linkage.space.mechanism.output.kind == "angle"
         return kind is Kind.ANGLE or (kind is Kind.PLUNGER and turns)
 
-    def _quantity(self, cell: Cell, *, signed: bool) -> float:
-        name, unit = self.column.split("_")
+    def _quantity(self, row: Mapping[str, Cell], column: str, *, signed: bool) -> float:
+        self.column, cell = column, row[column]
+        name, unit = column.split("_")
         if unit == "deg":
             low, most = (-_WIDEST_DEG, _WIDEST_DEG) if signed else (0.0, _WIDEST_DEG)
             expected = f"an angle from {low:g} to {most:g} degrees"
@@ -214,22 +210,21 @@ class _Rows:
             value = length.to_inches(
                 self._number(cell, -most if signed else 0.0, most, f"a length up to {most:g} {unit}")
             )
-        if value <= 0.0 and not signed:
-            raise CellFaultError("out_of_range", f"a {name} above 0", "Read it again, or leave it blank.")
+        remedy = "Read it again, or leave it blank."
+        self._require(value > 0.0 or signed, column, f"a {name} above 0", remedy, "out_of_range")
         return value
 
     def _extension(self, row: Mapping[str, Cell]) -> float | None:
         extension = None
         reach = 3.0 * abs(self.linkage.gear.reference.stroke[1] - self.linkage.low)
         for unit in (LengthUnit.INCH, LengthUnit.MILLIMETRE):
-            self.column = f"extension_{unit}"
+            self.column, most = f"extension_{unit}", unit.from_inches(reach)
             if self.column in row:
-                if extension is not None or (unit is not LengthUnit.INCH and self.linkage.driven_in != "in"):
-                    raise CellFaultError("extension_columns", "one extension, in the unit of the input", "Leave one.")
-                most = unit.from_inches(reach)
-                extension = unit.to_inches(
-                    self._number(row[self.column], 0.0, most, f"an extension from 0 to {most:.4g}")
-                )
+                one = extension is None and (unit is LengthUnit.INCH or self.linkage.driven_in == "in")
+                expected = "one extension, in the unit of the input"
+                self._require(one, self.column, expected, "Leave one.", "extension_columns")
+                read = self._number(row[self.column], 0.0, most, f"an extension from 0 to {most:.4g}")
+                extension = unit.to_inches(read)
         return extension
 
     def _number(self, cell: Cell, low: float, most: float, expected: str) -> float:
@@ -261,10 +256,10 @@ class _Rows:
         self._require(kind is not Kind.EXTENSION or space.moves_reference, "kind", expected, remedy)
         return start, end
 
-    def _require(self, holds: bool, column: str, expected: str, remedy: str) -> None:
+    def _require(self, holds: bool, column: str, expected: str, remedy: str, code: str = "point_unknown") -> None:
         if not holds:
             self.column = column
-            raise CellFaultError("point_unknown", expected, remedy)
+            raise CellFaultError(code, expected, remedy)
 
     def _fault(self, row: int, column: str, cell: Cell, code: str, expected: str, remedy: str) -> None:
         place = f"{column_letters(self.header.index(column))}{row}" if column in self.header else None

@@ -148,7 +148,6 @@ def too_large(what: str) -> FileRefusedError:
 
 
 def password_protected() -> FileRefusedError:
-    """Return the refusal of a workbook that cannot be opened without its password."""
     return FileRefusedError("password_protected", "the file is password protected")
 
 

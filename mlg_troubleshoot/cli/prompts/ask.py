@@ -72,7 +72,6 @@ class _Saver:
         self.saved = True
 
     def put_away(self, session: Session) -> None:
-        """Close an unfinished session that is not wanted any more."""
         try:
             self._store.finish(session)
         except (OutputError, SessionTakenError) as error:

@@ -41,7 +41,6 @@ def line(*parts: str | tuple[str, Tone], indent: int = 1, rigid: bool = False) -
 
 
 def keys(*pairs: tuple[str, str]) -> Line:
-    """Make a line of keys and what each does."""
     parts: list[tuple[str, Tone]] = []
     for name, meaning in pairs:
         parts += [(name, Tone.KEY), (f" = {meaning}", Tone.PLAIN), ("   ", Tone.PLAIN)]

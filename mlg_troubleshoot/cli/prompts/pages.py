@@ -85,30 +85,29 @@ def welcome(gear: Gear, width: int, unfinished: tuple[Session, ...]) -> tuple[Li
     return tuple(shown)
 
 
+def _heading_page(asked: str, kept: str | None, *shown: Line) -> Page:
+    return Page((BLANK, *shown), f" {asked}{_keeps(kept)} > ")
+
+
 def tail_page(answers: Answers) -> Page:
-    return Page((BLANK,), f" Tail number{_keeps(answers.tail_no)} > ")
+    return _heading_page("Tail number", answers.tail_no)
 
 
 def side_page(answers: Answers) -> Page:
-    shown = (BLANK, line("Which gear?   ", ("l", Tone.KEY), " LH, left    ", ("r", Tone.KEY), " RH, right"))
-    return Page(shown, f" Side{_keeps(answers.side)} > ")
+    which = line("Which gear?   ", ("l", Tone.KEY), " LH, left    ", ("r", Tone.KEY), " RH, right")
+    return _heading_page("Side", answers.side, which)
 
 
 def unit_page(answers: Answers) -> Page:
-    shown = (
-        BLANK,
-        line("Unit of your readings?"),
-        choice("i", "inch          for example .013"),
-        choice("t", "thou          for example 13"),
-        choice("m", "millimetre    for example 0.33"),
-    )
-    return Page(shown, f" Unit{_keeps(answers.unit)} > ")
+    examples = {"inch": ".013", "thou": "13", "millimetre": "0.33"}
+    choices = (choice(name[0], f"{name:<13} for example {example}") for name, example in examples.items())
+    return _heading_page("Unit", answers.unit, line("Unit of your readings?"), *choices)
 
 
 def convention_page(answers: Answers) -> Page:
     choices = (choice(c[0].lower(), f"{c.replace('_', ' '):<13} {c.meaning}") for c in ClearanceConvention)
     kept = None if answers.convention is None else CONVENTION_NAMES[answers.convention]
-    return Page((BLANK, line("What is your reading?"), *choices, FACTOR_TWO), f" Reading is{_keeps(kept)} > ")
+    return _heading_page("Reading is", kept, line("What is your reading?"), *choices, FACTOR_TWO)
 
 
 def reread_page(answers: Answers, old: LengthUnit) -> Page:
