@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import warnings
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -110,26 +111,18 @@ _SHAPES = (b"<xdr:sp ", b"<xdr:sp>", b"<xdr:cxnSp", b"<xdr:grpSp")
 
 
 def _not_taken_over(before: bytes, after: bytes) -> tuple[str, ...]:
-    """Compare what the two packages hold beside their cells."""
-    with ZipFile(io.BytesIO(before)) as old, ZipFile(io.BytesIO(after)) as new:
-        lost = [
-            f"the annotated copy lacks {count} of the {what} of the workbook"
-            for folder, what in _DROPPABLE
-            if (count := _count(old, folder) - _count(new, folder)) > 0
-        ]
-        shapes = _shapes(old) - _shapes(new)
-    if shapes > 0:
-        lost.append(f"the annotated copy lacks {shapes} of the drawn shapes of the workbook")
-    return tuple(lost)
+    lost = _beside_cells(before) - _beside_cells(after)
+    return tuple(f"the annotated copy lacks {count} of the {what} of the workbook" for what, count in lost.items())
 
 
-def _count(archive: ZipFile, folder: str) -> int:
-    return sum(1 for name in archive.namelist() if name.lower().startswith(folder) and "_rels" not in name)
-
-
-def _shapes(archive: ZipFile) -> int:
-    drawings = [name for name in archive.namelist() if name.lower().startswith("xl/drawings/drawing")]
-    return sum(archive.read(name).count(mark) for name in drawings for mark in _SHAPES)
+def _beside_cells(package: bytes) -> Counter[str]:
+    """Count what a package holds beside its cells, by what a user calls it."""
+    with ZipFile(io.BytesIO(package)) as archive:
+        names = [name for name in archive.namelist() if "_rels" not in name]
+        held = Counter(what for folder, what in _DROPPABLE for name in names if name.lower().startswith(folder))
+        drawings = [archive.read(name) for name in names if name.lower().startswith("xl/drawings/drawing")]
+    held["drawn shapes"] = sum(drawing.count(mark) for drawing in drawings for mark in _SHAPES)
+    return held
 
 
 def _load(source: str | Path, out: str | Path) -> bytes:
@@ -205,13 +198,10 @@ def _put(cell: Cell | MergedCell, value: str | float | None) -> None:
             cell.quotePrefix = True
 
 
-def _headers(own: VerdictColumns) -> list[str]:
-    return list(dict.fromkeys(header for values in own.values() for header in values))
-
-
 def _behind_table(sheet: Worksheet, layout: SheetLayout, free: int, own: VerdictColumns) -> None:
     sheet.row_dimensions[layout.header_row].height = None
-    for column, header in enumerate(_headers(own), free):
+    headers = dict.fromkeys(header for values in own.values() for header in values)
+    for column, header in enumerate(headers, free):
         cell = sheet.cell(layout.header_row, column)
         _put(cell, header)
         cell.font = Font(name=FONT, bold=True)
@@ -230,7 +220,7 @@ def _behind_table(sheet: Worksheet, layout: SheetLayout, free: int, own: Verdict
                 sheet.row_dimensions[row].height = 15.0 * -(-len(str(value)) // _ON_A_LINE)
             if header == "verdict":
                 _fill(written, _VERDICT_FILLS.get(str(value), _UNDECIDED_FILL))
-    longest = max((len(header) for header in _headers(own)), default=0)
+    longest = max(map(len, headers), default=0)
     sheet.row_dimensions[layout.header_row].height = 15.0 * -(-longest // (_NUMBER_WIDTH - 2))
 
 

@@ -27,30 +27,23 @@ class Form:
     value_column: int
 
     def is_untouched(self, options: ReadOptions) -> bool:
-        for _, label, value in self.lines:
-            if value is None:
-                continue
-            found = recognise(label, options.joint_numbers, options.joint_names).field
-            if found is None or found.kind not in _DECLARATIONS:
-                return False
-        return True
+        filled = [label for _, label, value in self.lines if value is not None]
+        fields = (recognise(label, options.joint_numbers, options.joint_names).field for label in filled)
+        return all(field is not None and field.kind in _DECLARATIONS for field in fields)
 
 
 def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
-    known: Counter[int] = Counter()
-    kinds: dict[int, set[Kind]] = {}
+    kinds: dict[int, list[Kind]] = {}
     for _, cells in rows:
         for index, cell in enumerate(cells[:4]):
-            if isinstance(cell, str):
-                found = recognise(cell, options.joint_numbers, options.joint_names)
-                if found.field is not None:
-                    known[index] += 1
-                    kinds.setdefault(index, set()).add(found.field.kind)
-                    break
-    if not known:
-        return None
-    column, count = known.most_common(1)[0]
-    if count < 3 or not kinds[column] & {*IDENTITY} or Kind.CLEARANCE not in kinds[column]:
+            text = cell if isinstance(cell, str) else ""
+            found = recognise(text, options.joint_numbers, options.joint_names).field
+            if found is not None:
+                kinds.setdefault(index, []).append(found.kind)
+                break
+    column = max(kinds, key=lambda index: len(kinds[index]), default=0)
+    known = kinds.get(column, [])
+    if len(known) < 3 or not {*IDENTITY} & {*known} or Kind.CLEARANCE not in known:
         return None
     ours = any(cell == FORM_TITLE for _, cells in rows[:2] for cell in cells[:1])
     value_column = column + 1

@@ -280,9 +280,7 @@ class ColumnReader:
     def _missing(self, columns: Columns, row: int) -> None:
         fields = {p.field.kind for p in columns.placed if p.field is not None}
         unknown = [p.header for p in columns.placed if p.field is None and p.header]
-        missing: list[tuple[str, str]] = [
-            (kind.value, f"a column {kind.value}") for kind in REQUIRED if kind not in fields
-        ]
+        missing = [(kind.value, f"a column {kind.value}") for kind in REQUIRED if kind not in fields]
         if Kind.RECORD_ID not in fields and columns.is_long:
             missing.insert(0, ("record_id", "a column record_id, by which the rows of one inspection are gathered"))
         elif Kind.RECORD_ID not in fields:

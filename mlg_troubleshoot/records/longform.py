@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.records.cells import Cell, OddCell, column_letters, quote, show
-from mlg_troubleshoot.records.columns import PER_JOINT, Field, Kind
+from mlg_troubleshoot.records.columns import PER_JOINT, Kind
 from mlg_troubleshoot.records.headers import tidy
 from mlg_troubleshoot.records.model import TableInHand
 from mlg_troubleshoot.records.rows import PlacedField, RowReader
@@ -36,21 +36,18 @@ class LongReader:
         self._record = self._find(Kind.RECORD_ID)
         self._joint = self._find(Kind.JOINT)
         self._per_joint = [p for p in placed if p.field is not None and p.field.kind in PER_JOINT]
-        wide: list[PlacedField] = [
-            replace(p, field=None, refused=True) if p is self._joint or p in self._per_joint else p for p in placed
-        ]
+        own = self._own()
+        wide: list[PlacedField] = [replace(p, field=None, refused=True) if p in own else p for p in placed]
         # The joint's own columns stay in place but empty; each joint's reading gets a column behind them.
         self._slots: dict[tuple[int, int], int] = {}
         for p in self._per_joint:
             for joint in options.joint_numbers:
                 self._slots[p.index, joint] = len(wide)
-                kind = p.field.kind if p.field is not None else Kind.CLEARANCE
-                unit = p.field.unit if p.field is not None else None
-                wide.append(replace(p, index=len(wide), field=Field(kind, joint, unit), header_cell=p.header_cell))
+                own_field = None if p.field is None else replace(p.field, number=joint)
+                wide.append(replace(p, index=len(wide), field=own_field))
         self._width = len(wide)
         self._names = {tidy(name): number for number, name in options.joint_names.items()}
-        self._groups: dict[str, _Group] = {}
-        self._loose: list[_Group] = []
+        self._groups: dict[str | int, _Group] = {}
         self._reader = RowReader(wide, table)
 
     def _find(self, kind: Kind) -> PlacedField | None:
@@ -60,17 +57,15 @@ class LongReader:
         width = len(self._placed)
         filled = [*cells[:width], *[None] * (width - len(cells))]
         record = filled[self._record.index] if self._record is not None else None
-        key = show(record).strip()
-        group = self._groups.get(key) if key else None
+        # A row without a record id stands alone.
+        key = show(record).strip() or row
+        group = self._groups.get(key)
         if group is None:
             places = [(row, f"{column_letters(i)}{row}") for i in range(self._width)]
             group = _Group(row, [*filled, *[None] * (self._width - width)], places)
             for p in self._own():
                 group.cells[p.index] = None
-            if key:
-                self._groups[key] = group
-            else:
-                self._loose.append(group)
+            self._groups[key] = group
         else:
             self._same_elsewhere(group, row, filled)
         self._take_reading(group, row, filled)
@@ -80,12 +75,10 @@ class LongReader:
 
     def _same_elsewhere(self, group: _Group, row: int, filled: Sequence[Cell]) -> None:
         """Check that what belongs to the whole inspection is the same in each of its rows."""
-        own = {p.index for p in self._own()}
+        own = self._own()
         for p in self._placed:
-            if p.index in own:
-                continue
             here, there = filled[p.index], group.cells[p.index]
-            if here is None or here == there:
+            if p in own or here is None or here == there:
                 continue
             if there is None:
                 group.cells[p.index] = here
@@ -145,7 +138,7 @@ class LongReader:
 
     def finish(self) -> list[Inspection | InvalidRow]:
         done: list[Inspection | InvalidRow] = []
-        for group in [*self._groups.values(), *self._loose]:
+        for group in self._groups.values():
             read = self._reader.read(group.row, group.cells, group.places)
             warnings = (*read.warnings, *group.warnings)
             if group.bad:

@@ -86,7 +86,7 @@ class _Table:
         self._reader = RowReader(columns.placed, table)
         self._long = LongReader(columns.placed, table) if columns.is_long else None
         self._faulty = sheet.facts.faulty
-        self._is_header = _header_test(header)
+        self._texts = tuple(text or None for text in header.texts)
         self._width = len(header.texts) if delimiter is not None else None
         self._out = out
         self._repeated = 0
@@ -97,7 +97,8 @@ class _Table:
         ]
 
     def take(self, number: int, cells: Sequence[Cell]) -> None:
-        if self._is_header(cells):
+        # The header is printed again on a later page.
+        if cells[0] == self._texts[0] and tuple(cells) == self._texts[: len(cells)] and any(cells):
             self._repeated += 1
             return
         if self._stands_aside(number, cells):
@@ -152,17 +153,6 @@ class _Table:
             cells = sum(words.values())
             notes.append(f"{cells} {'cells' if cells > 1 else 'cell'} with {shown} read as not measured")
         return notes
-
-
-def _header_test(header: Header) -> Callable[[Sequence[Cell]], bool]:
-    """Return a test that tells the header printed again on a later page."""
-    texts = tuple(text or None for text in header.texts)
-    first = next((i for i, text in enumerate(texts) if text), 0)
-
-    def is_header(cells: Sequence[Cell]) -> bool:
-        return len(cells) > first and cells[first] == texts[first] and tuple(cells) == texts[: len(cells)]
-
-    return is_header
 
 
 def _hidden_notes(sheet: Sheet, columns: Columns, header_row: int) -> list[str]:

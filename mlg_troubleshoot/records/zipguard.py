@@ -18,7 +18,6 @@ MAX_RATIO = 100
 MAX_MEMBERS = 5_000
 _SMALL_MEMBER_BYTES = 1_000_000
 _CHUNK = 1 << 16
-_HEAD_BYTES = 1 << 16
 _BEFORE_ROOT = re.compile(rb"(?:\xef\xbb\xbf|\xff\xfe|\xfe\xff)?(?:\s++|<\?.*?\?>|<!--.*?-->)*+", re.DOTALL)
 # A tree is kept until a row or a text is complete, and an empty shell of each until the end of its part.
 MAX_OPEN_BYTES = 2_000_000
@@ -71,10 +70,10 @@ class GuardedZip:
     def _refuse_declarations(self) -> None:
         for name in self._members:
             # A declaration stands before the first element; UTF-16 is read without its zero bytes.
-            head = self._head(name).replace(b"\0", b"")
+            head = next(self.chunks(name), b"").replace(b"\0", b"")
             before = _BEFORE_ROOT.match(head)
             rest = head[before.end() if before is not None else 0 :]
-            if rest.startswith((b"<!", b"<?")) or (not rest and len(head) >= _HEAD_BYTES // 2):
+            if rest.startswith((b"<!", b"<?")) or (not rest and len(head) >= _CHUNK // 2):
                 found = f"{name} declares a document type or entities, which no spreadsheet program writes"
                 raise FileRefusedError("xml_declaration", found)
 
@@ -82,13 +81,6 @@ class GuardedZip:
     def names(self) -> frozenset[str]:
         """Names of the parts, in lower case, with plain slashes."""
         return frozenset(self._members)
-
-    def _head(self, name: str) -> bytes:
-        try:
-            with self._zip.open(self._members[name]) as part:
-                return part.read(_HEAD_BYTES)
-        except _ZIP_ERRORS:
-            raise damaged(f"{name} cannot be unpacked") from None
 
     def size(self, name: str) -> int:
         return self._member(name).file_size

@@ -9,8 +9,8 @@ import pytest
 
 from mlg_troubleshoot.cli.output import to_ascii
 from mlg_troubleshoot.cli.prompts import Answers, Session, SessionStore, ask_inspection
+from mlg_troubleshoot.cli.prompts.answers import plunger_in
 from mlg_troubleshoot.cli.prompts.flow import Ask, Effect, Flow
-from mlg_troubleshoot.cli.prompts.more import plunger_in
 from mlg_troubleshoot.cli.prompts.sketch import sketch
 from mlg_troubleshoot.decision.inspection import Outcome, Side
 from mlg_troubleshoot.errors import UsageError

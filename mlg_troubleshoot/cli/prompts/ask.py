@@ -85,10 +85,9 @@ class _Saver:
         return tuple(each for each in found if each.id != self.session.id)
 
     def find_saved(self, tail_no: str, side: Side) -> Session | None:
-        for each in self.unfinished():
-            if (each.answers.tail_no or "").casefold() == tail_no.casefold() and each.answers.side is side:
-                return each
-        return None
+        gear = (tail_no.casefold(), side)
+        found = (s for s in self.unfinished() if ((s.answers.tail_no or "").casefold(), s.answers.side) == gear)
+        return next(found, None)
 
     def _say_once(self, message: str) -> None:
         if message not in self._said:

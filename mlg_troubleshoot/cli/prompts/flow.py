@@ -19,9 +19,10 @@ from mlg_troubleshoot.cli.prompts.answers import (
     Reading,
     judge,
     judge_more,
+    plunger_in,
+    read_more,
 )
 from mlg_troubleshoot.cli.prompts.lines import Line, Tone, line
-from mlg_troubleshoot.cli.prompts.more import plunger_in, read_more
 from mlg_troubleshoot.cli.prompts.pages import Page
 from mlg_troubleshoot.cli.prompts.store import Session
 from mlg_troubleshoot.decision.inspection import Side
