@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import re
 import warnings
 from collections import Counter
 from collections.abc import Mapping
+from html import escape
 from pathlib import Path
 from types import MappingProxyType
 from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile
@@ -14,6 +16,7 @@ from openpyxl import Workbook, load_workbook
 from openpyxl.cell import Cell, MergedCell
 from openpyxl.comments import Comment
 from openpyxl.styles import Alignment, Font, PatternFill
+from openpyxl.worksheet._reader import FORMULA_TAG, VALUE_TAG
 from openpyxl.worksheet.pagebreak import Break
 from openpyxl.worksheet.worksheet import Worksheet
 from openpyxl.writer.excel import ExcelWriter
@@ -21,13 +24,12 @@ from openpyxl.writer.excel import ExcelWriter
 from mlg_troubleshoot.decision.inspection import RowSource
 from mlg_troubleshoot.errors import OutputError, Problem, UsageError
 from mlg_troubleshoot.outputs import write_bytes
-from mlg_troubleshoot.records.cachedvalues import restore_results
 from mlg_troubleshoot.records.cells import column_letters, writable
 from mlg_troubleshoot.records.columns import Field, Kind
 from mlg_troubleshoot.records.model import ReadResult, SheetLayout
 from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.template import FONT, HEADER_FILL
-from mlg_troubleshoot.records.xlsx import XlsxFile
+from mlg_troubleshoot.records.xlsx import XlsxFile, XlsxSheet
 from mlg_troubleshoot.units import LengthUnit
 
 _BAD_FILL = "FFFFB3B3"
@@ -73,7 +75,7 @@ def annotate_workbook(
             f"{source} cannot be copied ({type(error).__name__}): a part of it is not understood",
             "Open it in a spreadsheet program, save it again as .xlsx, and annotate the copy.",
         ) from None
-    written = restore_results(data, buffer.getvalue())
+    written = _restore_results(data, buffer.getvalue())
     write_bytes(out, written)
     return _not_taken_over(data, written)
 
@@ -245,3 +247,43 @@ def _beside_form(sheet: Worksheet, layout: SheetLayout, free: int, own: VerdictC
             label.font = Font(name=FONT, bold=True)
             if value is not None:
                 _put(sheet.cell(layout.header_row + offset, free + 1), value)
+
+
+_FORMULA = re.compile(
+    r'<c r="([A-Z]{1,3}\d{1,7})"((?: s="\d+")?)(?: t="\w+")?>(<f\b[^>]*(?:/>|>[^<]*</f>))<v ?(?:/>|></v>)</c>'
+)
+
+
+def _restore_results(original: bytes, written: bytes) -> bytes:
+    """Put the last results of formulas back into a copy: openpyxl keeps either them or the formulas."""
+    before = {sheet.name: sheet for sheet in XlsxFile(original).sheets}
+    after = {sheet.part.lower(): sheet.name for sheet in XlsxFile(written).sheets}
+    out = io.BytesIO()
+    with ZipFile(io.BytesIO(written)) as old, ZipFile(out, "w", ZIP_DEFLATED) as new:
+        for member in old.infolist():
+            content = old.read(member)
+            sheet = before.get(after.get(member.filename.lower()))
+            if sheet is not None and b"<f" in content:
+                results = _results(sheet)
+                content = _FORMULA.sub(lambda m, r=results: _with_result(m, r), content.decode()).encode()  # type: ignore[misc]
+            new.writestr(member, content)
+    return out.getvalue()
+
+
+def _results(sheet: XlsxSheet) -> dict[str, tuple[str, str]]:
+    """Return the kind and the text of every last result by its cell, as they stand in the file."""
+    found = {}
+    for row in sheet.elements():
+        for cell in row:
+            kind, result = cell.get("t", "n"), cell.findtext(VALUE_TAG)
+            if result and kind != "s" and cell.find(FORMULA_TAG) is not None:
+                found[cell.get("r", "")] = kind, result
+    return found
+
+
+def _with_result(match: re.Match[str], results: dict[str, tuple[str, str]]) -> str:
+    place, style, formula = match.groups()
+    if place not in results:
+        return match[0]
+    kind, result = results[place]
+    return f'<c r="{place}"{style} t="{kind}">{formula}<v>{escape(result, quote=False)}</v></c>'

@@ -31,6 +31,7 @@ _LINE = Side(style="thin", color="FF9AA5B1")
 _REQUIRED_FILL = "FFFFE9A8"
 _TEXT_KINDS = frozenset({Kind.RECORD_ID, Kind.TAIL_NO, Kind.GAUGE_ID, Kind.TECHNICIAN_ID, *CARRIED})
 _MUST = frozenset({Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE, Kind.CONVENTION})
+_NEVER_NEGATIVE = (LENGTHS | {Kind.LANDINGS}) - {Kind.PLUNGER_DISPLACEMENT, Kind.PLUNGER_DOWN_LOCK}
 _CHOICES: dict[Kind, tuple[str, ...]] = {
     Kind.SIDE: ("LH", "RH"),
     Kind.CONVENTION: tuple(ClearanceConvention),
@@ -194,12 +195,11 @@ def _validate(sheet: Worksheet, kind: Kind, cells: str) -> None:
     if kind in _CHOICES:
         rule = DataValidation("list", formula1='"' + ",".join(_CHOICES[kind]) + '"', allow_blank=True)
         rule.errorTitle, rule.error = "Not in the list", "Choose one of: " + ", ".join(_CHOICES[kind])
-    elif kind in LENGTHS and kind is not Kind.PLUNGER_DISPLACEMENT and kind is not Kind.PLUNGER_DOWN_LOCK:
+    elif kind in _NEVER_NEGATIVE:
         rule = DataValidation("decimal", operator="greaterThanOrEqual", formula1="0", allow_blank=True)
-        rule.errorTitle, rule.error = "Not a length", "Enter a number, 0 or more, or leave the cell blank."
-        rule.errorStyle = "warning"
-    elif kind is Kind.LANDINGS:
-        rule = DataValidation("decimal", operator="greaterThanOrEqual", formula1="0", allow_blank=True)
+        if kind in LENGTHS:
+            rule.errorTitle, rule.error = "Not a length", "Enter a number, 0 or more, or leave the cell blank."
+            rule.errorStyle = "warning"
     else:
         return
     rule.showErrorMessage = True

@@ -9,7 +9,7 @@ from enum import StrEnum
 from typing import TypeVar, cast
 
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.records.cells import UNWRITABLE, OddCell, OddKind, show_number
+from mlg_troubleshoot.records.cells import UNWRITABLE, OddCell, OddKind, show, show_number
 from mlg_troubleshoot.units import LengthUnit, parse_length
 
 
@@ -82,6 +82,14 @@ def odd_cell_fault(cell: OddCell, expected: str) -> CellFaultError:
     return CellFaultError(_ODD_CELLS.get(cell.kind, "cell_is_boolean"), expected)
 
 
+def _number_of(cell: float | OddCell, expected: str) -> float:
+    if isinstance(cell, float):
+        return cell
+    if cell.kind is not OddKind.PADDED or cell.number is None:
+        raise odd_cell_fault(cell, expected)
+    return cell.number
+
+
 def plain_text(text: str) -> str:
     return text.translate(_INVISIBLE).strip()
 
@@ -96,16 +104,11 @@ def read_length(
     expected: str,
 ) -> tuple[float, LengthUnit, str]:
     """Read a length in its own unit or that of its column, which must agree, or else in the declared one."""
-    if isinstance(cell, float):
-        text = show_number(cell)
-        value, written = cell, None
-    elif isinstance(cell, str):
+    if isinstance(cell, str):
         text = plain_text(cell)
         value, written = _written_length(text, decimal_comma, expected, unit)
-    elif cell.kind is OddKind.PADDED and cell.number is not None:
-        text, value, written = cell.text, cell.number, None
     else:
-        raise odd_cell_fault(cell, expected)
+        text, value, written = show(cell), _number_of(cell, expected), None
     if not math.isfinite(value):
         raise CellFaultError("not_finite", expected)
     if value < 0 and not signed:
@@ -163,14 +166,10 @@ def _length_fault(text: str, body: str, expected: str, unit: LengthUnit | None) 
 def read_number(
     cell: str | float | OddCell, low: float, high: float, *, decimal_comma: bool, expected: str, suffix: str = ""
 ) -> float:
-    if isinstance(cell, OddCell):
-        if cell.kind is not OddKind.PADDED or cell.number is None:
-            raise odd_cell_fault(cell, expected)
-        value = cell.number
-    elif isinstance(cell, float):
-        value = cell
-    else:
+    if isinstance(cell, str):
         value = _written_number(plain_text(cell), decimal_comma, expected, suffix)
+    else:
+        value = _number_of(cell, expected)
     if not math.isfinite(value):
         raise CellFaultError("not_finite", expected)
     if not low <= value <= high:
