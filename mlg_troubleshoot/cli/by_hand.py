@@ -16,7 +16,7 @@ from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.cli.prompts import Terminal
+    from mlg_troubleshoot.cli.prompts import RichTerminal
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +113,7 @@ def ask(
         return ending.result
 
 
-def _what_now(terminal: Terminal) -> str:
+def _what_now(terminal: RichTerminal) -> str:
     try:
         while True:
             typed = terminal.ask(" r = write the report, c = correct an answer, Enter = done > ").strip().lower()

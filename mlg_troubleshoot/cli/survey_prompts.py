@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from mlg_troubleshoot.cli.prompts.lines import BLANK, Tone, keys, line
-from mlg_troubleshoot.cli.prompts.terminal import Terminal
+from mlg_troubleshoot.cli.prompts.terminal import RichTerminal
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.outputs import write_csv
@@ -20,7 +20,7 @@ _TYPED = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+))\s*(?P<unit>in|thou|mm
 _SIGNED = re.compile(r"[-+]\d*\.?\d+(e-\d+)?")
 
 
-def ask_survey(file: Path, gear: Gear, terminal: Terminal) -> bool:
+def ask_survey(file: Path, gear: Gear, terminal: RichTerminal) -> bool:
     """Ask for the readings that a template still lacks and keep each in it; False if the user stopped."""
     if file.suffix.lower() != ".csv":
         raise UsageError(f"{file.name!r} does not end in .csv", "Answers are kept as CSV: give such a name.")

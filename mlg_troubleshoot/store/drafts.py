@@ -42,12 +42,10 @@ class Drafts:
             connection.execute(DRAFTS.insert().values(draft_id=draft.id, saved=last + 1, **row))
         return True
 
-    def newest_first(self, owner: str | None = None, draft_id: str | None = None) -> list[Draft]:
-        """Drafts of an owner, or the one of an id; what is too large to be one comes without its content."""
+    def newest_first(self, owner: str | None = None) -> list[Draft]:
+        """Drafts of an owner, or of all; what is too large to be one comes without its content."""
         content = sql.case((sql.func.length(DRAFTS.c.content) <= _MOST_CHARACTERS, DRAFTS.c.content), else_="")
-        wanted = [
-            column == value for column, value in ((DRAFTS.c.owner, owner), (DRAFTS.c.draft_id, draft_id)) if value
-        ]
+        wanted = [DRAFTS.c.owner == owner] if owner else []
         with self.store.transaction(writing=False) as connection:
             if not sql.inspect(connection).has_table(DRAFTS.name):
                 return []

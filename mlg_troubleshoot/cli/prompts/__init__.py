@@ -4,7 +4,7 @@ from mlg_troubleshoot.cli.prompts.answers import Answers
 from mlg_troubleshoot.cli.prompts.ask import EntryInterruptedError, ask_inspection
 from mlg_troubleshoot.cli.prompts.lines import Line
 from mlg_troubleshoot.cli.prompts.store import Session, SessionFileError, SessionStore
-from mlg_troubleshoot.cli.prompts.terminal import RichTerminal, Terminal
+from mlg_troubleshoot.cli.prompts.terminal import RichTerminal
 
 __all__ = [
     "Answers",
@@ -14,6 +14,5 @@ __all__ = [
     "Session",
     "SessionFileError",
     "SessionStore",
-    "Terminal",
     "ask_inspection",
 ]

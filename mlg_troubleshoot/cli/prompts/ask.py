@@ -11,7 +11,7 @@ from mlg_troubleshoot.cli.prompts.answers import Answers
 from mlg_troubleshoot.cli.prompts.flow import Advice, Ask, Effect, Flow, State, Turn
 from mlg_troubleshoot.cli.prompts.lines import BLANK, Tone, line
 from mlg_troubleshoot.cli.prompts.store import Session, SessionStore, SessionTakenError, new_session
-from mlg_troubleshoot.cli.prompts.terminal import Terminal
+from mlg_troubleshoot.cli.prompts.terminal import RichTerminal
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.gear.gear import Gear
@@ -36,7 +36,7 @@ class Entry:
 class _Saver:
     """Keeps the session in the store in step with the answers; says once if it cannot."""
 
-    def __init__(self, gear: Gear, terminal: Terminal, store: SessionStore, session: Session) -> None:
+    def __init__(self, gear: Gear, terminal: RichTerminal, store: SessionStore, session: Session) -> None:
         self._gear = gear
         self._terminal = terminal
         self._store = store
@@ -97,7 +97,7 @@ class _Saver:
 
 def ask_inspection(
     gear: Gear,
-    terminal: Terminal,
+    terminal: RichTerminal,
     store: SessionStore,
     given: Answers,
     *,
@@ -124,7 +124,7 @@ def ask_inspection(
         raise _stopped(terminal, saver) from None
 
 
-def _converse(flow: Flow, turn: Turn, terminal: Terminal, saver: _Saver) -> Entry:
+def _converse(flow: Flow, turn: Turn, terminal: RichTerminal, saver: _Saver) -> Entry:
     shown = None
     while True:
         if turn.effect is Effect.COMPUTE:
@@ -150,7 +150,7 @@ def _converse(flow: Flow, turn: Turn, terminal: Terminal, saver: _Saver) -> Entr
                 pass
 
 
-def _stopped(terminal: Terminal, saver: _Saver) -> EntryInterruptedError:
+def _stopped(terminal: RichTerminal, saver: _Saver) -> EntryInterruptedError:
     if saver.saved:
         said = line(("Saved. ", Tone.GOOD), "Go on later with:  ", ("mlg check --resume", Tone.KEY))
         terminal.say((BLANK, said))

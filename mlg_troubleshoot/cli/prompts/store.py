@@ -105,31 +105,26 @@ class SessionStore:
             own.discard(draft.id)
         return saved
 
-    def _newest_first(self, owner: str | None = None, draft_id: str | None = None) -> list[Draft]:
-        """Drafts of the store; what waits on this machine is newer than its like there."""
-        own = [draft for drafts in self._waiting for draft in drafts.newest_first(owner, draft_id)]
+    def _newest_first(self) -> list[Draft]:
+        """Drafts of the user; what waits on this machine is newer than its like there."""
+        own = [draft for drafts in self._waiting for draft in drafts.newest_first(self.owner)]
         try:
-            found = self._kept.newest_first(owner, draft_id)
+            found = self._kept.newest_first(self.owner)
         except OutputError:
             if not own:
                 raise
             return own
         return own + [draft for draft in found if draft.id not in {each.id for each in own}]
 
-    def load(self, session_id: str) -> Session:
-        for draft in self._newest_first(draft_id=session_id):
-            return _session(draft)
-        raise SessionFileError(f"there is no saved inspection {session_id!r}", "Run mlg check to begin a new one.")
-
     def latest(self) -> Session | None:
-        open_ones = (draft for draft in self._newest_first(self.owner) if not draft.complete)
+        open_ones = (draft for draft in self._newest_first() if not draft.complete)
         return next(map(self._readable, open_ones), None)
 
     def unfinished(self, gear_id: str) -> tuple[tuple[Session, ...], tuple[str, ...]]:
         """Return the unfinished sessions of a gear, the last one first, and what could not be read on the way."""
         found, damaged = [], []
         try:
-            for draft in self._newest_first(self.owner):
+            for draft in self._newest_first():
                 if draft.complete:
                     continue
                 try:
@@ -146,7 +141,7 @@ class SessionStore:
     def _readable(self, draft: Draft) -> Session:
         """Read a draft; one that is damaged is said once and put away."""
         try:
-            return _session(draft)
+            return read_session(draft)
         except DamagedSessionError:
             self._save(replace(draft, complete=True), (draft.writer,))
             raise
@@ -154,7 +149,7 @@ class SessionStore:
     def finish(self, session: Session) -> None:
         """Mark a session complete, and delete all but the last few complete ones."""
         self.save(replace(session, complete=True))
-        complete = [draft.id for draft in self._newest_first(self.owner) if draft.complete]
+        complete = [draft.id for draft in self._newest_first() if draft.complete]
         for session_id in complete[_KEPT_COMPLETE:]:
             self.discard(session_id)
 
@@ -165,7 +160,7 @@ class SessionStore:
                 drafts.discard(session_id)
 
 
-def _session(draft: Draft) -> Session:
+def read_session(draft: Draft) -> Session:
     try:
         raw = json.loads(draft.content)
     except (ValueError, RecursionError) as error:

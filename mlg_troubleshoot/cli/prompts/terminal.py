@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterable
-from typing import Protocol
 
 from rich.text import Text
 
@@ -23,20 +22,6 @@ _STYLES = {
     Tone.BAD: "bold red",
 }
 _WIDEST = 80
-
-
-class Terminal(Protocol):
-    """Where questions are asked."""
-
-    @property
-    def width(self) -> int:
-        """Width at this moment. [columns]"""
-
-    def say(self, lines: Iterable[Line]) -> None:
-        """Show lines."""
-
-    def ask(self, prompt: str) -> str:
-        """Ask for one line; EOFError or KeyboardInterrupt if the user ends it."""
 
 
 class RichTerminal:
