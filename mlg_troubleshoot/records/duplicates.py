@@ -34,8 +34,11 @@ def settle_duplicates(
             continue
         for place, row in zip(places, found, strict=True):
             others = [_where(other.source) for other in found if other is not row]
-            problems.append(_problem(record_id, row.source, others, layouts))
-            rows[place] = _refused(row, layouts)
+            header, cell = _column(row.source, layouts)
+            problems.append(_problem(record_id, row.source, others, header, cell))
+            correct = row.correct if isinstance(row, InvalidRow) else ()
+            columns = tuple(dict.fromkeys((header, *correct)))
+            rows[place] = InvalidRow(row.record_id, row.tail_no, row.side, columns, row.warnings, row.source)
     return problems
 
 
@@ -59,17 +62,9 @@ def _column(source: RowSource, layouts: Sequence[SheetLayout]) -> tuple[str, str
     return Kind.RECORD_ID.value, None
 
 
-def _problem(record_id: str, source: RowSource, others: list[str], layouts: Sequence[SheetLayout]) -> Problem:
-    header, cell = _column(source, layouts)
+def _problem(record_id: str, source: RowSource, others: list[str], header: str, cell: str | None) -> Problem:
     shown = ", ".join(others[:3]) + (f" and {len(others) - 3} more" if len(others) > 3 else "")
     expected = f"a record id that no other inspection of the file has; {shown} has it too"
     remedy = "Keep the right row, or give each inspection its own record id."
     place = source.file, source.sheet, source.row, header, cell
     return Problem("record_id_duplicate", *place, record_id, expected, remedy)
-
-
-def _refused(row: Inspection | InvalidRow, layouts: Sequence[SheetLayout]) -> InvalidRow:
-    header, _ = _column(row.source, layouts)
-    correct = row.correct if isinstance(row, InvalidRow) else ()
-    columns = (header, *(c for c in correct if c != header))
-    return InvalidRow(row.record_id, row.tail_no, row.side, columns, row.warnings, row.source)

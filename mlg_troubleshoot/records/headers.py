@@ -139,9 +139,7 @@ def _recognise(  # noqa: PLR0911 - each return is one way to be sure
     if field is not None:
         return Recognition(Standing.CANONICAL if snake == header.strip() else Standing.UNDERSTOOD, field)
     bracketed = [part.strip() for part in _BRACKETS.findall(text)]
-    bare = _BRACKETS.sub(" ", text)
-    bare = bare.replace("_", " ").replace("°", " ")
-    words = _TOKEN.findall(bare)
+    words = _TOKEN.findall(_BRACKETS.sub(" ", text).replace("_", " ").replace("°", " "))
     units, foreign, odd = _units_in(bracketed)
     words, trailing = _trailing_unit(words)
     if trailing is not None:
@@ -190,15 +188,10 @@ def _trailing_unit(words: list[str]) -> tuple[list[str], LengthUnit | None]:
 
 def _by_alias(plain: str, units: set[LengthUnit], foreign: list[str], odd: list[str]) -> Recognition:
     kind = _ALIASES.get(f"{plain} {' '.join(odd)}") if odd else None
-    if kind is not None:
-        odd = []
+    odd = [] if kind is not None else odd
     kind = kind or _ALIASES.get(plain)
-    if kind is None:
+    if kind is None or (kind not in LENGTHS and (units or foreign or odd)):
         return UNKNOWN
-    if kind not in LENGTHS:
-        if units or foreign or odd:
-            return UNKNOWN
-        return Recognition(Standing.UNDERSTOOD, Field(kind))
     field = Field(kind, 1 if kind is Kind.PLUNGER_DISPLACEMENT else None)
     return _with_unit(field, units, foreign, odd)
 
@@ -215,9 +208,8 @@ def _resembles_clearance(
         if number is not None and int(number[1]) in joint_numbers:
             return _doubt("a number alone does not say what was measured", f"clearance_{int(number[1])}")
     rest = said - _CLEARANCE_WORDS - _JOINT_WORDS
-    vocabulary = {word for _, name in names for word in _name_words(name)}
     speaks_of_joint = len(rest) < len(said)
-    named = len(rest) > 1 and rest <= vocabulary
+    named = len(rest) > 1 and rest <= _vocabulary(names)
     if (speaks_of_joint and has_unit and rest) or (named and (speaks_of_joint or has_unit)):
         fitting = [number for number, name in names if rest and rest <= _name_words(name)]
         nearest = f"clearance_{fitting[0]}" if len(fitting) == 1 else None
@@ -292,18 +284,19 @@ def _check_name(kind: Kind, number: int, after: list[str], names: tuple[tuple[in
     """Accept a joint's name behind its number only if it is this joint's, not another's."""
     nearest = f"{kind.value}_{number}"
     said = set(after) - _FILLERS
-    if said:
-        vocabulary = {word for _, name in names for word in _name_words(name)}
-        strange = said - vocabulary
-        if strange:
-            return _doubt(f"{' '.join(after)!r} may make it something else than the clearance", nearest)
-        own = next((_name_words(name) for n, name in names if n == number), frozenset())
-        if not said <= own:
-            others = [n for n, name in names if n != number and said <= _name_words(name)]
-            if others or own:
-                hint = f"; that is joint {others[0]}" if len(others) == 1 else ""
-                return _doubt(f"{' '.join(after)!r} is not the name of joint {number}{hint}", nearest)
+    if said - _vocabulary(names):
+        return _doubt(f"{' '.join(after)!r} may make it something else than the clearance", nearest)
+    own = next((_name_words(name) for n, name in names if n == number), frozenset())
+    if not said <= own:
+        others = [n for n, name in names if n != number and said <= _name_words(name)]
+        if others or own:
+            hint = f"; that is joint {others[0]}" if len(others) == 1 else ""
+            return _doubt(f"{' '.join(after)!r} is not the name of joint {number}{hint}", nearest)
     return Recognition(Standing.UNDERSTOOD, Field(kind, number))
+
+
+def _vocabulary(names: tuple[tuple[int, str], ...]) -> frozenset[str]:
+    return frozenset(word for _, name in names for word in _name_words(name))
 
 
 def _name_words(name: str) -> frozenset[str]:
