@@ -15,7 +15,7 @@ from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.bank import build_bank
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE
-from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
+from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
 from mlg_troubleshoot.diagnosis.extension import Term
@@ -28,9 +28,8 @@ from mlg_troubleshoot.diagnosis.noise import (
     estimate_repeatability,
     measured_uncertainty,
     robust_scale,
-    small_trends,
 )
-from mlg_troubleshoot.diagnosis.scene import Prediction, build_scene, effect_columns
+from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
 from mlg_troubleshoot.diagnosis.screen import shrunk
 from mlg_troubleshoot.diagnosis.simulation.result import Verdict
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
@@ -240,24 +239,25 @@ def diagnose(
         where = where or Discrepancies()
         read = len(table)
         table = _answerable(table)
-        plain, faults = _without_faults(model, table, where, None)
+        (scene, rows), faults = _without_faults(model, table, where, None)
         catalogue = (*CATALOGUE, *own_causes)
-        table = plain.scene.table
         # What never varies cannot be told from a linkage of other dimensions.
-        same = {name for name, values in table.quantities.items() if len(np.unique(values[np.isfinite(values)])) < 2}
-        told = set(table.columns) - same
+        same = {
+            name for name, values in scene.table.quantities.items() if len(np.unique(values[np.isfinite(values)])) < 2
+        }
+        told = set(scene.table.columns) - same
         testable = [cause for cause in catalogue if set(cause.needs) <= told]
         blind = [cause for cause in catalogue if cause not in testable]
         not_testable = tuple((c.name, next(n for n in c.needs if n not in told)) for c in blind)
         rng = np.random.default_rng(seed)
-        case = _infer(plain, (testable, blind), ensemble, permutations, rng, progress)
+        case = _infer(scene, rows, (testable, blind), ensemble, permutations, rng, progress)
         if case.finding.fit is not None:
             # A large effect hides slips of single cells: look again with what is named taken out.
-            again, more = _without_faults(model, table, where, case.explained)
+            again, more = _without_faults(model, scene.table, where, case.explained)
             if more:
                 faults = (*faults, *more)
-                case = _infer(again, (testable, blind), ensemble, permutations, rng, progress)
-        return _report(model, case.plain.scene.table, read, faults, not_testable, case, seed, permutations, rng)
+                case = _infer(*again, (testable, blind), ensemble, permutations, rng, progress)
+        return _report(model, case.scene.table, read, faults, not_testable, case, seed, permutations, rng)
 
 
 @dataclass(frozen=True)
@@ -267,9 +267,9 @@ class _Case:
     candidates: Sequence[Candidate]
     columns: Array
     misfit: Array
-    predicted: Array
     finding: Finding
-    plain: Prediction
+    scene: Scene
+    rows: Rows
     values: Array
     covariance: Array
 
@@ -283,7 +283,7 @@ class _Case:
 
 def _without_faults(
     model: LinkageModel, table: DiagnosisTable, where: Discrepancies, explained: Array | None
-) -> tuple[Prediction, tuple[DataFault, ...]]:
+) -> tuple[tuple[Scene, Rows], tuple[DataFault, ...]]:
     """Predict the rows, those with data faults repaired or set aside, without rows whose linkage does not close."""
     read = len(table)
     table, faults, usable = screen_faults(model, table, explained)
@@ -291,7 +291,7 @@ def _without_faults(
     table = table.take(usable & np.isfinite(table.measured_in))
     _enough(table)
     plain = build_scene(model, table, where)
-    closes = np.isfinite(plain.scene.over_in)
+    closes = np.isfinite(plain[0].over_in)
     if not closes.all():
         table = table.take(closes)
         _enough(table)
@@ -300,15 +300,15 @@ def _without_faults(
 
 
 def _infer(
-    plain: Prediction,
+    scene: Scene,
+    rows: Rows,
     causes: tuple[Sequence[Cause], Sequence[Cause]],
     ensemble: Sequence[LinkageModel],
     permutations: int,
     rng: np.random.Generator,
     progress: Callable[[float], None] | None,
 ) -> _Case:
-    scene, table = plain.scene, plain.scene.table
-    testable, blind = causes
+    table, (testable, blind) = scene.table, causes
     candidates = [candidate for cause in testable for candidate in cause.candidates(scene)]
     candidates += [candidate for cause in blind for candidate in cause.stand_ins(scene)]
     columns = effect_columns(scene, candidates)
@@ -318,19 +318,6 @@ def _infer(
     blocks = [b for cause in testable if isinstance(cause, JointFactors) for b in cause.blocks(scene, ensemble)]
     _comparable(table.measured_in, scene.over_in, ~table.along, blocks)
     misfit = table.measured_in - scene.over_in
-    rows = Rows(
-        scene.over_in,
-        table.tails,
-        table.gears,
-        plain.u_filled_in,
-        plain.u_shared_in,
-        plain.unread_in,
-        plain.along_in,
-        plain.u_read_in,
-        measured_uncertainty(table),
-        plain.drawn_in,
-        *small_trends(table),
-    )
     bank = build_bank(scene, columns)
     finding = infer(misfit, rows, candidates, columns, bank, blocks, permutations, rng, progress)
     values, covariance = np.empty(0), np.empty((0, 0))
@@ -340,7 +327,7 @@ def _infer(
             held, block = columns[:, list(finding.chosen)], finding.block
             expected = misfit - EXPECTED_SLOPE * scene.over_in
             values, covariance = shrunk(finding.noise, held, block.columns, block.covariance, expected)
-    return _Case(candidates, columns, misfit, scene.over_in, finding, plain, values, covariance)
+    return _Case(candidates, columns, misfit, finding, scene, rows, values, covariance)
 
 
 def _answerable(table: DiagnosisTable) -> DiagnosisTable:
@@ -469,7 +456,7 @@ def _report(  # noqa: PLR0913 - everything that a diagnosis says
     named = _named(case)
     read = np.isfinite(table.clearance_in)
     seen = np.asarray(read.any(axis=0))
-    latent = np.where(seen, 0.0, case.plain.scene.clearance_in)
+    latent = np.where(seen, 0.0, case.scene.clearance_in)
     raw = predicted(model, table, np.where(read, table.clearance_in, latent))[0]
     raw_misfit = table.measured_in - raw
     gain = _gain(case, rng) if finding.verdict is Verdict.NAMED and finding.fit is not None else None
@@ -490,8 +477,8 @@ def _report(  # noqa: PLR0913 - everything that a diagnosis says
         rows_read=rows_read,
         rows_used=len(set(table.record_id)),
         unread=tuple(n for n, some in zip(model.joint_numbers, seen, strict=True) if not some),
-        unread_in=float(np.mean(case.plain.scene.contribution_in[:, ~seen].sum(axis=1))),
-        unread_u_in=float(np.sqrt(np.mean(np.sum(case.plain.unread_in**2, axis=1)))),
+        unread_in=float(np.mean(case.scene.contribution_in[:, ~seen].sum(axis=1))),
+        unread_u_in=float(np.sqrt(np.mean(np.sum(case.rows.unread_in**2, axis=1)))),
         mean_in=float(np.mean(raw_misfit)),
         rms_in=float(np.sqrt(np.mean(raw_misfit**2))),
         repeatability_in=repeatability if np.isfinite(repeatability) else None,
@@ -506,7 +493,7 @@ def _report(  # noqa: PLR0913 - everything that a diagnosis says
         remainder_is_noise=finding.verdict is Verdict.NONE
         or (finding.verdict is Verdict.NAMED and finding.remainder_p > 0.05),
         used=table,
-        predicted_in=case.predicted,
+        predicted_in=case.scene.over_in,
         misfit_in=misfit,
         seed=seed,
         permutations=permutations,
@@ -515,9 +502,9 @@ def _report(  # noqa: PLR0913 - everything that a diagnosis says
 
 def _gain(case: _Case, rng: np.random.Generator) -> Gain:
     """What the extension gains on tails that it was not fitted to, on rows if it is about one tail."""
-    finding, table = case.finding, case.plain.scene.table
+    finding, table = case.finding, case.scene.table
     held = case.columns[:, list(finding.chosen)]
-    return measure_gain(finding.noise, held, case.misfit, case.predicted, table, rng, finding.block)
+    return measure_gain(finding.noise, held, case.misfit, case.scene.over_in, table, rng, finding.block)
 
 
 def _corrected(model: LinkageModel, table: DiagnosisTable, named: Sequence[NamedCause]) -> tuple[DataFault, ...]:
@@ -533,33 +520,18 @@ def _corrected(model: LinkageModel, table: DiagnosisTable, named: Sequence[Named
 
 
 def _named(case: _Case) -> tuple[NamedCause, ...]:
-    finding, columns = case.finding, case.columns
-    found = []
+    finding, block, found = case.finding, case.finding.block, []
     p_values = (*finding.p_values, *[None] * len(finding.chosen))
     for place, k in enumerate(finding.chosen if finding.fit is not None else ()):
         value, error = float(case.values[place]), float(np.sqrt(case.covariance[place, place]))
-        found.append(_cause(case.candidates[k], columns[:, k] * value, p_values[place], value, error))
-    if finding.block is not None:
-        block, k = finding.block, len(finding.chosen)
-        change, covariance = case.values[k:], case.covariance[k:, k:]
-        found.append(
-            _cause(
-                block.candidate(change, covariance), block.columns @ change, finding.block_p, 1.0, 0.0, finding.aliases
-            )
-        )
+        interval = value - 1.96 * error, value + 1.96 * error
+        found.append(NamedCause(case.candidates[k], value, interval, case.columns[:, k] * value, p_values[place]))
+    if block is not None:
+        k = len(finding.chosen)
+        change, candidate = case.values[k:], block.candidate(case.values[k:], case.covariance[k:, k:])
+        effect = block.columns @ change
+        found.append(NamedCause(candidate, 1.0, (1.0, 1.0), effect, finding.block_p, finding.aliases))
     return tuple(sorted(found, key=lambda c: -c.effect_rms_in))
-
-
-def _cause(
-    candidate: Candidate,
-    effect: Array,
-    p_value: float | None,
-    value: float,
-    error: float,
-    aliases: tuple[Candidate, ...] = (),
-) -> NamedCause:
-    interval = value - 1.96 * error, value + 1.96 * error
-    return NamedCause(candidate, value, interval, effect, p_value, aliases)
 
 
 def _rivals(candidates: Sequence[Candidate], columns: Array, finding: Finding) -> tuple[NamedCause, ...]:

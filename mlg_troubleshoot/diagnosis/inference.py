@@ -113,15 +113,15 @@ class Finding:
     """
 
     verdict: Verdict
-    chosen: tuple[int, ...]
-    rivals: tuple[int, ...]
-    p_values: tuple[float, ...]
-    variables: tuple[str, ...]
     remainder_p: float
     noise: NoiseModel
-    fit: Fit | None
     smallest_rms_in: float
-    ruled_out: tuple[Key, ...]
+    chosen: tuple[int, ...] = ()
+    rivals: tuple[int, ...] = ()
+    p_values: tuple[float, ...] = ()
+    variables: tuple[str, ...] = ()
+    fit: Fit | None = None
+    ruled_out: tuple[Key, ...] = ()
     block: Block | None = None
     aliases: tuple[Candidate, ...] = ()
     rival: Block | None = None
@@ -198,7 +198,7 @@ class Inference:
         unlisted = unlisted and self._size(noise, none, top) >= SECOND_SHARE * self._explained(noise, none.sum(axis=1))
         variables = self.bank.variables[top] if unlisted else ()
         verdict = Verdict.UNLISTED if variables else Verdict.NONE
-        return Finding(verdict, (), (), (), variables, min(bank_p, p_alarm), noise, None, smallest, ())
+        return Finding(verdict, min(bank_p, p_alarm), noise, smallest, variables=variables)
 
     @cached_property
     def bare(self) -> NoiseModel:
@@ -237,7 +237,7 @@ class Inference:
         constant = self._constant(lead)
         if constant is not None:
             p, variables = constant
-            return Finding(Verdict.UNLISTED, (), (), (p_alarm,), variables, p, self.bare, None, smallest, ())
+            return Finding(Verdict.UNLISTED, p, self.bare, smallest, p_values=(p_alarm,), variables=variables)
         finding = self._with([lead], [p_alarm], self._second([lead], SECOND_SHARE), smallest)
         if finding.verdict is Verdict.UNLISTED:
             # What is left may be a weaker cause of the catalogue: a listed cause goes before an unlisted one.
@@ -266,15 +266,14 @@ class Inference:
         noise, fitted = self._refit(chosen)
         remainder_p, variables, refuted = self._remainder(noise, chosen, fitted)
         ruled_out = tuple(sorted(behind, key=lambda key: behind[key]))
-        if refuted:
-            return Finding(
-                Verdict.UNLISTED, (), (), tuple(p_values), variables, remainder_p, noise, None, smallest, ruled_out
-            )
-        rivals = list(dict.fromkeys(rivals))
-        verdict = Verdict.AMBIGUOUS if rivals or not clear else Verdict.NAMED
-        return Finding(
-            verdict, tuple(chosen), tuple(rivals), tuple(p_values), (), remainder_p, noise, fitted, smallest, ruled_out
+        found = Finding(
+            Verdict.UNLISTED, remainder_p, noise, smallest, (), (), tuple(p_values), variables, None, ruled_out
         )
+        if refuted:
+            return found
+        verdict = Verdict.AMBIGUOUS if rivals or not clear else Verdict.NAMED
+        rivals = list(dict.fromkeys(rivals))
+        return replace(found, verdict=verdict, chosen=tuple(chosen), rivals=tuple(rivals), variables=(), fit=fitted)
 
     def _constant(self, lead: int) -> tuple[float, tuple[str, ...]] | None:
         """Tell whether a shift of all rows alike explains clearly more than any cause; no listed cause does that.
@@ -495,19 +494,18 @@ def infer(  # noqa: PLR0913 - all that a search for causes looks at
     aliases = [] if other is None else [Candidate(other.cause)]
     if _nested(candidates[k].cause for k in plain.chosen) and lead < PAIR_LEAD:
         aliases = [candidates[k] for k in plain.chosen]
-    return Finding(
-        Verdict.AMBIGUOUS if found.verdict is Verdict.AMBIGUOUS and not faint else Verdict.NAMED,
-        chosen,
-        () if faint else tuple(kept[k] for k in found.rivals),
-        () if faint else found.p_values,
-        (),
-        found.remainder_p,
-        noise,
-        fit(noise.beside(block.effects_in), held, whole.misfit),
-        plain.smallest_rms_in,
-        found.ruled_out,
-        block,
-        tuple(aliases),
+    return replace(
+        found,
+        verdict=Verdict.AMBIGUOUS if found.verdict is Verdict.AMBIGUOUS and not faint else Verdict.NAMED,
+        noise=noise,
+        smallest_rms_in=plain.smallest_rms_in,
+        chosen=chosen,
+        rivals=() if faint else tuple(kept[k] for k in found.rivals),
+        p_values=() if faint else found.p_values,
+        variables=(),
+        fit=fit(noise.beside(block.effects_in), held, whole.misfit),
+        block=block,
+        aliases=tuple(aliases),
         block_p=p,
     )
 

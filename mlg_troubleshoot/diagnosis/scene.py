@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.along import displaced, predicted, travel, unknown_along, wear_of_gears
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Scene
+from mlg_troubleshoot.diagnosis.noise import Rows, measured_uncertainty, small_trends
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import likely_clearances
 from mlg_troubleshoot.gear.adjustment import Adjustment
@@ -20,31 +20,8 @@ from mlg_troubleshoot.gear.model import LinkageModel, links_from
 _SHARE_DOUBT = 0.35
 
 
-@dataclass(frozen=True)
-class Prediction:
-    """The plain prediction with what is not known about it.
-
-    scene: model, rows and plain prediction.
-    u_filled_in, u_shared_in, shape (n,): standard uncertainty by clearances that were not read: of each row, and common
-        to a gear's rows. [in]
-    unread_in, shape (n, n_joints): standard uncertainty by the fleet's wear of each joint that nobody read. [in]
-    along_in, shape (n, k): what is not known of rows along the stroke, each at one standard deviation. [in]
-    u_read_in: standard uncertainty by the reading of clearances, root mean square over the rows. [in]
-    drawn_in, shape (n,): by how much the prediction from the readings as they are lies above the one with all of them
-        drawn to their expectation. [in]
-    """
-
-    scene: Scene
-    u_filled_in: Array
-    u_shared_in: Array
-    unread_in: Array
-    along_in: Array
-    u_read_in: float
-    drawn_in: Array
-
-
-def build_scene(model: LinkageModel, table: DiagnosisTable, where: Discrepancies) -> Prediction:
-    """Predict every row with the plain model.
+def build_scene(model: LinkageModel, table: DiagnosisTable, where: Discrepancies) -> tuple[Scene, Rows]:
+    """Predict every row with the plain model; what is known of the rows before their misfit is looked at.
 
     Readings of clearances are drawn to their expectation as far as the measured displacements say that they
     scatter as declared: a gauge that reads better than declared is believed more.
@@ -69,7 +46,19 @@ def build_scene(model: LinkageModel, table: DiagnosisTable, where: Discrepancies
     along = unknown_along(model, table, clearance, scene.over_in, scene.directions)
     if not np.isfinite(table.clearance_in).any():
         along, shared_in = np.hstack([along, wear_of_gears(table, slopes * worn.u_gear_in)]), np.zeros(len(table))
-    return Prediction(scene, filled_in, shared_in, slopes * worn.u_fleet_in, along, u_read, np.nan_to_num(-drawn))
+    return scene, Rows(
+        scene.over_in,
+        table.tails,
+        table.gears,
+        filled_in,
+        shared_in,
+        slopes * worn.u_fleet_in,
+        along,
+        u_read,
+        measured_uncertainty(table),
+        np.nan_to_num(-drawn),
+        *small_trends(table),
+    )
 
 
 def scene_at(

@@ -123,13 +123,13 @@ class _Plan:
 
     def __init__(self, gear: Gear, recorded: set[str], joints: set[int]) -> None:
         table = _fleet(gear, recorded, joints)
-        plain = build_scene(gear.model, table, gear.discrepancies)
-        found = [c for cause in CATALOGUE if set(cause.needs) <= recorded for c in cause.candidates(plain.scene)]
-        found += [c for cause in CATALOGUE if not set(cause.needs) <= recorded for c in cause.stand_ins(plain.scene)]
-        effects = effect_columns(plain.scene, found)
+        scene, rows = build_scene(gear.model, table, gear.discrepancies)
+        found = [c for cause in CATALOGUE if set(cause.needs) <= recorded for c in cause.candidates(scene)]
+        found += [c for cause in CATALOGUE if not set(cause.needs) <= recorded for c in cause.stand_ins(scene)]
+        effects = effect_columns(scene, found)
         effects[:, [not _speaks_for_all(c, table) for c in found]] = 0.0
         tails = TAIL_RATIOS[1] * (table.tails[:, None] == np.unique(table.tails))
-        tails = np.hstack([tails, plain.along_in / ROW_IN])
+        tails = np.hstack([tails, rows.along_in / ROW_IN])
         common = np.linalg.cholesky(np.eye(len(table)) + tails @ tails.T)
         # A slope of the prediction is a cause of its own; a shift of all rows is none.
 
@@ -150,7 +150,7 @@ class _Plan:
         self.stand_ins = {_key(c) for c in found if c.stands_in}
         self.row_in = ROW_IN / float(np.sqrt(len(table)))
         causes = [c for c in CATALOGUE if isinstance(c, JointFactors)]
-        tried = {(c.name, None): c.blocks(plain.scene, gear.ensemble_models[1:]) for c in causes}
+        tried = {(c.name, None): c.blocks(scene, gear.ensemble_models[1:]) for c in causes}
         # Another linkage is known by an ensemble only.
         self.blocks: dict[Key, Array] = {}
         for key, blocks in tried.items() if all(tried.values()) else ():

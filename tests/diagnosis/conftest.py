@@ -69,7 +69,7 @@ def fleet(
 
 def scene_of(model: LinkageModel, table: DiagnosisTable, where: Discrepancies) -> Scene:
     """The plain prediction of a table."""
-    return build_scene(model, table, where).scene
+    return build_scene(model, table, where)[0]
 
 
 def only(cause: Cause, scene: Scene) -> Candidate:

@@ -58,7 +58,7 @@ def cells(found: Diagnosis) -> list[tuple[str, str, str, str | None]]:
 def along(gear: Gear) -> NDArray[np.float64]:
     """What a wrong rate of 1 % does to the rows of a sound rig."""
     table = table_from_inspections(rig(gear), gear, along=True)
-    scene = build_scene(gear.model, table, gear.discrepancies).scene
+    scene = build_scene(gear.model, table, gear.discrepancies)[0]
     return effect(scene, CalibrationRate().adjust(scene, only(CalibrationRate(), scene), 0.01))
 
 

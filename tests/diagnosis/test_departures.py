@@ -198,7 +198,7 @@ def test_the_extension_predicts_the_plunger_as_loaded(gear: Gear) -> None:
     table = FLEETS["loads"](gear)
     extension = ModelExtension(gear, found("loads").terms, 0.002, ("ab",), 200)
     (term,) = extension.terms
-    scene = build_scene(gear.model, table, gear.discrepancies).scene
+    scene = build_scene(gear.model, table, gear.discrepancies)[0]
     moved = adjusted_worst_case(gear.model, term.candidate.cause.adjust(scene, term.candidate, term.value))
     assert moved.over_in == pytest.approx(as_loaded(gear, scene.clearance_in), abs=0.003)
     assert np.array_equal(moved.over_in, moved.under_in)
@@ -239,7 +239,7 @@ def test_a_table_of_the_other_sign_is_still_refused(gear: Gear) -> None:
 def test_a_linkage_that_does_not_close_with_what_was_read_is_not_the_gear_s(gear: Gear) -> None:
     worn = fleet(gear.model)
     worn.clearance_in[0] = 0.018
-    scene = build_scene(gear.model, worn, gear.discrepancies).scene
+    scene = build_scene(gear.model, worn, gear.discrepancies)[0]
     others = gear.ensemble_models[1:]
     closing = [bool(np.isfinite(worst_of_sense(other, scene.clearance_in)[0]).all()) for other in others]
     blocks = OtherGeometry().blocks(scene, others)

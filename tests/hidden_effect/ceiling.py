@@ -38,9 +38,9 @@ def chance(task: Task) -> tuple[str, str, float]:
     ((cause, target),) = fleet.label.causes
     table, gear = as_table(fleet.table), load_gear()
     usable = np.isfinite(table.measured_in)
-    plain = build_scene(gear.model, table.take(usable), gear.discrepancies)
-    rivals = [c for kind in CATALOGUE for c in kind.candidates(plain.scene) if not _same(c.key, (cause, target))]
-    columns = effect_columns(plain.scene, rivals)
+    scene, _rows = build_scene(gear.model, table.take(usable), gear.discrepancies)
+    rivals = [c for kind in CATALOGUE for c in kind.candidates(scene) if not _same(c.key, (cause, target))]
+    columns = effect_columns(scene, rivals)
     truth = fleet.label.truth_term[usable]
     along = truth @ columns
     sign = np.array([c.cause.sign for c in rivals])

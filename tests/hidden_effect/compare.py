@@ -87,10 +87,10 @@ def _diagnosed(table: DiagnosisTable, train: np.ndarray, test: np.ndarray) -> np
     except InconclusiveDataError:
         return np.zeros(int(test.sum()))
     unseen = table.take(test)
-    plain = build_scene(gear.model, unseen, gear.discrepancies)
-    clearance = plain.scene.clearance_in
+    scene, _rows = build_scene(gear.model, unseen, gear.discrepancies)
+    clearance = scene.clearance_in
     terms = adjustment_of(found.terms, gear.model, unseen, clearance, gear.discrepancies)
-    return effect(plain.scene, terms)
+    return effect(scene, terms)
 
 
 def run(seed: int) -> dict[str, Any]:
@@ -102,7 +102,7 @@ def run(seed: int) -> dict[str, Any]:
     usable = np.isfinite(table.measured_in)
     table, truth = table.take(usable), fleet.label.truth_term[usable]
     gear = load_gear()
-    scene = build_scene(gear.model, table, gear.discrepancies).scene
+    scene = build_scene(gear.model, table, gear.discrepancies)[0]
     misfit, x = table.measured_in - scene.over_in, _features(table, scene.over_in)
     tails = np.unique(table.tails)
     held = np.isin(table.tails, tails[:: max(1, len(tails) // 4)][:4])
