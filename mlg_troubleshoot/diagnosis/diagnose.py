@@ -524,14 +524,18 @@ def _named(case: _Case) -> tuple[NamedCause, ...]:
     p_values = (*finding.p_values, *[None] * len(finding.chosen))
     for place, k in enumerate(finding.chosen if finding.fit is not None else ()):
         value, error = float(case.values[place]), float(np.sqrt(case.covariance[place, place]))
-        interval = value - 1.96 * error, value + 1.96 * error
-        found.append(NamedCause(case.candidates[k], value, interval, case.columns[:, k] * value, p_values[place]))
+        effect = case.columns[:, k] * value
+        found.append(NamedCause(case.candidates[k], value, _interval(value, error), effect, p_values[place]))
     if block is not None:
         k = len(finding.chosen)
         change, candidate = case.values[k:], block.candidate(case.values[k:], case.covariance[k:, k:])
         effect = block.columns @ change
         found.append(NamedCause(candidate, 1.0, (1.0, 1.0), effect, finding.block_p, finding.aliases))
     return tuple(sorted(found, key=lambda c: -c.effect_rms_in))
+
+
+def _interval(value: float, error: float) -> tuple[float, float]:
+    return value - 1.96 * error, value + 1.96 * error
 
 
 def _rivals(candidates: Sequence[Candidate], columns: Array, finding: Finding) -> tuple[NamedCause, ...]:
