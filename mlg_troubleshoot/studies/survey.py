@@ -33,13 +33,15 @@ _WIDENED, _STEPS, _KEPT = (300.0, 100.0, 30.0, 10.0, 3.0, 1.0), 6, 6
 # Draws of the prior that are starts beside the ensemble. The loss of a reading where the linkage is open.
 _AROUND, _OPEN, _LAST_STEPS, _TRIALS = 80, 100.0, 25, 8
 # The best few are left and fitted again with uncertainties widened so far, from so many points around each.
-_REHEATED, _AGAIN, _REHEAT_STEPS, _BESIDE = (10.0, 3.0), 12, 4, 0.03
+_REHEATED, _TRIED, _AGAIN, _REHEAT_STEPS, _BESIDE = (10.0, 3.0), 100, 12, 4, 0.03
 # One reading in a hundred is a slip, anywhere within some twenty inches: minus twice the logarithm of that density
 # over the one at no error. Without a limit one large slip would cost more than a wrong linkage with small ones.
 _SLIP = 23.0
-_FREEDOM, _ATTEMPTS, _TRUSTED = 4.0, 2, 6.0
-# Of a fit: each attempt, what does not fit, the modes, the draws.
-_STAGES = _ATTEMPTS + 3
+_FREEDOM, _TRUSTED = 4.0, 6.0
+# Of a fit: the search, that of slips, what does not fit, the modes, the draws.
+_STAGES = 5
+# In search of a slip: so many starts, with so many steps each; the readings likeliest to be one and the best starts.
+_STARTS, _FEW_STEPS, _LIKELIEST, _BEST_STARTS = 10, 3, 6, 3
 # The greatest of forty clean residuals exceeds 3.9 in 0.4 % of surveys, in about 1 % where the fit bends.
 MISFIT = 3.9
 # Two readings contradict each other, neither of them alone is wrong, if leaving out one or the other fits alike.
@@ -200,6 +202,12 @@ class Fitting:
         self.value = np.array([r.value for r in readings])
         self.u = np.array([r.u for r in readings])
 
+    @property
+    def still(self) -> list[int]:
+        """Which of them are read at the reference position, and so need no motion."""
+        moves = (Kind.PLUNGER, Kind.ORDER)
+        return [i for i, r in enumerate(self.readings) if r.extension is None and r.kind not in moves]
+
     def residuals(self, points: Array) -> Array:
         with np.errstate(all="ignore"):
             return np.asarray((self.linkage.predicted(self.readings, points) - self.value) / self.u)
@@ -218,7 +226,7 @@ class Fitting:
         """Damped least squares of all starts at once, in variables in which the prior is the unit sphere."""
         points = points.copy()
         means = np.broadcast_to(self.prior.mean if means is None else means, points.shape)
-        noise = np.broadcast_to(noise, (len(points), len(self.readings)))
+        noise, kept = (np.broadcast_to(each, (len(points), len(self.readings))) for each in (noise, kept))
         loss = self.loss(points, means, widened, kept, robust, noise)
         damping = np.full(len(points), 1e-2)
         moving, n = np.arange(len(points)), points.shape[1]
@@ -226,9 +234,9 @@ class Fitting:
             x, before = points[moving], loss[moving]
             with np.errstate(all="ignore"):
                 found, slopes = self.linkage.slopes(self.readings, x)
-            r = np.where(kept, ((found - self.value) / self.u - noise[moving]) / widened, 0.0)
+            r = np.where(kept[moving], ((found - self.value) / self.u - noise[moving]) / widened, 0.0)
             weight = _robust(r)[1] if robust else np.ones_like(r)
-            g = np.where(kept[:, None], slopes / (self.u * widened)[:, None], 0.0) @ self.prior.root
+            g = np.where(kept[moving][..., None], slopes / (self.u * widened)[:, None], 0.0) @ self.prior.root
             # A position that does not close pulls nowhere.
             bad = ~(np.isfinite(g).all(axis=2) & np.isfinite(r))
             r, g = np.where(bad, 0.0, r), np.where(bad[..., None], 0.0, g)
@@ -239,7 +247,7 @@ class Fitting:
                 at = moving[left]
                 step = np.linalg.solve(gram[left] + damping[at, None, None] * np.eye(n), down[left][..., None])[..., 0]
                 trial = x[left] - np.where(np.isfinite(step), step, 0.0) @ self.prior.root.T
-                new = self.loss(trial, means[at], widened, kept, robust, noise[at])
+                new = self.loss(trial, means[at], widened, kept[at], robust, noise[at])
                 better = new < loss[at]
                 points[at[better]], loss[at[better]] = trial[better], new[better]
                 damping[at] = np.where(better, damping[at] / 5.0, damping[at] * 8.0).clip(1e-9, 1e12)
@@ -258,10 +266,10 @@ class Fitting:
         does not tell stays as the start has it, so that starts which also move are among them.
         """
         everything = np.ones(len(self.readings), dtype=bool)
-        still = tuple(r for r in self.readings if r.extension is None and r.kind not in (Kind.PLUNGER, Kind.ORDER))
+        still = self.still
         starts = points
         if len(still) > 2:
-            standing = Fitting(self.linkage, self.prior, still)
+            standing = Fitting(self.linkage, self.prior, tuple(self.readings[i] for i in still))
             for widened in _WIDENED:
                 points, _ = standing.descend(points, everything[: len(still)], widened, _STEPS, True, starts)
             # Of the linkages that stand right, those that also move are the ones to go on with.
@@ -274,24 +282,70 @@ class Fitting:
                 points, starts = points[order], starts[order]
         return self.descend(points, everything, 1.0, _LAST_STEPS, robust=True)
 
-    def reheated(self, points: Array, rng: Generator) -> tuple[Array, Array]:
+    def suspected(self, starts: Array) -> tuple[Array, Mask]:
+        """Fit what stands still without each reading in turn, and with two distances exchanged; the best few remain.
+
+        A slip leads a fit that begins with it into another valley, where readings that are right look wrong. Only
+        with the few likeliest to be wrong is each other exchanged, from the starts that fitted best without them.
+        Returns the points and, of each, the readings that it keeps.
+        """
+        still = self.still
+        part = Fitting(self.linkage, self.prior, tuple(self.readings[i] for i in still))
+        distances = [i for i, r in enumerate(part.readings) if r.kind is Kind.DISTANCE]
+        if len(distances) < 2:
+            return starts[:0], np.ones((0, len(self.readings)), dtype=bool)
+        kept = np.repeat(~np.eye(len(still), dtype=bool), len(starts), axis=0)
+        points, loss = part.narrowed(np.tile(starts, (len(still), 1)), kept, np.zeros(len(still)))
+        by_start = loss.reshape(len(still), -1)
+        begun, apart = [], []
+        for i in sorted(distances, key=lambda k: float(by_start[k].min()))[:_LIKELIEST]:
+            best = starts[np.argsort(by_start[i])[:_BEST_STARTS]]
+            for j in distances:
+                exchanged = np.zeros((len(best), len(still)))
+                exchanged[:, [i, j]] = np.array([1.0, -1.0]) * (part.value[j] - part.value[i]) / part.u[[i, j]]
+                begun.append(best)
+                apart.append(exchanged)
+        noise = np.concatenate(apart)
+        exchanged_points, exchanged_loss = part.narrowed(np.concatenate(begun), np.ones_like(noise, dtype=bool), noise)
+        points, loss = np.concatenate([points, exchanged_points]), np.concatenate([loss, exchanged_loss])
+        kept = np.concatenate([kept, noise == 0.0])
+        likely = np.argsort(loss)
+        _, first = np.unique(kept[likely], axis=0, return_index=True)
+        likely = likely[np.sort(first)[:_KEPT]]
+        everything = np.ones((len(likely), len(self.readings)), dtype=bool)
+        everything[:, still] = kept[likely]
+        return points[likely], everything
+
+    def narrowed(self, points: Array, kept: Mask, noise: Array) -> tuple[Array, Array]:
+        """Least squares with uncertainties that shrink to their own."""
+        loss = np.zeros(len(points))
+        for widened in _WIDENED:
+            points, loss = self.descend(points, kept, widened, _FEW_STEPS, robust=False, noise=noise)
+        return points, loss
+
+    def reheated(self, points: Array, kept: Mask, rng: Generator) -> tuple[Array, Array]:
         """Fit once more from around each point, as far as wider uncertainties would let it go; the best few remain.
 
         Beside a valley there often lies a better one, behind a low ridge or where more of the readings close.
+        kept, shape (n_points, n_readings): what each is fitted to at first; all of the readings judge in the end.
         """
         everything = np.ones(len(self.readings), dtype=bool)
         with np.errstate(all="ignore"):
             found, slopes = self.linkage.slopes(self.readings, points)
-        weight = np.nan_to_num(_robust((found - self.value) / self.u)[1])
+        weight = np.where(kept, np.nan_to_num(_robust((found - self.value) / self.u)[1]), 0.0)
         g = np.nan_to_num(slopes, posinf=0.0, neginf=0.0) / self.u[:, None] @ self.prior.root
         values, turned = np.linalg.eigh(np.swapaxes(g, 1, 2) @ (weight[..., None] * g))
-        around = [points]
+        around, tried = [points], _AGAIN if kept.all() else _TRIED
         for widened in _REHEATED:
-            z = rng.standard_normal((len(points), _AGAIN, points.shape[1]))
+            z = rng.standard_normal((len(points), tried, points.shape[1]))
             z /= np.sqrt(1.0 + np.maximum(values, 0.0) / widened**2)[:, None]
             trial = points[:, None] + np.einsum("pij,pkj->pki", turned, z) @ self.prior.root.T
             trial = trial.reshape(-1, points.shape[1])
-            around.append(self.descend(trial, everything, widened, _REHEAT_STEPS, robust=True)[0])
+            held = np.repeat(kept, tried, axis=0)
+            # Of many around a fit of what stands still, those that also move are the ones to go on with.
+            loss = self.loss(trial, self.prior.mean, widened, held, robust=True).reshape(len(points), -1)
+            best = (np.argsort(loss, axis=1)[:, :_AGAIN] + tried * np.arange(len(points))[:, None]).ravel()
+            around.append(self.descend(trial[best], held[best], widened, _REHEAT_STEPS, robust=True)[0])
         points, loss = self.descend(np.concatenate(around), everything, 1.0, _STEPS, robust=True)
         points, _ = self._apart(points, loss, 3 * _KEPT)
         points, loss = self.descend(points, everything, 1.0, _LAST_STEPS, robust=True)
@@ -535,15 +589,20 @@ def fit(
     if len(readings) < FEW * len(linkage.names):
         readings = (*readings, prior.order)
     fitting = Fitting(linkage, prior, readings)
-    points = prior.members[:0]
-    for attempt in range(_ATTEMPTS):
-        reached, loss = fitting.robust(np.concatenate([prior.members, prior.closing(_AROUND, rng, readings)]))
-        points, loss = fitting.reheated(np.concatenate([points[:_KEPT], reached[np.argsort(loss)][:_KEPT]]), rng)
-        told(attempt + 1, _STAGES)
-        kept = np.abs(fitting.residuals(points[:1])[0]) < _TRUSTED
+    starts = np.concatenate([prior.members, prior.closing(_AROUND, rng, readings)])
+    points, loss = fitting.robust(starts)
+    points = points[np.argsort(loss)][:_KEPT]
+    everything = np.ones((_KEPT, len(readings)), dtype=bool)
+    points, _ = fitting.reheated(points, everything[: len(points)], rng)
+    told(1, _STAGES)
+    kept = np.abs(fitting.residuals(points[:1])[0]) < _TRUSTED
+    if not kept.all():
         # What does not fit is a slip or another valley.
-        if kept.all():
-            break
+        points, (without, held) = points[:_KEPT], fitting.suspected(starts[:_STARTS])
+        held = np.concatenate([everything[: len(points)], held])
+        points, _ = fitting.reheated(np.concatenate([points, without]), held, rng)
+        kept = np.abs(fitting.residuals(points[:1])[0]) < _TRUSTED
+    told(2, _STAGES)
     modes = fitting.modes(points, np.broadcast_to(prior.mean, points.shape), kept)
     if not modes:
         raise InconclusiveDataError(

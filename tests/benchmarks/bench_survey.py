@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from mlg_troubleshoot.errors import TroubleshootError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.studies.survey import Prior
+from mlg_troubleshoot.studies.survey import Fitting, Prior
 from mlg_troubleshoot.studies.survey_plan import planned, suggested_early
 from mlg_troubleshoot.studies.survey_readings import Kind, Reading, SurveyedLinkage
 from mlg_troubleshoot.studies.survey_result import SurveyResult
@@ -39,8 +39,8 @@ GEAR = load_gear()
 POINTS = ("F", "E", "Q", "4", "1", "2", "3", "5", "6", "7", "8", "9", "10")
 TRAVEL, LIMIT = 0.45, 0.0075
 U = {"DISTANCE": 0.01, "PLUNGER": 0.0015, "EXTENSION": 0.005, "ANGLE": 1.0}
-# Six leave-one-out standard deviations of a distance that the others only just check (a tenth of its variance).
-LEAST_SLIP = 6.0 * U["DISTANCE"] / 0.1**0.5
+# Leave-one-out standard deviations that a slip counts from. No distance has a smaller one than its own uncertainty.
+LEAST_SIZE = 6.0
 SLIPS = ("x25.4", "x2.54", "wrong pin", "swapped pair")
 
 
@@ -147,12 +147,33 @@ def surveyed(
             wrong = hidden.distance(str(rows[i]["from"]), str(rng.choice(others)))
         else:
             wrong, rows_wrong = float(str(rows[j]["value_in"])), {i + 2, j + 2}
-        if abs(wrong - right) >= LEAST_SLIP:
+        if abs(wrong - right) >= LEAST_SIZE * U["DISTANCE"]:
             break
     rows[i]["value_in"] = wrong
     if slip == "swapped pair":
         rows[j]["value_in"] = right
     return rows, rows_wrong
+
+
+def size_of_slip(hidden: Hidden, readings: tuple[Reading, ...], wrong: set[int]) -> float:
+    """How far the wrong readings are from what all right ones predict for them, in its standard deviations; the least.
+
+    The right readings are fitted from the hidden linkage, so that no other valley counts.
+    """
+    linkage, x = SurveyedLinkage(GEAR), hidden.x
+    numbers = {f"{p}.{axis}": x[2 * i + k] for i, p in enumerate(POINTS) for k, axis in enumerate("xy")}
+    turned = dict(
+        zip(("link_assembly.direction", "link_assembly.dihedral", "10.axis"), np.radians(x[-4:-1]), strict=True)
+    )
+    numbers |= {"5.r": numbers["5.x"], **turned, "extension": x[-1], "travel": TRAVEL}
+    prior = Prior(linkage)
+    kept = np.array([r.row not in wrong for r in readings])
+    mode = Fitting(linkage, prior, readings).modes(
+        np.array([[numbers[n] for n in linkage.names]]), prior.mean[None], kept
+    )[0]
+    predicted, slopes = linkage.slopes(readings, mode.vector[None])
+    variance = np.einsum("mi,ij,mj->m", slopes[0], mode.covariance, slopes[0]) + [r.u**2 for r in readings]
+    return float(np.min((np.abs(predicted[0] - [r.value for r in readings]) / np.sqrt(variance))[~kept]))
 
 
 def run(rows: list[dict[str, object]], folder: Path) -> SurveyResult:
@@ -284,16 +305,18 @@ def main() -> None:
         for slip in SLIPS:
             hits = tried = 0
             for _ in range(chosen.slips):
-                rows, wrong = surveyed(drawn(ten, rng), template, rng, slip)
+                hidden = drawn(ten, rng)
+                rows, wrong = surveyed(hidden, template, rng, slip)
                 try:
                     found = run(rows, folder)
                 except TroubleshootError:
                     tried += 1
                     continue
                 assert found.survey is not None
-                sizes = {m.reading.row: abs(m.reading.value - m.expected) / m.spread for m in found.survey.misfits}
+                if size_of_slip(hidden, found.survey.readings, wrong) < LEAST_SIZE:
+                    continue
                 tried += 1
-                hits += bool(wrong & {row for row in sizes if row is not None})
+                hits += wrong <= {m.reading.row for m in found.survey.misfits}
             print(f"slip {slip}: found {ends(hits, tried)} (target 95 %)", flush=True)
 
 

@@ -216,8 +216,9 @@ def test_a_fit_that_is_held_up_is_freed_by_fitting_again_from_around_it(gear: Ge
     linkage = SurveyedLinkage(gear)
     prior = Prior(linkage)
     fitting = Fitting(linkage, prior, read)
-    held_up, before = fitting.descend(prior.members[7:8], np.ones(len(read), dtype=bool), 1.0, 25, robust=True)
-    _, after = fitting.reheated(held_up, np.random.default_rng(0))
+    everything = np.ones((1, len(read)), dtype=bool)
+    held_up, before = fitting.descend(prior.members[7:8], everything, 1.0, 25, robust=True)
+    _, after = fitting.reheated(held_up, everything, np.random.default_rng(0))
     assert before[0] > 100.0
     assert after[0] < 30.0
 
@@ -248,6 +249,21 @@ def test_the_slip_alone_is_named_with_the_unit_that_would_fit(slipped: tuple[Sur
     assert misfit.reading.row == row
     assert "25.4 times too large" in misfit.suggestion
     assert not found.contradicts
+
+
+def named(gear: Gear, read: tuple[Reading, ...], wrong: dict[int, float]) -> dict[int | None, str]:
+    """What a survey says of each misfit, with other values in these rows."""
+    rows = tuple(replace(r, value=wrong.get(r.row or 0, r.value)) for r in read)
+    return {m.reading.row: m.suggestion for m in fit(gear, rows, np.random.default_rng(1)).misfits}
+
+
+def test_a_swapped_pair_in_a_full_survey_is_named_and_nothing_else(gear: Gear, read: tuple[Reading, ...]) -> None:
+    value = {r.row: r.value for r in read}
+    found = named(gear, read, {36: value[37], 37: value[36]})
+    assert {row: words.partition(":")[0] for row, words in found.items()} == {
+        36: "swapped with row 37",
+        37: "swapped with row 36",
+    }
 
 
 def test_the_intervals_hold_the_true_indices_and_are_narrow(slipped: tuple[Survey, int], truth: np.ndarray) -> None:
