@@ -292,7 +292,7 @@ class Fuzz:
         text = damaged(DRAFT, self.rng).decode("utf-8", "replace")
         Drafts(Store(self.store.place)).save(Draft("draft", self.store.owner, "", False, text), ("",))
         try:
-            self.store.load("draft")
+            self.store.latest()
         except TroubleshootError:
             return 2
         return 0
