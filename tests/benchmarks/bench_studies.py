@@ -122,7 +122,7 @@ def _chain_rates() -> list[Line]:
     def own() -> np.ndarray:
         return kernel.batch(0.5, clearance, np.zeros(4), compiled=compiled)
 
-    out = own()
+    own()
     own_rate = count / least(own)
     lines = [Line("small chain, this package", f"{own_rate / 1e6:.1f} M/s", "", None)]
     here = kernel.positions(0.5, kernel.no_clearance())["K"]
