@@ -20,6 +20,7 @@ from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
 from mlg_troubleshoot.gear.directions import worst_case, worst_of_sense
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import links_from
+from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
 
 from .conftest import Array, fleet
 
@@ -192,6 +193,11 @@ def test_a_scale_and_one_direction_are_named_as_directions_of_all_joints_that_ro
         "load_directions",
         {"calibration_rate", "direction_not_worst_case"},
     )
+
+
+def test_what_rows_cannot_tell_from_a_named_cause_is_not_said_to_be_ruled_out() -> None:
+    cause = seven_lines(found("one pin turned"))[2].text
+    assert cause.endswith("Not ruled out besides: none.")
 
 
 def test_the_extension_predicts_the_plunger_as_loaded(gear: Gear) -> None:
