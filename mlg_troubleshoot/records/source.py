@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -31,7 +32,7 @@ class SheetFacts:
     faulty: dict[int, FileRefusedError] = field(default_factory=dict)
 
 
-class Sheet:
+class Sheet(ABC):
     """A table of cells; its name is None in CSV."""
 
     def __init__(self, name: str | None = None, *, hidden: bool = False) -> None:
@@ -44,8 +45,9 @@ class Sheet:
         self.facts = SheetFacts()
         yield from self._read()
 
+    @abstractmethod
     def _read(self) -> Iterator[NumberedRow]:
-        raise NotImplementedError
+        """Read the rows as each kind of file holds them, and note the facts on the way."""
 
     def merged(self) -> Sequence[MergedRange]:
         """Return merged ranges as first row, first column, last row, last column (rows from 1, columns from 0)."""
