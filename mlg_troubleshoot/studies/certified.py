@@ -53,15 +53,13 @@ def certified_bound(
     clearance_in: Array,
     sense: float = 1.0,
     gap_in: float = 1e-6,
-    mid_only: bool = False,
     most_boxes: int = _MOST_BOXES,
 ) -> CertifiedBound:
     """Enclose the largest displacement over all directions and the whole release stroke.
 
     gap_in: wanted difference of bound and best found. [in]
-    mid_only: only at mid-position, else over the whole stroke.
     """
-    search = _Search(model, np.asarray(clearance_in, float), sense, mid_only)
+    search = _Search(model, np.asarray(clearance_in, float), sense)
     waiting = search.start()
     settled, examined = -np.inf, 0
     while waiting.low.size and examined < most_boxes:
@@ -99,7 +97,7 @@ def _halves(boxes: Box, smear: Array) -> Box:
 class _Search:
     """Contracts boxes of the links that have a clearance, and of the stroke; remembers the best it reached."""
 
-    def __init__(self, model: LinkageModel, clearance: Array, sense: float, mid_only: bool) -> None:
+    def __init__(self, model: LinkageModel, clearance: Array, sense: float) -> None:
         self.model = model
         self.clearance = clearance
         self.sense = sense
@@ -108,7 +106,6 @@ class _Search:
         groups = (tuple(worn[n] for n in group if n in worn) for group in model.mechanism.alike)
         self.groups = tuple(group for group in groups if group)
         self.reach = np.array([clearance[list(group)].sum() for group in self.groups])
-        self.over_stroke = not mid_only
         self.stroke = model.stroke[1]
         # The sequential rule is a good start: what it reaches drops most boxes at once.
         moved, directions = worst_of_sense(model, clearance[None], sense)
@@ -119,8 +116,6 @@ class _Search:
     def start(self) -> Box:
         """All directions, and the stroke in some parts."""
         reach = np.repeat(self.reach, 2)[:, None]
-        if not self.over_stroke:
-            return Box(-reach, reach)
         edges = np.linspace(min(self.model.stroke), max(self.model.stroke), _STROKES + 1)
         all_ = np.tile(reach, _STROKES)
         return Box(np.vstack([-all_, edges[:-1]]), np.vstack([all_, edges[1:]]))
@@ -159,20 +154,18 @@ class _Search:
             arc_low, arc_high = _arc(low[rows], high[rows], float(length))
             bottom[rows] = np.fmax(bottom[rows], arc_low)
             top[rows] = np.fmin(top[rows], arc_high)
-        if self.over_stroke:
-            bottom[-1] = np.where(low[-1] > 0.0, top[-1], bottom[-1])
-            top[-1] = np.where(high[-1] < 0.0, boxes.low[-1], top[-1])
-            ends = self.model.stroke
-            # A part of the stroke that is not its end hands its own end to the next part.
-            first, last = min(ends), max(ends)
-            inner = ((low[-1] > 0.0) & (boxes.high[-1] < last)) | ((high[-1] < 0.0) & (boxes.low[-1] > first))
-            bottom[0] = np.where(inner, np.inf, bottom[0])
+        bottom[-1] = np.where(low[-1] > 0.0, top[-1], bottom[-1])
+        top[-1] = np.where(high[-1] < 0.0, boxes.low[-1], top[-1])
+        # A part of the stroke that is not its end hands its own end to the next part.
+        first, last = sorted(self.model.stroke)
+        inner = ((low[-1] > 0.0) & (boxes.high[-1] < last)) | ((high[-1] < 0.0) & (boxes.low[-1] > first))
+        bottom[0] = np.where(inner, np.inf, bottom[0])
         return Box(bottom, top)
 
     def _displacement(self, boxes: Box) -> Range:
         kernel = self.model.kernel
         variables = boxes.variables()
-        stroke = variables.pop() if self.over_stroke else self.model.stroke[1]
+        stroke = variables.pop()
         links: list[Range | float] = list(kernel.no_clearance())
         for k, group in enumerate(self.groups):
             j = group[0]
@@ -191,15 +184,14 @@ class _Search:
         directions = np.zeros((middle.shape[1], len(self.clearance)))
         for k, group in enumerate(self.groups):
             directions[:, list(group)] = np.arctan2(middle[2 * k + 1], middle[2 * k])[:, None]
-        stroke = middle[-1] if self.over_stroke else np.full(len(directions), self.model.stroke[1])
         links = links_from(np.broadcast_to(self.clearance, directions.shape), directions)
-        reached = self.sense * self.model.displacement(links, None, stroke)
+        reached = self.sense * self.model.displacement(links, None, middle[-1])
         if np.any(np.isfinite(reached)):
             top = int(np.nanargmax(reached))
             if reached[top] > self.best:
                 self.best = float(reached[top])
                 self.directions = directions[top].copy()
-                self.stroke = float(stroke[top])
+                self.stroke = float(middle[-1, top])
 
 
 def _arc(low: Array, high: Array, length: float) -> tuple[Array, Array]:

@@ -39,7 +39,7 @@ class Replicated:
     places: Wholes
 
 
-def central_composite(n: int, count: int | None = None) -> Array:
+def central_composite(n: int) -> Array:
     """Corners and axial points of the range.
 
     The paper has 138 points in ten joints and does not say how they are made up. 128 corners are the
@@ -48,30 +48,12 @@ def central_composite(n: int, count: int | None = None) -> Array:
     on. (With all ten at their limits a joint in mid-range would go with high values of the others, which
     adds 0.004 to every first-order index.)
 
-    count: points wanted: the corners and 0, n or 2 n axial points; one centre point may be added. Else the corners
-      and n axial points.
-    Returns, shape (count, n): points of the unit cube. [1]
+    Returns, shape (n_corners + n, n): points of the unit cube. [1]
     Raises `UsageError` if there is no such design.
     """
     if not 2 <= n <= max(_FRACTIONS):
         raise UsageError(f"a central composite design in {n} variables", f"It has 2 to {max(_FRACTIONS)}.")
-    corners, centre = _corners(n), np.full((1, n), 0.5)
-    alternate, upper, lower = (
-        np.where(np.eye(n, dtype=bool), ends, 0.5) for ends in (np.arange(1, n + 1) % 2, 1.0, 0.0)
-    )
-    designs = [
-        np.concatenate([corners, *axial, *middle])
-        for axial in ((), (alternate,), (upper, lower))
-        for middle in ((), (centre,))
-    ]
-    wanted = len(corners) + n if count is None else count
-    for design in designs:
-        if len(design) == wanted:
-            return design
-    raise UsageError(
-        f"a central composite design of {wanted} points in {n} variables",
-        f"Use one of {', '.join(str(len(design)) for design in designs)} points.",
-    )
+    return np.concatenate([_corners(n), np.where(np.eye(n, dtype=bool), np.arange(1, n + 1) % 2, 0.5)])
 
 
 def _corners(n: int) -> Array:

@@ -93,7 +93,7 @@ def replicated_first_order(
             f"a replicated design of {design.n1} × ({design.n2} + {design.n_ccd}) points",
             "It has at least two repetitions and two points in each.",
         )
-    ccd = central_composite(n, design.n_ccd) if design.n_ccd else None
+    ccd = central_composite(n) if design.n_ccd else None
     found: list[Array] = []
     evaluations = failed = 0
     for stream in np.random.SeedSequence(seed).spawn(iterations):
