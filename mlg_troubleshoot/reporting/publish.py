@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import os
-import queue
 import re
+import threading
 import unicodedata
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mlg_troubleshoot.errors import UsageError
@@ -130,22 +130,18 @@ def publish_all(
     *,
     formats: Sequence[str],
     page: str,
-    workers: int | None = None,
     progress: Progress | None = None,
 ) -> list[WrittenReport]:
     """Write many documents, the PDFs in several child processes."""
-    count = max(1, workers or min(4, os.cpu_count() or 1))
-    started = [PdfEngine() for _ in range(count)]
-    engines: queue.SimpleQueue[PdfEngine] = queue.SimpleQueue()
-    for engine in started:
-        engines.put(engine)
+    count = min(4, os.cpu_count() or 1)
+    own, started = threading.local(), list[PdfEngine]()
+
+    def begin() -> None:
+        own.engine = PdfEngine()
+        started.append(own.engine)
 
     def one(document: Document) -> WrittenReport:
-        engine = engines.get()
-        try:
-            return publish(document, directory, formats=formats, page=page, engine=engine)
-        finally:
-            engines.put(engine)
+        return publish(document, directory, formats=formats, page=page, engine=own.engine)
 
     written: list[WrittenReport] = []
     waiting: deque[Future[WrittenReport]] = deque()
@@ -155,10 +151,15 @@ def publish_all(
         if progress is not None:
             progress(len(written), total)
 
-    pool = ThreadPoolExecutor(count)
+    pool = ThreadPoolExecutor(count, initializer=begin)
+    seen: Counter[str] = Counter()
     try:
         for document in documents:
-            waiting.append(pool.submit(one, document))
+            # Files of inspections that carry the same identity are numbered: none overwrites another.
+            seen[document.stem] += 1
+            again = seen[document.stem]
+            named = document if again == 1 else replace(document, stem=f"{document.stem}-{again}")
+            waiting.append(pool.submit(one, named))
             # Documents are handed out a few at a time, so that a long batch does not stand in memory.
             if len(waiting) > 2 * count:
                 take()

@@ -299,27 +299,22 @@ def write_reports(
     """
     if directory.exists() and not directory.is_dir():
         raise OutputError(f"{directory} is a file, not a folder", "Give a folder that you may write to.")
-    from mlg_troubleshoot.reporting import provenance_of
-    from mlg_troubleshoot.reporting import write_reports as write_all
+    from mlg_troubleshoot.reporting import batch_document, inspection_document, provenance_of, publish, publish_all
 
-    return write_all(
-        result.judgements,
-        result.problems,
-        result.gear,
-        directory,
-        formats=formats,
-        page=page,
-        unit=unit,
-        provenance=provenance_of(
-            result.gear,
-            result.inputs_sha256,
-            extension=None if options.extension is None else options.extension.describe(),
-            remembered=options.remembered,
-        ),
-        notes=result.notes,
-        before=before,
-        progress=on_written,
+    gear, judgements, problems = result.gear, result.judgements, result.problems
+    extension = None if options.extension is None else options.extension.describe()
+    made = provenance_of(gear, result.inputs_sha256, extension=extension, remembered=options.remembered)
+    documents = (
+        inspection_document(j, gear, made, problems, unit, steps)
+        for j, steps in zip(judgements, before or [()] * len(judgements), strict=True)
     )
+    reports = publish_all(documents, len(judgements), directory, formats=formats, page=page, progress=on_written)
+    if len(reports) == 1:
+        return tuple(reports)
+    names = ((report.html, report.pdf) for report in reports)
+    links = {place: (html.name if html else "", pdf.name if pdf else "") for place, (html, pdf) in enumerate(names)}
+    summary = batch_document(judgements, problems, gear, made, result.notes, links, unit)
+    return (publish(summary, directory, formats=formats, page=page), *reports)
 
 
 def write_template(

@@ -22,6 +22,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import ReportProvenance, WrittenReport, inspection_document, publish
 from mlg_troubleshoot.studies.index_table import IndexTable
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from mlg_troubleshoot.workflows import check as task
 
 FAILURE = {3: 0.013, 5: 0.007}
 WORN = {1: 0.0020, 2: 0.0031, 3: 0.0126, 4: 0.0041, 5: 0.0068, 6: 0.0012, 7: 0.0023, 8: 0.0018, 9: 0.0009, 10: 0.0021}
@@ -95,6 +96,18 @@ def write_inspection_report(
     """Write the report of one inspection."""
     document = inspection_document(judgement, gear, provenance, problems, unit)
     return publish(document, folder, formats=formats, page=page)
+
+
+def write_reports(
+    judgements: Sequence[Assessment | Rejected],
+    gear: Gear,
+    folder: Path,
+    formats: Sequence[str] = ("html",),
+    on_written: Callable[[int, int], None] | None = None,
+) -> tuple[WrittenReport, ...]:
+    """Write the reports of a batch."""
+    result = task.CheckResult(gear=gear, judgements=tuple(judgements))
+    return task.write_reports(result, task.CheckOptions(), folder, formats, on_written=on_written)
 
 
 @dataclass(frozen=True)

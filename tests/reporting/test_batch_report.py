@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import re
 from collections.abc import Sequence
 from datetime import date
@@ -14,9 +15,9 @@ from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
 from mlg_troubleshoot.decision.order import latest_of_each_gear
 from mlg_troubleshoot.errors import OutputError, Problem
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting import ReportProvenance, WrittenReport, batch_document, publish, write_reports
+from mlg_troubleshoot.reporting import ReportProvenance, WrittenReport, batch_document, publish
 
-from .conftest import FAILURE, SOUND, WORN, Judge, readable
+from .conftest import FAILURE, SOUND, WORN, Judge, readable, write_reports
 from .test_pdf import opened
 
 
@@ -118,31 +119,25 @@ def test_a_long_table_repeats_its_header_on_each_page(
     assert all("Verdict" in text for text in with_rows)
 
 
-def test_a_batch_gets_its_summary_first_then_a_report_a_row(
-    batch: list[Judgement], gear: Gear, provenance: ReportProvenance, tmp_path: Path
-) -> None:
-    written = write_reports(batch, [PROBLEM], gear, tmp_path, provenance=provenance, formats=("html",))
+def test_a_batch_gets_its_summary_first_then_a_report_a_row(batch: list[Judgement], gear: Gear, tmp_path: Path) -> None:
+    written = write_reports(batch, gear, tmp_path)
     assert len(written) == len(batch) + 1
     names = [report.html.name for report in written if report.html]
     assert names[0].startswith("mlg-batch")
     assert "published" in names[2]
 
 
-def test_the_summary_links_the_reports(
-    batch: list[Judgement], gear: Gear, provenance: ReportProvenance, tmp_path: Path
-) -> None:
-    first = write_reports(batch, [], gear, tmp_path, provenance=provenance, formats=("html",))[0]
+def test_the_summary_links_the_reports(batch: list[Judgement], gear: Gear, tmp_path: Path) -> None:
+    first = write_reports(batch, gear, tmp_path)[0]
     assert first.html is not None
     links = re.findall(r'href="([^"#]+)"', first.html.read_text(encoding="utf-8"))
     assert len(links) == len(batch)
     assert all((tmp_path / link).is_file() for link in links)
 
 
-def test_a_link_to_a_long_name_leads_there(
-    judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path
-) -> None:
+def test_a_link_to_a_long_name_leads_there(judge: Judge, gear: Gear, tmp_path: Path) -> None:
     long = [judge(SOUND, tail_no="N" * 40, record_id=f"{n}" * 40) for n in range(2)]
-    first = write_reports(long, [], gear, tmp_path, provenance=provenance, formats=("html",))[0]
+    first = write_reports(long, gear, tmp_path)[0]
     assert first.html is not None
     links = re.findall(r'href="([^"#]+)"', first.html.read_text(encoding="utf-8"))
     assert all(len(link) > 64 and (tmp_path / link).is_file() for link in links)
@@ -192,10 +187,8 @@ def test_earlier_inspections_have_a_table_of_their_own(
     assert "2024-03-01 spring" in second
 
 
-def test_a_link_in_the_pdf_opens_the_pdf_beside_it(
-    twice: list[Judgement], gear: Gear, provenance: ReportProvenance, tmp_path: Path
-) -> None:
-    written = write_reports(twice, [], gear, tmp_path, provenance=provenance, formats=("pdf",))
+def test_a_link_in_the_pdf_opens_the_pdf_beside_it(twice: list[Judgement], gear: Gear, tmp_path: Path) -> None:
+    written = write_reports(twice, gear, tmp_path, ("pdf",))
     assert written[0].pdf is not None
     actions = [
         note.get_object()["/A"]
@@ -207,47 +200,36 @@ def test_a_link_in_the_pdf_opens_the_pdf_beside_it(
     assert files == {report.pdf.name for report in written[1:] if report.pdf}
 
 
-def test_inspections_of_the_same_identity_do_not_overwrite_each_other(
-    judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path
-) -> None:
+def test_inspections_of_the_same_identity_do_not_overwrite_each_other(judge: Judge, gear: Gear, tmp_path: Path) -> None:
     twice = [judge(SOUND), judge(FAILURE)]
-    written = write_reports(twice, [], gear, tmp_path, provenance=provenance, formats=("html",))
+    written = write_reports(twice, gear, tmp_path)
     assert len({report.html for report in written}) == 3
 
 
-def test_one_inspection_gets_no_summary(judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path) -> None:
-    assert len(write_reports([judge(SOUND)], [], gear, tmp_path, provenance=provenance, formats=("html",))) == 1
+def test_one_inspection_gets_no_summary(judge: Judge, gear: Gear, tmp_path: Path) -> None:
+    assert len(write_reports([judge(SOUND)], gear, tmp_path)) == 1
 
 
-def test_progress_counts_every_report(
-    batch: list[Judgement], gear: Gear, provenance: ReportProvenance, tmp_path: Path
-) -> None:
+def test_progress_counts_every_report(batch: list[Judgement], gear: Gear, tmp_path: Path) -> None:
     seen: list[tuple[int, int]] = []
-    write_reports(
-        batch,
-        [],
-        gear,
-        tmp_path,
-        provenance=provenance,
-        formats=("html",),
-        progress=lambda done, total: seen.append((done, total)),
-    )
+    write_reports(batch, gear, tmp_path, on_written=lambda done, total: seen.append((done, total)))
     assert seen == [(n, len(batch)) for n in range(1, len(batch) + 1)]
 
 
 def test_reports_written_in_parallel_equal_reports_written_alone(
-    batch: list[Judgement], gear: Gear, provenance: ReportProvenance, tmp_path: Path
+    batch: list[Judgement], gear: Gear, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def written(folder: str, workers: int) -> dict[str, bytes]:
-        write_reports(batch, [], gear, tmp_path / folder, provenance=provenance, workers=workers)
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1715938200")
+
+    def written(folder: str, cores: int) -> dict[str, bytes]:
+        monkeypatch.setattr(os, "cpu_count", lambda: cores)
+        write_reports(batch, gear, tmp_path / folder, ("html", "pdf"))
         return {path.name: path.read_bytes() for path in (tmp_path / folder).iterdir()}
 
     assert written("a", 1) == written("b", 3)
 
 
-def test_a_folder_that_cannot_be_written_is_named(
-    batch: list[Assessment], gear: Gear, provenance: ReportProvenance, tmp_path: Path
-) -> None:
+def test_a_folder_that_cannot_be_written_is_named(batch: list[Assessment], gear: Gear, tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("a file", encoding="utf-8")
     with pytest.raises(OutputError, match="taken"):
-        write_reports(batch, [], gear, tmp_path / "taken", provenance=provenance, formats=("html",))
+        write_reports(batch, gear, tmp_path / "taken")

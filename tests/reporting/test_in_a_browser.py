@@ -16,9 +16,8 @@ import pytest
 
 from mlg_troubleshoot.decision.assessment import Rejected
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting import ReportProvenance, write_reports
 
-from .conftest import FAILURE, SOUND, WORN, Judge, Made
+from .conftest import FAILURE, SOUND, WORN, Judge, Made, write_reports
 
 pytestmark = pytest.mark.slow
 
@@ -107,10 +106,8 @@ def test_axe_finds_nothing_in_the_report_of_an_invalid_row(
     assert violations(make(rejected, formats=("html",)).html, tmp_path) == []
 
 
-def test_axe_finds_nothing_in_a_batch_summary(
-    judge: Judge, rejected: Rejected, gear: Gear, provenance: ReportProvenance, tmp_path: Path
-) -> None:
-    written = write_reports([judge(FAILURE), rejected], [], gear, tmp_path, provenance=provenance, formats=("html",))
+def test_axe_finds_nothing_in_a_batch_summary(judge: Judge, rejected: Rejected, gear: Gear, tmp_path: Path) -> None:
+    written = write_reports([judge(FAILURE), rejected], gear, tmp_path)
     assert written[0].html is not None
     assert violations(written[0].html.read_text(encoding="utf-8"), tmp_path) == []
 
