@@ -91,15 +91,6 @@ class Prediction:
         return np.where(np.isfinite(z), normal_cdf(np.nan_to_num(z)), 0.0)
 
 
-def clearances(inspections: Sequence[Inspection], gear: Gear, unmeasured: Array) -> Array:
-    filled = np.tile(np.asarray(unmeasured, float), (len(inspections), 1))
-    place = {number: j for j, number in enumerate(gear.joint_numbers)}
-    for row, inspection in enumerate(inspections):
-        for number, value in inspection.clearance_in.items():
-            filled[row, place[number]] = value
-    return filled
-
-
 def predict(
     gear: Gear,
     inspections: Sequence[Inspection],

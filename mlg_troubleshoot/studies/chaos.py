@@ -162,17 +162,9 @@ def total_degree(n: int, degree: int) -> Wholes:
 
 def legendre_terms(unit: Array, exponents: Wholes) -> Array:
     """Orthonormal Legendre polynomials at points of the unit cube, shape (n_points, n_terms). [1]"""
-    x = 2.0 * unit - 1.0
     degree = int(exponents.max(initial=0))
-    count, n = unit.shape
-    values = np.empty((degree + 1, n, count))
-    values[0] = 1.0
-    if degree:
-        values[1] = x.T
-    for k in range(1, degree):
-        values[k + 1] = ((2 * k + 1) * x.T * values[k] - k * values[k - 1]) / (k + 1)
-    values *= np.sqrt(2.0 * np.arange(degree + 1) + 1.0)[:, None, None]
-    flat = values.reshape((degree + 1) * n, count)
+    values = np.moveaxis(np.polynomial.legendre.legvander(2.0 * unit.T - 1.0, degree), -1, 0)
+    flat = (values * np.sqrt(2.0 * np.arange(degree + 1) + 1.0)[:, None, None]).reshape(-1, len(unit))
     places = _factors(exponents.tobytes(), exponents.shape)
     matrix = flat[places[0]]
     for factor in places[1:]:
