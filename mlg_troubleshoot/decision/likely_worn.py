@@ -9,7 +9,6 @@ something other than clearance moves the plunger as well. All of this is assumed
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,40 +23,29 @@ from mlg_troubleshoot.gear.gear import Gear
 _QUANTILES = (0.05, 0.5, 0.95)
 # Below this chance no joint is named as likely worn. [1]
 _WORTH_SAYING = 0.05
+# Assumed before the plunger is read: chance that one link or pivot is worn beyond its limit, either end of a link being
+# as likely. [1]
+_WORN = 0.05
+# Largest clearance of a worn joint in units of its limit. [1]
+_MOST_WORN = 2.0
+# Chance that something other than clearance moves the plunger, and the standard deviation of what it adds, in units of
+# the gear's margin. [1]
+_OTHER_CAUSE, _OTHER_CAUSE_U = 0.05, 2.0
 
 
-@dataclass(frozen=True, slots=True)
-class Prior:
-    """What is assumed before the plunger is read.
-
-    worn: chance that one link or pivot is worn beyond its limit, either end of a link being as likely. [1]
-    most_worn: largest clearance of a worn joint in units of its limit. [1]
-    other_cause: chance that something other than clearance moves the plunger. [1]
-    other_cause_u: standard deviation of what it adds, in units of the gear's margin. [1]
-    """
-
-    worn: float = 0.05
-    most_worn: float = 2.0
-    other_cause: float = 0.05
-    other_cause_u: float = 2.0
-
-
-DEFAULT_PRIOR = Prior()
-
-
-def explain(one: Cases, rng: np.random.Generator, draws: int = 32768, prior: Prior = DEFAULT_PRIOR) -> Posterior | None:
+def explain(one: Cases, rng: np.random.Generator, draws: int = 32768) -> Posterior | None:
     gear, reading = one.gear, float(one.mean_in[0])
     if not np.isfinite(reading):
         return None
-    drawn, log_weight = _draw_clearances(one, rng, draws, prior)
+    drawn, log_weight = _draw_clearances(one, rng, draws)
     turns = rng.uniform(0.0, 2.0 * np.pi, drawn.shape)
     links = np.empty((draws, 2 * drawn.shape[1]))
     links[:, 0::2], links[:, 1::2] = drawn * np.cos(turns), drawn * np.sin(turns)
     predicted = responses(gear)[0].displacement(links)
     u = np.hypot(model_uncertainty(predicted, one.residual_u_in), one.mean_u_in[0])
-    wide = np.hypot(u, prior.other_cause_u * gear.margin.value)
-    plain = np.log1p(-prior.other_cause) - np.log(u) - 0.5 * ((reading - predicted) / u) ** 2
-    other = np.log(prior.other_cause) - np.log(wide) - 0.5 * ((reading - predicted) / wide) ** 2
+    wide = np.hypot(u, _OTHER_CAUSE_U * gear.margin.value)
+    plain = np.log1p(-_OTHER_CAUSE) - np.log(u) - 0.5 * ((reading - predicted) / u) ** 2
+    other = np.log(_OTHER_CAUSE) - np.log(wide) - 0.5 * ((reading - predicted) / wide) ** 2
     top = float(np.max(np.maximum(plain, other) + log_weight))
     by_clearance, by_other = np.exp(plain + log_weight - top), np.exp(other + log_weight - top)
     weight = by_clearance + by_other
@@ -67,7 +55,7 @@ def explain(one: Cases, rng: np.random.Generator, draws: int = 32768, prior: Pri
     return _summary(gear, drawn, worn, weight, float(by_other.sum()) / total)
 
 
-def _draw_clearances(one: Cases, rng: np.random.Generator, n: int, prior: Prior) -> tuple[Array, Array]:
+def _draw_clearances(one: Cases, rng: np.random.Generator, n: int) -> tuple[Array, Array]:
     """Clearances, and the log of prior over proposal: worn joints are drawn more often than they occur. [in, 1]"""
     gear, found, limits = one.gear, one.clearance_in[0], one.gear.limits_in
     drawn = np.empty((n, len(found)))
@@ -78,12 +66,12 @@ def _draw_clearances(one: Cases, rng: np.random.Generator, n: int, prior: Prior)
             if np.isfinite(found[j]):
                 drawn[:, j] = _reading_with_error(float(found[j]), float(one.gauge_u_in[0, j]), rng, n)
                 continue
-            chance = prior.worn / len(group)
+            chance = _WORN / len(group)
             often = 0.2 / len(group)
             is_worn = rng.random(n) < often
             log_weight += np.where(is_worn, np.log(chance / often), np.log((1.0 - chance) / (1.0 - often)))
             within = 1.0 - np.sqrt(1.0 - rng.random(n))
-            beyond = 1.0 + (prior.most_worn - 1.0) * rng.random(n)
+            beyond = 1.0 + (_MOST_WORN - 1.0) * rng.random(n)
             drawn[:, j] = limits[j] * np.where(is_worn, beyond, within)
     return drawn, log_weight
 

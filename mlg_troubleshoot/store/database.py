@@ -318,11 +318,10 @@ class Store:
         with self.transaction(writing=False) as connection:
             return [_record(row) for row in self._rows(connection, *where)]
 
-    def all(self, *kinds: Kind) -> list[Record]:
-        """All records of some kinds, or of every kind, in the order of the chain."""
-        where = [_records.c.kind.in_([kind.value for kind in kinds])] if kinds else []
+    def all(self) -> list[Record]:
+        """All records in the order of the chain."""
         with self.transaction(writing=False) as connection:
-            return [_record(row) for row in self._rows(connection, *where)]
+            return [_record(row) for row in self._rows(connection)]
 
     def verify(self) -> tuple[int, Broken | None]:
         """Walk the chain; return how many records fit and the first one that does not."""

@@ -11,18 +11,17 @@ from scipy.stats import norm
 from mlg_troubleshoot.decision.assessment import Posterior
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.judge_rows import AssessOptions
-from mlg_troubleshoot.decision.likely_worn import Prior, explain
+from mlg_troubleshoot.decision.likely_worn import explain
 from mlg_troubleshoot.gear.gear import Gear
 from tests.benchmarks import worn_gears
 from tests.decision.conftest import Judge, every_joint, inspected
 
 
-def explained(gear: Gear, clearance_in: dict[int, float], reading_in: float, **more: object) -> Posterior:
+def explained(gear: Gear, clearance_in: dict[int, float], reading_in: float) -> Posterior:
     found = explain(
         Cases.of(gear, [inspected(clearance_in, readings_in=(reading_in,))]),
         np.random.default_rng(2),
         draws=4096,
-        **more,
     )
     assert found is not None
     return found
@@ -82,9 +81,11 @@ def test_the_sense_of_the_displacement_tells_little(gear: Gear) -> None:
     assert chance(explained(gear, sound, 0.02), 2) == pytest.approx(chance(explained(gear, sound, -0.02), 2), abs=0.1)
 
 
-def test_what_is_assumed_beforehand_matters_and_can_be_changed(gear: Gear) -> None:
-    often = explained(gear, {}, 0.02, prior=Prior(worn=0.3))
-    seldom = explained(gear, {}, 0.02, prior=Prior(worn=0.01))
+def test_what_is_assumed_beforehand_matters(gear: Gear, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mlg_troubleshoot.decision.likely_worn._WORN", 0.3)
+    often = explained(gear, {}, 0.02)
+    monkeypatch.setattr("mlg_troubleshoot.decision.likely_worn._WORN", 0.01)
+    seldom = explained(gear, {}, 0.02)
     assert often.no_joint_worn < seldom.no_joint_worn
 
 
