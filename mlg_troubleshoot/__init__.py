@@ -49,8 +49,8 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear_file import load_gear as load_gear
     from mlg_troubleshoot.gear.gear_file import shipped_gears as shipped_gears
     from mlg_troubleshoot.schemas import schema as schema
-    from mlg_troubleshoot.studies.findings import StudyFindings as StudyFindings
     from mlg_troubleshoot.studies.index_table import load_index_table as load_index_table
+    from mlg_troubleshoot.studies.study import StudyFindings as StudyFindings
     from mlg_troubleshoot.studies.study import StudyOptions as StudyOptions
     from mlg_troubleshoot.units import ClearanceConvention as ClearanceConvention
     from mlg_troubleshoot.units import LengthUnit as LengthUnit
@@ -75,9 +75,8 @@ _HOME = {
     "gear.gear": "Gear",
     "gear.gear_file": "load_gear shipped_gears",
     "schemas": "schema",
-    "studies.findings": "StudyFindings",
     "studies.index_table": "load_index_table",
-    "studies.study": "StudyOptions",
+    "studies.study": "StudyFindings StudyOptions",
     "units": "ClearanceConvention LengthUnit parse_length",
     "workflows.check": "CheckOptions CheckResult check check_files predict write_reports",
     "workflows.diagnose": "DiagnoseOptions DiagnoseResult diagnose_files load_model_extension",

@@ -180,7 +180,3 @@ class ReadResult:
     @property
     def inspections(self) -> tuple[Inspection, ...]:
         return tuple(row for row in self.rows if isinstance(row, Inspection))
-
-    @property
-    def invalid(self) -> tuple[InvalidRow, ...]:
-        return tuple(row for row in self.rows if isinstance(row, InvalidRow))

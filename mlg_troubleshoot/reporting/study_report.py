@@ -20,9 +20,8 @@ from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.reporting.study_figures import BarSeries
-from mlg_troubleshoot.studies.findings import StudyFindings
 from mlg_troubleshoot.studies.statements import Outcome
-from mlg_troubleshoot.studies.study import Directions
+from mlg_troubleshoot.studies.study import Directions, StudyFindings
 from mlg_troubleshoot.units import LengthUnit
 
 # A reason that explains less than a third of an excess is not its reason.

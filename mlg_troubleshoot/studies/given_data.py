@@ -29,7 +29,6 @@ class GivenDataIndices:
     first_order: Array
     interval: Array
     rows: Wholes
-    classes: Wholes
 
 
 def given_data_indices(
@@ -49,21 +48,21 @@ def given_data_indices(
         )
     n = clearance_in.shape[1]
     first, bounds = np.full(n, np.nan), np.full((n, 2), np.nan)
-    rows, classes = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    rows = np.zeros(n, dtype=np.int64)
     for j in range(n):
         usable = measured & np.isfinite(clearance_in[:, j])
         x, y = clearance_in[usable, j], displacement_in[usable]
         rows[j] = len(x)
         if len(x) < _FEWEST or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
             continue
-        classes[j] = max(2, min(20, round(len(x) ** (1.0 / 3.0) * 1.5)))
-        first[j] = _share(x, y, int(classes[j]))
+        classes = max(2, min(20, round(len(x) ** (1.0 / 3.0) * 1.5)))
+        first[j] = _share(x, y, classes)
         chosen = rng.integers(0, len(x), (resamples, len(x)))
-        spread = np.array([_share(x[pick], y[pick], int(classes[j])) for pick in chosen])
+        spread = np.array([_share(x[pick], y[pick], classes) for pick in chosen])
         # The resampled indices are centred on the estimate: repeated rows make class means too different.
         deviation = np.percentile(spread - np.mean(spread), [2.5, 97.5])
         bounds[j] = first[j] + deviation
-    return GivenDataIndices(first, bounds, rows, classes)
+    return GivenDataIndices(first, bounds, rows)
 
 
 def _share(x: Array, y: Array, classes: int) -> float:

@@ -1,4 +1,4 @@
-"""The study of one gear: a design, indices of every joint, and their spread over the ensemble."""
+"""The study of one gear: a design, indices of every joint, their spread over the ensemble, what goes beside them."""
 
 from __future__ import annotations
 
@@ -24,6 +24,8 @@ from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.studies.paper import PaperDesign, ReplicatedIndices
+    from mlg_troubleshoot.studies.statements import Statement
+    from mlg_troubleshoot.studies.worst_search import WorstSearch
 
 Progress = Callable[[str, int, int | None], None]
 Stages = Callable[[str], Callable[[int, int | None], None]]
@@ -126,6 +128,34 @@ class StudyResult:
     groups: tuple[GroupIndices, ...]
     growth: Amplification
     finished: bool
+
+
+@dataclass(frozen=True, slots=True)
+class StudyFindings:
+    """A study and what was found beside it.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    options : StudyOptions
+        What was asked for.
+    result : StudyResult
+        Indices and amplification.
+    designs : tuple of ReplicatedIndices
+        The paper's designs; empty if they were not run.
+    statements : tuple of Statement
+        What became of the source's statements; empty if they were not checked.
+    searches : tuple of WorstSearch
+        Worst displacement of each sense; empty if it was not looked for.
+    """
+
+    gear: Gear
+    options: StudyOptions
+    result: StudyResult
+    designs: tuple[ReplicatedIndices, ...] = ()
+    statements: tuple[Statement, ...] = ()
+    searches: tuple[WorstSearch, ...] = ()
 
 
 @dataclass(slots=True)

@@ -23,9 +23,8 @@ from mlg_troubleshoot.studies.targets import targets_file
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.reporting import WrittenReport
-    from mlg_troubleshoot.studies.findings import StudyFindings
     from mlg_troubleshoot.studies.given_data import GivenDataIndices
-    from mlg_troubleshoot.studies.study import StudyOptions
+    from mlg_troubleshoot.studies.study import StudyFindings, StudyOptions
     from mlg_troubleshoot.studies.worst_search import WorstSearch
 
 from mlg_troubleshoot.units import LengthUnit
@@ -81,7 +80,6 @@ def run_study(
         If the options do not fit together, or statements are asked for that the gear does not have.
     """
     from mlg_troubleshoot.studies import study
-    from mlg_troubleshoot.studies.findings import StudyFindings
     from mlg_troubleshoot.studies.statements import check_statements
 
     known = gear if isinstance(gear, Gear) else load_gear(gear)
@@ -89,7 +87,7 @@ def run_study(
     told = progress or (lambda _stage, _done, _total: None)
     if statements and not targets_file(known).exists():
         raise UsageError(f"{known.name} has no printed statements", f"Write {targets_file(known).name} beside it.")
-    findings = StudyFindings(known, wanted, study.run_study(known, wanted, told))
+    findings = study.StudyFindings(known, wanted, study.run_study(known, wanted, told))
     if not findings.result.finished:
         return findings
     if designs:

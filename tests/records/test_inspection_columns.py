@@ -374,7 +374,7 @@ def test_a_missing_required_column_is_reported_once_with_the_header_that_may_be_
     doubtful = [p for p in result.problems if p.code == "header_doubtful"]
     assert len(missing) + len(doubtful) >= 1
     assert any("tial_no" in p.remedy for p in result.problems)
-    assert len(result.invalid) == 2
+    assert sum(isinstance(row, InvalidRow) for row in result.rows) == 2
 
 
 def test_a_row_unit_that_contradicts_the_header_is_an_error(read, table):

@@ -12,9 +12,8 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import ReportProvenance, publish
 from mlg_troubleshoot.reporting.study_report import study_document
 from mlg_troubleshoot.studies.certified import CertifiedBound
-from mlg_troubleshoot.studies.findings import StudyFindings
 from mlg_troubleshoot.studies.statements import check_statements
-from mlg_troubleshoot.studies.study import Directions, StudyOptions, compare_designs, run_study
+from mlg_troubleshoot.studies.study import Directions, StudyFindings, StudyOptions, compare_designs, run_study
 from mlg_troubleshoot.studies.worst_search import WorstSearch
 
 from .conftest import readable
