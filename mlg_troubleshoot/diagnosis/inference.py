@@ -22,6 +22,7 @@ from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.chance import Chance
 from mlg_troubleshoot.diagnosis.covariance import NoiseModel
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, Rows, build_noise
+from mlg_troubleshoot.diagnosis.one_by_one import one_by_one
 from mlg_troubleshoot.diagnosis.screen import Fit, Screen, fit, held_out_part
 from mlg_troubleshoot.diagnosis.simulation.result import Verdict
 
@@ -90,6 +91,7 @@ _FOLDS = 5
 # By how many standard errors, and by how much at the least, a value may lie off the only one that it can have.
 _OFF, _OFF_SHARE = 3.5, 0.15
 _PAIR_POOL = 24
+_MOST_CAUSES = 5
 
 
 @dataclass(frozen=True)
@@ -184,7 +186,7 @@ class Inference:
         screen = Screen(noise, self.columns, self.signs, exact=self.exact)
         gain = screen.run(self.misfit[:, None]).gain[:, 0]
         score = gain - self.penalty
-        null = self._null(noise, screen)
+        null = self.null(noise, screen)
         at_random = screen.largest(null, self.penalty)
         lead = int(np.argmax(score)) if len(score) else -1
         p_alarm = Chance(at_random).of(score[lead]) if len(score) else 1.0
@@ -215,7 +217,7 @@ class Inference:
         top = int(np.argmax(gain))
         return top, Chance(screen.largest(null, barred)).of(float(gain[top]))
 
-    def _null(self, noise: NoiseModel, screen: Screen, aside: bool = False) -> Array:
+    def null(self, noise: NoiseModel, screen: Screen, aside: bool = False) -> Array:
         """Draw data sets with nothing wrong; aside from the stream that the rest of the diagnosis draws from."""
         ratio, scale = screen.tail_ratio(self.misfit)
         rng = self.rng.spawn(1)[0] if aside else self.rng
@@ -238,22 +240,20 @@ class Inference:
         if constant is not None:
             p, variables = constant
             return Finding(Verdict.UNLISTED, p, self.bare, smallest, p_values=(p_alarm,), variables=variables)
-        finding = self._with([lead], [p_alarm], self._second([lead], SECOND_SHARE), smallest)
+        alone = _Together(self, (lead,), (p_alarm,), SECOND_SHARE)
+        finding = self._with(one_by_one(alone, _MOST_CAUSES), smallest)
         if finding.verdict is Verdict.UNLISTED:
             # What is left may be a weaker cause of the catalogue: a listed cause goes before an unlisted one.
-            weaker = self._second([lead], WEAK_SHARE)
-            if weaker is not None:
-                again = self._with([lead], [p_alarm], weaker, smallest)
+            weaker = one_by_one(replace(alone, least_share=WEAK_SHARE), _MOST_CAUSES)
+            if len(weaker.chosen) > 1:
+                again = self._with(weaker, smallest)
                 if again.verdict is not Verdict.UNLISTED:
                     return again
         return finding
 
-    def _with(
-        self, chosen: list[int], p_values: list[float], second: tuple[list[int], float] | None, smallest: float
-    ) -> Finding:
-        """Check one cause, or two, against their rivals and against what they leave."""
-        if second is not None:
-            chosen, p_values = second[0], [p_values[0], second[1]]
+    def _with(self, together: _Together, smallest: float) -> Finding:
+        """Check causes against their rivals and against what they leave."""
+        chosen, p_values = list(together.chosen), together.p_values
         rivals: list[int] = []
         behind: dict[Key, float] = {}
         clear = p_values[0] <= NAME
@@ -263,12 +263,10 @@ class Inference:
             chosen[place] = better
             rivals += near
             behind.update(rest)
-        noise, fitted = self._refit(chosen)
+        noise, fitted = self.refit(chosen)
         remainder_p, variables, refuted = self._remainder(noise, chosen, fitted)
         ruled_out = tuple(sorted(behind, key=lambda key: behind[key]))
-        found = Finding(
-            Verdict.UNLISTED, remainder_p, noise, smallest, (), (), tuple(p_values), variables, None, ruled_out
-        )
+        found = Finding(Verdict.UNLISTED, remainder_p, noise, smallest, (), (), p_values, variables, None, ruled_out)
         if refuted:
             return found
         verdict = Verdict.AMBIGUOUS if rivals or not clear else Verdict.NAMED
@@ -287,11 +285,11 @@ class Inference:
         if gain[0] < gain[1] - self.penalty[lead] + CONSTANT:
             return None
         screen = _of_shapes(noise, self.bank.columns, everywhere)
-        top, p = self._strongest(screen, self._null(noise, screen))
+        top, p = self._strongest(screen, self.null(noise, screen))
         variables = self.bank.variables[top] if p <= ALARM else ("all rows",)
         return min(p, ALARM), variables
 
-    def _refit(self, chosen: Sequence[int]) -> tuple[NoiseModel, Fit]:
+    def refit(self, chosen: Sequence[int]) -> tuple[NoiseModel, Fit]:
         """Noise with the chosen causes taken out, and their fit under it; kept, since rivals and pairs ask again."""
         key = tuple(chosen)
         if key not in self._refitted:
@@ -300,47 +298,9 @@ class Inference:
             self._refitted[key] = noise, fit(noise, columns, self.misfit)
         return self._refitted[key]
 
-    def _second(self, chosen: list[int], least_share: float) -> tuple[list[int], float] | None:
-        """Look for the best pair, and accept it if its second cause stands out and is no slip of form."""
-        noise, _fitted = self._refit(chosen)
-        screen = Screen(noise, self.columns, self.signs, exact=self.exact)
-        single = screen.run(self.misfit[:, None]).gain[:, 0] - self.penalty
-        order = np.argsort(-single)
-        pool: list[int] = []
-        seen: set[Key] = set()
-        for k in order:
-            key = self.candidates[int(k)].key
-            if key not in seen:
-                seen.add(key)
-                pool.append(int(k))
-            if len(pool) == _PAIR_POOL:
-                break
-        together = screen.pairs(self.misfit, np.array(pool)) - self.penalty[:, None] - self.penalty[pool]
-        for place, first in enumerate(pool):
-            same = [i for i, c in enumerate(self.candidates) if c.key == self.candidates[first].key]
-            together[same, place] = -np.inf
-        partner, beside = divmod(int(np.argmax(together)), together.shape[1])
-        best = float(together[partner, beside])
-        if not np.isfinite(best):
-            return None
-        pair = [pool[beside], partner]
-        pair.sort(key=lambda k: -single[k])
-        _noise, fitted = self._refit(pair)
-        wrong = [self.signs[k] != 0 and np.sign(v) != self.signs[k] for k, v in zip(pair, fitted.values, strict=True)]
-        if any(wrong):
-            return None
-        sizes = [
-            float(np.sqrt(np.mean((self.columns[:, k] * v) ** 2))) for k, v in zip(pair, fitted.values, strict=True)
-        ]
-        if min(sizes) < least_share * max(sizes):
-            return None
-        held = Screen(noise, self.columns, self.signs, self.columns[:, [pair[0]]], self.exact)
-        p = Chance(held.largest(self._null(noise, held), self.penalty)).of(best - float(np.max(single)))
-        return (pair, p) if p <= SECOND else None
-
     def _rivals(self, lead: int, others: Sequence[int], clear: bool) -> tuple[int, list[int], dict[Key, float]]:
         """Best candidate in the lead's place, the rivals that are near it, and how far the rest is behind."""
-        noise, _fitted = self._refit([lead, *others])
+        noise, _fitted = self.refit([lead, *others])
         screen = Screen(noise, self.columns, self.signs, self.columns[:, list(others)] if others else None, self.exact)
         gain = screen.run(self.misfit[:, None]).gain[:, 0]
         score = gain - self.prior
@@ -384,7 +344,7 @@ class Inference:
         """
         held = self.columns[:, list(chosen)]
         screen = _of_shapes(noise, self.bank.columns, held)
-        null = self._null(noise, screen)
+        null = self.null(noise, screen)
         top, p = self._strongest(screen, null)
         self.progress(0.9)
         known = held @ fitted.values
@@ -423,7 +383,7 @@ class Inference:
             smooth = [(rows, self.bank.smooth[name]) for rows in groups for name in names]
             shapes = np.column_stack([rows * (z - np.mean(z[rows])) for rows, z in smooth])
             screen = _of_shapes(noise, shapes, held)
-            most, p = self._strongest(screen, self._null(noise, screen, aside=True))
+            most, p = self._strongest(screen, self.null(noise, screen, aside=True))
             both = fit(noise, np.column_stack([held, shapes[:, most]]), self.misfit)
             if p <= REFUTED and float(np.std(shapes[:, most])) * abs(float(both.values[-1])) >= OWN_SHARE * own:
                 found = p, (cause.acts_in, names[most % len(names)])
@@ -438,6 +398,94 @@ class Inference:
         """Standard deviation over the rows of a fitted shape, what is named fitted with it. [in]"""
         both = fit(noise, np.column_stack([held, self.bank.columns[:, shape]]), self.misfit)
         return float(np.std(self.bank.columns[:, shape])) * abs(float(both.values[-1]))
+
+
+@dataclass(frozen=True)
+class _Together:
+    """Single causes that explain the misfit together, the chance of as much of each, and how small one may be beside
+    the largest."""
+
+    whole: Inference
+    chosen: tuple[int, ...]
+    p_values: tuple[float, ...]
+    least_share: float
+
+    def further(self) -> _Together | None:
+        """The same with the next cause; beside one the best pair of all, since two may hide each other."""
+        whole, second = self.whole, len(self.chosen) == 1
+        noise, _fitted = whole.refit(self.chosen)
+        found = self._pair(noise) if second else self._next(noise)
+        if found is None or not self._sound(found[0]):
+            return None
+        chosen, gain = found
+        kept = whole.columns[:, chosen[:-1]]
+        if not second and _held_out(noise, whole.columns[:, chosen], None, whole.misfit) >= _held_out(
+            noise, kept, None, whole.misfit
+        ):
+            return None
+        p = self._chance(noise, kept, gain, aside=not second)
+        return replace(self, chosen=tuple(chosen), p_values=(*self.p_values, p)) if p <= SECOND else None
+
+    def without_idle(self) -> _Together | None:
+        """The same without the one that stands out least, if no more than by chance; two stood out as a pair."""
+        whole, found = self.whole, []
+        if len(self.chosen) < 3:
+            return None
+        noise, _fitted = whole.refit(self.chosen)
+        for place, k in enumerate(self.chosen):
+            others = whole.columns[:, [c for c in self.chosen if c != k]]
+            screen = Screen(noise, whole.columns[:, [k]], whole.signs[[k]], others, whole.exact[[k]])
+            gain = float(screen.run(whole.misfit[:, None]).gain[0, 0] - whole.penalty[k])
+            found.append((self._chance(noise, others, gain, aside=True), place))
+        p, place = max(found)
+        if p <= SECOND:
+            return None
+        chosen, p_values = ((*values[:place], *values[place + 1 :]) for values in (self.chosen, self.p_values))
+        return replace(self, chosen=chosen, p_values=p_values)
+
+    def _chance(self, noise: NoiseModel, kept: Array, gain: float, aside: bool) -> float:
+        """Chance of as much by any candidate beside some columns if nothing more is wrong."""
+        whole = self.whole
+        screen = Screen(noise, whole.columns, whole.signs, kept, whole.exact)
+        return Chance(screen.largest(whole.null(noise, screen, aside), whole.penalty)).of(gain)
+
+    def _sound(self, chosen: list[int]) -> bool:
+        """Tell whether each has the sign that it can have, and is no slip of the form of the largest."""
+        whole = self.whole
+        values = whole.refit(chosen)[1].values
+        if np.any((whole.signs[chosen] != 0) & (np.sign(values) != whole.signs[chosen])):
+            return False
+        sizes = np.sqrt(np.mean((whole.columns[:, chosen] * values) ** 2, axis=0))
+        return bool(sizes.min() >= self.least_share * sizes.max())
+
+    def _next(self, noise: NoiseModel) -> tuple[list[int], float] | None:
+        """The cause that explains most beside those chosen, after them, and its gain."""
+        whole, chosen = self.whole, list(self.chosen)
+        screen = Screen(noise, whole.columns, whole.signs, whole.columns[:, chosen], whole.exact)
+        score = screen.run(whole.misfit[:, None]).gain[:, 0] - whole.penalty
+        keys = {whole.candidates[k].key for k in chosen}
+        score[[c.key in keys for c in whole.candidates]] = -np.inf
+        k = int(np.argmax(score))
+        return ([*chosen, k], float(score[k])) if np.isfinite(score[k]) else None
+
+    def _pair(self, noise: NoiseModel) -> tuple[list[int], float] | None:
+        """The best pair of causes, the stronger first, and its gain over the best single cause."""
+        whole = self.whole
+        screen = Screen(noise, whole.columns, whole.signs, exact=whole.exact)
+        single = screen.run(whole.misfit[:, None]).gain[:, 0] - whole.penalty
+        pool: dict[Key, int] = {}
+        for k in np.argsort(-single).tolist():
+            pool.setdefault(whole.candidates[k].key, k)
+            if len(pool) == _PAIR_POOL:
+                break
+        first = np.array(list(pool.values()))
+        together = screen.pairs(whole.misfit, first) - whole.penalty[:, None] - whole.penalty[first]
+        together[[[c.key == key for key in pool] for c in whole.candidates]] = -np.inf
+        partner, beside = divmod(int(np.argmax(together)), together.shape[1])
+        if not np.isfinite(together[partner, beside]):
+            return None
+        pair = sorted([int(first[beside]), partner], key=lambda k: -single[k])
+        return pair, float(together[partner, beside] - np.max(single))
 
 
 def _of_shapes(noise: NoiseModel, shapes: Array, held: Array | None = None) -> Screen:
@@ -670,7 +718,7 @@ def _block_chance(whole: Inference, blocks: Sequence[Block]) -> float:
     noise = build_noise(whole.misfit, whole.rows)
     none = np.empty((len(whole.misfit), 0))
     bare = Screen(noise, none, np.empty(0))
-    sets = np.column_stack([whole.misfit, whole._null(noise, bare, aside=True)])
+    sets = np.column_stack([whole.misfit, whole.null(noise, bare, aside=True)])
     gain = np.max([Screen(noise.beside(b.effects_in), none, np.empty(0)).run(sets).null for b in blocks], axis=0)
     gain -= bare.run(sets).null
     return Chance(gain[1:]).of(float(gain[0]))

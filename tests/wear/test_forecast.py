@@ -91,6 +91,15 @@ def test_the_same_seed_gives_the_same_forecast() -> None:
     assert np.array_equal(one.samples, two.samples)
 
 
+def test_another_seed_tells_the_kinds_alike_where_all_parts_begin_at_exactly_the_same_number() -> None:
+    rng = np.random.default_rng(3)
+    usage = np.linspace(0.0, 1.0, 8)
+    worn = 0.9 + np.cumsum(rng.lognormal(-2.0, 0.3, (20, 1)) * rng.gamma(9.0, 1.0 / 9.0, (20, 7)), axis=1)
+    paths = [WearPath(str(k), usage, np.r_[0.9, each]) for k, each in enumerate(worn)]
+    one, other = (fit_wear(paths, seed=seed).kinds for seed in (0, 1))
+    assert max(abs(one[kind] - other[kind]) for kind in one) < 0.05
+
+
 def test_other_units_of_measurement_give_the_same_forecast(model: WearModel) -> None:
     other = fit_wear(
         [WearPath(p.unit, np.asarray(p.usage) * 1000.0, np.asarray(p.value) * 0.0254) for p in small_fleet()]

@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
 from mlg_troubleshoot.diagnosis.chance import Chance
+from mlg_troubleshoot.diagnosis.one_by_one import one_by_one, settled
 from mlg_troubleshoot.diagnosis.simulation import scatter
 from mlg_troubleshoot.diagnosis.simulation.held_out import folds_of, held_out
 from mlg_troubleshoot.diagnosis.simulation.inputs import checked
@@ -281,6 +282,39 @@ class Point:
         found, _base, cost = self.study.runner.fit(values, active, by.white, self.columns[:, active])
         return found, cost / by.variance
 
+    def further(self) -> Point | None:
+        """The point with one more cause that stands out and helps, fitted anew; None if there is none."""
+        study, told = self.study, self.evidence(self.fixed)
+        good = [int(k) for k in np.argsort(-told.surprise) if told.surprise[k] > -np.log(NAME)]
+        good = [k for k in good if self.helps(k)]
+        contend = [k for k in good if told.surprise[k] >= _CONTENDS * told.surprise[good[0]]][:_CONTENDERS]
+        if not contend:
+            return self._nearer(told)
+        fits = {k: self.fit((*self.chosen, k), self.values) for k in contend}
+        k = min(fits, key=lambda k: fits[k][1])
+        # Of a class that fits alike the first stands for all, so that two sessions call it the same.
+        k = min(j for j in fits if j in study.design.class_of(k) and fits[j][1] < fits[k][1] + 2.0 * RULED_OUT)
+        return Point(study, fits[k][0], (*self.chosen, k))
+
+    def _nearer(self, told: Evidence) -> Point | None:
+        """Try the cause that stands out where what is left looks like a pattern: it may be the bend of its effect."""
+        k = int(np.argmax(told.score[0]))
+        if len(told.score) == 1 or told.chances[0].of(float(told.score[0, k])) > NAME or not self.helps(k):
+            return None
+        chosen = (*self.chosen, k)
+        there = settled(Point(self.study, self.fit(chosen, self.values)[0], chosen))
+        return there if k in there.chosen and there.white is there.plain else None
+
+    def without_idle(self) -> Point | None:
+        """The point without the cause that no longer stands out beside the others; None if all do."""
+        surprise, k = min((float(self.beside_others(k).surprise[k]), k) for k in self.chosen)
+        if surprise > -np.log(NAME):
+            return None
+        values = self.values.copy()
+        values[k] = self.study.runner.nominal[k]
+        chosen = tuple(j for j in self.chosen if j != k)
+        return Point(self.study, self.fit(chosen, values)[0], chosen)
+
     def helps(self, k: int) -> bool:
         """Tell whether a suspect, fitted as well, makes rows smaller that are held out."""
         columns = self.columns / self.scale[:, None]
@@ -346,50 +380,7 @@ class Study:
             size = np.linalg.norm(point.columns[:, : self.count] / point.scale[:, None], axis=0)
             _left, seen = beside(columns[:, : self.count], columns[:, self.count :], size)
             self.design = self.design.within(np.flatnonzero(seen))
-        start = point
-        tried: set[tuple[int, ...]] = {()}
-        while len(point.chosen) < _MOST_CAUSES:
-            told = point.evidence(point.fixed)
-            good = [int(k) for k in np.argsort(-told.surprise) if told.surprise[k] > -np.log(NAME)]
-            good = [k for k in good if point.helps(k)]
-            contend = [k for k in good if told.surprise[k] >= _CONTENDS * told.surprise[good[0]]][:_CONTENDERS]
-            if not contend:
-                nearer = self._nearer(point, told)
-                if nearer is None:
-                    break
-                point = nearer
-                continue
-            fits = {k: point.fit((*point.chosen, k), point.values) for k in contend}
-            k = min(fits, key=lambda k: fits[k][1])
-            # Of a class that fits alike the first stands for all, so that two sessions call it the same.
-            alike = [j for j in fits if j in self.design.class_of(k) and fits[j][1] < fits[k][1] + 2.0 * RULED_OUT]
-            k = min(alike)
-            point = self._settled(Point(self, fits[k][0], (*point.chosen, k)))
-            if tuple(sorted(point.chosen)) in tried:
-                break
-            tried.add(tuple(sorted(point.chosen)))
-        return start, point
-
-    def _nearer(self, point: Point, told: Evidence) -> Point | None:
-        """Try the cause that stands out where what is left looks like a pattern: it may be the bend of its effect."""
-        k = int(np.argmax(told.score[0]))
-        if len(told.score) == 1 or told.chances[0].of(float(told.score[0, k])) > NAME or not point.helps(k):
-            return None
-        chosen = (*point.chosen, k)
-        there = self._settled(Point(self, point.fit(chosen, point.values)[0], chosen))
-        return there if k in there.chosen and there.white is there.plain else None
-
-    def _settled(self, point: Point) -> Point:
-        """Leave out again what no longer stands out beside the others."""
-        while len(point.chosen) > 1:
-            surprise, k = min((float(point.beside_others(k).surprise[k]), k) for k in point.chosen)
-            if surprise > -np.log(NAME):
-                break
-            values = point.values.copy()
-            values[k] = self.runner.nominal[k]
-            chosen = tuple(j for j in point.chosen if j != k)
-            point = Point(self, point.fit(chosen, values)[0], chosen)
-        return point
+        return point, one_by_one(point, _MOST_CAUSES)
 
     def rivals(self, point: Point, k: int) -> list[int]:
         """Suspects that could stand in the place of a cause, the nearest first."""

@@ -1,0 +1,44 @@
+"""Several causes at once: added one by one while each earns its place, left out again where others make it idle."""
+
+from __future__ import annotations
+
+from typing import Protocol, Self, TypeVar
+
+
+class Explanation(Protocol):
+    """Causes that explain data together, by their places in a list of candidates."""
+
+    @property
+    def chosen(self) -> tuple[int, ...]:
+        """The causes."""
+
+    def further(self) -> Self | None:
+        """The same with one more, if one stands out beyond chance and makes rows smaller that are held out."""
+
+    def without_idle(self) -> Self | None:
+        """The same without the one that stands out least, if it does so no more than by chance beside the others."""
+
+
+E = TypeVar("E", bound=Explanation)
+
+
+def one_by_one(explanation: E, most: int) -> E:
+    """Add causes until none earns its place any more, or one comes back to what was tried."""
+    tried = {tuple(sorted(explanation.chosen))}
+    while len(explanation.chosen) < most:
+        more = explanation.further()
+        if more is None:
+            break
+        explanation = settled(more)
+        key = tuple(sorted(explanation.chosen))
+        if key in tried:
+            break
+        tried.add(key)
+    return explanation
+
+
+def settled(explanation: E) -> E:
+    """Leave out again what no longer stands out beside the others."""
+    while len(explanation.chosen) > 1 and (fewer := explanation.without_idle()) is not None:
+        explanation = fewer
+    return explanation
