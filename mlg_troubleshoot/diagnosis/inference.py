@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import chi2
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.diagnosis.bank import WITHIN, Bank
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.causes.together import Block
@@ -418,12 +418,9 @@ class _Together:
         if found is None or not self._sound(found[0]):
             return None
         chosen, gain = found
-        kept = whole.columns[:, chosen[:-1]]
-        if not second and _held_out(noise, whole.columns[:, chosen], None, whole.misfit) >= _held_out(
-            noise, kept, None, whole.misfit
-        ):
+        if not second and not self._helps(noise, chosen):
             return None
-        p = self._chance(noise, kept, gain, aside=not second)
+        p = self._chance(noise, whole.columns[:, chosen[:-1]], gain, aside=not second)
         return replace(self, chosen=tuple(chosen), p_values=(*self.p_values, p)) if p <= SECOND else None
 
     def without_idle(self) -> _Together | None:
@@ -448,6 +445,18 @@ class _Together:
         whole = self.whole
         screen = Screen(noise, whole.columns, whole.signs, kept, whole.exact)
         return Chance(screen.largest(whole.null(noise, screen, aside), whole.penalty)).of(gain)
+
+    def _helps(self, noise: NoiseModel, chosen: Sequence[int]) -> bool:
+        """Tell whether the last one makes tails that are held out likelier, a shift common to them being noise."""
+        before, after = (
+            _left_out(noise, self.whole.columns[:, list(held)], None, self.whole.misfit)
+            for held in (chosen[:-1], chosen)
+        )
+        both, ratio = np.column_stack([before, after]), noise.tail_ratios[-1]
+        folds = _folds(noise)
+        parts = [noise.take(folds == k).square(both[folds == k], ratio) for k in np.unique(folds)]
+        square = np.sum(parts, axis=0)
+        return bool(square[1] < square[0])
 
     def _sound(self, chosen: list[int]) -> bool:
         """Tell whether each has the sign that it can have, and is no slip of the form of the largest."""
@@ -639,8 +648,11 @@ def _single(
     needed = NESTED if nested and block.cause.bounded else needed
     rejects = rejected < SCALE_REJECTED and lead >= SCALE_LEAD
     allowed = PAIR_WORSE if needed < BLOCK_LEAD or rejects else 1.0
-    smaller = _held_out(noise, columns[:, list(plain.chosen)], None, whole.misfit)
-    worse = _held_out(noise, columns[:, list(chosen)], block, whole.misfit) > allowed * smaller
+    smaller, larger = (
+        float(np.mean(_left_out(noise, columns[:, list(held)], with_it, whole.misfit) ** 2))
+        for held, with_it in ((plain.chosen, None), (chosen, block))
+    )
+    worse = larger > allowed * smaller
     if not worse and (lead >= needed or rejects):
         return None
     one_scale = bool(named) and named[0].one_scale
@@ -668,10 +680,14 @@ def _one_scale_rejected(noise: NoiseModel, held: Array, scale: Array, block: Blo
     return float(chi2.sf(2.0 * (free - one), max(block.columns.shape[1] - 1, 1)))
 
 
-def _held_out(noise: NoiseModel, held: Array, block: Block | None, misfit: Array) -> float:
-    """Mean square misfit that a model leaves on tails that it was not fitted to. [in²]"""
-    fold = (noise.tails if noise.tails.max() >= 3 else np.arange(len(misfit))) % _FOLDS
-    return float(np.mean((misfit - held_out_part(noise, held, misfit, fold, block)) ** 2))
+def _left_out(noise: NoiseModel, held: Array, block: Block | None, misfit: Array) -> Array:
+    """Misfit that a model leaves on tails that it was not fitted to. [in]"""
+    return misfit - held_out_part(noise, held, misfit, _folds(noise), block)
+
+
+def _folds(noise: NoiseModel) -> Wholes:
+    """Number the fold in which each row is held out, with its tail where there are enough."""
+    return (noise.tails if noise.tails.max() >= 3 else np.arange(len(noise.tails))) % _FOLDS
 
 
 def _class_of(

@@ -54,6 +54,7 @@ PLAN: dict[str, int] = {
     "missing_column": 60,
     "rounded:10": 140,
     "rounded:15": 70,
+    "triple": 150,
 }
 
 
@@ -208,6 +209,7 @@ def summarise(records: list[Record]) -> dict[str, Any]:
     alarmed = [r for g, rows in by_group.items() if g.startswith(named_kinds) for r in rows]
     alarmed = [r for r in alarmed if r["verdict"] in {"NAMED", "AMBIGUOUS", "UNLISTED"}]
     both_strong = [r for r in by_group["double"] if min(r["strengths"], default=0.0) >= 9.5]
+    triple = [r for r in by_group["triple"] if min(r["strengths"], default=0.0) >= 9.5]
     gains = [r["share_of_true_gain"] for r in strong if r["right"] and r.get("share_of_true_gain") is not None]
     extended = [r for r in every if "worse" in r]
     faults = sum(r["faults"] for r in every)
@@ -255,6 +257,11 @@ def summarise(records: list[Record]) -> dict[str, Any]:
         "two causes, each S >= 10: both named": rate(both_strong, "right"),
         "two causes, each S without the common shift >= 10: both named": rate(
             [r for r in both_strong if least(r) >= 9.5], "right"
+        ),
+        "three causes, each S >= 10: all named": rate(triple, "right"),
+        "three causes, each S >= 10: something else named": rate(triple, "wrong"),
+        "three causes, each S without the common shift >= 10: all named": rate(
+            [r for r in triple if least(r) >= 9.5], "right"
         ),
         "needed column removed: not misnamed": rate(by_group["missing_column"], lambda r: not r["wrong"]),
         "uniquely named extension makes unseen rows worse": rate(extended, "worse"),

@@ -34,6 +34,7 @@ CASES: tuple[tuple[str, dict[str, Any]], ...] = (
     *(("off_catalogue", {"cause": cause, "strength": STRENGTH}) for cause in OFF_CATALOGUE),
     ("aliased", {"strength": STRENGTH}),
     ("double", {"strength": STRENGTH}),
+    ("triple", {"strength": STRENGTH}),
 )
 PLACE = {words.get("cause") or words.get("null") or kind: k for k, (kind, words) in enumerate(CASES)}
 
@@ -162,6 +163,11 @@ def test_causes_that_cannot_be_told_apart_do_not_extend_the_model() -> None:
 def test_two_hidden_causes_are_both_named() -> None:
     found = case("double")
     assert (found.diagnosis.verdict, found.named) == ("NAMED", found.hidden)
+
+
+def test_three_hidden_causes_are_all_named() -> None:
+    found = case("triple")
+    assert found.named == found.hidden
 
 
 def test_two_named_causes_gain_on_rows_that_the_fit_never_saw() -> None:

@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 #: Kinds of nothing-wrong fleets.
 NULLS = ("iid", "heavy_tails", "tail_scatter", "confounded", "growing_noise", "n500")
 #: Kinds of fleets; ``mix`` draws one of the others.
-KINDS = ("null", "single", "double", "off_catalogue", "aliased", "missing_column", "confounded")
-_MIX = (0.22, 0.24, 0.12, 0.22, 0.05, 0.11, 0.04)
+KINDS = ("null", "single", "double", "off_catalogue", "aliased", "missing_column", "confounded", "triple")
+_MIX = (0.22, 0.24, 0.12, 0.22, 0.05, 0.11, 0.04, 0.0)
 _ALIAS_CAUSES = {
     "gauge_technician": ("gauge_bias", "technician_bias"),
     "tail_gauge": ("rigging_offset", "gauge_bias"),
@@ -582,7 +582,7 @@ def draw_spec(
     kind : str
         One of ``KINDS``, or ``mix``.
     strength : float, optional
-        Requested S of every effect; drawn from 5, 7, 10, 15 and 25 if None (10 and more for two causes) [-].
+        Requested S of every effect; drawn from 5, 7, 10, 15 and 25 if None (10 and more for several causes) [-].
     cause : str, optional
         Name of the (first) cause; drawn if None.
     target : str, optional
@@ -636,10 +636,13 @@ def draw_spec(
         spec = replace(spec, drop_columns=causes.CATALOGUE[name].columns)
     if kind == "confounded":
         spec = replace(spec, arrangement="confounded")
-    if kind == "double":
+    if kind in ("double", "triple"):
         second = str(rng.choice([other for other in names if other != name]))
         size = strength if strength is not None else float(rng.choice([10.0, 15.0, 25.0]))
         spec = replace(spec, effects=(EffectSpec(name, target, size), EffectSpec(second, None, size)))
+    if kind == "triple":
+        third = str(rng.choice([other for other in names if other not in (name, second)]))
+        spec = replace(spec, effects=(*spec.effects, EffectSpec(third, None, size)))
     for effect in spec.effects:
         spec = _with_pump(spec, effect.cause)
     return spec
