@@ -153,19 +153,19 @@ def _assessment(
     )
 
 
+_PROVISIONAL = (
+    f"provisional: the larger of {PROVISIONAL_U_IN:g} in and {100 * PROVISIONAL_U_SHARE:.0f} % of the prediction, "
+    "because one published failure gives none"
+)
+
+
 def _budget(batch: BatchPrediction, cases: Cases, i: int) -> UncertaintyBudget:
-    source = (
-        f"provisional: the larger of {PROVISIONAL_U_IN:g} in and {100 * PROVISIONAL_U_SHARE:.0f} % of the prediction, "
-        "because one published failure gives none"
-        if cases.extension is None
-        else f"residual scatter of the diagnosis ({cases.extension.describe()})"
-    )
+    extension = cases.extension
+    source = _PROVISIONAL if extension is None else f"residual scatter of the diagnosis ({extension.describe()})"
     lower = batch.lower
+    by_joint = dict(zip(cases.gear.joint_numbers, lower.u_readings_in[i].tolist(), strict=True))
     return UncertaintyBudget(
-        {
-            joint: float(lower.u_readings_in[i, cases.gear.joint_numbers.index(joint)])
-            for joint in cases.inspections[i].clearance_in
-        },
+        {joint: by_joint[joint] for joint in cases.inspections[i].clearance_in},
         float(lower.u_geometry_in[i]),
         float(lower.u_model_in[i]),
         float(cases.margin_u_in[i]),

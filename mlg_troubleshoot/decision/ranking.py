@@ -33,6 +33,8 @@ def rank_joints(
     contribution = ensemble_amplification(gear) * assumed[:, None, :]
     places = _places(over[:, None, :], contribution, table.total_order)
     best, worst = places.min(axis=1).tolist(), places.max(axis=1).tolist()
+    # There are few ranges: a large batch holds each of them once.
+    ranges: dict[tuple[int, int], tuple[int, int]] = {}
     ranks, known, above = places[:, 0].tolist(), clearance_in.tolist(), over.tolist()
     room = np.full(clearance_in.shape, np.nan) if allowance_in is None else allowance_in
     allowed = np.where(np.isfinite(room), room, np.nan).tolist()
@@ -51,7 +53,7 @@ def rank_joints(
             total_order=indices.total_order,
             plunger_amplification=indices.plunger_amplification,
             rank=ranks[i][j],
-            rank_range=(best[i][j], worst[i][j]),
+            rank_range=ranges.setdefault((span := (best[i][j], worst[i][j])), span),
             alike=gear.alike[joint.number],
             allowance_in=None if allowed[i][j] != allowed[i][j] else allowed[i][j],
         )

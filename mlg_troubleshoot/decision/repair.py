@@ -36,6 +36,8 @@ class Subsets:
     weights: the same as 0 and 1, for sums. [1]
     alike: the same number for subsets of equally many joints in equal minutes.
     pairs: 1 where both joints of a pair are members, the pairs as in an upper triangle. [1]
+    joints: numbers of the joints of each.
+    to_measure: minutes to read them.
     """
 
     members: Mask
@@ -43,6 +45,8 @@ class Subsets:
     minutes: Array
     alike: Places
     pairs: Array
+    joints: Sequence[tuple[int, ...]]
+    to_measure: Sequence[float]
 
 
 @lru_cache(maxsize=4)
@@ -51,14 +55,21 @@ def subsets_of(gear: Gear) -> Subsets:
     n = len(gear.joints)
     members = ((np.arange(2**n)[:, None] >> np.arange(n)) & 1).astype(bool)
     numbers = np.array(gear.joint_numbers)
-    minutes = np.array([minutes_to_restore(gear, [int(k) for k in numbers[row]]) for row in members])
+    minutes = np.array([minutes_to_restore(gear, numbers[row].tolist()) for row in members])
     order = np.lexsort((members.sum(axis=1), np.round(minutes, 6)))
     members, minutes = members[order], minutes[order]
+    joints = [tuple(numbers[row].tolist()) for row in members]
     first, second = np.triu_indices(n)
     keys = np.column_stack([np.round(minutes, 6), members.sum(axis=1)])
     alike = np.cumsum(np.r_[0, np.any(np.diff(keys, axis=0) != 0.0, axis=1)])
     return Subsets(
-        members, members.astype(float), minutes, alike, (members[:, first] & members[:, second]).astype(float)
+        members,
+        members.astype(float),
+        minutes,
+        alike,
+        (members[:, first] & members[:, second]).astype(float),
+        joints,
+        [minutes_to_measure(gear, each) for each in joints],
     )
 
 
@@ -195,13 +206,11 @@ def repair_sets(cases: Cases, found: Search, wanted: Mask) -> list[tuple[RepairS
         return [tuple(sets) for sets in result]
     sets = sets.astype(np.intp)
     prediction, p = _restored(cases, rows, sets)
-    moved, numbers = prediction.displacement_in, np.array(cases.gear.joint_numbers)
+    moved = prediction.displacement_in
     for k in np.flatnonzero(p >= CONFORMANCE):
-        joints = tuple(numbers[table.members[sets[k]]].tolist())
-        minutes = float(table.minutes[sets[k]])
-        result[rows[k]].append(
-            RepairSet(joints, float(moved[k]), float(p[k]), minutes_to_measure(cases.gear, joints), minutes)
-        )
+        which = sets[k]
+        minutes = table.to_measure[which], float(table.minutes[which])
+        result[rows[k]].append(RepairSet(table.joints[which], float(moved[k]), float(p[k]), *minutes))
     return [tuple(sets) for sets in result]
 
 
