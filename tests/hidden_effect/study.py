@@ -54,7 +54,6 @@ PLAN: dict[str, int] = {
     "missing_column": 60,
     "rounded:10": 140,
     "rounded:15": 70,
-    "triple": 150,
 }
 
 
