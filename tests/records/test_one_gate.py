@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 from dataclasses import dataclass, replace
 
 import pytest
@@ -25,7 +26,12 @@ VALUES = (
     *("inf", "1e309", "0.013 cm", "x", "0.0.13", "50 thou", "51 thou", "1.27 mm"),
 )
 MARGINS = ("0.03", "0.2in", "0.3in", "0", "-0.03", "0.762 mm")
-NUMBERS = (0.0, 0.013, 0.015, 0.0151, 0.05, 0.0501, 0.33, -0.013, math.nan, math.inf, 13.0)
+# The same as numbers in inches, as Python has them.
+NUMBERS = (
+    *(0.0, 0.0001, 0.004, 0.007, 0.0075, 0.01, 0.013, 0.33 / 25.4, 0.381 / 25.4, 0.015, 0.0151, 0.02, 0.05, 0.0501),
+    *(0.1, 0.33, 0.5, 1.0, 13.0, 1e6, -0.0001, -0.013, math.nan, math.inf),
+)
+MARGIN_NUMBERS = (0.03, 0.2, 0.3, 0.0, -0.03, 0.762 / 25.4)
 
 
 @dataclass(frozen=True)
@@ -65,7 +71,7 @@ def by_flag(gear: Gear, value: str, margin: str, convention: Convention) -> Foun
 
 def words(error: TroubleshootError) -> str:
     """Return a refusal as expectation and remedy, without the name of what was refused."""
-    expected = [part.partition("expected ")[2] for part in error.message.split("; --")]
+    expected = [part.partition("expected ")[2] for part in re.split(r"; (?=--|clearance|margin)", error.message)]
     return " ".join([*expected, error.remedy])
 
 
@@ -87,6 +93,19 @@ def by_prompt(gear: Gear, value: str, margin: str, convention: Convention) -> Fo
     return Found(row.clearance_in[3], row.margin_in, row.warnings)
 
 
+def by_python(gear: Gear, value: float, margin: float, convention: Convention) -> Found:
+    given = Inspection("R1", "N1", Side.LH, convention, {3: value}, margin_in=margin)
+    try:
+        found = check(given, gear, advice=False)
+    except TroubleshootError as error:
+        return Found(refused=words(error))
+    assert found.margin_in == margin
+    row = judge_again(given, ReadOptions.of(gear))
+    assert set(row.warnings) <= set(found.warnings)
+    assert found.inspection.clearance_in == row.clearance_in
+    return Found(row.clearance_in[3], row.margin_in, row.warnings)
+
+
 def said(found: Found) -> set[str]:
     return set(found.refused.replace(".", "").split())
 
@@ -103,16 +122,14 @@ def test_a_value_gives_the_same_as_a_cell_a_flag_and_a_prompt_answer(gear: Gear,
 
 @pytest.mark.parametrize("value", NUMBERS)
 @pytest.mark.parametrize("convention", Convention)
-def test_a_number_gives_the_same_in_python_as_in_a_cell(gear: Gear, value: float, convention: Convention) -> None:
-    cell = by_cell(gear, value, "0.03", convention)
-    given = Inspection("R1", "N1", Side.LH, convention, {3: value}, margin_in=0.03)
-    try:
-        row = judge_again(given, ReadOptions.of(gear))
-        found = Found(row.clearance_in[3], row.margin_in, row.warnings)
-    except TroubleshootError as error:
-        found = Found(refused=words(error))
-    assert replace(found, refused="") == replace(cell, refused="")
-    assert said(found) == said(cell)
+def test_a_number_gives_the_same_in_python_as_the_other_ways(gear: Gear, value: float, convention: Convention) -> None:
+    for margin in MARGIN_NUMBERS:
+        python = by_python(gear, value, margin, convention)
+        written = repr(value), repr(margin), convention
+        others = by_cell(gear, value, repr(margin), convention), by_flag(gear, *written), by_prompt(gear, *written)
+        for other in others:
+            assert replace(python, refused="") == replace(other, refused="")
+            assert said(python) == said(other)
 
 
 def test_the_list_holds_values_that_are_taken_warned_of_and_refused(gear: Gear) -> None:
