@@ -34,6 +34,12 @@ class NoiseModel:
     scale_in: float
     _roots: dict[float, tuple[Array, float]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
+    @classmethod
+    def white(cls, n: int) -> NoiseModel:
+        """Noise of rows that are whitened already: equal, independent and of unit size."""
+        none = np.zeros(n, np.int64)
+        return cls(np.ones(n), none, none, np.empty((n, 0)), 0.0, 0.0, (0.0,), 1.0)
+
     def floored(self, square: Array) -> Array:
         """Add what no row can be better than to a residual sum of squares."""
         return np.maximum(square, 0.0) + len(self.relative) * self.floor_in**2

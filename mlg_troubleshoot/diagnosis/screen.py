@@ -52,6 +52,7 @@ class Screen:
         """
         root, log_determinant = self.noise.tail_root(ratio)
         if fixed is not None and fixed.shape[1]:
+            fixed = fixed / np.maximum(np.linalg.norm(fixed, axis=0), 1e-300)
             held, _log = self.noise.precision_times(fixed, ratio)
             values, vectors = np.linalg.eigh(fixed.T @ held)
             kept = values > 1e-14 * values[-1]
@@ -75,6 +76,12 @@ class Screen:
                 return np.asarray(-0.5 * n * np.log(np.maximum(rest - drop, 1e-12 * rest) / n) - 0.5 * log)
 
             yield rest, products - along[:, which].T @ common, square[which], likelihood
+
+    def explained(self, data: Array) -> tuple[Array, Array]:
+        """What each candidate takes off the residual sum of squares of each data set, and that sum without any, where
+        nothing scatters between tails."""
+        rest, along, square, _likelihood = next(self._levels(data))
+        return self._drop(along, square), rest
 
     def run(self, data: Array) -> Gain:
         """Compute the gains for one or many data sets."""

@@ -14,7 +14,9 @@ from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
 from mlg_troubleshoot.diagnosis.chance import Chance
+from mlg_troubleshoot.diagnosis.covariance import NoiseModel
 from mlg_troubleshoot.diagnosis.one_by_one import one_by_one, settled
+from mlg_troubleshoot.diagnosis.screen import Screen
 from mlg_troubleshoot.diagnosis.simulation import scatter
 from mlg_troubleshoot.diagnosis.simulation.held_out import folds_of, held_out
 from mlg_troubleshoot.diagnosis.simulation.inputs import checked
@@ -126,25 +128,24 @@ class Metric:
         self._left = np.sum(drawn**2, axis=0) - np.sum((everything.T @ drawn) ** 2, axis=0)
 
     def stands_out(self, fixed: Sequence[int], data: Array) -> tuple[Array, Chance]:
-        """Squared t of each suspect beside fixed ones, and the largest of all where nothing is wrong."""
-        point, count = self.point, self.point.study.count
-        held = self.white(point.columns[:, list(fixed)])
-        left, usable = beside(self.white(point.columns[:, :count]), held)
-        usable &= np.isin(np.arange(count), point.study.design.testable)
-        left = np.where(usable, left / np.where(usable, np.linalg.norm(left, axis=0), 1.0), 0.0)
-        score = self._score(left, self.white(data)[:, None], held, np.array([self.variance * self.degrees]))
-        return score[:, 0], Chance(self._score(left, self.drawn, held, self._left).max(axis=0, initial=0.0))
+        """Squared t of each suspect beside fixed ones, and the largest of all where nothing is wrong. [1]
 
-    def _score(self, left: Array, sets: Array, held: Array, total: Array) -> Array:
-        """Squared t of each column for each data set, given what all columns leave of it. [1]"""
-        squared = (left.T @ sets) ** 2
-        if self.point.crowded:
-            # No room for all suspects at once: each against what it leaves itself.
-            basis = basis_of(held)
-            total = np.sum(sets**2, axis=0) - np.sum((basis.T @ sets) ** 2, axis=0)
-            spare = max(len(sets) - basis.shape[1] - 1, 1)
-            return np.asarray(squared / np.maximum(total - squared, 1e-12 * total) * spare)
-        return np.asarray(squared / np.maximum(total, 1e-300) * self.degrees)
+        Squared t is given what all columns leave of the data; where there is no room for all at once, what it leaves
+        itself.
+        """
+        point, count = self.point, self.point.study.count
+        held, suspects = self.white(point.columns[:, list(fixed)]), self.white(point.columns[:, :count])
+        usable = beside(suspects, held)[1] & np.isin(np.arange(count), point.study.design.testable)
+        screen = Screen(NoiseModel.white(len(held)), suspects, np.zeros(count), held)
+        squared, rest = screen.explained(np.column_stack([self.white(data), self.drawn]))
+        if point.crowded:
+            spare = max(len(held) - basis_of(held).shape[1] - 1, 1)
+            score = squared / np.maximum(rest - squared, 1e-12 * rest) * spare
+        else:
+            left = np.r_[self.variance * self.degrees, self._left]
+            score = squared / np.maximum(left, 1e-300) * self.degrees
+        score[~usable] = 0.0
+        return score[:, 0], Chance(score[:, 1:].max(axis=0, initial=0.0))
 
 
 class Point:
