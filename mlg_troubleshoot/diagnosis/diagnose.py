@@ -18,6 +18,8 @@ from mlg_troubleshoot.diagnosis.causes import CATALOGUE
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
+from mlg_troubleshoot.diagnosis.evidence.screen import shrunk
+from mlg_troubleshoot.diagnosis.evidence.verdict import Verdict
 from mlg_troubleshoot.diagnosis.extension import Term
 from mlg_troubleshoot.diagnosis.faults import LEAST_ALONG, DataFault, screen_faults
 from mlg_troubleshoot.diagnosis.gain import LEAST_TAILS, Gain, measure_gain
@@ -30,8 +32,6 @@ from mlg_troubleshoot.diagnosis.noise import (
     robust_scale,
 )
 from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
-from mlg_troubleshoot.diagnosis.screen import shrunk
-from mlg_troubleshoot.diagnosis.simulation.result import Verdict
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Discrepancies

@@ -8,10 +8,9 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.diagnosis.causes.together import Block
-from mlg_troubleshoot.diagnosis.covariance import NoiseModel
+from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
+from mlg_troubleshoot.diagnosis.evidence.held_out import folds_of, held_out_part
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE
-from mlg_troubleshoot.diagnosis.screen import held_out_part
-from mlg_troubleshoot.diagnosis.simulation.held_out import folds_of
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 
 # With fewer tails none can be held out.

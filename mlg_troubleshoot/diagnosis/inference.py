@@ -19,12 +19,13 @@ from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.diagnosis.bank import WITHIN, Bank
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.causes.together import Block
-from mlg_troubleshoot.diagnosis.chance import Chance
-from mlg_troubleshoot.diagnosis.covariance import NoiseModel
+from mlg_troubleshoot.diagnosis.evidence.chance import Chance
+from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
+from mlg_troubleshoot.diagnosis.evidence.held_out import held_out_part
+from mlg_troubleshoot.diagnosis.evidence.one_by_one import one_by_one
+from mlg_troubleshoot.diagnosis.evidence.screen import Fit, Screen, fit
+from mlg_troubleshoot.diagnosis.evidence.verdict import Verdict
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, Rows, build_noise
-from mlg_troubleshoot.diagnosis.one_by_one import one_by_one
-from mlg_troubleshoot.diagnosis.screen import Fit, Screen, fit, held_out_part
-from mlg_troubleshoot.diagnosis.simulation.result import Verdict
 
 Key = tuple[str, str | None]
 

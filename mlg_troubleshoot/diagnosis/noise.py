@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from mlg_troubleshoot.arrays import Array, Wholes
-from mlg_troubleshoot.diagnosis.covariance import NoiseModel
+from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 
 # What is no cause yet: set in 2026 on healthy fleets of the study's tuning seeds (iid, heavy tails, scatter between

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.diagnosis import Diagnosis, diagnose, screen
+from mlg_troubleshoot.diagnosis import Diagnosis, diagnose
+from mlg_troubleshoot.diagnosis.evidence import held_out
 from mlg_troubleshoot.gear.gear import Gear
 
 from .conftest import Array, DiagnosisTable, fleet
@@ -42,8 +43,8 @@ def fitted_tails(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
         seen.append(len(data))
         return real(noise, columns, data)
 
-    real = screen.fit
-    monkeypatch.setattr(screen, "fit", watched)
+    real = held_out.fit
+    monkeypatch.setattr(held_out, "fit", watched)
     yield seen
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from mlg_troubleshoot.diagnosis.one_by_one import one_by_one
+from mlg_troubleshoot.diagnosis.evidence.one_by_one import one_by_one
 
 
 @dataclass(frozen=True)

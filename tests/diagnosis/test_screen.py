@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.diagnosis.covariance import NoiseModel
+from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
+from mlg_troubleshoot.diagnosis.evidence.screen import Screen, fit, shrunk
 from mlg_troubleshoot.diagnosis.gain import Gain, measure_gain
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE
-from mlg_troubleshoot.diagnosis.screen import Screen, fit, shrunk
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 
 from .conftest import Array

@@ -14,9 +14,9 @@ from scipy.stats import gumbel_r, norm
 from mlg_troubleshoot.diagnosis import CATALOGUE, Candidate, Scene, Term
 from mlg_troubleshoot.diagnosis.causes.convention import as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, LoadDirections, OtherGeometry
-from mlg_troubleshoot.diagnosis.chance import Chance
 from mlg_troubleshoot.diagnosis.diagnose import _expected_scatter, _single_slips
 from mlg_troubleshoot.diagnosis.diagnose import _interval as interval_of
+from mlg_troubleshoot.diagnosis.evidence.chance import Chance
 from mlg_troubleshoot.diagnosis.extension import adjustment_of
 from mlg_troubleshoot.diagnosis.faults import DataFault
 from mlg_troubleshoot.diagnosis.gain import _interval

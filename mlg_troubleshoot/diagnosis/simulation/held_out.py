@@ -9,27 +9,8 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.diagnosis.simulation.runner import least_squares
 
-_FOLDS = 10
-# Share of what a cause does that must remain in the rows it is learned from. [1]
-_LEARNED = 0.1
 # Singular value, in units of the largest, below which rows say nothing about a combination of nuisance parameters.
 _KNOWN = 1e-5
-
-
-def folds_of(row: Wholes, group: Wholes | None, columns: Array, shuffled: Wholes) -> tuple[Wholes, str]:
-    """Number the fold in which each reading is held out: whole groups, or rows where a cause acts in one group only."""
-    if group is not None and group.max() > 0:
-        numbers = (
-            np.argsort(np.argsort(shuffled[: group.max() + 1])) if group.max() >= _FOLDS else np.arange(group.max() + 1)
-        )
-        part = np.asarray(numbers % _FOLDS)[group[row]]
-        square = columns**2
-        learned = [
-            np.sum(square[part != k], axis=0) >= _LEARNED * np.sum(square, axis=0) for k in range(part.max() + 1)
-        ]
-        if np.all(learned):
-            return part, "group"
-    return shuffled[row] % min(_FOLDS, len(shuffled)), "row"
 
 
 def held_out(columns: Array, rest: Array, causes: Sequence[int], nuisance: Sequence[int], part: Wholes) -> Array:

@@ -4,16 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 
-
-class Verdict(StrEnum):
-    """What measured data say about a simulation."""
-
-    NONE = "NONE"
-    NAMED = "NAMED"
-    AMBIGUOUS = "AMBIGUOUS"
-    UNLISTED = "UNLISTED"
+from mlg_troubleshoot.diagnosis.evidence.verdict import Verdict
 
 
 @dataclass(frozen=True, slots=True)

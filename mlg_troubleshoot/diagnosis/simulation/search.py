@@ -13,19 +13,20 @@ from scipy.stats import t as student
 from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
-from mlg_troubleshoot.diagnosis.chance import Chance
-from mlg_troubleshoot.diagnosis.covariance import NoiseModel
-from mlg_troubleshoot.diagnosis.one_by_one import one_by_one, settled
-from mlg_troubleshoot.diagnosis.screen import Screen
+from mlg_troubleshoot.diagnosis.evidence.chance import Chance
+from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
+from mlg_troubleshoot.diagnosis.evidence.held_out import folds_of
+from mlg_troubleshoot.diagnosis.evidence.one_by_one import one_by_one, settled
+from mlg_troubleshoot.diagnosis.evidence.screen import Screen
+from mlg_troubleshoot.diagnosis.evidence.verdict import Verdict
 from mlg_troubleshoot.diagnosis.simulation import scatter
-from mlg_troubleshoot.diagnosis.simulation.held_out import folds_of, held_out
+from mlg_troubleshoot.diagnosis.simulation.held_out import held_out
 from mlg_troubleshoot.diagnosis.simulation.inputs import checked
 from mlg_troubleshoot.diagnosis.simulation.result import (
     HeldOutGain,
     SimulationDiagnosis,
     Suspect,
     SuspectFound,
-    Verdict,
 )
 from mlg_troubleshoot.diagnosis.simulation.runner import Runner, least_squares
 from mlg_troubleshoot.diagnosis.simulation.scatter import Whitener, basis_of, build_whitener

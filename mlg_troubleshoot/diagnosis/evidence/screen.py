@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Places, Wholes
-from mlg_troubleshoot.diagnosis.causes.together import Block
-from mlg_troubleshoot.diagnosis.covariance import NoiseModel
+from mlg_troubleshoot.arrays import Array, Places
+from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
 
 
 @dataclass(frozen=True)
@@ -175,23 +174,6 @@ def shrunk(noise: NoiseModel, free: Array, columns: Array, covariance: Array, da
     inner[k:, k:] += np.linalg.inv(covariance)
     inverse = np.linalg.pinv(inner)
     return inverse @ (both.T @ product[:, -1]) / scale**2, np.asarray(inverse, float)
-
-
-def held_out_part(noise: NoiseModel, columns: Array, data: Array, fold: Wholes, block: Block | None = None) -> Array:
-    """What a model explains of each row that was fitted to the rows of the other folds alone. [in]"""
-    explained = np.zeros(len(data))
-    for k in np.unique(fold):
-        train, test = fold != k, fold == k
-        used = np.any(columns[train] != 0.0, axis=0)
-        held, part = columns[:, used], noise.take(train)
-        if not train.any():
-            continue
-        if block is not None:
-            values, _covariance = shrunk(part, held[train], block.columns[train], block.covariance, data[train])
-            explained[test] = np.hstack([held, block.columns])[test] @ values
-        elif used.any():
-            explained[test] = held[test] @ fit(part, held[train], data[train]).values
-    return explained
 
 
 def fit(noise: NoiseModel, columns: Array, data: Array) -> Fit:

@@ -1,0 +1,58 @@
+"""Rows that are not used for a fit: which stand together, and what a model explains of them."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from mlg_troubleshoot.arrays import Array, Wholes
+from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
+from mlg_troubleshoot.diagnosis.evidence.screen import fit, shrunk
+
+_FOLDS = 10
+# Share of what a cause does that must remain in the rows it is learned from. [1]
+_LEARNED = 0.1
+
+
+class Known(Protocol):
+    """Effects of which the sizes are known beforehand: columns, shape (n, k), and the covariance of their sizes."""
+
+    @property
+    def columns(self) -> Array: ...
+
+    @property
+    def covariance(self) -> Array: ...
+
+
+def folds_of(row: Wholes, group: Wholes | None, columns: Array, shuffled: Wholes) -> tuple[Wholes, str]:
+    """Number the fold in which each reading is held out: whole groups, or rows where a cause acts in one group only."""
+    if group is not None and group.max() > 0:
+        numbers = (
+            np.argsort(np.argsort(shuffled[: group.max() + 1])) if group.max() >= _FOLDS else np.arange(group.max() + 1)
+        )
+        part = np.asarray(numbers % _FOLDS)[group[row]]
+        square = columns**2
+        learned = [
+            np.sum(square[part != k], axis=0) >= _LEARNED * np.sum(square, axis=0) for k in range(part.max() + 1)
+        ]
+        if np.all(learned):
+            return part, "group"
+    return shuffled[row] % min(_FOLDS, len(shuffled)), "row"
+
+
+def held_out_part(noise: NoiseModel, columns: Array, data: Array, fold: Wholes, known: Known | None = None) -> Array:
+    """What a model explains of each row that was fitted to the rows of the other folds alone. [in]"""
+    explained = np.zeros(len(data))
+    for k in np.unique(fold):
+        train, test = fold != k, fold == k
+        used = np.any(columns[train] != 0.0, axis=0)
+        held, part = columns[:, used], noise.take(train)
+        if not train.any():
+            continue
+        if known is not None:
+            values, _covariance = shrunk(part, held[train], known.columns[train], known.covariance, data[train])
+            explained[test] = np.hstack([held, known.columns])[test] @ values
+        elif used.any():
+            explained[test] = held[test] @ fit(part, held[train], data[train]).values
+    return explained
