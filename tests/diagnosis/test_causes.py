@@ -242,12 +242,14 @@ def test_the_rate_scales_the_prediction(gear: Gear, scene: Scene) -> None:
     assert moved == pytest.approx(1.05 * scene.over_in, rel=1e-9)
 
 
-def test_the_directions_of_approach_differ_by_the_parameter(scene: Scene) -> None:
-    cause = BY_NAME["approach_hysteresis"]
-    offset = cause.adjust(scene, first(cause, scene), 0.004).offset_in
-    assert offset is not None
-    extending = scene.table.factors["approach"] == "EXTENDING"
-    assert np.mean(offset[extending]) - np.mean(offset[~extending]) == pytest.approx(0.004)
+@pytest.mark.parametrize(("name", "larger"), [("approach_hysteresis", "EXTENDING"), ("side_difference", "RH")])
+def test_two_kinds_of_rows_differ_by_the_parameter(name: str, larger: str, scene: Scene) -> None:
+    cause = BY_NAME[name]
+    rows = scene.table.factors[cause.needs[0]] == larger
+    for candidate in cause.candidates(scene):
+        offset = cause.adjust(scene, candidate, 0.004).offset_in
+        assert offset is not None
+        assert np.mean(offset[rows]) - np.mean(offset[~rows]) == pytest.approx(0.004)
 
 
 def test_a_rigging_change_concerns_one_aircraft_or_one_of_its_gears(scene: Scene) -> None:
