@@ -58,20 +58,13 @@ class Inputs:
         return np.asarray(_QUANTILES[self.distribution](unit) * self.limits_in)
 
     def on_unit_cube(self, response: Response) -> Response:
-        def on_cube(unit: Array) -> Array:
-            return response(self.at(unit))
-
-        return on_cube
+        return lambda unit: response(self.at(unit))
 
 
 def with_random_directions(model: LinkageModel, inputs: Inputs) -> Response:
     """Displacement when every clearance takes a uniformly random direction (as Zhu and Ting do)."""
     n = len(inputs.limits_in)
-
-    def on_cube(unit: Array) -> Array:
-        return model.displacement(links_from(inputs.at(unit[:, :n]), 2.0 * np.pi * unit[:, n:]))
-
-    return on_cube
+    return lambda unit: model.displacement(links_from(inputs.at(unit[:, :n]), 2.0 * np.pi * unit[:, n:]))
 
 
 def joint_groups(n_joints: int) -> tuple[tuple[int, ...], ...]:
@@ -81,8 +74,4 @@ def joint_groups(n_joints: int) -> tuple[tuple[int, ...], ...]:
 
 def beyond_margin(response: Response, margin_in: float) -> Response:
     """Turn a displacement into 1 where it exceeds the margin or the linkage does not close, else 0."""
-
-    def exceeds(variables: Array) -> Array:
-        return np.asarray(~(np.abs(response(variables)) <= margin_in), dtype=float)
-
-    return exceeds
+    return lambda variables: np.asarray(~(np.abs(response(variables)) <= margin_in), dtype=float)

@@ -112,8 +112,9 @@ class WearModel:
         for chosen, count in _chunks(len(units)):
             last = self._last([units[i] for i in chosen])
             ends = self._ends([units[i] for i in chosen], count, rng)
-            parts.append(np.concatenate([end.crossing(limits[chosen], last, rng) for end in ends]))
-        samples = np.concatenate([_last_axis(part) for part in parts]) * self.scale.usage
+            found = np.concatenate([end.crossing(limits[chosen], last, rng) for end in ends])
+            parts.append(np.moveaxis(found, 1, 0).reshape(len(chosen), -1))
+        samples = np.concatenate(parts) * self.scale.usage
         return Samples(samples[0] if isinstance(unit, str) else samples)
 
     def _forecast_parts(
@@ -273,11 +274,6 @@ def _gamma_passage(away: Array, rng: np.random.Generator) -> Array:
         over = shape * np.maximum(1.0 - 1.0 / (9.0 * shape) + z / (3.0 * np.sqrt(shape)), 0.0) ** 3 >= away
         low, high = np.where(over, low, middle), np.where(over, middle, high)
     return (low + high) / 2.0
-
-
-def _last_axis(found: Array) -> Array:
-    """Put (draws, units, repeats) as (units, samples)."""
-    return np.moveaxis(found, 1, 0).reshape(found.shape[1], -1)
 
 
 def _chunks(units: int) -> Iterator[tuple[Places, int]]:

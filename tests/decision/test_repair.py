@@ -47,6 +47,12 @@ def probabilities_after(gear: Gear, *repairs: tuple[int, ...]) -> np.ndarray:
     return found.probability_within(np.full(n, MARGIN_IN), np.zeros(n))
 
 
+def test_only_what_is_measured_and_worn_beyond_a_new_part_can_be_restored_with_a_gain(gear: Gear) -> None:
+    new = gear.new_parts_in
+    read = {1: new[0], 2: new[1] + 5e-5, 3: new[2] + 2e-4, 4: 0.5 * new[3]}
+    assert repair.removable(Cases.of(gear, [inspected(read)]))[0].tolist() == [n == 3 for n in range(1, 11)]
+
+
 def test_restoring_joint_three_alone_is_too_close(gear: Gear) -> None:
     assert 0.76 <= probabilities_after(gear, (3,))[0] <= 0.91
 

@@ -13,11 +13,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, in_unit
 
 UNIT_NAMES = {LengthUnit.INCH: "inches", LengthUnit.THOU: "thou", LengthUnit.MILLIMETRE: "millimetres"}
-CONVENTION_NAMES = {
-    ClearanceConvention.RADIAL: "radial",
-    ClearanceConvention.DIAMETRAL: "diametral",
-    ClearanceConvention.TOTAL_PLAY: "total play",
-}
+CONVENTION_NAMES = {convention: convention.lower().replace("_", " ") for convention in ClearanceConvention}
 _EXAMPLES = {LengthUnit.INCH: ".013", LengthUnit.THOU: "13", LengthUnit.MILLIMETRE: "0.33"}
 _HOW = {
     ClearanceConvention.RADIAL: "how far the pin centre can leave the hole centre: half of a dial reading "
