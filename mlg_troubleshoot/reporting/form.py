@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 
 from mlg_troubleshoot.errors import OutputError
@@ -28,7 +29,7 @@ def write_form(file: Path, gear: Gear, *, page: str = "A4", unit: LengthUnit = L
         write_bytes(file, render(document, page).encode("utf-8"))
         return
     try:
-        with PdfEngine() as engine:
+        with closing(PdfEngine()) as engine:
             made, _ = engine.convert(render(document, page, for_pdf=True), page, document.created)
     except PdfError as error:
         instead = file.with_suffix(".html").name

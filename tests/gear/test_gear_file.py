@@ -243,3 +243,15 @@ def test_the_files_carry_no_machine_path(gear: Gear) -> None:
 
 def test_limits_are_an_array_in_the_order_of_the_joints(gear: Gear) -> None:
     assert gear.limits_in == pytest.approx(np.full(10, 0.0075))
+
+
+def test_what_a_gear_file_need_not_state_is_assumed_and_says_so(edited: Edit) -> None:
+    restore = load_gear(edited('restore_min = 120\nrestore_source = "minutes"\n', "")).joints[0].restore
+    assert (restore.value, restore.unit, restore.kind) == (120.0, "min", SourceKind.ASSUMED)
+    assert "120 min is assumed" in restore.source
+
+
+@pytest.mark.parametrize("name", ["length.F-1", "lever.6.across", "length.6-7"])
+def test_a_cause_that_would_change_no_number_of_the_linkage_is_refused(edited: Edit, name: str) -> None:
+    with pytest.raises(GearFileError, match=r"a number of the linkage instead of 'length\.1-F'"):
+        load_gear(edited(f'"{name}"', '"length.1-F"'))

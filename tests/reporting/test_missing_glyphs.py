@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -69,7 +70,7 @@ def test_the_html_keeps_the_name_as_entered(judge: Judge, make: Callable[..., Ma
 
 def test_a_box_in_the_pdf_is_noticed() -> None:
     # A private-use character that no font has.
-    with PdfEngine() as engine:
+    with closing(PdfEngine()) as engine:
         assert engine.convert(page_of("<p>a \U000f1234</p>"), "A4", NOW)[1]
 
 

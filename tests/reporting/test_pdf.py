@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import closing
 from datetime import UTC, datetime
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
@@ -176,7 +177,7 @@ def test_letter_takes_as_many_pages_as_a4(judge: Judge, make: Callable[..., Made
 
 
 def test_a_pdf_without_a_font_is_refused() -> None:
-    with PdfEngine() as engine, pytest.raises(PdfError, match="no font is embedded"):
+    with closing(PdfEngine()) as engine, pytest.raises(PdfError, match="no font is embedded"):
         engine.convert("<p></p>", "A4", NOW)
 
 
@@ -197,7 +198,7 @@ def test_nothing_is_fetched_from_the_network() -> None:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         there = f"http://127.0.0.1:{server.server_port}"
         body = f'<p>text</p><img src="{there}/a.png"><link rel="stylesheet" href="{there}/b.css">'
-        with PdfEngine() as engine:
+        with closing(PdfEngine()) as engine:
             engine.convert(page_of(f"{body}<p style='background:url({there}/c.png)'>more</p>"), "A4", NOW)
         server.shutdown()
     assert asked == []
@@ -206,18 +207,18 @@ def test_nothing_is_fetched_from_the_network() -> None:
 def test_no_file_of_this_computer_is_read(tmp_path: Path) -> None:
     square = '<svg xmlns="http://www.w3.org/2000/svg" width="10" height="10"><text>SECRET</text></svg>'
     (tmp_path / "secret.svg").write_text(square, encoding="utf-8")
-    with PdfEngine() as engine:
+    with closing(PdfEngine()) as engine:
         made = engine.convert(page_of(f'<p>text</p><img src="file://{tmp_path}/secret.svg">'), "A4", NOW)[0]
     assert "SECRET" not in text_of(made)
 
 
 def test_a_document_that_takes_too_long_is_stopped() -> None:
-    with PdfEngine(time_limit_s=0.05) as engine, pytest.raises(PdfError, match=r"longer than 0\.05 s"):
+    with closing(PdfEngine(time_limit_s=0.05)) as engine, pytest.raises(PdfError, match=r"longer than 0\.05 s"):
         engine.convert(page_of("<p>word</p>" * 200_000), "A4", NOW)
 
 
 def test_the_engine_works_again_after_it_was_stopped() -> None:
-    with PdfEngine(time_limit_s=0.05) as engine:
+    with closing(PdfEngine(time_limit_s=0.05)) as engine:
         with pytest.raises(PdfError):
             engine.convert(page_of("<p>word</p>" * 200_000), "A4", NOW)
         engine.time_limit_s = 30.0
@@ -226,7 +227,7 @@ def test_the_engine_works_again_after_it_was_stopped() -> None:
 
 def test_an_engine_that_dies_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", "/bin/false")
-    with PdfEngine() as engine, pytest.raises(PdfError):
+    with closing(PdfEngine()) as engine, pytest.raises(PdfError):
         engine.convert(page_of("<p>word</p>"), "A4", NOW)
 
 
