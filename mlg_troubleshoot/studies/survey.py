@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -40,8 +41,8 @@ _SLIP = 23.0
 _FREEDOM, _TRUSTED = 4.0, 6.0
 # Of a fit: the search, that of slips, what does not fit, the modes, the draws.
 _STAGES = 5
-# In search of a slip: so many starts, with so many steps each; the readings likeliest to be one and the best starts.
-_STARTS, _FEW_STEPS, _LIKELIEST, _BEST_STARTS = 10, 3, 6, 3
+# In search of a slip: as many starts as make so many residuals, so many steps each; so many points are left at least.
+_RESIDUALS, _FEW_STEPS, _FEWEST = 175_000, 3, 60
 # The greatest of forty clean residuals exceeds 3.9 in 0.4 % of surveys, in about 1 % where the fit bends.
 MISFIT = 3.9
 # Two readings contradict each other, neither of them alone is wrong, if leaving out one or the other fits alike.
@@ -50,6 +51,8 @@ _ALIKE = 9.0
 _MOST_MISFITS = 0.1
 # Two points of the posterior are one if they stand on the same sides and no index differs by more than this share.
 _SAME, _LEAST_WEIGHT = 0.01, 1e-3
+# One reading in a hundred is exchanged, with any of twenty others.
+_EXCHANGE = 16.0
 # A joint's other side is tried where the readings place the joint: to a fifth of its distance from the line between.
 _PLACED = 0.2
 # With fewer readings than this share of the numbers of the linkage few of them are determined.
@@ -259,7 +262,7 @@ class Fitting:
                 break
         return points, loss
 
-    def robust(self, points: Array) -> tuple[Array, Array]:
+    def robust(self, points: Array) -> Array:
         """Fit from every start with uncertainties that shrink to their own; the best few remain.
 
         What is read at the reference position needs no motion: it comes first and closes from every start. What it
@@ -280,86 +283,83 @@ class Fitting:
             if k >= 1:
                 order = np.argsort(loss)[: max(_KEPT, len(points) // 2)]
                 points, starts = points[order], starts[order]
-        return self.descend(points, everything, 1.0, _LAST_STEPS, robust=True)
+        points, loss = self.descend(points, everything, 1.0, _LAST_STEPS, robust=True)
+        return points[np.argsort(loss)][:_KEPT]
 
-    def suspected(self, starts: Array) -> tuple[Array, Mask]:
-        """Fit what stands still without each reading in turn, and with two distances exchanged; the best few remain.
+    def suspected(self, starts: Array) -> tuple[Array, Mask, Array]:
+        """Fit what stands still without each reading in turn, and with each two distances exchanged.
 
-        A slip leads a fit that begins with it into another valley, where readings that are right look wrong. Only
-        with the few likeliest to be wrong is each other exchanged, from the starts that fitted best without them.
-        Returns the points and, of each, the readings that it keeps.
+        A slip leads a fit that begins with it into another valley, where readings that are right look wrong. All
+        begin at every start, and the worse two thirds are given up whenever the uncertainties shrink.
+        Returns the points of the likeliest few, which readings each keeps, and how far it takes each reading to be off
+        in the reading's uncertainty.
         """
         still = self.still
         part = Fitting(self.linkage, self.prior, tuple(self.readings[i] for i in still))
-        distances = [i for i, r in enumerate(part.readings) if r.kind is Kind.DISTANCE]
-        if len(distances) < 2:
-            return starts[:0], np.ones((0, len(self.readings)), dtype=bool)
-        kept = np.repeat(~np.eye(len(still), dtype=bool), len(starts), axis=0)
-        points, loss = part.narrowed(np.tile(starts, (len(still), 1)), kept, np.zeros(len(still)))
-        by_start = loss.reshape(len(still), -1)
-        begun, apart = [], []
-        for i in sorted(distances, key=lambda k: float(by_start[k].min()))[:_LIKELIEST]:
-            best = starts[np.argsort(by_start[i])[:_BEST_STARTS]]
-            for j in distances:
-                exchanged = np.zeros((len(best), len(still)))
-                exchanged[:, [i, j]] = np.array([1.0, -1.0]) * (part.value[j] - part.value[i]) / part.u[[i, j]]
-                begun.append(best)
-                apart.append(exchanged)
-        noise = np.concatenate(apart)
-        exchanged_points, exchanged_loss = part.narrowed(np.concatenate(begun), np.ones_like(noise, dtype=bool), noise)
-        points, loss = np.concatenate([points, exchanged_points]), np.concatenate([loss, exchanged_loss])
-        kept = np.concatenate([kept, noise == 0.0])
-        likely = np.argsort(loss)
-        _, first = np.unique(kept[likely], axis=0, return_index=True)
-        likely = likely[np.sort(first)[:_KEPT]]
-        everything = np.ones((len(likely), len(self.readings)), dtype=bool)
-        everything[:, still] = kept[likely]
-        return points[likely], everything
-
-    def narrowed(self, points: Array, kept: Mask, noise: Array) -> tuple[Array, Array]:
-        """Least squares with uncertainties that shrink to their own."""
-        loss = np.zeros(len(points))
+        pairs = list(combinations([i for i, r in enumerate(part.readings) if r.kind is Kind.DISTANCE], 2))
+        kept = np.concatenate([~np.eye(len(still), dtype=bool), np.ones((len(pairs), len(still)), dtype=bool)])
+        noise, starts = np.zeros(kept.shape), starts[: max(1, _RESIDUALS // kept.size)]
+        for row, (i, j) in zip(noise[len(still) :], pairs, strict=True):
+            row[[i, j]] = np.array([1.0, -1.0]) * (part.value[j] - part.value[i]) / part.u[[i, j]]
+        points = means = np.tile(starts, (len(kept), 1))
+        which = np.repeat(np.arange(len(kept)), len(starts))
         for widened in _WIDENED:
-            points, loss = self.descend(points, kept, widened, _FEW_STEPS, robust=False, noise=noise)
-        return points, loss
+            points, loss = part.descend(points, kept[which], widened, _FEW_STEPS, False, means, noise[which])
+            better = np.argsort(loss)[: max(_FEWEST, len(loss) // 3)]
+            points, means, which = points[better], means[better], which[better]
+        likely = np.isin(which, list(dict.fromkeys(which))[:_KEPT])
+        points, means, which = points[likely], means[likely], which[likely]
+        held, off = np.ones((len(points), len(self.readings)), dtype=bool), np.zeros((len(points), len(self.readings)))
+        held[:, still], off[:, still] = kept[which], noise[which]
+        for widened in _WIDENED[1:]:
+            points, loss = self.descend(points, held, widened, _FEW_STEPS, False, means, off)
+        each = [np.flatnonzero(which == k) for k in dict.fromkeys(which)]
+        best = np.concatenate([of[self._apart(points[of], loss[of], 2)] for of in each])
+        return points[best], held[best], off[best]
 
-    def reheated(self, points: Array, kept: Mask, rng: Generator) -> tuple[Array, Array]:
+    def reheated(self, points: Array, rng: Generator, kept: Any = True, noise: Any = 0.0) -> tuple[Array, Array]:
         """Fit once more from around each point, as far as wider uncertainties would let it go; the best few remain.
 
         Beside a valley there often lies a better one, behind a low ridge or where more of the readings close.
         kept, shape (n_points, n_readings): what each is fitted to at first; all of the readings judge in the end.
+        noise, shape (n_points, n_readings): how far each takes the readings to be off where two are exchanged.
         """
-        everything = np.ones(len(self.readings), dtype=bool)
+        kept, noise = (np.broadcast_to(each, (len(points), len(self.readings))) for each in (kept, noise))
         with np.errstate(all="ignore"):
             found, slopes = self.linkage.slopes(self.readings, points)
-        weight = np.where(kept, np.nan_to_num(_robust((found - self.value) / self.u)[1]), 0.0)
+        weight = np.where(kept, np.nan_to_num(_robust((found - self.value) / self.u - noise)[1]), 0.0)
         g = np.nan_to_num(slopes, posinf=0.0, neginf=0.0) / self.u[:, None] @ self.prior.root
         values, turned = np.linalg.eigh(np.swapaxes(g, 1, 2) @ (weight[..., None] * g))
-        around, tried = [points], _AGAIN if kept.all() else _TRIED
+        around, which, tried = [points], np.arange(len(points)), _AGAIN if (kept & (noise == 0.0)).all() else _TRIED
+        held, off = (np.repeat(each, tried, axis=0) for each in (kept, noise))
         for widened in _REHEATED:
             z = rng.standard_normal((len(points), tried, points.shape[1]))
             z /= np.sqrt(1.0 + np.maximum(values, 0.0) / widened**2)[:, None]
             trial = points[:, None] + np.einsum("pij,pkj->pki", turned, z) @ self.prior.root.T
             trial = trial.reshape(-1, points.shape[1])
-            held = np.repeat(kept, tried, axis=0)
             # Of many around a fit of what stands still, those that also move are the ones to go on with.
-            loss = self.loss(trial, self.prior.mean, widened, held, robust=True).reshape(len(points), -1)
+            loss = self.loss(trial, self.prior.mean, widened, held, True, off).reshape(len(points), -1)
             best = (np.argsort(loss, axis=1)[:, :_AGAIN] + tried * np.arange(len(points))[:, None]).ravel()
-            around.append(self.descend(trial[best], held[best], widened, _REHEAT_STEPS, robust=True)[0])
-        points, loss = self.descend(np.concatenate(around), everything, 1.0, _STEPS, robust=True)
-        points, _ = self._apart(points, loss, 3 * _KEPT)
-        points, loss = self.descend(points, everything, 1.0, _LAST_STEPS, robust=True)
-        # A few readings may be fitted by what does not move over its stroke.
-        return self._apart(points, np.where(self.linkage.closes(points), loss, np.inf), 2 * _KEPT)
+            found, _ = self.descend(trial[best], held[best], widened, _REHEAT_STEPS, robust=True, noise=off[best])
+            around.append(found)
+        which = np.concatenate([which, *len(_REHEATED) * [np.repeat(which, _AGAIN)]])
+        points, everything = np.concatenate(around), np.ones(len(self.readings), dtype=bool)
+        for steps, most in ((_STEPS, 3 * _KEPT), (_LAST_STEPS, 2 * _KEPT)):
+            points, loss = self.descend(points, everything, 1.0, steps, robust=True, noise=noise[which])
+            # A few readings may be fitted by what does not move over its stroke.
+            loss = np.where(self.linkage.closes(points), loss, np.inf) + _EXCHANGE * noise[which].any(axis=1)
+            apart = self._apart(points, loss, most)
+            points, loss, which = points[apart], loss[apart], which[apart]
+        return points, loss
 
-    def _apart(self, points: Array, loss: Array, most: int) -> tuple[Array, Array]:
+    def _apart(self, points: Array, loss: Array, most: int) -> list[int]:
         """The best points that are not beside a better one."""
         found: list[int] = []
         whitened = points @ self.prior.whiten.T
         for k in map(int, np.argsort(loss)):
             if len(found) < most and (np.abs(whitened[found] - whitened[k]).max(axis=1) > _BESIDE).all():
                 found.append(k)
-        return points[found], loss[found]
+        return found
 
     def modes(self, points: Array, means: Array, kept: Mask) -> tuple[Mode, ...]:
         """Least squares on the readings kept, from every point; each mode with its Laplace posterior and evidence."""
@@ -590,18 +590,18 @@ def fit(
         readings = (*readings, prior.order)
     fitting = Fitting(linkage, prior, readings)
     starts = np.concatenate([prior.members, prior.closing(_AROUND, rng, readings)])
-    points, loss = fitting.robust(starts)
-    points = points[np.argsort(loss)][:_KEPT]
-    everything = np.ones((_KEPT, len(readings)), dtype=bool)
-    points, _ = fitting.reheated(points, everything[: len(points)], rng)
+    points, loss = fitting.reheated(fitting.robust(starts), rng)
     told(1, _STAGES)
     kept = np.abs(fitting.residuals(points[:1])[0]) < _TRUSTED
-    if not kept.all():
+    if not kept.all() and fitting.still:
         # What does not fit is a slip or another valley.
-        points, (without, held) = points[:_KEPT], fitting.suspected(starts[:_STARTS])
-        held = np.concatenate([everything[: len(points)], held])
-        points, _ = fitting.reheated(np.concatenate([points, without]), held, rng)
+        points, (without, held, off) = points[:_KEPT], fitting.suspected(starts)
+        nothing = np.zeros((len(points), len(readings)))
+        held, off = np.concatenate([nothing == 0.0, held]), np.concatenate([nothing, off])
+        points, loss = fitting.reheated(np.concatenate([points, without]), rng, held, off)
         kept = np.abs(fitting.residuals(points[:1])[0]) < _TRUSTED
+    # What is that much less likely, each slip counted, is no mode: without what was exchanged it might seem one.
+    points = points[loss <= loss[0] - 2.0 * np.log(_LEAST_WEIGHT)]
     told(2, _STAGES)
     modes = fitting.modes(points, np.broadcast_to(prior.mean, points.shape), kept)
     if not modes:
