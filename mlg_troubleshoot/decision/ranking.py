@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.assessment import JointFinding
+from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.joints import ROUNDING_IN
 from mlg_troubleshoot.studies.index_table import IndexTable
-
-
-@lru_cache(maxsize=4)
-def ensemble_amplification(gear: Gear) -> Array:
-    """Plunger amplification index of each joint on each linkage of the ensemble. [1]"""
-    return np.array([model.plunger_amplification() for model in gear.ensemble_models])
 
 
 def rank_joints(
@@ -30,7 +23,7 @@ def rank_joints(
     measured = np.isfinite(clearance_in)
     over = clearance_in > gear.limits_in + ROUNDING_IN
     assumed = np.where(measured, clearance_in, 0.5 * gear.limits_in)
-    contribution = ensemble_amplification(gear) * assumed[:, None, :]
+    contribution = np.array([linkage.amplification for linkage in responses(gear)]) * assumed[:, None, :]
     places = _places(over[:, None, :], contribution, table.total_order)
     best, worst = places.min(axis=1).tolist(), places.max(axis=1).tolist()
     # There are few ranges: a large batch holds each of them once.

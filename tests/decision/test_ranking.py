@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.decision.ranking import ensemble_amplification, rank_joints
+from mlg_troubleshoot.decision.ranking import rank_joints
+from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.studies.index_table import IndexTable
 from tests.decision.conftest import Judge, every_joint
@@ -79,7 +80,7 @@ def test_the_rank_range_covers_the_rank_on_every_linkage(gear: Gear, judge: Judg
     clearance = every_joint(0.002)
     found = judge(clearance)
     for j, finding in enumerate(found.joints):
-        places = [1 + sum(row > row[j] + 1e-9) for row in ensemble_amplification(gear)]
+        places = [1 + sum(row > row[j] + 1e-9) for row in (response.amplification for response in responses(gear))]
         assert finding.rank_range[0] <= finding.rank <= finding.rank_range[1]
         assert finding.rank_range[0] >= min(places)
 
@@ -96,10 +97,9 @@ def test_a_joint_that_acts_like_another_names_it(judge: Judge) -> None:
     assert alike == {3: (5,), 5: (3,), 6: (7,), 7: (6,), 9: (10,), 10: (9,)}
 
 
-def test_the_ensemble_has_one_row_a_linkage_and_the_reference_first(gear: Gear) -> None:
-    rows = ensemble_amplification(gear)
-    assert rows.shape == (10, 10)
-    assert rows[0] == pytest.approx(gear.model.plunger_amplification())
+def test_the_order_on_each_linkage_is_that_of_its_own_amplification(gear: Gear) -> None:
+    for response, model in zip(responses(gear), gear.ensemble_models, strict=True):
+        assert response.amplification == pytest.approx(model.plunger_amplification(), rel=1e-9)
 
 
 def test_the_table_agrees_with_the_model_it_was_computed_from(gear: Gear, table: IndexTable) -> None:
