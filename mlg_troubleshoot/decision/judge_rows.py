@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -43,28 +42,23 @@ from mlg_troubleshoot.studies.index_table import IndexTable
 _CHUNK = 1024
 
 
-@dataclass(frozen=True, slots=True)
-class AssessOptions:
-    """What to compute beside verdict, plan, repair sets and allowances; `advice` is what is worth it for one gear."""
-
-    advice: bool = False
-    seed: int = 1
-    extension: Extension | None = None
-
-
 def assess(
     rows: Sequence[Inspection | InvalidRow],
     gear: Gear,
     table: IndexTable,
-    options: AssessOptions | None = None,
+    *,
+    advice: bool = False,
+    seed: int = 1,
+    extension: Extension | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[Judgement, ...]:
-    options = options or AssessOptions()
+    """Judge rows: verdict, plan, repair sets and allowances; with `advice` what is worth it for one gear alone."""
     judged: list[Judgement] = []
     for start in range(0, len(rows), _CHUNK):
         part = rows[start : start + _CHUNK]
         valid = [row for row in part if isinstance(row, Inspection)]
-        assessed = iter(_assess_valid(valid, gear, table, options) if valid else ())
+        drawn = seed if advice else None
+        assessed = iter(_assess_valid(Cases.of(gear, valid, extension), table, drawn) if valid else ())
         judged += [
             next(assessed) if isinstance(row, Inspection) else Rejected(row, correct(row), row.warnings) for row in part
         ]
@@ -73,10 +67,7 @@ def assess(
     return tuple(judged)
 
 
-def _assess_valid(
-    inspections: Sequence[Inspection], gear: Gear, table: IndexTable, options: AssessOptions
-) -> list[Assessment]:
-    cases = Cases.of(gear, inspections, options.extension)
+def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Assessment]:
     batch = predict_batch(cases)
     p_lower = batch.lower.probability_within(cases.margin_in, cases.margin_u_in)
     p_upper = batch.upper.probability_within(cases.margin_in, cases.margin_u_in)
@@ -89,11 +80,11 @@ def _assess_valid(
     found = calibrated(cases, search(cases, batch.upper.displacement_in, batch.upper.u_clearances_in))
     wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in verdicts]) & closes
     sets = repair_sets(cases, found, wanted)
-    findings = rank_joints(gear, table, cases.clearance_in, allowances(cases, batch.lower))
+    findings = rank_joints(cases.gear, table, cases.clearance_in, allowances(cases, batch.lower))
     order = np.array([[f.rank for f in row] for row in findings]).argsort(axis=1)
     judged = Judged(verdicts, batch, plunger, order, p_lower, batch.lower.standard_uncertainty(cases.margin_u_in))
     courses = plans(cases, judged, found, sets)
-    return [_assessment(cases, judged, i, findings[i], courses[i], sets[i], options) for i in range(len(cases))]
+    return [_assessment(cases, judged, i, findings[i], courses[i], sets[i], seed) for i in range(len(cases))]
 
 
 def _assessment(
@@ -103,7 +94,7 @@ def _assessment(
     findings: tuple[JointFinding, ...],
     plan: Plan,
     sets: tuple[RepairSet, ...],
-    options: AssessOptions,
+    seed: int | None,
 ) -> Assessment:
     inspection, found, lower, plunger = cases.inspections[i], judged.verdicts[i], judged.batch.lower, judged.plunger
     margin = float(cases.margin_in[i])
@@ -117,7 +108,7 @@ def _assessment(
     worst = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
     budget = _budget(judged.batch, cases, i) if known else None
     beyond = bool(plunger.beyond[i])
-    detail = _detail(cases, i, found, worst, budget, options) if options.advice and closes else {}
+    detail = _detail(cases, i, found, worst, budget, seed) if seed is not None and closes else {}
     return Assessment(
         inspection=inspection,
         verdict=found,
@@ -179,10 +170,10 @@ def _detail(
     found: Verdict,
     worst_in: tuple[float, float],
     budget: UncertaintyBudget | None,
-    options: AssessOptions,
+    seed: int,
 ) -> dict[str, Any]:
     """What is worked out for a gear that is looked at alone."""
-    one, rng = cases.take(np.array([i])), np.random.default_rng(options.seed)
+    one, rng = cases.take(np.array([i])), np.random.default_rng(seed)
     detail: dict[str, Any] = {"measuring": advise(one)}
     if budget is not None:
         detail["confidence"] = check_probability(one, worst_in, budget, rng)

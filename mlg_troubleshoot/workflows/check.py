@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, MeasuringAdvice, Verdict
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, Side
-from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.next_joint import advise
 from mlg_troubleshoot.decision.prediction import Extension
 from mlg_troubleshoot.errors import OutputError, UsageError
@@ -170,12 +170,8 @@ def check(
     from mlg_troubleshoot.records import ReadOptions, judge_again
 
     known = gear if isinstance(gear, Gear) else load_gear(gear)
-    (judged,) = assess(
-        [judge_again(inspection, ReadOptions.of(known))],
-        known,
-        load_index_table(known),
-        AssessOptions(advice=advice, extension=extension),
-    )
+    row = judge_again(inspection, ReadOptions.of(known))
+    (judged,) = assess([row], known, load_index_table(known), advice=advice, extension=extension)
     if not isinstance(judged, Assessment):
         raise TypeError(f"{type(inspection).__name__} is not an Inspection")
     return judged
@@ -250,8 +246,8 @@ def _judge(
     **told: Any,
 ) -> CheckResult:
     advice = len(rows) == 1 if options.advice is None else options.advice
-    asked = AssessOptions(advice=advice, seed=options.seed, extension=options.extension)
-    judgements = assess(rows, gear, load_index_table(gear), asked, on_judged)
+    asked: dict[str, Any] = {"advice": advice, "seed": options.seed, "extension": options.extension}
+    judgements = assess(rows, gear, load_index_table(gear), **asked, progress=on_judged)
     return CheckResult(gear=gear, judgements=judgements, seed=options.seed, **told)
 
 

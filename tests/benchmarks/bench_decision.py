@@ -25,7 +25,7 @@ from mlg_troubleshoot.decision import repair
 from mlg_troubleshoot.decision.assessment import RepairSet, Verdict
 from mlg_troubleshoot.decision.case import Cases, predict_batch
 from mlg_troubleshoot.decision.inspection import Inspection, Side
-from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.likely_worn import explain
 from mlg_troubleshoot.decision.next_joint import outlook
 from mlg_troubleshoot.decision.plan import minutes_to_measure
@@ -340,11 +340,10 @@ def speed() -> None:
     gear = load_gear()
     table = load_index_table(gear)
     rows = {1: 0.002, 2: 0.004, 3: 0.013, 5: 0.007, 6: 0.001}
-    options = AssessOptions(advice=True)
     times = []
     for _ in range(4):
         start = time.perf_counter()
-        assess([inspection(rows, 0.04)], gear, table, options)
+        assess([inspection(rows, 0.04)], gear, table, advice=True)
         times.append(time.perf_counter() - start)
     show(
         "one gear with repair sets and next joint, first / least of 4",

@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from mlg_troubleshoot.decision.assessment import Assessment
 from mlg_troubleshoot.decision.inspection import Inspection, Side
-from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.store import Record, Store, inspection_record
@@ -77,7 +77,7 @@ def lives(gears: int, visits: int, rng: np.random.Generator) -> list[list[Inspec
 def records(drawn: list[list[Inspection]], gear: Gear) -> list[Record]:
     """Turn inspections and their assessments into records, as keeping does."""
     flat = [inspection for own in drawn for inspection in own]
-    judged = assess(flat[::100], gear, load_index_table(gear), AssessOptions())
+    judged = assess(flat[::100], gear, load_index_table(gear))
     found: list[Record] = []
     for n, inspection in enumerate(flat):
         of = judged[n // 100]

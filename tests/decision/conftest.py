@@ -11,7 +11,8 @@ import pytest
 
 from mlg_troubleshoot.decision.assessment import Assessment
 from mlg_troubleshoot.decision.inspection import Inspection, Side
-from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.decision.judge_rows import assess
+from mlg_troubleshoot.decision.prediction import Extension
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.studies.index_table import IndexTable
@@ -60,10 +61,13 @@ def judge(gear: Gear, table: IndexTable) -> Judge:
     """Judge one inspection of the shipped gear; the same inspection is judged once, for judgements cannot change."""
     judged: dict[Any, Assessment] = {}
 
-    def judge_one(clearance_in: Mapping[int, float], options: AssessOptions | None = None, **more: Any) -> Assessment:
-        key = (frozenset(clearance_in.items()), options, frozenset(more.items()))
+    def judge_one(
+        clearance_in: Mapping[int, float], *, advice: bool = False, extension: Extension | None = None, **more: Any
+    ) -> Assessment:
+        key = (frozenset(clearance_in.items()), advice, extension, frozenset(more.items()))
         if key not in judged:
-            (found,) = assess([inspected(clearance_in, **more)], gear, table, options)
+            row = inspected(clearance_in, **more)
+            (found,) = assess([row], gear, table, advice=advice, extension=extension)
             assert isinstance(found, Assessment)
             judged[key] = found
         return judged[key]

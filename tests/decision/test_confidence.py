@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import norm
 
 from mlg_troubleshoot.decision.case import Cases, exact_chance
-from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.monte_carlo import check_probability
 from mlg_troubleshoot.decision.sentences import confidence_words, rigging_sentence
 from mlg_troubleshoot.gear.directions import worst_case
@@ -17,28 +17,25 @@ from mlg_troubleshoot.reporting.json_form import check_as_json
 from mlg_troubleshoot.studies.index_table import IndexTable
 from tests.decision.conftest import Judge, Shifted, every_joint, inspected
 
-ADVICE = AssessOptions(advice=True)
-REPAIRS = AssessOptions(advice=True)
-
 
 @pytest.mark.parametrize("clearance_in", [0.0, 0.0014, 0.0016, 0.002, 0.0025, 0.003, 0.004])
 @pytest.mark.parametrize("gauge_u_in", [0.0005, 0.002])
 def test_curvature_moves_the_probability_by_less_than_one_percent(
     judge: Judge, clearance_in: float, gauge_u_in: float
 ) -> None:
-    checked = judge(every_joint(clearance_in), ADVICE, gauge_u_in=gauge_u_in).confidence
+    checked = judge(every_joint(clearance_in), advice=True, gauge_u_in=gauge_u_in).confidence
     assert checked is not None
     assert abs(checked.monte_carlo - checked.analytic) < 0.01
 
 
 def test_the_analytic_value_is_the_probability_of_the_contract(judge: Judge) -> None:
-    found = judge(every_joint(0.002), ADVICE)
+    found = judge(every_joint(0.002), advice=True)
     assert found.confidence is not None
     assert found.confidence.analytic == pytest.approx(found.probability_within_margin, abs=1e-12)
 
 
 def test_advice_does_not_change_the_verdict_or_its_probability(judge: Judge) -> None:
-    plain, advised = judge(every_joint(0.002)), judge(every_joint(0.002), ADVICE)
+    plain, advised = judge(every_joint(0.002)), judge(every_joint(0.002), advice=True)
     assert (plain.verdict, plain.probability_within_margin) == (advised.verdict, advised.probability_within_margin)
 
 
@@ -53,8 +50,8 @@ def test_the_error_of_one_monte_carlo_value_is_the_scatter_of_many(gear: Gear, j
 
 
 def test_a_worse_gauge_is_in_the_monte_carlo_value(judge: Judge) -> None:
-    fine = judge(every_joint(0.0015), ADVICE, gauge_u_in=0.0001).confidence
-    coarse = judge(every_joint(0.0015), ADVICE, gauge_u_in=0.002).confidence
+    fine = judge(every_joint(0.0015), advice=True, gauge_u_in=0.0001).confidence
+    coarse = judge(every_joint(0.0015), advice=True, gauge_u_in=0.002).confidence
     assert fine is not None
     assert coarse is not None
     assert coarse.monte_carlo < fine.monte_carlo - 0.02
@@ -64,8 +61,8 @@ def test_the_own_uncertainty_of_a_joint_is_in_the_monte_carlo_value(
     gear: Gear, table: IndexTable, judge: Judge
 ) -> None:
     read = inspected(every_joint(0.0015), gauge_u_by_joint_in={5: 0.004})
-    (own,) = assess([read], gear, table, ADVICE)
-    checked, plain = own.confidence, judge(every_joint(0.0015), ADVICE).confidence
+    (own,) = assess([read], gear, table, advice=True)
+    checked, plain = own.confidence, judge(every_joint(0.0015), advice=True).confidence
     assert checked is not None
     assert plain is not None
     assert checked.monte_carlo < plain.monte_carlo - 0.02
@@ -81,7 +78,7 @@ def test_re_rigging_takes_back_what_shifts_the_plunger_already(gear: Gear, shift
 def test_the_monte_carlo_value_is_off_the_linear_one_by_what_errors_of_the_readings_do_to_the_worst_case(
     gear: Gear, judge: Judge
 ) -> None:
-    found = judge(every_joint(0.001), ADVICE, gauge_u_in=0.004)
+    found = judge(every_joint(0.001), advice=True, gauge_u_in=0.004)
     errors = 0.004 * np.random.default_rng(8).standard_normal((1500, 10))
     errors, start = np.vstack([errors, -errors]), np.full(10, 0.001)
     steps = 1e-5 * np.eye(10)
@@ -99,12 +96,12 @@ def test_the_monte_carlo_value_is_off_the_linear_one_by_what_errors_of_the_readi
 
 
 def test_the_error_stands_beside_the_probability(judge: Judge) -> None:
-    assert "±" in confidence_words(judge(every_joint(0.002), ADVICE).confidence)
+    assert "±" in confidence_words(judge(every_joint(0.002), advice=True).confidence)
     assert confidence_words(None) == ""
 
 
 def test_re_rigging_leaves_half_of_the_range_between_both_worst_cases(gear: Gear, judge: Judge) -> None:
-    found = judge(every_joint(0.004), REPAIRS).rigging
+    found = judge(every_joint(0.004), advice=True).rigging
     exact = worst_case(gear.model, np.full((1, 10), 0.004))
     assert found is not None
     assert found.predicted_displacement_in == pytest.approx(0.5 * (exact.over_in[0] - exact.under_in[0]), abs=1e-12)
@@ -112,25 +109,25 @@ def test_re_rigging_leaves_half_of_the_range_between_both_worst_cases(gear: Gear
 
 
 def test_re_rigging_cannot_clear_the_published_failure(judge: Judge) -> None:
-    found = judge({3: 0.013, 5: 0.007}, REPAIRS).rigging
+    found = judge({3: 0.013, 5: 0.007}, advice=True).rigging
     assert found is not None
     assert found.probability_within_margin < 0.05
     assert 0.2 < found.probability_exceed_random_directions < 0.3
 
 
 def test_a_gear_within_its_margin_has_no_rigging_alternative(judge: Judge) -> None:
-    assert judge(every_joint(0.001), REPAIRS).rigging is None
+    assert judge(every_joint(0.001), advice=True).rigging is None
 
 
 def test_the_sentence_on_re_rigging_says_that_the_joints_stay_worn(judge: Judge) -> None:
-    found = judge({3: 0.013, 5: 0.007}, REPAIRS).rigging
+    found = judge({3: 0.013, 5: 0.007}, advice=True).rigging
     assert found is not None
     assert rigging_sentence(found).endswith("the joints stay worn.")
 
 
 def test_the_seed_decides_the_draws_and_stands_in_the_json(gear: Gear, table: IndexTable) -> None:
     one, again, other = (
-        assess([inspected(every_joint(0.002), gauge_u_in=0.002)], gear, table, AssessOptions(advice=True, seed=seed))[0]
+        assess([inspected(every_joint(0.002), gauge_u_in=0.002)], gear, table, advice=True, seed=seed)[0]
         for seed in (4, 4, 5)
     )
     assert one == again

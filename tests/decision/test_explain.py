@@ -10,7 +10,6 @@ from scipy.stats import norm
 
 from mlg_troubleshoot.decision.assessment import Posterior
 from mlg_troubleshoot.decision.case import Cases
-from mlg_troubleshoot.decision.judge_rows import AssessOptions
 from mlg_troubleshoot.decision.likely_worn import explain
 from mlg_troubleshoot.gear.gear import Gear
 from tests.benchmarks import worn_gears
@@ -121,7 +120,7 @@ def test_ninety_percent_intervals_cover_the_clearances_of_a_simulated_fleet(gear
 
 
 def test_the_posterior_is_in_the_assessment_of_a_measured_gear(judge: Judge) -> None:
-    found = judge({3: 0.013, 5: 0.007}, AssessOptions(advice=True), readings_in=(0.04,))
+    found = judge({3: 0.013, 5: 0.007}, advice=True, readings_in=(0.04,))
     assert found.posterior is not None
     assert found.posterior.groups[0].joints == (3, 5)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from mlg_troubleshoot.decision.inspection import InvalidRow, Side
-from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.json_form import check_as_json
@@ -28,7 +28,7 @@ PROBLEM = Problem("negative", "a.csv", None, 2, "clearance_3_in", "F2", "-1", "0
 @pytest.fixture
 def form(gear: Gear, table: IndexTable, judge: Judge) -> dict:
     rejected = assess([InvalidRow("R2", None, Side.RH, ("tail_no",), ("noticed",))], gear, table)
-    judged = judge({3: 0.013, 5: 0.007}, AssessOptions(), readings_in=(0.041,))
+    judged = judge({3: 0.013, 5: 0.007}, readings_in=(0.041,))
     return check_as_json(gear, [judged, *rejected], [PROBLEM], ["a note"])
 
 
@@ -102,7 +102,7 @@ def test_what_was_not_asked_for_is_null(form: dict) -> None:
 
 
 def test_with_advice_the_posterior_names_groups_and_intervals(gear: Gear, judge: Judge) -> None:
-    judged = judge({3: 0.013, 5: 0.007}, AssessOptions(advice=True), readings_in=(0.041,))
+    judged = judge({3: 0.013, 5: 0.007}, advice=True, readings_in=(0.041,))
     (row,) = check_as_json(gear, [judged], [], [])["inspections"]
     assert row["posterior"]["groups"][0]["joints"] == [3, 5]
     assert [interval["joint"] for interval in row["posterior"]["intervals"]] == list(range(1, 11))

@@ -10,7 +10,7 @@ from scipy.stats import norm
 
 from mlg_troubleshoot.decision.assessment import Assessment, MeasuringAdvice, Verdict
 from mlg_troubleshoot.decision.case import Cases
-from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.next_joint import (
     COST_OF_WRONG_WITHIN,
     advise,
@@ -333,7 +333,7 @@ def test_the_advice_is_the_same_at_every_call(gear: Gear) -> None:
 
 def test_with_advice_the_next_action_is_the_same(judge: Judge) -> None:
     measured = {3: 0.001, 5: 0.001}
-    assert judge(measured, AssessOptions(advice=True)).next_action == judge(measured).next_action
+    assert judge(measured, advice=True).next_action == judge(measured).next_action
 
 
 def test_a_critical_joint_is_next_even_where_another_would_tell_more(gear: Gear) -> None:

@@ -11,7 +11,7 @@ from mlg_troubleshoot.decision import repair
 from mlg_troubleshoot.decision.assessment import RepairSet
 from mlg_troubleshoot.decision.case import Cases, predict_batch
 from mlg_troubleshoot.decision.inspection import Inspection
-from mlg_troubleshoot.decision.judge_rows import AssessOptions, allowances
+from mlg_troubleshoot.decision.judge_rows import allowances
 from mlg_troubleshoot.decision.plan import minutes_to_measure
 from mlg_troubleshoot.decision.prediction import predict
 from mlg_troubleshoot.gear.directions import worst_case
@@ -59,7 +59,7 @@ def test_restoring_joint_three_alone_is_too_close(gear: Gear) -> None:
 
 def test_restoring_joints_three_and_five_clears_the_failure(gear: Gear, judge: Judge) -> None:
     assert probabilities_after(gear, (3, 5))[0] >= 0.95
-    sets = judge(FULL_FAILURE, AssessOptions()).repair_sets
+    sets = judge(FULL_FAILURE).repair_sets
     assert sets is not None
     assert sets[0].joints == (3, 5)
 
@@ -121,7 +121,7 @@ def test_only_measured_joints_are_proposed_for_repair(gear: Gear) -> None:
 
 
 def test_a_gear_within_its_margin_has_no_repair_sets(judge: Judge) -> None:
-    assert judge(every_joint(0.001), AssessOptions()).repair_sets == ()
+    assert judge(every_joint(0.001)).repair_sets == ()
 
 
 def test_a_joint_worn_by_its_allowance_brings_the_worst_case_to_the_margin(gear: Gear) -> None:
@@ -143,12 +143,12 @@ def test_an_allowance_ends_at_the_limit_of_the_joint_where_that_comes_before_the
 
 
 def test_beyond_the_margin_there_is_no_allowance(judge: Judge) -> None:
-    found = judge(FAILURE, AssessOptions())
+    found = judge(FAILURE)
     assert {finding.allowance_in for finding in found.joints} == {None}
 
 
 def test_an_unmeasured_joint_has_no_allowance(judge: Judge) -> None:
-    found = judge({3: 0.001}, AssessOptions())
+    found = judge({3: 0.001})
     assert [f.joint for f in found.joints if f.allowance_in is not None] == [3]
 
 

@@ -11,7 +11,7 @@ import pytest
 from mlg_troubleshoot.decision.assessment import Assessment, UncertaintyBudget, Verdict
 from mlg_troubleshoot.decision.case import Cases, predict_batch
 from mlg_troubleshoot.decision.inspection import Inspection
-from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.prediction import predict
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.directions import worst_case
@@ -154,24 +154,24 @@ def test_the_upper_prediction_gives_unmeasured_joints_no_reading_uncertainty(gea
 
 
 def test_an_extension_replaces_the_model_uncertainty_by_its_residual_scatter_and_says_so(judge: Judge) -> None:
-    found = budget(judge(WORN, AssessOptions(extension=Shifted())))
+    found = budget(judge(WORN, extension=Shifted()))
     assert found.model_in == 0.001
     assert "plunger shifted by 0.004 in" in found.model_source
 
 
 def test_an_extension_acts_on_every_displacement(judge: Judge) -> None:
-    plain, extended = judge(WORN), judge(WORN, AssessOptions(extension=Shifted()))
+    plain, extended = judge(WORN), judge(WORN, extension=Shifted())
     for name in ("over_travel_in", "under_travel_in", "predicted_displacement_in", "predicted_upper_in"):
         assert getattr(extended, name) - getattr(plain, name) == pytest.approx(0.004)
 
 
 def test_an_inspection_without_a_column_that_an_extension_needs_says_so(judge: Judge) -> None:
-    said = " ".join(judge(WORN, AssessOptions(extension=Shifted())).warnings)
+    said = " ".join(judge(WORN, extension=Shifted()).warnings)
     assert "The extension of the model needs gauge_id, which this inspection lacks" in said
 
 
 def test_an_inspection_with_all_that_an_extension_needs_says_nothing(judge: Judge) -> None:
-    found = judge(WORN, AssessOptions(extension=Shifted()), gauge_id="G-1")
+    found = judge(WORN, extension=Shifted(), gauge_id="G-1")
     assert not any("lacks" in warning for warning in found.warnings)
 
 
@@ -183,7 +183,7 @@ class Scaled(Shifted):
 
 
 def test_the_part_of_the_readings_grows_with_the_calibration_rate(judge: Judge) -> None:
-    plain, scaled = judge(WORN), judge(WORN, AssessOptions(extension=Scaled()))
+    plain, scaled = judge(WORN), judge(WORN, extension=Scaled())
     assert budget(scaled).clearances_in == pytest.approx(1.1 * budget(plain).clearances_in)
 
 
@@ -196,7 +196,7 @@ class Loaded(Shifted):
 
 @pytest.fixture(scope="module")
 def loaded(judge: Judge) -> Assessment:
-    return judge(WORN, AssessOptions(extension=Loaded()), gauge_id="G-1")
+    return judge(WORN, extension=Loaded(), gauge_id="G-1")
 
 
 def test_the_prediction_as_loaded_is_smaller_than_the_bound(judge: Judge, loaded: Assessment) -> None:
@@ -218,7 +218,7 @@ def test_the_geometry_spread_is_that_of_the_prediction_as_loaded_on_every_linkag
 
 
 def test_a_shift_moves_the_bound_too(judge: Judge) -> None:
-    shifted = judge(WORN, AssessOptions(extension=Shifted()), gauge_id="G-1")
+    shifted = judge(WORN, extension=Shifted(), gauge_id="G-1")
     assert shifted.bound_in == shifted.predicted_displacement_in
     assert not shifted.as_loaded
 
@@ -249,7 +249,7 @@ def test_the_stated_chance_of_the_other_side_is_how_often_a_gear_lies_there(gear
     bound = bound + rng.standard_normal(n) * np.maximum(0.003, 0.1 * bound)
     read = np.maximum(true + 0.0005 * rng.standard_normal((n, 10)), 0.0)
     seen = [inspected(dict(enumerate(row.tolist(), 1)), gauge_u_in=0.0005) for row in read]
-    judged = assess(seen, gear, table, AssessOptions(advice=False))
+    judged = assess(seen, gear, table, advice=False)
     stated = np.array([a.probability_within_margin for a in judged])
     wrong = [a.chance_wrong for a in judged]
     for low, high in ((0.0, 0.05), (0.05, 0.35), (0.35, 0.65), (0.65, 0.95), (0.95, 1.0)):

@@ -18,7 +18,7 @@ import tomli_w
 
 from mlg_troubleshoot.datafile import LONGEST_LINE, MOST_BYTES, read_json, read_toml
 from mlg_troubleshoot.decision.inspection import Inspection, Side
-from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.errors import GearFileError, MechanismError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
@@ -103,7 +103,7 @@ def test_hostile_names_are_text_in_the_drawing_of_a_report(hostile: Gear, table:
     gear = hostile
     own = replace(table, geometry_sha256=gear.geometry_sha256, ensemble_sha256=gear.ensemble_sha256)
     inspection = Inspection("R", "N1", Side.LH, ClearanceConvention.RADIAL, {3: 0.013, 5: 0.007})
-    (judged,) = assess([inspection], gear, own, AssessOptions())
+    (judged,) = assess([inspection], gear, own)
     told = ReportProvenance("1", datetime(2024, 5, 17, tzinfo=UTC), gear.geometry_sha256)
     html = render(inspection_document(judged, gear, told), "A4")
     assert "<script>" not in html

@@ -15,7 +15,7 @@ import pytest
 
 from mlg_troubleshoot.decision.assessment import Assessment, Rejected
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, InvalidRow, Outcome, RowSource, Side
-from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.planner import correct
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
@@ -55,8 +55,7 @@ def judge(gear: Gear, table: IndexTable) -> Judge:
     """Judge one inspection, repair sets and allowances included."""
 
     def judged(clearance_in: Mapping[int, float], **changes: Any) -> Assessment:
-        options = AssessOptions(advice=True)
-        (found,) = assess([inspection(clearance_in, **changes)], gear, table, options)
+        (found,) = assess([inspection(clearance_in, **changes)], gear, table, advice=True)
         assert isinstance(found, Assessment)
         return found
 

@@ -9,7 +9,7 @@ import pytest
 
 from mlg_troubleshoot.decision.assessment import Rejected
 from mlg_troubleshoot.decision.inspection import Side
-from mlg_troubleshoot.decision.judge_rows import AssessOptions, assess
+from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.sources import SourceKind
@@ -311,9 +311,7 @@ def test_a_report_has_one_unit(unit: LengthUnit, shown: str, judge: Judge, make:
 def test_the_joints_that_explain_a_measured_displacement_have_a_table(
     gear: Gear, table: IndexTable, make: Make
 ) -> None:
-    (partly,) = assess(
-        [inspection({2: 0.001, 4: 0.001}, readings_in=(0.028,))], gear, table, AssessOptions(advice=True)
-    )
+    (partly,) = assess([inspection({2: 0.001, 4: 0.001}, readings_in=(0.028,))], gear, table, advice=True)
     text = make(partly, formats=("html",)).text
     assert "Which joints explain the measured displacement" in text
     assert re.search(r"#3 and #5 \d[\d.]*\s% #3 0\.0\d+ to 0\.0\d+; #5 ", text)
