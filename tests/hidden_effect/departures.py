@@ -258,7 +258,16 @@ def summarise(records: list[Record]) -> dict[str, Any]:
     said: dict[str, Counter[str]] = defaultdict(Counter)
     for r in records:
         said[r["group"]]["+".join(sorted(str(n[0]) for n in r["named"])) or r["verdict"]] += 1
-    return {"lines": rates, "said": {group: dict(said[group]) for group in sorted(said)}}
+    linked = [r for r in records if r["group"] == "linkage, one cause"]
+    causes = {*(r["truth"][0][0] for r in linked)} - {"?"}
+    by_cause = {c: [r for r in linked if r["truth"][0][0] == c] for c in sorted(causes)} | {"all": linked}
+    return {
+        "lines": rates,
+        "by_cause": {
+            c: study._rate(sum(_right(r, "geometry") for r in rows), len(rows)) for c, rows in by_cause.items()
+        },
+        "said": {group: dict(said[group]) for group in sorted(said)},
+    }
 
 
 def result_of(records: list[Record], first_seed: int) -> dict[str, Any]:

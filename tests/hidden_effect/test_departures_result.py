@@ -57,6 +57,23 @@ def test_a_hidden_cause_counts_as_named_with_the_linkage_beside_it_but_not_with_
     assert rate("another linkage, one cause, S = 15: named, geometry beside it or not", right, wrong) == 0.5
 
 
+def test_what_is_named_on_another_linkage_is_told_by_cause() -> None:
+    gauge, rate_error = ([["gauge_bias", "gauge G-1"]], [["calibration_rate", None]])
+    found = result_of(
+        [
+            record("linkage, one cause", [*gauge], [*gauge]),
+            record("linkage, one cause", [], [*rate_error]),
+            record("loads:40", [], [["load_directions", None]]),
+        ],
+        0,
+    )["by_cause"]
+    assert {cause: (one["n"], one["rate"]) for cause, one in found.items()} == {
+        "calibration_rate": (1, 0.0),
+        "gauge_bias": (1, 1.0),
+        "all": (2, 0.5),
+    }
+
+
 def test_directions_are_asked_for_only_where_a_regression_beats_one_scale() -> None:
     loads: list[list[str | None]] = [["load_directions", None]]
     line = "load directions, spread 40°: named (or their class), where a regression beats one scale"
