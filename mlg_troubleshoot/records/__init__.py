@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mlg_troubleshoot.records.gate import admit, judge_again, judge_length
 from mlg_troubleshoot.records.model import ColumnReading, FileRead, ReadOptions, ReadResult, SheetLayout
-from mlg_troubleshoot.records.read import expand, read_inspections, read_many
+from mlg_troubleshoot.records.read import expand, read_many
 
 __all__ = [
     "ColumnReading",
@@ -16,6 +16,5 @@ __all__ = [
     "expand",
     "judge_again",
     "judge_length",
-    "read_inspections",
     "read_many",
 ]

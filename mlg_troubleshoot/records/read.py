@@ -58,16 +58,10 @@ def _ticker(progress: Progress | None) -> Callable[[int], None]:
     return tick
 
 
-def read_inspections(
-    source: Source, options: ReadOptions, *, name: str | None = None, progress: Progress | None = None
-) -> ReadResult:
-    return _finish([_read_file(source, options, name, _ticker(progress))])
-
-
 def read_many(sources: Iterable[Source], options: ReadOptions, *, progress: Progress | None = None) -> ReadResult:
     """Read the inspections of several files, folders and patterns as one batch."""
     ticker = _ticker(progress)
-    return _finish([_read_file(item, options, None, ticker) for source in sources for item in expand(source)])
+    return _finish([_read_file(item, options, ticker) for source in sources for item in expand(source)])
 
 
 def expand(source: Source) -> list[Source]:
@@ -92,8 +86,8 @@ def _is_scratch(path: Path) -> bool:
     return path.name.startswith(("~$", ".~lock", "."))
 
 
-def _read_file(source: Source, options: ReadOptions, name: str | None, ticker: Callable[[int], None]) -> _Found:
-    label = writable(name or (str(source) if isinstance(source, str | Path) else STDIN_NAME))
+def _read_file(source: Source, options: ReadOptions, ticker: Callable[[int], None]) -> _Found:
+    label = writable(str(source if isinstance(source, str | Path) else getattr(source, "name", STDIN_NAME)))
     digest: str | None = None
     kind = "unreadable"
     found = Collected()

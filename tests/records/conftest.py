@@ -11,8 +11,9 @@ from typing import Any
 import openpyxl
 import pytest
 
-from mlg_troubleshoot.records import ReadOptions, ReadResult, read_inspections
+from mlg_troubleshoot.records import ReadOptions, ReadResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from tests.records.reading import read_inspections
 
 HEADER = ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in")
 GOOD = ("R1", "N100AB", "LH", "RADIAL", 0.013, 0.007)

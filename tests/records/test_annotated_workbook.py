@@ -16,8 +16,9 @@ from openpyxl.worksheet.datavalidation import DataValidation
 
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.outputs import write_csv
-from mlg_troubleshoot.records import ReadOptions, read_inspections
+from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.records.annotate import annotate_workbook
+from tests.records.reading import read_inspections
 
 HEADER = ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in", "inspection_date")
 ROWS = [

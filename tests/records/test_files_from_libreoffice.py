@@ -10,8 +10,9 @@ import zipfile
 import openpyxl
 import pytest
 
-from mlg_troubleshoot.records import ReadOptions, read_inspections
+from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.records.template import write_template
+from tests.records.reading import read_inspections
 
 JOINTS = [(n, f"name {n}", f"place {n}") for n in range(1, 11)]
 

@@ -9,10 +9,11 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.errors import OutputError
-from mlg_troubleshoot.records import ReadOptions, read_inspections
+from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.records.annotate import annotate_workbook
 from mlg_troubleshoot.records.template import write_template
 from mlg_troubleshoot.units import LengthUnit
+from tests.records.reading import read_inspections
 
 JOINTS = [(n, f"name {n}", f"place {n}") for n in range(1, 11)]
 FILLED = {

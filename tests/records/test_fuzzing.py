@@ -11,8 +11,9 @@ import zipfile
 
 import pytest
 
-from mlg_troubleshoot.records import ReadOptions, ReadResult, read_inspections
+from mlg_troubleshoot.records import ReadOptions, ReadResult
 from tests.machine import SLOWER
+from tests.records.reading import read_inspections
 
 SLOWEST_S = 5.0
 MEMORY_LIMIT_KB = 1_000_000

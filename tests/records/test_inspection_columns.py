@@ -417,11 +417,11 @@ def test_a_number_whose_digits_are_lost_is_no_identity(read, xlsx):
 def test_progress_is_told_as_the_rows_are_read(table):
     import io
 
-    from mlg_troubleshoot.records import ReadOptions, read_inspections
+    from mlg_troubleshoot.records import ReadOptions, read_many
 
     text = table(rows=[(f"R{i}", *GOOD[1:]) for i in range(1200)])
     told: list[int] = []
-    read_inspections(io.BytesIO(text.encode()), ReadOptions(), progress=lambda done, _: told.append(done))
+    read_many([io.BytesIO(text.encode())], ReadOptions(), progress=lambda done, _: told.append(done))
     assert told == [500, 1000, 1200]
 
 

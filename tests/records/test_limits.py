@@ -16,16 +16,18 @@ import pytest
 
 from mlg_troubleshoot import datafile
 from mlg_troubleshoot.decision.inspection import Inspection
-from mlg_troubleshoot.records import ReadOptions, cells, csvfile, read, read_inspections, read_many, xls, zipguard
+from mlg_troubleshoot.records import ReadOptions, cells, csvfile, read, read_many, xls, zipguard
 from mlg_troubleshoot.records.annotate import annotate_workbook
 from mlg_troubleshoot.reporting import pdf
 from tests.machine import SLOWER
+from tests.records.reading import read_inspections
 
 HEADER = "record_id,tail_no,side,clearance_convention,clearance_3_in,clearance_5_in\n"
 GOOD = "R1,N1,LH,RADIAL,0.013,0.007\n"
 _READ = """
 import sys, time
-from mlg_troubleshoot.records import ReadOptions, read_inspections
+from mlg_troubleshoot.records import ReadOptions
+from tests.records.reading import read_inspections
 made = {"blank lines": b"\\n" * 60_000_000, "blank lines below": sys.stdin.buffer.read() + b"\\r\\n" * 9_000_000,
         "commas": b"," * 100_000_000, "commas below": sys.stdin.buffer.read() + b"," * 20_000_000,
         "one line": b"x" * 24_000_000, "wide letters": "\\U0001f600".encode() * 6_000_000,

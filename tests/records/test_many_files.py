@@ -6,7 +6,8 @@ import io
 
 import pytest
 
-from mlg_troubleshoot.records import ReadOptions, read_inspections, read_many
+from mlg_troubleshoot.records import ReadOptions, read_many
+from tests.records.reading import read_inspections
 
 HEADER = "record_id,tail_no,side,clearance_convention,clearance_3_in\n"
 
@@ -80,3 +81,8 @@ def test_each_file_is_identified_by_its_hash(folder):
 
     (file,) = read_inspections(folder / "a.csv", ReadOptions()).files
     assert file.sha256 == hashlib.sha256((folder / "a.csv").read_bytes()).hexdigest()
+
+
+def test_an_open_file_is_called_by_its_name(folder):
+    with (folder / "a.csv").open("rb") as file:
+        assert read_many([file], ReadOptions()).files[0].name == str(folder / "a.csv")

@@ -13,8 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
-from mlg_troubleshoot.records import ReadOptions, read_inspections
+from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from tests.records.reading import read_inspections
 
 HEADER = (
     "record_id",

@@ -15,10 +15,11 @@ from mlg_troubleshoot.cli.check import Flags
 from mlg_troubleshoot.cli.prompts.answers import Answers, JointAnswer, judge, read_more
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.records import ReadOptions, judge_again, read_inspections
+from mlg_troubleshoot.records import ReadOptions, judge_again
 from mlg_troubleshoot.units import ClearanceConvention as Convention
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows.check import CheckOptions
+from tests.records.reading import read_inspections
 
 VALUES = (
     *("0", "0.0", ".013", "0.013", "0.013 in", "13 thou", "0.33 mm", '.007"', "0.381 mm", "15 thou", "0.015", "0.0151"),

@@ -15,8 +15,8 @@ from tests.machine import SLOWER
 MEASURE = """
 import json, sys, time
 start = time.process_time()
-from mlg_troubleshoot.records import ReadOptions, read_inspections
-result = read_inspections(sys.argv[1], ReadOptions())
+from mlg_troubleshoot.records import ReadOptions, read_many
+result = read_many([sys.argv[1]], ReadOptions())
 judged = time.process_time() - start
 peak = int(open("/proc/self/status").read().split("VmHWM:")[1].split()[0]) / 1024
 counts = len(result.inspections), len(result.problems)
@@ -112,8 +112,8 @@ def test_ten_thousand_rows_of_csv_are_read_in_time(tmp_path):
 
 def test_reading_a_table_loads_no_spreadsheet_library():
     code = (
-        "import io, sys; from mlg_troubleshoot.records import ReadOptions, read_inspections;"
-        "read_inspections(io.BytesIO(b'record_id,tail_no,side,clearance_3_in\\nR1,N1,LH,0.1\\n'), ReadOptions());"
+        "import io, sys; from mlg_troubleshoot.records import ReadOptions, read_many;"
+        "read_many([io.BytesIO(b'record_id,tail_no,side,clearance_3_in\\nR1,N1,LH,0.1\\n')], ReadOptions());"
         "print([m for m in ('pandas', 'openpyxl', 'python_calamine') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60)

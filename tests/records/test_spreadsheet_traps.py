@@ -772,8 +772,9 @@ def test_44_an_exported_text_is_no_formula(tmp_path, text):
 
 
 def test_44_a_text_in_an_annotated_workbook_is_no_formula(tmp_path, read, xlsx):
-    from mlg_troubleshoot.records import ReadOptions, read_inspections
+    from mlg_troubleshoot.records import ReadOptions
     from mlg_troubleshoot.records.annotate import annotate_workbook
+    from tests.records.reading import read_inspections
 
     source, out = tmp_path / "in.xlsx", tmp_path / "out.xlsx"
     source.write_bytes(xlsx())
