@@ -490,6 +490,12 @@ class Fitting:
         """What would make a misfit fit, and whether that says that this reading is the wrong one."""
         reading, near = self.readings[i], 3.5 * float(spread[i])
         value, expected = reading.value, reading.value - float(gap[i])
+        for j in map(int, np.flatnonzero(out)):
+            other = self.readings[j]
+            if j != i and other.row is not None and other.kind is reading.kind:
+                back = other.value - float(gap[j])
+                if abs(other.value - expected) < near and abs(value - back) < 3.5 * float(spread[j]):
+                    return f"swapped with row {other.row}: {other.words}", True
         if not reading.is_angle:
             for slip in _SLIPS:
                 for size, factor, words in (
@@ -499,12 +505,6 @@ class Fitting:
                     if abs(value * factor - expected) < near:
                         right = f"{reading.shown(value * factor)} would fit"
                         return f"{right}: the value is {slip.factor:g} times too {size}, {words}", True
-        for j in map(int, np.flatnonzero(out)):
-            other = self.readings[j]
-            if j != i and other.row is not None and other.kind is reading.kind:
-                back = other.value - float(gap[j])
-                if abs(other.value - expected) < near and abs(value - back) < 3.5 * float(spread[j]):
-                    return f"swapped with row {other.row}: {other.words}", True
         if reading.kind is Kind.DISTANCE:
             names = [p.name for p in self.linkage.space.mechanism.points]
             others = [
