@@ -208,9 +208,10 @@ def test_12_a_row_of_units_below_the_header_is_read(read, xlsx):
     assert clearances(read(xlsx(rows), "t.xlsx")) == {3: pytest.approx(0.33 / 25.4), 5: pytest.approx(0.007)}
 
 
-def test_13_a_header_that_stands_twice_is_an_error(read, table):
+@pytest.mark.parametrize("again", [0.001, None])
+def test_13_neither_of_two_columns_of_one_header_is_read(read, table, again):
     header = (*HEADER, "clearance_3_in")
-    result = read(table(header, [(*GOOD, 0.001)]))
+    result = read(table(header, [(*GOOD, again)]))
     problem = only(result)
     assert (problem.code, problem.cell, problem.row) == ("header_duplicate", "G1", 1)
     assert isinstance(result.rows[0], InvalidRow)
