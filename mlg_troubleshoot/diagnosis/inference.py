@@ -237,12 +237,13 @@ class Inference:
         return float(scale * (np.sqrt(2.0 * max(bar, 0.0)) + 0.84) / np.sqrt(len(self.misfit)))
 
     def _named(self, lead: int, p_alarm: float, smallest: float) -> Finding:
+        alone = _Together(self, (lead,), (p_alarm,), SECOND_SHARE)
+        several = one_by_one(alone, _MOST_CAUSES)
         constant = self._constant(lead)
-        if constant is not None:
+        if constant is not None and self._shifted(several.chosen):
             p, variables = constant
             return Finding(Verdict.UNLISTED, p, self.bare, smallest, p_values=(p_alarm,), variables=variables)
-        alone = _Together(self, (lead,), (p_alarm,), SECOND_SHARE)
-        finding = self._with(one_by_one(alone, _MOST_CAUSES), smallest)
+        finding = self._with(several, smallest)
         if finding.verdict is Verdict.UNLISTED:
             # What is left may be a weaker cause of the catalogue: a listed cause goes before an unlisted one.
             weaker = one_by_one(replace(alone, least_share=WEAK_SHARE), _MOST_CAUSES)
@@ -260,7 +261,7 @@ class Inference:
         clear = p_values[0] <= NAME
         for place in range(len(chosen)):
             others = [c for k, c in enumerate(chosen) if k != place]
-            better, near, rest = self._rivals(chosen[place], others, clear)
+            better, near, rest = self.rivals(chosen[place], others, clear)
             chosen[place] = better
             rivals += near
             behind.update(rest)
@@ -290,6 +291,12 @@ class Inference:
         variables = self.bank.variables[top] if p <= ALARM else ("all rows",)
         return min(p, ALARM), variables
 
+    def _shifted(self, chosen: Sequence[int]) -> bool:
+        """Tell whether a shift of all rows alike still stands out beside causes; beside a single one it did."""
+        noise, _fitted = self.refit(chosen)
+        screen = _of_shapes(noise, np.ones((len(self.misfit), 1)), self.columns[:, list(chosen)])
+        return len(chosen) < 2 or float(screen.run(self.misfit[:, None]).gain[0, 0]) > CONSTANT
+
     def refit(self, chosen: Sequence[int]) -> tuple[NoiseModel, Fit]:
         """Noise with the chosen causes taken out, and their fit under it; kept, since rivals and pairs ask again."""
         key = tuple(chosen)
@@ -299,7 +306,7 @@ class Inference:
             self._refitted[key] = noise, fit(noise, columns, self.misfit)
         return self._refitted[key]
 
-    def _rivals(self, lead: int, others: Sequence[int], clear: bool) -> tuple[int, list[int], dict[Key, float]]:
+    def rivals(self, lead: int, others: Sequence[int], clear: bool) -> tuple[int, list[int], dict[Key, float]]:
         """Best candidate in the lead's place, the rivals that are near it, and how far the rest is behind."""
         noise, _fitted = self.refit([lead, *others])
         screen = Screen(noise, self.columns, self.signs, self.columns[:, list(others)] if others else None, self.exact)
@@ -413,16 +420,26 @@ class _Together:
 
     def further(self) -> _Together | None:
         """The same with the next cause; beside one the best pair of all, since two may hide each other."""
-        whole, second = self.whole, len(self.chosen) == 1
+        if len(self.chosen) == 1:
+            return self._added(self._pair)
+        polished = self._polished()
+        return polished._added(polished._next)
+
+    def _polished(self) -> _Together:
+        """The same, each in the form that explains most beside the others."""
+        chosen = list(self.chosen)
+        for place, k in enumerate(chosen):
+            chosen[place] = self.whole.rivals(k, [*chosen[:place], *chosen[place + 1 :]], clear=True)[0]
+        return replace(self, chosen=tuple(chosen))
+
+    def _added(self, found_by: Callable[[NoiseModel], tuple[list[int], float] | None]) -> _Together | None:
+        whole, further = self.whole, len(self.chosen) > 1
         noise, _fitted = whole.refit(self.chosen)
-        found = self._pair(noise) if second else self._next(noise)
-        if found is None or not self._sound(found[0]):
+        found = found_by(noise)
+        if found is None or not self._sound(found[0]) or (further and not self._helps(noise, found[0])):
             return None
-        chosen, gain = found
-        if not second and not self._helps(noise, chosen):
-            return None
-        p = self._chance(noise, whole.columns[:, chosen[:-1]], gain, aside=not second)
-        return replace(self, chosen=tuple(chosen), p_values=(*self.p_values, p)) if p <= SECOND else None
+        p = self._chance(noise, whole.columns[:, found[0][:-1]], found[1], aside=further)
+        return replace(self, chosen=tuple(found[0]), p_values=(*self.p_values, p)) if p <= SECOND else None
 
     def without_idle(self) -> _Together | None:
         """The same without the one that stands out least, if no more than by chance; two stood out as a pair."""
