@@ -291,7 +291,8 @@ def _without_faults(
     table = table.take(usable & np.isfinite(table.measured_in))
     _enough(table)
     plain = build_scene(model, table, where)
-    closes = np.isfinite(plain[0].over_in)
+    # With all its clearances, and without any one of them: what each adds must be known.
+    closes = np.isfinite(np.column_stack([plain[0].over_in, plain[0].contribution_in])).all(axis=1)
     if not closes.all():
         table = table.take(closes)
         _enough(table)
@@ -414,6 +415,11 @@ def _unsaid(table: DiagnosisTable) -> tuple[str, ...]:
         found.append(
             f"With fewer than {LEAST_TAILS} aircraft it cannot be said whether other gears do the same, nor where this "
             "plunger rod should be rigged; what is gained is told on rows of the same gears."
+        )
+    if not np.isfinite(table.clearance_in).any() and len(np.unique(table.gears)) > 1:
+        found.append(
+            "Without clearances the wear of each gear is only supposed: what is found in several gears may be wear. "
+            "Read clearances, at least of #2 to #5, before acting on it."
         )
     if len(table) < LEAST_ROWS:
         found.append(f"With fewer than {LEAST_ROWS} rows small effects stay unseen, and scatter is a rough guess.")

@@ -252,7 +252,7 @@ def _explain(
     slips = _slips(model, table, usual, place, clearance)
     rows = table.take(np.full(len(slips), place))
     rows = replace(rows, quantities={**rows.quantities, ALONG: np.array([s.extension for s in slips])})
-    over = predicted(model, rows, np.array([s.clearance for s in slips]))[0]
+    over = predicted(model, rows, np.array([s.clearance for s in slips]))[0] if slips else np.empty(0)
     before = misfit[place]
     best: tuple[float, _Slip] | None = None
     for slip, at in zip(slips, over, strict=True):

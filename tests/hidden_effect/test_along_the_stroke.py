@@ -1,7 +1,8 @@
 """An effect is hidden along the stroke: a curve tells apart what one position cannot, and one rig is enough.
 
 What was hidden is compared after the diagnosis, which reads the CSV file that the simulator wrote. The seeds of what
-one position cannot tell apart are those of eight at which it could not; the others are the first ones tried.
+one position cannot tell apart are those of eight at which it could not, those of a fleet without clearances once failed
+(one was AMBIGUOUS, one has a far reading that no slip explains); the others are the first ones tried.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ CLEARANCES = (*(f"clearance_{joint}_in" for joint in range(1, 11)), "clearance_c
 DIRECTIONS = CurveSpec(effect="load_directions", parameters={"spread_deg": 40.0})
 OTHER_LINKAGE = CurveSpec(geometry="C")
 RATE = CurveSpec(effect="calibration_rate")
+SOUND = CurveSpec()
 RIG = CurveSpec(gears=1, rows=24, fleet=False)
 OTHER_RIG = CurveSpec(gears=1, rows=24, fleet=False, geometry="A-G:0.2")
 
@@ -91,6 +93,15 @@ def test_nothing_is_found_on_a_sound_rig() -> None:
 
 def test_nothing_is_found_on_a_worn_rig_of_which_no_clearance_was_read() -> None:
     assert found("RIG", 1, CLEARANCES).verdict == "NONE"
+
+
+@pytest.mark.parametrize("seed", [9000, 9001])
+def test_nothing_is_found_in_a_sound_fleet_of_which_no_clearance_was_read(seed: int) -> None:
+    assert found("SOUND", seed, CLEARANCES).verdict == "NONE"
+
+
+def test_a_fleet_without_clearances_says_that_its_wear_is_supposed() -> None:
+    assert any("only supposed" in said for said in found("SOUND", 9000, CLEARANCES).unsaid)
 
 
 def test_one_rig_without_clearances_shows_another_linkage() -> None:

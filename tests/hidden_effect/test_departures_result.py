@@ -114,3 +114,8 @@ def test_what_moves_with_temperature_on_one_aircraft_is_no_re_rigging_of_its_las
     # Fleet 49 of those that the rule was set on; its other rows show what moves.
     found = run(("one group", 49, 6_300_049))
     assert (found["named"], found["variables"]) == ([], ["tail_no", "temperature_c"])
+
+
+def test_a_row_that_does_not_close_without_one_of_its_clearances_is_no_crash() -> None:
+    # The seed at which it was found.
+    assert run(("loads and gauge_bias", 41, 6_900_041))["verdict"] == "NAMED"
