@@ -15,9 +15,9 @@ from rich.table import Table
 
 from mlg_troubleshoot.cli import output
 from mlg_troubleshoot.cli.boundary import INTERRUPTED
+from mlg_troubleshoot.cli.flags import StudyFlags
 from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.remembered import Settings
-from mlg_troubleshoot.cli.study import StudyFlags
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear

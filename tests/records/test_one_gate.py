@@ -11,7 +11,7 @@ import pytest
 
 from mlg_troubleshoot import Inspection, Side, TroubleshootError, check
 from mlg_troubleshoot.cli.by_hand import from_flags
-from mlg_troubleshoot.cli.check import Flags
+from mlg_troubleshoot.cli.flags import Flags
 from mlg_troubleshoot.cli.prompts.answers import Answers, JointAnswer, judge, read_more
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear

@@ -189,7 +189,8 @@ def fit(noise: NoiseModel, columns: Array, data: Array) -> Fit:
         likelihood = -0.5 * n * np.log(rest / n) - 0.5 * log_determinant
         if best is None or likelihood > best.log_likelihood:
             scale = np.sqrt(rest / max(n - k, 1))
-            best = Fit(values, scale * np.sqrt(np.diag(inverse)), float(likelihood), ratio, float(scale))
+            errors = scale * np.sqrt(np.maximum(np.diag(inverse), 0.0))
+            best = Fit(values, errors, float(likelihood), ratio, float(scale))
     if best is None:
         raise ValueError("no tail ratio to try")
     return best
