@@ -52,14 +52,12 @@ def annotate_workbook(
     result: ReadResult,
     verdicts: VerdictColumns,
     over_limit: OverLimit = MappingProxyType({}),
-    *,
-    name: str | None = None,
 ) -> tuple[str, ...]:
     """Write a copy of a workbook with bad cells and joints over their limit marked, and verdict columns.
 
     ``over_limit`` gives for a row its joints over their limit, each with that limit. [in]
     """
-    label = writable(name if name is not None else str(source))
+    label = writable(str(source))
     data = _load(source, out)
     buffer = io.BytesIO()
     try:

@@ -58,7 +58,6 @@ def environment() -> Environment:
         percent=formats.percent,
         joints=formats.joint_list,
         several=formats.several,
-        short=formats.short,
         landings=formats.landings,
         minutes=formats.minutes,
         moment=formats.moment,

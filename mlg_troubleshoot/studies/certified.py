@@ -23,6 +23,8 @@ from mlg_troubleshoot.geometry.intervals import Box, Range, cosine_range
 _STROKES = 64
 _BATCH = 64
 _MOST_BOXES = 4000
+# Wanted difference of the bound and the best that was found. [in]
+_GAP_IN = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,16 +51,9 @@ class CertifiedBound:
 
 
 def certified_bound(
-    model: LinkageModel,
-    clearance_in: Array,
-    sense: float = 1.0,
-    gap_in: float = 1e-6,
-    most_boxes: int = _MOST_BOXES,
+    model: LinkageModel, clearance_in: Array, sense: float = 1.0, most_boxes: int = _MOST_BOXES
 ) -> CertifiedBound:
-    """Enclose the largest displacement over all directions and the whole release stroke.
-
-    gap_in: wanted difference of bound and best found. [in]
-    """
+    """Enclose the largest displacement over all directions and the whole release stroke."""
     search = _Search(model, np.asarray(clearance_in, float), sense)
     waiting = search.start()
     settled, examined = -np.inf, 0
@@ -68,7 +63,7 @@ def certified_bound(
         waiting = Box(waiting.low[:, :-count], waiting.high[:, :-count])
         examined += count
         boxes, bounds, smear = search.contract(boxes)
-        within = bounds <= search.best + gap_in
+        within = bounds <= search.best + _GAP_IN
         settled = max(settled, float(np.max(bounds[within], initial=-np.inf)))
         if not np.all(within):
             kept = Box(boxes.low[:, ~within], boxes.high[:, ~within])

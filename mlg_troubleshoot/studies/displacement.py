@@ -46,7 +46,7 @@ class HeldDirections:
         return moved
 
 
-def worst_directions(model: LinkageModel, limits_in: Array, *, compiled: bool = False) -> HeldDirections:
+def worst_directions(model: LinkageModel, limits_in: Array) -> HeldDirections:
     """Worst directions found with every clearance at its limit, then held for all samples (section 4.3).
 
     "We set the direction of the clearances so that the plunger would have the maximum number of failures."
@@ -58,7 +58,7 @@ def worst_directions(model: LinkageModel, limits_in: Array, *, compiled: bool = 
     # A sense in which the linkage does not close governs: its samples must be seen to fail.
     is_over = bool(np.isnan(over) or (over >= under))
     directions = (worst.over_directions if is_over else worst.under_directions)[0]
-    return HeldDirections(model, directions, 1.0 if is_over else -1.0, compiled)
+    return HeldDirections(model, directions, 1.0 if is_over else -1.0)
 
 
 def worst_sense(model: LinkageModel, limits_in: Array, sense: float) -> HeldDirections:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from pathlib import Path
 
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.studies.targets import Target, load_targets, targets_file
@@ -66,11 +65,9 @@ class Statement:
         return f"{self.claim} (section {self.section}): {self.outcome}. {self.numbers}"
 
 
-def check_statements(
-    gear: Gear, targets: Path | None = None, progress: Callable[[int, int], None] | None = None
-) -> tuple[Statement, ...]:
-    """Check every statement of a targets file on the reference and the whole ensemble."""
-    entries = load_targets(targets_file(gear) if targets is None else targets)
+def check_statements(gear: Gear, progress: Callable[[int, int], None] | None = None) -> tuple[Statement, ...]:
+    """Check every statement of the targets of a gear on the reference and the whole ensemble."""
+    entries = load_targets(targets_file(gear))
     columns: list[list[float]] = []
     for model in gear.ensemble_models:
         facts = Facts(gear, model)

@@ -333,12 +333,9 @@ def advice(found: Iterable[GearLife]) -> Advice:
     """Count outcomes that name a joint, and those whose joint was advised first."""
     right = asked = 0
     for life in found:
-        by_digest = {r.digest: r.record_id for r in life.records}
         for record in life.outcomes:
             joint = record.body["joint"]
-            result = next(
-                (s.result for s in life.inspections if s.record.record_id == by_digest.get(record.body["of"])), {}
-            )
+            result = next((s.result for s in life.inspections if s.record.record_id == record.record_id), {})
             if joint is not None and result:
                 first = {j["joint"] for j in result["joints"] if j["rank"] == 1}
                 advised = set((result.get("next_action") or {}).get("joints") or ()) | first
