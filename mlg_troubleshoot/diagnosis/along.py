@@ -85,4 +85,5 @@ def wear_of_gears(table: DiagnosisTable, unread_in: Array) -> Array:
     together = unread_in.sum(axis=1)
     each = np.column_stack([unread_in, together, together * landings / max(float(np.mean(landings)), 1e-9)])
     own = table.gears[:, None] == np.unique(table.gears)
-    return np.hstack([FLEET_WORN * each, (own[:, :, None] * each[:, None, :]).reshape(len(table), -1)])
+    of_gears = (own[:, :, None] * each[:, None, :]).reshape(len(table), -1)
+    return np.hstack([FLEET_WORN * each, of_gears]) if own.shape[1] > 1 else of_gears
