@@ -335,17 +335,12 @@ def _root(x: Pair) -> tuple[Pair, Pair, Pair]:
 
 
 def _cos(x: Pair) -> tuple[Pair, Pair, Pair]:
-    cosine, sine = cosine_range(*x), _sine(x)
+    cosine, sine = cosine_range(*x), cosine_range(x[0] - np.pi / 2, x[1] - np.pi / 2)
     return cosine, _negated(sine), _negated(cosine)
 
 
 def _sin(x: Pair) -> tuple[Pair, Pair, Pair]:
-    cosine, sine = cosine_range(*x), _sine(x)
-    return sine, cosine, _negated(sine)
-
-
-def _sine(x: Pair) -> Pair:
-    return cosine_range(x[0] - np.pi / 2, x[1] - np.pi / 2)
+    return _cos((x[0] - np.pi / 2, x[1] - np.pi / 2))
 
 
 def cosine_range(low: Array, high: Array) -> Pair:
