@@ -36,6 +36,8 @@ from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 
+from .conftest import fleet
+
 BY_NAME = {cause.name: cause for cause in CATALOGUE}
 
 
@@ -129,6 +131,29 @@ def test_resting_places_of_pins_have_the_moments_of_their_angles(gear: Gear, spr
     found = LoadDirections().covariances(gear.model, ())[k]
     assert found[0, 0] == pytest.approx(np.mean(change**2), abs=0.005)
     assert found[0, 1] == pytest.approx(np.mean(change) ** 2, abs=0.005)
+
+
+@pytest.mark.parametrize("k", range(4))
+def test_joints_near_and_far_from_the_worst_direction_have_together_the_moments_of_all(gear: Gear, k: int) -> None:
+    scene, _rows = build_scene(gear.model, fleet(gear.model), gear.discrepancies)
+    block = LoadDirections().blocks(scene, ())[k]
+    assert block.parts is not None
+    share, mean, variance = block.parts.T
+    assert share @ (variance + mean**2) == pytest.approx(block.covariance[0, 0], abs=0.005)
+    assert (share @ mean) ** 2 == pytest.approx(block.covariance[0, 1], abs=0.005)
+
+
+def test_a_skewed_prior_counts_the_mean_over_what_it_draws() -> None:
+    rng, covariance = np.random.default_rng(2), np.array([[0.3, 0.1], [0.1, 0.2]])
+    parts = np.array([[0.7, -0.1, 0.01], [0.3, -0.8, 0.09]])
+    block = Block(LoadDirections(), (3, 5), np.ones((4, 2)), covariance, 0.0, parts=parts)
+    along, square = np.array([-3.0, 1.0]), np.array([[6.0, 2.0], [2.0, 9.0]])
+    which = rng.choice(2, p=parts[:, 0], size=(400_000, 2))
+    skewed = parts[which, 1] + np.sqrt(parts[which, 2]) * rng.standard_normal(which.shape)
+    plain = rng.multivariate_normal(np.zeros(2), covariance, 400_000)
+    mean = [np.mean(np.exp(x @ along - 0.5 * np.einsum("ij,ij->i", x @ square, x))) for x in (skewed, plain)]
+    assert block.skew(along, square) == pytest.approx(float(np.log(mean[0] / mean[1])), abs=0.01)
+    assert replace(block, parts=None).skew(along, square) == 0.0
 
 
 def test_factors_of_all_joints_have_intervals_of_95_percent() -> None:

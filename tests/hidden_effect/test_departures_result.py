@@ -110,6 +110,16 @@ def test_a_pin_that_rests_far_off_its_worst_direction_is_not_named_beside_anothe
     assert rate("load directions: something else named", one) == 0.0
 
 
+def test_directions_are_named_where_one_joint_loses_much_and_the_others_little() -> None:
+    one = run(("loads:40", 25, 6_201_025))
+    assert [name for name, _target in one["named"]] == ["load_directions"]
+
+
+def test_one_joint_beside_another_linkage_is_not_taken_for_directions_of_all() -> None:
+    one = run(("linkage, one cause", 115, 6_201_315))
+    assert rate("another linkage, one cause, S = 15: named, geometry beside it or not", one) == 1.0
+
+
 def test_what_moves_with_temperature_on_one_aircraft_is_no_re_rigging_of_its_last_two_rows() -> None:
     # Fleet 49 of those that the rule was set on; its other rows show what moves.
     found = run(("one group", 49, 6_300_049))

@@ -2,7 +2,8 @@
 
 Ten factors cannot be had from 200 rows one by one. They are drawn from what is known before the data are looked at (a
 prior with a covariance), which shrinks them as far as the data leave them open; the marginal likelihood then says
-whether all ten are worth it beside one cause, or one scale for all.
+whether all ten are worth it beside one cause, or one scale for all. For that the prior of directions is skewed, as they
+are: of joints near their worst direction, which lose little, and far from it.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.polynomial import legendre
 from scipy.linalg import block_diag
+from scipy.special import logsumexp
+from scipy.stats import norm
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.along import predicted
@@ -31,6 +34,8 @@ SPREADS_DEG = (25.0, 45.0, 70.0, 180.0)
 LINKAGES = ((1.0, 0.0), (0.5, 0.0), (1.0, 0.5))
 # What a true linkage may differ beside the ensemble's spread, each joint on its own: an eighth of the largest. [1]
 ALONE = 0.03
+# With more joints there are too many ways to have some of them near the worst direction and the others far from it.
+_MOST_SKEWED = 12
 # Degree of the polynomials in the extension that stand for the curves of linkages between those of the ensemble.
 _DEGREE = 6
 
@@ -46,6 +51,8 @@ class Block:
     covariance, shape (k, k): covariance of the changes of the factors about none. [1]
     penalty: logarithm of the number of blocks of the same cause that are tried. [1]
     uncalibrated: True if all joints may also count more or less alike.
+    parts, shape (2, 3): share, mean and variance of the changes of joints near their worst direction, and far from it:
+        the prior is skewed where most joints lose little and a few lose much. [1]
     """
 
     cause: JointFactors
@@ -54,6 +61,20 @@ class Block:
     covariance: Array
     penalty: float
     uncalibrated: bool = False
+    parts: Array | None = None
+
+    def skew(self, along: Array, square: Array) -> float:
+        """Log-likelihood by which the skewed prior beats the normal one, for exp(aᵀx − xᵀQx/2) of changes x."""
+        count = len(along)
+        if self.parts is None or count > _MOST_SKEWED:
+            return 0.0
+        which = np.indices((2,) * count).reshape(count, -1).T
+        share, mean, variance = (part[which] for part in self.parts.T)
+        apart = _evidence(along, square, mean, np.sqrt(variance)[:, None] * np.eye(count))
+        apart += np.sum(np.log(share), axis=1)
+        root = np.asarray(np.linalg.cholesky(self.covariance)[None], float)
+        normal = _evidence(along, square, np.zeros((1, count)), root)
+        return float(logsumexp(apart) - normal[0])
 
     @property
     def effects_in(self) -> Array:
@@ -145,6 +166,18 @@ class LoadDirections(JointFactors):
             found.append((mean - 1.0) ** 2 * np.ones((n, n)) + variance * np.eye(n))
         return found
 
+    def blocks(self, scene: Scene, ensemble: Sequence[LinkageModel]) -> list[Block]:
+        """Joints within one standard deviation of the worst direction (all around: a right angle), and the others."""
+        chance = (np.arange(2000) + 0.5) / 2000
+        found = []
+        for block, spread in zip(super().blocks(scene, ensemble), np.radians(SPREADS_DEG), strict=True):
+            around = spread >= np.pi
+            angle = np.pi * chance if around else spread * norm.ppf(0.5 + 0.5 * chance)
+            near, change = angle <= (np.pi / 2 if around else spread), np.cos(angle) - 1.0
+            parts = [(np.mean(part), np.mean(change[part]), np.var(change[part])) for part in (near, ~near)]
+            found.append(replace(block, parts=np.array(parts)))
+        return found
+
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Let each clearance act by its factor along its worst direction."""
         return Adjustment(scene.clearance_in, direction_factors=self.factors(scene.joints, candidate, value))
@@ -195,6 +228,15 @@ class OtherGeometry(JointFactors):
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Let each clearance count by its factor."""
         return Adjustment(scene.clearance_in * self.factors(scene.joints, candidate, value))
+
+
+def _evidence(along: Array, square: Array, mean: Array, root: Array) -> Array:
+    """Logarithm of the mean of exp(aᵀx − xᵀQx/2) over normal x, for means (m, k) and roots of covariances (m, k, k)."""
+    turned = np.swapaxes(root, 1, 2)
+    low = np.linalg.cholesky(np.eye(len(along)) + turned @ square @ root)
+    own = np.linalg.solve(low, turned @ (along - mean @ square)[..., None])[..., 0]
+    level = mean @ along - 0.5 * np.einsum("mi,mi->m", mean @ square, mean) + 0.5 * np.sum(own**2, axis=1)
+    return np.asarray(level - np.sum(np.log(np.einsum("mii->mi", low)), axis=1))
 
 
 def _apart(model: LinkageModel, ensemble: Sequence[LinkageModel]) -> Array:
