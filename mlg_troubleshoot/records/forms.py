@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from mlg_troubleshoot.records.cells import Cell, column_letters
 from mlg_troubleshoot.records.columns import IDENTITY, Kind
-from mlg_troubleshoot.records.headers import Standing, recognise
+from mlg_troubleshoot.records.headers import UNKNOWN, recognise
 from mlg_troubleshoot.records.layout import ColumnReader
 from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout, TableInHand
 from mlg_troubleshoot.records.rows import RowReader
@@ -64,7 +64,7 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
 def _is_line(label: str, options: ReadOptions) -> bool:
     """Leave out titles, hints and signature lines, but not a label that may be a reading."""
     found = recognise(label, options.joint_numbers, options.joint_names)
-    return found.standing is not Standing.UNKNOWN or label in options.column_map or label.rstrip().endswith(":")
+    return found is not UNKNOWN or label in options.column_map or label.rstrip().endswith(":")
 
 
 def read_form(form: Form, options: ReadOptions, *, file: str | None, sheet: str | None) -> Collected:

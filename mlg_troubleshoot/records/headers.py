@@ -6,8 +6,7 @@ import difflib
 import re
 import unicodedata
 from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import StrEnum
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from mlg_troubleshoot.errors import UsageError
@@ -16,23 +15,17 @@ from mlg_troubleshoot.records.columns import LENGTHS, NUMBERED, PER_JOINT, VERDI
 from mlg_troubleshoot.units import UNIT_SPELLINGS, LengthUnit
 
 
-class Standing(StrEnum):
-    CANONICAL = "canonical"
-    UNDERSTOOD = "understood"
-    DOUBTFUL = "doubtful"
-    UNKNOWN = "unknown"
-
-
 @dataclass(frozen=True, slots=True)
 class Recognition:
-    standing: Standing
+    """What a header was understood as, or else why it is in doubt; neither if it is unknown."""
+
     field: Field | None = None
     reason: str = ""
     nearest: str | None = None
     code: str = "header_doubtful"
 
 
-UNKNOWN = Recognition(Standing.UNKNOWN)
+UNKNOWN = Recognition()
 
 _FOREIGN_UNITS = frozenset(
     ("cm", "um", "μm", "µm", "micron", "microns", "m", "ft", "foot", "feet", "dm", "nm", "cms", "metre", "meter")
@@ -128,16 +121,14 @@ def parse_canonical(name: str, joint_numbers: tuple[int, ...]) -> Field | None:
 
 
 @lru_cache(maxsize=4096)
-def _recognise(  # noqa: PLR0911 - each return is one way to be sure
-    header: str, joint_numbers: tuple[int, ...], names: tuple[tuple[int, str], ...]
-) -> Recognition:
+def _recognise(header: str, joint_numbers: tuple[int, ...], names: tuple[tuple[int, str], ...]) -> Recognition:
     text = tidy(header)
     if not text or len(text) > 120:
         return UNKNOWN
     snake = re.sub(r"[\s\-]+", "_", text)
     field = parse_canonical(snake, joint_numbers)
     if field is not None:
-        return Recognition(Standing.CANONICAL if snake == header.strip() else Standing.UNDERSTOOD, field)
+        return Recognition(field)
     bracketed = [part.strip() for part in _BRACKETS.findall(text)]
     words = _TOKEN.findall(_BRACKETS.sub(" ", text).replace("_", " ").replace("°", " "))
     units, foreign, odd = _units_in(bracketed)
@@ -147,16 +138,14 @@ def _recognise(  # noqa: PLR0911 - each return is one way to be sure
     plain = " ".join(words)
     other = " ".join([plain, *(b.replace("°", "") for b in bracketed)]).strip()
     if other in _WITH_OTHER_UNIT:
-        return Recognition(Standing.UNDERSTOOD, Field(_WITH_OTHER_UNIT[other]))
+        return Recognition(Field(_WITH_OTHER_UNIT[other]))
     numbered = _numbered(words, joint_numbers, names)
     if numbered is None:
         by_alias = _by_alias(plain, units, foreign, odd)
-        if by_alias.standing is Standing.UNKNOWN:
+        if by_alias is UNKNOWN:
             return _resembles_clearance(words, bool(units), joint_numbers, names)
         return by_alias
-    if numbered.standing is not Standing.UNDERSTOOD or numbered.field is None:
-        return numbered
-    return _with_unit(numbered.field, units, foreign, odd)
+    return numbered if numbered.field is None else _with_unit(numbered.field, units, foreign, odd)
 
 
 def _units_in(bracketed: list[str]) -> tuple[set[LengthUnit], list[str], list[str]]:
@@ -224,11 +213,11 @@ def _with_unit(field: Field, units: set[LengthUnit], foreign: list[str], odd: li
         return _doubt("it names two units", field.name)
     if odd:
         return _doubt(f"{' '.join(odd)!r} beside it leaves open what was measured", field.name)
-    return Recognition(Standing.UNDERSTOOD, Field(field.kind, field.number, next(iter(units), None)))
+    return Recognition(replace(field, unit=next(iter(units), None)))
 
 
 def _doubt(reason: str, nearest: str | None, code: str = "header_doubtful") -> Recognition:
-    return Recognition(Standing.DOUBTFUL, None, reason, nearest, code)
+    return Recognition(None, reason, nearest, code)
 
 
 def _split_number(words: list[str]) -> tuple[list[str], int | None, list[str]]:
@@ -252,11 +241,11 @@ def _numbered(  # noqa: PLR0911 - each return is one reason to doubt
         return None
     is_joint = bool(said & _JOINT_WORDS)
     is_clearance = bool(said & _CLEARANCE_WORDS)
-    is_float = "float" in said or "axial" in said or "endfloat" in said
+    is_float = bool(said & {"float", "axial", "endfloat"})
     everything = said | set(after)
     if not (is_joint or is_clearance or is_float):
         if said == {"plunger", "displacement"} and not after:
-            return Recognition(Standing.UNDERSTOOD, Field(Kind.PLUNGER_DISPLACEMENT, number))
+            return Recognition(Field(Kind.PLUNGER_DISPLACEMENT, number))
         return None
     if everything & _OTHER_MATTER and not (is_clearance or is_float):
         return UNKNOWN
@@ -292,7 +281,7 @@ def _check_name(kind: Kind, number: int, after: list[str], names: tuple[tuple[in
         if others or own:
             hint = f"; that is joint {others[0]}" if len(others) == 1 else ""
             return _doubt(f"{' '.join(after)!r} is not the name of joint {number}{hint}", nearest)
-    return Recognition(Standing.UNDERSTOOD, Field(kind, number))
+    return Recognition(Field(kind, number))
 
 
 def _vocabulary(names: tuple[tuple[int, str], ...]) -> frozenset[str]:
@@ -328,7 +317,7 @@ def near_miss(header: str, joint_numbers: tuple[int, ...]) -> Recognition:
     if field is not None and field.kind in VERDICT_BEARING:
         unit = snake[len(bare) :]
         return _doubt(f"it looks like a slip of the pen for {close[0]}{unit}", close[0] + unit)
-    return Recognition(Standing.UNKNOWN, nearest=close[0])
+    return Recognition(nearest=close[0])
 
 
 def parse_target(name: str, joint_numbers: tuple[int, ...]) -> Field | None:

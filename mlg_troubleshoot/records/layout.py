@@ -9,7 +9,7 @@ from itertools import pairwise, zip_longest
 
 from mlg_troubleshoot.records.cells import Cell, column_letters, show, writable
 from mlg_troubleshoot.records.columns import ALONG, CARRIED, IDENTITY, LENGTHS, PER_JOINT, REQUIRED, Kind
-from mlg_troubleshoot.records.headers import UNKNOWN, Recognition, Standing, near_miss, parse_target, recognise, tidy
+from mlg_troubleshoot.records.headers import UNKNOWN, Recognition, near_miss, parse_target, recognise, tidy
 from mlg_troubleshoot.records.model import ReadOptions, TableInHand
 from mlg_troubleshoot.records.refusals import HEADER_SEARCH_ROWS
 from mlg_troubleshoot.records.rows import PlacedField
@@ -69,7 +69,7 @@ def header_score(cells: Sequence[Cell], options: ReadOptions) -> int:
             mapped = _mapped(cell, index, options)
             found = UNKNOWN if mapped else recognise(cell, options.joint_numbers, options.joint_names)
             known |= set() if found.field is None else {found.field.quantity}
-            doubtful += mapped or found.standing is Standing.DOUBTFUL
+            doubtful += mapped or bool(found.reason)
     kinds = {kind for kind, _ in known}
     core = len(kinds & {*IDENTITY, Kind.CLEARANCE}) + bool(doubtful)
     # A table of clearances alone is a table, too: what it lacks is then named column by column.
@@ -161,12 +161,9 @@ class ColumnReader:
         options = self._options
         for key, target in {**options.remembered_map, **options.column_map}.items():
             if tidy(key) == tidy(text) or key == column_letters(index):
-                found = parse_target(target, options.joint_numbers)
-                return Recognition(Standing.UNDERSTOOD if found else Standing.UNKNOWN, found), True
-        found_by_name = recognise(text, options.joint_numbers, options.joint_names)
-        if found_by_name.standing is Standing.UNKNOWN and text:
-            found_by_name = near_miss(text, options.joint_numbers)
-        return found_by_name, False
+                return Recognition(parse_target(target, options.joint_numbers)), True
+        found = recognise(text, options.joint_numbers, options.joint_names)
+        return near_miss(text, options.joint_numbers) if found is UNKNOWN and text else found, False
 
     def place(
         self,
@@ -185,7 +182,7 @@ class ColumnReader:
             if known is not None and index < len(units) and units[index] is not None:
                 known = replace(known, unit=known.unit or units[index])
             readings.append((found, mapped))
-            placed = PlacedField(index, text, known, found.standing is Standing.DOUBTFUL, cell, header_row)
+            placed = PlacedField(index, text, known, bool(found.reason), cell, header_row)
             columns.placed.append(placed)
             if placed.refused:
                 self._doubt(placed, found)

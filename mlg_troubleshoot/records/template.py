@@ -29,8 +29,9 @@ HEADER_FILL = "FFD9E2EC"
 _LINE_PT = 15.0
 _LINE = Side(style="thin", color="FF9AA5B1")
 _REQUIRED_FILL = "FFFFE9A8"
-_TEXT_KINDS = frozenset({Kind.RECORD_ID, Kind.TAIL_NO, Kind.GAUGE_ID, Kind.TECHNICIAN_ID, *CARRIED})
-_MUST = frozenset({Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE, Kind.CONVENTION})
+_TEXT_KINDS = (Kind.RECORD_ID, Kind.TAIL_NO, Kind.GAUGE_ID, Kind.TECHNICIAN_ID, *CARRIED)
+_NUMBER_FORMATS = {**dict.fromkeys(_TEXT_KINDS, "@"), Kind.DATE: "yyyy-mm-dd"}
+_MUST = frozenset({Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE, Kind.CONVENTION, Kind.UNIT})
 _NEVER_NEGATIVE = (LENGTHS | {Kind.LANDINGS}) - {Kind.PLUNGER_DISPLACEMENT, Kind.PLUNGER_DOWN_LOCK}
 _CHOICES: dict[Kind, tuple[str, ...]] = {
     Kind.SIDE: ("LH", "RH"),
@@ -39,15 +40,17 @@ _CHOICES: dict[Kind, tuple[str, ...]] = {
     Kind.APPROACH: ("EXTENDING", "RETRACTING"),
     Kind.OUTCOME: ("RETRACTED", "FAILED"),
 }
+# What each column holds, in the order of the columns.
 _MEANING: dict[Kind, str] = {
     Kind.RECORD_ID: "Required. Your own unique name of this inspection.",
     Kind.TAIL_NO: "Required. Tail number, kept as text.",
     Kind.SIDE: "Required. LH or RH; there is no default.",
     Kind.CONVENTION: "Required. " + " ".join(f"{c.value}: {c.meaning}." for c in ClearanceConvention),
     Kind.UNIT: "Unit of every length on this sheet: in, thou or mm.",
-    Kind.DATE: "Optional. Year-month-day, for example 2026-03-04.",
-    Kind.LANDINGS: "Optional. Landings since overhaul, 0 or more.",
     Kind.CLEARANCE: "Clearance. Leave blank if it was not measured; 0 means measured and found to be zero.",
+    Kind.DATE: "Optional. Year-month-day, for example 2026-03-04.",
+    Kind.OUTCOME: "Optional. What the gear did: RETRACTED or FAILED.",
+    Kind.LANDINGS: "Optional. Landings since overhaul, 0 or more.",
     Kind.GAUGE_U: "Optional. Standard uncertainty of one reading, as read. Blank: 0.0005 in is assumed.",
     Kind.PLUNGER_DISPLACEMENT: "Optional. Measured change of the plunger position at mid-position, over-travel "
     "positive, under-travel negative. Repeat readings have their own columns.",
@@ -60,12 +63,11 @@ _MEANING: dict[Kind, str] = {
     Kind.APPROACH: "Optional. How the position was approached before the reading: EXTENDING or RETRACTING.",
     Kind.GAUGE_ID: "Optional. The gauge set that was used.",
     Kind.TECHNICIAN_ID: "Optional. Who measured.",
-    Kind.AXIAL_FLOAT: "Optional. End float of the joint along its pin.",
-    Kind.OUTCOME: "Optional. What the gear did: RETRACTED or FAILED.",
     Kind.WORK_ORDER: "Optional. Goes to the report unchanged.",
     Kind.MANUAL_REF: "Optional. Manual reference; goes to the report unchanged.",
     Kind.MANUAL_REV: "Optional. Manual revision; goes to the report unchanged.",
     Kind.REMARKS: "Optional. Goes to the report unchanged.",
+    Kind.AXIAL_FLOAT: "Optional. End float of the joint along its pin.",
 }
 _INSTRUCTIONS = (
     "Instructions (this sheet is not read)",
@@ -110,18 +112,11 @@ def write_book(path: str | Path, book: Workbook) -> None:
 
 
 def _fields(joints: Sequence[JointLine], unit: LengthUnit | None) -> list[Field]:
+    """Return the columns in one unit, or the lines of the form: these say their unit on a line of its own."""
     numbers = [number for number, _, _ in joints]
-    columns: list[tuple[Kind, Sequence[int | None]]] = [
-        *((kind, (None,)) for kind in (Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE, Kind.CONVENTION)),
-        (Kind.CLEARANCE, numbers),
-        *((kind, (None,)) for kind in (Kind.DATE, Kind.OUTCOME, Kind.LANDINGS, Kind.GAUGE_U)),
-        (Kind.PLUNGER_DISPLACEMENT, (1, 2, 3)),
-        *((kind, (None,)) for kind in (Kind.PLUNGER_DOWN_LOCK, Kind.PLUNGER_GAUGE_U, Kind.MARGIN, Kind.MARGIN_U)),
-        *((kind, (None,)) for kind in (Kind.TEMPERATURE, Kind.PRESSURE, Kind.APPROACH, Kind.GAUGE_ID)),
-        *((kind, (None,)) for kind in (Kind.TECHNICIAN_ID, *CARRIED)),
-        (Kind.AXIAL_FLOAT, numbers),
-    ]
-    return [Field(kind, n, unit if kind in LENGTHS else None) for kind, each in columns for n in each]
+    several = {Kind.CLEARANCE: numbers, Kind.PLUNGER_DISPLACEMENT: (1, 2, 3), Kind.AXIAL_FLOAT: numbers}
+    kinds = [kind for kind in _MEANING if kind is not Kind.UNIT or unit is None]
+    return [Field(kind, n, unit if kind in LENGTHS else None) for kind in kinds for n in several.get(kind, (None,))]
 
 
 def _explain(field: Field, joints: Sequence[JointLine]) -> str:
@@ -172,9 +167,8 @@ def _table(book: Workbook, joints: Sequence[JointLine], unit: LengthUnit) -> Non
         cell.border = Border(bottom=_LINE, right=_LINE)
         cell.comment = Comment(_explain(field, joints), "mlg", width=320, height=120)
         sheet.column_dimensions[letters].width = 30 if field.kind is Kind.REMARKS else 13
-        number_format = _number_format(field.kind)
-        for row in range(2, _ROWS + 2) if number_format is not None else ():
-            sheet.cell(row, index + 1).number_format = number_format
+        for row in range(2, _ROWS + 2) if field.kind in _NUMBER_FORMATS else ():
+            sheet.cell(row, index + 1).number_format = _NUMBER_FORMATS[field.kind]
         _validate(sheet, field.kind, f"{letters}2:{letters}{_ROWS + 1}")
     sheet.row_dimensions[1].height = 45
     sheet.freeze_panes = "D2"
@@ -183,12 +177,6 @@ def _table(book: Workbook, joints: Sequence[JointLine], unit: LengthUnit) -> Non
     sheet.page_setup.paperSize, sheet.page_setup.orientation, sheet.page_setup.scale = 9, "landscape", 53
     for after in (Kind.CLEARANCE, Kind.MARGIN_U, Kind.REMARKS):
         sheet.col_breaks.append(Break(id=max(i for i, field in enumerate(fields, 1) if field.kind is after)))
-
-
-def _number_format(kind: Kind) -> str | None:
-    if kind in _TEXT_KINDS:
-        return "@"
-    return "yyyy-mm-dd" if kind is Kind.DATE else None
 
 
 def _validate(sheet: Worksheet, kind: Kind, cells: str) -> None:
@@ -214,14 +202,12 @@ def _form(book: Workbook, joints: Sequence[JointLine]) -> None:
     sheet["A2"] = "One sheet is one inspection. Yellow lines must be filled in; blank means not measured."
     for letters, width in (("A", 28), ("B", 24), ("C", 66)):
         sheet.column_dimensions[letters].width = width
-    fields = _fields(joints, None)
-    fields.insert(4, Field(Kind.UNIT))
-    for row, field in enumerate(fields, 4):
+    for row, field in enumerate(_fields(joints, None), 4):
         label, value, hint = sheet.cell(row, 1, field.label), sheet.cell(row, 2), sheet.cell(row, 3)
-        must = field.kind in _MUST or field.kind is Kind.UNIT
+        must = field.kind in _MUST
         value.fill = PatternFill("solid", fgColor=_REQUIRED_FILL if must else "FFFFFFFF")
         value.border = Border(left=_LINE, right=_LINE, top=_LINE, bottom=_LINE)
-        value.number_format = _number_format(field.kind) or "General"
+        value.number_format = _NUMBER_FORMATS.get(field.kind, "General")
         value.alignment = label.alignment = Alignment(horizontal="left", vertical="top")
         label.font = Font(name=FONT, bold=must)
         hint.value = _explain(field, joints)

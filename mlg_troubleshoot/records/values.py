@@ -6,7 +6,7 @@ import math
 import re
 from datetime import date
 from enum import StrEnum
-from typing import TypeVar, cast
+from typing import TypeVar
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.records.cells import UNWRITABLE, OddCell, OddKind, show, show_number
@@ -66,7 +66,6 @@ NOT_MEASURED = frozenset(
 )
 
 _E = TypeVar("_E", bound=StrEnum)
-_CHOICES: dict[type[StrEnum], dict[str, StrEnum]] = {}
 
 
 _ODD_CELLS = {OddKind.NO_VALUE: "formula_without_value", OddKind.DATE: "cell_is_date"}
@@ -218,18 +217,15 @@ def read_text(cell: str | float | OddCell, expected: str, *, required: bool = Fa
 
 def read_choice(cell: str | float | OddCell, choices: type[_E], code: str, hints: dict[str, str]) -> _E:
     """Read one of a few words, in upper or lower case."""
-    known = _CHOICES.get(choices)
-    if known is None:
-        known = _CHOICES[choices] = {str(choice): choice for choice in choices}
-    found = known.get(cell) if isinstance(cell, str) else None
-    if found is not None:
-        return cast("_E", found)
+    known = choices.__members__
+    if isinstance(cell, str) and cell in known:
+        return known[cell]
     words = list(known)
     expected = " or ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
     text = plain_text(cell) if isinstance(cell, str) else ""
     name = re.sub(r"[\s\-]+", "_", text).upper()
-    if name in words:
-        return choices(name)
+    if name in known:
+        return known[name]
     if isinstance(cell, OddCell):
         raise odd_cell_fault(cell, expected)
     hint = hints.get(text.casefold())
