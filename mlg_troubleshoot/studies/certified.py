@@ -44,11 +44,6 @@ class CertifiedBound:
     stroke_in: float
     boxes: int
 
-    @property
-    def gap_in(self) -> float:
-        """Bound less what was found. [in]"""
-        return self.bound_in - self.found_in
-
 
 def certified_bound(
     model: LinkageModel, clearance_in: Array, sense: float = 1.0, most_boxes: int = _MOST_BOXES

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -81,20 +80,10 @@ class IndexTable:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the table as plain values, in the order of the JSON contract of ``mlg study``."""
-        return {
-            "schema_version": SCHEMA_VERSION,
-            "gear": {
-                "id": self.gear_id,
-                "geometry_sha256": self.geometry_sha256,
-                "ensemble_sha256": self.ensemble_sha256,
-                "provenance": self.provenance,
-            },
-            "seed": self.seed,
-            "design": self.design,
-            "evaluations": self.evaluations,
-            "failed": self.failed,
-            "joints": [asdict(entry) for entry in self.joints],
-        }
+        told = asdict(self)
+        names = {"gear_id": "id", **{n: n for n in ("geometry_sha256", "ensemble_sha256", "provenance")}}
+        gear = {shown: told.pop(name) for name, shown in names.items()}
+        return {"schema_version": SCHEMA_VERSION, "gear": gear, **told}
 
 
 def ranks(first_order: Array) -> Wholes:
@@ -146,9 +135,9 @@ def load_index_table(gear: Gear) -> IndexTable:
     limits = tuple((entry.joint, entry.limit_in) for entry in table.joints)
     wanted_limits = tuple((joint.number, joint.limit.value) for joint in gear.joints)
     if limits != wanted_limits:
-        raise GearFileError(
-            f"{path.name}: was computed for other joints or limits: {_differing(limits, wanted_limits)}", _remedy(gear)
-        )
+        gone = sorted(set(limits) ^ set(wanted_limits))
+        named = ", ".join(f"joint {number} at {limit:g} in" for number, limit in gone)
+        raise GearFileError(f"{path.name}: was computed for other joints or limits: {named}", _remedy(gear))
     return table
 
 
@@ -161,11 +150,6 @@ def _remedy(gear: Gear) -> str:
     shipped = gear.id in shipped_gears() and load_gear(gear.id).path == gear.path
     name = gear.id if shipped else str(gear.path)
     return f"Run: mlg study --gear {name} --write-table"
-
-
-def _differing(found: Sequence[tuple[int, float]], wanted: Sequence[tuple[int, float]]) -> str:
-    gone = set(found) ^ set(wanted)
-    return ", ".join(f"joint {number} at {limit:g} in" for number, limit in sorted(gone))
 
 
 def _index_table(t: DataTable) -> IndexTable:

@@ -218,8 +218,6 @@ def _miss(target: Target, computed: float) -> float:
     if np.isfinite(target.low) and np.isfinite(target.high):
         middle, half = (target.low + target.high) / 2.0, (target.high - target.low) / 2.0
         return (computed - middle) / half
-    bound = target.low if np.isfinite(target.low) else target.high
-    unit = max(abs(bound), 0.05)
-    spare = bound + (1.0 if np.isfinite(target.low) else -1.0) * INSIDE * unit
-    short = spare - computed if np.isfinite(target.low) else computed - spare
-    return max(0.0, short) / (INSIDE * unit)
+    sense, bound = (1.0, target.low) if np.isfinite(target.low) else (-1.0, target.high)
+    spare = INSIDE * max(abs(bound), 0.05)
+    return max(0.0, sense * (bound + sense * spare - computed)) / spare

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -35,16 +36,18 @@ def saltelli_indices(  # noqa: PLR0913 - what is asked, where it stops, what a f
     used: int = 0,
 ) -> Indices:
     """Compute indices with more and more points until every interval is as narrow as wanted."""
+    from scipy.stats import qmc
+
     sets = tuple((i,) for i in range(n)) if groups is None else groups
     children = rng.spawn(SCRAMBLES)
     power = _FIRST_POWER
-    streams = [_Stream(child, n) for child in children]
+    streams = [qmc.Sobol(2 * n, scramble=True, rng=child) for child in children]
     sums = [_Sums(len(sets)) for _ in children]
     found: Indices | None = None
     while True:
         try:
             for stream, total in zip(streams, sums, strict=True):
-                for a, b in stream.up_to(power):
+                for a, b in _continued(stream, power):
                     used += total.add(response, a, b, sets)
         except KeyboardInterrupt:
             if found is None:
@@ -66,22 +69,11 @@ def saltelli_indices(  # noqa: PLR0913 - what is asked, where it stops, what a f
         power += 1
 
 
-class _Stream:
-    """Scrambled Sobol points in both halves of the variables, continued on demand."""
-
-    def __init__(self, rng: Generator, n: int) -> None:
-        from scipy.stats import qmc
-
-        self._engine = qmc.Sobol(2 * n, scramble=True, rng=rng)
-        self._n = n
-        self._drawn = 0
-
-    def up_to(self, power: int) -> Iterator[tuple[Array, Array]]:
-        while self._drawn < 1 << power:
-            count = min(_ROWS, (1 << power) - self._drawn)
-            both = self._engine.random(count)
-            self._drawn += count
-            yield both[:, : self._n], both[:, self._n :]
+def _continued(stream: Any, power: int) -> Iterator[tuple[Array, Array]]:
+    """Further Sobol points of a scramble, in both halves of the variables."""
+    while stream.num_generated < 1 << power:
+        first, second = np.split(stream.random(min(_ROWS, (1 << power) - stream.num_generated)), 2, axis=1)
+        yield first, second
 
 
 class _Sums:

@@ -254,10 +254,8 @@ def _of_tensor(tensor: TensorIndices, coarse: TensorIndices | None, seed: int) -
     half = np.zeros((2, len(first)))
     if coarse is not None:
         half = np.abs([first - coarse.first_order, total - coarse.total_order])
-        evaluations, note = (
-            evaluations + coarse.evaluations,
-            "intervals are the difference to two Gauss points a joint",
-        )
+        evaluations += coarse.evaluations
+        note = "intervals are the difference to two Gauss points a joint"
     design, estimates = f"tensor of {len(tensor.weights)} Gauss points a joint", ((first, half[0]), (total, half[1]))
     return Indices.around(design, seed, *estimates, tensor.mean, tensor.variance, evaluations, tensor.failed, note)
 

@@ -192,21 +192,17 @@ def study_values(findings: StudyFindings, given: GivenDataResult | None = None) 
         ],
     }
     if given is not None:
-        values["given_data"] = _given_values(findings.gear, given)
+        found = given.indices
+        lists = (found.first_order.tolist(), found.interval.tolist(), found.rows.tolist())
+        values["given_data"] = {
+            **chosen(given, "file", "rows_read", "rows_used"),
+            "joints": [
+                {"joint": number, "first_order": first, "first_order_interval": ends, "rows": rows}
+                for number, first, ends, rows in zip(findings.gear.joint_numbers, *lists, strict=True)
+            ],
+        }
     cleaned: dict[str, Any] = plain(values)
     return cleaned
-
-
-def _given_values(gear: Gear, given: GivenDataResult) -> dict[str, Any]:
-    found = given.indices
-    lists = (found.first_order.tolist(), found.interval.tolist(), found.rows.tolist())
-    return {
-        **{name: getattr(given, name) for name in ("file", "rows_read", "rows_used")},
-        "joints": [
-            {"joint": number, "first_order": first, "first_order_interval": ends, "rows": rows}
-            for number, first, ends, rows in zip(gear.joint_numbers, *lists, strict=True)
-        ],
-    }
 
 
 def write_study_csv(findings: StudyFindings, path: Path) -> None:
