@@ -100,9 +100,6 @@ class ReadingWorth:
     variance_in2: float
     critical: bool
 
-    def per_minute(self, *, by_risk: bool) -> float:
-        return (self.risk_drop if by_risk else self.variance_in2) / self.minutes
-
 
 @dataclass(frozen=True, slots=True)
 class MeasuringAdvice:

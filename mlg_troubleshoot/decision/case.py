@@ -52,7 +52,7 @@ class Cases:
             inspections=rows,
             extension=extension,
             clearance_in=np.array([[i.clearance_in.get(n, math.nan) for n in numbers] for i in rows], float),
-            gauge_u_in=np.array([i.gauge_us(numbers) for i in rows]),
+            gauge_u_in=np.array([[i.gauge_u_of(number) for number in numbers] for i in rows]),
             own_gauge=np.array([[number in i.gauge_u_by_joint_in for number in numbers] for i in rows]),
             margin_in=np.array([gear.margin.value if i.margin_in is None else i.margin_in for i in rows]),
             margin_u_in=np.array([i.margin_u_in for i in rows]),

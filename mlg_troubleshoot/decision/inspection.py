@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import date
 from enum import StrEnum
@@ -138,10 +138,6 @@ class Inspection:
     def measured_displacement_in(self) -> float | None:
         """Mean of the plunger readings, over-travel positive; None if there is none. [in]"""
         return sum(self.readings_in) / len(self.readings_in) if self.readings_in else None
-
-    def gauge_us(self, joints: Iterable[int]) -> list[float]:
-        """Standard uncertainties of the radial clearances of some joints. [in]"""
-        return [self.gauge_u_of(joint) for joint in joints]
 
     def gauge_u_of(self, joint: int) -> float:
         """Standard uncertainty of the radial clearance of one joint. [in]"""

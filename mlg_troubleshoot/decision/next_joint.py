@@ -72,23 +72,27 @@ def outlook(one: Cases, anchor: tuple[float, float] | None = None) -> Outlook:
     is the value of the reading. Where no single reading has a value, the share of the variance of the worst case takes
     its place. Distribution and expansion serve the ranking only.
     """
-    gear, missing = one.gear, np.flatnonzero(~one.measured[0])
-    numbers = [gear.joint_numbers[j] for j in missing]
-    opened = frozenset(gear.joint(number).area for number in gear.joint_numbers if number not in numbers)
-    minutes = [minutes_to_measure(gear, [number], opened) for number in numbers]
+    gear, missing = one.gear, np.flatnonzero(~one.measured[0]).tolist()
+    opened = frozenset(joint.area for joint, read in zip(gear.joints, one.measured[0], strict=True) if read)
     linkages = responses(gear)
     if anchor is not None:
         linkages = (linkages[0].anchored(one.filled(0.0)[0], *anchor), *linkages[1:])
     belief = _Belief(one, linkages)
-    drops = np.array([belief.risk_drop(int(j)) for j in missing])
-    variances = np.array([belief.variance(int(j)) for j in missing])
     worth = [
-        ReadingWorth(number, minutes[k], float(drops[k]), float(variances[k]), gear.joint(number).critical)
-        for k, number in enumerate(numbers)
+        ReadingWorth(
+            gear.joint_numbers[j],
+            minutes_to_measure(gear, [gear.joint_numbers[j]], opened),
+            belief.risk_drop(j),
+            belief.variance(j),
+            gear.joints[j].critical,
+        )
+        for j in missing
     ]
     first = [w for w in worth if w.critical] or worth
     valued = any(w.risk_drop > _NO_VALUE for w in first)
-    ordered = tuple(sorted(worth, key=lambda w: (not w.critical, -w.per_minute(by_risk=valued))))
+    ordered = tuple(
+        sorted(worth, key=lambda w: (not w.critical, -(w.risk_drop if valued else w.variance_in2) / w.minutes))
+    )
     return Outlook(ordered, belief.within(), belief.too_close())
 
 
@@ -166,11 +170,8 @@ def advise(one: Cases) -> MeasuringAdvice:
         precise = _can_precision_settle(one, now)
         certain = None if now is Verdict.INCONCLUSIVE else now
         return MeasuringAdvice((), not precise, now, float(p[0]), certain, _all_measured(now, precise))
-    anchor = None
-    over, under = float(prediction.worst.over_in[0]), float(prediction.worst.under_in[0])
-    if np.isfinite(over) and np.isfinite(under):
-        anchor = (over, under)
-    ahead = outlook(one, anchor)
+    anchor = float(prediction.worst.over_in[0]), float(prediction.worst.under_in[0])
+    ahead = outlook(one, anchor if np.isfinite(anchor).all() else None)
     return MeasuringAdvice(
         ahead.worth,
         stop=settled,

@@ -115,7 +115,8 @@ class _Course:
         unread = not self.cases.measured[i].all()
         if self.sets and not f.read_first[i]:
             best = self.sets[0]
-            return self._restore(self._ranked(best.joints), best.predicted_displacement_in, unread).end(End.WITHIN)
+            ranked = self._joints(np.isin(self.gear.joint_numbers, best.joints))
+            return self._restore(ranked, best.predicted_displacement_in, unread).end(End.WITHIN)
         if not unread:
             return self._restore_over_limit().end(End.CANNOT_CLEAR)
         self._measure(self._joints(f.group[i]))
@@ -175,9 +176,6 @@ class _Course:
         """Numbers of joints in the order of their rank."""
         return tuple(self.gear.joint_numbers[j] for j in self.judged.order[self.row] if places[j])
 
-    def _ranked(self, joints: Sequence[int]) -> tuple[int, ...]:
-        return self._joints(np.isin(self.gear.joint_numbers, joints))
-
 
 class _Ahead:
     """What to expect of the joints that are not measured, gear by gear and level of wear by level of wear."""
@@ -193,11 +191,6 @@ class _Ahead:
         model = model_uncertainty(cases.margin_in, cases.residual_u_in)
         u = np.sqrt(readings**2 + np.nan_to_num(lower.u_geometry_in) ** 2 + cases.margin_u_in**2 + model**2)
         self.within_in, self.outside_in = cases.margin_in - SCORE * u, cases.margin_in + SCORE * u
-
-    @property
-    def mean_in(self) -> Array:
-        """Expected clearance of each joint, if it is not measured. [in]"""
-        return (self.weight @ moments()[0])[:, None] * self.gear.limits_in
 
     def total(self, joints: Mask) -> tuple[Array, Array]:
         """Mean and standard deviation, at each level, of what some joints add to the worst case. [in]"""
@@ -311,7 +304,7 @@ def _measure_again(cases: Cases, judged: Judged) -> tuple[Mask, Array]:
 
 def _expected(cases: Cases, judged: Judged, ahead: _Ahead, complaint: Mask) -> tuple[Mask, list[Verdict]]:
     """What will be restored, and the verdict, if every unmeasured joint is as worn as expected."""
-    full = cases.filled(ahead.mean_in)
+    full = cases.filled((ahead.weight @ moments()[0])[:, None] * cases.gear.limits_in)
     sets, ends = np.zeros_like(cases.measured), list(judged.verdicts)
     rows = np.flatnonzero(~cases.measured.all(axis=1) & np.isfinite(judged.batch.upper.displacement_in))
     if not len(rows):
