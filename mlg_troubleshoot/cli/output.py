@@ -8,7 +8,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -174,14 +174,12 @@ def write(result: str) -> None:
     write_pieces((result, "\n"))
 
 
-def write_json(result: object) -> None:
+def write_json(result: dict[str, Any] | Iterator[str]) -> None:
     """Write a result as JSON to stdout, or the pieces of it if it is an iterator."""
     if isinstance(result, dict):
         pieces: Iterable[str] = (json.dumps(result, allow_nan=False, ensure_ascii=False, indent=1), "\n")
-    elif isinstance(result, Iterable):
-        pieces = result
     else:
-        raise TypeError(f"{type(result).__name__} is no JSON object")
+        pieces = result
     utf8 = codecs.lookup(sys.stdout.encoding or "ascii").name == "utf-8"
     beyond = re.compile("[\ud800-\udfff]" if utf8 else "[^\x00-\x7f]")
     write_pieces(beyond.sub(lambda found: json.dumps(found[0])[1:-1], piece) for piece in pieces)

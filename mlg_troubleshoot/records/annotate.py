@@ -158,9 +158,7 @@ def _mark(sheet: Worksheet, layout: SheetLayout, problem: Problem) -> None:
         place = f"{column_letters(layout.index_of(Kind.RECORD_ID.value) or 0)}{row}"
     cell = sheet[place]
     if isinstance(cell, MergedCell):
-        anchor = next((r for r in sheet.merged_cells.ranges if place in r), None)
-        if anchor is None:
-            return
+        anchor = next(r for r in sheet.merged_cells.ranges if place in r)
         cell = sheet.cell(anchor.min_row, anchor.min_col)
     said = f"found {problem.value or 'nothing'}; expected {problem.expected}. {problem.remedy}"
     _fill(cell, _BAD_FILL, said)

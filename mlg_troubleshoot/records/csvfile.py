@@ -152,13 +152,9 @@ def csv_book(data: bytes, header_score: Callable[[Sequence[Cell]], int]) -> Work
 def _find_delimiter(head: str, header_score: Callable[[Sequence[Cell]], int]) -> str:
     """Take the separator under which one of the first rows makes most sense as a header."""
     lines = head.splitlines()[:20]
-    best, best_score = ",", 0
-    for delimiter in _DELIMITERS:
-        score = 0
-        for line in lines:
-            if delimiter in line:
-                fields = next(csv.reader([line], delimiter=delimiter), [])
-                score = max(score, header_score([f or None for f in fields[:MAX_COLUMNS]]))
-        if score > best_score:
-            best, best_score = delimiter, score
-    return best
+
+    def best_score(delimiter: str) -> int:
+        rows = (next(csv.reader([line], delimiter=delimiter), []) for line in lines if delimiter in line)
+        return max((header_score([f or None for f in fields[:MAX_COLUMNS]]) for fields in rows), default=0)
+
+    return max(_DELIMITERS, key=best_score)

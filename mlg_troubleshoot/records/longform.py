@@ -36,8 +36,9 @@ class LongReader:
         self._record = self._find(Kind.RECORD_ID)
         self._joint = self._find(Kind.JOINT)
         self._per_joint = [p for p in placed if p.field is not None and p.field.kind in PER_JOINT]
-        own = self._own()
-        wide: list[PlacedField] = [replace(p, field=None, refused=True) if p in own else p for p in placed]
+        # What is of one reading, not of the whole inspection.
+        self._own = [*self._per_joint, *([] if self._joint is None else [self._joint])]
+        wide: list[PlacedField] = [replace(p, field=None, refused=True) if p in self._own else p for p in placed]
         # The joint's own columns stay in place but empty; each joint's reading gets a column behind them.
         self._slots: dict[tuple[int, int], int] = {}
         for p in self._per_joint:
@@ -63,22 +64,18 @@ class LongReader:
         if group is None:
             places = [(row, f"{column_letters(i)}{row}") for i in range(self._width)]
             group = _Group(row, [*filled, *[None] * (self._width - width)], places)
-            for p in self._own():
+            for p in self._own:
                 group.cells[p.index] = None
             self._groups[key] = group
         else:
             self._same_elsewhere(group, row, filled)
         self._take_reading(group, row, filled)
 
-    def _own(self) -> list[PlacedField]:
-        return [*self._per_joint, *([self._joint] if self._joint is not None else [])]
-
     def _same_elsewhere(self, group: _Group, row: int, filled: Sequence[Cell]) -> None:
         """Check that what belongs to the whole inspection is the same in each of its rows."""
-        own = self._own()
         for p in self._placed:
             here, there = filled[p.index], group.cells[p.index]
-            if p in own or here is None or here == there:
+            if p in self._own or here is None or here == there:
                 continue
             if there is None:
                 group.cells[p.index] = here

@@ -179,6 +179,9 @@ class RowReader:
             warnings.append(f"{alone[0].value}_in is not used: the row has no {other.value}_in")
         gauge_us = _taken(lengths, Kind.GAUGE_U)
         gauge_u = gauge_us.pop(0, None)
+        idle = [f"#{joint}" for joint in gauge_us if joint not in clearance]
+        if idle:
+            warnings.append(f"gauge uncertainty of joint {', '.join(idle)} is not used: the joint has no reading")
         readings = sorted(_taken(lengths, Kind.PLUNGER_DISPLACEMENT).items())
         floats = _taken(lengths, Kind.AXIAL_FLOAT)
         # Columns bear the names of the fields that they fill.
@@ -192,7 +195,7 @@ class RowReader:
             entered=entered,
             gauge_u_in=DEFAULT_GAUGE_U_IN if gauge_u is None else gauge_u / convention.per_radial,
             gauge_u_is_default=gauge_u is None,
-            gauge_u_by_joint_in=self._own_uncertainties(gauge_us, clearance, convention, warnings),
+            gauge_u_by_joint_in={j: u / convention.per_radial for j, u in gauge_us.items() if j in clearance},
             readings_in=tuple(value for _, value in readings),
             axial_float_in=floats or _NO_FLOATS,
             carried=carried,
@@ -394,19 +397,6 @@ class RowReader:
                 if value_in is not None:
                     found[field.quantity] = value_in
         return found
-
-    @staticmethod
-    def _own_uncertainties(
-        gauge_us: Mapping[int, float],
-        clearance: Mapping[int, float],
-        convention: ClearanceConvention,
-        warnings: list[str],
-    ) -> Mapping[int, float]:
-        """Return the uncertainties of single joints as radial ones; one without a reading is noted and left out."""
-        idle = [f"#{joint}" for joint in gauge_us if joint not in clearance]
-        if idle:
-            warnings.append(f"gauge uncertainty of joint {', '.join(idle)} is not used: the joint has no reading")
-        return {joint: u / convention.per_radial for joint, u in gauge_us.items() if joint in clearance}
 
     def _one_length(self, index: int, row_unit: LengthUnit | None, cell: str | float | OddCell) -> float:
         field = self._lengths[index]

@@ -219,9 +219,7 @@ class _Rows(WorkSheetParser):
         number, found = super().parse_row(row)
         cells: list[Cell] = []
         for index, cell in cast(list[tuple[int, Cell]], found):
-            if cell is not None and index == len(cells):
-                cells.append(cell)
-            elif cell is not None:
+            if cell is not None:
                 cells.extend([None] * (index + 1 - len(cells)))
                 cells[index] = cell
         if cells and row.get("hidden") in _TRUE:

@@ -126,10 +126,6 @@ class Flow:
     def open_joints(self, answers: Answers) -> tuple[int, ...]:
         return tuple(number for number in self.order if number not in answers.joints)
 
-    def begin(self, given: Answers) -> Turn:
-        """Begin an inspection with what flags already gave; `b` still reaches it."""
-        return self._offer_or_go_on(given)
-
     def resume(self, saved: Session, given: Answers) -> Turn:
         answers = saved.answers
         if saved.gear_id != self.gear.id or not set(answers.joints) <= set(self.gear.joint_numbers):
@@ -158,28 +154,25 @@ class Flow:
         if word == "b":
             return self._back(state)
         if word == "?":
-            return Turn(state, self._help(state))
+            of_joint = state.ask in (Ask.JOINT, Ask.CONFIRM)
+            own = pages.joint_help(self.gear, state.answers, state.joint) if of_joint else _QUESTIONS[state.ask].help
+            return Turn(state, own)
         turn = _QUESTIONS[state.ask].take(self, state, typed)
         here, passing = (state.ask, state.at), (Ask.OFFER, Ask.REREAD, Ask.CONFIRM, Ask.CONFIRM_MORE)
         moved = (turn.state.ask, turn.state.at) != here and state.ask not in passing
         return replace(turn, state=replace(turn.state, trail=(*state.trail, here) if moved else state.trail))
 
-    def _help(self, state: State) -> tuple[Line, ...]:
-        if state.ask in (Ask.JOINT, Ask.CONFIRM):
-            return pages.joint_help(self.gear, state.answers, state.joint)
-        return _QUESTIONS[state.ask].help
-
     def _tail(self, state: State, typed: str) -> Turn:
         answers = state.answers
         if not typed and answers.tail_no is None:
             return _again(state, "Enter alone enters nothing. Type the tail number, for example N123AB.")
-        return self._offer_or_go_on(replace(answers, tail_no=typed or answers.tail_no), state.from_review)
+        return self.begin(replace(answers, tail_no=typed or answers.tail_no), state.from_review)
 
     def _side(self, state: State, typed: str) -> Turn:
         side = _SIDES.get(typed.lower()) if typed else state.answers.side
         if side is None:
             return _again(state, _not_taken(typed, "Type l for the left gear or r for the right."))
-        return self._offer_or_go_on(replace(state.answers, side=side), state.from_review)
+        return self.begin(replace(state.answers, side=side), state.from_review)
 
     def _unit(self, state: State, typed: str) -> Turn:
         answers = state.answers
@@ -353,8 +346,11 @@ class Flow:
             return self._jump(replace(state, from_review=True), int(number[1]))
         return _again(state, _not_taken(typed, f"Type a joint number ({self._joint_names()}), or Enter alone."))
 
-    def _offer_or_go_on(self, answers: Answers, from_review: bool = False) -> Turn:
-        """Offer an unfinished inspection as soon as tail and side are known."""
+    def begin(self, answers: Answers, from_review: bool = False) -> Turn:
+        """Begin with what flags already gave; `b` still reaches it.
+
+        An unfinished inspection is offered as soon as tail and side are known.
+        """
         begun = bool(answers.joints) or from_review
         if self.find_saved is not None and answers.tail_no and answers.side is not None and not begun:
             saved = self.find_saved(answers.tail_no, answers.side)

@@ -95,8 +95,8 @@ def side_page(answers: Answers) -> Page:
 
 
 def unit_page(answers: Answers) -> Page:
-    examples = {"inch": ".013", "thou": "13", "millimetre": "0.33"}
-    choices = (choice(name[0], f"{name:<13} for example {example}") for name, example in examples.items())
+    names = {unit.name.lower(): example for unit, example in _EXAMPLES.items()}
+    choices = (choice(name[0], f"{name:<13} for example {example}") for name, example in names.items())
     return _heading_page("Unit", answers.unit, line("Unit of your readings?"), *choices)
 
 
@@ -151,7 +151,8 @@ def joint_page(
     )
     unit = "in" if answers.unit is None else answers.unit.value
     kind = "" if answers.convention is None else f" {CONVENTION_NAMES[answers.convention]}"
-    enter = _keeps(_entered(answers, number))
+    reading = answers.reading(number)
+    enter = _keeps(_as_typed(reading) if reading else "not measured" if number in answers.joints else None)
     if not enter and suggested not in (None, number):
         enter = f" (Enter goes to #{suggested})"
     return Page(shown, f" #{number}{kind}, {unit}{enter} > ")
@@ -345,14 +346,6 @@ def _as_typed(reading: Reading) -> str:
     return text if text[-1:].isalpha() or text[-1:] in "\"″”'" else f"{text} {reading.unit.value}"
 
 
-def _entered(answers: Answers, number: int) -> str | None:
-    answer = answers.joints.get(number)
-    if answer is None:
-        return None
-    reading = answers.reading(number)
-    return "not measured" if reading is None else _as_typed(reading)
-
-
 def _keeps(value: str | None) -> str:
     return f" (Enter keeps {value})" if value else ""
 
@@ -366,10 +359,5 @@ def _limit(gear: Gear, answers: Answers, number: int) -> str:
 
 
 def _progress(answers: Answers, order: tuple[int, ...]) -> str:
-    def box(number: int) -> str:
-        answer = answers.joints.get(number)
-        if answer is None:
-            return "□"
-        return "–" if answer.written is None else "■"
-
-    return "".join(map(box, order))
+    marks = {number: "–" if answer.written is None else "■" for number, answer in answers.joints.items()}
+    return "".join(marks.get(number, "□") for number in order)
