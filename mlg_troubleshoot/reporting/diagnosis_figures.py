@@ -191,7 +191,11 @@ def residual_plot(
         _point(canvas, *plot.at(float(x[place]), float(y[place])), after=after, marked=bool(marked[place]))
     rows = known & marked if against.marked is not None else known
     if against.groups is None:
-        _means(plot, x[rows], y[rows])
+        # The mean of each stretch of the column that holds as many rows as the others.
+        order = np.flatnonzero(rows)[np.argsort(x[rows], kind="stable")]
+        for part in np.array_split(order, max(1, min(_BINS, len(order) // _FEWEST_IN_A_BIN))):
+            if len(part) >= _FEWEST_IN_A_BIN:
+                _mean_mark(plot, float(np.mean(x[part])), y[part])
     for k, name in enumerate(groups):
         own = y[(against.groups == name) & known]
         if len(own) >= 2:
@@ -209,14 +213,6 @@ def _point(canvas: Canvas, x: float, y: float, *, after: bool, marked: bool = Fa
         canvas.marker("circle", x, y, 1.9, colour=ACCENT)
     else:
         canvas.add("circle", cx=x, cy=y, r=2.3, fill="none", stroke=SOFT, stroke_width=0.8)
-
-
-def _means(plot: Plot, x: Array, y: Array) -> None:
-    """Mark the mean of each stretch of the column that holds as many rows as the others."""
-    order = np.argsort(x, kind="stable")
-    count = min(_BINS, len(x) // _FEWEST_IN_A_BIN)
-    for part in np.array_split(order, count) if count else ():
-        _mean_mark(plot, float(np.mean(x[part])), y[part])
 
 
 def _mean_mark(plot: Plot, x: float, values: Array) -> None:

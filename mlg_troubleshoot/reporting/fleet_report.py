@@ -70,16 +70,12 @@ def fleet_document(
             **line,
             "left": interval_bar(line["landings_to_limit"], gear.horizon.value),
             "spark": sparkline(*series[line["tail_no"], line["side"]], lengths),
-            "link": f"{_gear_stem(line['tail_no'], line['side'])}.html",
+            "link": f"{safe_stem('life', line['tail_no'], line['side'])}.html",
         }
         for line in fleet["gears"]
     ]
     context = {**head("Fleet", "Fleet", gear, provenance, lengths), "lines_of": lines, "advice": advice}
     return Document("fleet.html.j2", context, "fleet", landscape=True)
-
-
-def _gear_stem(tail_no: str, side: str) -> str:
-    return safe_stem("life", tail_no, side)
 
 
 def life_document(
@@ -93,4 +89,4 @@ def life_document(
     name = f"{life['tail_no']} {life['side']}"
     shown = {"life": life, "steps": steps}
     context = {**head(f"Life of {name}", name, gear, provenance, Lengths(unit)), **shown}
-    return Document("life.html.j2", context, _gear_stem(life["tail_no"], life["side"]))
+    return Document("life.html.j2", context, safe_stem("life", life["tail_no"], life["side"]))

@@ -42,7 +42,12 @@ def inspection_document(
     if isinstance(judgement, Rejected):
         row = judgement.row
         stem = safe_stem(row.tail_no, row.side.value if row.side else None, row.record_id, *_place(row.source))
-        context = _rejected(judgement, gear, provenance, problems, lengths)
+        context = {
+            **_identified(judgement, gear, provenance, lengths),
+            "carried": [],
+            "correct": row.correct,
+            "problems": [p for p in problems if (p.file, p.sheet, str(p.row or "")) == _place(row.source, "")],
+        }
         return Document("rejected.html.j2", context, stem)
     inspection = judgement.inspection
     stem = safe_stem(inspection.tail_no, inspection.side.value, inspection.record_id)
@@ -97,17 +102,6 @@ def _inspection(a: Assessment, gear: Gear, provenance: ReportProvenance, lengths
         "cases": _sequence(gear, a, lengths),
         "signatories": [(role, inspection.technician_id or "" if i == 0 else "") for i, role in enumerate(SIGNATORIES)],
         "intervals": {i.joint: i for i in a.posterior.intervals} if a.posterior else {},
-    }
-
-
-def _rejected(
-    r: Rejected, gear: Gear, provenance: ReportProvenance, problems: Iterable[Problem], lengths: Lengths
-) -> dict[str, Any]:
-    return {
-        **_identified(r, gear, provenance, lengths),
-        "carried": [],
-        "correct": r.row.correct,
-        "problems": [p for p in problems if (p.file, p.sheet, str(p.row or "")) == _place(r.row.source, "")],
     }
 
 

@@ -197,7 +197,8 @@ class _PlaneDrawing:
             if arrow is not None:
                 _arrow(canvas, *arrow)
                 segments.append(arrow)
-                boxes.append(_around(*arrow))
+                (ax, ay), (bx, by) = arrow
+                boxes.append((min(ax, bx), min(ay, by), max(ax, bx), max(ay, by)))
             if markers[joint.number] != at(joint.point):
                 canvas.line(*at(joint.point), *markers[joint.number], colour=SOFT, width=1.2)
                 canvas.marker("circle", *at(joint.point), 2.5)
@@ -303,10 +304,6 @@ class _PlaneDrawing:
     def _rigid(self, joint: str, pivot: str) -> bool:
         """Tell whether two points are already drawn as an edge of a rigid part."""
         return any(isinstance(s, Lever) and s.pivot == pivot and joint in (s.follows, s.joint) for s in self.steps)
-
-
-def _around(a: Place, b: Place) -> Box:
-    return min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]), max(a[1], b[1])
 
 
 def _bar(canvas: Canvas, a: Place, b: Place) -> None:

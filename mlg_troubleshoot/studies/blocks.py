@@ -12,7 +12,7 @@ import json
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
@@ -118,8 +118,6 @@ class TotalOrder:
     iterations: int
     evaluations: int
     failed: int
-    blocks_done: int
-    blocks: int
     note: str
 
 
@@ -194,13 +192,10 @@ def total_order_study(
 
 
 def _on_this_machine(study: BlockStudy, blocks: list[Block], workers: int) -> Iterator[tuple[Block, BlockSums]]:
-    pool: Executor
-    if numba_is_installed():
-        # The compiled loop runs without the interpreter's lock: threads share its memory.
-        pool = ThreadPoolExecutor(workers)
-    else:
-        # Forking a process that has threads of its own can hang; a fresh interpreter cannot.
-        pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+    # The compiled loop runs without the interpreter's lock: threads share its memory. Forking a process that has
+    # threads of its own can hang; a fresh interpreter cannot.
+    fresh = partial(ProcessPoolExecutor, mp_context=get_context("spawn"))
+    pool: Executor = (ThreadPoolExecutor if numba_is_installed() else fresh)(workers)
     try:
         waiting = {pool.submit(compute_block, study, block): block for block in blocks}
         yield from ((waiting[future], future.result()) for future in as_completed(waiting))
@@ -227,8 +222,6 @@ def _summed(study: BlockStudy, done: dict[Block, BlockSums]) -> TotalOrder:
         len(indices),
         evaluations,
         failed,
-        len(done),
-        len(study.blocks),
         failed_note(failed, evaluations) if failed else "",
     )
 

@@ -284,7 +284,7 @@ def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _
         totals = total_order_study(study, options.workers, options.state, options.scheduler, told("total order"))
         total, spread = totals.total_order, student_half(totals.scatter, totals.iterations)
         evaluations, failed = evaluations + totals.evaluations, failed + totals.failed
-        finished = totals.blocks_done == totals.blocks
+        finished = totals.iterations == iterations
         if totals.note:
             note += f"; {totals.note}"
     if not finished:
