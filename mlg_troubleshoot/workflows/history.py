@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import cached_property
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -335,11 +336,10 @@ def advice(found: Iterable[GearLife]) -> Advice:
     for life in found:
         for record in life.outcomes:
             joint = record.body["joint"]
-            result = next((s.result for s in life.inspections if s.record.record_id == record.record_id), {})
-            if joint is not None and result:
-                first = {j["joint"] for j in result["joints"] if j["rank"] == 1}
-                advised = set((result.get("next_action") or {}).get("joints") or ()) | first
-                asked, right = asked + 1, right + (joint in advised)
+            seen = next((s for s in life.inspections if s.record.record_id == record.record_id), None)
+            if joint is not None and seen is not None and seen.result:
+                advised = (seen.result.get("next_action") or {}).get("joints") or ()
+                asked, right = asked + 1, right + (joint in (worst_joint(seen), *advised))
     return Advice(right, asked)
 
 
@@ -454,11 +454,9 @@ def _forecast_some(part: Sequence[GearLife], model: WearModel, gear: Gear) -> It
         displacement = straight[g] * np.interp(_AHEAD, _ASKED, ratio[g])[:, None]
         to_limit = np.stack([_first_passage(ahead, wear[g, j], gear.limits_in[j]) for j in range(len(numbers))])
         of_joints = {number: Samples(to_limit[j]) for j, number in enumerate(numbers) if read[g, j]}
-        to_margin = _first_passage(ahead, displacement, margin)
-        first = Samples(np.minimum(to_limit.min(axis=0), to_margin))
-        due = float(first.quantile(gear.accepted_chance.value))
-        limit, margins = Samples(to_limit.min(axis=0)), Samples(to_margin)
-        yield Forecast(of_joints, limit, margins, due if np.isfinite(due) else None)
+        to_margin, to_any = _first_passage(ahead, displacement, margin), to_limit.min(axis=0)
+        due = float(Samples(np.minimum(to_any, to_margin)).quantile(gear.accepted_chance.value))
+        yield Forecast(of_joints, Samples(to_any), Samples(to_margin), due if np.isfinite(due) else None)
 
 
 def _first_passage(ahead: Array, paths: Array, limit: float) -> Array:
@@ -477,13 +475,15 @@ def suggestions(found: Sequence[GearLife], model: WearModel | None, gear: Gear) 
     """Name last inspections that look like a restoration nobody recorded, or like two gears exchanged."""
     if model is None:
         return []
-    kept = [life for life in found if _can_be_compared(life)]
+    # Seen twice, the last time with its landings.
+    kept = [f for f in found if len(f.inspections) > 1 and f.inspections[-1].inspection.gear_landings is not None]
     off = _departures([(life, life) for life in kept], model, gear)
     said: list[str] = []
     swapped: set[int] = set()
     poor = [i for i, z in enumerate(off) if _fit(z) < _POOR]
     # Gears are exchanged on one aircraft, or by those who entered one day's sheets.
-    pairs = [(i, j) for n, i in enumerate(poor) for j in poor[n + 1 :] if _may_be_exchanged(kept[i], kept[j])]
+    days = [life.inspections[-1].record.day for life in kept]
+    pairs = [(i, j) for i, j in combinations(poor, 2) if kept[i].key[0] == kept[j].key[0] or days[i] == days[j]]
     crossed = _departures([(kept[a], kept[b]) for i, j in pairs for a, b in ((i, j), (j, i))], model, gear)
     gains = []
     for n, (i, j) in enumerate(pairs):
@@ -517,15 +517,6 @@ def _fit(scores: Array) -> float:
 
 def _square(*scores: Array) -> float:
     return float(sum(np.nansum(z**2) for z in scores))
-
-
-def _may_be_exchanged(one: GearLife, two: GearLife) -> bool:
-    return one.key[0] == two.key[0] or one.inspections[-1].record.day == two.inspections[-1].record.day
-
-
-def _can_be_compared(life: GearLife) -> bool:
-    """Seen twice, the last time with its landings."""
-    return len(life.inspections) > 1 and life.inspections[-1].inspection.gear_landings is not None
 
 
 def _departures(pairs: Sequence[tuple[GearLife, GearLife]], model: WearModel, gear: Gear) -> list[Array]:
