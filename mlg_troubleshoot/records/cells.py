@@ -49,7 +49,6 @@ def column_letters(index: int) -> str:
 
 
 LETTERS: tuple[str, ...] = tuple(column_letters(i) for i in range(MAX_COLUMNS))
-COLUMN_INDEX: dict[str, int] = {name: i for i, name in enumerate(LETTERS)}
 
 
 def show_number(value: float) -> str:

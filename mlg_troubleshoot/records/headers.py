@@ -141,10 +141,8 @@ def _recognise(header: str, joint_numbers: tuple[int, ...], names: tuple[tuple[i
         return Recognition(Field(_WITH_OTHER_UNIT[other]))
     numbered = _numbered(words, joint_numbers, names)
     if numbered is None:
-        by_alias = _by_alias(plain, units, foreign, odd)
-        if by_alias is UNKNOWN:
-            return _resembles_clearance(words, bool(units), joint_numbers, names)
-        return by_alias
+        found = _by_alias(plain, units, foreign, odd)
+        return _resembles_clearance(words, bool(units), joint_numbers, names) if found is UNKNOWN else found
     return numbered if numbered.field is None else _with_unit(numbered.field, units, foreign, odd)
 
 

@@ -114,12 +114,10 @@ def _read_file(source: Source, options: ReadOptions, ticker: Callable[[int], Non
 def load_bytes(source: Source) -> bytes:
     """The bytes of a file, at most so many; one that cannot be read is refused."""
     try:
-        if isinstance(source, str | Path) and str(source) == STDIN_NAME:
-            data = sys.stdin.buffer.read(MAX_FILE_BYTES + 1)
-        elif isinstance(source, str | Path):
+        if isinstance(source, str | Path) and str(source) != STDIN_NAME:
             data = _regular_file(source)
         else:
-            data = source.read(MAX_FILE_BYTES + 1)
+            data = (sys.stdin.buffer if isinstance(source, str | Path) else source).read(MAX_FILE_BYTES + 1)
     except FileNotFoundError:
         raise FileRefusedError("file_not_found", "there is no such file") from None
     except IsADirectoryError:
@@ -215,8 +213,9 @@ def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Can
     tables = [c for c in candidates if c.header is not None]
     filled = [c for c in tables if c.has_rows]
     forms = [c for c in candidates if c.form is not None and not c.form.is_untouched(options)]
+    chosen = [c for c in candidates if c in filled or c in forms]
     if options.sheet == "*":
-        return [c for c in candidates if c in filled or c in forms] or tables
+        return chosen or tables
     if len(filled) > 1:
         names = ", ".join(repr(c.sheet.name) for c in filled)
         raise FileRefusedError(
@@ -225,7 +224,6 @@ def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Can
             "one table, or the sheet to read",
             f'Name the sheet, for example --sheet "{filled[0].sheet.name}", or --sheet "*" for all of them.',
         )
-    chosen = [c for c in candidates if c in filled or c in forms]
     hidden = ", ".join(repr(sheet.name) for sheet in book.sheets if sheet.hidden)
     if hidden:
         found.notes.append(f"hidden sheets were not read: {hidden}")

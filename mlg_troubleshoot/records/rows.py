@@ -86,6 +86,15 @@ _OTHERS: dict[Kind, Callable[[bool, str | float | OddCell], object]] = {
 }
 
 
+# A column, the name of what it holds, and how a cell of it is read.
+_Loose = tuple[int, str, Callable[[Any], object]]
+
+
+def _carried_text(cell: str | float | OddCell) -> str:
+    is_shown = isinstance(cell, OddCell) and cell.kind in (OddKind.DATE, OddKind.BOOLEAN)
+    return show(cell) if is_shown else read_text(cell, "text")
+
+
 def _taken(lengths: dict[tuple[Kind, int | None], float], kind: Kind) -> dict[int, float]:
     """Take the lengths of one kind out, by number; one without a number stands under 0."""
     return {number or 0: lengths.pop((kind, number)) for each, number in list(lengths) if each is kind}
@@ -126,18 +135,24 @@ class RowReader:
         # The readings of a fleet repeat: what was understood once is not taken apart again.
         self._clearance_of = lru_cache(_REMEMBERED)(self._one_clearance)
         self._length_of = lru_cache(_REMEMBERED)(self._one_length)
-        self._others = [(index, field.kind) for index, field in good if field.kind in _OTHERS]
-        # In these cells a word says that nothing was measured; a margin or an identity is never left out by a word.
-        self._blankable = [index for index, field in good if field.kind not in _NEVER_BLANK]
-        self.not_measured: Counter[str] = Counter()
-        self._carried = [(index, field.kind.value) for index, field in good if field.kind in CARRIED]
-        self._unknown: dict[str, int] = {}
+        # Cells that bear no verdict, by the names under which they are found: what is read, and what is only carried.
+        self._others: list[_Loose] = [
+            (index, field.kind.value, partial(_OTHERS[field.kind], self._comma))
+            for index, field in good
+            if field.kind in _OTHERS
+        ]
+        self._carried: list[_Loose] = [
+            (index, field.kind.value, _carried_text) for index, field in good if field.kind in CARRIED
+        ]
         for p in placed:
             if p.field is None and not p.refused:
                 name = p.header or f"column {column_letters(p.index)}"
-                while name in self._unknown or any(name == carried for _, carried in self._carried):
+                while any(name == carried for _, carried, _ in self._carried):
                     name = f"{name} (again)"
-                self._unknown[name] = p.index
+                self._carried.append((p.index, name, lambda cell: writable(show(cell))))
+        # In these cells a word says that nothing was measured; a margin or an identity is never left out by a word.
+        self._blankable = [index for index, field in good if field.kind not in _NEVER_BLANK]
+        self.not_measured: Counter[str] = Counter()
         self._without_unit: set[str | None] = set()
         self._row = 0
         self._places: Sequence[tuple[int, str]] | None = None
@@ -159,8 +174,7 @@ class RowReader:
         row_unit = self._read_row_unit()
         clearance, entered = self._read_clearances(convention, row_unit, warnings)
         lengths = self._read_lengths(row_unit)
-        others = self._read_others()
-        carried = self._read_carried()
+        others, carried = self._read_loose(self._others), self._read_loose(self._carried)
 
         for place, found in sorted(self._faults, key=lambda fault: fault[0]):
             self._tell(place, found)
@@ -241,10 +255,10 @@ class RowReader:
         self._bad = {index for index in self._refused if cells[index] is not None}
         self._faults = []
 
-    def _read_others(self) -> dict[str, Any]:
+    def _read_loose(self, columns: Sequence[_Loose]) -> dict[str, Any]:
         found = {
-            kind.value: self._noted(index, partial(_OTHERS[kind], self._comma), bearing=False)
-            for index, kind in self._others
+            name: self._noted(index, read, bearing=False)
+            for index, name, read in columns
             if self._cells[index] is not None
         }
         return {name: value for name, value in found.items() if value is not None}
@@ -418,21 +432,6 @@ class RowReader:
                 f"{field.kind.value}_out_of_range", expected, slip or "Check the unit and the decimal point."
             )
         return value_in + 0.0
-
-    def _read_carried(self) -> dict[str, str]:
-        def read(cell: str | float | OddCell) -> str:
-            is_shown = isinstance(cell, OddCell) and cell.kind in (OddKind.DATE, OddKind.BOOLEAN)
-            return show(cell) if is_shown else read_text(cell, "text")
-
-        carried = {
-            name: self._noted(index, read, bearing=False)
-            for index, name in self._carried
-            if self._cells[index] is not None
-        }
-        for name, index in self._unknown.items():
-            if self._cells[index] is not None:
-                carried[name] = writable(show(self._cells[index]))
-        return {name: text for name, text in carried.items() if text is not None}
 
     def _fault(self, index: int, fault: CellFaultError, *, bearing: bool = True) -> None:
         self._faults.append((index, fault))

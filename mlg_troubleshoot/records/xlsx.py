@@ -33,7 +33,6 @@ from openpyxl.worksheet._reader import (
 from openpyxl.xml.constants import SHEET_MAIN_NS
 
 from mlg_troubleshoot.records.cells import (
-    COLUMN_INDEX,
     MAX_COLUMNS,
     MAX_ROWS,
     NO_VALUE_TEXT,
@@ -181,9 +180,7 @@ class XlsxSheet(Sheet):
 
     def _read(self) -> Iterator[NumberedRow]:
         with damage(f"sheet {self.name!r} cannot be read"):
-            for number, cells in _Rows(self).parse():
-                if cells:
-                    yield number, cells
+            yield from (row for row in _Rows(self).parse() if row[1])
 
     def elements(self) -> Iterator[Element]:
         stream = Stream(self.book.archive, self.part)
@@ -250,8 +247,7 @@ class _Rows(WorkSheetParser):
             letters = reference.rstrip("0123456789")
             if reference[len(letters) :] != str(self.row_counter):
                 raise damaged(f"cell {reference!r} of sheet {self._sheet.name!r} stands in row {self.row_counter}")
-            index = COLUMN_INDEX.get(letters)
-            self.col_counter = column_index_from_string(letters) if index is None else index + 1
+            self.col_counter = column_index_from_string(letters)
         return self.col_counter - 1
 
     def _value(  # noqa: PLR0911 - one return for each kind of cell

@@ -146,8 +146,6 @@ def _converse(flow: Flow, turn: Turn, terminal: RichTerminal, saver: _Saver) -> 
                 saver.resume(turn.session)
             case Effect.PUT_AWAY if turn.session is not None:
                 saver.put_away(turn.session)
-            case _:
-                pass
 
 
 def _stopped(terminal: RichTerminal, saver: _Saver) -> EntryInterruptedError:
