@@ -54,6 +54,7 @@ PLAN: dict[str, int] = {
     "missing_column": 60,
     "rounded:10": 140,
     "rounded:15": 70,
+    "triple": 150,
 }
 
 
@@ -380,6 +381,9 @@ AIMS: dict[str, str] = {
     "exactly aliased causes: all listed": "100 %",
     "two causes, each S >= 10: both named": "≥ 97 %",
     "two causes, each S without the common shift >= 10: both named": "≥ 97 %",
+    "three causes, each S >= 10: all named": "",
+    "three causes, each S >= 10: something else named": "",
+    "three causes, each S without the common shift >= 10: all named": "",
     "needed column removed: not misnamed": "",
     "uniquely named extension makes unseen rows worse": "0 %",
     "data faults found (rows)": "100 %",
