@@ -103,23 +103,20 @@ def expand(model: LinkageModel) -> Response:
     """Expand the displacement of one linkage by central differences."""
     n = 2 * len(model.joint_numbers)
     unit = np.eye(n)
-    pairs = [(i, j) for i in range(n) for j in range(i, n)]
-    plus = np.array([unit[i] + unit[j] for i, j in pairs]) * _STEP_IN
-    minus = np.array([unit[i] - unit[j] for i, j in pairs]) * _STEP_IN
+    i, j = np.triu_indices(n)
+    plus, minus = (unit[i] + unit[j]) * _STEP_IN, (unit[i] - unit[j]) * _STEP_IN
     points = np.vstack([unit * 1e-5, -unit * 1e-5, plus, -plus, minus, -minus])
     moved = model.displacement(list(points.T))
     gradient = (moved[:n] - moved[n : 2 * n]) / 2e-5
     of_plus, of_minus = np.split(moved[2 * n :], 2)
     mixed = of_plus.reshape(2, -1).sum(axis=0) - of_minus.reshape(2, -1).sum(axis=0)
     curvature = np.empty((n, n))
-    for (i, j), value in zip(pairs, mixed / (4.0 * _STEP_IN**2), strict=True):
-        curvature[i, j] = curvature[j, i] = value
+    curvature[i, j] = curvature[j, i] = mixed / (4.0 * _STEP_IN**2)
     amplification = np.hypot(gradient[0::2], gradient[1::2])
     directions = np.zeros((n // 2, n))
-    for j in range(n // 2):
-        length = amplification[j]
-        part = gradient[2 * j : 2 * j + 2]
-        directions[j, 2 * j : 2 * j + 2] = part / length if length > 0.0 else (1.0, 0.0)
+    for place, length in enumerate(amplification):
+        part = gradient[2 * place : 2 * place + 2]
+        directions[place, 2 * place : 2 * place + 2] = part / length if length > 0.0 else (1.0, 0.0)
     return Response(gradient, curvature, amplification, directions @ curvature @ directions.T)
 
 

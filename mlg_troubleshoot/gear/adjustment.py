@@ -40,10 +40,9 @@ class Adjustment:
     def numbers(self, model: LinkageModel) -> dict[str, Array]:
         """New values of the changed numbers of one linkage, by name, shape (n,). [in, rad or 1]"""
         nominal = dict(zip(model.kernel.parameter_names, model.kernel.parameters.tolist(), strict=True))
-        names = [*self.changed, *(name for name in self.scaled if name not in self.changed)]
         return {
             name: nominal[name] * np.asarray(self.scaled.get(name, 1.0)) + np.asarray(self.changed.get(name, 0.0))
-            for name in names
+            for name in dict.fromkeys((*self.changed, *self.scaled))
         }
 
     def take(self, rows: Places) -> Adjustment:

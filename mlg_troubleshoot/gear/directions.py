@@ -167,10 +167,7 @@ def chance_beyond(
         wide = {name: np.asarray(value)[part, None] for name, value in (changed or {}).items()}
         links: list[Any] = []
         for j in range(c.shape[1]):
-            if not np.any(c[:, j]):
-                links += [0.0, 0.0]
-            else:
-                links += [c[:, j, None] * cosines[j], c[:, j, None] * sines[j]]
+            links += [c[:, j, None] * cosines[j], c[:, j, None] * sines[j]] if np.any(c[:, j]) else [0.0, 0.0]
         moved = np.atleast_2d(model.displacement(links, wide))
         if rate_factor is not None:
             moved = rate_factor[part, None] * moved

@@ -19,7 +19,7 @@ from mlg_troubleshoot.reporting.formats import Lengths, short
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.reporting.publish import safe_stem
-from mlg_troubleshoot.reporting.schematic import joint_mark, joint_state, schematic
+from mlg_troubleshoot.reporting.schematic import JOINT_STATES, joint_mark, joint_state, schematic
 from mlg_troubleshoot.units import LengthUnit
 
 SIGNATORIES = ("Measured by", "Independently measured by", "Rectified by", "Inspected by")
@@ -90,11 +90,7 @@ def _inspection(a: Assessment, gear: Gear, provenance: ReportProvenance, lengths
         "unmeasured": [f.joint for f in a.joints if f.clearance_in is None],
         "gauge": drawn.margin_gauge(a, lengths),
         "drawing": schematic(gear, a, lengths),
-        "legend": [
-            (joint_mark("", "over"), "over its limit"),
-            (joint_mark("", "fine"), "within its limit"),
-            (joint_mark("", "missing"), "not measured"),
-        ],
+        "legend": [(joint_mark("", state), words) for state, words in JOINT_STATES.items()],
         "extended": bool(provenance.extension),
         "wrong": chance_wrong_sentence(a),
         "rows": _joints(gear, a, lengths),

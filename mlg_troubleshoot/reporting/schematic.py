@@ -19,6 +19,11 @@ from mlg_troubleshoot.reporting.figures import INK, PALE, PAPER, RULE, SOFT, Anc
 from mlg_troubleshoot.reporting.formats import Lengths
 
 JointState = Literal["over", "fine", "missing"]
+JOINT_STATES: dict[JointState, str] = {
+    "over": "over its limit",
+    "fine": "within its limit",
+    "missing": "not measured",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,8 +287,6 @@ class _PlaneDrawing:
                 case Slider(upstream=upstream, axis=axis):
                     segments += [_plunger(canvas, place, axis), (at(upstream), place)]
                     _bar(canvas, at(upstream), place)
-                case Lever() | Slot():
-                    pass
         return segments
 
     def _rigid_parts(self, canvas: Canvas, at: _At) -> list[Segment]:
@@ -378,7 +381,7 @@ def _mark(canvas: Canvas, x: float, y: float, text: str, state: str, faded: bool
 
 
 def joint_mark(text: str, state: JointState) -> Markup:
-    words = {"over": "over its limit", "fine": "within its limit", "missing": "not measured"}[state]
+    words = JOINT_STATES[state]
     canvas = Canvas(22, 22, f"joint {text}, {words}" if text else words)
     _mark(canvas, 11, 11, text, state)
     return canvas.svg("mark")

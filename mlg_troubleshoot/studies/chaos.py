@@ -70,7 +70,8 @@ def chaos_indices(
     corners = np.concatenate([np.zeros((1, n)), np.ones((1, n)), rng.integers(0, 2, (_CORNERS - 2, n))])
     held = _latin(rng, _HELD_OUT, n)
     checks = np.concatenate([held, corners])
-    points = _latin(rng, _first_size(n), n)
+    # Points of the first fit: enough for the second degree, or for a good one where variables are few.
+    points = _latin(rng, max(128, 2 * len(total_degree(n, 2))), n)
     values = response(np.concatenate([checks, points]))
     check_values, values = values[: len(checks)], values[len(checks) :]
     best: ChaosFit | None = None
@@ -93,11 +94,6 @@ def chaos_indices(
             return without_numbers(design, seed, n, used, 0, note, (float(values.mean()), np.nan)), None
         more = _latin(rng, len(values), n)
         points, values = np.concatenate([points, more]), np.concatenate([values, response(more)])
-
-
-def _first_size(n: int) -> int:
-    """Points of the first fit: enough for the second degree, or for a good one where variables are few."""
-    return max(128, int(np.ceil(2.0 * len(total_degree(n, 2)))))
 
 
 def _latin(rng: Generator, count: int, n: int) -> Array:

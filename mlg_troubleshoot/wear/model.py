@@ -95,8 +95,18 @@ class WearModel:
             raise UsageError("a usage to forecast is negative or not finite", "Give usages from 0.")
         wanted = np.broadcast_to(np.atleast_1d(asked), (len(units), np.atleast_1d(asked).shape[-1]))
         rng = np.random.default_rng(self.seed)
-        found = np.concatenate([*self._forecast_parts(units, wanted, rng, reading=reading)])
-        return Samples(found[0] if isinstance(unit, str) else found)
+        parts = []
+        for chosen, count in _chunks(len(units)):
+            names = [units[i] for i in chosen]
+            order = np.argsort(wanted[chosen], axis=1)
+            ascending = np.take_along_axis(wanted[chosen], order, axis=1) / self.scale.usage
+            last, known = self._last(names), self._known_reading(names)
+            ends = self._ends(names, count, rng)
+            found = np.concatenate([end.follow(ascending, last, known, rng, reading=reading) for end in ends])
+            samples = np.moveaxis(found, (0, 1, 2, 3), (2, 0, 3, 1)).reshape(*ascending.shape, -1)
+            back = np.take_along_axis(samples, np.argsort(order, axis=1)[:, :, None], axis=1)
+            parts.append(self.scale.start + self.scale.value * back)
+        return Samples(parts[0][0] if isinstance(unit, str) else np.concatenate(parts))
 
     def usage_to_limit(self, unit: str | Sequence[str], limit: ArrayLike) -> Samples:
         """Forecast the usage at which the wear itself of one unit or n, not a reading of it, crosses a limit.
@@ -116,20 +126,6 @@ class WearModel:
             parts.append(np.moveaxis(found, 1, 0).reshape(len(chosen), -1))
         samples = np.concatenate(parts) * self.scale.usage
         return Samples(samples[0] if isinstance(unit, str) else samples)
-
-    def _forecast_parts(
-        self, units: Sequence[str], wanted: Array, rng: np.random.Generator, *, reading: bool
-    ) -> Iterator[Array]:
-        for chosen, count in _chunks(len(units)):
-            names = [units[i] for i in chosen]
-            order = np.argsort(wanted[chosen], axis=1)
-            ascending = np.take_along_axis(wanted[chosen], order, axis=1) / self.scale.usage
-            last, known = self._last(names), self._known_reading(names)
-            ends = self._ends(names, count, rng)
-            found = np.concatenate([end.follow(ascending, last, known, rng, reading=reading) for end in ends])
-            samples = np.moveaxis(found, (0, 1, 2, 3), (2, 0, 3, 1)).reshape(*ascending.shape, -1)
-            back = np.take_along_axis(samples, np.argsort(order, axis=1)[:, :, None], axis=1)
-            yield self.scale.start + self.scale.value * back
 
     def _paths(self, unit: str) -> tuple[WearPath, ...]:
         return self.paths[unit] if unit in self.paths else (WearPath(unit, (), ()),)

@@ -79,8 +79,7 @@ def members(*, estimate_reading: bool, restored: bool) -> list[Member]:
 
 
 def _log_posterior(member: Member, steps: Steps, resolution: float) -> Callable[[Array], Array]:
-    mean = np.array([_PRIOR[name][0] for name in member.names])
-    sd = np.array([_PRIOR[name][1] for name in member.names])
+    mean, sd = np.array([_PRIOR[name] for name in member.names]).T
     size = max(1, _CHUNK // max(steps.seen.shape[1], 1))
 
     def value(theta: Array) -> Array:
@@ -130,8 +129,7 @@ def _student_density(theta: Array, centre: Array, root: Array) -> Array:
 
 def _sample(member: Member, value: Callable[[Array], Array], rng: np.random.Generator) -> tuple[Array, Array]:
     """Sample one kind's posterior; return the draws and their log weights, the mean of which is the evidence."""
-    mean = np.array([_PRIOR[name][0] for name in member.names])
-    sd = np.array([_PRIOR[name][1] for name in member.names])
+    mean, sd = np.array([_PRIOR[name] for name in member.names]).T
     mode, hessian = _mode(value, mean)
     # No direction is taken for wider than its prior, nor for exactly known.
     per_prior = np.outer(sd, sd)
