@@ -241,8 +241,7 @@ def _beside_form(sheet: Worksheet, layout: SheetLayout, free: int, own: VerdictC
             label = sheet.cell(layout.header_row + offset, free)
             _put(label, header)
             label.font = Font(name=FONT, bold=True)
-            if value is not None:
-                _put(sheet.cell(layout.header_row + offset, free + 1), value)
+            _put(sheet.cell(layout.header_row + offset, free + 1), value)
 
 
 _FORMULA = re.compile(

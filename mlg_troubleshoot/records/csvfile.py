@@ -43,8 +43,7 @@ def decode(data: bytes) -> tuple[str, list[str]]:
     try:
         return data.decode("utf-8"), []
     except UnicodeDecodeError:
-        pass
-    return _strictly(data, "cp1252"), ["read as Windows-1252 text, because it is not UTF-8"]
+        return _strictly(data, "cp1252"), ["read as Windows-1252 text, because it is not UTF-8"]
 
 
 def _strictly(data: bytes, encoding: str) -> str:

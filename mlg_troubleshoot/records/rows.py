@@ -351,28 +351,21 @@ class RowReader:
         entered: dict[int, EnteredClearance] = {}
         # Without its convention a reading can still be checked, as the largest radial value that it may be.
         scale = convention or ClearanceConvention.TOTAL_PLAY
-        cells = self._cells
         for joint, index, unit in self._clearances:
-            cell = cells[index]
-            if cell is None:
-                continue
-            try:
-                radial_in, text, confirm = self._clearance_of(cell, unit, row_unit, scale)
-            except CellFaultError as fault:
-                self._fault(index, fault)
-                continue
-            clearance[joint] = radial_in
-            entered[joint] = text
-            if confirm:
-                warnings.append(self._confirm_text(joint, radial_in, text, scale))
+            if self._cells[index] is not None:
+                found = self._noted(index, partial(self._clearance_of, unit, row_unit, scale))
+                if found is not None:
+                    clearance[joint], entered[joint], confirm = found
+                    if confirm:
+                        warnings.append(self._confirm_text(joint, clearance[joint], entered[joint], scale))
         return clearance, entered
 
     def _one_clearance(
         self,
-        cell: str | float | OddCell,
         unit: LengthUnit | None,
         row_unit: LengthUnit | None,
         scale: ClearanceConvention,
+        cell: str | float | OddCell,
     ) -> tuple[float, EnteredClearance, bool]:
         limit, usual = self._options.clearance_hard_max_in, self._options.clearance_confirm_above_in
         stated = unit or row_unit or LengthUnit.INCH

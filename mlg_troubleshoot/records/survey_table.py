@@ -174,7 +174,8 @@ class _Rows:
         self.column = "kind"
         try:
             kind = read_choice(row.get("kind", ""), Kind, "kind_unknown", {})
-            is_angle = self._is_angle(kind)
+            turns = self.linkage.space.mechanism.output.kind == "angle"
+            is_angle = kind is Kind.ANGLE or (kind is Kind.PLUNGER and turns)
             self._require(kind in _KINDS, "kind", "one of " + ", ".join(_KINDS), "Correct the word.", "kind_unknown")
             wanted = ("value_deg",) if is_angle else ("value_in", "value_mm")
             one, expected = given[1:] == [] and given[0] in wanted, f"one value, in {' or '.join(wanted)}"
@@ -192,10 +193,6 @@ class _Rows:
             self._fault(number, self.column, row.get(self.column), fault.code, fault.expected, fault.remedy)
             return None
         return Reading(kind, start, end, value, u, extension, number, is_angle, self.linkage.driven_in)
-
-    def _is_angle(self, kind: Kind) -> bool:
-        turns = self.linkage.space.mechanism.output.kind == "angle"
-        return kind is Kind.ANGLE or (kind is Kind.PLUNGER and turns)
 
     def _quantity(self, row: Mapping[str, Cell], column: str, *, signed: bool) -> float:
         self.column, cell = column, row[column]

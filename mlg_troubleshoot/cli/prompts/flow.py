@@ -336,9 +336,8 @@ class Flow:
             if not answers.radial_in:
                 return _again(state, "No joint has a clearance, so there is nothing to compute. Type a joint number.")
             return Turn(state, effect=Effect.COMPUTE)
-        asked = next((ask for ask in _HEADING if ask.value == typed.lower()), None)
-        if asked is not None:
-            return Turn(State(asked, answers, from_review=True))
+        if typed.lower() in _HEADING:
+            return Turn(State(Ask(typed.lower()), answers, from_review=True))
         if typed.lower() in pages.DETAILS:
             return Turn(State(Ask.DETAIL, answers, pages.DETAILS[typed.lower()], from_review=True))
         number = re.fullmatch(r"#?\s*(\d{1,4})", typed)

@@ -41,7 +41,9 @@ def show_problems(problems: Sequence[Problem]) -> None:
 
 
 def _show_problem(console: Console, problem: Problem) -> None:
-    _message(console, f"{problem.place()}: {_what(problem)}", indent=2)
+    about_all = problem.row is None and problem.column is None
+    found = "" if problem.value is None else f"{problem.value}; " if about_all else f"found {problem.value!r}; "
+    _message(console, f"{problem.place()}: {found}expected {problem.expected}.", indent=2)
     _message(console, f"What to do: {problem.remedy}", indent=4)
 
 
@@ -77,9 +79,3 @@ def _message(console: Console, text: str, indent: int = 0) -> None:
         console.print(Padding(output.text(text), (0, 0, 0, indent)))
     else:
         console.print(output.text(" " * indent + text), soft_wrap=True)
-
-
-def _what(problem: Problem) -> str:
-    about_all = problem.row is None and problem.column is None
-    found = "" if problem.value is None else f"{problem.value}; " if about_all else f"found {problem.value!r}; "
-    return f"{found}expected {problem.expected}."
