@@ -23,7 +23,8 @@ from mlg_troubleshoot.diagnosis.evidence.verdict import Verdict
 from mlg_troubleshoot.diagnosis.extension import Term
 from mlg_troubleshoot.diagnosis.faults import LEAST_ALONG, DataFault, screen_faults
 from mlg_troubleshoot.diagnosis.gain import LEAST_TAILS, Gain, measure_gain
-from mlg_troubleshoot.diagnosis.inference import Finding, infer
+from mlg_troubleshoot.diagnosis.inference import Finding
+from mlg_troubleshoot.diagnosis.model_choice import infer
 from mlg_troubleshoot.diagnosis.noise import (
     EXPECTED_SLOPE,
     Rows,

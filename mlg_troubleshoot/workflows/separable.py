@@ -16,7 +16,8 @@ from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate
 from mlg_troubleshoot.diagnosis.causes.together import JointFactors
 from mlg_troubleshoot.diagnosis.extension import MOST_IN
-from mlg_troubleshoot.diagnosis.inference import CLASS_APART, RULED_OUT
+from mlg_troubleshoot.diagnosis.inference import RULED_OUT
+from mlg_troubleshoot.diagnosis.model_choice import CLASS_APART
 from mlg_troubleshoot.diagnosis.noise import TAIL_RATIOS
 from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
 from mlg_troubleshoot.diagnosis.simulation.search import ALIKE, beside

@@ -22,13 +22,13 @@ from mlg_troubleshoot.diagnosis.faults import DataFault
 from mlg_troubleshoot.diagnosis.gain import _interval
 from mlg_troubleshoot.diagnosis.inference import (
     ALARM,
-    CLASS_APART,
     NAME,
     RULED_OUT,
     SECOND,
     UNLISTED_ALARM,
     Inference,
 )
+from mlg_troubleshoot.diagnosis.model_choice import CLASS_APART
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, measured_uncertainty, robust_scale
 from mlg_troubleshoot.diagnosis.scene import build_scene
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
