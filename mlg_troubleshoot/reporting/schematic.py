@@ -104,9 +104,6 @@ class _Shown:
     exaggeration: int
     lengths: Lengths
 
-    def mark(self, joint: int) -> JointState:
-        return joint_state(self.findings[joint])
-
     def state(self, joint: int) -> str:
         finding = self.findings[joint]
         if finding.clearance_in is None:
@@ -194,9 +191,10 @@ class _PlaneDrawing:
         self._plain_points(canvas, at)
         markers = self._apart(at)
         here = [j for j in self.gear.joints if self._home(j.point)]
+        states = {number: joint_state(finding) for number, finding in shown.findings.items()}
         for joint in self.gear.joints:
             if joint.point in self.points and not self._home(joint.point):
-                _mark(canvas, *markers[joint.number], str(joint.number), shown.mark(joint.number), faded=True)
+                _mark(canvas, *markers[joint.number], str(joint.number), states[joint.number], faded=True)
         for joint in here:
             arrow = shown.arrow(joint.number, at(joint.point), scale)
             if arrow is not None:
@@ -209,7 +207,7 @@ class _PlaneDrawing:
                 canvas.marker("circle", *at(joint.point), 2.5)
                 x, y = markers[joint.number]
                 boxes.append((x - 11.0, y - 11.0, x + 11.0, y + 11.0))
-            _mark(canvas, *markers[joint.number], str(joint.number), shown.mark(joint.number))
+            _mark(canvas, *markers[joint.number], str(joint.number), states[joint.number])
         framed = sum(shown.findings[j.number].over_limit for j in here) <= _MOST_FRAMES
         for joint in sorted(here, key=lambda j: not shown.findings[j.number].over_limit):
             strong = framed and shown.findings[joint.number].over_limit

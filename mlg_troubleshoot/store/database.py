@@ -162,16 +162,12 @@ def own_file() -> str:
     return str(user_data_path("mlg") / "store.sqlite")
 
 
-def default_place() -> str:
-    """Where the store is when nobody says: ``MLG_STORE``, or the user's own file."""
-    return os.environ.get("MLG_STORE") or own_file()
-
-
 class Store:
     """The store at a path (SQLite) or a URL (``postgresql+psycopg://…``)."""
 
     def __init__(self, place: str | Path | None = None, patience_s: int = _PATIENCE_S) -> None:
-        self.place = str(place or default_place())
+        # Where nobody says: ``MLG_STORE``, or the user's own file.
+        self.place = str(place or os.environ.get("MLG_STORE") or own_file())
         is_url = "://" in self.place
         self._file = None if is_url else Path(self.place)
         try:
@@ -260,8 +256,15 @@ class Store:
         distinct = {record.identity_hash: record for record in records}
         with self.transaction(writing=True) as connection:
             known = self._known(connection, list(distinct))
-            if judge is not None:
-                self._refuse(known, distinct, judge)
+            others = [r for identity, r in known.items() if judge is not None and not judge(r, distinct[identity])]
+            if others:
+                named = ", ".join(f"{r.record_id} ({r.tail_no} {r.side} {r.day or 'no date'})" for r in others[:5])
+                more = f" and {len(others) - 5} more" if len(others) > 5 else ""
+                raise StoreError(
+                    f"kept already with other content: {named}{more}; nothing of this was kept",
+                    "If the new one is right: mlg history correct RECORD FILE. If it is another inspection, give it "
+                    "its own record_id or date.",
+                )
             new = [record for identity, record in distinct.items() if identity not in known]
             last = connection.execute(
                 sql.select(_records.c.seq, _records.c.hash).order_by(_records.c.seq.desc()).limit(1)
@@ -290,20 +293,6 @@ class Store:
                 known[bytes(row.identity)] = _record(row)
         return known
 
-    @staticmethod
-    def _refuse(
-        known: Mapping[bytes, Record], new: Mapping[bytes, Record], judge: Callable[[Record, Record], bool]
-    ) -> None:
-        others = [record for identity, record in known.items() if not judge(record, new[identity])]
-        if others:
-            named = ", ".join(f"{r.record_id} ({r.tail_no} {r.side} {r.day or 'no date'})" for r in others[:5])
-            more = f" and {len(others) - 5} more" if len(others) > 5 else ""
-            raise StoreError(
-                f"kept already with other content: {named}{more}; nothing of this was kept",
-                "If the new one is right: mlg history correct RECORD FILE. If it is another inspection, give it its "
-                "own record_id or date.",
-            )
-
     def gears(self) -> list[tuple[str, str]]:
         """Tail and side of every gear that has a record."""
         with self.transaction(writing=False) as connection:
@@ -328,9 +317,8 @@ class Store:
         before, count = bytes.fromhex(GENESIS), 0
         with self.transaction(writing=False) as connection:
             for row in self._rows(connection):
-                values = dict(row._mapping)
-                for name in ("identity", "body", "hash"):
-                    values[name] = _bytes(values[name])
+                found = row._mapping
+                values = {**found, **{name: _bytes(found[name]) for name in ("identity", "body", "hash")}}
                 why = ""
                 if row.seq != count + 1:
                     why = f"record {count + 1} is missing before it"

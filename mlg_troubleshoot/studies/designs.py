@@ -53,14 +53,11 @@ def central_composite(n: int) -> Array:
     """
     if not 2 <= n <= max(_FRACTIONS):
         raise UsageError(f"a central composite design in {n} variables", f"It has 2 to {max(_FRACTIONS)}.")
-    return np.concatenate([_corners(n), np.where(np.eye(n, dtype=bool), np.arange(1, n + 1) % 2, 0.5)])
-
-
-def _corners(n: int) -> Array:
     base, words = (n, ()) if n <= _FULL else _FRACTIONS[n]
     signs = np.array(list(product((-1, 1), repeat=base)))
     columns = [signs, *(np.prod(signs[:, list(word)], axis=1)[:, None] for word in words)]
-    return np.asarray((np.concatenate(columns, axis=1) + 1) / 2.0)
+    corners = (np.concatenate(columns, axis=1) + 1) / 2.0
+    return np.concatenate([corners, np.where(np.eye(n, dtype=bool), np.arange(1, n + 1) % 2, 0.5)])
 
 
 def replicated_levels(n: int, n1: int, n2: int, rng: Generator) -> Wholes:
