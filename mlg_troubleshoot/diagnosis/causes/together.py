@@ -66,7 +66,7 @@ class Block:
     def skew(self, along: Array, square: Array) -> float:
         """Log-likelihood by which the skewed prior beats the normal one, for exp(aᵀx − xᵀQx/2) of changes x."""
         count = len(along)
-        if self.parts is None or count > _MOST_SKEWED:
+        if self.parts is None or not 0 < count <= _MOST_SKEWED:
             return 0.0
         which = np.indices((2,) * count).reshape(count, -1).T
         share, mean, variance = (part[which] for part in self.parts.T)
