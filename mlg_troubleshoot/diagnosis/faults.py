@@ -189,7 +189,8 @@ def _bend(table: DiagnosisTable, left: Array) -> Array:
     for _ in range(_BEND_ROUNDS):
         if near.sum() < LEAST_ALONG:
             break
-        curve = np.polynomial.Polynomial.fit(at[near], left[near], min(_BEND, int(near.sum()) // 4))
+        places = len(np.unique(np.round(at[near] / max(float(np.ptp(at[near])), 1e-9), 2)))
+        curve = np.polynomial.Polynomial.fit(at[near], left[near], min(_BEND, int(near.sum()) // 4, places - 1))
         off = np.abs(left - curve(at))
         bend = np.where(table.along, curve(at), 0.0)
         near = table.along & (off <= _FAR * max(float(np.median(off[near])), 1e-9))

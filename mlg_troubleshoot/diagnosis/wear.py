@@ -248,7 +248,8 @@ def _lines(by_gear: Array, x: Array, y: Array, weight: Array, fleet: Array, spre
     w, wx, wxx, wy, wxy = sums.reshape(len(by_gear), 5, j).swapaxes(0, 1)
     aa, ab, bb = w + p[0], wx + p[1], wxx + p[2]
     right = wy + p[0] * fleet[0] + p[1] * fleet[1], wxy + p[1] * fleet[0] + p[2] * fleet[1]
-    det = aa * bb - ab * ab
+    # Rounding must not make level and rate of a gear exactly one.
+    det = np.maximum(aa * bb - ab * ab, 1e-12 * aa * bb)
     unsure = np.array([bb, -ab, aa]) / det
     lines = np.array([unsure[0] * right[0] + unsure[1] * right[1], unsure[1] * right[0] + unsure[2] * right[1]])
     return lines, unsure

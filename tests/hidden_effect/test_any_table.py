@@ -1,0 +1,73 @@
+"""Tables of all kinds of fleets, with columns, rows and cells missing or wrong: diagnosed, or refused in words."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.errors import TroubleshootError
+from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions, diagnose_files
+
+from . import departures
+from .simulator import linkage, simulate_fleet
+from .simulator.stroke import CurveSpec, curve_table
+
+Table = dict[str, list[Any]]
+STAYS = ("record_id", "tail_no", "side", "clearance_convention")
+ODD = ("", "x", "-5", "1000000", "0")
+
+
+def drawn(seed: int, rng: np.random.Generator) -> Table:
+    """The table of a departure's fleet, or of readings along the stroke."""
+    if rng.random() < 0.65:
+        group = str(rng.choice(list(departures.PLAN)))
+        return dict(simulate_fleet(departures._spec(group, int(rng.integers(100)), seed), seed).table)
+    effect = str(rng.choice(["", "calibration_rate", "load_directions", "thermal_growth"])) or None
+    gears, rows = int(rng.choice([1, 2, 5, 12])), int(rng.choice([5, 10, 24]))
+    geometry = str(rng.choice(["A", "C", "A-G:0.2"]))
+    return dict(curve_table(CurveSpec(gears, rows, effect, {}, geometry, fleet=bool(rng.random() < 0.6)), seed)[0])
+
+
+def spoiled(table: Table, rng: np.random.Generator) -> Table:
+    """The table without some of its columns and rows, and with odd cells."""
+    clearances = [name for name in table if name.startswith("clearance_") and name.endswith("_in")]
+    others = [name for name in table if name not in clearances and name not in STAYS]
+    share = rng.random()
+    gone = {*clearances, "clearance_convention"} if share < 0.15 else set()
+    if 0.15 <= share < 0.4:
+        gone = set(rng.choice(clearances, int(rng.integers(1, len(clearances))), replace=False).tolist())
+    gone |= set(rng.choice(others, int(rng.integers(0, min(6, len(others)))), replace=False).tolist())
+    count = len(table["record_id"])
+    rows = np.sort(rng.choice(count, int(rng.choice([count, count, count // 2, max(count // 10, 2)])), replace=False))
+    left = {name: [cells[i] for i in rows] for name, cells in table.items() if name not in gone}
+    for name in [name for name in left if name not in STAYS and rng.random() < 0.1]:
+        for i in rng.choice(len(rows), max(1, len(rows) // 10), replace=False):
+            left[name][i] = str(rng.choice(ODD))
+    return left
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(0, 240, 40))
+def test_any_table_is_diagnosed_or_refused_without_a_warning(first: int, tmp_path: Path) -> None:
+    diagnosed = 0
+    for seed in range(first, first + 40):
+        rng = np.random.default_rng(seed)
+        try:
+            table = spoiled(drawn(seed, rng), rng)
+        except linkage.ClosureError:
+            continue
+        file = tmp_path / f"{seed}.csv"
+        with file.open("w", newline="", encoding="utf-8") as out:
+            writer = csv.writer(out)
+            writer.writerow(table)
+            writer.writerows(zip(*table.values(), strict=True))
+        try:
+            diagnose_files([file], DiagnoseOptions(permutations=99))
+            diagnosed += 1
+        except TroubleshootError as refused:
+            assert refused.remedy, seed
+    assert diagnosed > 5
