@@ -107,7 +107,7 @@ def _plots(residuals: Residuals) -> list[PlotPair]:
     d = residuals.diagnosis
     if d.causes:
         pairs = []
-        for cause in d.causes[:_MOST_PANELS]:
+        for cause in d.causes:
             column = drawn.against_cause(residuals, cause.candidate, cause.effect_in)
             left = drawn.residual_plot(residuals, column, "before")
             right = drawn.residual_plot(residuals, column, "with the extension", after=True)

@@ -15,7 +15,7 @@ import pytest
 from mlg_troubleshoot.diagnosis import CATALOGUE, Diagnosis, ModelExtension, diagnose
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import ReportProvenance, publish
-from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
+from mlg_troubleshoot.reporting.diagnosis_lines import cause_words, seven_lines
 from mlg_troubleshoot.reporting.diagnosis_report import diagnosis_document
 from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions, diagnose_files
 from mlg_troubleshoot.workflows.diagnose import write_diagnosis_report as report_of
@@ -95,6 +95,17 @@ def without_landings(gear: Gear, make: Make, plain: DiagnosisTable) -> Made:
 def convention(gear: Gear, make: Make) -> Made:
     """A technician who writes diametral clearances as radial."""
     return make(FLEETS["convention"](gear))
+
+
+def three_at_once(table: DiagnosisTable, over: Array) -> Array:
+    right = np.where(table.factors["side"] == "RH", 0.006, 0.0)
+    return technician_off(table, over) + right + 2e-4 * (table.quantities["temperature_c"] - 20.0)
+
+
+def test_each_of_three_causes_is_drawn_before_and_after(gear: Gear, make: Make) -> None:
+    made = make(fleet(gear.model, three_at_once, rows=200))
+    assert len(made.diagnosis.causes) == 3
+    assert all(f'<p class="small strong">{cause_words(cause)}</p>' in made.html for cause in made.diagnosis.causes)
 
 
 def test_the_report_shows_each_clearance_of_the_other_convention_as_entered_and_as_used(convention: Made) -> None:
