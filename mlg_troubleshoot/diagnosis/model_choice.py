@@ -276,6 +276,8 @@ def _judged(misfit: Array, rows: Rows, held: Array, block: Block) -> NoiseModel:
 def _marginal(noise: NoiseModel, held: Array, block: Block, misfit: Array) -> float:
     """Marginal log-likelihood of factors of all joints beside single causes, less its penalty."""
     found = fit(noise.beside(block.effects_in), held, misfit)
+    if block.parts is None:
+        return found.log_likelihood - block.penalty
     # What is fitted freely may be as large as an inch.
     free, count = noise.beside(held / np.sqrt(np.mean(held**2, axis=0))), block.columns.shape[1]
     product = block.columns.T @ free.precision_times(np.column_stack([block.columns, misfit]), found.tail_ratio)[0]
