@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from mlg_troubleshoot.diagnosis.bank import build_bank
+from mlg_troubleshoot.diagnosis.causes import CATALOGUE
 from mlg_troubleshoot.diagnosis.evidence.one_by_one import one_by_one
+from mlg_troubleshoot.diagnosis.inference import SECOND_SHARE, Inference, _Together
+from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
+from mlg_troubleshoot.gear.gear import Gear
+
+from .conftest import Array, DiagnosisTable, fleet
 
 
 @dataclass(frozen=True)
@@ -38,3 +47,25 @@ def test_a_cause_that_others_make_idle_is_left_out_again() -> None:
 
 def test_a_search_that_goes_in_a_circle_ends() -> None:
     assert one_by_one(Script((0, 1), frozenset({(0, 1), (1, 0)})), most=9).chosen in {(0,), (1,)}
+
+
+def two_wrong(table: DiagnosisTable, _over: Array) -> Array:
+    return np.where(table.factors["technician_id"] == "T-2", 0.007, 0.0) + np.where(
+        table.factors["side"] == "RH", 0.006, 0.0
+    )
+
+
+def test_of_a_gears_causes_the_one_that_does_nothing_is_left_out(gear: Gear) -> None:
+    table = fleet(gear.model, two_wrong, rows=200)
+    scene, rows = build_scene(gear.model, table, gear.discrepancies)
+    candidates = [
+        next(c for c in cause.candidates(scene) if c.target in (None, "technician T-2"))
+        for cause in CATALOGUE
+        if cause.name in ("technician_bias", "side_difference", "thermal_growth")
+    ]
+    columns = effect_columns(scene, candidates)
+    misfit, bank = table.measured_in - scene.over_in, build_bank(scene, columns)
+    whole = Inference(misfit, rows, candidates, columns, bank, 199, np.random.default_rng(1))
+    fewer = _Together(whole, (0, 1, 2), (0.0, 0.0, 0.0), SECOND_SHARE).without_idle()
+    assert fewer is not None
+    assert [candidates[k].cause.name for k in (0, 1, 2) if k not in fewer.chosen] == ["thermal_growth"]

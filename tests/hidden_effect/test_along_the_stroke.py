@@ -20,6 +20,7 @@ from mlg_troubleshoot.cli.app import app
 from mlg_troubleshoot.diagnosis import Diagnosis
 from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions, diagnose_files
 
+from .along import CLEARANCES
 from .simulator import linkage
 from .simulator.fleet import draw_design
 from .simulator.physics import Gears
@@ -27,7 +28,6 @@ from .simulator.records import write_csv
 from .simulator.stroke import CurveSpec, curve_table, positions
 
 ALONG = ("actuator_extension_in", "plunger_position_in")
-CLEARANCES = (*(f"clearance_{joint}_in" for joint in range(1, 11)), "clearance_convention")
 DIRECTIONS = CurveSpec(effect="load_directions", parameters={"spread_deg": 40.0})
 OTHER_LINKAGE = CurveSpec(geometry="C")
 RATE = CurveSpec(effect="calibration_rate")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions, diagnose_files
 
 from . import departures
 from .simulator import linkage, simulate_fleet
+from .simulator.records import write_csv
 from .simulator.stroke import CurveSpec, curve_table
 
 Table = dict[str, list[Any]]
@@ -61,10 +61,7 @@ def test_any_table_is_diagnosed_or_refused_without_a_warning(first: int, tmp_pat
         except linkage.ClosureError:
             continue
         file = tmp_path / f"{seed}.csv"
-        with file.open("w", newline="", encoding="utf-8") as out:
-            writer = csv.writer(out)
-            writer.writerow(table)
-            writer.writerows(zip(*table.values(), strict=True))
+        write_csv(table, file)
         try:
             diagnose_files([file], DiagnoseOptions(permutations=99))
             diagnosed += 1
