@@ -189,6 +189,7 @@ def _bend(table: DiagnosisTable, left: Array) -> Array:
     for _ in range(_BEND_ROUNDS):
         if near.sum() < LEAST_ALONG:
             break
+        # A curve through fewer places than it has coefficients is none.
         places = len(np.unique(np.round(at[near] / max(float(np.ptp(at[near])), 1e-9), 2)))
         curve = np.polynomial.Polynomial.fit(at[near], left[near], min(_BEND, int(near.sum()) // 4, places - 1))
         off = np.abs(left - curve(at))

@@ -42,7 +42,8 @@ JOINTS_APART, GEARS_APART, ROWS_APART = 0.35, 0.5, 0.4
 # Radial wear of a joint of a fleet of which no clearance was read, supposed. [in]
 UNREAD_IN = 0.003
 # How much a joint of such a fleet may be worn in all its gears, over that: no gear is as new, so that otherwise what
-# does the same in all of them, as a rate or another linkage, is taken for what wear does. [1]
+# does the same in all of them, as a rate or another linkage, is taken for what wear does. Of 20 sound simulated fleets
+# (seeds 9,000 to 9,019) ten alarmed without it, three at 1.5, one at this. [1]
 FLEET_WORN = 3.0
 # How much of what a gear's read joints are worn beyond the fleet's is to be expected of the others: the variance
 # between gears over that plus a fourth of the variance between the joints of a gear, of the same fleets. [1]

@@ -23,7 +23,8 @@ from mlg_troubleshoot.wear.paths import Steps
 
 _LOG_2PI = float(np.log(2.0 * np.pi))
 # A reading is a thousandth of the whole rise worse than it says: where all parts begin at exactly the same number the
-# posterior would be a needle, of which its samples hit one point. [1]
+# posterior would be a needle, of which its samples hit one point. Of measured cracks (tests/wear/real.py) the chance of
+# one kind was 0.19 to 0.97 by seed without it; with it 0.22 to 0.23, and 970 to 1,230 of 1,600 draws count. [1]
 _LEAST_VARIANCE = 1e-6
 
 

@@ -13,7 +13,7 @@ class Explanation(Protocol):
         """The causes."""
 
     def further(self) -> Self | None:
-        """The same with one more, if one stands out beyond chance and makes rows smaller that are held out."""
+        """The same with one more, if one earns its place: it stands out beyond chance beside the others, and helps."""
 
     def without_idle(self) -> Self | None:
         """The same without the one that stands out least, if it does so no more than by chance beside the others."""
