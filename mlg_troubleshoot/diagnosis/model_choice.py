@@ -15,8 +15,8 @@ from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.evidence.chance import Chance
 from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
 from mlg_troubleshoot.diagnosis.evidence.screen import Screen, fit
-from mlg_troubleshoot.diagnosis.evidence.verdict import Verdict
-from mlg_troubleshoot.diagnosis.inference import NAME, SECOND, Finding, Inference, left_out
+from mlg_troubleshoot.diagnosis.evidence.verdict import NAME, Verdict
+from mlg_troubleshoot.diagnosis.inference import Finding, Inference, left_out
 from mlg_troubleshoot.diagnosis.noise import Rows, build_noise
 
 # Thresholds: set in 2026 on departures' fleets of other seeds than those that judge them; not re-tuned.
@@ -91,7 +91,7 @@ def infer(  # noqa: PLR0913 - all that a search for causes looks at
     block = _best(whole.misfit, rows, columns[:, beside], blocks, blocks)
     kept = [k for k, c in enumerate(candidates) if not c.cause.of_joints]
     found = whole.beside(block, kept, aside).run()
-    faint = found.verdict is not Verdict.UNLISTED and (not found.p_values or found.p_values[0] > SECOND)
+    faint = found.verdict is not Verdict.UNLISTED and (not found.p_values or found.p_values[0] > NAME)
     chosen = () if faint else tuple(kept[k] for k in found.chosen)
     # Both are judged under the noise of the larger model.
     held = columns[:, list(chosen)]

@@ -17,17 +17,11 @@ from mlg_troubleshoot.diagnosis.causes.together import Block, LoadDirections, Ot
 from mlg_troubleshoot.diagnosis.diagnose import _expected_scatter, _single_slips
 from mlg_troubleshoot.diagnosis.diagnose import _interval as interval_of
 from mlg_troubleshoot.diagnosis.evidence.chance import Chance
+from mlg_troubleshoot.diagnosis.evidence.verdict import ALARM, NAME, REMAINS
 from mlg_troubleshoot.diagnosis.extension import adjustment_of
 from mlg_troubleshoot.diagnosis.faults import DataFault
 from mlg_troubleshoot.diagnosis.gain import _interval
-from mlg_troubleshoot.diagnosis.inference import (
-    ALARM,
-    NAME,
-    RULED_OUT,
-    SECOND,
-    UNLISTED_ALARM,
-    Inference,
-)
+from mlg_troubleshoot.diagnosis.inference import RULED_OUT, Inference
 from mlg_troubleshoot.diagnosis.model_choice import CLASS_APART
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, measured_uncertainty, robust_scale
 from mlg_troubleshoot.diagnosis.scene import build_scene
@@ -69,7 +63,7 @@ def test_a_healthy_fleet_reads_less_than_the_bound_by_what_pins_scatter() -> Non
 def test_the_smallest_effect_would_be_found_four_times_in_five() -> None:
     # An estimate of a size of t standard errors exceeds the bar, here 0, four times in five if t is this quantile.
     bare = cast(Any, SimpleNamespace(penalty=np.zeros(3), misfit=np.zeros(100)))
-    assert Inference._smallest(bare, np.zeros(50), 1.0) * 10.0 == pytest.approx(float(norm.ppf(0.8)), abs=0.005)
+    assert Inference._smallest(bare, Chance(np.zeros(50)), 1.0) * 10.0 == pytest.approx(float(norm.ppf(0.8)), abs=0.005)
 
 
 def test_a_rival_is_ruled_out_only_at_odds_of_ten_to_one() -> None:
@@ -90,6 +84,12 @@ def test_a_chance_counts_each_of_many_equals_once() -> None:
 def test_a_chance_beyond_all_draws_is_that_of_the_largest_of_many() -> None:
     drawn = gumbel_r.rvs(3.0, 0.8, size=2000, random_state=2)
     assert Chance(drawn).of(gumbel_r.isf(1e-5, 3.0, 0.8)) == pytest.approx(1e-5, rel=0.5)
+
+
+@pytest.mark.parametrize("chance", [0.3, 0.012, 1e-5])
+def test_a_bar_is_cleared_with_its_chance(chance: float) -> None:
+    at_random = Chance(np.random.default_rng(1).gumbel(3.0, 0.8, 199))
+    assert at_random.of(at_random.bar(chance)) == pytest.approx(chance, rel=0.1)
 
 
 def test_the_robust_scale_is_the_standard_deviation_of_a_normal_distribution() -> None:
@@ -186,8 +186,8 @@ def test_what_is_written_twice_as_large_has_twice_the_error(plain: DiagnosisTabl
 
 
 def test_healthy_fleets_alarm_at_most_twice_in_a_hundred_and_a_name_needs_more() -> None:
-    assert ALARM + UNLISTED_ALARM <= 0.02
-    assert max(NAME, SECOND) <= ALARM / 4.0
+    assert ALARM + REMAINS <= 0.02
+    assert NAME <= ALARM / 4.0
 
 
 def test_a_cause_with_two_targets_pays_for_both_and_what_pins_scatter_is_expected() -> None:

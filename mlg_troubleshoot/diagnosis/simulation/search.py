@@ -13,12 +13,12 @@ from scipy.stats import t as student
 from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
-from mlg_troubleshoot.diagnosis.evidence.chance import Chance
+from mlg_troubleshoot.diagnosis.evidence.chance import Chance, smallest_rms
 from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
 from mlg_troubleshoot.diagnosis.evidence.held_out import folds_of
 from mlg_troubleshoot.diagnosis.evidence.one_by_one import one_by_one, settled
 from mlg_troubleshoot.diagnosis.evidence.screen import Screen
-from mlg_troubleshoot.diagnosis.evidence.verdict import Verdict
+from mlg_troubleshoot.diagnosis.evidence.verdict import ALARM, NAME, REMAINS, Verdict, verdict_of
 from mlg_troubleshoot.diagnosis.simulation import scatter
 from mlg_troubleshoot.diagnosis.simulation.held_out import held_out
 from mlg_troubleshoot.diagnosis.simulation.inputs import checked
@@ -34,9 +34,8 @@ from mlg_troubleshoot.diagnosis.simulation.scatter import Whitener, basis_of, bu
 # Thresholds: set in 2026 on five simulated rigs (tests/simulation/rigs.py; groups, far readings, gaps; other seeds than
 # the benchmark's) and the three sets of measured data in docs/tutorial/data; lower ones name more, and name patterns.
 
-# Chance, if nothing is wrong, below which something is (alarm), below which a cause is named, below which what is
-# left is no noise, and below which a pattern in it is counted as discrepancy that a cause must stand out against.
-ALARM, NAME, REMAINS, SMOOTH = 0.012, 0.002, 0.002, 0.002
+# Chance, if nothing is wrong, below which a pattern is counted as discrepancy that a cause must stand out against.
+SMOOTH = 0.002
 # Log-likelihood by which a rival must fall behind to be ruled out.
 RULED_OUT = 5.0
 # Share of its effect that a suspect keeps beside the nuisance parameters, below which it cannot be tested; and of
@@ -475,21 +474,15 @@ def _report(study: Study, start: Point, point: Point, permutations: int, seed: i
         if near:
             possible += [_found(study, point, j) for j in (k, *near)]
     remainder_p, _most = point.pattern(point.columns[:, point.fixed])
-    verdict = Verdict.NONE
     told = point.evidence(point.fixed)
     lead = int(np.argmax(told.surprise))
-    if remainder_p <= REMAINS:
-        verdict = Verdict.UNLISTED
-    elif possible:
-        verdict = Verdict.AMBIGUOUS
-    elif causes:
-        verdict = Verdict.NAMED
-    elif told.surprise[lead] > -np.log(ALARM):
-        verdict = Verdict.AMBIGUOUS
+    p = 0.0 if causes else float(np.exp(-told.surprise[lead]))
+    verdict = verdict_of(p, bool(possible), remainder_p <= REMAINS)
+    if verdict is Verdict.AMBIGUOUS and not causes:
         score = told.score[told.by[lead]]
         near = [int(k) for k in np.argsort(-score) if score[k] > max(score[lead] - 2.0 * RULED_OUT, 0.0)]
         possible = [_found(study, point, k) for k in near]
-    bar = float(np.quantile(told.chances[-1].largest, 1.0 - NAME))
+    bar = told.chances[-1].bar(ALARM)
     spread = np.sqrt(point.metrics[-1].variance) * point.scale
     return SimulationDiagnosis(
         verdict=verdict,
@@ -500,7 +493,7 @@ def _report(study: Study, start: Point, point: Point, permutations: int, seed: i
         gain=_gain(study, start, point),
         parameters=dict(zip(names, point.values.tolist(), strict=True)),
         remainder_p=min(max(remainder_p, 1.0 / (1 + permutations)), 1.0),
-        smallest_detectable_rms=float(np.sqrt(np.mean(spread**2) / len(spread)) * (np.sqrt(bar) + 0.84)),
+        smallest_detectable_rms=smallest_rms(bar, float(np.sqrt(np.mean(spread**2))), len(spread)),
         noise=tuple(
             float(np.median(spread[runner.output == k])) if np.any(runner.output == k) else float("nan")
             for k in range(study.m)
