@@ -113,6 +113,8 @@ class Diagnosis:
         Named causes by effect; empty unless NAMED.
     also_possible : tuple of NamedCause
         The whole set that the data cannot separate; empty unless AMBIGUOUS.
+    beside : tuple of NamedCause
+        The set of which something acts beside what is named; empty unless NAMED.
     unlisted_variables : tuple of str
         Columns that an effect outside the catalogue moves with.
     not_testable : tuple of (str, str)
@@ -162,6 +164,7 @@ class Diagnosis:
     verdict: Verdict
     causes: tuple[NamedCause, ...]
     also_possible: tuple[NamedCause, ...]
+    beside: tuple[NamedCause, ...]
     unlisted_variables: tuple[str, ...]
     not_testable: tuple[tuple[str, str], ...]
     unsaid: tuple[str, ...]
@@ -459,28 +462,28 @@ def _report(  # noqa: PLR0913 - everything that a diagnosis says
     permutations: int,
     rng: np.random.Generator,
 ) -> Diagnosis:
-    columns, misfit, finding = case.columns, case.misfit, case.finding
-    named = _named(case)
+    misfit, finding = case.misfit, case.finding
+    verdict = Verdict.NAMED if finding.sure else finding.verdict
+    causes, open_ = _told(case)
     read = np.isfinite(table.clearance_in)
     seen = np.asarray(read.any(axis=0))
     latent = np.where(seen, 0.0, case.scene.clearance_in)
     raw = predicted(model, table, np.where(read, table.clearance_in, latent))[0]
     raw_misfit = table.measured_in - raw
-    gain = _gain(case, rng) if finding.verdict is Verdict.NAMED and finding.fit is not None else None
-    left = misfit if gain is None else misfit - case.explained
+    gain = _gain(case, rng) if verdict is Verdict.NAMED else None
+    left = misfit - np.sum([cause.effect_in for cause in causes], axis=0)
     repeatability, source = estimate_repeatability(table)
     return Diagnosis(
-        verdict=finding.verdict,
-        causes=named if finding.verdict is Verdict.NAMED else (),
-        also_possible=(*named, *_rivals(case.candidates, columns, finding))
-        if finding.verdict is Verdict.AMBIGUOUS
-        else (),
+        verdict=verdict,
+        causes=causes,
+        also_possible=() if causes else open_,
+        beside=open_ if causes else (),
         unlisted_variables=finding.variables,
         not_testable=not_testable,
         unsaid=_unsaid(table),
         ruled_out=finding.ruled_out,
         faults=faults,
-        corrected=_corrected(model, table, named if finding.verdict is Verdict.NAMED else ()),
+        corrected=_corrected(model, table, causes),
         rows_read=rows_read,
         rows_used=len(set(table.record_id)),
         unread=tuple(n for n, some in zip(model.joint_numbers, seen, strict=True) if not some),
@@ -492,12 +495,12 @@ def _report(  # noqa: PLR0913 - everything that a diagnosis says
         repeatability_source=source,
         smallest_rms_in=finding.smallest_rms_in,
         gain=gain,
-        terms=() if gain is None else tuple(cause for cause in named if cause.predicts),
+        terms=() if gain is None else tuple(cause for cause in causes if cause.predicts),
         residual_u_in=float(np.std(left)),
         expected_scatter_in=_expected_scatter(model, table, repeatability),
         remainder_p=finding.remainder_p,
         # Where nothing stands out beyond chance, what is left is noise by the same test.
-        remainder_is_noise=finding.verdict is Verdict.NONE
+        remainder_is_noise=verdict is Verdict.NONE
         or (finding.verdict is Verdict.NAMED and finding.remainder_p > 0.05),
         used=table,
         predicted_in=case.scene.over_in,
@@ -508,10 +511,17 @@ def _report(  # noqa: PLR0913 - everything that a diagnosis says
 
 
 def _gain(case: _Case, rng: np.random.Generator) -> Gain:
-    """What the extension gains on tails that it was not fitted to, on rows if it is about one tail."""
-    finding, table = case.finding, case.scene.table
-    held = case.columns[:, list(finding.chosen)]
-    return measure_gain(finding.noise, held, case.misfit, case.scene.over_in, table, rng, finding.block)
+    """What the extension gains on tails that it was not fitted to, on rows if it is about one tail.
+
+    What else acts, being one of a set, is noise of the size that it was found with.
+    """
+    finding, columns, block = case.finding, case.columns, case.finding.block
+    noise, firm = finding.noise, list(finding.firm)
+    if finding.sure:
+        others = [place for place, k in enumerate(finding.chosen) if k not in finding.sure]
+        noise = noise.beside(columns[:, list(finding.chosen)][:, others] * case.values[others])
+        noise, block = noise if block is None else noise.beside(block.effects_in), None
+    return measure_gain(noise, columns[:, firm], case.misfit, case.scene.over_in, case.scene.table, rng, block)
 
 
 def _corrected(model: LinkageModel, table: DiagnosisTable, named: Sequence[NamedCause]) -> tuple[DataFault, ...]:
@@ -526,30 +536,36 @@ def _corrected(model: LinkageModel, table: DiagnosisTable, named: Sequence[Named
     return tuple(cells)
 
 
-def _named(case: _Case) -> tuple[NamedCause, ...]:
-    finding, block, found = case.finding, case.finding.block, []
+def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
+    """The causes that are named, by effect, and the set of those that the data cannot separate."""
+    finding, block = case.finding, case.finding.block
+    named: list[NamedCause] = []
+    possible: list[NamedCause] = []
     p_values = (*finding.p_values, *[None] * len(finding.chosen))
     for place, k in enumerate(finding.chosen if finding.fit is not None else ()):
         value, error = float(case.values[place]), float(np.sqrt(case.covariance[place, place]))
         effect = case.columns[:, k] * value
-        found.append(NamedCause(case.candidates[k], value, _interval(value, error), effect, p_values[place]))
+        found = NamedCause(case.candidates[k], value, _interval(value, error), effect, p_values[place])
+        (named if k in finding.firm else possible).append(found)
     if block is not None:
         k = len(finding.chosen)
         change, candidate = case.values[k:], block.candidate(case.values[k:], case.covariance[k:, k:])
         effect = block.columns @ change
-        found.append(NamedCause(candidate, 1.0, (1.0, 1.0), effect, finding.block_p, finding.aliases))
-    return tuple(sorted(found, key=lambda c: -c.effect_rms_in))
+        found = NamedCause(candidate, 1.0, (1.0, 1.0), effect, finding.block_p, finding.aliases)
+        (named if finding.verdict is Verdict.NAMED else possible).append(found)
+    rivals = [case.candidates[k] for k in finding.rivals]
+    rivals += [] if finding.rival is None else [Candidate(finding.rival.cause)]
+    none = np.zeros(len(case.misfit))
+    unfitted = [NamedCause(candidate, 0.0, (0.0, 0.0), none, None) for candidate in rivals]
+
+    def by_effect(found: list[NamedCause]) -> list[NamedCause]:
+        return sorted(found, key=lambda c: -c.effect_rms_in)
+
+    return tuple(by_effect(named)), (*by_effect(possible), *unfitted)
 
 
 def _interval(value: float, error: float) -> tuple[float, float]:
     return value - 1.96 * error, value + 1.96 * error
-
-
-def _rivals(candidates: Sequence[Candidate], columns: Array, finding: Finding) -> tuple[NamedCause, ...]:
-    empty = np.zeros(len(columns))
-    possible = [candidates[k] for k in finding.rivals]
-    possible += [] if finding.rival is None else [Candidate(finding.rival.cause)]
-    return tuple(NamedCause(candidate, 0.0, (0.0, 0.0), empty, None) for candidate in possible)
 
 
 def _expected_scatter(model: LinkageModel, table: DiagnosisTable, repeatability: float) -> float | None:

@@ -61,6 +61,7 @@ class Finding:
     verdict: NONE, NAMED, AMBIGUOUS or UNLISTED.
     chosen: candidates that are named, or the leading one of an ambiguous set.
     rivals: the best candidate of each further cause and target that the data cannot rule out.
+    sure: of an ambiguous set, those of `chosen` that are there whatever the rest is.
     p_values: chance of as much if nothing is wrong, for each of `chosen`. [1]
     variables: variables of an unlisted effect.
     remainder_p: chance of as much left if only noise is left. [1]
@@ -80,6 +81,7 @@ class Finding:
     smallest_rms_in: float
     chosen: tuple[int, ...] = ()
     rivals: tuple[int, ...] = ()
+    sure: tuple[int, ...] = ()
     p_values: tuple[float, ...] = ()
     variables: tuple[str, ...] = ()
     fit: Fit | None = None
@@ -88,6 +90,11 @@ class Finding:
     aliases: tuple[Candidate, ...] = ()
     rival: Block | None = None
     block_p: float | None = None
+
+    @property
+    def firm(self) -> tuple[int, ...]:
+        """Single causes that are named: all that are chosen, or those of an ambiguous set that are sure."""
+        return self.chosen if self.verdict is Verdict.NAMED else self.sure
 
 
 class Inference:
@@ -212,24 +219,55 @@ class Inference:
     def _with(self, together: _Together, smallest: float) -> Finding:
         """Check causes against their rivals and against what they leave."""
         chosen, p_values = list(together.chosen), together.p_values
-        rivals: list[int] = []
+        instead: list[list[int]] = []
         behind: dict[Key, float] = {}
         clear = p_values[0] <= NAME
         for place in range(len(chosen)):
             others = [c for k, c in enumerate(chosen) if k != place]
             better, near, rest = self.rivals(chosen[place], others, clear)
             chosen[place] = better
-            rivals += near
+            instead.append(near)
             behind.update(rest)
+        rivals = list(dict.fromkeys(k for near in instead for k in near))
         noise, fitted = self.refit(chosen)
         remainder_p, variables, refuted = self._remainder(noise, chosen, fitted)
-        ruled_out = tuple(sorted(behind, key=lambda key: behind[key]))
-        found = Finding(Verdict.UNLISTED, remainder_p, noise, smallest, (), (), p_values, variables, None, ruled_out)
+        possible = {self.candidates[k].key for k in (*chosen, *rivals)}
+        found = Finding(
+            Verdict.UNLISTED,
+            remainder_p,
+            noise,
+            smallest,
+            p_values=p_values,
+            variables=variables,
+            ruled_out=tuple(sorted(behind.keys() - possible, key=lambda key: (behind[key], str(key)))),
+        )
         if refuted:
             return found
-        verdict = verdict_of(p_values[0], bool(rivals), refuted)
-        rivals = list(dict.fromkeys(rivals))
-        return replace(found, verdict=verdict, chosen=tuple(chosen), rivals=tuple(rivals), variables=(), fit=fitted)
+        return replace(
+            found,
+            verdict=verdict_of(p_values[0], bool(rivals), refuted),
+            chosen=tuple(chosen),
+            rivals=tuple(rivals),
+            sure=self._sure(chosen, instead) if clear else (),
+            variables=(),
+            fit=fitted,
+        )
+
+    def _sure(self, chosen: Sequence[int], instead: Sequence[Sequence[int]]) -> tuple[int, ...]:
+        """Those of several causes that stand alone in their place, whatever stands in the places of the others."""
+        if not any(instead):
+            return ()
+        sets = [[*chosen[:place], k, *chosen[place + 1 :]] for place, near in enumerate(instead) for k in near]
+
+        def alone(place: int) -> bool:
+            k, held = chosen[place], [other for other in sets if other[place] == chosen[place]]
+            found = [self.rivals(k, [c for c in other if c != k], clear=True) for other in held]
+            return all(self.candidates[best].key == self.candidates[k].key and not near for best, near, _far in found)
+
+        chances = _Together(self, tuple(chosen), (), 0.0).chances()
+        return tuple(
+            k for place, k in enumerate(chosen) if not instead[place] and chances[place] <= NAME and alone(place)
+        )
 
     def _constant(self, lead: int) -> tuple[float, tuple[str, ...]] | None:
         """Tell whether a shift of all rows alike explains clearly more than any cause; no listed cause does that.
@@ -400,20 +438,24 @@ class _Together:
 
     def without_idle(self) -> _Together | None:
         """The same without the one that stands out least, if no more than by chance; two stood out as a pair."""
-        whole, found = self.whole, []
         if len(self.chosen) < 3:
             return None
-        noise, _fitted = whole.refit(self.chosen)
-        for place, k in enumerate(self.chosen):
-            others = whole.columns[:, [c for c in self.chosen if c != k]]
-            screen = Screen(noise, whole.columns[:, [k]], whole.signs[[k]], others, whole.exact[[k]])
-            gain = float(screen.run(whole.misfit[:, None]).gain[0, 0] - whole.penalty[k])
-            found.append((self._chance(noise, others, gain, aside=True), place))
-        p, place = max(found)
+        p, place = max((p, place) for place, p in enumerate(self.chances()))
         if p <= NAME:
             return None
         chosen, p_values = ((*values[:place], *values[place + 1 :]) for values in (self.chosen, self.p_values))
         return replace(self, chosen=chosen, p_values=p_values)
+
+    def chances(self) -> list[float]:
+        """Chance of as much as each explains beside the others if it is not there."""
+        whole, found = self.whole, []
+        noise, _fitted = whole.refit(self.chosen)
+        for k in self.chosen:
+            others = whole.columns[:, [c for c in self.chosen if c != k]]
+            screen = Screen(noise, whole.columns[:, [k]], whole.signs[[k]], others, whole.exact[[k]])
+            gain = float(screen.run(whole.misfit[:, None]).gain[0, 0] - whole.penalty[k])
+            found.append(self._chance(noise, others, gain, aside=True))
+        return found
 
     def _chance(self, noise: NoiseModel, kept: Array, gain: float, aside: bool) -> float:
         """Chance of as much by any candidate beside some columns if nothing more is wrong."""

@@ -91,8 +91,10 @@ def infer(  # noqa: PLR0913 - all that a search for causes looks at
     block = _best(whole.misfit, rows, columns[:, beside], blocks, blocks)
     kept = [k for k, c in enumerate(candidates) if not c.cause.of_joints]
     found = whole.beside(block, kept, aside).run()
+    chosen, rivals, sure = (tuple(kept[k] for k in places) for places in (found.chosen, found.rivals, found.sure))
+    found = replace(found, chosen=chosen, rivals=rivals, sure=sure)
     faint = found.verdict is not Verdict.UNLISTED and (not found.p_values or found.p_values[0] > NAME)
-    chosen = () if faint else tuple(kept[k] for k in found.chosen)
+    chosen = () if faint else found.chosen
     # Both are judged under the noise of the larger model.
     held = columns[:, list(chosen)]
     noise = _judged(whole.misfit, rows, held, block)
@@ -117,7 +119,8 @@ def infer(  # noqa: PLR0913 - all that a search for causes looks at
         noise=noise,
         smallest_rms_in=plain.smallest_rms_in,
         chosen=chosen,
-        rivals=() if faint else tuple(kept[k] for k in found.rivals),
+        rivals=() if faint else found.rivals,
+        sure=() if faint else found.sure,
         p_values=() if faint else found.p_values,
         variables=(),
         fit=fit(noise.beside(block.effects_in), held, whole.misfit),
@@ -220,13 +223,18 @@ def _single(
     rival = BLOCK_RIVAL if named else np.inf
     if one_scale:
         rival = BOUND_RIVAL if block.cause.bounded else SCALE_RIVAL
-    # Beside factors of all joints nothing else may stand out any more: then they are a rival of anything.
-    if not chosen and found.verdict is Verdict.NONE and not one_scale:
+    # Beside factors of all joints it may stand out no more: then they are a rival of anything.
+    if not one_scale and (instead or (not chosen and found.verdict is Verdict.NONE)):
         rival = min(rival, HIDDEN_RIVAL if block.parts is None else SKEWED_RIVAL)
     rival = NESTED if nested else rival
     near = lead > rival or rejected < SCALE_DOUBTED
     near |= one_scale and any(other.uncalibrated for other in blocks)
-    return replace(plain, verdict=Verdict.AMBIGUOUS, rival=block) if near else plain
+    if not near:
+        return plain
+    # Beside factors of all joints only what is about no joint is sure, and only if it stands beside them, too.
+    firm = {whole.candidates[k].key for k in found.firm if k in chosen}
+    sure = tuple(k for k in plain.firm if whole.candidates[k].key in firm and not causes[k].of_joints)
+    return replace(plain, verdict=Verdict.AMBIGUOUS, rival=block, sure=sure)
 
 
 def _nested(causes: Iterable[Cause]) -> bool:
