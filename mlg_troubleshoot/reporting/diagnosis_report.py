@@ -89,7 +89,7 @@ def _context(
         "as_loaded": any("load_directions" in (o.cause.name for o in (c.candidate, *c.aliases)) for c in d.causes),
         "changes": _changes(residuals),
         "more_changes": len(d.gain.verdicts_changed) - _MOST_CHANGES if d.gain else 0,
-        "do": [(cause_words(c), c.candidate.cause.inspect, c.candidate.separates) for c in found],
+        "do": [(cause_words(c), c.candidate.cause.inspect, c.candidate.separates) for c in (*found, *d.beside)],
         "extension": extension,
         "approval": [("Proposed by", ""), ("Checked by", ""), ("Approved for use by", "")],
     }

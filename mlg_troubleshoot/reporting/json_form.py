@@ -157,9 +157,8 @@ def diagnosis_as_json(diagnosis: Diagnosis, extension: ModelExtension | None) ->
         "misfit": chosen(d, "mean_in", "rms_in", "repeatability_in", "repeatability_source"),
         "verdict": d.verdict,
         "causes": [_cause(c) for c in d.causes],
-        "also_possible": [
-            {**_named(c.candidate), "separating_reading": c.candidate.separates} for c in d.also_possible
-        ],
+        "also_possible": [_possible(c.candidate) for c in d.also_possible],
+        "beside": [_possible(c.candidate) for c in d.beside],
         "unlisted_variables": list(d.unlisted_variables),
         "not_testable": [{"cause": cause, "missing_column": column} for cause, column in d.not_testable],
         "cannot_say": list(d.unsaid),
@@ -181,11 +180,16 @@ def _named(candidate: Any) -> dict[str, Any]:
     return {"cause": candidate.cause.name, "target": candidate.target}
 
 
+def _possible(candidate: Any) -> dict[str, Any]:
+    return {**_named(candidate), "separating_reading": candidate.separates}
+
+
 def _cause(c: NamedCause) -> dict[str, Any]:
     return {
         **_named(c.candidate),
         **chosen(c, "effect_rms_in", "p_value", "parameters"),
         "interval_95": plain(c.interval_shown),
+        "aliases": [_possible(candidate) for candidate in c.aliases],
     }
 
 

@@ -128,7 +128,7 @@ def run(task: tuple[str, int, int]) -> Record:
         "verdict": found.verdict,
         "named": [(c.candidate.cause.name, c.candidate.target) for c in found.causes],
         "class": sorted({a.cause.name for c in found.causes for a in c.aliases}),
-        "also": [(c.candidate.cause.name, c.candidate.target) for c in found.also_possible],
+        "also": [(c.candidate.cause.name, c.candidate.target) for c in (*found.also_possible, *found.beside)],
         "variables": list(found.unlisted_variables),
         "truth": list(fleet.label.causes),
         "linkage": fleet.spec.geometry,

@@ -132,10 +132,11 @@ def _compare(fleet: simulator.Fleet, found: Diagnosis | None) -> Record:
     record["cells_found"] = len(wrong_cells & {(f.record_id, f.column) for f in found.faults})
     record["false_faults"] = len(proposed - wrong_rows)
     names = [(c.candidate.cause.name, c.candidate.target) for c in found.causes]
-    also = [(c.candidate.cause.name, c.candidate.target) for c in found.also_possible]
+    also = [(c.candidate.cause.name, c.candidate.target) for c in (*found.also_possible, *found.beside)]
     record["named"] = names
     if listed and truth:
-        record["right"] = len(names) == len(truth) and all(any(_same(n, t) for n in names) for t in truth)
+        told = not found.beside and len(names) == len(truth)
+        record["right"] = told and all(any(_same(n, t) for n in names) for t in truth)
         record["in_set"] = all(any(_same(n, t) for n in (*names, *also)) for t in truth)
         record["some_right"] = any(_same(n, t) for n in names for t in truth)
         record["wrong"] = bool(names) and not all(any(_same(n, t) for t in truth) for n in names)
