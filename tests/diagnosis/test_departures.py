@@ -83,6 +83,10 @@ def worn_when_not_read(gear: Gear) -> DiagnosisTable:
     return replace(table, clearance_in=values, readings_in=table.readings_in + more[:, None])
 
 
+def a_gauge_and_a_scale(table: DiagnosisTable, over: Array) -> Array:
+    return -0.06 * over + np.where(table.factors["gauge_id"] == "G-2", 0.004, 0.0)
+
+
 def loads_and_a_bend(table: DiagnosisTable, over: Array) -> Array:
     off = over - over.mean()
     return loads(table, over) + 0.12 * off**2 / off.std()
@@ -105,6 +109,7 @@ FLEETS: dict[str, Callable[[Gear], DiagnosisTable]] = {
     "nothing": lambda gear: fleet(gear.model, rows=200),
     "loads": lambda gear: fleet(gear.model, loads, rows=200),
     "loads and a gauge": lambda gear: fleet(gear.model, loads_and_a_gauge, rows=200),
+    "a gauge and a scale": lambda gear: fleet(gear.model, a_gauge_and_a_scale, rows=200),
     "loads against": lambda gear: fleet(
         gear.model, lambda t, over: loads_and_a_gauge(t, over, AGAINST, 0.012), rows=200
     ),
@@ -314,3 +319,44 @@ def test_an_effect_of_one_tail_alone_is_unlisted_with_its_variable() -> None:
         "UNLISTED",
         {"tail_no", "hydraulic_pressure_psi"},
     )
+
+
+def test_a_sure_cause_is_named_although_what_acts_beside_it_cannot_be_told() -> None:
+    d = found("a gauge and a scale")
+    assert (d.verdict, named("a gauge and a scale")) == ("NAMED", {("gauge_bias", "gauge G-2")})
+
+
+def test_what_cannot_be_told_beside_a_sure_cause_is_a_set_of_its_own() -> None:
+    d = found("a gauge and a scale")
+    beside = {c.candidate.cause.name for c in d.beside}
+    assert (beside, d.also_possible) == ({"calibration_rate", "load_directions"}, ())
+
+
+def test_a_sure_cause_is_fitted_with_what_acts_beside_it() -> None:
+    (cause,) = found("a gauge and a scale").causes
+    assert cause.interval[0] < 0.004 < cause.interval[1]
+
+
+def test_the_model_is_extended_by_the_sure_cause_alone_and_gains() -> None:
+    d = found("a gauge and a scale")
+    assert [term.candidate.cause.name for term in d.terms] == [c.candidate.cause.name for c in d.causes if c.predicts]
+    assert d.gain is not None
+    assert d.gain.rms_after_in < d.gain.rms_before_in
+
+
+def test_what_acts_beside_a_sure_cause_stays_in_what_is_left() -> None:
+    d = found("a gauge and a scale")
+    (cause,) = d.causes
+    assert d.residual_u_in == pytest.approx(np.std(d.misfit_in - cause.effect_in))
+    assert not d.remainder_is_noise
+
+
+def test_what_is_in_the_set_is_not_said_to_be_ruled_out() -> None:
+    d = found("a gauge and a scale")
+    assert not {c.candidate.key for c in d.beside} & set(d.ruled_out)
+
+
+def test_the_lines_say_what_may_act_beside_a_sure_cause_and_what_to_read() -> None:
+    lines = {line.word: line.text for line in seven_lines(found("a gauge and a scale"))}
+    assert "Beside it something acts that the data cannot tell" in lines["CAUSE"]
+    assert "To tell what acts beside it, take" in lines["DO"]
