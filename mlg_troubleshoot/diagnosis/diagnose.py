@@ -500,8 +500,7 @@ def _report(  # noqa: PLR0913 - everything that a diagnosis says
         expected_scatter_in=_expected_scatter(model, table, repeatability),
         remainder_p=finding.remainder_p,
         # Where nothing stands out beyond chance, what is left is noise by the same test.
-        remainder_is_noise=verdict is Verdict.NONE
-        or (finding.verdict is Verdict.NAMED and finding.remainder_p > 0.05),
+        remainder_is_noise=verdict is Verdict.NONE or (finding.verdict is Verdict.NAMED and finding.remainder_p > 0.05),
         used=table,
         predicted_in=case.scene.over_in,
         misfit_in=misfit,

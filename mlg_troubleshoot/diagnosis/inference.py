@@ -232,26 +232,13 @@ class Inference:
         noise, fitted = self.refit(chosen)
         remainder_p, variables, refuted = self._remainder(noise, chosen, fitted)
         possible = {self.candidates[k].key for k in (*chosen, *rivals)}
-        found = Finding(
-            Verdict.UNLISTED,
-            remainder_p,
-            noise,
-            smallest,
-            p_values=p_values,
-            variables=variables,
-            ruled_out=tuple(sorted(behind.keys() - possible, key=lambda key: (behind[key], str(key)))),
-        )
+        ruled_out = tuple(sorted(behind.keys() - possible, key=lambda key: (behind[key], str(key))))
+        verdict = verdict_of(p_values[0], bool(rivals), refuted)
+        found = Finding(verdict, remainder_p, noise, smallest, p_values=p_values, ruled_out=ruled_out)
         if refuted:
-            return found
-        return replace(
-            found,
-            verdict=verdict_of(p_values[0], bool(rivals), refuted),
-            chosen=tuple(chosen),
-            rivals=tuple(rivals),
-            sure=self._sure(chosen, instead) if clear else (),
-            variables=(),
-            fit=fitted,
-        )
+            return replace(found, variables=variables)
+        sure = self._sure(chosen, instead) if clear else ()
+        return replace(found, chosen=tuple(chosen), rivals=tuple(rivals), sure=sure, fit=fitted)
 
     def _sure(self, chosen: Sequence[int], instead: Sequence[Sequence[int]]) -> tuple[int, ...]:
         """Those of several causes that stand alone in their place, whatever stands in the places of the others."""
