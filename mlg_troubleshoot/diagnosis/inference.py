@@ -20,7 +20,7 @@ from mlg_troubleshoot.diagnosis.causes.base import Candidate
 from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.evidence.chance import Chance, smallest_rms
 from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
-from mlg_troubleshoot.diagnosis.evidence.held_out import held_out_part
+from mlg_troubleshoot.diagnosis.evidence.held_out import folds_of, held_out_part, likelier
 from mlg_troubleshoot.diagnosis.evidence.one_by_one import one_by_one
 from mlg_troubleshoot.diagnosis.evidence.screen import Fit, Screen, fit
 from mlg_troubleshoot.diagnosis.evidence.verdict import ALARM, NAME, REMAINS, Verdict, verdict_of
@@ -46,7 +46,6 @@ WEAK_SHARE = 0.12
 CONSTANT = 1.5
 # A remainder in the named cause's own variable refutes its form from this share of the effect on.
 OWN_SHARE = 0.2
-_FOLDS = 5
 # By how many standard errors, and by how much at the least, a value may lie off the only one that it can have.
 _OFF, _OFF_SHARE = 3.5, 0.15
 # Likeliest causes of which a pair has one at least; causes that are sought together: of 30 fleets with four (seeds
@@ -452,15 +451,10 @@ class _Together:
 
     def _helps(self, noise: NoiseModel, chosen: Sequence[int]) -> bool:
         """Tell whether the last one makes tails that are held out likelier, a shift common to them being noise."""
-        before, after = (
-            left_out(noise, self.whole.columns[:, list(held)], None, self.whole.misfit)
-            for held in (chosen[:-1], chosen)
-        )
-        both, ratio = np.column_stack([before, after]), noise.tail_ratios[-1]
-        folds = _folds(noise)
-        parts = [noise.take(folds == k).square(both[folds == k], ratio) for k in np.unique(folds)]
-        square = np.sum(parts, axis=0)
-        return bool(square[1] < square[0])
+        columns, misfit = self.whole.columns[:, list(chosen)], self.whole.misfit
+        fold = folds(noise, columns)
+        before, after = (misfit - held_out_part(noise, held, misfit, fold) for held in (columns[:, :-1], columns))
+        return likelier(noise, before, after, fold)
 
     def _sound(self, chosen: list[int]) -> bool:
         """Tell whether each has the sign that it can have, and is no slip of the form of the largest."""
@@ -506,11 +500,7 @@ def _of_shapes(noise: NoiseModel, shapes: Array, held: Array | None = None) -> S
     return Screen(noise, shapes, np.zeros(shapes.shape[1]), held)
 
 
-def left_out(noise: NoiseModel, held: Array, block: Block | None, misfit: Array) -> Array:
-    """Misfit that a model leaves on tails that it was not fitted to. [in]"""
-    return misfit - held_out_part(noise, held, misfit, _folds(noise), block)
-
-
-def _folds(noise: NoiseModel) -> Wholes:
-    """Number the fold in which each row is held out, with its tail where there are enough."""
-    return (noise.tails if noise.tails.max() >= 3 else np.arange(len(noise.tails))) % _FOLDS
+def folds(noise: NoiseModel, columns: Array) -> Wholes:
+    """Number the fold in which each row is held out, with its tail where there are enough and others teach the rest."""
+    rows = np.arange(len(noise.tails))
+    return folds_of(rows, noise.tails if noise.tails.max() >= 3 else None, columns, rows)[0]

@@ -14,9 +14,10 @@ from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.evidence.chance import Chance
 from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
+from mlg_troubleshoot.diagnosis.evidence.held_out import held_out_part
 from mlg_troubleshoot.diagnosis.evidence.screen import Screen, fit
 from mlg_troubleshoot.diagnosis.evidence.verdict import NAME, Verdict
-from mlg_troubleshoot.diagnosis.inference import Finding, Inference, left_out
+from mlg_troubleshoot.diagnosis.inference import Finding, Inference, folds
 from mlg_troubleshoot.diagnosis.noise import Rows, build_noise
 
 # Thresholds: set in 2026 on departures' fleets of other seeds than those that judge them; not re-tuned.
@@ -212,8 +213,9 @@ def _single(
     needed = NESTED if nested and block.cause.bounded else needed
     rejects = rejected < SCALE_REJECTED and lead >= SCALE_LEAD
     allowed = PAIR_WORSE if needed < BLOCK_LEAD or rejects else 1.0
+    fold = folds(noise, columns[:, [*plain.chosen, *chosen]])
     smaller, larger = (
-        float(np.mean(left_out(noise, columns[:, list(held)], with_it, whole.misfit) ** 2))
+        float(np.mean((whole.misfit - held_out_part(noise, columns[:, list(held)], whole.misfit, fold, with_it)) ** 2))
         for held, with_it in ((plain.chosen, None), (chosen, block))
     )
     worse = larger > allowed * smaller

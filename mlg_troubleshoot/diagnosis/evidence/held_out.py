@@ -41,6 +41,16 @@ def folds_of(row: Wholes, group: Wholes | None, columns: Array, shuffled: Wholes
     return shuffled[row] % min(_FOLDS, len(shuffled)), "row"
 
 
+def likelier(noise: NoiseModel, before: Array, after: Array, fold: Wholes) -> bool:
+    """Tell whether what is left of held-out rows is likelier after than before, what a fold has in common being noise.
+
+    Far readings decide no more than others: where noise is estimated they scatter more.
+    """
+    left, ratio = np.column_stack([before, after]), noise.tail_ratios[-1]
+    square = np.sum([noise.take(fold == k).square(left[fold == k], ratio) for k in np.unique(fold)], axis=0)
+    return bool(square[1] < square[0])
+
+
 def held_out_part(noise: NoiseModel, columns: Array, data: Array, fold: Wholes, known: Known | None = None) -> Array:
     """What a model explains of each row that was fitted to the rows of the other folds alone. [in]"""
     explained = np.zeros(len(data))

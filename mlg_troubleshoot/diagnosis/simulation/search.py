@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
 from mlg_troubleshoot.diagnosis.evidence.chance import Chance, smallest_rms
 from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
-from mlg_troubleshoot.diagnosis.evidence.held_out import folds_of
+from mlg_troubleshoot.diagnosis.evidence.held_out import folds_of, likelier
 from mlg_troubleshoot.diagnosis.evidence.one_by_one import one_by_one, settled
 from mlg_troubleshoot.diagnosis.evidence.screen import Screen
 from mlg_troubleshoot.diagnosis.evidence.verdict import ALARM, NAME, REMAINS, Verdict, verdict_of
@@ -324,9 +324,7 @@ class Point:
             held_out(columns, self.rest / self.scale, list(causes), self.study.nuisance, parts)
             for causes in (self.chosen, (*self.chosen, k))
         )
-        # Beyond two standard deviations linear, so that a few far readings do not decide.
-        loss = [float(np.sum(np.where(np.abs(z) < 2.0, z**2, 4.0 * np.abs(z) - 4.0))) for z in (before, after)]
-        return loss[1] < loss[0]
+        return likelier(NoiseModel.white(len(parts)), before, after, parts)
 
 
 class Study:
