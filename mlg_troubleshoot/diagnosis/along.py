@@ -14,7 +14,6 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.noise import robust_scale
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-from mlg_troubleshoot.diagnosis.wear import FLEET_WORN, gears_of, landings_of
 from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 
@@ -76,14 +75,3 @@ def unknown_along(model: LinkageModel, table: DiagnosisTable, clearance_in: Arra
     known = len(gears) >= _MANY_GEARS and np.isfinite(levels).all()
     apart = min(robust_scale(levels), RIGGED_IN) if known else RIGGED_IN
     return np.column_stack([along * turned, along * RIGGED_IN, apart * own])
-
-
-def wear_of_gears(table: DiagnosisTable, unread_in: Array) -> Array:
-    """Wear where no clearance was read, each joint's and all joints' together, also with landings: of the whole fleet,
-    and of each gear. [in]"""
-    landings = landings_of(table.quantities.get("gear_landings"), gears_of(table))[0]
-    together = unread_in.sum(axis=1)
-    each = np.column_stack([unread_in, together, together * landings / max(float(np.mean(landings)), 1e-9)])
-    own = table.gears[:, None] == np.unique(table.gears)
-    of_gears = (own[:, :, None] * each[:, None, :]).reshape(len(table), -1)
-    return np.hstack([FLEET_WORN * each, of_gears]) if own.shape[1] > 1 else of_gears

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.diagnosis.along import displaced, predicted, travel, unknown_along, wear_of_gears
+from mlg_troubleshoot.diagnosis.along import displaced, predicted, travel, unknown_along
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Scene
-from mlg_troubleshoot.diagnosis.noise import Rows, measured_uncertainty, small_trends
+from mlg_troubleshoot.diagnosis.evidence.screen import fit
+from mlg_troubleshoot.diagnosis.noise import Rows, build_noise, measured_uncertainty, small_trends
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-from mlg_troubleshoot.diagnosis.wear import likely_clearances
+from mlg_troubleshoot.diagnosis.wear import HEAVY_LEAD, UNREAD_IN, LikelyClearances, likely_clearances, wear_of_gears
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
@@ -24,9 +25,27 @@ def build_scene(model: LinkageModel, table: DiagnosisTable, where: Discrepancies
     """Predict every row with the plain model; what is known of the rows before their misfit is looked at.
 
     Readings of clearances are drawn to their expectation as far as the measured displacements say that they
-    scatter as declared: a gauge that reads better than declared is believed more.
+    scatter as declared: a gauge that reads better than declared is believed more. Where no wear was read at all,
+    moderate wear is supposed, or heavy wear where that is clearly likelier.
     """
-    worn = likely_clearances(table)
+    if np.nan_to_num(table.clearance_in).any():
+        return _scene(model, table, where, likely_clearances(table))
+    supposed = [_scene(model, table, where, likely_clearances(table, unread_in)) for unread_in in UNREAD_IN]
+    moderate, heavy = (_likelihood(*found) for found in supposed)
+    return supposed[heavy > moderate + HEAVY_LEAD]
+
+
+def _likelihood(scene: Scene, rows: Rows) -> float:
+    """Log-likelihood of rows in which nothing is wrong; none if a linkage does not close."""
+    misfit = scene.table.measured_in - scene.over_in
+    if not np.isfinite(misfit).all():
+        return -np.inf
+    return fit(build_noise(misfit, rows), np.empty((len(misfit), 0)), misfit).log_likelihood
+
+
+def _scene(
+    model: LinkageModel, table: DiagnosisTable, where: Discrepancies, worn: LikelyClearances
+) -> tuple[Scene, Rows]:
     likely = worn.likely_in
     as_read = np.where(np.isfinite(table.clearance_in), table.clearance_in, likely)
     read = predicted(model, table, as_read)[0]
@@ -44,7 +63,7 @@ def build_scene(model: LinkageModel, table: DiagnosisTable, where: Discrepancies
     )
     u_read = share * float(np.sqrt(np.nanmean(read_in**2)))
     along = unknown_along(model, table, clearance, scene.over_in, scene.directions)
-    if not np.isfinite(table.clearance_in).any():
+    if not np.nan_to_num(table.clearance_in).any():
         along, shared_in = np.hstack([along, wear_of_gears(table, slopes * worn.u_gear_in)]), np.zeros(len(table))
     return scene, Rows(
         scene.over_in,

@@ -39,12 +39,14 @@ _HEAVY_TAILS = 1.5
 # Wear of a joint that nobody read over the mean of the read ones: standard deviation between joints of the fleet,
 # between gears, and between inspections of one gear. Supposed, from the read joints of simulated fleets. [1]
 JOINTS_APART, GEARS_APART, ROWS_APART = 0.35, 0.5, 0.4
-# Radial wear of a joint of a fleet of which no clearance was read, supposed. [in]
-UNREAD_IN = 0.003
-# How much a joint of such a fleet may be worn in all its gears, over that: no gear is as new, so that otherwise what
-# does the same in all of them, as a rate or another linkage, is taken for what wear does. Of 20 sound simulated fleets
-# (seeds 9,000 to 9,019) ten alarmed without it, three at 1.5, one at this. [1]
-FLEET_WORN = 3.0
+# Mean radial wear of joints where none was read, moderate and heavy [in]; log-likelihood by which the heavy one must be
+# ahead to be supposed: another linkage makes it no more than half a unit likelier, fleets twice as worn by ten.
+UNREAD_IN, HEAVY_LEAD = (0.003, 0.006), 3.0
+# How far all joints of such a fleet, and of one of its gears, may be worn more or less together, over that. Of 100
+# sound simulated fleets (seeds 20,000 and on) two alarmed, seven where wear was half as much again. [1]
+FLEET_TOGETHER, GEARS_TOGETHER = 0.5, 0.25
+# Share of the largest variance below which one is but rounding. [1]
+_NEGLIGIBLE = 1e-9
 # How much of what a gear's read joints are worn beyond the fleet's is to be expected of the others: the variance
 # between gears over that plus a fourth of the variance between the joints of a gear, of the same fleets. [1]
 OWN_GEAR = 0.5
@@ -72,7 +74,7 @@ class LikelyClearances:
 
     likely_in, shape (n, n_joints): most likely radial clearances. [in]
     u_row_in, u_gear_in, u_fleet_in, shape (n, n_joints): standard uncertainty of what was not read: of each row, common
-        to a gear's rows, common to all rows. [in]
+        to a gear's rows, common to all rows; where no wear was read, that of the gear is all that is supposed. [in]
     u_read_in, shape (n, n_joints): standard uncertainty of what was read. [in]
     """
 
@@ -83,7 +85,7 @@ class LikelyClearances:
     u_read_in: Array
 
 
-def likely_clearances(table: DiagnosisTable) -> LikelyClearances:
+def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) -> LikelyClearances:
     """Estimate the clearances behind the readings, and those that were not read.
 
     A gear's joint wears along its own history (`wear`). A reading is drawn towards what that makes expect as far as
@@ -91,13 +93,12 @@ def likely_clearances(table: DiagnosisTable) -> LikelyClearances:
     the scatter of the readings alone looks like a cause, because a reading that is too large by chance
     predicts too much. A joint that nobody read is latent: it wears with landings as the read joints do on average,
     in part as those of its own gear, and how far it lies off that is unknown for the fleet, each gear and each row.
+    Where no wear was read at all, joints are supposed to be worn by `unread_in` [in] on average.
     """
     readings = table.clearance_in
     if not np.nan_to_num(readings).any():
-        none, unread = np.zeros_like(readings), np.where(np.isfinite(readings), 0.0, UNREAD_IN)
-        # The joints of a gear wear together between two inspections.
-        apart = ROWS_APART * np.sqrt(readings.shape[1]) * _read_again(table)[:, None]
-        return LikelyClearances(none, apart * unread, unread, none, none)
+        none, unread = np.zeros_like(readings), np.where(np.isfinite(readings), 0.0, unread_in)
+        return LikelyClearances(landed_share(table)[:, None] * unread, none, unread, none, none)
     history, kilo, landed = fleet_history(table)
     known, noise = np.isfinite(readings), history.reading_in2
     # What wear is to be expected of an inspection without its landings is not known: its readings stand.
@@ -122,17 +123,6 @@ def likely_clearances(table: DiagnosisTable) -> LikelyClearances:
     return LikelyClearances(np.maximum(likely, 0.0), spread, shared, common, left)
 
 
-def _read_again(table: DiagnosisTable) -> Mask:
-    """Rows of gears that were inspected at more than one date or number of landings."""
-    gears, found = gears_of(table), np.zeros(len(table), bool)
-    for name in {"gear_landings", "day"} & set(table.quantities):
-        values = table.quantities[name]
-        for gear in np.unique(gears):
-            own = (gears == gear) & np.isfinite(values)
-            found[gears == gear] |= len(np.unique(values[own])) > 1
-    return found
-
-
 def gears_of(table: DiagnosisTable) -> Places:
     """Number of the single gear of each row."""
     return np.unique(table.gears, return_inverse=True)[1]
@@ -147,6 +137,33 @@ def landings_of(landings: Array | None, gears: Places) -> tuple[Array, Mask]:
     total = np.bincount(gears[known], landings[known], minlength=gears.max() + 1)
     mean = np.where(count > 0, total / np.maximum(count, 1), np.mean(landings[known]))
     return np.where(known, landings, mean[gears]) / 1000.0, known
+
+
+def landed_share(table: DiagnosisTable) -> Array:
+    """Landings of each row over their mean, 1 where none are known. [1]"""
+    landings = landings_of(table.quantities.get("gear_landings"), gears_of(table))[0]
+    return landings / np.mean(landings) if landings.any() else np.ones(len(table))
+
+
+def wear_of_gears(table: DiagnosisTable, unread_in: Array) -> Array:
+    """What wear may add or lack where none was read, each column at one standard deviation: (n, k). [in]
+
+    The joints of the fleet, of each gear, and at each inspection of it lie off what is supposed, on their own and
+    together. The rows of one inspection, at one number of landings or on one day, share their wear.
+    """
+    gears, worn = gears_of(table), landed_share(table)
+    own = gears[:, None] == gears
+    visit = own.copy()
+    for name in {"gear_landings", "day"} & set(table.quantities):
+        values = np.nan_to_num(table.quantities[name], nan=-1.0)
+        visit &= values[:, None] == values
+    each, all_in = unread_in @ unread_in.T, unread_in.sum(axis=1)
+    together, grown = np.outer(all_in, all_in), np.outer(worn, worn)
+    covariance = (1.0 + grown) * (FLEET_TOGETHER**2 * together + JOINTS_APART**2 * each)
+    covariance += own * grown * (GEARS_TOGETHER**2 * together + GEARS_APART**2 * each)
+    values, vectors = np.linalg.eigh(covariance + visit * grown * ROWS_APART**2 * each)
+    kept = values > _NEGLIGIBLE * values[-1]
+    return np.asarray(vectors[:, kept] * np.sqrt(values[kept]))
 
 
 def fleet_history(table: DiagnosisTable) -> tuple[WearHistory, Array, Mask]:

@@ -14,6 +14,7 @@ from mlg_troubleshoot.diagnosis import Diagnosis, diagnose, table_from_inspectio
 from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.causes.linkage import CalibrationRate
 from mlg_troubleshoot.diagnosis.scene import build_scene, effect
+from mlg_troubleshoot.diagnosis.wear import wear_of_gears
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention
@@ -24,10 +25,11 @@ from .conftest import only
 NOISE_IN = 0.001
 
 
-def rig(gear: Gear, rows: int = 16, clearance_in: float | None = 0.003) -> list[Inspection]:
+def rig(gear: Gear, rows: int = 16, clearance_in: float | NDArray[np.float64] | None = 0.003) -> list[Inspection]:
     """One sound gear, a dial on its plunger, read from Down Lock to mid-position."""
     extension = np.linspace(0.05, gear.reference.stroke[1], rows)
-    joints = {} if clearance_in is None else dict.fromkeys(gear.joint_numbers, clearance_in)
+    worn = [] if clearance_in is None else np.broadcast_to(clearance_in, len(gear.joint_numbers)).tolist()
+    joints = dict(zip(gear.joint_numbers, worn, strict=False))
     table = table_from_inspections([_row(k, float(s), 0.0, joints) for k, s in enumerate(extension)], gear, along=True)
     moved = predicted(gear.model, table, np.nan_to_num(table.clearance_in))[0]
     position = gear.model.plunger(extension) + moved + np.random.default_rng(1).normal(0.0, NOISE_IN, rows)
@@ -150,3 +152,26 @@ def test_a_position_without_its_extension_is_said_to_be_of_no_use(gear: Gear, tm
     )
     (row,) = read_many([file], ReadOptions.of(gear, DiagnoseOptions())).inspections
     assert "plunger_position_in is not used: the row has no actuator_extension_in" in row.warnings
+
+
+@pytest.mark.parametrize(("worn_in", "supposed_in"), [(0.003, 0.003), (0.012, 0.006)])
+def test_heavy_wear_is_supposed_of_a_fleet_without_clearances_where_it_is_clearly_likelier(
+    gear: Gear, worn_in: float, supposed_in: float
+) -> None:
+    rng = np.random.default_rng(3)
+    rows = []
+    for number in range(8):
+        worn = worn_in * rng.lognormal(0.0, 0.4, len(gear.joint_numbers))
+        rows += [
+            replace(row, record_id=f"{number}-{row.record_id}", tail_no=f"N{number}") for row in rig(gear, 16, worn)
+        ]
+    unread = [replace(row, clearance_in={}) for row in rows]
+    scene = build_scene(gear.model, table_from_inspections(unread, gear, along=True), gear.discrepancies)[0]
+    assert scene.clearance_in == pytest.approx(supposed_in)
+
+
+def test_readings_of_one_day_share_the_wear_that_nobody_read(gear: Gear) -> None:
+    table = table_from_inspections(rig(gear)[:3], gear, along=True)
+    dated = replace(table, quantities={**table.quantities, "day": np.array([0.0, 0.0, 9.0])})
+    wear = wear_of_gears(dated, np.full((3, 10), 0.001))
+    assert [np.allclose(wear[0], wear[1]), np.allclose(wear[0], wear[2])] == [True, False]

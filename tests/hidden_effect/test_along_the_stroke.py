@@ -2,7 +2,8 @@
 
 What was hidden is compared after the diagnosis, which reads the CSV file that the simulator wrote. The seeds of what
 one position cannot tell apart are those of eight at which it could not, those of a fleet without clearances once failed
-(one was AMBIGUOUS, one has a far reading that no slip explains); the others are the first ones tried.
+(one was AMBIGUOUS, one has a far reading that no slip explains, in one something was named, in one the rate was not);
+the others are the first ones tried.
 """
 
 from __future__ import annotations
@@ -99,9 +100,13 @@ def test_nothing_is_found_on_a_worn_rig_of_which_no_clearance_was_read() -> None
     assert found("RIG", 1, CLEARANCES).verdict == "NONE"
 
 
-@pytest.mark.parametrize("seed", [9000, 9001])
+@pytest.mark.parametrize("seed", [9000, 9001, 20011])
 def test_nothing_is_found_in_a_sound_fleet_of_which_no_clearance_was_read(seed: int) -> None:
     assert found("SOUND", seed, CLEARANCES).verdict == "NONE"
+
+
+def test_the_rate_is_found_in_a_fleet_of_which_no_clearance_was_read() -> None:
+    assert named(found("RATE", 20005, CLEARANCES)) == [("calibration_rate",)]
 
 
 def test_a_fleet_without_clearances_says_that_its_wear_is_supposed() -> None:
