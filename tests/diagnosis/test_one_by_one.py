@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
+import pytest
 
+from mlg_troubleshoot.diagnosis import inference
 from mlg_troubleshoot.diagnosis.bank import build_bank
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE
 from mlg_troubleshoot.diagnosis.evidence.one_by_one import one_by_one
@@ -69,3 +73,37 @@ def test_of_a_gears_causes_the_one_that_does_nothing_is_left_out(gear: Gear) -> 
     fewer = _Together(whole, (0, 1, 2), (0.0, 0.0, 0.0), SECOND_SHARE).without_idle()
     assert fewer is not None
     assert [candidates[k].cause.name for k in (0, 1, 2) if k not in fewer.chosen] == ["thermal_growth"]
+
+
+def sure(
+    monkeypatch: pytest.MonkeyPatch,
+    beside: dict[int, tuple[int, list[int]]] | None = None,
+    chances: tuple[float, float] = (1e-6, 1e-6),
+) -> tuple[int, ...]:
+    """What is sure of the causes 0 and 1, of which 2 could stand in the place of 1; `beside` says what explains most in
+    the place of 0 beside each of them, and its rivals."""
+    told = beside or {1: (0, []), 2: (0, [])}
+    whole = SimpleNamespace(
+        candidates=[SimpleNamespace(key=k) for k in range(4)],
+        rivals=lambda _k, others, **_: (*told[others[0]], {}),
+    )
+    monkeypatch.setattr(inference, "_Together", lambda *_: SimpleNamespace(chances=lambda: chances))
+    return inference.Inference._sure(cast(Any, whole), (0, 1), ([], [2]))
+
+
+def test_a_cause_without_rivals_is_sure_whatever_stands_beside_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert sure(monkeypatch) == (0,)
+
+
+def test_a_cause_that_has_a_rival_beside_another_of_the_set_is_not_sure(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert sure(monkeypatch, {1: (0, []), 2: (0, [3])}) == ()
+
+
+def test_a_cause_that_another_beats_beside_another_of_the_set_is_not_sure(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert sure(monkeypatch, {1: (0, []), 2: (3, [])}) == ()
+
+
+def test_a_cause_that_stands_out_beside_the_others_no_more_than_by_chance_is_not_sure(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert sure(monkeypatch, chances=(0.01, 1e-6)) == ()
