@@ -34,6 +34,8 @@ SPREADS_DEG = (25.0, 45.0, 70.0, 180.0)
 LINKAGES = ((1.0, 0.0), (0.5, 0.0), (1.0, 0.5))
 # What a true linkage may differ beside the ensemble's spread, each joint on its own: an eighth of the largest. [1]
 ALONE = 0.03
+# And beside the way from the drawn one to a member of the ensemble. [1]
+NEAR = 0.01
 # With more joints there are too many ways to have some of them near the worst direction and the others far from it.
 _MOST_SKEWED = 12
 # Degree of the polynomials in the extension that stand for the curves of linkages between those of the ensemble.
@@ -206,16 +208,18 @@ class OtherGeometry(JointFactors):
         if not found:
             return []
         apart = _apart(scene.model, ensemble)
-        bent = [
+        bends = [
             predicted(other, scene.table, scene.clearance_in)[0] - scene.over_in - scene.contribution_in @ own
             for other, own in zip(ensemble, apart, strict=True)
         ]
         # A linkage that does not close with clearances that were read is not the one that they were read in.
-        bent = [bend for bend in bent if np.isfinite(bend).all()]
+        closes = [bool(np.isfinite(bend).all()) for bend in bends]
+        bent = [bend for bend, fits in zip(bends, closes, strict=True) if fits]
+        apart = apart[closes][:, [scene.joints.index(joint) for joint in found[0].joints]]
         curves = _curves(scene, ensemble)
         columns = np.column_stack([found[0].columns, *bent, curves])
         even = block_diag(np.eye(len(bent)) / max(len(bent), 1), np.eye(curves.shape[1]))
-        return [
+        between = [
             replace(
                 block,
                 columns=columns,
@@ -224,6 +228,17 @@ class OtherGeometry(JointFactors):
             )
             for block, (share, alike) in zip(found, LINKAGES, strict=True)
         ]
+        alone = np.diag([NEAR**2] * len(found[0].joints) + [1e-9])
+        members = [
+            replace(
+                found[0],
+                columns=np.column_stack([found[0].columns, bend]),
+                covariance=np.outer([*own, 1.0], [*own, 1.0]) + alone,
+                penalty=float(np.log(len(bent))),
+            )
+            for bend, own in zip(bent, apart, strict=True)
+        ]
+        return [*between, *members]
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Let each clearance count by its factor."""
