@@ -50,6 +50,9 @@ _CLEARLY_LESS, _SLIP = 0.7, 4.0
 # Above this ratio readings against the prediction are no slip of the sign, which gives -0.9 to -1.1 (20 simulated
 # tables with one cause or none), nor of a unit: that the clearances tell of them beyond chance is enough. [1]
 _SIGN_SLIP, _BY_CHANCE = -0.75, 0.05
+# And where one scale leaves more than this of the variance, which a slip of the unit does not (of 60 tables with one
+# cause, S = 10 and 25, at most 0.25 in 57): that they tell beyond this chance.
+_NO_SCALE, _SURELY = 0.3, 0.001
 
 
 @dataclass(frozen=True)
@@ -409,7 +412,9 @@ def _explained_by_clearances(
     unexplained, constant = np.mean(left[near] ** 2), np.var(measured)
     if no_sign_slip:
         return bool(len(measured) * np.log(constant / unexplained) > chi2.isf(_BY_CHANCE, contribution_in.shape[1]))
-    return bool(unexplained < _CLEARLY_LESS * min(np.mean(one**2, axis=0).min(), constant))
+    alone = min(np.mean(one**2, axis=0).min(), constant)
+    surely = len(measured) * np.log(alone / unexplained) > chi2.isf(_SURELY, contribution_in.shape[1])
+    return bool(unexplained < _CLEARLY_LESS * alone or (surely and alone > _NO_SCALE * constant))
 
 
 def _unsaid(table: DiagnosisTable) -> tuple[str, ...]:

@@ -241,6 +241,19 @@ def test_readings_against_the_prediction_that_no_clearance_tells_of_are_refused(
         diagnose(gear.model, unrelated, gear.discrepancies, ensemble=gear.ensemble_models[1:], permutations=99)
 
 
+def test_small_readings_that_the_clearances_explain_are_directions_and_no_wrong_unit(gear: Gear) -> None:
+    factors = np.array([0.1, 0.4, 0.0, 0.3, 0.0, -1.0, 0.9, 0.5, -1.0, -0.5])
+    table = fleet(gear.model, lambda t, over: loads(t, over, factors), rows=200, noise_in=0.003)
+    d = diagnose(gear.model, table, gear.discrepancies, ensemble=gear.ensemble_models[1:], permutations=99)
+    assert [c.candidate.cause.name for c in d.causes] == ["load_directions"]
+
+
+def test_readings_in_another_unit_are_refused(gear: Gear) -> None:
+    table = fleet(gear.model, lambda _t, over: (1.0 / 25.4 - 1.0) * over, rows=200, noise_in=0.0001)
+    with pytest.raises(InconclusiveDataError, match="unit"):
+        diagnose(gear.model, table, gear.discrepancies, ensemble=gear.ensemble_models[1:], permutations=99)
+
+
 def test_a_table_of_the_other_sign_is_still_refused(gear: Gear) -> None:
     turned = fleet(gear.model, lambda _t, over: -2.0 * over)
     with pytest.raises(InconclusiveDataError, match="times the predicted"):
