@@ -102,7 +102,7 @@ def infer(  # noqa: PLR0913 - all that a search for causes looks at
     single = fit(noise, columns[:, list(plain.chosen)], whole.misfit).log_likelihood
     single -= float(np.sum(whole.prior[list(plain.chosen)]))
     lead = _marginal(noise, held, block, whole.misfit) - float(np.sum(whole.prior[list(chosen)])) - single
-    smaller = _single(whole, plain, found, chosen, noise, block, lead, blocks)
+    smaller = _single(whole, plain, found, chosen, noise, block, lead)
     pair = len(plain.chosen) - len(beside) > 1
     if not chosen and (smaller is None or smaller.rival is not None or pair):
         joint = _beside_linkage(whole, plain, noise, blocks, single, aside)
@@ -194,7 +194,6 @@ def _single(
     noise: NoiseModel,
     block: Block,
     lead: float,
-    blocks: Sequence[Block],
 ) -> Finding | None:
     """The finding without factors of all joints, where the data do not reject it for them; ambiguous where they may."""
     if plain.verdict in {Verdict.NONE, Verdict.UNLISTED}:
@@ -230,7 +229,8 @@ def _single(
         rival = min(rival, HIDDEN_RIVAL if block.parts is None else SKEWED_RIVAL)
     rival = NESTED if nested else rival
     near = lead > rival or rejected < SCALE_DOUBTED
-    near |= one_scale and any(other.uncalibrated for other in blocks)
+    values = () if plain.fit is None else plain.fit.values
+    near |= any(causes[k].one_scale and abs(value) > MOST_RATE for k, value in zip(plain.chosen, values, strict=True))
     if not near:
         return plain
     # Beside factors of all joints only what is about no joint is sure, and only if it stands beside them, too.

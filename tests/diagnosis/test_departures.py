@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -12,7 +13,7 @@ import pytest
 
 from mlg_troubleshoot import load_gear
 from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension, diagnose, load_extension, write_extension
-from mlg_troubleshoot.diagnosis.causes.together import OtherGeometry
+from mlg_troubleshoot.diagnosis.causes.together import LoadDirections, OtherGeometry
 from mlg_troubleshoot.diagnosis.scene import build_scene
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.errors import InconclusiveDataError
@@ -115,7 +116,7 @@ FLEETS: dict[str, Callable[[Gear], DiagnosisTable]] = {
     ),
     "one pin turned": lambda gear: fleet(gear.model, lambda t, over: loads(t, over, ONE_TURNED), rows=200),
     "loads and a slight bend": lambda gear: fleet(gear.model, loads_and_a_bend, rows=200),
-    "readings 1.05 times as large": lambda gear: fleet(gear.model, lambda _t, over: 0.05 * over, rows=200),
+    "readings 1.1 times as large": lambda gear: fleet(gear.model, lambda _t, over: 0.1 * over, rows=200),
     "convention": lambda gear: one_technician_twice(fleet(gear.model, rows=200)),
     "unread": lambda gear: unread(worn_with_landings(gear)),
     "worn unread": worn_where_nobody_reads,
@@ -188,7 +189,7 @@ def test_a_bend_small_beside_what_the_directions_explain_does_not_refute_them() 
 
 
 def test_one_scale_that_the_data_do_not_reject_is_named_before_factors_of_all_joints() -> None:
-    assert named("readings 1.05 times as large") == {("calibration_rate", None)}
+    assert named("readings 1.1 times as large") == {("calibration_rate", None)}
 
 
 def test_a_scale_and_one_direction_are_named_as_directions_of_all_joints_that_rows_cannot_tell_from_them() -> None:
@@ -250,7 +251,7 @@ def test_small_readings_that_the_clearances_explain_are_directions_and_no_wrong_
 
 def test_readings_in_another_unit_are_refused(gear: Gear) -> None:
     table = fleet(gear.model, lambda _t, over: (1.0 / 25.4 - 1.0) * over, rows=200, noise_in=0.0001)
-    with pytest.raises(InconclusiveDataError, match="unit"):
+    with pytest.raises(InconclusiveDataError, match="times the predicted"):
         diagnose(gear.model, table, gear.discrepancies, ensemble=gear.ensemble_models[1:], permutations=99)
 
 
@@ -268,8 +269,26 @@ def test_a_linkage_that_does_not_close_with_what_was_read_is_not_the_gear_s(gear
     closing = [bool(np.isfinite(worst_of_sense(other, scene.clearance_in)[0]).all()) for other in others]
     blocks = OtherGeometry().blocks(scene, others)
     assert 0 < sum(closing) < len(others)
-    assert {b.columns.shape[1] for b in blocks} == {10 + sum(closing)}
+    counts = Counter(b.columns.shape[1] for b in blocks)
+    assert counts == {10 + sum(closing): len(blocks) - sum(closing), 11: sum(closing)}
     assert all(np.isfinite(b.effects_in).all() for b in blocks)
+
+
+def test_a_member_of_the_ensemble_is_a_linkage_of_its_own(gear: Gear) -> None:
+    scene = build_scene(gear.model, fleet(gear.model), gear.discrepancies)[0]
+    (other,) = gear.ensemble_models[1:2]
+    *_between, member = OtherGeometry().blocks(scene, [other])
+    moved = worst_case(other, scene.clearance_in).over_in - scene.over_in
+    effects = member.effects_in
+    share = np.linalg.lstsq(effects, moved, rcond=None)[0]
+    assert effects @ share == pytest.approx(moved, abs=1e-9)
+    assert np.linalg.norm(share) == pytest.approx(1.0, rel=1e-2)
+
+
+def test_what_the_joints_add_is_together_the_displacement(gear: Gear) -> None:
+    scene = build_scene(gear.model, fleet(gear.model), gear.discrepancies)[0]
+    for block in (*LoadDirections().blocks(scene, ()), *OtherGeometry().blocks(scene, gear.ensemble_models[1:])):
+        assert block.columns[:, :10].sum(axis=1) == pytest.approx(scene.over_in)
 
 
 def test_a_technician_who_writes_the_other_convention_is_named() -> None:

@@ -140,7 +140,11 @@ class JointFactors(Cause):
         joints = tuple(scene.joints[j] for j in used)
         found = self.covariances(scene.model, ensemble)
         penalty = float(np.log(max(len(found), 1)))
-        return [Block(self, joints, scene.contribution_in[:, used], k[np.ix_(used, used)], penalty) for k in found]
+        # What each adds is taken so that together they are the displacement: with all at nothing nothing moves.
+        total, at_mid = np.sum(scene.contribution_in, axis=1), ~scene.table.along
+        whole = np.divide(scene.over_in, total, out=np.ones_like(total), where=at_mid & (total > 0.0))
+        columns = scene.contribution_in[:, used] * whole[:, None]
+        return [Block(self, joints, columns, k[np.ix_(used, used)], penalty) for k in found]
 
     def factors(self, joints: Sequence[int], candidate: Candidate, value: float) -> Array:
         """Factor of each joint, shape (n_joints,). [1]"""
@@ -207,15 +211,15 @@ class OtherGeometry(JointFactors):
         found = super().blocks(scene, ensemble)
         if not found:
             return []
-        apart = _apart(scene.model, ensemble)
+        apart = _apart(scene.model, ensemble)[:, [scene.joints.index(joint) for joint in found[0].joints]]
         bends = [
-            predicted(other, scene.table, scene.clearance_in)[0] - scene.over_in - scene.contribution_in @ own
+            predicted(other, scene.table, scene.clearance_in)[0] - scene.over_in - found[0].columns @ own
             for other, own in zip(ensemble, apart, strict=True)
         ]
         # A linkage that does not close with clearances that were read is not the one that they were read in.
         closes = [bool(np.isfinite(bend).all()) for bend in bends]
         bent = [bend for bend, fits in zip(bends, closes, strict=True) if fits]
-        apart = apart[closes][:, [scene.joints.index(joint) for joint in found[0].joints]]
+        apart = apart[closes]
         curves = _curves(scene, ensemble)
         columns = np.column_stack([found[0].columns, *bent, curves])
         even = block_diag(np.eye(len(bent)) / max(len(bent), 1), np.eye(curves.shape[1]))
