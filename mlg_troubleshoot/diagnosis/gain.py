@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Places
+from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
 from mlg_troubleshoot.diagnosis.evidence.held_out import folds_of, held_out_part
@@ -40,6 +40,12 @@ class Gain:
     held_out_by: str
 
 
+def folds(noise: NoiseModel, columns: Array, shuffled: Wholes) -> tuple[Wholes, str]:
+    """Number the fold in which each row is held out, with its tail where there are enough and others teach the rest."""
+    group = noise.tails if noise.tails.max() + 1 >= LEAST_TAILS else None
+    return folds_of(np.arange(len(shuffled)), group, columns, shuffled)
+
+
 def measure_gain(
     noise: NoiseModel,
     columns: Array,
@@ -50,12 +56,12 @@ def measure_gain(
     block: Block | None = None,
 ) -> Gain:
     """Cross-validate an extension; rows of one tail are never on both sides, unless the others cannot teach it."""
-    tails = np.unique(table.tails, return_inverse=True)[1]
-    group = tails if tails.max() + 1 >= LEAST_TAILS else None
-    fold, held_out_by = folds_of(np.arange(len(misfit)), group, columns, rng.permutation(len(misfit)))
+    fold, held_out_by = folds(noise, columns, rng.permutation(len(misfit)))
     expected = misfit - EXPECTED_SLOPE * predicted
-    correction = held_out_part(noise, columns, expected, fold, block)
+    known = None if block is None else (block.columns, block.covariance)
+    correction = held_out_part(noise, columns, expected, fold, known)
     before, after = misfit, misfit - correction
+    drawn = noise.tails if noise.tails.max() + 1 >= LEAST_TAILS else np.arange(len(misfit))
     measured = predicted + misfit
     outside = np.abs(measured) > table.margin_in
     said_before = np.abs(predicted) <= table.margin_in
@@ -63,7 +69,7 @@ def measure_gain(
     return Gain(
         rms_before_in=float(np.sqrt(np.mean(before**2))),
         rms_after_in=float(np.sqrt(np.mean(after**2))),
-        share_interval=_interval(before, after, np.arange(len(misfit)) if group is None else tails, rng),
+        share_interval=_interval(before, after, drawn, rng),
         false_within_before=int(np.sum(said_before & outside)),
         false_within_after=int(np.sum(said_after & outside)),
         false_outside_before=int(np.sum(~said_before & ~outside)),
@@ -73,11 +79,10 @@ def measure_gain(
     )
 
 
-def _interval(before: Array, after: Array, groups: Places, rng: np.random.Generator) -> tuple[float, float]:
+def _interval(before: Array, after: Array, groups: Wholes, rng: np.random.Generator) -> tuple[float, float]:
     """Bootstrap over tails of the share of mean square misfit removed."""
-    number = np.unique(groups, return_inverse=True)[1]
-    square_before = np.bincount(number, before**2)
-    square_after = np.bincount(number, after**2)
+    square_before = np.bincount(groups, before**2)
+    square_after = np.bincount(groups, after**2)
     drawn = rng.integers(0, len(square_before), size=(999, len(square_before)))
     share = 1.0 - square_after[drawn].sum(axis=1) / np.maximum(square_before[drawn].sum(axis=1), 1e-30)
     low, high = np.quantile(share, [0.025, 0.975])

@@ -17,7 +17,8 @@ from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
 from mlg_troubleshoot.diagnosis.evidence.held_out import held_out_part
 from mlg_troubleshoot.diagnosis.evidence.screen import Screen, fit
 from mlg_troubleshoot.diagnosis.evidence.verdict import NAME, Verdict
-from mlg_troubleshoot.diagnosis.inference import Finding, Inference, folds
+from mlg_troubleshoot.diagnosis.gain import folds
+from mlg_troubleshoot.diagnosis.inference import Finding, Inference
 from mlg_troubleshoot.diagnosis.noise import Rows, build_noise
 
 # Thresholds: set in 2026 on departures' fleets of other seeds than those that judge them; not re-tuned.
@@ -89,7 +90,7 @@ def infer(  # noqa: PLR0913 - all that a search for causes looks at
     p = _block_chance(whole, blocks) if not plain.p_values else plain.p_values[0]
     if plain.verdict in {Verdict.NONE, Verdict.UNLISTED} and p > NAME:
         return plain
-    block = _best(whole.misfit, rows, columns[:, beside], blocks, blocks)
+    block = _best(whole.misfit, rows, columns[:, beside], blocks)
     kept = [k for k, c in enumerate(candidates) if not c.cause.of_joints]
     found = whole.beside(block, kept, aside).run()
     chosen, rivals, sure = (tuple(kept[k] for k in places) for places in (found.chosen, found.rivals, found.sure))
@@ -168,7 +169,7 @@ def _beside_linkage(
         wide = noise.beside(block.effects_in)
         alone.append(_marginal(noise, none, block, misfit))
         if joints and not block.cause.bounded:
-            gain = Screen(wide, whole.columns[:, joints], whole.signs[joints]).run(misfit[:, None]).gain[:, 0]
+            gain = Screen(wide, whole.columns[:, joints], whole.signs[joints]).run(misfit[:, None])[0][:, 0]
             found.append((alone[-1] + float(np.max(gain - whole.prior[joints])), block))
     best, linkage = max(found, key=lambda pair: pair[0])
     if best - max(alone) < JOINT_LEAD or best - single < PAIR_RIVAL:
@@ -212,10 +213,10 @@ def _single(
     needed = NESTED if nested and block.cause.bounded else needed
     rejects = rejected < SCALE_REJECTED and lead >= SCALE_LEAD
     allowed = PAIR_WORSE if needed < BLOCK_LEAD or rejects else 1.0
-    fold = folds(noise, columns[:, [*plain.chosen, *chosen]])
+    fold, _by = folds(noise, columns[:, [*plain.chosen, *chosen]], np.arange(len(whole.misfit)))
     smaller, larger = (
         float(np.mean((whole.misfit - held_out_part(noise, columns[:, list(held)], whole.misfit, fold, with_it)) ** 2))
-        for held, with_it in ((plain.chosen, None), (chosen, block))
+        for held, with_it in ((plain.chosen, None), (chosen, (block.columns, block.covariance)))
     )
     worse = larger > allowed * smaller
     if not worse and (lead >= needed or rejects):
@@ -295,9 +296,9 @@ def _marginal(noise: NoiseModel, held: Array, block: Block, misfit: Array) -> fl
     return found.log_likelihood - block.penalty + block.skew(along, square)
 
 
-def _best(misfit: Array, rows: Rows, held: Array, blocks: Sequence[Block], every: Sequence[Block]) -> Block:
+def _best(misfit: Array, rows: Rows, held: Array, blocks: Sequence[Block]) -> Block:
     """The block of the largest marginal likelihood, judged under the noise that the widest one leaves."""
-    widest = max(every, key=lambda b: float(np.trace(b.covariance)))
+    widest = max(blocks, key=lambda b: float(np.trace(b.covariance)))
     noise = _judged(misfit, rows, held, widest)
     return max(blocks, key=lambda b: _marginal(noise, held, b, misfit))
 
@@ -308,6 +309,6 @@ def _block_chance(whole: Inference, blocks: Sequence[Block]) -> float:
     none = np.empty((len(whole.misfit), 0))
     bare = Screen(noise, none, np.empty(0))
     sets = np.column_stack([whole.misfit, whole.null(noise, bare, aside=True)])
-    gain = np.max([Screen(noise.beside(b.effects_in), none, np.empty(0)).run(sets).null for b in blocks], axis=0)
-    gain -= bare.run(sets).null
+    gain = np.max([Screen(noise.beside(b.effects_in), none, np.empty(0)).run(sets)[1] for b in blocks], axis=0)
+    gain -= bare.run(sets)[1]
     return Chance(gain[1:]).of(float(gain[0]))

@@ -57,7 +57,7 @@ def likelihood(columns: Array, data: Array) -> float:
 
 def test_the_gain_of_a_candidate_beside_a_fixed_one_is_that_of_least_squares() -> None:
     fixed, columns, data = RNG.standard_normal((N, 1)), RNG.standard_normal((N, 4)), RNG.standard_normal((N, 1))
-    gain = Screen(NOISE, columns, np.zeros(4), fixed).run(data).gain[:, 0]
+    gain = Screen(NOISE, columns, np.zeros(4), fixed).run(data)[0][:, 0]
     both = [likelihood(np.column_stack([fixed, column]), data[:, 0]) for column in columns.T]
     assert gain == pytest.approx(np.array(both) - likelihood(fixed, data[:, 0]), abs=1e-9)
 
@@ -66,13 +66,13 @@ def test_the_largest_gain_is_that_of_all_candidates_less_their_penalties() -> No
     columns, sets = RNG.standard_normal((N, 6)), RNG.standard_normal((N, 20))
     penalty = np.array([0.0, 1.5, 0.7, 1.5, np.inf, 0.0])
     screen = Screen(NOISE, columns, np.array([0, 1, -1, 0, 0, 1]))
-    assert screen.largest(sets, penalty) == pytest.approx(np.max(screen.run(sets).gain - penalty[:, None], axis=0))
+    assert screen.largest(sets, penalty) == pytest.approx(np.max(screen.run(sets)[0] - penalty[:, None], axis=0))
 
 
 @pytest.mark.parametrize(("sign", "explains"), [(0, True), (-1, True), (1, False)])
 def test_a_candidate_explains_nothing_with_a_sign_that_it_cannot_have(sign: int, explains: bool) -> None:
     column = RNG.standard_normal((N, 1))
-    gain = Screen(NOISE, column, np.array([sign])).run(-column + 0.1 * RNG.standard_normal((N, 1))).gain[0, 0]
+    gain = Screen(NOISE, column, np.array([sign])).run(-column + 0.1 * RNG.standard_normal((N, 1)))[0][0, 0]
     assert bool(gain > 1.0) is explains
 
 

@@ -118,7 +118,7 @@ def test_the_share_removed_has_an_interval_of_95_percent_over_tails() -> None:
     after = before * rng.uniform(0.2, 0.6, 400)
     share = np.sum(after**2) / np.sum(before**2)
     error = float(np.std(after**2 - share * before**2) / np.sqrt(400) / np.mean(before**2))
-    low, high = _interval(before, after, tails.astype(str), rng)
+    low, high = _interval(before, after, tails, rng)
     assert (low, high) == pytest.approx(norm.interval(0.95, 1.0 - share, error), abs=0.3 * error)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Wholes
@@ -15,28 +13,14 @@ _FOLDS = 10
 _LEARNED = 0.1
 
 
-class Known(Protocol):
-    """Effects of which the sizes are known beforehand: columns, shape (n, k), and the covariance of their sizes."""
-
-    @property
-    def columns(self) -> Array: ...
-
-    @property
-    def covariance(self) -> Array: ...
-
-
 def folds_of(row: Wholes, group: Wholes | None, columns: Array, shuffled: Wholes) -> tuple[Wholes, str]:
     """Number the fold in which each reading is held out: whole groups, or rows where a cause acts in one group only."""
     if group is not None and group.max() > 0:
-        numbers = (
-            np.argsort(np.argsort(shuffled[: group.max() + 1])) if group.max() >= _FOLDS else np.arange(group.max() + 1)
-        )
+        numbers = np.argsort(np.argsort(shuffled[: group.max() + 1]))
         part = np.asarray(numbers % _FOLDS)[group[row]]
         square = columns**2
-        learned = [
-            np.sum(square[part != k], axis=0) >= _LEARNED * np.sum(square, axis=0) for k in range(part.max() + 1)
-        ]
-        if np.all(learned):
+        least = _LEARNED * np.sum(square, axis=0)
+        if all(np.all(np.sum(square[part != k], axis=0) >= least) for k in range(part.max() + 1)):
             return part, "group"
     return shuffled[row] % min(_FOLDS, len(shuffled)), "row"
 
@@ -51,8 +35,13 @@ def likelier(noise: NoiseModel, before: Array, after: Array, fold: Wholes) -> bo
     return bool(square[1] < square[0])
 
 
-def held_out_part(noise: NoiseModel, columns: Array, data: Array, fold: Wholes, known: Known | None = None) -> Array:
-    """What a model explains of each row that was fitted to the rows of the other folds alone. [in]"""
+def held_out_part(
+    noise: NoiseModel, columns: Array, data: Array, fold: Wholes, known: tuple[Array, Array] | None = None
+) -> Array:
+    """What a model explains of each row that was fitted to the rows of the other folds alone. [in]
+
+    known: further effects, shape (n, k), and the covariance of their sizes that is known beforehand.
+    """
     explained = np.zeros(len(data))
     for k in np.unique(fold):
         train, test = fold != k, fold == k
@@ -61,8 +50,8 @@ def held_out_part(noise: NoiseModel, columns: Array, data: Array, fold: Wholes, 
         if not train.any():
             continue
         if known is not None:
-            values, _covariance = shrunk(part, held[train], known.columns[train], known.covariance, data[train])
-            explained[test] = np.hstack([held, known.columns])[test] @ values
+            values, _covariance = shrunk(part, held[train], known[0][train], known[1], data[train])
+            explained[test] = np.hstack([held, known[0]])[test] @ values
         elif used.any():
             explained[test] = held[test] @ fit(part, held[train], data[train]).values
     return explained

@@ -11,18 +11,6 @@ from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
 
 
-@dataclass(frozen=True)
-class Gain:
-    """Gain in log-likelihood of each candidate over the null, profiled over scale and tail scatter.
-
-    gain, shape (n_candidates, n_sets): gain in log-likelihood. [1]
-    null, shape (n_sets,): log-likelihood of the null. [1]
-    """
-
-    gain: Array
-    null: Array
-
-
 class Screen:
     """Candidates against data under one noise model; the products are computed once for all data sets.
 
@@ -82,14 +70,14 @@ class Screen:
         rest, along, square, _likelihood = next(self._levels(data))
         return self._drop(along, square), rest
 
-    def run(self, data: Array) -> Gain:
-        """Compute the gains for one or many data sets."""
+    def run(self, data: Array) -> tuple[Array, Array]:
+        """Gain in log-likelihood of candidates over the null, shape (n_candidates, n_sets), and the null's. [1]"""
         best = np.full((self.columns.shape[1], data.shape[1]), -np.inf)
         null = np.full(data.shape[1], -np.inf)
         for _rest, along, square, likelihood in self._levels(data):
             null = np.maximum(null, likelihood())
             best = np.maximum(best, likelihood(self._drop(along, square)))
-        return Gain(best - null, null)
+        return best - null, null
 
     def largest(self, data: Array, penalty: Array) -> Array:
         """Largest gain less its penalty over all candidates, for each of many data sets: what chance makes of it."""

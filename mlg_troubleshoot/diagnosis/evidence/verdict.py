@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from enum import StrEnum
 
+import numpy as np
+
 
 class Verdict(StrEnum):
     """What measured data say about a simulation."""
@@ -19,6 +21,11 @@ class Verdict(StrEnum):
 # and on five simulated rigs. A lower bar names more at S = 5 to 7 and names more wrongly; a higher one leaves more sets
 # undecided.
 ALARM, NAME, REMAINS = 0.012, 0.002, 0.002
+
+
+def refutes(p: float, size: float = np.inf, slip: float = 0.0) -> bool:
+    """Tell whether what is left refutes what is named: it is no noise, and larger than a cause's form may slip."""
+    return p <= REMAINS and size >= slip
 
 
 def verdict_of(p: float, rivals: bool, refuted: bool) -> Verdict:

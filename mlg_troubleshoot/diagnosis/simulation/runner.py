@@ -1,4 +1,4 @@
-"""A simulation that is called with parameters: its predictions, its sensitivities and its fit, all checked."""
+"""A simulation that is called with parameters: predictions, sensitivities, fit and what that leaves, all checked."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.diagnosis.simulation.result import Suspect
 from mlg_troubleshoot.errors import UsageError
 
@@ -21,6 +21,8 @@ _EVEN = 1e-3
 _ITERATIONS = 30
 # Expected fall of the sum of squares, in variances of a reading, below which parameters stand.
 _STANDS = 1e-3
+# Singular value, in units of the largest, below which rows say nothing about a combination of nuisance parameters.
+_KNOWN = 1e-5
 
 
 class Runner:
@@ -69,10 +71,8 @@ class Runner:
 
     def sensitivities(self, values: Array, base: Array, which: Sequence[int]) -> Array:
         """Change of the readings for a change of some parameters by their trials, shape (N, len(which))."""
-        columns = np.empty((len(self.row), len(which)))
-        for place, k in enumerate(which):
-            columns[:, place] = self._column(values, base, k)
-        return columns
+        none = np.empty((len(self.row), 0))
+        return np.column_stack([none, *(self._column(values, base, k) for k in which)])
 
     def _column(self, values: Array, base: Array, k: int) -> Array:
         for step in (_STEP, 1.0, 0.01):
@@ -147,3 +147,29 @@ def least_squares(columns: Array, data: Array) -> Array:
     size = np.where(size > 0.0, size, 1.0)
     found = np.linalg.lstsq(columns / size, data, rcond=1e-7)[0]
     return np.asarray((found.T / size).T)
+
+
+def held_out(columns: Array, rest: Array, causes: Sequence[int], nuisance: Sequence[int], part: Wholes) -> Array:
+    """Misfit of each reading, fitted on the other folds.
+
+    What only the held-out readings know of the nuisance parameters (the place of their own socket) is fitted there.
+    """
+    left = rest.copy()
+    chosen, free = columns[:, list(causes)], columns[:, list(nuisance)]
+    size = np.linalg.norm(free, axis=0)
+    free = free / np.where(size > 0.0, size, 1.0)
+    for k in np.unique(part):
+        test, train = part == k, part != k
+        if not train.any():
+            continue
+        known = unknown = free
+        if free.shape[1]:
+            values, across = np.linalg.eigh(free[train].T @ free[train])
+            told = values > _KNOWN**2 * max(float(values[-1]), 1e-300)
+            known, unknown = free @ across[:, told], free @ across[:, ~told]
+        both = np.hstack([chosen, known])
+        if both.shape[1]:
+            left[test] -= both[test] @ least_squares(both[train], rest[train])
+        if unknown.shape[1]:
+            left[test] -= unknown[test] @ least_squares(unknown[test], left[test])
+    return left

@@ -17,18 +17,13 @@ from mlg_troubleshoot.diagnosis.evidence.chance import Chance, smallest_rms
 from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
 from mlg_troubleshoot.diagnosis.evidence.held_out import folds_of, likelier
 from mlg_troubleshoot.diagnosis.evidence.one_by_one import one_by_one, settled
+from mlg_troubleshoot.diagnosis.evidence.rivals import near_and_behind
 from mlg_troubleshoot.diagnosis.evidence.screen import Screen
-from mlg_troubleshoot.diagnosis.evidence.verdict import ALARM, NAME, REMAINS, Verdict, verdict_of
+from mlg_troubleshoot.diagnosis.evidence.verdict import ALARM, NAME, Verdict, refutes, verdict_of
 from mlg_troubleshoot.diagnosis.simulation import scatter
-from mlg_troubleshoot.diagnosis.simulation.held_out import held_out
 from mlg_troubleshoot.diagnosis.simulation.inputs import checked
-from mlg_troubleshoot.diagnosis.simulation.result import (
-    HeldOutGain,
-    SimulationDiagnosis,
-    Suspect,
-    SuspectFound,
-)
-from mlg_troubleshoot.diagnosis.simulation.runner import Runner, least_squares
+from mlg_troubleshoot.diagnosis.simulation.result import HeldOutGain, SimulationDiagnosis, Suspect, SuspectFound
+from mlg_troubleshoot.diagnosis.simulation.runner import Runner, held_out, least_squares
 from mlg_troubleshoot.diagnosis.simulation.scatter import Whitener, basis_of, build_whitener
 
 # Thresholds: set in 2026 on five simulated rigs (tests/simulation/rigs.py; groups, far readings, gaps; other seeds than
@@ -75,8 +70,8 @@ class Design:
         return Design(kept, tuple(members for members in classes if members))
 
     def class_of(self, k: int) -> tuple[int, ...]:
-        """Class that a suspect is in."""
-        return next(members for members in self.classes if k in members)
+        """Class that a suspect is in; its own if it cannot be tested."""
+        return next((members for members in self.classes if k in members), (k,))
 
 
 def beside(columns: Array, fixed: Array, size: Array | None = None) -> tuple[Array, Mask]:
@@ -344,8 +339,7 @@ class Study:
         self.n, self.m = runner.shape
         self.nuisance = list(range(count, len(runner.names)))
         self.declared = None if declared is None else declared[runner.row, runner.output]
-        self.outputs = [np.flatnonzero(runner.output == k) for k in range(self.m)]
-        self.outputs = [index for index in self.outputs if len(index)]
+        self.outputs = [np.flatnonzero(runner.output == k) for k in np.unique(runner.output)]
         self.fold = rng.permutation(self.n)
         predicted = runner.nominal_prediction()
         everything = range(len(runner.names))
@@ -389,18 +383,17 @@ class Study:
         near = [int(j) for j in np.argsort(-score) if score[j] > 0.0 and j not in point.chosen]
         within = max(2.0 * RULED_OUT, 0.3 * score[k])
         near = [j for j in near if score[k] - score[j] < within and j not in self.design.class_of(k)][:_CONTENDERS]
-        if not near:
-            return []
-        cost = point.fit(point.chosen, point.values, by)[1]
-        found = []
-        for j in near:
+        gain = np.full(self.count, -np.inf)
+        for j in (k, *near) if near else ():
             values = point.values.copy()
-            values[k] = self.runner.nominal[k]
-            chosen = tuple(j if c == k else c for c in point.chosen)
-            behind = 0.5 * (point.fit(chosen, values, by)[1] - cost)
-            if behind < RULED_OUT:
-                found.append((behind, j))
-        return [j for _behind, j in sorted(found)]
+            values[k] = point.values[k] if j == k else self.runner.nominal[k]
+            gain[j] = -0.5 * point.fit(tuple(j if c == k else c for c in point.chosen), values, by)[1]
+        return self.near(gain, k, clear=True)
+
+    def near(self, gain: Array, k: int, clear: bool) -> list[int]:
+        """Suspects that are near one in log-likelihood, the nearest first; the first of each class."""
+        classes = [self.design.class_of(j) for j in range(self.count)]
+        return near_and_behind(gain, gain, classes, k, RULED_OUT, clear)[0]
 
 
 def diagnose_simulation(
@@ -475,11 +468,12 @@ def _report(study: Study, start: Point, point: Point, permutations: int, seed: i
     told = point.evidence(point.fixed)
     lead = int(np.argmax(told.surprise))
     p = 0.0 if causes else float(np.exp(-told.surprise[lead]))
-    verdict = verdict_of(p, bool(possible), remainder_p <= REMAINS)
+    # The simulation itself is fitted: no part of what is left is a slip of a suspect's form.
+    verdict = verdict_of(p, bool(possible), refutes(remainder_p))
     if verdict is Verdict.AMBIGUOUS and not causes:
         score = told.score[told.by[lead]]
-        near = [int(k) for k in np.argsort(-score) if score[k] > max(score[lead] - 2.0 * RULED_OUT, 0.0)]
-        possible = [_found(study, point, k) for k in near]
+        near = study.near(np.where(score > 0.0, 0.5 * score, -np.inf), lead, clear=False)
+        possible = [_found(study, point, k) for k in (lead, *near)]
     bar = told.chances[-1].bar(ALARM)
     spread = np.sqrt(point.metrics[-1].variance) * point.scale
     return SimulationDiagnosis(
