@@ -233,11 +233,13 @@ def repair(
 ) -> None:
     """Record joints that were restored: their wear starts again."""
     from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.store import Kind
     from mlg_troubleshoot.workflows import history as task
 
     known = load_gear(gear)
     _refuse_unknown(joints, known)
-    record = task.repair(_kept_in(store), (tail, side_of(side)), joints, _day(day), landings, work_order)
+    done = {"joints": sorted(set(joints)), "landings": landings}
+    record = task.work(_kept_in(store), Kind.REPAIR, (tail, side_of(side)), _day(day), work_order, **done)
     output.say(f"Kept: repair of {tail} {record.side}, {', '.join(f'#{j}' for j in record.body['joints'])}.")
 
 
@@ -245,9 +247,11 @@ def rerig(
     tail: Tail, side: Side, day: Day, landings: Landings = None, work_order: WorkOrder = None, store: Place = None
 ) -> None:
     """Record that the reversing valve was re-rigged; the wear of the joints goes on."""
+    from mlg_troubleshoot.store import Kind
     from mlg_troubleshoot.workflows import history as task
 
-    record = task.rerig(_kept_in(store), (tail, side_of(side)), _day(day), landings, work_order)
+    key = (tail, side_of(side))
+    record = task.work(_kept_in(store), Kind.RERIG, key, _day(day), work_order, landings=landings)
     output.say(f"Kept: re-rigging of {tail} {record.side}.")
 
 

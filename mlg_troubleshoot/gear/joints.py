@@ -3,31 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
 
 from mlg_troubleshoot.gear.sources import Sourced
 
 # 0.1905 mm is 0.0075000000000000006 in to a computer: no gauge reads a difference of 1e-9 in.
 ROUNDING_IN = 1e-9
-
-
-class Joint(IntEnum):
-    """The ten joints of the Hawker 800XP down-lock linkage, in the order of the mechanism (Fig. 7).
-
-    The paper's text names joints 2 to 5 (section 4.3); the other names follow from the order of the
-    mechanism in section 3.2 and the reconstructed topology.
-    """
-
-    ACTUATOR_ROD_END = 1
-    LOCKING_PIN = 2
-    SHORT_LINK_INNER = 3
-    LOCKING_LEVER_PIVOT = 4
-    SHORT_LINK_OUTER = 5
-    EXTENSION_LEVER_END = 6
-    BELLCRANK_INPUT = 7
-    BELLCRANK_PIVOT = 8
-    BELLCRANK_OUTPUT = 9
-    PLUNGER_PIN = 10
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ operation, so that the true value of the formulas lies inside.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -89,13 +89,12 @@ class Box:
         for i in range(count):
             slope = np.zeros((count, boxes))
             slope[i] = 1.0
-            at = middle[i]
-            found.append(
-                Range((self.low[i], self.high[i]), (slope, slope), (flat, flat), (at, at), (slope, slope), offsets)
-            )
+            at, own = (middle[i], middle[i]), (slope, slope)
+            found.append(Range((self.low[i], self.high[i]), own, (flat, flat), at, own, offsets))
         return found
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class Range:
     """Enclosures of a quantity and of its derivatives over boxes of the variables.
 
@@ -107,53 +106,38 @@ class Range:
     offsets, shape (n_variables, n_boxes): ranges of the variables about the middle. [in]
     """
 
-    __slots__ = ("at_middle", "bend", "offsets", "slope", "slope_at_middle", "value")
+    value: Pair
+    slope: Pair
+    bend: Pair
+    at_middle: Pair
+    slope_at_middle: Pair
+    offsets: Pair
 
-    def __init__(
-        self, value: Pair, slope: Pair, bend: Pair, at_middle: Pair, slope_at_middle: Pair, offsets: Pair
-    ) -> None:
-        self.value = value
-        self.slope = slope
-        self.bend = bend
-        self.at_middle = at_middle
-        self.slope_at_middle = slope_at_middle
-        self.offsets = offsets
-
-    def _each(self, function: Callable[[Pair], Pair]) -> Range:
-        value, slope, bend, middle, turned = (function(getattr(self, name)) for name in _ENCLOSED)
-        return Range(value, slope, bend, middle, turned, self.offsets)
+    def _each(self, function: Callable[..., Pair], *others: Range) -> Range:
+        parts = (self, *others)
+        return replace(self, **{name: function(*(getattr(part, name) for part in parts)) for name in _ENCLOSED})
 
     def _narrowed(self) -> Range:
-        self.slope = _common(self.slope, _plus(self.slope_at_middle, _along(self.bend, self.offsets)))
-        self.value = _common(self.value, _plus(self.at_middle, _along(self.slope, self.offsets)))
-        return self
+        slope = _common(self.slope, _plus(self.slope_at_middle, _along(self.bend, self.offsets)))
+        value = _common(self.value, _plus(self.at_middle, _along(slope, self.offsets)))
+        return replace(self, slope=slope, value=value)
 
-    def __add__(self, other: Any) -> Range:
+    def _plus(self, other: Any) -> Range:
         if isinstance(other, Range):
-            value, slope, bend, middle, turned = (
-                _plus(getattr(self, name), getattr(other, name)) for name in _ENCLOSED
-            )
-            return Range(value, slope, bend, middle, turned, self.offsets)._narrowed()
-        return Range(
-            _out(self.value[0] + other, self.value[1] + other),
-            self.slope,
-            self.bend,
-            _out(self.at_middle[0] + other, self.at_middle[1] + other),
-            self.slope_at_middle,
-            self.offsets,
-        )
+            return self._each(_plus, other)._narrowed()
+        number = (other, other)
+        return replace(self, value=_plus(self.value, number), at_middle=_plus(self.at_middle, number))
 
-    __radd__ = __add__
+    __add__ = __radd__ = _plus
 
     def __neg__(self) -> Range:
         return self._each(_negated)
 
     def __sub__(self, other: Any) -> Range:
-        return self.__add__(-other)
+        return self._plus(-other)
 
     def __rsub__(self, other: Any) -> Range:
-        turned: Range = -self
-        return turned.__add__(other)
+        return (-self)._plus(other)
 
     def __mul__(self, other: Any) -> Range:
         twice = other is self
@@ -223,24 +207,24 @@ def narrowed_by_links(joint: Joint, start: Joint, end: Joint, square: Any, area:
     a, b = tuple(_as_range(p, like) for p in start), tuple(_as_range(p, like) for p in end)
     grown = _as_range(square, like) * 0.5
     cross = _as_range(area, like).value
-    _first_guess(c, a, b, grown, cross)
+    c = _first_guess(c, a, b, grown, cross)
     for _ in range(_ROUNDS):
         u, v = (c[0] - a[0], c[1] - a[1]), (c[0] - b[0], c[1] - b[1])
         inverse = _inverse_or_nothing(_common(cross, (u[0] * v[1] - u[1] * v[0]).value))
         slopes = _implicit_slopes(u, v, inverse, a, b, grown)
-        for part, slope in zip(c, slopes, strict=True):
-            part.slope = _common(part.slope, slope)
+        c = tuple(replace(p, slope=_common(p.slope, slope)) for p, slope in zip(c, slopes, strict=True))
         turned = [[_minus(p.slope, q.slope) for p, q in zip(c, far, strict=True)] for far in (a, b)]
         bent = [_plus(_outer(x, x), _outer(y, y)) for x, y in turned]
         first = _minus(_plus(_dot(u, (a[0].bend, a[1].bend)), grown.bend), bent[0])
         second = _minus(_dot(v, (b[0].bend, b[1].bend)), bent[1])
-        for part, bend in zip(c, _solved(u, v, inverse, first, second), strict=True):
-            part.bend = _common(part.bend, bend)
-            part._narrowed()
+        bends = _solved(u, v, inverse, first, second)
+        c = tuple(replace(p, bend=_common(p.bend, bend))._narrowed() for p, bend in zip(c, bends, strict=True))
     return c[0], c[1]
 
 
-def _first_guess(c: tuple[Range, ...], a: tuple[Range, ...], b: tuple[Range, ...], grown: Range, cross: Pair) -> None:
+def _first_guess(
+    c: tuple[Range, ...], a: tuple[Range, ...], b: tuple[Range, ...], grown: Range, cross: Pair
+) -> tuple[Range, ...]:
     """Enclose the joint from its middle alone, where its formulas give next to nothing.
 
     A box around the middle is guessed. If the gradients over it carry the joint nowhere out of it, the joint
@@ -262,10 +246,12 @@ def _first_guess(c: tuple[Range, ...], a: tuple[Range, ...], b: tuple[Range, ...
         for part, slope, bound in zip(c, slopes, guess, strict=True):
             reached = _plus(part.at_middle, _along(slope, part.offsets))
             inside &= (reached[0] > bound[0]) & (reached[1] < bound[1])
-        for part, slope, bound in zip(c, slopes, guess, strict=True):
-            part.value = _common(part.value, _where(inside, bound))
-            part.slope = _common(part.slope, _where(inside, slope))
-            part._narrowed()
+        found = ((_where(inside, bound), _where(inside, slope)) for bound, slope in zip(guess, slopes, strict=True))
+        c = tuple(
+            replace(part, value=_common(part.value, value), slope=_common(part.slope, slope))._narrowed()
+            for part, (value, slope) in zip(c, found, strict=True)
+        )
+    return c
 
 
 def _where(known: Mask, bounds: Pair) -> Pair:

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.gear.joints import Joint
 from mlg_troubleshoot.records.columns import LENGTHS, NUMBERED, PER_JOINT, VERDICT_BEARING, Field, Kind
 from mlg_troubleshoot.units import UNIT_SPELLINGS, LengthUnit
 
@@ -290,9 +289,13 @@ def _name_words(name: str) -> frozenset[str]:
     return frozenset(_TOKEN.findall(name.casefold()))
 
 
-_REFERENCE_NAMES: tuple[tuple[int, str], ...] = tuple(
-    (int(joint), joint.name.replace("_", " ").lower() + " bearing joint") for joint in Joint
+# The ten joints of the Hawker 800XP in the order of the mechanism (Fig. 7). The paper's text names joints 2 to 5
+# (section 4.3); the other names follow from the order of the mechanism in section 3.2 and the reconstructed topology.
+_NAMES = (
+    "actuator rod end|locking pin|short link inner|locking lever pivot|short link outer|extension lever end|"
+    "bellcrank input|bellcrank pivot|bellcrank output|plunger pin"
 )
+_REFERENCE_NAMES = {number: f"{name} bearing joint" for number, name in enumerate(_NAMES.split("|"), 1)}
 
 
 def recognise(header: str, joint_numbers: tuple[int, ...], joint_names: Mapping[int, str]) -> Recognition:

@@ -87,11 +87,8 @@ def address(file_name: str) -> Markup:
 
 def css_string(text: str) -> Markup:
     """Write a text as a CSS string that can end neither itself nor the style element."""
-
-    def coded(match: re.Match[str]) -> str:
-        return f"\\{ord(match[0]):x} "
-
-    return Markup('"' + re.sub(r"[^0-9A-Za-z .,:·–…\u00a0-\U0010ffff]", coded, visible(text)) + '"')
+    coded = re.sub(r"[^0-9A-Za-z .,:·–…\u00a0-\U0010ffff]", lambda found: f"\\{ord(found[0]):x} ", visible(text))
+    return Markup(f'"{coded}"')
 
 
 @cache

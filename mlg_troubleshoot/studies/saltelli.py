@@ -138,6 +138,5 @@ def fast_indices(
     """Compute indices by polynomial chaos, or by sampling where the response is not smooth: there is then no fit."""
     found, fit = chaos_indices(response, n, rng, seed, accuracy, most=min(2048, most))
     if fit is None and not found.failed:
-        spent = found.note, found.evaluations
-        found = saltelli_indices(response, n, rng, seed, accuracy, most, None, progress, *spent)
+        found = saltelli_indices(response, n, rng, seed, accuracy, most, None, progress, found.note, found.evaluations)
     return found, fit

@@ -224,18 +224,13 @@ def next_joint(gear: Gear, measured: Mapping[int, float]) -> MeasuringAdvice:
 
 def before_and_after(judgements: Sequence[Judgement]) -> tuple[Assessment, Assessment] | None:
     """Return two inspections of one gear in the order of their dates: before and after a repair."""
-    if len(judgements) != 2:
+    judged = [j for j in judgements if isinstance(j, Assessment)]
+    gears = {(j.inspection.tail_no, j.inspection.side) for j in judged}
+    if not len(judgements) == len(judged) == 2 or len(gears) > 1:
         return None
-    first, second = judgements
-    if not (isinstance(first, Assessment) and isinstance(second, Assessment)):
-        return None
-    one, two = first.inspection, second.inspection
-    if (one.tail_no, one.side) != (two.tail_no, two.side):
-        return None
-    dates = (one.inspection_date, two.inspection_date)
-    if dates[0] is not None and dates[1] is not None and dates[1] < dates[0]:
-        return second, first
-    return first, second
+    first, second = judged
+    one, two = (j.inspection.inspection_date for j in judged)
+    return (second, first) if one is not None and two is not None and two < one else (first, second)
 
 
 def _judge(

@@ -269,19 +269,8 @@ def find(store: Store, record_id: str) -> Record:
     raise UsageError(f"{len(found)} records are called {record_id!r}: {named}", "Name one by the start of its hash.")
 
 
-def repair(
-    store: Store, key: GearKey, joints: Sequence[int], day: date, landings: float | None, work_order: str | None
-) -> Record:
-    """Record that joints were restored."""
-    return _work(store, Kind.REPAIR, key, day, work_order, joints=sorted(set(joints)), landings=landings)
-
-
-def rerig(store: Store, key: GearKey, day: date, landings: float | None, work_order: str | None) -> Record:
-    """Record that the reversing valve was re-rigged: the joints wear on, the plunger stands elsewhere."""
-    return _work(store, Kind.RERIG, key, day, work_order, landings=landings)
-
-
-def _work(store: Store, kind: Kind, key: GearKey, day: date, work_order: str | None, **done: Any) -> Record:
+def work(store: Store, kind: Kind, key: GearKey, day: date, work_order: str | None, **done: Any) -> Record:
+    """Record that joints were restored, or the reversing valve re-rigged: the joints wear on, the plunger moved."""
     life_of(store, *key)
     body = packed({**done, "work_order": work_order})
     return _added(store, Record(kind, work_order or "", *key, day.isoformat(), body))

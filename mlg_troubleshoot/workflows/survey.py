@@ -105,17 +105,13 @@ def survey_gear(
     else:
         suggestion = suggested(linkage, draws, unknown, readings)
     judged = tuple(
-        InspectedGear(name, float(d), _ends(each), float(np.mean(each <= known.margin.value)))
+        InspectedGear(name, float(d), (float(low), float(high)), float(np.mean(each <= known.margin.value)))
         for (name, _), d, each in zip(cases, own[0], moved.T, strict=True)
+        for low, high in [np.nanquantile(each, [0.05, 0.95])]
     )
     own_index = linkage.amplification(middle)[0]
     read = known, found, problems, before, interval, own_index
     return SurveyResult(*read, suggestion, judged, warnings, path, digest, seed)
-
-
-def _ends(values: Array) -> tuple[float, float]:
-    low, high = np.nanquantile(values, [0.05, 0.95])
-    return float(low), float(high)
 
 
 def _check_target(write: Path, gear: Gear) -> None:
