@@ -17,7 +17,7 @@ from mlg_troubleshoot.diagnosis.bank import build_bank
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
-from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
+from mlg_troubleshoot.diagnosis.causes.together import JointFactors
 from mlg_troubleshoot.diagnosis.evidence.screen import shrunk
 from mlg_troubleshoot.diagnosis.evidence.verdict import Verdict
 from mlg_troubleshoot.diagnosis.extension import Term
@@ -324,7 +324,7 @@ def _infer(
     candidates = [c for c, keep in zip(candidates, moving, strict=True) if keep]
     columns = columns[:, moving]
     blocks = [b for cause in testable if isinstance(cause, JointFactors) for b in cause.blocks(scene, ensemble)]
-    _comparable(table.measured_in, scene.over_in, ~table.along, blocks)
+    _comparable(table.measured_in, scene.over_in, scene.contribution_in, ~table.along)
     misfit = table.measured_in - scene.over_in
     bank = build_bank(scene, columns)
     finding = infer(misfit, rows, candidates, columns, bank, blocks, permutations, rng, progress)
@@ -367,9 +367,9 @@ def _single_slips(faults: tuple[DataFault, ...], read: int) -> None:
         )
 
 
-def _comparable(measured_in: Array, predicted_in: Array, at_mid: Mask, blocks: Sequence[Block]) -> None:
+def _comparable(measured_in: Array, predicted_in: Array, contribution_in: Array, at_mid: Mask) -> None:
     """Refuse measured displacements that cannot be what the prediction is of: sign, unit, or a gauge that is stuck."""
-    measured_in, predicted_in = measured_in[at_mid], predicted_in[at_mid]
+    measured_in, predicted_in, contribution_in = measured_in[at_mid], predicted_in[at_mid], contribution_in[at_mid]
     if not len(measured_in):
         return
     if np.ptp(measured_in) == 0.0:
@@ -381,8 +381,9 @@ def _comparable(measured_in: Array, predicted_in: Array, at_mid: Mask, blocks: S
     ratio = float(np.median(measured_in[large] / np.maximum(predicted_in[large], 1e-9)))
     if 1.0 / _MOST_RATIO < ratio < _MOST_RATIO or not np.any(predicted_in > 0.0):
         return
-    contribution_in = blocks[0].columns[at_mid] if blocks else np.empty(0)
-    if blocks and _explained_by_clearances(measured_in, predicted_in, contribution_in, _SIGN_SLIP < ratio < 0.0):
+    if contribution_in.any() and _explained_by_clearances(
+        measured_in, predicted_in, contribution_in, _SIGN_SLIP < ratio < 0.0
+    ):
         return
     check = "Check the unit and the convention of the clearances, and that the gauge moves with the plunger."
     if ratio <= -1.0 / _MOST_RATIO:
