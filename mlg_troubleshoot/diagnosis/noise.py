@@ -152,22 +152,25 @@ def build_noise(
     """Estimate the noise from the misfit; effects of unknown size, and of the curve, are no scatter but its doubt."""
     rest = misfit if explained is None else misfit - explained
     wide = rows.along_in if effects_in is None else np.hstack([rows.along_in, effects_in])
-    noise = _scatter(rest, rows)
-    if not wide.size:
-        return noise
-    for _ in range(_ROUNDS):
-        noise = _scatter(rest - noise.beside(wide).share_of(wide, rest), rows)
-    return noise.beside(wide)
+    noise, unread = _scatter(rest, rest, rows), np.empty((len(rest), 0))
+    if rows.unread_in.any():
+        unread = np.hstack([rows.unread_in, rows.u_shared_in[:, None] * (rows.gears[:, None] == np.unique(rows.gears))])
+    for _ in range(_ROUNDS if wide.size + unread.size else 0):
+        known = noise.beside(wide)
+        left = rest - known.share_of(wide, rest)
+        noise = _scatter(left, left - known.share_of(unread, rest), rows)
+    return noise.beside(wide) if wide.size else noise
 
 
-def _scatter(rest: Array, rows: Rows) -> NoiseModel:
+def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
+    """Noise of the rows; `alone` is what is left without what joints that nobody read most likely add to gears. [in]"""
     predicted = rows.predicted_in
     numbers = tail_numbers(rows.tails)
-    centred = rest.copy()
+    centred = alone.copy()
     for tail in range(numbers.max() + 1):
         own = numbers == tail
         if own.sum() > 2:
-            centred[own] -= np.median(rest[own])
+            centred[own] -= np.median(alone[own])
     least = max(LEAST_SCATTER * float(np.sqrt(np.mean(predicted**2))), 1e-9)
     scale = max(robust_scale(centred), least)
     relative = _growth(centred, predicted)
@@ -176,7 +179,7 @@ def _scatter(rest: Array, rows: Rows) -> NoiseModel:
     shared, own = _shared(rows.u_shared_in / scale, gears)
     relative = np.sqrt(relative**2 + (rows.u_filled_in / scale) ** 2 + own**2)
     # Rows far out in the tails of the distribution count less, but never as nothing.
-    standard = np.minimum(np.abs(centred), _companion(rest, numbers)) / (scale * relative)
+    standard = np.minimum(np.abs(centred), _companion(alone, numbers)) / (scale * relative)
     relative = relative * np.maximum(1.0, standard / 3.0)
     # Clearances cannot scatter more than the misfit does beyond the plunger gauge.
     room = np.sqrt(max(scale**2 - rows.u_measured_in**2, 0.0))

@@ -61,6 +61,7 @@ def _scene(
     filled_in, shared_in, read_in = (
         np.sqrt(np.sum((slopes * u) ** 2, axis=1)) for u in (worn.u_row_in, worn.u_gear_in, worn.u_read_in)
     )
+    fleet_in = slopes * worn.u_fleet_in
     u_read = share * float(np.sqrt(np.nanmean(read_in**2)))
     along = unknown_along(model, table, clearance, scene.over_in, scene.directions)
     if not np.nan_to_num(table.clearance_in).any():
@@ -71,7 +72,7 @@ def _scene(
         table.gears,
         filled_in,
         shared_in,
-        slopes * worn.u_fleet_in,
+        np.hstack([fleet_in, np.sum(fleet_in, axis=1, keepdims=True) * worn.together]),
         along,
         u_read,
         measured_uncertainty(table),

@@ -47,9 +47,10 @@ UNREAD_IN, HEAVY_LEAD = (0.003, 0.006), 3.0
 FLEET_TOGETHER, GEARS_TOGETHER = 0.5, 0.25
 # Share of the largest variance below which one is but rounding. [1]
 _NEGLIGIBLE = 1e-9
-# How much of what a gear's read joints are worn beyond the fleet's is to be expected of the others: the variance
-# between gears over that plus a fourth of the variance between the joints of a gear, of the same fleets. [1]
+# How much of what a gear's only read joint is worn beyond the fleet's is to be expected of the others, supposed. [1]
 OWN_GEAR = 0.5
+# Standard deviations of how much further that may follow one read joint than others, and of exponents of wear. [1]
+FOLLOWS, BENT = 0.2, 0.1
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,7 @@ class LikelyClearances:
     u_row_in, u_gear_in, u_fleet_in, shape (n, n_joints): standard uncertainty of what was not read: of each row, common
         to a gear's rows, common to all rows; where no wear was read, that of the gear is all that is supposed. [in]
     u_read_in, shape (n, n_joints): standard uncertainty of what was read. [in]
+    together, shape (n, k): further changes of u_fleet_in, of all joints that nobody read alike. [1]
     """
 
     likely_in: Array
@@ -83,6 +85,7 @@ class LikelyClearances:
     u_gear_in: Array
     u_fleet_in: Array
     u_read_in: Array
+    together: Array
 
 
 def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) -> LikelyClearances:
@@ -98,7 +101,7 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
     readings = table.clearance_in
     if not np.nan_to_num(readings).any():
         none, unread = np.zeros_like(readings), np.where(np.isfinite(readings), 0.0, unread_in)
-        return LikelyClearances(landed_share(table)[:, None] * unread, none, unread, none, none)
+        return LikelyClearances(landed_share(table)[:, None] * unread, none, unread, none, none, none[:, :0])
     history, kilo, landed = fleet_history(table)
     known, noise = np.isfinite(readings), history.reading_in2
     # What wear is to be expected of an inspection without its landings is not known: its readings stand.
@@ -112,15 +115,23 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
     spread = np.where(known, 0.0, np.sqrt(history.scatter_in2))
     shared = np.where(known, 0.0, _HEAVY_TAILS * np.sqrt(history.unsure_in2))
     left = np.where(known, np.sqrt(trust * noise + (1.0 - trust) ** 2 * history.unsure_in2), 0.0)
-    common = np.zeros_like(readings)
+    common, together = np.zeros_like(readings), np.empty((len(readings), 0))
     seen = np.isfinite(readings).any(axis=0)
     if seen.any() and not seen.all():
-        own = np.mean(history.expected_in[:, seen], axis=1)
-        line = np.polyval(np.polyfit(kilo, own, 1 if np.ptp(kilo) > 0.0 else 0), kilo)
-        worn = np.maximum(line + OWN_GEAR * (own - line), 0.0)[:, None]
+        lines = np.polyfit(kilo, history.expected_in[:, seen], 1 if np.ptp(kilo) > 0.0 else 0)
+        lines = np.maximum(np.polyval(lines[:, None], kilo[:, None]), _TIGHT_IN)
+        own = np.where(landed[:, None] | ~known, history.expected_in, readings)[:, seen]
+        further, n = np.where(lines > _TIGHT_IN, own / lines - 1.0, 0.0), int(seen.sum())
+        apart = float(np.mean(further**2) / max(np.mean(np.mean(further, axis=1) ** 2), 1e-12))
+        alike = OWN_GEAR if n == 1 else np.clip((n - apart) / (n - 1), 0.0, 1.0)
+        line = np.mean(lines, axis=1, keepdims=True)
+        worn = np.maximum(line + alike * line * np.mean(further, axis=1, keepdims=True), 0.0)
+        rows_apart = np.sqrt(np.mean(history.scatter_in2[:, seen] / np.maximum(own, _TIGHT_IN) ** 2))
         likely[:, ~seen], common[:, ~seen] = worn, JOINTS_APART * worn
-        shared[:, ~seen], spread[:, ~seen] = GEARS_APART * worn, ROWS_APART * worn
-    return LikelyClearances(np.maximum(likely, 0.0), spread, shared, common, left)
+        shared[:, ~seen], spread[:, ~seen] = GEARS_APART * worn, rows_apart * worn
+        bent = BENT * np.log(np.maximum(kilo, 0.1 * np.mean(kilo)) + _TIGHT_IN)[:, None]
+        together = np.hstack([FOLLOWS * further, bent - np.mean(bent), BENT * np.mean(worn) / line]) / JOINTS_APART
+    return LikelyClearances(np.maximum(likely, 0.0), spread, shared, common, left, together)
 
 
 def gears_of(table: DiagnosisTable) -> Places:

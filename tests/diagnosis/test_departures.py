@@ -60,6 +60,16 @@ def worn_with_landings(gear: Gear) -> DiagnosisTable:
     return fleet(gear.model, rows=200, clearance_in=clearance, quantities=dict(plain.quantities))
 
 
+def worn_together(gear: Gear) -> DiagnosisTable:
+    """A fleet with nothing wrong in which the joints of a gear wear together, each at its own rate in all gears."""
+    plain, rng = fleet(gear.model, rows=200), np.random.default_rng(12)
+    gears = np.unique(plain.gears, return_inverse=True)[1]
+    hard = rng.lognormal(0.0, 0.4, (gears.max() + 1, 1)) * rng.lognormal(0.0, 0.2, (gears.max() + 1, 10))
+    kilo = plain.quantities["gear_landings"][:, None] / 1000.0
+    clearance = 0.0006 + rng.uniform(0.0007, 0.0021, 10) * hard[gears] * kilo ** rng.uniform(0.85, 1.2, 10)
+    return fleet(gear.model, rows=200, clearance_in=clearance, quantities=dict(plain.quantities))
+
+
 def unread(table: DiagnosisTable) -> DiagnosisTable:
     values = table.clearance_in.copy()
     values[:, [0, 5, 6, 7, 8, 9]] = np.nan
@@ -119,6 +129,7 @@ FLEETS: dict[str, Callable[[Gear], DiagnosisTable]] = {
     "readings 1.1 times as large": lambda gear: fleet(gear.model, lambda _t, over: 0.1 * over, rows=200),
     "convention": lambda gear: one_technician_twice(fleet(gear.model, rows=200)),
     "unread": lambda gear: unread(worn_with_landings(gear)),
+    "unread, worn with the read ones": lambda gear: unread(worn_together(gear)),
     "worn unread": worn_where_nobody_reads,
     "worn when not read": worn_when_not_read,
     "oval on another linkage": lambda _gear: on_another_linkage(5, worn_further=1.5),
@@ -329,6 +340,10 @@ def test_a_convention_never_changes_a_prediction() -> None:
 
 def test_joints_that_nobody_read_are_no_cause() -> None:
     assert found("unread").verdict == "NONE"
+
+
+def test_joints_that_nobody_read_and_that_wear_with_the_read_ones_of_their_gear_are_no_cause() -> None:
+    assert named("unread, worn with the read ones") == set()
 
 
 def test_an_aircraft_whose_unread_joints_may_be_worn_is_not_named_as_re_rigged() -> None:

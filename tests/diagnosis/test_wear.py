@@ -168,3 +168,31 @@ def test_an_unread_joint_is_expected_to_be_worn_more_where_the_joints_of_its_gea
     likely = likely_clearances(replace(plain, clearance_in=clearance)).likely_in
     unread, read = likely[worn_gear, 9].mean(), likely[worn_gear, :9].mean()
     assert likely[~worn_gear, 9].mean() < unread < read
+
+
+def fleet_of(plain: DiagnosisTable, together: float, apart: float) -> tuple[DiagnosisTable, Array]:
+    """A fleet that reads all joints but the last, and its clearances; gears and their joints wear apart by these."""
+    rng, (gears, rows) = np.random.default_rng(4), np.unique(plain.gears, return_inverse=True)
+    hard = rng.lognormal(0.0, together, (len(gears), 1)) * rng.lognormal(0.0, apart, (len(gears), 10))
+    true_in = (0.0006 + 0.0012 * plain.quantities["gear_landings"][:, None] / 1000.0) * hard[rows]
+    read = true_in.copy()
+    read[:, 9] = np.nan
+    return replace(plain, clearance_in=read), true_in
+
+
+def test_an_unread_joint_follows_the_others_of_its_gear_as_far_as_joints_wear_together(plain: DiagnosisTable) -> None:
+    for together, apart, least, most in ((0.4, 0.1, 0.8, 1.2), (0.0, 0.4, -0.2, 0.6)):
+        table, true_in = fleet_of(plain, together, apart)
+        others = np.log(true_in[:, :9].mean(axis=1) / (0.0006 + 0.0012 * table.quantities["gear_landings"] / 1000.0))
+        filled = np.log(likely_clearances(table).likely_in[:, 9] / table.quantities["gear_landings"])
+        shape = np.column_stack([np.ones(len(others)), others, 1.0 / table.quantities["gear_landings"]])
+        assert least < np.linalg.lstsq(shape, filled, rcond=None)[0][1] < most
+
+
+def test_an_unread_joint_of_a_row_without_landings_is_as_worn_as_the_row_s_other_joints(plain: DiagnosisTable) -> None:
+    table, true_in = fleet_of(plain, 0.3, 0.05)
+    latest = int(np.argmax(table.quantities["gear_landings"]))
+    gap = table.quantities["gear_landings"].copy()
+    gap[latest] = np.nan
+    likely = likely_clearances(replace(table, quantities={**table.quantities, "gear_landings": gap})).likely_in
+    assert likely[latest, 9] == pytest.approx(true_in[latest, 9], rel=0.25)
