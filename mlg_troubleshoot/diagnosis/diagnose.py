@@ -544,29 +544,25 @@ def _corrected(model: LinkageModel, table: DiagnosisTable, named: Sequence[Named
 def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
     """The causes that are named, by effect, and the set of those that the data cannot separate."""
     finding, block = case.finding, case.finding.block
-    named: list[NamedCause] = []
-    possible: list[NamedCause] = []
+    fitted: list[tuple[NamedCause, bool]] = []
     p_values = (*finding.p_values, *[None] * len(finding.chosen))
     for place, k in enumerate(finding.chosen if finding.fit is not None else ()):
         value, error = float(case.values[place]), float(np.sqrt(case.covariance[place, place]))
         effect = case.columns[:, k] * value
         found = NamedCause(case.candidates[k], value, _interval(value, error), effect, p_values[place])
-        (named if k in finding.firm else possible).append(found)
+        fitted.append((found, k in finding.firm))
     if block is not None:
         k = len(finding.chosen)
         change, candidate = case.values[k:], block.candidate(case.values[k:], case.covariance[k:, k:])
         effect = block.columns @ change
         found = NamedCause(candidate, 1.0, (1.0, 1.0), effect, finding.block_p, finding.aliases)
-        (named if finding.verdict is Verdict.NAMED else possible).append(found)
+        fitted.append((found, finding.verdict is Verdict.NAMED))
+    fitted.sort(key=lambda told: -told[0].effect_rms_in)
     rivals = [case.candidates[k] for k in finding.rivals]
     rivals += [] if finding.rival is None else [Candidate(finding.rival.cause)]
     none = np.zeros(len(case.misfit))
-    unfitted = [NamedCause(candidate, 0.0, (0.0, 0.0), none, None) for candidate in rivals]
-
-    def by_effect(found: list[NamedCause]) -> list[NamedCause]:
-        return sorted(found, key=lambda c: -c.effect_rms_in)
-
-    return tuple(by_effect(named)), (*by_effect(possible), *unfitted)
+    possible = [NamedCause(candidate, 0.0, (0.0, 0.0), none, None) for candidate in rivals]
+    return tuple(c for c, firm in fitted if firm), (*(c for c, firm in fitted if not firm), *possible)
 
 
 def _interval(value: float, error: float) -> tuple[float, float]:

@@ -104,8 +104,7 @@ def infer(  # noqa: PLR0913 - all that a search for causes looks at
     single -= float(np.sum(whole.prior[list(plain.chosen)]))
     lead = _marginal(noise, held, block, whole.misfit) - float(np.sum(whole.prior[list(chosen)])) - single
     smaller = _single(whole, plain, found, chosen, noise, block, lead)
-    pair = len(plain.chosen) - len(beside) > 1
-    if not chosen and (smaller is None or smaller.rival is not None or pair):
+    if not chosen and (smaller is None or smaller.rival is not None or len(plain.chosen) - len(beside) > 1):
         joint = _beside_linkage(whole, plain, noise, blocks, single, aside)
         if joint is not None:
             return joint if joint.block is None else replace(joint, block_p=p)

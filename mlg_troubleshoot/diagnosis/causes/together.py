@@ -212,14 +212,11 @@ class OtherGeometry(JointFactors):
         if not found:
             return []
         apart = _apart(scene.model, ensemble)[:, [scene.joints.index(joint) for joint in found[0].joints]]
-        bends = [
-            predicted(other, scene.table, scene.clearance_in)[0] - scene.over_in - found[0].columns @ own
-            for other, own in zip(ensemble, apart, strict=True)
-        ]
+        moved = [predicted(other, scene.table, scene.clearance_in)[0] - scene.over_in for other in ensemble]
+        bent = np.array(moved) - apart @ found[0].columns.T
         # A linkage that does not close with clearances that were read is not the one that they were read in.
-        closes = [bool(np.isfinite(bend).all()) for bend in bends]
-        bent = [bend for bend, fits in zip(bends, closes, strict=True) if fits]
-        apart = apart[closes]
+        closes = np.isfinite(bent).all(axis=1)
+        bent, apart = bent[closes], apart[closes]
         curves = _curves(scene, ensemble)
         columns = np.column_stack([found[0].columns, *bent, curves])
         even = block_diag(np.eye(len(bent)) / max(len(bent), 1), np.eye(curves.shape[1]))
@@ -232,12 +229,11 @@ class OtherGeometry(JointFactors):
             )
             for block, (share, alike) in zip(found, LINKAGES, strict=True)
         ]
-        alone = np.diag([NEAR**2] * len(found[0].joints) + [1e-9])
         members = [
             replace(
                 found[0],
                 columns=np.column_stack([found[0].columns, bend]),
-                covariance=np.outer([*own, 1.0], [*own, 1.0]) + alone,
+                covariance=np.outer([*own, 1.0], [*own, 1.0]) + np.diag([NEAR**2] * len(own) + [1e-9]),
                 penalty=float(np.log(len(bent))),
             )
             for bend, own in zip(bent, apart, strict=True)
