@@ -36,11 +36,12 @@ def test_contact_of_the_only_joints_that_are_read_looks_like_a_wrong_rate_unless
     assert contact.told_apart_from_in is None or contact.told_apart_from_in > 5.0 * contact.found_from_in
 
 
-def test_the_cheapest_column_that_splits_them_is_one_more_clearance_which_does_split_them() -> None:
-    further = planned(*TWO_JOINTS)["joint_contact", "joints 3,5"].further_column
+def test_the_cheapest_column_that_splits_them_tells_them_apart_at_half_the_size() -> None:
+    contact = planned(*TWO_JOINTS)["joint_contact", "joints 3,5"]
+    assert contact.further_column is not None
+    further = planned(*TWO_JOINTS, contact.further_column)["joint_contact", "joints 3,5"].told_apart_from_in
     assert further is not None
-    assert further.startswith("clearance_")
-    assert planned(*TWO_JOINTS, further)["joint_contact", "joints 3,5"].told_apart_from_in is not None
+    assert contact.told_apart_from_in is None or further <= 0.5 * contact.told_apart_from_in
 
 
 def test_a_cause_whose_column_is_not_planned_says_which() -> None:
