@@ -51,7 +51,7 @@ _CLEARLY_LESS, _SLIP = 0.7, 4.0
 # tables with one cause or none), nor of a unit: that the clearances tell of them beyond chance is enough. [1]
 _SIGN_SLIP, _BY_CHANCE = -0.75, 0.05
 # And where one scale leaves more than this of the variance, which a slip of the unit does not (of 60 tables with one
-# cause, S = 10 and 25, at most 0.25 in 57): that they tell beyond this chance.
+# cause, S = 10 and 25, seeds 8,700,000 and on, at most 0.25 in 57): that they tell beyond this chance. [1]
 _NO_SCALE, _SURELY = 0.3, 0.001
 
 

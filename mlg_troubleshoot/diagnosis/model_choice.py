@@ -229,7 +229,7 @@ def _single(
         rival = min(rival, HIDDEN_RIVAL if block.parts is None else SKEWED_RIVAL)
     rival = NESTED if nested else rival
     near = lead > rival or rejected < SCALE_DOUBTED
-    values = () if plain.fit is None else plain.fit.values
+    values = whole.refit(plain.chosen)[1].values
     near |= any(causes[k].one_scale and abs(value) > MOST_RATE for k, value in zip(plain.chosen, values, strict=True))
     if not near:
         return plain

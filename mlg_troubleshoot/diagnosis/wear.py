@@ -49,7 +49,7 @@ FLEET_TOGETHER, GEARS_TOGETHER = 0.5, 0.25
 _NEGLIGIBLE = 1e-9
 # How much of what a gear's only read joint is worn beyond the fleet's is to be expected of the others, supposed. [1]
 OWN_GEAR = 0.5
-# Standard deviations of how much further that may follow one read joint than others, and of exponents of wear. [1]
+# Standard deviations, supposed: how much further that may follow one read joint, and of exponents of wear. [1]
 FOLLOWS, BENT = 0.2, 0.1
 
 

@@ -34,7 +34,7 @@ SPREADS_DEG = (25.0, 45.0, 70.0, 180.0)
 LINKAGES = ((1.0, 0.0), (0.5, 0.0), (1.0, 0.5))
 # What a true linkage may differ beside the ensemble's spread, each joint on its own: an eighth of the largest. [1]
 ALONE = 0.03
-# And beside the way from the drawn one to a member of the ensemble. [1]
+# And beside the way from the drawn one to a member of the ensemble, supposed: a third of that. [1]
 NEAR = 0.01
 # With more joints there are too many ways to have some of them near the worst direction and the others far from it.
 _MOST_SKEWED = 12
@@ -207,7 +207,7 @@ class OtherGeometry(JointFactors):
         return [share**2 * spread + alike**2 for share, alike in LINKAGES]
 
     def blocks(self, scene: Scene, ensemble: Sequence[LinkageModel]) -> list[Block]:
-        """Beside the factors, how each linkage of the ensemble bends the displacement otherwise than the drawn one."""
+        """Any mixture of the ensemble's linkages, with how each bends the displacement; and the way to each of them."""
         found = super().blocks(scene, ensemble)
         if not found:
             return []

@@ -31,7 +31,7 @@ from mlg_troubleshoot.diagnosis.simulation.scatter import Whitener, basis_of, bu
 
 # Chance, if nothing is wrong, below which a pattern is counted as discrepancy that a cause must stand out against.
 SMOOTH = 0.002
-# Log-likelihood by which a rival must fall behind to be ruled out.
+# Log-likelihood by which a rival must fall behind to be ruled out; at 2.5 one of 1,000 simulated sets had a wrong name.
 RULED_OUT = 5.0
 # Share of its effect that a suspect keeps beside the nuisance parameters, below which it cannot be tested; and of
 # the square of an effect by which two must differ not to be one.
