@@ -16,9 +16,9 @@ from mlg_troubleshoot.diagnosis.evidence.chance import Chance
 from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
 from mlg_troubleshoot.diagnosis.evidence.held_out import held_out_part
 from mlg_troubleshoot.diagnosis.evidence.screen import Screen, fit
-from mlg_troubleshoot.diagnosis.evidence.verdict import NAME, Verdict
+from mlg_troubleshoot.diagnosis.evidence.verdict import NAME, Verdict, verdict_of
 from mlg_troubleshoot.diagnosis.gain import folds
-from mlg_troubleshoot.diagnosis.inference import Finding, Inference
+from mlg_troubleshoot.diagnosis.inference import SECOND_SHARE, Finding, Inference
 from mlg_troubleshoot.diagnosis.noise import Rows, build_noise
 
 # Thresholds: set in 2026 on departures' fleets of other seeds than those that judge them; not re-tuned.
@@ -87,8 +87,9 @@ def infer(  # noqa: PLR0913 - all that a search for causes looks at
     if not blocks:
         return plain
     aside = rng.spawn(1)[0]
-    p = _block_chance(whole, blocks) if not plain.p_values else plain.p_values[0]
-    if plain.verdict in {Verdict.NONE, Verdict.UNLISTED} and p > NAME:
+    p = plain.p_values[0] if plain.p_values else 1.0
+    p = p if p <= NAME else _block_chance(whole, blocks)
+    if p > NAME:
         return plain
     block = _best(whole.misfit, rows, columns[:, beside], blocks)
     kept = [k for k, c in enumerate(candidates) if not c.cause.of_joints]
@@ -111,12 +112,16 @@ def infer(  # noqa: PLR0913 - all that a search for causes looks at
     if smaller is not None or found.verdict is Verdict.UNLISTED:
         return smaller or found
     block, other = _class_of(whole.misfit, rows, held, noise, blocks)
+    known = {whole.candidates[k].key for k in plain.chosen} <= {whole.candidates[k].key for k in chosen}
+    if chosen and known and _slips(noise, held, block, whole.misfit):
+        noise, fitted = whole.refit(chosen)
+        return plain if plain.verdict is Verdict.NAMED else replace(found, noise=noise, fit=fitted)
     aliases = [] if other is None else [Candidate(other.cause)]
     if _nested(candidates[k].cause for k in plain.chosen) and lead < (PAIR_LEAD if aliases else SKEWED_RIVAL):
         aliases = [candidates[k] for k in plain.chosen]
     return replace(
         found,
-        verdict=Verdict.AMBIGUOUS if found.verdict is Verdict.AMBIGUOUS and not faint else Verdict.NAMED,
+        verdict=verdict_of(p, found.verdict is Verdict.AMBIGUOUS and not faint, refuted=False),
         noise=noise,
         smallest_rms_in=plain.smallest_rms_in,
         chosen=chosen,
@@ -242,6 +247,14 @@ def _single(
 def _nested(causes: Iterable[Cause]) -> bool:
     """Tell whether two causes are factors of all joints at their fewest: one scale, one joint's direction."""
     return sum(cause.one_scale or (cause.of_joints and cause.sign < 0) for cause in causes) > 1
+
+
+def _slips(noise: NoiseModel, held: Array, block: Block, misfit: Array) -> bool:
+    """Tell whether factors of all joints do no more than the form of the largest single cause may slip."""
+    found = fit(noise.beside(block.effects_in), held, misfit)
+    known = held * found.values
+    left = noise.beside(block.effects_in).share_of(block.effects_in, misfit - known.sum(axis=1))
+    return bool(np.mean(left**2) < SECOND_SHARE**2 * np.max(np.mean(known**2, axis=0)))
 
 
 def _one_scale_rejected(noise: NoiseModel, held: Array, scale: Array, block: Block, misfit: Array) -> float:
