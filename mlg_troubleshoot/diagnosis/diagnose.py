@@ -32,7 +32,7 @@ from mlg_troubleshoot.diagnosis.noise import (
     measured_uncertainty,
     robust_scale,
 )
-from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
+from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns, scene_at
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Discrepancies
@@ -327,7 +327,13 @@ def _infer(
     _comparable(table.measured_in, scene.over_in, scene.contribution_in, ~table.along)
     misfit = table.measured_in - scene.over_in
     bank = build_bank(scene, columns)
-    finding = infer(misfit, rows, candidates, columns, bank, blocks, permutations, rng, progress)
+
+    def columns_in(other: LinkageModel) -> Array:
+        changed = scene_at(other, table, scene.where, scene.clearance_in, scene.drawn_share)
+        return np.nan_to_num(effect_columns(changed, candidates))
+
+    finding = infer(misfit, rows, candidates, columns, bank, blocks, permutations, rng, progress, columns_in)
+    columns = columns if finding.columns is None else finding.columns
     values, covariance = np.empty(0), np.empty((0, 0))
     if finding.fit is not None:
         values, covariance = finding.fit.values, np.diag(finding.fit.errors**2)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from mlg_troubleshoot.diagnosis.evidence.screen import Fit, Screen, fit
 from mlg_troubleshoot.diagnosis.evidence.verdict import ALARM, NAME, REMAINS, Verdict, refutes, verdict_of
 from mlg_troubleshoot.diagnosis.gain import folds
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, Rows, build_noise
+from mlg_troubleshoot.gear.model import LinkageModel
 
 Key = tuple[str, str | None]
 
@@ -71,6 +72,7 @@ class Finding:
     block, aliases, rival: factors of all joints that are part of the model; what these data cannot tell from them, the
         other cause that changes all joints, or two causes together; and factors of all joints that explain as much as
         what is chosen.
+    columns, shape (n, n_candidates): effects of the candidates in the linkage that the block is. [in / unit]
     block_p: chance of as much by factors of all joints if nothing is wrong. [1]
     """
 
@@ -86,6 +88,7 @@ class Finding:
     fit: Fit | None = None
     ruled_out: tuple[Key, ...] = ()
     block: Block | None = None
+    columns: Array | None = None
     aliases: tuple[Candidate, ...] = ()
     rival: Block | None = None
     block_p: float | None = None
@@ -117,6 +120,7 @@ class Inference:
         rng: np.random.Generator,
         progress: Callable[[float], None] | None = None,
         block: Block | None = None,
+        columns_in: Callable[[LinkageModel], Array] | None = None,
     ) -> None:
         self.observed, self.misfit = misfit, misfit - EXPECTED_SLOPE * rows.predicted_in
         self.rows = rows
@@ -127,6 +131,7 @@ class Inference:
         self.rng = rng
         self.progress = progress or (lambda _share: None)
         self.block = block
+        self.columns_in = cache(columns_in) if columns_in is not None else lambda _model: columns
         self._refitted: dict[tuple[int, ...], tuple[NoiseModel, Fit]] = {}
         self.signs = np.array([c.cause.sign for c in candidates])
         self.exact = np.array([np.nan if c.cause.exact is None else c.cause.exact for c in candidates])
@@ -137,9 +142,13 @@ class Inference:
         # What cannot be tested can be a rival, never a name.
         self.penalty = np.where([c.stands_in for c in candidates], np.inf, self.prior)
 
+    def columns_beside(self, block: Block) -> Array:
+        """Effects of the candidates beside factors of all joints: in another linkage they differ."""
+        return self.columns if block.model is None else self.columns_in(block.model)
+
     def beside(self, block: Block, kept: Sequence[int], rng: np.random.Generator) -> Inference:
         """The same data with some of the candidates, factors of all joints being part of the model."""
-        candidates, columns = [self.candidates[k] for k in kept], self.columns[:, list(kept)]
+        candidates, columns = [self.candidates[k] for k in kept], self.columns_beside(block)[:, list(kept)]
         return Inference(self.observed, self.rows, candidates, columns, self.bank, self.permutations, rng, None, block)
 
     def run(self) -> Finding:

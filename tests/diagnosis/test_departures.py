@@ -13,8 +13,10 @@ import pytest
 
 from mlg_troubleshoot import load_gear
 from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension, diagnose, load_extension, write_extension
+from mlg_troubleshoot.diagnosis.causes.base import Candidate
+from mlg_troubleshoot.diagnosis.causes.linkage import OutOfPlaneTilt
 from mlg_troubleshoot.diagnosis.causes.together import LoadDirections, OtherGeometry
-from mlg_troubleshoot.diagnosis.scene import build_scene
+from mlg_troubleshoot.diagnosis.scene import build_scene, scene_at
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
@@ -116,6 +118,20 @@ def on_another_linkage(member: int, worn_further: float = 1.0, all_further: floa
     return fleet(gear.model, lambda t, over: worst_case(other, factor * t.clearance_in).over_in - over, rows=200)
 
 
+def one_pin_turned_on_another_linkage(table: DiagnosisTable, over: Array) -> Array:
+    other, factors = load_gear().ensemble_models[6], np.ones(10)
+    factors[3] = 0.2
+    directions = worst_case(other, table.clearance_in).over_directions
+    return other.displacement(links_from(factors * table.clearance_in, directions)) - over
+
+
+def tilt_on_another_linkage(table: DiagnosisTable, over: Array) -> Array:
+    gear = load_gear()
+    scene = scene_at(gear.ensemble_models[9], table, gear.discrepancies, table.clearance_in)
+    tilted = OutOfPlaneTilt().adjust(scene, Candidate(OutOfPlaneTilt()), 0.2)
+    return adjusted_worst_case(scene.model, tilted).over_in - over
+
+
 FLEETS: dict[str, Callable[[Gear], DiagnosisTable]] = {
     "nothing": lambda gear: fleet(gear.model, rows=200),
     "loads": lambda gear: fleet(gear.model, loads, rows=200),
@@ -133,6 +149,8 @@ FLEETS: dict[str, Callable[[Gear], DiagnosisTable]] = {
     "worn unread": worn_where_nobody_reads,
     "worn when not read": worn_when_not_read,
     "oval on another linkage": lambda _gear: on_another_linkage(5, worn_further=1.5),
+    "one pin turned on another linkage": lambda gear: fleet(gear.model, one_pin_turned_on_another_linkage, rows=200),
+    "tilt on another linkage": lambda gear: fleet(gear.model, tilt_on_another_linkage, rows=200),
     "a linkage that nobody calibrated": lambda _gear: on_another_linkage(2, all_further=1.7),
     "all readings 1.7 times as large": lambda gear: fleet(gear.model, lambda _t, over: 0.7 * over, rows=200),
     "one tail": lambda gear: fleet(gear.model, pressure_on_one_tail, rows=200),
@@ -308,6 +326,14 @@ def test_a_technician_who_writes_the_other_convention_is_named() -> None:
 
 def test_an_oval_bore_is_named_beside_another_linkage() -> None:
     assert named("oval on another linkage") == {("oval_wear", "joint 4"), ("geometry", None)}
+
+
+def test_one_pin_beside_its_worst_direction_in_another_linkage_is_no_load_on_all_pins() -> None:
+    assert named("one pin turned on another linkage") == {("direction_not_worst_case", "joint 4"), ("geometry", None)}
+
+
+def test_a_cause_is_sought_with_the_effect_that_it_has_in_another_linkage() -> None:
+    assert named("tilt on another linkage") == {("out_of_plane_tilt", None), ("geometry", None)}
 
 
 def test_readings_beyond_the_bound_are_another_linkage_and_no_resting_place_of_pins() -> None:

@@ -176,6 +176,15 @@ def test_two_named_causes_gain_on_rows_that_the_fit_never_saw() -> None:
     assert gain.rms_after_in < 0.7 * gain.rms_before_in
 
 
+def test_how_the_effect_of_a_named_cause_bends_is_not_named_as_directions_or_another_linkage() -> None:
+    fleet, gear = draw_fleet(9_100_836, "double"), load_gear()
+    ensemble = gear.ensemble_models[1:]
+    found = diagnose(
+        gear.model, as_table(fleet.table), gear.discrepancies, ensemble=ensemble, permutations=PERMUTATIONS
+    )
+    assert {(c.candidate.cause.name, c.candidate.target) for c in found.causes} == set(fleet.label.causes)
+
+
 def test_two_causes_of_single_joints_are_taken_neither_for_another_linkage_nor_for_directions_of_all_joints() -> None:
     seed = 3_460_014
     effects = (EffectSpec("oval_wear", strength=18.0), EffectSpec("direction_not_worst_case", strength=18.0))

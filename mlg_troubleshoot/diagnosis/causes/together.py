@@ -55,6 +55,7 @@ class Block:
     uncalibrated: True if all joints may also count more or less alike.
     parts, shape (2, 3): share, mean and variance of the changes of joints near their worst direction, and far from it:
         the prior is skewed where most joints lose little and a few lose much. [1]
+    model: the linkage that they are the way to, if they are the way to a certain one.
     """
 
     cause: JointFactors
@@ -64,6 +65,7 @@ class Block:
     penalty: float
     uncalibrated: bool = False
     parts: Array | None = None
+    model: LinkageModel | None = None
 
     def skew(self, along: Array, square: Array) -> float:
         """Log-likelihood by which the skewed prior beats the normal one, for exp(aᵀx − xᵀQx/2) of changes x."""
@@ -216,7 +218,7 @@ class OtherGeometry(JointFactors):
         bent = np.array(moved) - apart @ found[0].columns.T
         # A linkage that does not close with clearances that were read is not the one that they were read in.
         closes = np.isfinite(bent).all(axis=1)
-        bent, apart = bent[closes], apart[closes]
+        bent, apart, closing = bent[closes], apart[closes], [ensemble[k] for k in np.flatnonzero(closes).tolist()]
         curves = _curves(scene, ensemble)
         columns = np.column_stack([found[0].columns, *bent, curves])
         even = block_diag(np.eye(len(bent)) / max(len(bent), 1), np.eye(curves.shape[1]))
@@ -235,8 +237,9 @@ class OtherGeometry(JointFactors):
                 columns=np.column_stack([found[0].columns, bend]),
                 covariance=np.outer([*own, 1.0], [*own, 1.0]) + np.diag([NEAR**2] * len(own) + [1e-9]),
                 penalty=float(np.log(len(bent))),
+                model=other,
             )
-            for bend, own in zip(bent, apart, strict=True)
+            for bend, own, other in zip(bent, apart, closing, strict=True)
         ]
         return [*between, *members]
 
