@@ -333,7 +333,6 @@ def _infer(
         return np.nan_to_num(effect_columns(changed, candidates))
 
     finding = infer(misfit, rows, candidates, columns, bank, blocks, permutations, rng, progress, columns_in)
-    columns = columns if finding.columns is None else finding.columns
     values, covariance = np.empty(0), np.empty((0, 0))
     if finding.fit is not None:
         values, covariance = finding.fit.values, np.diag(finding.fit.errors**2)

@@ -32,7 +32,14 @@ MOST_IN = 1.0
 class Term:
     """One named cause with its fitted parameter.
 
-    value, interval: the parameter and its 95 % interval. [unit of the cause's parameter]
+    Parameters
+    ----------
+    candidate : Candidate
+        Cause, target and setting.
+    value : float
+        The parameter. [unit of the cause's parameter]
+    interval : tuple of float
+        95 % interval of the parameter. [unit of the cause's parameter]
     """
 
     candidate: Candidate
@@ -48,10 +55,20 @@ class Term:
 class ModelExtension:
     """Terms that are added to the model of one geometry.
 
-    terms: their changes add up.
-    residual_u_in: scatter of what the extended model leaves, the model's standard uncertainty from now on. [in]
-    data_sha256, rows: hashes of the data that the terms were fitted to, and how many rows.
-    unread: joints that none of these rows had a clearance of.
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    terms : tuple of Term
+        The terms; their changes add up.
+    residual_u_in : float
+        Scatter of what the extended model leaves, the model's standard uncertainty from now on. [in]
+    data_sha256 : tuple of str
+        Hashes of the data that the terms were fitted to.
+    rows : int
+        Rows that they were fitted to.
+    unread : tuple of int
+        Joints that none of these rows had a clearance of.
     """
 
     gear: Gear
@@ -114,7 +131,20 @@ def adjustment_of(
 
 
 def write_extension(extension: ModelExtension, file: Path) -> None:
-    """Write an extension as TOML; OutputError if it cannot be written."""
+    """Write an extension as TOML.
+
+    Parameters
+    ----------
+    extension : ModelExtension
+        The extension.
+    file : Path
+        File to write.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
     terms = []
     for term in extension.terms:
         cause, candidate = term.candidate.cause, term.candidate
@@ -145,10 +175,24 @@ def write_extension(extension: ModelExtension, file: Path) -> None:
 def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ()) -> ModelExtension:
     """Load one or several extensions; several are stacked.
 
-    gear: the gear that is to be predicted; own: a user's own causes, beside the catalogue.
+    Parameters
+    ----------
+    files : sequence of Path
+        Extension files, the first one first.
+    gear : Gear
+        The gear that is to be predicted.
+    own : sequence of Cause
+        A user's own causes, beside the catalogue.
 
-    Returns all terms together, the residual scatter being that of the last file. GearFileError if a file is not an
-    extension, or was made on another geometry.
+    Returns
+    -------
+    ModelExtension
+        All terms together; the residual scatter is that of the last file.
+
+    Raises
+    ------
+    GearFileError
+        If a file is not an extension, or was made on another geometry.
     """
     terms: list[Term] = []
     hashes: list[str] = []

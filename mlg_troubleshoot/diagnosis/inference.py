@@ -72,7 +72,6 @@ class Finding:
     block, aliases, rival: factors of all joints that are part of the model; what these data cannot tell from them, the
         other cause that changes all joints, or two causes together; and factors of all joints that explain as much as
         what is chosen.
-    columns, shape (n, n_candidates): effects of the candidates in the linkage that the block is. [in / unit]
     block_p: chance of as much by factors of all joints if nothing is wrong. [1]
     """
 
@@ -88,7 +87,6 @@ class Finding:
     fit: Fit | None = None
     ruled_out: tuple[Key, ...] = ()
     block: Block | None = None
-    columns: Array | None = None
     aliases: tuple[Candidate, ...] = ()
     rival: Block | None = None
     block_p: float | None = None

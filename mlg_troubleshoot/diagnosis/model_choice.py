@@ -220,11 +220,10 @@ def _beside_linkage(
 
 
 def _fitted(whole: Inference, found: Finding, noise: NoiseModel) -> Finding:
-    """Single causes that are chosen beside a block, fitted with it."""
+    """Single causes that are chosen beside a block, fitted with it as they act in the linkage that is extended."""
     assert found.block is not None
-    columns = whole.columns_beside(found.block)
-    fitted = fit(noise.beside(found.block.effects_in), columns[:, list(found.chosen)], whole.misfit)
-    return replace(found, noise=noise, fit=fitted, columns=columns, variables=())
+    held = whole.columns[:, list(found.chosen)]
+    return replace(found, noise=noise, fit=fit(noise.beside(found.block.effects_in), held, whole.misfit), variables=())
 
 
 def _single(

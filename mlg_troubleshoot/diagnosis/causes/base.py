@@ -21,12 +21,26 @@ from mlg_troubleshoot.gear.model import LinkageModel
 class Scene:
     """The model and the rows that a cause acts on.
 
-    clearance_in, shape (n, n_joints): clearances with missing ones filled. [in]
-    joints: numbers of the joints; where: where inside the linkage causes act.
-    over_in, shape (n,): plain prediction, over-travel. [in]
-    directions, shape (n, n_joints): directions that give it. [rad]
-    contribution_in, shape (n, n_joints): what each joint's clearance adds to it, directions held. [in]
-    drawn_share: how far read clearances were drawn to what wear makes expect. [1]
+    Parameters
+    ----------
+    model : LinkageModel
+        The linkage.
+    table : DiagnosisTable
+        The rows.
+    clearance_in : ndarray, shape (n, n_joints)
+        Clearances with missing ones filled. [in]
+    joints : tuple of int
+        Numbers of the joints.
+    where : Discrepancies
+        Where inside the linkage causes act.
+    over_in : ndarray, shape (n,)
+        Plain prediction, over-travel. [in]
+    directions : ndarray, shape (n, n_joints)
+        Directions that give it. [rad]
+    contribution_in : ndarray, shape (n, n_joints)
+        What each joint's clearance adds to it, directions held. [in]
+    drawn_share : float
+        How far read clearances were drawn to what wear makes expect. [1]
     """
 
     model: LinkageModel
@@ -57,9 +71,17 @@ MOST_UNREAD = 0.15
 class Candidate:
     """One cause with its target and everything fixed but its parameter.
 
-    target: which joint, tail, gauge …; setting: what else is fixed, for example the day from which it acts.
-    stands_in: True if it can be a rival, never a name: its column is missing and something else stands for it, or
-        joints that nobody read may be the cause as well.
+    Parameters
+    ----------
+    cause : Cause
+        The cause.
+    target : str or None
+        Which joint, tail, gauge …
+    setting : mapping
+        What else is fixed, for example the day from which it acts.
+    stands_in : bool
+        True if it can be a rival, never a name: its column is missing and something else stands for it, or joints that
+        nobody read may be the cause as well.
     """
 
     cause: Cause
