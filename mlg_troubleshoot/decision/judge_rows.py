@@ -165,12 +165,7 @@ def _budget(batch: BatchPrediction, cases: Cases, i: int) -> UncertaintyBudget:
 
 
 def _detail(
-    cases: Cases,
-    i: int,
-    found: Verdict,
-    worst_in: tuple[float, float],
-    budget: UncertaintyBudget | None,
-    seed: int,
+    cases: Cases, i: int, found: Verdict, worst_in: tuple[float, float], budget: UncertaintyBudget | None, seed: int
 ) -> dict[str, Any]:
     """What is worked out for a gear that is looked at alone."""
     one, rng = cases.take(np.array([i])), np.random.default_rng(seed)

@@ -23,7 +23,7 @@ from mlg_troubleshoot.diagnosis.evidence.verdict import Verdict
 from mlg_troubleshoot.diagnosis.extension import Term
 from mlg_troubleshoot.diagnosis.faults import LEAST_ALONG, DataFault, screen_faults
 from mlg_troubleshoot.diagnosis.gain import LEAST_TAILS, Gain, measure_gain
-from mlg_troubleshoot.diagnosis.inference import Finding
+from mlg_troubleshoot.diagnosis.inference import Finding, Inference
 from mlg_troubleshoot.diagnosis.model_choice import infer
 from mlg_troubleshoot.diagnosis.noise import (
     EXPECTED_SLOPE,
@@ -332,7 +332,8 @@ def _infer(
         changed = scene_at(other, table, scene.where, scene.clearance_in, scene.drawn_share)
         return np.nan_to_num(effect_columns(changed, candidates))
 
-    finding = infer(misfit, rows, candidates, columns, bank, blocks, permutations, rng, progress, columns_in)
+    whole = Inference(misfit, rows, candidates, columns, bank, permutations, rng, progress, columns_in=columns_in)
+    finding = infer(whole, blocks)
     values, covariance = np.empty(0), np.empty((0, 0))
     if finding.fit is not None:
         values, covariance = finding.fit.values, np.diag(finding.fit.errors**2)

@@ -101,11 +101,7 @@ class ModelExtension:
 
 
 def adjustment_of(
-    terms: Sequence[Term],
-    model: LinkageModel,
-    table: DiagnosisTable,
-    clearance_in: Array,
-    where: Discrepancies,
+    terms: Sequence[Term], model: LinkageModel, table: DiagnosisTable, clearance_in: Array, where: Discrepancies
 ) -> Adjustment:
     """Combine the changes of several terms; a term whose columns a table lacks does nothing there."""
     clearance = np.asarray(clearance_in, float)

@@ -231,7 +231,7 @@ class Inference:
             behind.update(rest)
         rivals = list(dict.fromkeys(k for near in instead for k in near))
         noise, fitted = self.refit(chosen)
-        remainder_p, variables, refuted = self._remainder(noise, chosen, fitted)
+        remainder_p, variables, refuted = self.remainder(chosen)
         possible = {self.candidates[k].key for k in (*chosen, *rivals)}
         ruled_out = tuple(sorted(behind.keys() - possible, key=lambda key: (behind[key], str(key))))
         verdict = verdict_of(p_values[0], bool(rivals), refuted)
@@ -305,12 +305,12 @@ class Inference:
         first, second = self.columns[:, a], self.columns[:, b]
         return abs(float(first @ second)) > ALIKE * float(np.linalg.norm(first) * np.linalg.norm(second))
 
-    def _remainder(self, noise: NoiseModel, chosen: Sequence[int], fitted: Fit) -> tuple[float, tuple[str, ...], bool]:
+    def remainder(self, chosen: Sequence[int]) -> tuple[float, tuple[str, ...], bool]:
         """Chance of the strongest shape in what is left, its variables, and whether it refutes what is named.
 
         A large remainder of any shape does; a smaller one does if it moves with the named cause's own variable.
         """
-        held = self.columns[:, list(chosen)]
+        held, (noise, fitted) = self.columns[:, list(chosen)], self.refit(chosen)
         screen = _of_shapes(noise, self.bank.columns, held)
         null = self.null(noise, screen)
         top, p = self._strongest(screen, null)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import chi2
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.diagnosis.bank import Bank
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.evidence.chance import Chance
@@ -21,106 +19,83 @@ from mlg_troubleshoot.diagnosis.evidence.verdict import NAME, Verdict, verdict_o
 from mlg_troubleshoot.diagnosis.gain import folds
 from mlg_troubleshoot.diagnosis.inference import SECOND_SHARE, Finding, Inference, Key
 from mlg_troubleshoot.diagnosis.noise import Rows, build_noise
-from mlg_troubleshoot.gear.model import LinkageModel
 
-# Thresholds: set in 2026 on departures' fleets of other seeds than those that judge them; not re-tuned.
-
+# Thresholds, in log-likelihood if not said otherwise: set in 2026 on departures' fleets of other seeds than those that
+# judge them; not re-tuned.
 _BLOCK_ROUNDS = 2
-# Log-likelihood by which factors of all joints must beat the best of single causes, two causes of single joints, which
-# their prior covers dearly; and from which they are a rival of one cause, and of one scale for all.
+# By which factors of all joints must beat the best of single causes, and two causes of single joints, which their prior
+# covers dearly; and from which they are a rival of one cause, and of one scale for all.
 BLOCK_LEAD, PAIR_LEAD, BLOCK_RIVAL, SCALE_RIVAL = 3.0, -8.0, -1.0, -3.5
-# Of one scale below a bound, which directions do likelier than an error of the rate: 40° apart (52 fleets, seeds
-# 6,201,000) they are 5.4 behind at most, two by more than 5; where the rate is off (13 at S = 10 to 25, 6,205,000) 3.1
-# to 7.2, seven by more than 5.
+# From which directions are a rival of one scale below a bound: 40° apart (52 fleets, seeds 6,201,000) they are 5.4
+# behind at most; where the rate is off (13 at S = 10 to 25, 6,205,000) 3.1 to 7.2, seven by more than 5.
 BOUND_RIVAL = -5.0
 # And of any cause but one scale that no longer stands out beside them; and of a scale and a direction together, or two
-# directions, which are directions of all joints at their fewest. Where directions lie 40° apart (40 fleets, seeds
-# 3,600,000) the two are 5 to 11 ahead, where just the two are wrong (9, 3,700,000) 8 to 13. The data cannot tell; that
-# load moves the pins is one cause, that two meet which look like it is far rarer (some 60 to 1): they become its alias.
+# directions: 40° apart (40 fleets, seeds 3,600,000) the two are 5 to 11 ahead, where just the two are wrong (9,
+# 3,700,000) 8 to 13. The data cannot tell; that load moves the pins is one cause, that two meet which look like it is
+# far rarer (some 60 to 1): they become its alias.
 HIDDEN_RIVAL, NESTED = -5.0, -12.0
-# The first and the last of these for directions, whose prior is skewed as they are: 40° apart (26 fleets with one cause
-# instead, seeds 6,201,000) they are ahead by -3.8 to 50, two of three by more than 4; where one joint's direction or
-# contact is wrong (95, seeds 6,202,000 and 6,205,000) they are behind by 2.4 and more, nine of ten by more than 3.6.
+# BLOCK_LEAD and HIDDEN_RIVAL for directions, whose prior is skewed as they are: 40° apart (26 fleets with one cause
+# instead, seeds 6,201,000) they are ahead by -3.8 to 50, where one joint's direction or contact is wrong (95, seeds
+# 6,202,000 and 6,205,000) behind by 2.4 and more, nine of ten by more than 3.6.
 SKEWED_LEAD, SKEWED_RIVAL = -1.2, -4.0
-# Log-likelihood by which they may be behind two causes of which they spare one: on 56 fleets of other linkages with one
-# cause (seeds 3,400,000) they are behind by 0 to 1.4, on 70 of the drawn one with two causes (3,460,000) by 2.9 and
-# more. A lower bar takes a joint's cause for them, a higher one leaves what is there in a set.
+# By which they may be behind two causes of which they spare one: on 56 fleets of other linkages with one cause (seeds
+# 3,400,000) they are by 0 to 1.4, on 70 of the drawn one with two causes (3,460,000) by 2.9 and more.
 SECOND_LEAD = -2.0
-# Log-likelihood that a cause about no joint must add to factors of all joints to have a say in which they are: with
-# none, where directions lie 40° apart (80 fleets, seeds 8,900,000), two of 75 became a linkage with a cause by chance.
-CLEARLY = 8.0
-# Log-likelihood by which a joint's cause beside another linkage must lead factors of all joints, a direction's further,
-# being one of them, and by which it may be behind two causes. Where directions are the truth (310 fleets, seeds
-# 8,920,000) one leads by 3.3 at most, a direction by 4.1; where it is the truth (60 with another linkage) mostly by 4.5
-# to 35.
+# That a cause about no joint must add to factors of all joints to have a say in which they are: with none, where
+# directions lie 40° apart (80 fleets, seeds 8,900,000), two of 75 became a linkage with a chance cause. And from which
+# directions and linkage are told apart.
+CLEARLY, CLASS_APART = 8.0, 5.0
+# By which a joint's cause beside another linkage must lead factors of all joints, a direction's further, being one of
+# them, and may be behind two causes. Where directions are the truth (310 fleets, seeds 8,920,000) one leads by 3.3 at
+# most, a direction by 4.1; where it is the truth (60 with another linkage) mostly by 4.5 to 35.
 JOINT_LEAD, DIRECTION_LEAD, PAIR_RIVAL = 4.0, 5.5, -3.0
 # Standard errors by which readings are beyond a bound for certain; change of all predictions that is no error of the
-# rate alone: those of the study's fleets end at 0.2, linkages that nobody calibrated begin at 0.7. [1]
-_BEYOND, MOST_RATE = 2.0, 0.4
-# Loss of all predictions that no linkage brings: those of the departures' fleets end at 0.15, where directions lie all
-# around and another linkage was named it was 1.2 to 1.6. [1]
-MOST_LOSS = 0.6
+# rate alone: the study's fleets end at 0.2, linkages that nobody calibrated begin at 0.7; loss of all predictions that
+# no linkage brings: the departures' end at 0.15, where directions all around were named so it was 1.2 to 1.6. [1]
+_BEYOND, MOST_RATE, MOST_LOSS = 2.0, 0.4, 0.6
 # Mean square on held-out tails over that of two causes of single joints, up to which factors of all are preferred. [1]
 PAIR_WORSE = 1.2
-# Chance below which one scale for all joints is rejected, and below which it is doubted; log-likelihood by which the
-# factors may be behind it all the same: on 44 fleets that are one scale and were rejected or nearly so (seeds 3,210,000
-# and 4,210,000) they are behind by 2.1 to 3.4, on directions 40 degrees apart by 2.3 at most.
+# Chance below which one scale for all joints is rejected, and below which it is doubted; by which the factors may be
+# behind it all the same: on 44 fleets that are one scale and were rejected or nearly so (seeds 3,210,000 and 4,210,000)
+# they are by 2.1 to 3.4, on directions 40° apart by 2.3 at most.
 SCALE_REJECTED, SCALE_DOUBTED, SCALE_LEAD = 0.02, 0.1, -2.5
-# Log-likelihood from which directions and linkage are told apart.
-CLASS_APART = 5.0
 
 
-def infer(  # noqa: PLR0913 - all that a search for causes looks at
-    misfit: Array,
-    rows: Rows,
-    candidates: Sequence[Candidate],
-    columns: Array,
-    bank: Bank,
-    blocks: Sequence[Block],
-    permutations: int,
-    rng: np.random.Generator,
-    progress: Callable[[float], None] | None = None,
-    columns_in: Callable[[LinkageModel], Array] | None = None,
-) -> Finding:
+def infer(whole: Inference, blocks: Sequence[Block]) -> Finding:
     """Name what explains the misfit: single causes, or factors of all joints with single causes beside them.
 
     The smallest model that the data do not reject is named: factors of all joints only where their marginal
     likelihood is clearly beyond that of the best single causes, each paying for how many of its kind are tried.
     """
-    whole = Inference(misfit, rows, candidates, columns, bank, permutations, rng, progress, None, columns_in)
-    plain = whole.run()
+    candidates, columns, rows, plain = whole.candidates, whole.columns, whole.rows, whole.run()
     beside = [k for k in plain.chosen if not candidates[k].cause.of_joints]
     blocks = _possible(whole, columns[:, beside], blocks)
     if not blocks:
         return plain
-    aside = rng.spawn(1)[0]
-    p = plain.p_values[0] if plain.p_values else 1.0
-    p = p if p <= NAME else _block_chance(whole, blocks)
+    aside = whole.rng.spawn(1)[0]
+    p = plain.p_values[0] if plain.p_values and plain.p_values[0] <= NAME else _block_chance(whole, blocks)
     if p > NAME:
         return plain
-    scores = _scores(whole, plain, beside, blocks)
-    block = blocks[int(np.argmax(scores.without))]
+    single, without, joint = _score(whole, plain, beside, blocks)
+    block, linkage = blocks[int(np.argmax(without))], blocks[int(np.argmax(joint))]
     kept = [k for k, c in enumerate(candidates) if not c.cause.of_joints]
     found = whole.beside(block, kept, aside).run()
     chosen, rivals, sure = (tuple(kept[k] for k in places) for places in (found.chosen, found.rivals, found.sure))
     faint = found.verdict is not Verdict.UNLISTED and (not found.p_values or found.p_values[0] > NAME)
-    open_ = found.verdict is Verdict.AMBIGUOUS and not faint
     chosen, rivals, sure, p_values = ((), (), (), ()) if faint else (chosen, rivals, sure, found.p_values)
     smallest = plain.smallest_rms_in
     found = replace(found, chosen=chosen, rivals=rivals, sure=sure, p_values=p_values, smallest_rms_in=smallest)
     # Both are judged under the noise of the larger model.
     held = whole.columns_beside(block)[:, list(chosen)]
     noise = _judged(whole.misfit, rows, held, block)
-    single = fit(noise, columns[:, list(plain.chosen)], whole.misfit).log_likelihood
-    single -= float(np.sum(whole.prior[list(plain.chosen)]))
-    lead = _marginal(noise, held, block, whole.misfit) - float(np.sum(whole.prior[list(chosen)])) - single
+    lead = _marginal(noise, held, block, whole.misfit) - _paid(whole, chosen) - _alone(whole, noise, plain)
     smaller = _single(whole, plain, found, noise, block, lead)
     if not chosen and (smaller is None or smaller.rival or not 0 < len(plain.chosen) < len(beside) + 2):
+        lead_of_joint, over = float(np.max(joint) - np.max(without)), float(np.max(joint) - single)
+        one = _beside_linkage(whole, plain, linkage, lead_of_joint, over, aside)
         # A set says more than a name that it holds against, not more than another set.
-        told = {Verdict.NAMED, Verdict.AMBIGUOUS} if smaller is None else {Verdict.NAMED}
-        joint = _beside_linkage(whole, plain, blocks, scores, told, aside)
-        if joint is not None:
-            return joint if joint.block is None else replace(joint, block_p=p)
+        if one is not None and (smaller is None or one.verdict is Verdict.NAMED):
+            return one if one.block is None else replace(one, block_p=p, smallest_rms_in=smallest)
     if smaller is not None or found.verdict is Verdict.UNLISTED:
         return smaller or found
     if chosen and _keys(whole, plain.chosen) <= _keys(whole, chosen) and _slips(noise, held, block, whole.misfit):
@@ -130,8 +105,18 @@ def infer(  # noqa: PLR0913 - all that a search for causes looks at
     aliases = [] if other is None else [Candidate(other.cause)]
     if _nested(candidates[k].cause for k in plain.chosen) and lead < (PAIR_LEAD if aliases else SKEWED_RIVAL):
         aliases = [candidates[k] for k in plain.chosen]
-    verdict = verdict_of(p, open_, refuted=False)
-    return _fitted(whole, replace(found, verdict=verdict, block=block, aliases=tuple(aliases), block_p=p), noise)
+    verdict = verdict_of(p, found.verdict is Verdict.AMBIGUOUS and not faint, refuted=False)
+    return _fitted(whole, replace(found, verdict=verdict, aliases=tuple(aliases), block_p=p), block, noise)
+
+
+def _paid(whole: Inference, places: Sequence[int]) -> float:
+    """What causes pay for being some of many. [1]"""
+    return float(np.sum(whole.prior[list(places)]))
+
+
+def _alone(whole: Inference, noise: NoiseModel, plain: Finding) -> float:
+    """Log-likelihood of single causes that are chosen, less what they pay."""
+    return fit(noise, whole.columns[:, list(plain.chosen)], whole.misfit).log_likelihood - _paid(whole, plain.chosen)
 
 
 def _keys(whole: Inference, places: Iterable[int]) -> set[Key]:
@@ -155,84 +140,59 @@ def _possible(whole: Inference, held: Array, blocks: Sequence[Block]) -> list[Bl
     return [block for block in kept if not block.uncalibrated or abs(rate) > MOST_RATE]
 
 
-class _Scores(NamedTuple):
-    """Log-likelihood of models less what their causes pay for being some of many, all under the same noise.
+def _score(whole: Inference, plain: Finding, own: Sequence[int], blocks: Sequence[Block]) -> tuple[float, Array, Array]:
+    """Log-likelihood of models less what their causes pay, all under the noise that the widest block leaves. [1]
 
-    single: of what is chosen without factors of all joints. [1]
-    without, joint, shape (n_blocks,): of each block, with the best cause beside it that is about no joint where that is
-        clearly there; and of each with the best joint's cause beside it, -inf for directions, being one of them. [1]
+    Of what is chosen without factors of all joints; of each block, (n_blocks,), with the best cause beside it that is
+    about no joint where that is clearly there; and of each with the best joint's, -inf for directions, being one.
     """
-
-    single: float
-    without: Array
-    joint: Array
-
-
-def _scores(whole: Inference, plain: Finding, beside: Sequence[int], blocks: Sequence[Block]) -> _Scores:
-    """Score blocks under the noise that the widest one leaves, some single causes being fitted with each."""
-    misfit, chosen, held = whole.misfit, list(plain.chosen), whole.columns[:, list(beside)]
+    misfit, held = whole.misfit, whole.columns[:, list(own)]
     noise = _judged(misfit, whole.rows, held, max(blocks, key=lambda b: float(np.trace(b.covariance))))
-    causes = [c.cause for c in whole.candidates]
-    of_joints, scale = (
-        np.array(told, bool) for told in zip(*((c.of_joints, c.one_scale) for c in causes), strict=True)
-    )
+    of_joints = np.array([c.cause.of_joints for c in whole.candidates], bool)
+    single = np.array([c.cause.of_joints and not c.cause.one_scale for c in whole.candidates], bool)
     without, joint = [], []
     for block in blocks:
         screen = Screen(noise.beside(block.effects_in), whole.columns_beside(block), whole.signs, held, whole.exact)
         gain = screen.run(misfit[:, None])[0][:, 0] - whole.penalty
-        alone = _marginal(noise, held, block, misfit) - float(np.sum(whole.prior[list(beside)]))
+        alone = _marginal(noise, held, block, misfit) - _paid(whole, own)
         without.append(alone + max(float(np.max(gain[~of_joints], initial=0.0)) - CLEARLY, 0.0))
-        joints = of_joints & ~scale & (not block.cause.bounded)
-        joint.append(alone + float(np.max(gain[joints], initial=-np.inf)))
-    single = fit(noise, whole.columns[:, chosen], misfit).log_likelihood - float(np.sum(whole.prior[chosen]))
-    return _Scores(single, np.array(without), np.array(joint))
+        joint.append(alone + float(np.max(gain[single & (not block.cause.bounded)], initial=-np.inf)))
+    return _alone(whole, noise, plain), np.array(without), np.array(joint)
 
 
 def _beside_linkage(
-    whole: Inference,
-    plain: Finding,
-    blocks: Sequence[Block],
-    scores: _Scores,
-    told: Container[Verdict],
-    rng: np.random.Generator,
+    whole: Inference, plain: Finding, block: Block, lead: float, over: float, rng: np.random.Generator
 ) -> Finding | None:
     """One joint's cause, alone or beside another linkage, where that explains clearly more than factors of all joints.
 
-    Their own likelihood is compared first: to infer what stands beside each linkage would take too long.
-
-    told: verdicts that are worth telling.
+    lead, over: log-likelihood by which it does, and by which it beats what is chosen without them: to infer what stands
+        beside each linkage would take too long.
     """
-    best, linkage = float(np.max(scores.joint)), blocks[int(np.argmax(scores.joint))]
-    lead, over = best - float(np.max(scores.without)), best - scores.single
     if lead < JOINT_LEAD or over < PAIR_RIVAL:
         return None
-    beside = whole.beside(linkage, range(len(whole.candidates)), rng).run()
-    first = whole.candidates[beside.chosen[0]].cause if len(beside.chosen) == 1 else None
-    if beside.verdict not in told or first is None or not first.of_joints:
+    found = whole.beside(block, range(len(whole.candidates)), rng).run()
+    first = whole.candidates[found.chosen[0]].cause if len(found.chosen) == 1 else None
+    told = found.verdict in {Verdict.NAMED, Verdict.AMBIGUOUS}
+    if not told or first is None or not first.of_joints or (first.sign < 0 and lead < DIRECTION_LEAD):
         return None
-    if first.sign < 0 and lead < DIRECTION_LEAD:
-        return None
-    if beside.chosen == plain.chosen and plain.verdict is Verdict.NAMED and over < BLOCK_LEAD:
+    if found.chosen == plain.chosen and plain.verdict is Verdict.NAMED and over < BLOCK_LEAD:
         return plain
-    held = whole.columns_beside(linkage)[:, list(beside.chosen)]
-    found = replace(beside, block=linkage, smallest_rms_in=plain.smallest_rms_in)
-    return _fitted(whole, found, _judged(whole.misfit, whole.rows, held, linkage))
+    held = whole.columns_beside(block)[:, list(found.chosen)]
+    return _fitted(whole, found, block, _judged(whole.misfit, whole.rows, held, block))
 
 
-def _fitted(whole: Inference, found: Finding, noise: NoiseModel) -> Finding:
+def _fitted(whole: Inference, found: Finding, block: Block, noise: NoiseModel) -> Finding:
     """Single causes that are chosen beside a block, fitted with it as they act in the linkage that is extended."""
-    assert found.block is not None
-    held = whole.columns[:, list(found.chosen)]
-    return replace(found, noise=noise, fit=fit(noise.beside(found.block.effects_in), held, whole.misfit), variables=())
+    chosen, remainder_p = list(found.chosen), found.remainder_p
+    if block.model is not None and chosen:
+        drawn = whole.beside(replace(block, model=None), range(len(whole.candidates)), whole.rng.spawn(1)[0])
+        remainder_p = drawn.remainder(chosen)[0]
+    fitted = fit(noise.beside(block.effects_in), whole.columns[:, chosen], whole.misfit)
+    return replace(found, noise=noise, fit=fitted, block=block, variables=(), remainder_p=remainder_p)
 
 
 def _single(
-    whole: Inference,
-    plain: Finding,
-    found: Finding,
-    noise: NoiseModel,
-    block: Block,
-    lead: float,
+    whole: Inference, plain: Finding, found: Finding, noise: NoiseModel, block: Block, lead: float
 ) -> Finding | None:
     """The finding without factors of all joints, where the data do not reject it for them; ambiguous where they may."""
     if plain.verdict in {Verdict.NONE, Verdict.UNLISTED}:
@@ -285,8 +245,7 @@ def _nested(causes: Iterable[Cause]) -> bool:
 
 def _slips(noise: NoiseModel, held: Array, block: Block, misfit: Array) -> bool:
     """Tell whether factors of all joints do no more than the form of the largest single cause may slip."""
-    found = fit(noise.beside(block.effects_in), held, misfit)
-    known = held * found.values
+    known = held * fit(noise.beside(block.effects_in), held, misfit).values
     left = noise.beside(block.effects_in).share_of(block.effects_in, misfit - known.sum(axis=1))
     return bool(np.mean(left**2) < SECOND_SHARE**2 * np.max(np.mean(known**2, axis=0)))
 

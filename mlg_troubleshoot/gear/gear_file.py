@@ -66,8 +66,7 @@ def load_gear(name_or_path: str | Path = DEFAULT_GEAR) -> Gear:
     path = Path(text)
     if not path.exists():
         raise UsageError(
-            f"there is no gear {text!r}",
-            f"Give one of {', '.join(shipped_gears())}, or the path of a gear file.",
+            f"there is no gear {text!r}", f"Give one of {', '.join(shipped_gears())}, or the path of a gear file."
         )
     return _read(path)
 

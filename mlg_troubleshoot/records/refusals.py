@@ -24,10 +24,7 @@ _USUAL = {
         f"a header with record_id, tail_no, side and clearances in the first {HEADER_SEARCH_ROWS} rows",
         "Use the workbook that 'mlg template' writes, or name the columns with --map.",
     ),
-    "no_rows": (
-        "at least one row below the header, or a filled-in form",
-        "Enter the inspections and save the file.",
-    ),
+    "no_rows": ("at least one row below the header, or a filled-in form", "Enter the inspections and save the file."),
     "not_a_table": (
         "a CSV file in UTF-8, UTF-16 or Windows-1252, or an .xlsx workbook",
         "Save the table as .xlsx or as CSV (UTF-8) and read that.",

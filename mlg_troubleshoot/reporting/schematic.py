@@ -19,11 +19,7 @@ from mlg_troubleshoot.reporting.figures import INK, PALE, PAPER, RULE, SOFT, Anc
 from mlg_troubleshoot.reporting.formats import Lengths
 
 JointState = Literal["over", "fine", "missing"]
-JOINT_STATES: dict[JointState, str] = {
-    "over": "over its limit",
-    "fine": "within its limit",
-    "missing": "not measured",
-}
+JOINT_STATES: dict[JointState, str] = {"over": "over its limit", "fine": "within its limit", "missing": "not measured"}
 
 
 @dataclass(frozen=True, slots=True)
