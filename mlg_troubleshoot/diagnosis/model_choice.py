@@ -98,10 +98,10 @@ def infer(whole: Inference, blocks: Sequence[Block]) -> Finding:
             return one if one.block is None else replace(one, block_p=p, smallest_rms_in=smallest)
     if smaller is not None or found.verdict is Verdict.UNLISTED:
         return smaller or found
+    block, other = _class_of(whole.misfit, rows, held, noise, blocks)
     if chosen and _keys(whole, plain.chosen) <= _keys(whole, chosen) and _slips(noise, held, block, whole.misfit):
         noise, fitted = whole.refit(chosen)
         return plain if plain.verdict is Verdict.NAMED else replace(found, noise=noise, fit=fitted)
-    block, other = _class_of(whole.misfit, rows, held, noise, blocks)
     aliases = [] if other is None else [Candidate(other.cause)]
     if _nested(candidates[k].cause for k in plain.chosen) and lead < (PAIR_LEAD if aliases else SKEWED_RIVAL):
         aliases = [candidates[k] for k in plain.chosen]
