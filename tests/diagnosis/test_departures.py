@@ -336,6 +336,11 @@ def test_a_cause_is_sought_with_the_effect_that_it_has_in_another_linkage() -> N
     assert named("tilt on another linkage") == {("out_of_plane_tilt", None), ("geometry", None)}
 
 
+def test_what_a_cause_does_otherwise_in_another_linkage_is_left_and_said_to_be_no_noise() -> None:
+    assert not found("tilt on another linkage").remainder_is_noise
+    assert found("one pin turned on another linkage").remainder_is_noise
+
+
 def test_readings_beyond_the_bound_are_another_linkage_and_no_resting_place_of_pins() -> None:
     (cause,) = found("a linkage that nobody calibrated").causes
     assert (cause.candidate.cause.name, cause.aliases) == ("geometry", ())
