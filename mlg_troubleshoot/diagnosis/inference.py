@@ -105,6 +105,7 @@ class Inference:
     permutations: data sets drawn with nothing wrong.
     progress: called with the share that is done.
     block: factors of all joints that are part of the model, shrunk by what is known of them.
+    columns_in: effects of the candidates in another linkage, each asked for once; the same if not given. [in / unit]
     """
 
     def __init__(  # noqa: PLR0913 - all that a search for causes looks at
