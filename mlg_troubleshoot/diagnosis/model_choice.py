@@ -245,8 +245,9 @@ def _nested(causes: Iterable[Cause]) -> bool:
 
 def _slips(noise: NoiseModel, held: Array, block: Block, misfit: Array) -> bool:
     """Tell whether factors of all joints do no more than the form of the largest single cause may slip."""
-    known = held * fit(noise.beside(block.effects_in), held, misfit).values
-    left = noise.beside(block.effects_in).share_of(block.effects_in, misfit - known.sum(axis=1))
+    wide = noise.beside(block.effects_in)
+    known = held * fit(wide, held, misfit).values
+    left = wide.share_of(block.effects_in, misfit - known.sum(axis=1))
     return bool(np.mean(left**2) < SECOND_SHARE**2 * np.max(np.mean(known**2, axis=0)))
 
 
