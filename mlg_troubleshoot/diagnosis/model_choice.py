@@ -48,11 +48,13 @@ CLEARLY, CLASS_APART = 8.0, 5.0
 # By which a joint's cause beside another linkage must lead factors of all joints, a direction's further, being one of
 # them, and may be behind two causes. Where directions are the truth (310 fleets, seeds 8,920,000) one leads by 3.3 at
 # most, a direction by 4.1; where it is the truth (60 with another linkage) mostly by 4.5 to 35.
-JOINT_LEAD, DIRECTION_LEAD, PAIR_RIVAL = 4.0, 5.5, -3.0
+JOINT_LEAD, DIRECTION_LEAD, PAIR_RIVAL = 4.0, 6.5, -3.0
 # Standard errors by which readings are beyond a bound for certain; change of all predictions that is no error of the
 # rate alone: the study's fleets end at 0.2, linkages that nobody calibrated begin at 0.7; loss of all predictions that
 # no linkage brings: the departures' end at 0.15, where directions all around were named so it was 1.2 to 1.6. [1]
 _BEYOND, MOST_RATE, MOST_LOSS = 2.0, 0.4, 0.6
+# How far the rate of a valve may be off, supposed: one standard deviation. [1]
+_RATE_SPREAD = 0.1
 # Mean square on held-out tails over that of two causes of single joints, up to which factors of all are preferred. [1]
 PAIR_WORSE = 1.2
 # Chance below which one scale for all joints is rejected, and below which it is doubted; by which the factors may be
@@ -115,8 +117,10 @@ def _paid(whole: Inference, places: Sequence[int]) -> float:
 
 
 def _alone(whole: Inference, noise: NoiseModel, plain: Finding) -> float:
-    """Log-likelihood of single causes that are chosen, less what they pay."""
-    return fit(noise, whole.columns[:, list(plain.chosen)], whole.misfit).log_likelihood - _paid(whole, plain.chosen)
+    """Log-likelihood of single causes that are chosen, less what they pay, a rate the more the further it is off."""
+    found = fit(noise, whole.columns[:, list(plain.chosen)], whole.misfit)
+    rate = found.values[[whole.candidates[k].cause.one_scale for k in plain.chosen]]
+    return found.log_likelihood - _paid(whole, plain.chosen) - 0.5 * float(np.sum((rate / _RATE_SPREAD) ** 2))
 
 
 def _keys(whole: Inference, places: Iterable[int]) -> set[Key]:
