@@ -13,7 +13,7 @@ from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.evidence.chance import Chance
 from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
-from mlg_troubleshoot.diagnosis.evidence.held_out import held_out_part
+from mlg_troubleshoot.diagnosis.evidence.held_out import held_out_part, likelier
 from mlg_troubleshoot.diagnosis.evidence.screen import Screen, fit
 from mlg_troubleshoot.diagnosis.evidence.verdict import NAME, Verdict, verdict_of
 from mlg_troubleshoot.diagnosis.gain import folds
@@ -26,18 +26,16 @@ _BLOCK_ROUNDS = 2
 # By which factors of all joints must beat the best of single causes, and two causes of single joints, which their prior
 # covers dearly; and from which they are a rival of one cause, and of one scale for all.
 BLOCK_LEAD, PAIR_LEAD, BLOCK_RIVAL, SCALE_RIVAL = 3.0, -8.0, -1.0, -3.5
-# From which directions are a rival of one scale below a bound: 40° apart (52 fleets, seeds 6,201,000) they are 5.4
-# behind at most; where the rate is off (13 at S = 10 to 25, 6,205,000) 3.1 to 7.2, seven by more than 5.
-BOUND_RIVAL = -5.0
-# And of any cause but one scale that no longer stands out beside them; and of a scale and a direction together, or two
-# directions: 40° apart (40 fleets, seeds 3,600,000) the two are 5 to 11 ahead, where just the two are wrong (9,
-# 3,700,000) 8 to 13. The data cannot tell; that load moves the pins is one cause, that two meet which look like it is
-# far rarer (some 60 to 1): they become its alias.
+# By which directions must beat one joint's cause, and one scale; from which they are a rival of these. 40° apart (400
+# fleets, seeds 8,940,000) they are behind one joint's cause by 4.0 or more in 3 of 35, one scale by 4.6 or more in 4 of
+# 156; where just that is wrong (S = 10 to 25, seeds 8,950,000) they are ahead by more than -2.0 in 1 of 119, more than
+# -1.0 in 2 of 44, and behind by 4.0 or more in 92 %, by 4.6 or more in 45 %.
+SKEWED_LEAD, SCALE_ALONE, SKEWED_RIVAL, BOUND_RIVAL = -2.0, -1.0, -4.0, -4.6
+# From which factors of all joints are a rival of any cause but one scale that no longer stands out beside them; and
+# directions of a scale and a direction, or two directions: 40° apart (40 fleets, seeds 3,600,000) the two are 5 to 11
+# ahead, where just the two are wrong (9, 3,700,000) 8 to 13. The data cannot tell; that load moves the pins is one
+# cause, that two meet which look like it is far rarer (some 60 to 1): they become its alias.
 HIDDEN_RIVAL, NESTED = -5.0, -12.0
-# BLOCK_LEAD and HIDDEN_RIVAL for directions, whose prior is skewed as they are: 40° apart (26 fleets with one cause
-# instead, seeds 6,201,000) they are ahead by -3.8 to 50, where one joint's direction or contact is wrong (95, seeds
-# 6,202,000 and 6,205,000) behind by 2.4 and more, nine of ten by more than 3.6.
-SKEWED_LEAD, SKEWED_RIVAL = -1.2, -4.0
 # By which they may be behind two causes of which they spare one: on 56 fleets of other linkages with one cause (seeds
 # 3,400,000) they are by 0 to 1.4, on 70 of the drawn one with two causes (3,460,000) by 2.9 and more.
 SECOND_LEAD = -2.0
@@ -46,8 +44,8 @@ SECOND_LEAD = -2.0
 # directions and linkage are told apart.
 CLEARLY, CLASS_APART = 8.0, 5.0
 # By which a joint's cause beside another linkage must lead factors of all joints, a direction's further, being one of
-# them, and may be behind two causes. Where directions are the truth (310 fleets, seeds 8,920,000) one leads by 3.3 at
-# most, a direction by 4.1; where it is the truth (60 with another linkage) mostly by 4.5 to 35.
+# them, and may be behind two causes. Where directions are the truth (310 fleets, seeds 8,920,000, 400, 8,940,000) one
+# leads by 3.3 at most, a direction by 6.0; where it is the truth (60 with another linkage) by 4.5 to 35, by 6.7 to 15.
 JOINT_LEAD, DIRECTION_LEAD, PAIR_RIVAL = 4.0, 6.5, -3.0
 # Standard errors by which readings are beyond a bound for certain; change of all predictions that is no error of the
 # rate alone: the study's fleets end at 0.2, linkages that nobody calibrated begin at 0.7; loss of all predictions that
@@ -55,7 +53,7 @@ JOINT_LEAD, DIRECTION_LEAD, PAIR_RIVAL = 4.0, 6.5, -3.0
 _BEYOND, MOST_RATE, MOST_LOSS = 2.0, 0.4, 0.6
 # How far the rate of a valve may be off, supposed: one standard deviation. [1]
 _RATE_SPREAD = 0.1
-# Mean square on held-out tails over that of two causes of single joints, up to which factors of all are preferred. [1]
+# Square of what is left of held-out tails over that of two causes of single joints, up to which factors win. [1]
 PAIR_WORSE = 1.2
 # Chance below which one scale for all joints is rejected, and below which it is doubted; by which the factors may be
 # behind it all the same: on 44 fleets that are one scale and were rejected or nearly so (seeds 3,210,000 and 4,210,000)
@@ -210,17 +208,19 @@ def _single(
     instead = bool(chosen) and found.verdict is Verdict.NAMED and len(plain.chosen) > len(chosen)
     instead = instead and _keys(whole, chosen) <= _keys(whole, plain.chosen)
     nested = _nested(named)
-    alone = SKEWED_LEAD if named and block.parts is not None else BLOCK_LEAD
+    alone = BLOCK_LEAD
+    if named and block.changes is not None:
+        alone = SCALE_ALONE if named[0].one_scale else SKEWED_LEAD
     needed = PAIR_LEAD if len(named) > 1 else SECOND_LEAD if instead else alone
     needed = NESTED if nested and block.cause.bounded else needed
     rejects = rejected < SCALE_REJECTED and lead >= SCALE_LEAD
     allowed = PAIR_WORSE if needed < BLOCK_LEAD or rejects else 1.0
     fold, _by = folds(noise, columns[:, [*plain.chosen, *chosen]], np.arange(len(whole.misfit)))
     smaller, larger = (
-        float(np.mean((whole.misfit - held_out_part(noise, columns[:, list(held)], whole.misfit, fold, with_it)) ** 2))
+        whole.misfit - held_out_part(noise, columns[:, list(held)], whole.misfit, fold, with_it)
         for held, with_it in ((plain.chosen, None), (chosen, (block.columns, block.covariance)))
     )
-    worse = larger > allowed * smaller
+    worse = not likelier(noise, smaller, larger, fold, allowed)
     if not worse and (lead >= needed or rejects):
         return None
     one_scale = bool(named) and named[0].one_scale
@@ -228,8 +228,8 @@ def _single(
     if one_scale:
         rival = BOUND_RIVAL if block.cause.bounded else SCALE_RIVAL
     # Beside factors of all joints it may stand out no more: then they are a rival of anything.
-    if not one_scale and (instead or (not chosen and found.verdict is Verdict.NONE)):
-        rival = min(rival, HIDDEN_RIVAL if block.parts is None else SKEWED_RIVAL)
+    if not one_scale and (instead or (not chosen and found.verdict is not Verdict.UNLISTED)):
+        rival = min(rival, HIDDEN_RIVAL if block.changes is None else SKEWED_RIVAL)
     rival = NESTED if nested else rival
     near = lead > rival or rejected < SCALE_DOUBTED
     values = whole.refit(plain.chosen)[1].values
@@ -297,7 +297,7 @@ def _judged(misfit: Array, rows: Rows, held: Array, block: Block) -> NoiseModel:
 def _marginal(noise: NoiseModel, held: Array, block: Block, misfit: Array) -> float:
     """Marginal log-likelihood of factors of all joints beside single causes, less its penalty."""
     found = fit(noise.beside(block.effects_in), held, misfit)
-    if block.parts is None:
+    if block.changes is None:
         return found.log_likelihood - block.penalty
     # What is fitted freely may be as large as an inch.
     free, count = noise.beside(held / np.sqrt(np.mean(held**2, axis=0))), block.columns.shape[1]

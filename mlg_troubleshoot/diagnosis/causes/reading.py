@@ -56,17 +56,15 @@ class _Level(Cause):
 
     parameter: ClassVar[str] = "offset_in"
     trial: ClassVar[float] = 0.001
-    factor: ClassVar[str]
-    label: ClassVar[str]
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield one candidate for each value that occurs often enough, but not everywhere."""
-        for value in levels(scene.table.factors[self.factor]):
-            yield Candidate(self, f"{self.label} {value}", {"value": value})
+        for value in levels(scene.table.factors[self.needs[0]]):
+            yield Candidate(self, f"{self.needs[0].removesuffix('_id')} {value}", {"value": value})
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Shift the rows of that value."""
-        texts = scene.table.factors.get(self.factor, np.full(len(scene.table), ""))
+        texts = scene.table.factors.get(self.needs[0], np.full(len(scene.table), ""))
         return offset(scene, texts == candidate.setting["value"], value)
 
 
@@ -75,9 +73,7 @@ class GaugeBias(_Level):
 
     name: ClassVar[str] = "gauge_bias"
     needs: ClassVar[tuple[str, ...]] = ("gauge_id",)
-    factor: ClassVar[str] = "gauge_id"
     acts_in: ClassVar[str | None] = "gauge_id"
-    label: ClassVar[str] = "gauge"
     sentence: ClassVar[str] = "Readings with {target} are shifted"
     inspect: ClassVar[str] = "Calibration of that gauge"
     separates: ClassVar[str] = "one gear measured with this gauge and with another by the same technician on one day"
@@ -88,9 +84,7 @@ class TechnicianBias(_Level):
 
     name: ClassVar[str] = "technician_bias"
     needs: ClassVar[tuple[str, ...]] = ("technician_id",)
-    factor: ClassVar[str] = "technician_id"
     acts_in: ClassVar[str | None] = "technician_id"
-    label: ClassVar[str] = "technician"
     sentence: ClassVar[str] = "Readings by {target} are shifted"
     inspect: ClassVar[str] = "How that technician seats and zeroes the gauge"
     separates: ClassVar[str] = "one gear measured by this technician and by another with the same gauge on one day"

@@ -36,8 +36,8 @@ LINKAGES = ((1.0, 0.0), (0.5, 0.0), (1.0, 0.5))
 ALONE = 0.03
 # And beside the way from the drawn one to a member of the ensemble, supposed: a third of that. [1]
 NEAR = 0.01
-# With more joints there are too many ways to have some of them near the worst direction and the others far from it.
-_MOST_SKEWED = 12
+# Changes of one joint that stand for all that are likely, and rounds in which all joints settle to a hundredth.
+_LIKELY, _ROUNDS = 1000, 8
 # Degree of the polynomials in the extension that stand for the curves of linkages between those of the ensemble.
 _DEGREE = 6
 
@@ -53,8 +53,7 @@ class Block:
     covariance, shape (k, k): covariance of the changes of the factors about none. [1]
     penalty: logarithm of the number of blocks of the same cause that are tried. [1]
     uncalibrated: True if all joints may also count more or less alike.
-    parts, shape (2, 3): share, mean and variance of the changes of joints near their worst direction, and far from it:
-        the prior is skewed where most joints lose little and a few lose much. [1]
+    changes, shape (m,): equally likely changes of a joint, skewed: most lose little, a few lose much. [1]
     model: the linkage that they are the way to, if they are the way to a certain one.
     """
 
@@ -64,21 +63,16 @@ class Block:
     covariance: Array
     penalty: float
     uncalibrated: bool = False
-    parts: Array | None = None
+    changes: Array | None = None
     model: LinkageModel | None = None
 
     def skew(self, along: Array, square: Array) -> float:
         """Log-likelihood by which the skewed prior beats the normal one, for exp(aᵀx − xᵀQx/2) of changes x."""
-        count = len(along)
-        if self.parts is None or not 0 < count <= _MOST_SKEWED:
+        if self.changes is None or not len(along):
             return 0.0
-        which = np.indices((2,) * count).reshape(count, -1).T
-        share, mean, variance = (part[which] for part in self.parts.T)
-        apart = _evidence(along, square, mean, np.sqrt(variance)[:, None] * np.eye(count))
-        apart += np.sum(np.log(share), axis=1)
-        root = np.asarray(np.linalg.cholesky(self.covariance)[None], float)
-        normal = _evidence(along, square, np.zeros((1, count)), root)
-        return float(logsumexp(apart) - normal[0])
+        inner = np.eye(len(along)) + self.covariance @ square
+        normal = along @ np.linalg.solve(inner, self.covariance @ along) - np.linalg.slogdet(inner)[1]
+        return _evidence(along, square, self.changes) - 0.5 * float(normal)
 
     @property
     def effects_in(self) -> Array:
@@ -98,17 +92,10 @@ class Block:
         def by_joint(values: Array) -> dict[str, float]:
             return dict(zip(named, np.clip(1.0 + values, low, high).tolist(), strict=True))
 
-        setting = {
-            "factors": by_joint(change),
-            "low": by_joint(change - 1.96 * error),
-            "high": by_joint(change + 1.96 * error),
-            "together": tuple(
-                joint
-                for joint, most in zip(self.joints, np.min(together, axis=1, initial=0.0), strict=True)
-                if most < _TOGETHER
-            ),
-        }
-        return Candidate(self.cause, None, setting)
+        tied = zip(self.joints, np.min(together, axis=1, initial=0.0), strict=True)
+        setting = {"factors": by_joint(change), "together": tuple(joint for joint, most in tied if most < _TOGETHER)}
+        sides = {"low": by_joint(change - 1.96 * error), "high": by_joint(change + 1.96 * error)}
+        return Candidate(self.cause, None, {**setting, **sides})
 
 
 # Correlation of two factors from which only their sum is known. [1]
@@ -166,25 +153,13 @@ class LoadDirections(JointFactors):
     separates: ClassVar[str] = "one gear's plunger over the whole stroke, or read again with one pin pushed by hand"
 
     def covariances(self, model: LinkageModel, ensemble: Sequence[LinkageModel]) -> list[Array]:
-        """Mean and variance of cos φ for normal angles: exp(−σ²/2), and (1 − exp(−σ²))² / 2; ½ if all around."""
-        n, found = len(model.joint_numbers), []
-        for spread in np.radians(SPREADS_DEG):
-            around = spread >= np.pi
-            mean, variance = (0.0, 0.5) if around else (np.exp(-(spread**2) / 2), (1 - np.exp(-(spread**2))) ** 2 / 2)
-            found.append((mean - 1.0) ** 2 * np.ones((n, n)) + variance * np.eye(n))
-        return found
+        """Second moments of what normal angles change, about none."""
+        alike, own = np.ones((len(model.joint_numbers),) * 2), np.eye(len(model.joint_numbers))
+        return [np.mean(change) ** 2 * alike + np.var(change) * own for change in _changes()]
 
     def blocks(self, scene: Scene, ensemble: Sequence[LinkageModel]) -> list[Block]:
-        """Joints within one standard deviation of the worst direction (all around: a right angle), and the others."""
-        chance = (np.arange(2000) + 0.5) / 2000
-        found = []
-        for block, spread in zip(super().blocks(scene, ensemble), np.radians(SPREADS_DEG), strict=True):
-            around = spread >= np.pi
-            angle = np.pi * chance if around else spread * norm.ppf(0.5 + 0.5 * chance)
-            near, change = angle <= (np.pi / 2 if around else spread), np.cos(angle) - 1.0
-            parts = [(np.mean(part), np.mean(change[part]), np.var(change[part])) for part in (near, ~near)]
-            found.append(replace(block, parts=np.array(parts)))
-        return found
+        """The same with the changes of normal angles, which are skewed."""
+        return [replace(b, changes=c) for b, c in zip(super().blocks(scene, ensemble), _changes(), strict=True)]
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Let each clearance act by its factor along its worst direction."""
@@ -248,13 +223,38 @@ class OtherGeometry(JointFactors):
         return Adjustment(scene.clearance_in * self.factors(scene.joints, candidate, value))
 
 
-def _evidence(along: Array, square: Array, mean: Array, root: Array) -> Array:
-    """Logarithm of the mean of exp(aᵀx − xᵀQx/2) over normal x, for means (m, k) and roots of covariances (m, k, k)."""
-    turned = np.swapaxes(root, 1, 2)
-    low = np.linalg.cholesky(np.eye(len(along)) + turned @ square @ root)
-    own = np.linalg.solve(low, turned @ (along - mean @ square)[..., None])[..., 0]
-    level = mean @ along - 0.5 * np.einsum("mi,mi->m", mean @ square, mean) + 0.5 * np.sum(own**2, axis=1)
-    return np.asarray(level - np.sum(np.log(np.einsum("mii->mi", low)), axis=1))
+def _changes() -> list[Array]:
+    """Equally likely changes cos φ − 1 of a joint for normal angles φ of each spread, and for ones all around. [1]"""
+    half = (np.arange(_LIKELY) + 0.5) / _LIKELY
+    spreads = np.radians(SPREADS_DEG)
+    return [np.cos(np.pi * half if s >= np.pi else s * norm.ppf(0.5 + 0.5 * half)) - 1.0 for s in spreads]
+
+
+def _evidence(along: Array, square: Array, changes: Array) -> float:
+    """Logarithm of the mean of exp(aᵀx − xᵀQx/2), each of x one of some equally likely changes.
+
+    By expectation propagation (T. P. Minka, "Expectation Propagation for approximate Bayesian inference", 2001): each
+    joint's changes are taken as normal, with the moments that they have where the other joints are as they are.
+    """
+    precise, pull = (np.full(len(along), size / np.var(changes)) for size in (1.0, np.mean(changes)))
+    for _ in range(_ROUNDS):
+        inner = square + np.diag(precise)
+        spread = np.linalg.inv(inner)
+        mean, own = spread @ (along + pull), np.diag(spread)
+        others, push = np.maximum(1.0 / own - precise, 0.0), mean / own - pull
+        weight = push[:, None] * changes - 0.5 * others[:, None] * changes**2
+        size = logsumexp(weight, axis=1, keepdims=True)
+        chance = np.exp(weight - size)
+        at = chance @ changes
+        variance = np.maximum(chance @ changes**2 - at**2, 1e-8)
+        both = others + precise
+        level = float(
+            np.sum(size[:, 0] - np.log(len(changes)) + 0.5 * np.log(both) - (push + pull) ** 2 / (2.0 * both))
+        )
+        level += 0.5 * float((along + pull) @ mean - np.linalg.slogdet(inner)[1])
+        precise = 0.3 * precise + 0.7 * np.maximum(1.0 / variance - others, 1e-4)
+        pull = 0.3 * pull + 0.7 * (at / variance - push)
+    return level
 
 
 def _apart(model: LinkageModel, ensemble: Sequence[LinkageModel]) -> Array:

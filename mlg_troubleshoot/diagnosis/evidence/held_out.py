@@ -25,14 +25,16 @@ def folds_of(row: Wholes, group: Wholes | None, columns: Array, shuffled: Wholes
     return shuffled[row] % min(_FOLDS, len(shuffled)), "row"
 
 
-def likelier(noise: NoiseModel, before: Array, after: Array, fold: Wholes) -> bool:
+def likelier(noise: NoiseModel, before: Array, after: Array, fold: Wholes, allowed: float = 1.0) -> bool:
     """Tell whether what is left of held-out rows is likelier after than before, what a fold has in common being noise.
+
+    allowed: square of what is left after over that before, from which it is not. [1]
 
     Far readings decide no more than others: where noise is estimated they scatter more.
     """
     left, ratio = np.column_stack([before, after]), noise.tail_ratios[-1]
     square = np.sum([noise.take(fold == k).square(left[fold == k], ratio) for k in np.unique(fold)], axis=0)
-    return bool(square[1] < square[0])
+    return bool(square[1] < allowed * square[0])
 
 
 def held_out_part(
