@@ -115,6 +115,26 @@ def test_directions_are_named_where_one_joint_loses_much_and_the_others_little()
     assert [name for name, _target in one["named"]] == ["load_directions"]
 
 
+def test_readings_smaller_than_a_rate_is_ever_off_are_directions_before_one_scale() -> None:
+    one = run(("loads:40", 109, 8_940_109))
+    assert [name for name, _target in one["named"]] == ["load_directions"]
+
+
+def test_rows_that_scatter_more_decide_no_more_between_two_joints_and_directions_of_all() -> None:
+    one = run(("loads:40", 91, 8_940_091))
+    assert [name for name, _target in one["named"]] == ["load_directions"]
+
+
+def test_a_direction_is_not_named_where_beside_directions_of_all_joints_only_a_faint_cause_is_left() -> None:
+    one = run(("loads:40", 21, 8_940_021))
+    assert (one["named"], ("load_directions", None) in one["also"]) == ([], True)
+
+
+def test_directions_of_all_joints_are_not_taken_for_one_that_turns_beside_another_linkage() -> None:
+    one = run(("loads:40", 310, 8_940_310))
+    assert rate("load directions: something else named", one) == 0.0
+
+
 def test_one_joint_beside_another_linkage_is_not_taken_for_directions_of_all() -> None:
     one = run(("linkage, one cause", 115, 6_201_315))
     assert rate("another linkage, one cause, S = 15: named, geometry beside it or not", one) == 1.0
