@@ -117,7 +117,7 @@ def _paid(whole: Inference, places: Sequence[int]) -> float:
 def _alone(whole: Inference, noise: NoiseModel, plain: Finding) -> float:
     """Log-likelihood of single causes that are chosen, less what they pay, a rate the more the further it is off."""
     found = fit(noise, whole.columns[:, list(plain.chosen)], whole.misfit)
-    rate = found.values[[whole.candidates[k].cause.one_scale for k in plain.chosen]]
+    rate = np.clip(found.values[[whole.candidates[k].cause.one_scale for k in plain.chosen]], -MOST_RATE, MOST_RATE)
     return found.log_likelihood - _paid(whole, plain.chosen) - 0.5 * float(np.sum((rate / _RATE_SPREAD) ** 2))
 
 

@@ -10,13 +10,12 @@ import pytest
 
 from mlg_troubleshoot.diagnosis import CATALOGUE, Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes import JointContact, OutOfPlaneTilt, RiggingOffset
-from mlg_troubleshoot.diagnosis.causes.together import LoadDirections
 from mlg_troubleshoot.diagnosis.scene import effect_columns
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.gear.adjustment import adjusted_worst_case
 from mlg_troubleshoot.gear.gear import Gear
 
-from .conftest import Array, fleet, only, scene_of
+from .conftest import fleet, only, scene_of
 
 BY_NAME = {cause.name: cause for cause in CATALOGUE}
 # The names, the columns they need and the allowed sign of the parameter, from the contract and the physics.
@@ -321,19 +320,3 @@ def test_a_missing_cell_makes_a_cause_do_nothing_in_that_row(name: str, gear: Ge
 
 def test_the_contributions_of_the_joints_add_up_to_the_prediction(scene: Scene) -> None:
     assert scene.contribution_in.sum(axis=1) == pytest.approx(scene.over_in, rel=0.1)
-
-
-def test_the_skewed_prior_of_directions_is_that_of_the_cosine_of_normal_angles(gear: Gear) -> None:
-    worn = fleet(gear.model, clearance_in=fleet(gear.model).clearance_in * (np.arange(10) < 2))
-    block = LoadDirections().blocks(scene_of(gear.model, worn, gear.discrepancies), ())[1]
-    # What two joints' readings say of their changes: one hardly any, one about a half; the first known less well.
-    square = np.array([[40.0, 10.0], [10.0, 300.0]])
-    along = square @ [-0.05, -0.5]
-    rng = np.random.default_rng(0)
-    changes = np.cos(np.radians(45.0) * rng.standard_normal((400_000, 2))) - 1.0
-    alike = rng.standard_normal((400_000, 2)) @ np.linalg.cholesky(block.covariance).T
-
-    def level(x: Array) -> float:
-        return float(np.log(np.mean(np.exp(x @ along - 0.5 * np.einsum("ij,ij->i", x @ square, x)))))
-
-    assert block.skew(along, square) == pytest.approx(level(changes) - level(alike), abs=0.05)
