@@ -2,7 +2,7 @@
 
     python -m tests.hidden_effect.departures --workers 2
 
-Its seeds, 5,200,000 and following, were used for nothing before. The lines near what is asked have 400 fleets. Those
+Its seeds, 5,200,000 and following, were used for no threshold. The lines near what is asked have 400 fleets. Those
 from 5,100,000, 200 a line, judged five earlier versions of the program; what was changed in between was set on others.
 """
 
