@@ -44,8 +44,8 @@ SECOND_LEAD = -2.0
 # directions and linkage are told apart.
 CLEARLY, CLASS_APART = 8.0, 5.0
 # By which a joint's cause beside another linkage must lead factors of all joints, a direction's further, being one of
-# them, and may be behind two causes. Where directions are the truth (310 fleets, seeds 8,920,000, 400, 8,940,000) one
-# leads by 3.3 at most, a direction by 6.0; where it is the truth (60 with another linkage) by 4.5 to 35, by 6.7 to 15.
+# them, and may be behind two causes. Where directions are the truth (400 fleets, seeds 8,940,000) one leads by 3.8 at
+# most, a direction by 6.0; where it is the truth (another linkage, seeds 8,941,200) by 5.8 to 26, 7.9 to 18 in 7 of 9.
 JOINT_LEAD, DIRECTION_LEAD, PAIR_RIVAL = 4.0, 6.5, -3.0
 # Standard errors by which readings are beyond a bound for certain; change of all predictions that is no error of the
 # rate alone: the study's fleets end at 0.2, linkages that nobody calibrated begin at 0.7; loss of all predictions that

@@ -36,7 +36,7 @@ LINKAGES = ((1.0, 0.0), (0.5, 0.0), (1.0, 0.5))
 ALONE = 0.03
 # And beside the way from the drawn one to a member of the ensemble, supposed: a third of that. [1]
 NEAR = 0.01
-# Changes of one joint that stand for all that are likely, and rounds in which all joints settle to a hundredth.
+# Changes of one joint that stand for all; rounds that settle the evidence to 0.02, but of a spread far behind another.
 _LIKELY, _ROUNDS = 1000, 8
 # Degree of the polynomials in the extension that stand for the curves of linkages between those of the ensemble.
 _DEGREE = 6
