@@ -29,6 +29,11 @@ class LengthUnit(StrEnum):
         return {"in": 1.0, "thou": THOU_PER_IN, "mm": MM_PER_IN}[self.value]
 
     @property
+    def words(self) -> str:
+        """The unit in full, in the plural."""
+        return {"in": "inches", "thou": "thou", "mm": "millimetres"}[self.value]
+
+    @property
     def decimals(self) -> int:
         """Decimals that show a length to about 0.0001 in."""
         return {"in": 4, "thou": 1, "mm": 3}[self.value]

@@ -65,7 +65,7 @@ def _judged(
     typed = {"record_id": flags.record_id, "tail_no": flags.tail, "side": flags.side, **more}
     names = {"tail_no": "tail", "plunger_displacement": "measured"}
     named = {column: f"--{names.get(column, column).replace('_', '-')} {text!r}" for column, text in typed.items()}
-    options = ReadOptions.of(load_gear(declared.gear), unit=declared.unit, convention=declared.convention)
+    options = ReadOptions.of(load_gear(declared.gear), declared)
     return admit({**values, **more}, options, {**named, **labels})
 
 

@@ -61,6 +61,14 @@ ColumnMap = Annotated[
     typer.Option("--map", metavar="HEADER=COLUMN", help="How to read a header, e.g. 'Spiel 3=clearance_3_mm'."),
 ]
 DecimalComma = Annotated[bool, typer.Option("--decimal-comma", help="0,013 means 0.013.")]
+SmallReadingsTrue = Annotated[
+    bool,
+    typer.Option("--small-readings-true", help="Readings below the play of new parts were checked: the unit is right."),
+]
+Dates = Annotated[
+    str | None,
+    typer.Option("--dates", metavar="dmy|mdy|ymd", help="Order of dates that are written as numbers."),
+]
 Causes = Annotated[
     list[Path] | None,
     typer.Option("--causes", metavar="FILE.py", help="Your own causes. Runs this file: give only one that you trust."),
@@ -87,11 +95,16 @@ class Tables:
     sheet: Sheet = None
     column_map: ColumnMap = None
     decimal_comma: DecimalComma = False
+    small_readings_true: SmallReadingsTrue = False
+    dates: Dates = None
 
     def declared(self, remembered: Mapping[str, str]) -> dict[str, Any]:
         """What a task is told of them, with the headers that are remembered."""
+        from mlg_troubleshoot.records.dates import DateOrder
+
         told = {each.name: getattr(self, each.name) for each in fields(self)}
-        return {**told, "column_map": self.columns, "remembered_map": remembered}
+        dates = None if self.dates is None else DateOrder.parse(self.dates)
+        return {**told, "dates": dates, "column_map": self.columns, "remembered_map": remembered}
 
     @property
     def columns(self) -> dict[str, str]:

@@ -83,6 +83,11 @@ class Cases:
         """True for a gear of which a critical joint was not measured."""
         return np.asarray((~self.measured & self.gear.critical).any(axis=1))
 
+    @property
+    def unit_doubtful(self) -> Mask:
+        """True for a gear whose readings may be of another unit than the one that is stated."""
+        return np.array([bool(inspection.unit_question) for inspection in self.inspections])
+
     def filled(self, unmeasured: Array | float) -> Array:
         """Clearances with something in place of those not measured. [in]"""
         return np.where(self.measured, self.clearance_in, unmeasured)

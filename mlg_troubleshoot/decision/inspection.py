@@ -97,6 +97,10 @@ class Inspection:
         Who measured with what.
     axial_float_in : mapping of int to float
         End float of a joint along its pin. [in]
+    small_readings_true : bool
+        True if somebody confirmed that readings below the play of new parts were read in the stated unit.
+    unit_question : str
+        What must be confirmed about the unit of the readings before this gear can be cleared; empty if nothing.
     carried : mapping of str to str
         Columns that only travel to the report: work order, manual reference, remarks, unknown columns.
     warnings : tuple of str
@@ -130,6 +134,8 @@ class Inspection:
     gauge_id: str | None = None
     technician_id: str | None = None
     axial_float_in: Mapping[int, float] = field(default_factory=dict)
+    small_readings_true: bool = False
+    unit_question: str = ""
     carried: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     source: RowSource = RowSource()

@@ -72,9 +72,11 @@ def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Ass
     p_lower = batch.lower.probability_within(cases.margin_in, cases.margin_u_in)
     p_upper = batch.upper.probability_within(cases.margin_in, cases.margin_u_in)
     plunger = plunger_reading.compare(cases, batch.upper)
+    # A gear whose readings may be of another unit cannot be cleared either.
+    absent = cases.critical_missing | cases.unit_doubtful
     verdicts = [
-        Verdict.OUTSIDE_MARGIN if beyond else verdict(float(low), float(high), critical_missing=bool(absent))
-        for beyond, low, high, absent in zip(plunger.beyond, p_lower, p_upper, cases.critical_missing, strict=True)
+        Verdict.OUTSIDE_MARGIN if beyond else verdict(float(low), float(high), critical_missing=bool(missing))
+        for beyond, low, high, missing in zip(plunger.beyond, p_lower, p_upper, absent, strict=True)
     ]
     closes = np.isfinite(batch.lower.displacement_in)
     found = calibrated(cases, search(cases, batch.upper.displacement_in, batch.upper.u_clearances_in))
@@ -190,13 +192,14 @@ def _headline(cases: Cases, judged: Judged, i: int) -> str:
         return f"{sentences.measured(mean, margin, 'outside')} {then}"
     if not closes:
         return sentences.NO_CLOSURE
+    if found is Verdict.INCOMPLETE:
+        open_joints = [n for n, read in zip(cases.gear.joint_numbers, cases.measured[i], strict=True) if not read]
+        question = cases.inspections[i].unit_question
+        return sentences.unit_doubtful(question, said) if question else sentences.incomplete(open_joints, said)
     if found is Verdict.OUTSIDE_MARGIN:
         return sentences.outside(margin, said)
     if found is Verdict.WITHIN_MARGIN:
         return sentences.within(margin, said, failed=bool(cases.failed[i]))
-    if found is Verdict.INCOMPLETE:
-        open_joints = [n for n, read in zip(cases.gear.joint_numbers, cases.measured[i], strict=True) if not read]
-        return sentences.incomplete(open_joints, said)
     return sentences.inconclusive(margin, said, float(judged.p_within[i]))
 
 

@@ -39,6 +39,7 @@ def correct(row: InvalidRow) -> Plan:
     return Plan((Step(Action.CORRECT, (), 0.0, None, sentences.correct(row.correct)),), End.CORRECT)
 
 
+CONFIRM_UNIT = Plan((Step(Action.CORRECT, (), 0.0, None, sentences.CONFIRM_UNIT),), End.CORRECT)
 NOT_CLOSING = Plan((Step(Action.CORRECT, (), 0.0, None, sentences.CHECK_ENTRIES),), End.CORRECT)
 
 
@@ -97,6 +98,8 @@ class _Course:
         f, i = self.facts, self.row
         if not np.isfinite(self.judged.batch.lower.displacement_in[i]):
             return NOT_CLOSING
+        if self.cases.unit_doubtful[i]:
+            return CONFIRM_UNIT
         if f.settled_by_plunger[i]:
             return self._restore_over_limit().end(End.NOT_EXPLAINED)
         failed = self.cases.failed[i]

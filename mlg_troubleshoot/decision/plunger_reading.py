@@ -11,7 +11,7 @@ from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.decision.case import Cases, plunger_u
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.prediction import Prediction
-from mlg_troubleshoot.units import SLIPS
+from mlg_troubleshoot.units import SLIPS, ClearanceConvention, LengthUnit
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,26 +59,26 @@ def disagreement(inspection: Inspection, over_in: float, under_in: float, standa
         f"combined standard uncertainties ({2 * u:.4f} in)."
     )
     if under_in - 2.0 * u <= measured < over_in:
-        slip = _slip(measured, over_in, u)
         return (
             f"{differs} It lies inside the worst-case bounds, so it is possible: the clearances need not be taken "
-            f"up in the worst direction.{slip}"
+            "up in the worst direction."
         )
     return (
         f"{differs} It is beyond what the entered clearances can do in any direction. Look for: a clearance read "
         f"smaller than it is or entered with the wrong unit or convention, an unmeasured joint, a part outside "
-        f"the listed joints, a changed rigging, the plunger gauge.{_slip(measured, over_in, u)}"
+        f"the listed joints, a changed rigging, the plunger gauge."
+        f"{_entry_error(inspection, abs(measured), over_in if measured > 0.0 else -under_in, u)}"
     )
 
 
-def _slip(measured: float, predicted: float, u: float) -> str:
-    """Name a slip of the entry that would make the two agree; it is suggested, never applied."""
-    if predicted <= 0.0 or measured <= 0.0:
-        return ""
-    for slip in SLIPS.values():
-        factor = slip.factor
-        for value in (factor, 1.0 / factor):
-            if abs(measured - predicted * value) <= max(u, 0.05 * abs(measured)):
-                words = " or ".join(dict.fromkeys((slip.too_large, slip.too_small)))
-                return f" A slip that would explain it: {words} (factor {factor:g})."
+def _entry_error(inspection: Inspection, measured: float, bound: float, u: float) -> str:
+    """Name an error of entry that made the clearances, and so the bound, too small: suggested, never applied."""
+    possible = {
+        "unit": any(reading.unit is LengthUnit.MILLIMETRE for reading in inspection.entered.values()),
+        "point": True,
+        "convention": inspection.convention is not ClearanceConvention.RADIAL,
+    }
+    for name, slip in SLIPS.items():
+        if possible[name] and bound > 0.0 and abs(measured - bound * slip.factor) <= max(u, 0.05 * measured):
+            return f" An entry error that would explain it: {slip.too_small} (factor {slip.factor:g})."
     return ""

@@ -94,6 +94,14 @@ def incomplete(open_joints: Sequence[int], said: Predicted) -> str:
     return f"Cannot clear: not measured {joint_list(open_joints)} ({said} from the measured joints alone)."
 
 
+def unit_doubtful(question: str, said: Predicted) -> str:
+    """Headline of a gear whose readings may be of another unit."""
+    return f"Cannot clear before the unit of the readings is confirmed: {question} ({said} as entered)."
+
+
+CONFIRM_UNIT = "Do not use. Confirm that the readings were taken in the unit that is stated, or correct the unit."
+
+
 def inconclusive(margin_in: float, said: Predicted, p_within: float) -> str:
     """Headline of INCONCLUSIVE."""
     what = "the plunger" if said.loaded else "the bound"

@@ -35,6 +35,7 @@ class Kind(StrEnum):
     GAUGE_ID = "gauge_id"
     TECHNICIAN_ID = "technician_id"
     OUTCOME = "outcome"
+    SMALL_READINGS_TRUE = "small_readings_true"
     WORK_ORDER = "work_order"
     MANUAL_REF = "manual_ref"
     MANUAL_REV = "manual_rev"
@@ -62,7 +63,10 @@ REQUIRED = (Kind.TAIL_NO, Kind.SIDE)
 IDENTITY = (Kind.RECORD_ID, *REQUIRED)
 # A mistake in one of these changes a verdict, so the whole row is not judged.
 VERDICT_BEARING = frozenset(
-    {*IDENTITY, Kind.CONVENTION, Kind.UNIT, Kind.JOINT, Kind.CLEARANCE, Kind.MARGIN, Kind.MARGIN_U}
+    (
+        *(*IDENTITY, Kind.CONVENTION, Kind.UNIT, Kind.JOINT, Kind.CLEARANCE, Kind.SMALL_READINGS_TRUE),
+        *(Kind.OUTCOME, Kind.PLUNGER_DISPLACEMENT, Kind.MARGIN, Kind.MARGIN_U, Kind.GAUGE_U, Kind.PLUNGER_GAUGE_U),
+    )
 )
 CARRIED = (Kind.WORK_ORDER, Kind.MANUAL_REF, Kind.MANUAL_REV, Kind.REMARKS)
 

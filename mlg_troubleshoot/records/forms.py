@@ -81,6 +81,7 @@ def read_form(form: Form, options: ReadOptions, *, file: str | None, sheet: str 
     ids = [row for row, p in named if p.field is not None and p.field.kind is Kind.RECORD_ID]
     start = ids[0] if ids else form.lines[0][0]
     out.rows.append(reader.read(start, [value for _, _, value in form.lines], value_places))
+    out.notes += filter(None, [reader.settle_dates(out.rows)])
     out.invalid_content[out.rows[0].source] = hash(tuple(value for _, _, value in form.lines))
     read = tuple(ColumnReading(form.value_column, p.header, p.read_as, row) for row, p in named)
     out.layouts.append(SheetLayout(file, sheet, "form", form.lines[0][0], form.value_column + 1, read))

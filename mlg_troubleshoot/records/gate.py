@@ -20,7 +20,7 @@ from mlg_troubleshoot.records.rows import RowReader
 _AS_IN_A_TABLE = (
     *("record_id", "tail_no", "side", "convention", "outcome", "inspection_date", "gear_landings", "temperature_c"),
     *("hydraulic_pressure_psi", "approach", "gauge_id", "technician_id", "plunger_gauge_u_in", "plunger_down_lock_in"),
-    *("actuator_extension_in", "plunger_position_in", "margin_in", "margin_u_in"),
+    *("actuator_extension_in", "plunger_position_in", "margin_in", "margin_u_in", "small_readings_true"),
 )
 _NOBODY = {Kind.RECORD_ID.value: "-", Kind.TAIL_NO.value: "-", Kind.SIDE.value: "LH"}
 
@@ -40,7 +40,9 @@ def judge_row(values: Mapping[str, object], options: ReadOptions) -> tuple[Inspe
         if p.field is None and not p.refused
     ]
     reader = RowReader(columns.placed, table)
-    return replace(reader.read(1, [_cell(value) for value in values.values()]), source=RowSource()), problems
+    rows = [reader.read(1, [_cell(value) for value in values.values()])]
+    reader.settle_dates(rows)
+    return replace(rows[0], source=RowSource()), problems
 
 
 def admit(values: Mapping[str, object], options: ReadOptions, labels: Mapping[str, str] | None = None) -> Inspection:
@@ -87,6 +89,8 @@ def judge_again(inspection: Inspection, options: ReadOptions) -> Inspection:
     return replace(
         read,
         entered=given.entered or read.entered,
+        # Numbers are inches here: what was asked about the unit of the entry stands until it is confirmed.
+        unit_question="" if given.small_readings_true else given.unit_question or read.unit_question,
         carried=given.carried,
         warnings=tuple(dict.fromkeys((*given.warnings, *read.warnings))),
         source=given.source,

@@ -63,6 +63,11 @@ _ALIASES: dict[str, Kind] = {
         (Kind.DATE, "insp date|inspected on|date inspected|date measured|date|date of inspection"),
         (Kind.LANDINGS, "ldgs|landings since o h|landings|landings since overhaul|gear landings since overhaul"),
         (Kind.APPROACH, "approach direction"),
+        (
+            Kind.OUTCOME,
+            "result|test result|retraction result|retraction|retracted|gear retracted|failed|gear failed|"
+            "failed to retract|did it retract|retracted y n|gear retracted y n|failed y n|gear failed y n",
+        ),
         (Kind.GAUGE_ID, "gauge id no|gauge s n|gauge|gauge no|gauge number|gauge set"),
         (
             Kind.TECHNICIAN_ID,

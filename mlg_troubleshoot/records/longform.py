@@ -49,7 +49,7 @@ class LongReader:
         self._width = len(wide)
         self._names = {tidy(name): number for number, name in options.joint_names.items()}
         self._groups: dict[str | int, _Group] = {}
-        self._reader = RowReader(wide, table)
+        self.reader = RowReader(wide, table)
 
     def _find(self, kind: Kind) -> PlacedField | None:
         return next((p for p in self._placed if p.field is not None and p.field.kind is kind and not p.refused), None)
@@ -136,7 +136,7 @@ class LongReader:
     def finish(self) -> list[Inspection | InvalidRow]:
         done: list[Inspection | InvalidRow] = []
         for group in self._groups.values():
-            read = self._reader.read(group.row, group.cells, group.places)
+            read = self.reader.read(group.row, group.cells, group.places)
             warnings = (*read.warnings, *group.warnings)
             if group.bad:
                 correct = (*group.bad, *(read.correct if isinstance(read, InvalidRow) else ()))

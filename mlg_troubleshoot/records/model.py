@@ -9,6 +9,7 @@ from typing import Any
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.records.dates import DateOrder
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 Progress = Callable[[int, int | None], None]
@@ -33,6 +34,10 @@ class TableOptions:
         The same as remembered from another table: a header that is not there is no problem.
     decimal_comma : bool
         True if ``0,013`` means 0.013.
+    small_readings_true : bool
+        True if readings below the play of new parts were checked: they were read in the unit that is stated.
+    dates : DateOrder or None
+        Order of day, month and year in dates that are written as numbers; None takes it from the column.
     """
 
     unit: LengthUnit | None = None
@@ -41,6 +46,8 @@ class TableOptions:
     column_map: Mapping[str, str] = field(default_factory=dict)
     remembered_map: Mapping[str, str] = field(default_factory=dict)
     decimal_comma: bool = False
+    small_readings_true: bool = False
+    dates: DateOrder | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +80,9 @@ class ReadOptions(TableOptions):
     clearance_hard_max_in, clearance_confirm_above_in: a radial clearance above the one is refused, above the other
         accepted with a warning. [in]
     plunger_hard_max_in: a measured plunger displacement beyond this, either way, is refused. [in]
+    new_part_in, limit_in: radial clearance of a new part, and the largest one allowed, by joint; empty where no gear
+        says them. [in]
+    asks: a person is there to confirm what is unusual.
     """
 
     joint_numbers: tuple[int, ...] = tuple(range(1, 11))
@@ -80,6 +90,9 @@ class ReadOptions(TableOptions):
     clearance_hard_max_in: float = 0.050
     clearance_confirm_above_in: float = 0.015
     plunger_hard_max_in: float = 0.5
+    new_part_in: Mapping[int, float] = field(default_factory=dict)
+    limit_in: Mapping[int, float] = field(default_factory=dict)
+    asks: bool = False
 
     @classmethod
     def of(cls, gear: Gear, tables: TableOptions | None = None, **declared: Any) -> ReadOptions:
@@ -89,6 +102,8 @@ class ReadOptions(TableOptions):
             **declared,
             joint_numbers=gear.joint_numbers,
             joint_names={joint.number: joint.name for joint in gear.joints},
+            new_part_in={joint.number: joint.new_part.value for joint in gear.joints},
+            limit_in={joint.number: joint.limit.value for joint in gear.joints},
             clearance_hard_max_in=gear.hard_limit.value,
             clearance_confirm_above_in=gear.confirm_above.value,
         )

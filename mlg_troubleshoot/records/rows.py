@@ -6,11 +6,12 @@ import re
 import zlib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import date
 from functools import lru_cache, partial
 from pathlib import PurePath
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from mlg_troubleshoot.decision.inspection import (
     DEFAULT_GAUGE_U_IN,
@@ -18,23 +19,37 @@ from mlg_troubleshoot.decision.inspection import (
     EnteredClearance,
     Inspection,
     InvalidRow,
-    Outcome,
+    RowSource,
     Side,
 )
 from mlg_troubleshoot.records.cells import Cell, OddCell, OddKind, column_letters, quote, show, writable
-from mlg_troubleshoot.records.columns import ALONG, CARRIED, LENGTH_RANGE_IN, LENGTHS, VERDICT_BEARING, Field, Kind
+from mlg_troubleshoot.records.columns import (
+    ALONG,
+    CARRIED,
+    IDENTITY,
+    LENGTH_RANGE_IN,
+    LENGTHS,
+    VERDICT_BEARING,
+    Field,
+    Kind,
+)
+from mlg_troubleshoot.records.dates import DateOrder, readings
 from mlg_troubleshoot.records.model import TableInHand
+from mlg_troubleshoot.records.reading_scale import Scale, row_scale
 from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.slips import scale_slip
 from mlg_troubleshoot.records.values import (
     NOT_MEASURED,
+    AmbiguousDateError,
     CellFaultError,
     plain_text,
     read_choice,
     read_date,
     read_length,
     read_number,
+    read_outcome,
     read_text,
+    read_yes_no,
 )
 from mlg_troubleshoot.units import UNIT_SPELLINGS, ClearanceConvention, LengthUnit
 
@@ -49,10 +64,6 @@ _SIDES = {
     **dict.fromkeys(("r", "rh", "rhs", "right", "righthand", "starboard", "stbd", "rhmlg", "rightmlg"), Side.RH),
     **dict.fromkeys(("mlgr", "mlgrh"), Side.RH),
 }
-_OUTCOME_HINTS = {
-    **dict.fromkeys(("retracts", "ok", "good", "pass", "passed"), "RETRACTED"),
-    **dict.fromkeys(("fail", "fails", "failure", "no"), "FAILED"),
-}
 _APPROACH_HINTS = {**dict.fromkeys(("extend", "ext"), "EXTENDING"), **dict.fromkeys(("retract", "ret"), "RETRACTING")}
 _CONVENTION_HINTS = {
     **dict.fromkeys(("radius", "rad", "offset"), "RADIAL"),
@@ -65,24 +76,28 @@ _MISSING_CONVENTION = (
     "Say how the clearances were taken, in the column clearance_convention or with --convention: RADIAL is "
     "the offset of the centres, DIAMETRAL is bore minus pin, TOTAL_PLAY is the dial reading.",
 )
-_NEVER_BLANK = (VERDICT_BEARING - {Kind.CLEARANCE}) | {*CARRIED, Kind.GAUGE_ID, Kind.TECHNICIAN_ID}
+_NEVER_BLANK = frozenset((*IDENTITY, *CARRIED, Kind.CONVENTION, Kind.UNIT, Kind.JOINT, Kind.MARGIN, Kind.MARGIN_U)) | {
+    Kind.GAUGE_ID,
+    Kind.TECHNICIAN_ID,
+    Kind.SMALL_READINGS_TRUE,
+}
 _SIGNED = frozenset({Kind.PLUNGER_DOWN_LOCK, Kind.PLUNGER_POSITION, Kind.PLUNGER_DISPLACEMENT})
-# What else a row may say, read cell by cell; the flag says whether a comma is the decimal mark.
-_OTHERS: dict[Kind, Callable[[bool, str | float | OddCell], object]] = {
-    Kind.LANDINGS: lambda comma, cell: read_number(
+# What else a row may say, read cell by cell; the flag says whether a comma is the decimal mark, the text is the header.
+_OTHERS: dict[Kind, Callable[[bool, str, str | float | OddCell], object]] = {
+    Kind.LANDINGS: lambda comma, _, cell: read_number(
         cell, 0.0, 1e6, decimal_comma=comma, expected="landings since overhaul, 0 or more"
     ),
-    Kind.TEMPERATURE: lambda comma, cell: read_number(
+    Kind.TEMPERATURE: lambda comma, _, cell: read_number(
         cell, -60.0, 60.0, decimal_comma=comma, expected="a temperature from -60 to 60 degrees Celsius", suffix="C"
     ),
-    Kind.PRESSURE: lambda comma, cell: read_number(
+    Kind.PRESSURE: lambda comma, _, cell: read_number(
         cell, 0.0, 4000.0, decimal_comma=comma, expected="a pressure from 0 to 4000 psi", suffix="psi"
     ),
-    Kind.DATE: lambda _, cell: read_date(cell),
-    Kind.APPROACH: lambda _, cell: read_choice(cell, Approach, "approach_unknown", _APPROACH_HINTS),
-    Kind.OUTCOME: lambda _, cell: read_choice(cell, Outcome, "outcome_unknown", _OUTCOME_HINTS),
-    Kind.GAUGE_ID: lambda _, cell: read_text(cell, "a gauge id (text)", required=True),
-    Kind.TECHNICIAN_ID: lambda _, cell: read_text(cell, "a technician id (text)", required=True),
+    Kind.APPROACH: lambda _, __, cell: read_choice(cell, Approach, "approach_unknown", _APPROACH_HINTS),
+    Kind.OUTCOME: lambda _, header, cell: read_outcome(cell, header),
+    Kind.SMALL_READINGS_TRUE: lambda _, __, cell: read_yes_no(cell),
+    Kind.GAUGE_ID: lambda _, __, cell: read_text(cell, "a gauge id (text)", required=True),
+    Kind.TECHNICIAN_ID: lambda _, __, cell: read_text(cell, "a technician id (text)", required=True),
 }
 
 
@@ -98,6 +113,18 @@ def _carried_text(cell: str | float | OddCell) -> str:
 def _taken(lengths: dict[tuple[Kind, int | None], float], kind: Kind) -> dict[int, float]:
     """Take the lengths of one kind out, by number; one without a number stands under 0."""
     return {number or 0: lengths.pop((kind, number)) for each, number in list(lengths) if each is kind}
+
+
+class _CellPlace(NamedTuple):
+    row: int
+    header: str
+    cell: str
+
+
+class _WaitingDate(NamedTuple):
+    place: _CellPlace
+    raw: Cell
+    fault: AmbiguousDateError
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,10 +164,11 @@ class RowReader:
         self._length_of = lru_cache(_REMEMBERED)(self._one_length)
         # Cells that bear no verdict, by the names under which they are found: what is read, and what is only carried.
         self._others: list[_Loose] = [
-            (index, field.kind.value, partial(_OTHERS[field.kind], self._comma))
+            (index, field.kind.value, partial(_OTHERS[field.kind], self._comma, self._placed[index].header))
             for index, field in good
             if field.kind in _OTHERS
         ]
+        self._others += [(i, Kind.DATE.value, self._read_date) for i, f in good if f.kind is Kind.DATE]
         self._carried: list[_Loose] = [
             (index, field.kind.value, _carried_text) for index, field in good if field.kind in CARRIED
         ]
@@ -159,6 +187,9 @@ class RowReader:
         self._cells: Sequence[Cell] = ()
         self._bad: set[int] = set()
         self._faults: list[tuple[int, CellFaultError]] = []
+        # Which orders fit the dates that are written as numbers, and the dates of rows that wait for the others.
+        self._date_orders = set(DateOrder)
+        self._waiting: dict[RowSource, _WaitingDate] = {}
 
     def read(
         self, row: int, cells: Sequence[Cell], places: Sequence[tuple[int, str]] | None = None
@@ -173,12 +204,16 @@ class RowReader:
         convention = self._read_convention()
         row_unit = self._read_row_unit()
         clearance, entered = self._read_clearances(convention, row_unit, warnings)
-        lengths = self._read_lengths(row_unit)
+        lengths = self._read_lengths(convention, row_unit)
         others, carried = self._read_loose(self._others), self._read_loose(self._carried)
 
-        for place, found in sorted(self._faults, key=lambda fault: fault[0]):
-            self._tell(place, found)
         source = self._table.source(row)
+        question = self._unit_question(clearance, entered, convention, others, warnings)
+        for place, found in sorted(self._faults, key=lambda fault: fault[0]):
+            if isinstance(found, AmbiguousDateError):
+                self._waiting[source] = _WaitingDate(self._place(place), self._cells[place], found)
+            else:
+                self._tell(place, found)
         if self._bad or record_id is None or tail_no is None or side is None or convention is None:
             return InvalidRow(record_id, tail_no, side, self._correct(), tuple(warnings), source)
         if self._clearances and not clearance:
@@ -212,6 +247,7 @@ class RowReader:
             gauge_u_by_joint_in={j: u / convention.per_radial for j, u in gauge_us.items() if j in clearance},
             readings_in=tuple(value for _, value in readings),
             axial_float_in=floats or _NO_FLOATS,
+            unit_question=question,
             carried=carried,
             warnings=tuple(warnings),
             source=source,
@@ -257,7 +293,7 @@ class RowReader:
 
     def _read_loose(self, columns: Sequence[_Loose]) -> dict[str, Any]:
         found = {
-            name: self._noted(index, read, bearing=False)
+            name: self._noted(index, read, bearing=name in VERDICT_BEARING)
             for index, name, read in columns
             if self._cells[index] is not None
         }
@@ -395,20 +431,28 @@ class RowReader:
             f"{self._options.clearance_confirm_above_in:g} in: check the reading. {slip}"
         ).rstrip()
 
-    def _read_lengths(self, row_unit: LengthUnit | None) -> dict[tuple[Kind, int | None], float]:
+    def _read_lengths(
+        self, convention: ClearanceConvention | None, row_unit: LengthUnit | None
+    ) -> dict[tuple[Kind, int | None], float]:
+        # The uncertainty of a gauge is one of the reading: its bound is that of its radial value.
+        scale = convention or ClearanceConvention.TOTAL_PLAY
         found: dict[tuple[Kind, int | None], float] = {}
         for index, field in self._lengths.items():
             if self._cells[index] is not None:
-                read = partial(self._length_of, index, row_unit)
+                read = partial(self._length_of, index, row_unit, scale)
                 value_in = self._noted(index, read, bearing=field.kind in VERDICT_BEARING)
                 if value_in is not None:
                     found[field.quantity] = value_in
         return found
 
-    def _one_length(self, index: int, row_unit: LengthUnit | None, cell: str | float | OddCell) -> float:
+    def _one_length(
+        self, index: int, row_unit: LengthUnit | None, scale: ClearanceConvention, cell: str | float | OddCell
+    ) -> float:
         field = self._lengths[index]
         most = self._options.plunger_hard_max_in
         low, high = LENGTH_RANGE_IN.get(field.kind, (-most, most))
+        if field.kind is Kind.GAUGE_U:
+            high *= scale.per_radial
         unit = field.unit or row_unit or LengthUnit.INCH
         what = field.kind.value.replace("_", " ")
         expected = f"{what} from {unit.from_inches(low):.4g} to {unit.from_inches(high):.4g} {unit.value}"
@@ -440,10 +484,60 @@ class RowReader:
             where = placed.header_row, placed.header, placed.header_cell
             self._table.tell(fault.code, placed.header, "a unit: in, thou or mm", fault.remedy, *where)
             return
+        self._tell_cell(self._place(index), self._cells[index], fault)
+
+    def _place(self, index: int) -> _CellPlace:
+        placed = self._placed[index]
         row, cell = (self._row, f"{column_letters(index)}{self._row}") if self._places is None else self._places[index]
-        raw = self._cells[index]
+        return _CellPlace(row, placed.header, cell)
+
+    def _tell_cell(self, place: _CellPlace, raw: Cell, fault: CellFaultError) -> None:
         found = None if raw is None else quote(raw)
-        self._table.tell(fault.code, found, fault.expected, fault.remedy, row, placed.header, cell)
+        self._table.tell(fault.code, found, fault.expected, fault.remedy, place.row, place.header, place.cell)
+
+    def _read_date(self, cell: str | float | OddCell) -> date:
+        if isinstance(cell, str):
+            orders = set(readings(plain_text(cell)) or ())
+            # A year first says nothing of the order of day and month in other cells.
+            self._date_orders &= orders if orders - {DateOrder.YMD} else self._date_orders
+        return read_date(cell, self._options.dates)
+
+    def settle_dates(self, rows: list[Inspection | InvalidRow]) -> str:
+        """Date the rows whose numbers only the other rows of the column explain; what was understood is returned.
+
+        Where several orders, or none, fit all dates of the column, the cells are reported and stay unread.
+        """
+        if not self._waiting:
+            return ""
+        order = next(iter(self._date_orders)) if len(self._date_orders) == 1 else None
+        for waiting in self._waiting.values():
+            if order is None:
+                self._tell_cell(waiting.place, waiting.raw, waiting.fault)
+        for place, row in enumerate(rows):
+            if order is not None and row.source in self._waiting and isinstance(row, Inspection):
+                rows[place] = replace(row, inspection_date=self._waiting[row.source].fault.days[order])
+        return "" if order is None else f"dates are read as {order.words}: no other order fits all dates of the column"
+
+    def _unit_question(
+        self,
+        clearance: Mapping[int, float],
+        entered: Mapping[int, EnteredClearance],
+        convention: ClearanceConvention | None,
+        others: Mapping[str, object],
+        warnings: list[str],
+    ) -> str:
+        """Refuse readings that cannot be of the stated unit; return what must be asked before the gear is cleared."""
+        if convention is None or self._options.small_readings_true or others.get(Kind.SMALL_READINGS_TRUE):
+            return ""
+        found = row_scale(clearance, entered, convention, self._options)
+        if found.scale is Scale.TOO_SMALL and not self._options.asks:
+            (index,) = (i for joint, i, _ in self._clearances if joint == found.joints[0])
+            expected = "readings of new or worn parts in the unit that is stated"
+            remedy = f"{found.question[:1].upper()}{found.question[1:]}"
+            self._fault(index, CellFaultError("readings_too_small", expected, remedy))
+        elif found.question:
+            warnings.append(found.question)
+        return found.question if found.scale in (Scale.DOUBTFUL, Scale.TOO_SMALL) else ""
 
     def _correct(self) -> tuple[str, ...]:
         """Return the columns to correct, in the order of the table; missing columns stand last."""

@@ -91,6 +91,7 @@ class _Table:
         self._out = out
         self._repeated = 0
         self._aside: list[str] = []
+        self._dates = ""
         self._telling = [
             [p.index for p in columns.placed if p.field is not None and p.field.kind is kind]
             for kind in (Kind.TAIL_NO, Kind.SIDE, Kind.CLEARANCE)
@@ -133,8 +134,11 @@ class _Table:
 
     def finish(self) -> None:
         """Read what could be read only with all rows at hand."""
+        reader = self._reader
         if self._long is not None:
             self._out.rows[:] = sorted([*self._out.rows, *self._long.finish()], key=lambda row: row.source.row or 0)
+            reader = self._long.reader
+        self._dates = reader.settle_dates(self._out.rows)
 
     def notes(self) -> list[str]:
         notes = []
@@ -147,6 +151,8 @@ class _Table:
             count = f"{len(self._aside)} rows are" if len(self._aside) > 1 else "1 row is"
             shown = ", ".join(self._aside[:5]) + (", …" if len(self._aside) > 5 else "")
             notes.append(f"{count} no inspection and set aside: {shown}")
+        if self._dates:
+            notes.append(self._dates)
         words = self._reader.not_measured
         if words:
             shown = ", ".join(repr(word) for word in list(words)[:4])

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from datetime import date
 from enum import StrEnum
 from typing import TypeVar
 
+from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.records.cells import UNWRITABLE, OddCell, OddKind, show, show_number
+from mlg_troubleshoot.records.dates import DateOrder, readings, written_day
 from mlg_troubleshoot.units import LengthUnit, parse_length
 
 
@@ -29,7 +32,7 @@ _USUAL = {
     "cell_is_date": "The cell is formatted as a date or time; a fraction such as 1/8 is turned into one. Format the "
     "cell as a number (or text) and enter the value again.",
     "date_ambiguous": "Which number is the day and which the month is not guessed. Enter year-month-day, for example "
-    "2026-03-04.",
+    "2026-03-04, or say the order with --dates dmy, mdy or ymd.",
     "date_invalid": "Enter year-month-day, for example 2026-03-04.",
     "date_out_of_range": "Check the year.",
     "date_serial": "The cell holds a bare number. Format it as a date, or enter year-month-day as text.",
@@ -41,6 +44,7 @@ _USUAL = {
     "not_a_number": "Enter a plain number, or leave it blank if it is not known.",
     "not_finite": "Enter a number, or leave it blank if it was not measured.",
     "number_lost_digits": "A spreadsheet keeps 15 digits of a number. Format the cell as text and enter it again.",
+    "outcome_unknown": "Enter RETRACTED or FAILED, or leave it blank if it is not known.",
     "out_of_range": "Check the number and the unit, or leave it blank if it is not known.",
     "text_control_character": "It holds a line break or an invisible character. Enter it again.",
     "text_unwritable": "It holds a character that no file can carry. Enter the text again.",
@@ -233,8 +237,64 @@ def read_choice(cell: str | float | OddCell, choices: type[_E], code: str, hints
     raise CellFaultError(code, expected, remedy)
 
 
-def read_date(cell: str | float | OddCell) -> date:
-    """Read a day: ISO 8601 text, a text with the month as a word, or a cell that is formatted as a date."""
+_YES_NO = {**dict.fromkeys(("yes", "y", "true", "1"), True), **dict.fromkeys(("no", "n", "false", "0"), False)}
+
+
+def _yes_no(cell: str | float | OddCell) -> bool | None:
+    if isinstance(cell, OddCell):
+        return _YES_NO.get(cell.text.strip().casefold()) if cell.kind is OddKind.BOOLEAN else None
+    return _YES_NO.get(show(cell).strip().casefold())
+
+
+def read_yes_no(cell: str | float | OddCell) -> bool:
+    """Read the answer to a question: yes or no."""
+    said = _yes_no(cell)
+    if said is None:
+        raise CellFaultError("not_yes_or_no", "yes or no", "Enter yes or no.")
+    return said
+
+
+_OUTCOME_WORDS = {
+    **dict.fromkeys(("retracted", "retracts", "ok", "okay", "pass", "passed", "good", "normal"), Outcome.RETRACTED),
+    **dict.fromkeys(
+        ("failed", "fail", "fails", "failure", "failed to retract", "did not retract", "not retracted", "ng", "not ok"),
+        Outcome.FAILED,
+    ),
+}
+
+
+def read_outcome(cell: str | float | OddCell, header: str) -> Outcome:
+    """Read what the gear did; yes and no count only where the header asks a question (`Retracted?`, `Failed?`)."""
+    if isinstance(cell, str):
+        found = _OUTCOME_WORDS.get(re.sub(r"[\s_\-]+", " ", plain_text(cell).replace(".", "")).casefold())
+        if found is not None:
+            return found
+    asked = re.search(r"retract|fail", header, re.IGNORECASE)
+    said = None if asked is None else _yes_no(cell)
+    if asked is None or said is None:
+        if isinstance(cell, OddCell):
+            raise odd_cell_fault(cell, "RETRACTED or FAILED")
+        raise CellFaultError("outcome_unknown", "RETRACTED or FAILED")
+    retracted = said is (asked[0].casefold() == "retract")
+    return Outcome.RETRACTED if retracted else Outcome.FAILED
+
+
+class AmbiguousDateError(CellFaultError):
+    """A date whose numbers may be read in several orders.
+
+    days: the day by each order.
+    """
+
+    def __init__(self, days: Mapping[DateOrder, date], expected: str) -> None:
+        super().__init__("date_ambiguous", expected)
+        self.days = days
+
+
+def read_date(cell: str | float | OddCell, order: DateOrder | None = None) -> date:
+    """Read a day: ISO 8601, a month as a word, numbers in one order, or a cell that is formatted as a date.
+
+    Numbers of which only one order makes a day need no `order`; others raise `AmbiguousDateError` without one.
+    """
     expected = "a date as 2026-03-04 (year-month-day) or 4 Mar 2026"
     if isinstance(cell, float):
         raise CellFaultError("date_serial", expected)
@@ -243,35 +303,28 @@ def read_date(cell: str | float | OddCell) -> date:
             raise odd_cell_fault(cell, expected)
         day = cell.day
     else:
-        day = _iso_day(plain_text(cell), expected)
+        day = _written_day(plain_text(cell), order, expected)
     if day is None or not 1950 <= day.year <= 2100:
         raise CellFaultError("date_out_of_range", expected)
     return day
 
 
-_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
-_MONTH = (
-    r"jan(?:uary)?|feb(?:ruary)?|mar(?:ch)?|apr(?:il)?|may|june?|july?|aug(?:ust)?|sept?(?:ember)?|oct(?:ober)?"
-    r"|nov(?:ember)?|dec(?:ember)?"
-)
-_WORDED_DAY = re.compile(
-    rf"(?:(?P<day>\d{{1,2}})[\s.\-/]*(?P<month>{_MONTH})|(?P<first>{_MONTH})[\s.\-/]*(?P<second>\d{{1,2}}),?\s)"
-    r"[\s.,\-/]*(?P<year>\d{4}|\d{2})",
-    re.IGNORECASE | re.ASCII,
-)
-
-
-def _iso_day(text: str, expected: str) -> date:
-    match = re.fullmatch(r"(\d{4}-\d{2}-\d{2})(?:[T ]\d{2}:\d{2}(?::\d{2}(?:\.\d+)?)?(?:Z|[+\-]\d{2}:?\d{2})?)?", text)
-    worded = _WORDED_DAY.fullmatch(text)
+def _written_day(text: str, order: DateOrder | None, expected: str) -> date:
+    no_such_day = "There is no such day in the calendar."
     try:
-        if match is not None:
-            return date.fromisoformat(match[1])
-        if worded is not None:
-            year = int(worded["year"])
-            month = _MONTHS.index((worded["month"] or worded["first"])[:3].lower()) + 1
-            return date(year + (2000 if year < 100 else 0), month, int(worded["day"] or worded["second"]))
+        day = written_day(text)
     except ValueError:
-        raise CellFaultError("date_invalid", expected, "There is no such day in the calendar.") from None
-    numbers = re.fullmatch(r"\d{1,4}[./\-]\d{1,2}[./\-]\d{1,4}", text)
-    raise CellFaultError("date_invalid" if numbers is None else "date_ambiguous", expected)
+        raise CellFaultError("date_invalid", expected, no_such_day) from None
+    if day is not None:
+        return day
+    days = readings(text)
+    if days is None:
+        raise CellFaultError("date_invalid", expected)
+    if order in days:
+        return days[order]
+    if not days or order is not None:
+        in_order = "" if order is None else f" in the order {order.words}"
+        raise CellFaultError("date_invalid", f"{expected}{in_order}", no_such_day)
+    if len(set(days.values())) > 1:
+        raise AmbiguousDateError(days, expected)
+    return next(iter(days.values()))

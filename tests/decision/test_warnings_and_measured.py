@@ -8,9 +8,10 @@ import pytest
 
 from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.decision.case import plunger_u
-from mlg_troubleshoot.decision.inspection import Outcome
+from mlg_troubleshoot.decision.inspection import EnteredClearance, Outcome
 from mlg_troubleshoot.decision.plan import Action, End
 from mlg_troubleshoot.decision.plunger_reading import disagreement
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from tests.decision.conftest import Judge, every_joint, inspected
 
 NOT_EXPLAINED = "Joint clearances do not explain this failure: check hydraulics, reversing valve, doors."
@@ -107,20 +108,39 @@ def test_a_reading_beyond_the_bounds_is_said_to_be_impossible_with_its_possible_
         assert cause in text
 
 
+IN_MILLIMETRES = {"entered": {3: EnteredClearance("0.005", LengthUnit.MILLIMETRE)}}
+AS_TOTAL_PLAY = {"convention": ClearanceConvention.TOTAL_PLAY}
+
+
 @pytest.mark.parametrize(
-    ("factor", "words"),
-    [(25.4, "millimetres read as inches"), (10.0, "decimal point"), (2.0, "total play read as radial")],
+    ("factor", "entry", "words"),
+    [
+        (25.4, IN_MILLIMETRES, "inches read as millimetres (factor 25.4)"),
+        (10.0, {}, "a slipped decimal point (factor 10)"),
+        (2.0, AS_TOTAL_PLAY, "a radial clearance read as diametral or total play (factor 2)"),
+    ],
 )
-def test_a_slip_that_would_explain_the_difference_is_suggested(factor: float, words: str) -> None:
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_an_entry_error_that_made_the_clearances_too_small_is_suggested(
+    factor: float, entry: dict[str, object], words: str, sense: float
+) -> None:
+    text = disagreement(inspected({}, readings_in=(sense * 0.02 * factor,), **entry), 0.02, -0.02, 0.001)
+    assert text is not None
+    assert text.endswith(f"An entry error that would explain it: {words}.")
+
+
+@pytest.mark.parametrize("factor", [25.4, 2.0])
+def test_an_entry_error_that_this_entry_cannot_have_is_not_suggested(factor: float) -> None:
     text = disagreement(inspected({}, readings_in=(0.02 * factor,)), 0.02, -0.02, 0.001)
     assert text is not None
-    assert words in text
+    assert "entry error" not in text
 
 
-def test_a_slip_that_made_a_reading_too_small_is_suggested() -> None:
-    text = disagreement(inspected({}, readings_in=(0.004,)), 0.04, -0.04, 0.001)
+@pytest.mark.parametrize("factor", [25.4, 10.0, 2.0])
+def test_a_displacement_below_the_bound_suggests_no_entry_error(factor: float) -> None:
+    text = disagreement(inspected({}, readings_in=(0.1 / factor,), **AS_TOTAL_PLAY), 0.1, -0.1, 0.001)
     assert text is not None
-    assert "decimal point" in text
+    assert "entry error" not in text
 
 
 def test_a_suggested_slip_is_never_applied(judge: Judge) -> None:

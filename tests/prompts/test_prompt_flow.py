@@ -10,7 +10,7 @@ import pytest
 from mlg_troubleshoot.cli.output import to_ascii
 from mlg_troubleshoot.cli.prompts import Answers, Session, SessionStore, ask_inspection
 from mlg_troubleshoot.cli.prompts.answers import plunger_in
-from mlg_troubleshoot.cli.prompts.flow import Ask, Effect, Flow
+from mlg_troubleshoot.cli.prompts.flow import Ask, Effect, Flow, Turn
 from mlg_troubleshoot.cli.prompts.sketch import sketch
 from mlg_troubleshoot.decision.inspection import Outcome, Side
 from mlg_troubleshoot.errors import UsageError
@@ -704,3 +704,53 @@ def test_ascii_keeps_the_columns(gear: Gear) -> None:
     assert plain.isascii()
     assert len(plain) == len(text.replace("\n", ""))
     assert "?" not in plain
+
+
+INCHES_AS_MILLIMETRES = (".011", ".009", ".0115", ".010", ".011", ".009", ".0105", ".010", ".011", ".009")
+
+
+def in_millimetres(flow: Flow, *more: str) -> Turn:
+    """Readings in inches of a gear whose joints are all worn out, typed where millimetres were chosen."""
+    return play(
+        flow,
+        [*INCHES_AS_MILLIMETRES, "", "", "", "", "", "", *more],
+        replace(RADIAL_INCHES, unit=LengthUnit.MILLIMETRE),
+    )
+
+
+def test_readings_that_look_like_another_unit_are_asked_about_before_they_are_computed(flow: Flow) -> None:
+    turn = in_millimetres(flow)
+    assert turn.state.ask is Ask.CONFIRM_UNIT
+    assert "inches, not in millimetres" in shown(flow, turn.state)
+
+
+def test_a_yes_takes_the_readings_in_their_unit(flow: Flow, gear: Gear) -> None:
+    turn = in_millimetres(flow, "y")
+    assert turn.effect is Effect.COMPUTE
+    assert turn.state.answers.inspection(gear, "R1").unit_question == ""
+
+
+def test_a_no_goes_back_to_the_table(flow: Flow) -> None:
+    assert in_millimetres(flow, "n").state.ask is Ask.REVIEW
+
+
+def test_enter_alone_does_not_confirm_the_unit(flow: Flow) -> None:
+    assert in_millimetres(flow, "").state.ask is Ask.CONFIRM_UNIT
+
+
+def test_another_unit_takes_the_confirmation_back(flow: Flow) -> None:
+    turn = in_millimetres(flow, "y")
+    for typed in ("unit", "t", "y"):
+        turn = flow.answer(turn.state, typed)
+    assert "small_readings_true" not in turn.state.answers.more
+
+
+def test_a_small_reading_is_asked_again(flow: Flow) -> None:
+    turn = play(flow, [".004"], replace(RADIAL_INCHES, unit=LengthUnit.MILLIMETRE))
+    assert turn.state.ask is Ask.CONFIRM
+    assert "less than new parts have" in shown(flow, turn.state)
+
+
+def test_no_flag_is_named_at_a_prompt(flow: Flow) -> None:
+    turn = play(flow, [".004"], replace(RADIAL_INCHES, unit=LengthUnit.MILLIMETRE))
+    assert "--" not in shown(flow, turn.state)

@@ -44,12 +44,12 @@ SPOILING = {
     "clearance_convention": ("CLEAR", None, 3),
     "clearance": (-0.001, 0.33, 9, "0,013", "n/a?", "1/8", "0.3 mm", "−0.002", "nan", "~", "?", "#DIV/0!"),
     "margin_in": (-0.03, "x", 0.7),
+    "outcome": ("MAYBE", 1),
 }
 HARMLESS = {
     "inspection_date": ("03/04/2026", 46085, "soon"),
     "gear_landings": (-5, "many"),
     "temperature_c": (200, "warm"),
-    "outcome": ("MAYBE", 1),
 }
 
 
@@ -368,7 +368,7 @@ def test_a_table_comes_from_standard_input(tmp_path, kind):
 
 FORM = {
     **{"Record id": "F1", "Tail no": "007", "Side": "RH", "Clearance convention": "TOTAL_PLAY", "Unit": "mm"},
-    **{f"Clearance #{n}": 0.02 for n in range(1, 11)},
+    **{f"Clearance #{n}": 0.05 for n in range(1, 11)},
 }
 
 
@@ -404,7 +404,7 @@ def test_a_form_a_sheet_is_one_inspection_each(forms):
 
 def test_a_form_in_millimetres_of_total_play_is_read_in_radial_inches(forms):
     joints = mlg("check", forms, "--json").json["inspections"][0]["joints"]
-    assert [j["clearance_in"] for j in joints] == pytest.approx([0.02 / 25.4 / 2] * 10)
+    assert [j["clearance_in"] for j in joints] == pytest.approx([0.05 / 25.4 / 2] * 10)
 
 
 def test_a_bad_cell_of_a_form_is_named_on_its_sheet(forms):

@@ -151,16 +151,7 @@ def test_the_slip_that_explains_a_value_is_suggested_and_not_applied(read, table
 def test_every_bad_cell_of_a_row_is_reported_once_in_the_order_of_the_table(read, table):
     result = read(table((*HEADER, "outcome"), [("R1", None, "x", "RADIAL", "a", -1, "maybe")]))
     assert [p.cell for p in result.problems] == ["B2", "C2", "E2", "F2", "G2"]
-    assert result.rows[0].correct == ("tail_no", "side", "clearance_3_in", "clearance_5_in")
-
-
-@pytest.mark.parametrize(
-    ("name", "value"), [("margin_in", -0.03), ("margin_in", 0), ("margin_in", "x"), ("margin_u_in", -1)]
-)
-def test_a_bad_margin_makes_the_row_invalid(read, table, name, value):
-    result = read(with_column(table, name, value))
-    assert only(result).column == name
-    assert isinstance(result.rows[0], InvalidRow)
+    assert result.rows[0].correct == ("tail_no", "side", "clearance_3_in", "clearance_5_in", "outcome")
 
 
 def test_margin_and_its_uncertainty_are_read_in_their_units(read, table):
@@ -180,19 +171,27 @@ BAD_OPTIONAL = [
     ("hydraulic_pressure_psi", 4001),
     ("hydraulic_pressure_psi", "nan"),
     ("approach", "SIDEWAYS"),
+    ("actuator_extension_in", -0.1),
+    ("actuator_extension_in", 17),
+    ("plunger_position_in", 25.4),
+    ("axial_float_3_in", -0.01),
+    ("plunger_down_lock_in", 3),
+]
+BAD_DECISIVE = [
     ("gauge_u_in", -0.0005),
     ("gauge_u_in", 0.5),
     ("gauge_u_3_in", 0),
     ("gauge_u_3_in", 0.5),
-    ("actuator_extension_in", -0.1),
-    ("actuator_extension_in", 17),
-    ("plunger_position_in", 25.4),
     ("plunger_gauge_u_in", "x"),
-    ("axial_float_3_in", -0.01),
-    ("plunger_down_lock_in", 3),
     ("plunger_displacement_in", 1.2),
     ("plunger_displacement_in", "?"),
+    ("plunger_displacement_in", "0.O5"),
     ("outcome", "MAYBE"),
+    ("outcome", "FAILD"),
+    ("margin_in", -0.03),
+    ("margin_in", 0),
+    ("margin_in", "x"),
+    ("margin_u_in", -1),
 ]
 
 
@@ -209,6 +208,14 @@ def test_a_bad_optional_cell_is_reported_and_reads_as_absent(read, table, name, 
     assert row.clearance_in == plain.clearance_in
     assert (row.gauge_u_in, row.margin_in, row.readings_in, dict(row.axial_float_in)) == (0.0005, None, (), {})
     assert (row.outcome, row.approach, row.inspection_date, row.gear_landings) == (None, None, None, None)
+
+
+@pytest.mark.parametrize(("name", "value"), BAD_DECISIVE)
+def test_a_row_with_an_unreadable_cell_that_decides_is_invalid(read, table, name, value):
+    result = read(with_column(table, name, value))
+    assert only(result).column == name
+    assert isinstance(result.rows[0], InvalidRow)
+    assert result.rows[0].correct == (name,)
 
 
 RANGES = [

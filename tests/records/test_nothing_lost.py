@@ -52,7 +52,7 @@ BAD = {
     "margin_in": (-0.03, "x", 0.7),
     "outcome": ("MAYBE", 1),
 }
-HARMLESS = {"inspection_date", "gear_landings", "outcome"}
+HARMLESS = {"inspection_date", "gear_landings"}
 
 
 def make(rows, share, seed):

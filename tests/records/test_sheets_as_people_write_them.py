@@ -23,7 +23,7 @@ EXPECTED = [
     ("09_notes_below.csv", 3, ["C4"], 3),
     ("10_tabs.txt", 2, ["C4"], 0),
     ("11_windows.csv", 2, ["C4"], 0),
-    ("12_status_columns.csv", 3, ["C6", "I5"], 0),
+    ("12_status_columns.csv", 2, ["C6", "I5"], 0),
     ("13_grouped.csv", 3, ["D6"], 3),
 ]
 

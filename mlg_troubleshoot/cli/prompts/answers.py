@@ -16,7 +16,7 @@ from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, WrittenLengt
 # Columns that an entry may have beside its heading and its clearances, in the order in which they are shown.
 LENGTHS = ("plunger_displacement", "margin")
 SIGN_OFF = ("technician_id", "work_order", "gauge_id", "inspection_date")
-MORE = ("outcome", *LENGTHS, *SIGN_OFF)
+MORE = ("outcome", *LENGTHS, *SIGN_OFF, "small_readings_true")
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +86,21 @@ class Answers:
     def inspection(self, gear: Gear, record_id: str) -> Inspection:
         from mlg_troubleshoot.records import ReadOptions, admit
 
+        read = admit(self._row(gear, record_id), ReadOptions.of(gear, asks=True))
+        confirmed = [f"#{n}" for n, answer in sorted(self.joints.items()) if answer.confirmed]
+        said = f"asked again and confirmed: {', '.join(confirmed)}"
+        return replace(read, warnings=(*read.warnings, said)) if confirmed else read
+
+    def unit_question(self, gear: Gear) -> str:
+        """What is to be asked before the readings are taken in their unit; empty if nothing."""
+        from mlg_troubleshoot.records import ReadOptions
+        from mlg_troubleshoot.records.gate import judge_row
+
+        read, _ = judge_row(self._row(gear, "-"), ReadOptions.of(gear, asks=True))
+        return read.unit_question if isinstance(read, Inspection) else ""
+
+    def _row(self, gear: Gear, record_id: str) -> dict[str, object]:
+        """The answers as the cells of a row."""
         values: dict[str, object] = {
             "record_id": self.record_id or record_id,
             "tail_no": self.tail_no,
@@ -97,10 +112,7 @@ class Answers:
             reading = self.reading(number)
             if reading is not None:
                 values[f"clearance_{number}_{reading.unit}"] = reading.written.text
-        read = admit(values, ReadOptions.of(gear))
-        confirmed = [f"#{n}" for n, answer in sorted(self.joints.items()) if answer.confirmed]
-        said = f"asked again and confirmed: {', '.join(confirmed)}"
-        return replace(read, warnings=(*read.warnings, said)) if confirmed else read
+        return values
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +147,7 @@ def judge(typed: str, number: int, unit: LengthUnit, convention: ClearanceConven
     """Let the gate that judges the cells of tables say whether a reading is taken, asked again or refused."""
     from mlg_troubleshoot.records import ReadOptions, judge_length
 
-    options = ReadOptions.of(gear, unit=unit, convention=convention)
+    options = ReadOptions.of(gear, unit=unit, convention=convention, asks=True)
     read, problems = judge_length(f"clearance_{number}", typed, options)
     if problems or not isinstance(read, Inspection):
         return Judged(" ".join(f"expected {p.expected}. {p.remedy}" for p in problems), refused=True)

@@ -48,10 +48,13 @@ class Ask(StrEnum):
     CONFIRM = "confirm"
     MORE = "more"
     CONFIRM_MORE = "confirm more"
+    CONFIRM_UNIT = "confirm unit"
     DETAIL = "detail"
     REVIEW = "review"
 
 
+# What a confirmation goes back to.
+_CONFIRMS = {Ask.CONFIRM: Ask.JOINT, Ask.CONFIRM_MORE: Ask.MORE, Ask.CONFIRM_UNIT: Ask.REVIEW}
 _HEADING = (Ask.TAIL, Ask.SIDE, Ask.UNIT, Ask.CONVENTION)
 Place = tuple[Ask, int | str | None]
 
@@ -158,7 +161,7 @@ class Flow:
             own = pages.joint_help(self.gear, state.answers, state.joint) if of_joint else _QUESTIONS[state.ask].help
             return Turn(state, own)
         turn = _QUESTIONS[state.ask].take(self, state, typed)
-        here, passing = (state.ask, state.at), (Ask.OFFER, Ask.REREAD, Ask.CONFIRM, Ask.CONFIRM_MORE)
+        here, passing = (state.ask, state.at), (Ask.OFFER, Ask.REREAD, *_CONFIRMS)
         moved = (turn.state.ask, turn.state.at) != here and state.ask not in passing
         return replace(turn, state=replace(turn.state, trail=(*state.trail, here) if moved else state.trail))
 
@@ -333,9 +336,7 @@ class Flow:
     def _review(self, state: State, typed: str) -> Turn:
         answers = state.answers
         if not typed:
-            if not answers.radial_in:
-                return _again(state, "No joint has a clearance, so there is nothing to compute. Type a joint number.")
-            return Turn(state, effect=Effect.COMPUTE)
+            return self._compute(state)
         if typed.lower() in _HEADING:
             return Turn(State(Ask(typed.lower()), answers, from_review=True))
         if typed.lower() in pages.DETAILS:
@@ -344,6 +345,20 @@ class Flow:
         if number is not None:
             return self._jump(replace(state, from_review=True), int(number[1]))
         return _again(state, _not_taken(typed, f"Type a joint number ({self._joint_names()}), or Enter alone."))
+
+    def _compute(self, state: State) -> Turn:
+        if not state.answers.radial_in:
+            return _again(state, "No joint has a clearance, so there is nothing to compute. Type a joint number.")
+        if state.answers.unit_question(self.gear):
+            return Turn(replace(state, ask=Ask.CONFIRM_UNIT))
+        return Turn(state, effect=Effect.COMPUTE)
+
+    def _confirm_unit(self, state: State, typed: str) -> Turn:
+        if typed.lower() in _YES:
+            return Turn(State(Ask.REVIEW, state.answers.with_more(small_readings_true="yes")), effect=Effect.COMPUTE)
+        if typed.lower() in _NO:
+            return self._back(state)
+        return _again(state, _not_taken(typed, "Type y if the unit is right, or n to correct it."))
 
     def begin(self, answers: Answers, from_review: bool = False) -> Turn:
         """Begin with what flags already gave; `b` still reaches it.
@@ -365,7 +380,8 @@ class Flow:
 
     def _go_on(self, answers: Answers, from_review: bool = False, told: tuple[Line, ...] = ()) -> Turn:
         """Go to the first open question; readings that have become impossible are open again."""
-        answers, settled = self._settled(answers)
+        # What was confirmed of the readings holds for these readings only.
+        answers, settled = self._settled(answers.with_more(small_readings_true=None))
         told = (*told, *settled)
         for ask, value in zip(_HEADING, answers.heading, strict=True):
             if value is None:
@@ -400,8 +416,8 @@ class Flow:
         return replace(answers, joints=MappingProxyType(kept)), tuple(told)
 
     def _back(self, state: State) -> Turn:
-        if state.ask in (Ask.CONFIRM, Ask.CONFIRM_MORE):
-            return Turn(replace(state, ask=Ask.JOINT if state.ask is Ask.CONFIRM else Ask.MORE, pending=None))
+        if state.ask in _CONFIRMS:
+            return Turn(replace(state, ask=_CONFIRMS[state.ask], pending=None))
         if state.ask is Ask.REREAD:
             answers = replace(state.answers, unit=state.old_unit)
             return Turn(State(Ask.UNIT, answers, from_review=state.from_review, trail=state.trail))
@@ -431,7 +447,7 @@ class Flow:
         if skipped:
             parts.append(f"{skipped} said to be not measured")
         if answers.unit is not None:
-            parts.append(f"in {pages.UNIT_NAMES[answers.unit]}")
+            parts.append(f"in {answers.unit.words}")
         if answers.convention is not None:
             parts.append(f"read as {pages.CONVENTION_NAMES[answers.convention]}")
         return ", ".join(parts) + "."
@@ -506,6 +522,11 @@ _QUESTIONS: dict[Ask, _Question] = {
     Ask.MORE: _Question(Flow._more, lambda f, s, w: pages.more_page(s.answers, f.gear, w), pages.MORE_HELP),
     Ask.CONFIRM_MORE: _Question(
         Flow._confirm_more, lambda f, s, _: pages.confirm_more_page(f._most_in, s.answers.unit), pages.MORE_HELP
+    ),
+    Ask.CONFIRM_UNIT: _Question(
+        Flow._confirm_unit,
+        lambda f, s, _: pages.confirm_unit_page(s.answers, s.answers.unit_question(f.gear)),
+        pages.CONFIRM_UNIT_HELP,
     ),
     Ask.DETAIL: _Question(
         Flow._detail, lambda f, s, _: pages.detail_page(s.answers, str(s.at), f.today), pages.DETAIL_HELP

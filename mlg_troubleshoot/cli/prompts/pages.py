@@ -12,7 +12,6 @@ from mlg_troubleshoot.cli.prompts.store import Session
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, in_unit
 
-UNIT_NAMES = {LengthUnit.INCH: "inches", LengthUnit.THOU: "thou", LengthUnit.MILLIMETRE: "millimetres"}
 CONVENTION_NAMES = {convention: convention.lower().replace("_", " ") for convention in ClearanceConvention}
 _EXAMPLES = {LengthUnit.INCH: ".013", LengthUnit.THOU: "13", LengthUnit.MILLIMETRE: "0.33"}
 _HOW = {
@@ -108,13 +107,13 @@ def convention_page(answers: Answers) -> Page:
 
 def reread_page(answers: Answers, old: LengthUnit) -> Page:
     count = sum(a.written is not None and a.written.unit is None for a in answers.joints.values())
-    new = UNIT_NAMES[answers.unit or old]
+    new = (answers.unit or old).words
     were, they = ("reading was", "it") if count == 1 else ("readings were", "they")
     shown = (
         BLANK,
-        line((f"{count} {were} typed as {UNIT_NAMES[old]}, to be read as {new}?", Tone.WARN)),
+        line((f"{count} {were} typed as {old.words}, to be read as {new}?", Tone.WARN)),
         choice("y", f"yes, {they} had {new} all along"),
-        choice("n", f"no, {UNIT_NAMES[old]} stay; only the next readings are {new}"),
+        choice("n", f"no, {old.words} stay; only the next readings are {new}"),
     )
     return Page(shown, " y or n > ")
 
@@ -159,10 +158,13 @@ def joint_page(
 
 
 def confirm_page(gear: Gear, reading: Reading, number: int, unit: LengthUnit | None) -> Page:
-    limit = length(gear.joint(number).limit.value, unit)
+    joint = gear.joint(number)
+    above = f"is far beyond the limit of {length(joint.limit.value, unit)}"
+    below = f"is less than new parts have ({length(joint.new_part.value, unit)})"
+    what = above if joint.is_over_limit(reading.radial_in) else below
     said = judge(reading.written.text, number, reading.unit, reading.convention, gear).said
     shown = (
-        line((f"#{number}  {length(reading.radial_in, unit)} radial is far beyond the limit of {limit}.", Tone.WARN)),
+        line((f"#{number}  {length(reading.radial_in, unit)} radial {what}.", Tone.WARN)),
         line(in_unit(said, reading.unit), indent=3),
         choice("y", f"yes, it is really {length(reading.as_read_in, unit)} {CONVENTION_NAMES[reading.convention]}"),
         line(("or type the value again", Tone.QUIET), indent=3),
@@ -236,7 +238,7 @@ def more_page(answers: Answers, gear: Gear, width: int) -> Page:
 
     shown = (
         BLANK,
-        rule(f"{identity(answers)} · if you know it · numbers in {UNIT_NAMES[unit]}", width),
+        rule(f"{identity(answers)} · if you know it · numbers in {unit.words}", width),
         row("f", "", "the gear FAILED to retract", outcome if outcome == "FAILED" else None),
         row("r", "", "the gear RETRACTED", outcome if outcome == "RETRACTED" else None),
         row("p", plunger, "plunger off mid-position, + over-travel", answers.more.get("plunger_displacement")),
@@ -252,6 +254,22 @@ def confirm_more_page(most_in: float, unit: LengthUnit | None) -> Page:
         line(("y", Tone.KEY), " yes, it was read so   ", ("n", Tone.KEY), " no", indent=3),
     )
     return Page(shown, " y, n, or p with the displacement again > ")
+
+
+CONFIRM_UNIT_HELP = (
+    line("A pin hardly has less play than in new parts. The unit of the numbers may be another one.", indent=3),
+    line("n goes back to the table: type unit there to change the unit, or a joint's number.", indent=3),
+)
+
+
+def confirm_unit_page(answers: Answers, question: str) -> Page:
+    shown = (
+        BLANK,
+        line((f"{question[:1].upper()}{question[1:]}", Tone.WARN)),
+        choice("y", f"the readings are right in {(answers.unit or LengthUnit.INCH).words}"),
+        choice("n", "no, back to correct them"),
+    )
+    return Page(shown, " y or n > ")
 
 
 # What stands on the sign-off page: the word that leads back to it from the review, and its column.

@@ -1,0 +1,135 @@
+"""Readings whose size fits another unit better: a pin hardly has less play than in new parts.
+
+A row is compared with the play of new parts that the gear file states, by the mean ratio of its non-zero readings.
+What each number costs and catches: `python -m tests.records.unit_confusions`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+from mlg_troubleshoot.decision.inspection import EnteredClearance
+from mlg_troubleshoot.records.model import ReadOptions
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+
+# Below this ratio to new parts a reading is clearly too small. Inches taken for millimetres stay below it
+# unless the joints are worn beyond their limits on average (0.6 x 25.4 x 0.0005 in = 0.0076 in).
+_TOO_SMALL = 0.6
+# Between these a row may be of new parts, or of a gear with every joint worn out that was read in another unit:
+# a mean below new parts, and no reading clearly above them.
+_BELOW_NEW, _CLEARLY_WORN = 0.9, 1.25
+# Fewer readings than this do not show what the others of the row were read in.
+_FEWEST = 3
+CONFIRM_SMALL = (
+    "Correct the unit, or confirm the readings: --small-readings-true, or yes in a column small_readings_true."
+)
+
+
+class Scale(StrEnum):
+    """How the readings of a row fit the unit that is stated."""
+
+    FITS = "fits"
+    DOUBTFUL = "doubtful"
+    TOO_SMALL = "too small"
+    LARGE = "large"
+
+
+@dataclass(frozen=True, slots=True)
+class RowScale:
+    """How the readings of a row fit their unit, the joints whose readings do not, and what to ask about them."""
+
+    scale: Scale = Scale.FITS
+    joints: tuple[int, ...] = ()
+    question: str = ""
+
+
+def row_scale(
+    radial_in: Mapping[int, float],
+    entered: Mapping[int, EnteredClearance],
+    convention: ClearanceConvention,
+    options: ReadOptions,
+) -> RowScale:
+    """Judge whether the readings of a row can have been read in the unit that is stated. [in]"""
+    read = {
+        joint: value for joint, value in radial_in.items() if value > 0.0 and options.new_part_in.get(joint, 0.0) > 0.0
+    }
+    if not read:
+        return RowScale()
+    ratios = {joint: value / options.new_part_in[joint] for joint, value in read.items()}
+    units = [entered[joint].unit for joint in read]
+    stated = max(LengthUnit, key=units.count)
+    mean, enough = sum(ratios.values()) / len(ratios), len(read) >= _FEWEST
+    small = tuple(joint for joint, ratio in ratios.items() if ratio < _TOO_SMALL)
+    scale = Scale.FITS
+    if stated is LengthUnit.INCH:
+        # No unit is larger: single readings say nothing, a row of them may be of another convention.
+        small = small if enough and mean < _TOO_SMALL else ()
+    elif mean < _TOO_SMALL:
+        scale = Scale.TOO_SMALL if enough else Scale.DOUBTFUL
+    elif enough and mean < _BELOW_NEW and max(ratios.values()) <= _CLEARLY_WORN:
+        scale = Scale.DOUBTFUL
+        small = tuple(joint for joint, ratio in ratios.items() if ratio < 1.0)
+    if small:
+        return RowScale(scale, small, _small_question(small, read, stated, convention, options))
+    over = tuple(joint for joint, value in read.items() if value > options.limit_in[joint])
+    if stated is not LengthUnit.THOU and len(read) > 1 and sum(read.values()) > sum(options.limit_in[j] for j in read):
+        return RowScale(Scale.LARGE, over, _large_question(over, read, stated, convention))
+    return RowScale()
+
+
+def _small_question(
+    joints: tuple[int, ...],
+    read: Mapping[int, float],
+    stated: LengthUnit,
+    convention: ClearanceConvention,
+    options: ReadOptions,
+) -> str:
+    new_in = options.new_part_in[joints[0]] * convention.per_radial
+    said = (
+        f"{_readings(joints, read)} below the play of new parts "
+        f"({stated.from_inches(new_in):.4g} {stated}{_kind(convention)})"
+    )
+    larger = [unit for unit in LengthUnit if unit.per_inch < stated.per_inch]
+    others = [unit for unit in larger if _plausible(joints, read, stated, unit, options)] or larger
+    if others:
+        names = " or ".join(unit.words for unit in others)
+        confirm = "" if options.asks else f" {CONFIRM_SMALL}"
+        return f"{said}: {_asked(joints)} read in {names}, not in {stated.words}?{confirm}"
+    factor = "" if convention is ClearanceConvention.RADIAL else ", or is it a radial clearance (factor 2)"
+    return f"{said}: has the decimal point slipped{factor}?"
+
+
+def _large_question(
+    joints: tuple[int, ...], read: Mapping[int, float], stated: LengthUnit, convention: ClearanceConvention
+) -> str:
+    other = LengthUnit.MILLIMETRE if stated is LengthUnit.INCH else LengthUnit.THOU
+    factor = " Or is it a diametral clearance or total play, not radial (factor 2)?"
+    return (
+        f"{_readings(joints, read)} above the limit: {_asked(joints)} read in {other.words}, not in {stated.words}?"
+        f"{factor if convention is ClearanceConvention.RADIAL else ''}"
+    )
+
+
+def _plausible(
+    joints: tuple[int, ...], read: Mapping[int, float], stated: LengthUnit, other: LengthUnit, options: ReadOptions
+) -> bool:
+    """Whether the readings would be those of a gear, had they been read in the other unit."""
+    mean_in = other.to_inches(stated.from_inches(sum(read[joint] for joint in joints) / len(joints)))
+    return options.new_part_in[joints[0]] * _TOO_SMALL <= mean_in <= options.clearance_confirm_above_in
+
+
+def _readings(joints: tuple[int, ...], read: Mapping[int, float]) -> str:
+    named = ", ".join(f"#{joint}" for joint in joints)
+    if len(read) == 1:
+        return f"the reading of joint {joints[0]} is"
+    return f"{len(joints)} of {len(read)} readings ({named}) {'are' if len(joints) > 1 else 'is'}"
+
+
+def _asked(joints: tuple[int, ...]) -> str:
+    return "were they" if len(joints) > 1 else "was it"
+
+
+def _kind(convention: ClearanceConvention) -> str:
+    return f" {convention.value.lower().replace('_', ' ')}"

@@ -1,0 +1,98 @@
+"""Cells that decide about a gear: what everyone reads is read, what nobody can read stops the row."""
+
+from __future__ import annotations
+
+import pytest
+
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
+from mlg_troubleshoot.records import ReadOptions, read_many
+from mlg_troubleshoot.records.headers import recognise
+from tests.cli.conftest import mlg
+
+HEALTHY = {f"clearance_{n}_in": "0.001" for n in range(1, 11)}
+
+
+def table(tmp_path, **columns):
+    """Write one sound row with further columns."""
+    row = {"record_id": "R1", "tail_no": "N1", "side": "LH", "clearance_convention": "RADIAL", **HEALTHY, **columns}
+    file = tmp_path / "t.csv"
+    file.write_text("\n".join((",".join(row), ",".join(map(str, row.values())))) + "\n")
+    return file
+
+
+def one(tmp_path, gear, **columns):
+    (row,) = read_many([table(tmp_path, **columns)], ReadOptions.of(gear)).rows
+    return row
+
+
+@pytest.mark.parametrize(
+    "header", ["outcome", "Result", "RESULT", "Outcome", "Retracted?", "Failed?", "Gear retracted (Y/N)"]
+)
+def test_usual_headers_of_an_outcome_are_understood(gear, header):
+    found = recognise(header, gear.joint_numbers, {})
+    assert found.field is not None
+    assert found.field.name == "outcome"
+
+
+@pytest.mark.parametrize("word", ["fail", "FAIL", "Failed", "Failed to retract", "NG", "n.g.", "did not retract"])
+@pytest.mark.parametrize("header", ["Result", "outcome", "Retracted?"])
+def test_words_for_a_failure_are_read(tmp_path, gear, header, word):
+    assert one(tmp_path, gear, **{header: word}).outcome is Outcome.FAILED
+
+
+@pytest.mark.parametrize("word", ["pass", "OK", "ok", "Passed", "RETRACTED", "retracts"])
+@pytest.mark.parametrize("header", ["Result", "outcome", "Retracted?"])
+def test_words_for_a_gear_that_retracted_are_read(tmp_path, gear, header, word):
+    assert one(tmp_path, gear, **{header: word}).outcome is Outcome.RETRACTED
+
+
+@pytest.mark.parametrize(
+    ("header", "word", "outcome"),
+    [
+        ("Retracted?", "no", Outcome.FAILED),
+        ("Retracted?", "Yes", Outcome.RETRACTED),
+        ("Retracted?", "N", Outcome.FAILED),
+        ("Failed?", "no", Outcome.RETRACTED),
+        ("Failed?", "YES", Outcome.FAILED),
+        ("Failed to retract?", "y", Outcome.FAILED),
+    ],
+)
+def test_yes_and_no_answer_the_question_of_the_header(tmp_path, gear, header, word, outcome):
+    assert one(tmp_path, gear, **{header: word}).outcome is outcome
+
+
+@pytest.mark.parametrize("header", ["Result", "outcome"])
+@pytest.mark.parametrize("word", ["no", "yes"])
+def test_yes_and_no_under_a_header_that_asks_nothing_stop_the_row(tmp_path, gear, header, word):
+    assert isinstance(one(tmp_path, gear, **{header: word}), InvalidRow)
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [
+        ("outcome", "FAILD"),
+        ("plunger_displacement_in", "0.O5"),
+        ("plunger_displacement_in", "3.5"),
+        ("gauge_u_in", "0.021"),
+        ("gauge_u_3_in", "worn"),
+        ("plunger_gauge_u_in", "?"),
+        ("margin_in", "O.03"),
+        ("margin_u_in", "-1"),
+    ],
+)
+def test_a_decisive_cell_that_cannot_be_read_never_ends_with_exit_code_0(tmp_path, column, value):
+    run = mlg("check", table(tmp_path, **{column: value}), "--json")
+    assert run.code != 0
+    assert run.one["verdict"] == "INVALID"
+
+
+@pytest.mark.parametrize(("convention", "stated", "taken"), [("TOTAL_PLAY", 0.0373, True), ("RADIAL", 0.0373, False)])
+def test_the_limit_of_a_gauge_uncertainty_counts_on_its_radial_value(tmp_path, gear, convention, stated, taken):
+    row = one(tmp_path, gear, clearance_convention=convention, gauge_u_in=stated)
+    assert isinstance(row, Inspection) is taken
+
+
+def test_a_large_uncertainty_in_total_play_is_the_same_as_half_of_it_in_radial(tmp_path, gear):
+    total = one(tmp_path, gear, clearance_convention="TOTAL_PLAY", gauge_u_in=0.0373)
+    radial = one(tmp_path, gear, clearance_convention="RADIAL", gauge_u_in=0.01865)
+    assert total.gauge_u_in == pytest.approx(radial.gauge_u_in)

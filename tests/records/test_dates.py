@@ -1,0 +1,119 @@
+"""Dates written as numbers: read where only one order fits, never guessed."""
+
+from __future__ import annotations
+
+from datetime import date
+
+import pytest
+
+from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.records import ReadOptions, read_many
+from mlg_troubleshoot.records.dates import DateOrder
+from mlg_troubleshoot.records.values import AmbiguousDateError, CellFaultError, read_date
+from tests.cli.conftest import mlg
+
+HEADER = "record_id,tail_no,side,clearance_convention,clearance_3_in,inspection_date"
+
+
+def column(tmp_path, *texts):
+    file = tmp_path / "t.csv"
+    rows = [f'R{n},N{n},LH,RADIAL,0.002,"{text}"' for n, text in enumerate(texts)]
+    file.write_text("\n".join((HEADER, *rows)) + "\n")
+    return file
+
+
+def days(tmp_path, *texts, **options):
+    read = read_many([column(tmp_path, *texts)], ReadOptions(**options))
+    assert all(isinstance(row, Inspection) for row in read.rows)
+    return [row.inspection_date for row in read.rows], read
+
+
+@pytest.mark.parametrize(
+    ("text", "day"),
+    [
+        ("2026-03-04", date(2026, 3, 4)),
+        ("2026/03/04", date(2026, 3, 4)),
+        ("4-Mar-2026", date(2026, 3, 4)),
+        ("31/12/2025", date(2025, 12, 31)),
+        ("12/31/2025", date(2025, 12, 31)),
+        ("25.01.24", date(2024, 1, 25)),
+        ("05/05/2024", date(2024, 5, 5)),
+    ],
+)
+def test_a_date_that_can_be_read_in_one_way_only_is_read(text, day):
+    assert read_date(text) == day
+
+
+@pytest.mark.parametrize("text", ["03/04/2026", "3.4.26", "01-02-03", "24/01/25"])
+def test_a_date_that_can_be_read_in_several_ways_is_refused(text):
+    with pytest.raises(AmbiguousDateError):
+        read_date(text)
+
+
+@pytest.mark.parametrize("text", ["31/02/2026", "13.13.2025", "13.1.4", "2026-02-30"])
+def test_numbers_that_are_no_day_are_refused(text):
+    with pytest.raises(CellFaultError, match="date_invalid"):
+        read_date(text)
+
+
+@pytest.mark.parametrize(
+    ("order", "day"), [("dmy", date(2003, 2, 1)), ("mdy", date(2003, 1, 2)), ("ymd", date(2001, 2, 3))]
+)
+def test_a_stated_order_settles_a_date(order, day):
+    assert read_date("01-02-03", DateOrder(order)) == day
+
+
+def test_a_date_that_is_no_day_in_the_stated_order_is_refused():
+    with pytest.raises(CellFaultError, match="date_invalid"):
+        read_date("25/01/2024", DateOrder.MDY)
+
+
+def test_one_date_of_a_column_settles_the_others(tmp_path):
+    found, read = days(tmp_path, "03/04/2024", "13/01/2024", "2024-06-07")
+    assert found == [date(2024, 4, 3), date(2024, 1, 13), date(2024, 6, 7)]
+    assert not read.problems
+
+
+def test_the_order_that_a_column_showed_is_said(tmp_path):
+    _, read = days(tmp_path, "03/04/2024", "13/01/2024")
+    assert any("dates are read as day-month-year" in note for note in read.notes)
+
+
+def test_dates_that_no_other_date_settles_are_refused_by_cell(tmp_path):
+    found, read = days(tmp_path, "03/04/2024", "05/06/2024")
+    assert found == [None, None]
+    assert [(p.cell, p.code) for p in read.problems] == [("F2", "date_ambiguous"), ("F3", "date_ambiguous")]
+
+
+def test_a_column_of_two_orders_settles_nothing(tmp_path):
+    found, read = days(tmp_path, "13/01/2024", "01/13/2024", "03/04/2024")
+    assert found == [date(2024, 1, 13), date(2024, 1, 13), None]
+    assert [p.cell for p in read.problems] == ["F4"]
+
+
+def test_the_columns_of_two_files_are_judged_apart(tmp_path):
+    (tmp_path / "other").mkdir()
+    clear, open_ = column(tmp_path, "13/01/2024"), column(tmp_path / "other", "03/04/2024")
+    read = read_many([clear, open_], ReadOptions())
+    assert [p.code for p in read.problems] == ["date_ambiguous"]
+
+
+def test_a_long_table_settles_its_dates_as_a_wide_one(tmp_path):
+    file = tmp_path / "long.csv"
+    file.write_text(
+        "record_id,tail_no,side,clearance_convention,joint,clearance_in,inspection_date\n"
+        "R1,N1,LH,RADIAL,3,0.002,03/04/2024\nR1,N1,LH,RADIAL,5,0.002,03/04/2024\nR2,N2,LH,RADIAL,3,0.002,13/01/2024\n"
+    )
+    read = read_many([file], ReadOptions())
+    assert [row.inspection_date for row in read.inspections] == [date(2024, 4, 3), date(2024, 1, 13)]
+
+
+def test_the_flag_settles_a_column(tmp_path):
+    run = mlg("check", column(tmp_path, "03/04/2024"), "--dates", "mdy", "--json")
+    assert not run.json["problems"]
+
+
+def test_an_order_that_is_none_is_a_usage_error(tmp_path):
+    run = mlg("check", column(tmp_path, "03/04/2024"), "--dates", "dym")
+    assert run.code == 2
+    assert "dmy, mdy or ymd" in run.err

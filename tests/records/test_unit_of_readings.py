@@ -1,0 +1,193 @@
+"""Readings too small for their unit: not judged, or asked about, whatever way they come in."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from mlg_troubleshoot import check
+from mlg_troubleshoot.decision.assessment import Verdict
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Side
+from mlg_troubleshoot.decision.plan import Action
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.records import ReadOptions, read_many
+from mlg_troubleshoot.records.gate import judge_row
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from tests.cli.conftest import mlg
+
+# A worn gear in radial inches, as in the review: declared as millimetres it passed as WITHIN.
+WORN_IN = (0.004, 0.009, 0.013, 0.002, 0.007, 0.003, 0.004, 0.001, 0.002, 0.003)
+# Every joint worn beyond its limit: as millimetres each reading looks like that of a new part.
+ALL_WORN_OUT_IN = (0.011, 0.009, 0.0115, 0.010, 0.011, 0.009, 0.0105, 0.010, 0.011, 0.009)
+NEW_IN = (0.0005, 0.0004, 0.0006, 0.0005, 0.0007, 0.0005, 0.0004, 0.0006, 0.0005, 0.0005)
+UNITS = tuple(LengthUnit)
+TOO_SMALL = [
+    (LengthUnit.INCH, LengthUnit.MILLIMETRE),
+    (LengthUnit.INCH, LengthUnit.THOU),
+    (LengthUnit.MILLIMETRE, LengthUnit.THOU),
+]
+TOO_LARGE = [(declared, read) for read, declared in TOO_SMALL]
+
+
+def judged(gear: Gear, radial_in, read_in: LengthUnit, declared: LengthUnit, **more):
+    """Judge a row of readings that were read in one unit and declared in another."""
+    values = {
+        "record_id": "R1",
+        "tail_no": "N1",
+        "side": "LH",
+        "clearance_convention": "RADIAL",
+        **{f"clearance_{n}_{declared}": read_in.from_inches(value) for n, value in enumerate(radial_in, 1)},
+    }
+    options = {name: more.pop(name) for name in ("small_readings_true",) if more.get(name) is True}
+    return judge_row({**values, **more}, ReadOptions.of(gear, **options))
+
+
+@pytest.mark.parametrize(("read_in", "declared"), TOO_SMALL)
+def test_a_worn_gear_read_in_a_larger_unit_is_not_judged(gear, read_in, declared):
+    row, problems = judged(gear, WORN_IN, read_in, declared)
+    assert isinstance(row, InvalidRow)
+    assert [problem.code for problem in problems] == ["readings_too_small"]
+
+
+@pytest.mark.parametrize(("read_in", "declared"), TOO_SMALL)
+def test_the_refusal_names_both_units_in_words(gear, read_in, declared):
+    _, (problem,) = judged(gear, WORN_IN, read_in, declared)
+    assert f"read in {read_in.words}" in problem.remedy
+    assert f"not in {declared.words}" in problem.remedy
+
+
+def test_the_refusal_names_a_cell_of_a_small_reading(gear, tmp_path):
+    file = tmp_path / "t.csv"
+    file.write_text(
+        "record_id,tail_no,side,clearance_convention,clearance_1_mm,clearance_2_mm,clearance_3_mm\n"
+        "R1,N1,LH,RADIAL,0.013,0.004,0.002\n"
+    )
+    (problem,) = read_many([file], ReadOptions.of(gear)).problems
+    assert (problem.cell, problem.column, problem.value) == ("F2", "clearance_2_mm", "0.004")
+
+
+def test_the_refusal_says_how_to_confirm_true_readings(gear):
+    _, (problem,) = judged(gear, WORN_IN, LengthUnit.INCH, LengthUnit.MILLIMETRE)
+    assert "--small-readings-true" in problem.remedy
+    assert "small_readings_true" in problem.remedy
+
+
+@pytest.mark.parametrize("confirmed", [{"small_readings_true": "yes"}, {"small_readings_true": True}])
+def test_confirmed_small_readings_are_judged(gear, confirmed):
+    row, problems = judged(gear, WORN_IN, LengthUnit.INCH, LengthUnit.MILLIMETRE, **confirmed)
+    assert isinstance(row, Inspection)
+    assert not problems
+    assert not row.unit_question
+
+
+def test_an_answer_that_confirms_nothing_leaves_the_row_invalid(gear):
+    row, _ = judged(gear, WORN_IN, LengthUnit.INCH, LengthUnit.MILLIMETRE, small_readings_true="no")
+    assert isinstance(row, InvalidRow)
+
+
+def test_a_confirmation_that_cannot_be_read_makes_the_row_invalid(gear):
+    row, (problem,) = judged(gear, NEW_IN, LengthUnit.INCH, LengthUnit.INCH, small_readings_true="perhaps")
+    assert isinstance(row, InvalidRow)
+    assert problem.column == "small_readings_true"
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_new_parts_in_their_own_unit_are_judged_without_a_question(gear, unit):
+    row, problems = judged(gear, NEW_IN, unit, unit)
+    assert not problems
+    assert row.unit_question == ""
+    assert not [warning for warning in row.warnings if "play of new parts" in warning]
+
+
+@pytest.mark.parametrize(("read_in", "declared"), TOO_LARGE)
+def test_a_worn_gear_read_in_a_smaller_unit_is_not_judged(gear, read_in, declared):
+    row, _ = judged(gear, WORN_IN, read_in, declared)
+    assert isinstance(row, InvalidRow)
+
+
+def test_new_parts_in_millimetres_under_an_inch_header_are_asked_about(gear):
+    row, _ = judged(gear, NEW_IN, LengthUnit.MILLIMETRE, LengthUnit.INCH)
+    assert any("millimetres" in warning and "inches" in warning for warning in row.warnings)
+
+
+def test_readings_that_may_be_of_new_parts_or_of_another_unit_do_not_clear_the_gear(gear):
+    row, problems = judged(gear, ALL_WORN_OUT_IN, LengthUnit.INCH, LengthUnit.MILLIMETRE)
+    assert not problems
+    found = check(row, gear)
+    assert found.verdict is Verdict.INCOMPLETE
+    assert found.next_action.action is Action.CORRECT
+    assert "inches" in found.headline
+
+
+def test_readings_confirmed_in_python_clear_the_gear(gear):
+    row, _ = judged(gear, ALL_WORN_OUT_IN, LengthUnit.INCH, LengthUnit.MILLIMETRE, small_readings_true="yes")
+    assert check(row, gear).verdict is Verdict.WITHIN_MARGIN
+
+
+def test_one_small_reading_among_others_is_a_warning_that_says_the_same(gear):
+    row, problems = judged(gear, (0.002, 0.002, 0.0001, 0.002, 0.002), LengthUnit.MILLIMETRE, LengthUnit.MILLIMETRE)
+    assert not problems
+    (warning,) = [text for text in row.warnings if "play of new parts" in text]
+    assert "#3" in warning
+    assert "was it read in inches, not in millimetres?" in warning
+    assert "--small-readings-true" in warning
+
+
+def test_two_readings_are_too_few_to_refuse_a_row_but_do_not_clear_it(gear):
+    row, _ = judged(gear, (0.013, 0.004, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), LengthUnit.INCH, LengthUnit.THOU)
+    assert check(row, gear).verdict is Verdict.INCOMPLETE
+
+
+def test_a_gear_file_without_the_play_of_new_parts_asks_nothing(gear):
+    options = ReadOptions.of(gear)
+    values = {f"clearance_{n}_mm": value for n, value in enumerate(WORN_IN, 1)}
+    named = {"record_id": "R", "tail_no": "N", "side": "LH", "clearance_convention": "RADIAL", **values}
+    silent = ReadOptions(joint_numbers=options.joint_numbers, limit_in=options.limit_in)
+    assert not judge_row(named, silent)[1]
+
+
+def test_radial_readings_declared_as_total_play_are_asked_about(gear):
+    values = {f"clearance_{n}_in": value for n, value in enumerate(NEW_IN, 1)}
+    named = {"record_id": "R", "tail_no": "N", "side": "LH", "clearance_convention": "TOTAL_PLAY", **values}
+    row, problems = judge_row(named, ReadOptions.of(gear))
+    assert not problems
+    assert any("radial clearance (factor 2)" in warning for warning in row.warnings)
+
+
+def test_python_asks_about_small_readings_in_inches(gear):
+    small = Inspection(
+        record_id="R1",
+        tail_no="N1",
+        side=Side.LH,
+        convention=ClearanceConvention.RADIAL,
+        clearance_in={n: LengthUnit.MILLIMETRE.to_inches(value) for n, value in enumerate(WORN_IN, 1)},
+    )
+    # In inches no larger unit explains them: they are judged, and asked about.
+    assert any("below the play of new parts" in warning for warning in check(small, gear).warnings)
+
+
+def test_flags_refuse_small_readings():
+    given = [f"--set={n}={value}" for n, value in enumerate(WORN_IN, 1)]
+    run = mlg("check", "--tail", "N1", "--side", "LH", "--convention", "RADIAL", "--unit", "mm", *given)
+    assert run.code == 2
+    assert "were they read in inches, not in millimetres?" in " ".join(run.err.split())
+
+
+def test_flags_take_small_readings_that_are_confirmed():
+    given = [f"--set={n}={value}" for n, value in enumerate(WORN_IN, 1)]
+    run = mlg(
+        *("check", "--tail", "N1", "--side", "LH", "--convention", "RADIAL", "--unit", "mm"),
+        *("--small-readings-true", "--json", *given),
+    )
+    assert run.json["inspections"][0]["verdict"] == "WITHIN_MARGIN"
+
+
+def test_a_sheet_of_inches_under_millimetre_headers_ends_with_nothing_judged(tmp_path):
+    file = tmp_path / "fleet.csv"
+    header = ["record_id", "tail_no", "side", "clearance_convention", *(f"clearance_{n} [mm]" for n in range(1, 11))]
+    rows = [[f"R{k}", f"N{k}", "LH", "RADIAL", *map(str, WORN_IN)] for k in range(30)]
+    file.write_text("\n".join(",".join(row) for row in (header, *rows)))
+    run = mlg("check", file, "--json")
+    assert run.code == 3
+    assert {row["verdict"] for row in json.loads(run.out)["inspections"]} == {"INVALID"}
