@@ -17,11 +17,12 @@ from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 # Below this ratio to new parts a reading is clearly too small. Inches taken for millimetres stay below it
 # unless the joints are worn beyond their limits on average (0.6 x 25.4 x 0.0005 in = 0.0076 in).
 _TOO_SMALL = 0.6
-# Between these a row may be of new parts, or of a gear with every joint worn out that was read in another unit:
-# a mean below new parts, and no reading clearly above them.
-_BELOW_NEW, _CLEARLY_WORN = 0.9, 1.25
+# A row with a mean below new parts and no reading clearly above them may be of a new gear, or of a gear with every
+# joint worn out that was read in another unit. The number is the largest reading, as a ratio to new parts.
+_CLEARLY_WORN = 1.5
 # Fewer readings than this do not show what the others of the row were read in.
 _FEWEST = 3
+_ROUNDING = 1e-9
 CONFIRM_SMALL = (
     "Correct the unit, or confirm the readings: --small-readings-true, or yes in a column small_readings_true."
 )
@@ -68,7 +69,7 @@ def row_scale(
         small = small if enough and mean < _TOO_SMALL else ()
     elif mean < _TOO_SMALL:
         scale = Scale.TOO_SMALL if enough else Scale.DOUBTFUL
-    elif enough and mean < _BELOW_NEW and max(ratios.values()) <= _CLEARLY_WORN:
+    elif enough and mean < 1.0 - _ROUNDING and max(ratios.values()) <= _CLEARLY_WORN:
         scale = Scale.DOUBTFUL
         small = tuple(joint for joint, ratio in ratios.items() if ratio < 1.0)
     if small:
