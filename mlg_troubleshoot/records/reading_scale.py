@@ -75,7 +75,8 @@ def row_scale(
     if small:
         return RowScale(scale, small, _small_question(small, read, stated, convention, options))
     over = tuple(joint for joint, value in read.items() if value > options.limit_in[joint])
-    if stated is not LengthUnit.THOU and len(read) > 1 and sum(read.values()) > sum(options.limit_in[j] for j in read):
+    mostly_over = sum(read.values()) > sum(options.limit_in[joint] for joint in read)
+    if stated is not LengthUnit.THOU and enough and mostly_over:
         return RowScale(Scale.LARGE, over, _large_question(over, read, stated, convention))
     return RowScale()
 
