@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from mlg_troubleshoot.records.gate import admit, judge_again, judge_length
+from mlg_troubleshoot.records.headers import is_carried
+from mlg_troubleshoot.records.layout import understood
 from mlg_troubleshoot.records.model import ColumnReading, FileRead, ReadOptions, ReadResult, SheetLayout
 from mlg_troubleshoot.records.read import expand, read_many
 
@@ -14,7 +16,9 @@ __all__ = [
     "SheetLayout",
     "admit",
     "expand",
+    "is_carried",
     "judge_again",
     "judge_length",
     "read_many",
+    "understood",
 ]

@@ -149,6 +149,12 @@ def _unit_row(header: Header, cells: Sequence[Cell], options: ReadOptions) -> tu
     return tuple(units) if any(units) else None
 
 
+def understood(header: str, options: ReadOptions) -> Recognition:
+    """Return what a header is understood as by itself, with no mapping."""
+    found = recognise(header, options.joint_numbers, options.joint_names)
+    return near_miss(header, options.joint_numbers) if found is UNKNOWN and header else found
+
+
 class ColumnReader:
     def __init__(self, table: TableInHand, *, by_hand: bool = False) -> None:
         self._table = table
@@ -159,11 +165,12 @@ class ColumnReader:
     def _recognise(self, text: str, index: int) -> tuple[Recognition, bool]:
         """Read one header; True if the caller mapped it."""
         options = self._options
-        for key, target in {**options.remembered_map, **options.column_map}.items():
-            if tidy(key) == tidy(text) or key == column_letters(index):
+        for key, target in (*options.column_map.items(), *options.remembered_map.items()):
+            # Letters name a place in this table, which nothing that was remembered from another can know.
+            placed = key == column_letters(index) and key in options.column_map
+            if tidy(key) == tidy(text) or placed:
                 return Recognition(parse_target(target, options.joint_numbers)), True
-        found = recognise(text, options.joint_numbers, options.joint_names)
-        return near_miss(text, options.joint_numbers) if found is UNKNOWN and text else found, False
+        return understood(text, options), False
 
     def place(
         self,
