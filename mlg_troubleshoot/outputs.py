@@ -1,4 +1,4 @@
-"""The one place where files are written: whole or not at all, and only over a file of the same output.
+"""The one place where files are written: whole or not at all, only over a file of the same output.
 
 An output never replaces an input, a store, a device, or a file that something else wrote.
 """
@@ -17,9 +17,10 @@ from typing import BinaryIO
 from mlg_troubleshoot.errors import OutputError, UsageError
 
 Field = str | float | int | bool | None
-# What begins a field of a CSV, whichever separator a program assumes: the start of the text, a separator or a line
-# break, then any quotation marks and blanks. The comma is left out: a program that knows it keeps our quotation marks.
-# The wide forms of the signs start a formula in some language versions of Excel.
+# What begins a field of a CSV, whichever separator a program assumes: the start of the text, a
+# separator or a line break, then any quotation marks and blanks. The comma is left out: a program
+# that knows it keeps our quotation marks. The wide forms of the signs start a formula in some
+# language versions of Excel.
 _BREAKS = r"\t-\r\x1c-\x1e\x85\u2028\u2029"
 _FORMULA = re.compile(rf'(\A|[;|{_BREAKS}])(?=(?:[^\S{_BREAKS}]|")*[=+\-@＝＋－＠])')
 # How a file of SQLite begins: such a file is a store, of this program or of another.
@@ -52,7 +53,7 @@ CONTINUED = OutputKind("", lambda _: True)
 
 @dataclass(frozen=True, slots=True)
 class OutputFile:
-    """A file that a run is asked to write: by which option, where, and what; nothing without a path."""
+    """A file that a run is asked to write: by which option, where, and what; none without a path."""
 
     option: str
     path: str | Path | None
@@ -126,10 +127,11 @@ def claim_outputs(
 ) -> None:
     """Refuse, before anything is read, an output that would replace what it must not.
 
-    That is an input, the file of another output, or a file that no earlier run of this output wrote; the last may be
-    replaced with ``force``, if it is not a database. Inputs are files, folders of which every file counts, or the
-    descriptor of a file that is open. A file is the one that would be written, through links and missing folders.
-    Raises `UsageError` (exit code 2), and `OutputError` (5) where nothing can be written.
+    That is an input, the file of another output, or a file that no earlier run of this output
+    wrote; the last may be replaced with ``force``, if it is not a database. Inputs are files,
+    folders of which every file counts, or the descriptor of an open file. A file is the one that
+    would be written, through links and missing folders. Raises `UsageError` (exit code 2), and
+    `OutputError` (5) where nothing can be written.
     """
     files = [file for given in inputs for file in _files_of(given)]
     taken = {_identity(file): f"is one of the inputs ({_named(file)})" for file in files}
@@ -138,18 +140,19 @@ def claim_outputs(
             continue
         shown = f"{each.option} {each.path}"
         if str(each.path) == _STANDARD_OUTPUT:
-            raise UsageError(f"{shown} is not the name of a file", "Give a name, such as ./- for this one.")
+            raise UsageError(f"{shown} is not the name of a file", "Give the name of a file.")
         why = taken.get(_identity(each.path))
         if why is not None:
             raise UsageError(
-                f"{shown} {why}: nothing was read and nothing written", f"Give {each.option} another name."
+                f"{shown} {why}: nothing was read and nothing written",
+                f"Give {each.option} another name.",
             )
         taken[_identity(each.path)] = f"is the file of {each.option} as well"
         _refuse_another(each, shown, force=force)
 
 
 def _refuse_another(output: OutputFile, shown: str, *, force: bool) -> None:
-    """Refuse to replace a file that an earlier run of this output did not write; an empty one is nobody's."""
+    """Refuse to replace a file that no earlier run of this output wrote, unless it is empty."""
     target = Path(os.path.realpath(str(output.path)))
     try:
         _mode_of(target, str(output.path))

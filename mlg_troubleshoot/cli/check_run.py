@@ -16,7 +16,6 @@ from mlg_troubleshoot.cli.views import batch, notes, one_gear
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.outputs import OutputFile
-from mlg_troubleshoot.records.annotate import ANNOTATED
 from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
@@ -37,13 +36,15 @@ class Run:
         extensions, causes = wanted.extension or (), wanted.causes or ()
         self._files, self._flags, self._wanted = files, flags, wanted
         self._asks = not (files or flags.values)
+        outputs = [OutputFile("--csv", wanted.csv, task.VERDICTS)]
+        if wanted.annotate is not None:
+            from mlg_troubleshoot.records.annotate import ANNOTATED
+
+            outputs.append(OutputFile("--annotate", wanted.annotate, ANNOTATED))
         claim(
             tables.gear,
             [*files, *extensions, *causes],
-            [
-                OutputFile("--csv", wanted.csv, task.VERDICTS),
-                OutputFile("--annotate", wanted.annotate, ANNOTATED),
-            ],
+            outputs,
             wanted.report or (_ASKED_FOR if self._asks else None),
             store=wanted.store,
             force=wanted.force,

@@ -1,7 +1,7 @@
 """What is remembered from run to run in ``mlg.toml``: the unit to show, the paper, how headers are read.
 
-Never what could turn a verdict: unit of entry, convention, side or margin, nor another meaning for a header that is
-understood by itself. The file is data: it is checked strictly.
+Never what could turn a verdict: unit of entry, convention, side or margin, nor another meaning for a
+header that is understood by itself. The file is data: it is checked strictly.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def settings(
     *,
     keep: bool = False,
 ) -> Settings:
-    """Return the settings of a run and say what was remembered; keep what flags gave if that was asked.
+    """Return the settings of a run and say what was remembered; keep what flags gave if asked to.
 
     The gear says which headers are understood by themselves.
     """
@@ -50,13 +50,13 @@ def settings(
         say(f"Remembered: {_remember(gear, show, page, headers)}")
     found = _recall(gear, show, page)
     if found.note:
-        # Said even where notes are not wanted: a file that happens to lie in the folder shapes what is shown.
+        # Said even where notes are not wanted: a file that happens to lie here shapes what is shown.
         say(f"Note: {found.note}")
     return found
 
 
 def files() -> tuple[Path, Path]:
-    """Where settings may stand: in the working folder, which wins, and in the user's configuration."""
+    """Where settings may stand: in the working folder, which wins, and in the configuration."""
     from platformdirs import user_config_path
 
     return Path(NAME), user_config_path("mlg-troubleshoot", appauthor=False) / NAME
@@ -134,7 +134,7 @@ def _judged(file: Path, raw: Mapping[str, object], gear: str) -> Settings:
 
 
 def _refuse_understood(file: Path, headers: Mapping[str, str], gear: str) -> None:
-    """Refuse to remember another meaning for a header that the reader understands, or to pass over one in doubt."""
+    """Refuse to remember another meaning for a header that is understood, or to drop a doubtful one."""
     if not headers:
         return
     from mlg_troubleshoot.gear.gear_file import load_gear
@@ -147,7 +147,7 @@ def _refuse_understood(file: Path, headers: Mapping[str, str], gear: str) -> Non
             continue
         means = f"is read as {found.field.name}" if found.field else f"is doubtful: {found.reason}"
         raise UsageError(
-            f"{file}: headers: {header!r} = {column!r} is never remembered: by itself {header!r} {means}, and another "
-            "meaning could turn a verdict",
+            f"{file}: headers: {header!r} = {column!r} is never remembered: by itself {header!r} "
+            f"{means}, and another meaning could turn a verdict",
             f'Delete the line from {file}; give --map "{header}={column}" with each run that needs it.',
         )

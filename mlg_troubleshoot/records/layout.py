@@ -166,7 +166,7 @@ class ColumnReader:
         """Read one header; True if the caller mapped it."""
         options = self._options
         for key, target in (*options.column_map.items(), *options.remembered_map.items()):
-            # Letters name a place in this table, which nothing that was remembered from another can know.
+            # Letters name a place in this table: nothing that was remembered from another knows it.
             placed = key == column_letters(index) and key in options.column_map
             if tidy(key) == tidy(text) or placed:
                 return Recognition(parse_target(target, options.joint_numbers)), True

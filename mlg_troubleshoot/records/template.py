@@ -41,7 +41,7 @@ _CHOICES: dict[Kind, tuple[str, ...]] = {
     Kind.APPROACH: ("EXTENDING", "RETRACTING"),
     Kind.OUTCOME: ("RETRACTED", "FAILED"),
 }
-# What each column holds, in the order of the columns; in braces what the gear says, by the names of `_numbers`.
+# What each column holds, in the order of the columns; in braces the numbers of `_numbers`.
 _MEANING: dict[Kind, str] = {
     Kind.RECORD_ID: "Required. Your own unique name of this inspection.",
     Kind.TAIL_NO: "Required. Tail number, kept as text.",

@@ -27,8 +27,8 @@ FORMATS = ("html", "pdf", "pdf-ua")
 USUAL_FORMATS = ("html", "pdf")
 PAGES = ("A4", "Letter")
 _NAME = re.compile(r"(mlg-.*|fleet)\.(html|pdf)", re.IGNORECASE)
-# How a report is known: base.html.j2 writes the one into the head of a page; the other stands as a comment before the
-# last lines of a PDF, and no longer there when another program has added to it.
+# How a report is known: base.html.j2 writes the one into the head of a page; the other stands as a
+# comment before the last lines of a PDF, and no longer there when another program has added to it.
 _IN_PAGE, _IN_PDF = b'<meta name="generator" content="mlg-troubleshoot">', b"%mlg-troubleshoot\n"
 _HEAD, _END = 1000, 64
 

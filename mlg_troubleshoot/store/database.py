@@ -164,7 +164,7 @@ def own_file() -> str:
 
 
 def files_of(place: str | Path | None = None) -> tuple[Path, ...]:
-    """Return the files of the store at a place, with those that SQLite lays beside it; none for a server."""
+    """Return the files of a store, with those that SQLite lays beside it; none for a server."""
     where = str(place or os.environ.get("MLG_STORE") or own_file())
     if "://" in where:
         try:

@@ -339,6 +339,15 @@ def test_an_earlier_report_is_replaced_and_another_file_of_its_name_is_not(suffi
     assert mlg(*command, "--force").code == 1
 
 
+def test_a_report_in_a_folder_through_one_that_is_missing_does_not_replace_another_file(tmp_path: Path) -> None:
+    command = ("check", FAILURE, "-q", "--format", "html", "--report")
+    mlg(*command, tmp_path)
+    (report,) = tmp_path.glob("*.html")
+    report.write_text("mine", encoding="utf-8")
+    assert mlg(*command, f"{tmp_path}/no/..").code == 2
+    assert report.read_text(encoding="utf-8") == "mine"
+
+
 @pytest.mark.parametrize("option", ["--annotate", "--report"])
 def test_two_outputs_of_one_run_are_two_files(option: str, tmp_path: Path) -> None:
     csv = tmp_path / ("mlg-x.html" if option == "--report" else "o.xlsx")
