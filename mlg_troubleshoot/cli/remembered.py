@@ -138,16 +138,14 @@ def _refuse_understood(file: Path, headers: Mapping[str, str], gear: str) -> Non
     if not headers:
         return
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.records import ReadOptions, is_carried, understood
+    from mlg_troubleshoot.records import ReadOptions, why_not_remembered
 
     options = ReadOptions.of(load_gear(gear))
     for header, column in headers.items():
-        found = understood(header, options)
-        if found.field is None and not (found.reason and is_carried(column)):
-            continue
-        means = f"is read as {found.field.name}" if found.field else f"is doubtful: {found.reason}"
-        raise UsageError(
-            f"{file}: headers: {header!r} = {column!r} is never remembered: by itself {header!r} "
-            f"{means}, and another meaning could turn a verdict",
-            f'Delete the line from {file}; give --map "{header}={column}" with each run that needs it.',
-        )
+        why = why_not_remembered(header, column, options)
+        if why:
+            raise UsageError(
+                f"{file}: headers: {header!r} = {column!r} is never remembered: by itself {header!r} "
+                f"{why}, and another meaning could turn a verdict",
+                f'Delete the line from {file}; give --map "{header}={column}" with each run that needs it.',
+            )

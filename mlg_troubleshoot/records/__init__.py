@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from mlg_troubleshoot.records.gate import admit, judge_again, judge_length
-from mlg_troubleshoot.records.headers import is_carried
-from mlg_troubleshoot.records.layout import understood
+from mlg_troubleshoot.records.layout import why_not_remembered
 from mlg_troubleshoot.records.model import ColumnReading, FileRead, ReadOptions, ReadResult, SheetLayout
 from mlg_troubleshoot.records.read import expand, read_many
 
@@ -16,9 +15,8 @@ __all__ = [
     "SheetLayout",
     "admit",
     "expand",
-    "is_carried",
     "judge_again",
     "judge_length",
     "read_many",
-    "understood",
+    "why_not_remembered",
 ]

@@ -321,19 +321,15 @@ def near_miss(header: str, joint_numbers: tuple[int, ...]) -> Recognition:
     return Recognition(nearest=close[0])
 
 
-def is_carried(name: str) -> bool:
-    """Tell whether the target of a mapping leaves the column unread."""
-    return _snake(name) == "carry"
-
-
 def _snake(name: str) -> str:
     return re.sub(r"[\s\-]+", "_", tidy(name))
 
 
 def parse_target(name: str, joint_numbers: tuple[int, ...]) -> Field | None:
-    if is_carried(name):
+    text = _snake(name)
+    if text == "carry":
         return None
-    field = parse_canonical(_snake(name), joint_numbers)
+    field = parse_canonical(text, joint_numbers)
     if field is None:
         raise UsageError(
             f"--map: {name!r} is not a column of the inspection table",

@@ -135,6 +135,7 @@ def test_no_setting_turns_a_measured_failure_into_a_verdict_within_margin(here: 
         ("remarks", "carry"),
         # In doubt, and so a problem that is said; passed over it would be none.
         ("Joint 3 wear", "carry"),
+        ("Joint 3 wear", "remarks"),
         ("margn_in", "carry"),
     ],
 )
@@ -146,6 +147,12 @@ def test_no_other_meaning_is_remembered_for_a_header_that_is_understood(
     assert (found.code, found.out) == (2, "")
     assert f"mlg.toml: headers: {header!r} = {column!r} is never remembered" in found.err
     assert f'--map "{header}={column}"' in found.err
+
+
+def test_what_a_header_in_doubt_means_is_remembered(here: Path, table: Table) -> None:
+    (here / "mlg.toml").write_text('[headers]\n"Joint 3 wear" = "clearance_3"\n', encoding="utf-8")
+    path = table(row(clearance_3_in=None, **{"Joint 3 wear": "0.002"}))
+    assert mlg("check", path, "--unit", "in", "--json").one["joints"][2]["clearance_in"] == 0.002
 
 
 def test_another_meaning_for_a_header_that_is_understood_is_not_kept(here: Path, table: Table) -> None:
