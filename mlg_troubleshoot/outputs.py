@@ -1,18 +1,63 @@
-"""The one place where files are written: whole or not at all, never over an input, never over a device."""
+"""The one place where files are written: whole or not at all, only over a file of the same output.
+
+An output never replaces an input, a store, a device, or a file that something else wrote.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 import stat
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 from mlg_troubleshoot.errors import OutputError, UsageError
 
 Field = str | float | int | bool | None
-# The wide forms of the signs start a formula in some language versions of Excel.
-_STARTS_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
+# What begins a field of a CSV, whichever separator a program assumes: the start of the text, a
+# separator or a line break, then any quotation marks and blanks. The comma is left out: a program
+# that knows it keeps our quotation marks. The wide forms of the signs start a formula in some
+# language versions of Excel.
+_BREAKS = r"\t-\r\x1c-\x1e\x85\u2028\u2029"
+_FORMULA = re.compile(rf'(\A|[;|{_BREAKS}])(?=(?:[^\S{_BREAKS}]|")*[=+\-@＝＋－＠])')
+# How a file of SQLite begins: such a file is a store, of this program or of another.
+_DATABASE = b"SQLite format 3\0"
+_STANDARD_OUTPUT = "-"
+
+
+@dataclass(frozen=True, slots=True)
+class OutputKind:
+    """What an output writes, and how a file that an earlier run of it wrote is known.
+
+    ``otherwise`` says of another file why it is not replaced: ``is not a table of verdicts``.
+    """
+
+    otherwise: str
+    is_own: Callable[[BinaryIO], bool]
+
+    @classmethod
+    def marked(cls, otherwise: str, mark: str) -> OutputKind:
+        """Return the kind of files that begin with a text; an empty text marks none."""
+        start = mark.encode("utf-8")
+        return cls(otherwise, lambda file: bool(start) and file.read(len(start)) == start)
+
+
+# Somebody has measured what stands in such a file by now.
+TO_FILL_IN = OutputKind("may have been filled in", lambda _: False)
+# A file that is gone on with, by a reader that refuses what is not its own.
+CONTINUED = OutputKind("", lambda _: True)
+
+
+@dataclass(frozen=True, slots=True)
+class OutputFile:
+    """A file that a run is asked to write: by which option, where, and what; none without a path."""
+
+    option: str
+    path: str | Path | None
+    kind: OutputKind
 
 
 def write_bytes(path: str | Path, data: bytes) -> None:
@@ -33,10 +78,7 @@ def write_bytes(path: str | Path, data: bytes) -> None:
         Path(scratch).replace(target)
         scratch = None
     except OSError as error:
-        raise OutputError(
-            f"{path} cannot be written: {error.strerror or error}",
-            "Check the folder, the permissions and the free space, or write to another place.",
-        ) from error
+        raise _cannot_be_written(path, error) from error
     finally:
         if scratch is not None:
             Path(scratch).unlink(missing_ok=True)
@@ -60,13 +102,13 @@ def csv_text(header: Sequence[str], rows: Iterable[Sequence[Field]]) -> str:
 
 def _quoted(field: str) -> str:
     """A field that stays one whichever separator a program takes the file to have."""
-    return '"' + field.replace('"', '""') + '"' if any(sign in field for sign in ',;\t"\r\n') else field
+    return '"' + field.replace('"', '""') + '"' if any(sign in field for sign in ',;|\t"\r\n') else field
 
 
 def harmless(value: Field) -> str:
     """Return a value as a CSV field that a spreadsheet program takes as it is.
 
-    Numbers are unchanged; a text that would become a formula gets an apostrophe in front.
+    Numbers are unchanged; in a text, a sign that would start a formula gets an apostrophe in front.
     """
     if value is None:
         return ""
@@ -74,26 +116,71 @@ def harmless(value: Field) -> str:
         return "TRUE" if value else "FALSE"
     if isinstance(value, int | float):
         return repr(value) if isinstance(value, int) else repr(float(value))
-    return f"'{value}" if value.lstrip(" ").startswith(_STARTS_FORMULA) else value
+    return _FORMULA.sub(r"\1'", value)
 
 
-def refuse_inputs_as_outputs(inputs: Iterable[str | Path], outputs: Iterable[tuple[str, str | Path | None]]) -> None:
-    """Refuse an output that is one of the inputs, before anything is read.
+def claim_outputs(
+    inputs: Iterable[str | Path | int],
+    outputs: Iterable[OutputFile],
+    *,
+    force: bool = False,
+) -> None:
+    """Refuse, before anything is read, an output that would replace what it must not.
 
-    Inputs are files, or folders of which every file counts; outputs are pairs of the option and what it was given.
-    The same file through a link counts, too. Raises `UsageError` (exit code 2).
+    That is an input, the file of another output, or a file that no earlier run of this output
+    wrote; the last may be replaced with ``force``, if it is not a database. Inputs are files,
+    folders of which every file counts, or the descriptor of an open file. A file is the one that
+    would be written, through links and missing folders. Raises `UsageError` (exit code 2), and
+    `OutputError` (5) where nothing can be written.
     """
-    files = [file for given in inputs for file in _files_of(Path(given))]
-    known = {_identity(file): file for file in files}
-    for option, output in outputs:
-        if output is None:
+    files = [file for given in inputs for file in _files_of(given)]
+    taken = {_identity(file): f"is one of the inputs ({_named(file)})" for file in files}
+    for each in outputs:
+        if each.path is None:
             continue
-        same = known.get(_identity(Path(output)))
-        if same is not None:
+        shown = f"{each.option} {each.path}"
+        if str(each.path) == _STANDARD_OUTPUT:
+            raise UsageError(f"{shown} is not the name of a file", "Give the name of a file.")
+        why = taken.get(_identity(each.path))
+        if why is not None:
             raise UsageError(
-                f"{option} {output} is one of the inputs ({same}): nothing was read and nothing written",
-                f"Give {option} another name: what was measured is not replaced.",
+                f"{shown} {why}: nothing was read and nothing written",
+                f"Give {each.option} another name.",
             )
+        taken[_identity(each.path)] = f"is the file of {each.option} as well"
+        _refuse_another(each, shown, force=force)
+
+
+def _refuse_another(output: OutputFile, shown: str, *, force: bool) -> None:
+    """Refuse to replace a file that no earlier run of this output wrote, unless it is empty."""
+    target = Path(os.path.realpath(str(output.path)))
+    try:
+        _mode_of(target, str(output.path))
+        if not target.exists() or not target.stat().st_size:
+            return
+        with target.open("rb") as file:
+            is_database = file.read(len(_DATABASE)) == _DATABASE
+            file.seek(0)
+            if not is_database and (force or output.kind.is_own(file)):
+                return
+    except OSError as error:
+        raise _cannot_be_written(shown, error) from error
+    if is_database:
+        raise UsageError(
+            f"{shown} is a database, such as a store of inspections: it is never replaced",
+            f"Give {output.option} another name.",
+        )
+    raise UsageError(
+        f"{shown} exists and {output.kind.otherwise}: nothing was read and nothing written",
+        f"Give {output.option} another name, or --force to replace the file.",
+    )
+
+
+def _cannot_be_written(path: str | Path, error: OSError) -> OutputError:
+    return OutputError(
+        f"{path} cannot be written: {error.strerror or error}",
+        "Check the folder, the permissions and the free space, or write to another place.",
+    )
 
 
 def _mode_of(target: Path, asked: str | Path) -> int:
@@ -110,14 +197,22 @@ def _mode_of(target: Path, asked: str | Path) -> int:
     return stat.S_IMODE(found.st_mode)
 
 
-def _files_of(path: Path) -> list[Path]:
+def _files_of(given: str | Path | int) -> list[Path | int]:
+    if isinstance(given, int):
+        return [given]
+    path = Path(given)
     return [file for file in path.iterdir() if not file.is_dir()] if path.is_dir() else [path]
 
 
-def _identity(path: Path) -> tuple[int, int] | str:
+def _named(file: Path | int) -> str:
+    return "standard input" if isinstance(file, int) else str(file)
+
+
+def _identity(file: str | Path | int) -> tuple[int, int] | str:
     """What makes two names one file: device and inode, or where a file that does not exist yet would stand."""
+    place = file if isinstance(file, int) else Path(os.path.realpath(file))
     try:
-        found = path.stat()
+        found = os.fstat(place) if isinstance(place, int) else place.stat()
     except OSError:
-        return os.path.realpath(path)
+        return str(place)
     return found.st_dev, found.st_ino

@@ -1,15 +1,28 @@
-"""Files are written whole or not at all, never over an input, never over a device."""
+"""Files are written whole or not at all, and replace only what an earlier run of the same output wrote."""
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import io
 import os
+import sqlite3
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from mlg_troubleshoot.errors import OutputError, UsageError
-from mlg_troubleshoot.outputs import csv_text, refuse_inputs_as_outputs, write_bytes, write_csv
+from mlg_troubleshoot.outputs import (
+    OutputFile,
+    OutputKind,
+    claim_outputs,
+    csv_text,
+    harmless,
+    write_bytes,
+    write_csv,
+)
 
 
 def test_a_file_under_a_file_cannot_be_written(tmp_path: Path) -> None:
@@ -75,38 +88,130 @@ def test_a_folder_is_no_file_to_write(tmp_path: Path) -> None:
         write_bytes(tmp_path, b"x")
 
 
-@pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@SUM(A1)", " =1", "\t=1", "＝1"])
+SEPARATORS = (",", ";", "\t", "|")
+SIGNS = "=+-@＝＋－＠"
+# Whatever a field may begin with before its formula.
+BEFORE = " \u00a0'\"" + "".join(SEPARATORS) + "\r\n\f"
+
+
+def fields(text: str, separator: str) -> list[str]:
+    """Every field of a CSV as a program reads it that takes it to have this separator."""
+    with io.StringIO(text, newline="") as file:
+        return [field for row in csv.reader(file, delimiter=separator) for field in row]
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@SUM(A1)", " =1", "\t=1", '"=1', "＝1", "＠SUM(A1)"])
 def test_no_text_becomes_a_formula(text: str) -> None:
-    ((field,),) = csv.reader([csv_text(["a"], [[text]]).split("\n", 1)[1]])
-    assert field.startswith("'")
+    (_, field) = fields(csv_text(["a"], [[text]]), ",")
+    assert field.strip().startswith("'")
 
 
-@pytest.mark.parametrize("separator", [",", ";", "\t"])
-def test_no_text_splits_into_a_formula_whatever_the_separator(separator: str) -> None:
-    line = csv_text(["a"], [[f"x{separator}=HYPERLINK(1)"]]).splitlines()[1]
-    assert list(csv.reader([line], delimiter=separator)) == [[f"x{separator}=HYPERLINK(1)"]]
+@pytest.mark.parametrize("separator", [";", "\t", "|", ';"', "; ", "\r\n", "|\f"])
+@pytest.mark.parametrize("sign", SIGNS)
+def test_no_text_splits_into_a_formula_whatever_the_separator(separator: str, sign: str) -> None:
+    text = csv_text(["a", "b"], [["R2", f"x{separator}{sign}HYPERLINK(1)"]])
+    for read_with in SEPARATORS:
+        for field in fields(text, read_with):
+            assert not field.strip(' \f"').startswith(tuple(SIGNS))
+
+
+@given(
+    rows=st.lists(
+        st.lists(st.text(st.sampled_from(BEFORE + SIGNS + "x1()"), max_size=12) | st.just(-0.5), min_size=1, max_size=4)
+    )
+)
+@settings(max_examples=400, deadline=None)
+def test_no_field_starts_with_a_formula_sign_whichever_separator_it_is_read_with(
+    rows: list[list[str | float]],
+) -> None:
+    text = csv_text(["id"], [["R1", *row] for row in rows])
+    for separator in SEPARATORS:
+        for field in fields(text, separator):
+            assert field == "-0.5" or not field.strip(' \u00a0\f"').startswith(tuple(SIGNS))
+
+
+@given(text=st.text(st.sampled_from(BEFORE + SIGNS + "x1"), max_size=12))
+def test_what_was_made_harmless_is_not_changed_again(text: str) -> None:
+    assert harmless(harmless(text)) == harmless(text)
+
+
+def test_a_text_without_a_formula_is_read_back_as_it_was() -> None:
+    text = 'N123; LH | a-b, "c" = 1\n2'
+    assert fields(csv_text(["a"], [[text]]), ",") == ["a", text]
 
 
 def test_a_negative_number_stays_a_number() -> None:
     assert csv_text(["a"], [[-0.5]]) == "a\n-0.5\n"
 
 
-@pytest.mark.parametrize("given", ["in.csv", "link.csv", "hard.csv", "folder/../in.csv"])
-def test_an_output_that_is_an_input_is_refused(tmp_path: Path, given: str) -> None:
+TABLE = OutputKind.marked("is not a table", "a,b\n")
+
+
+@pytest.mark.parametrize("name", ["in.csv", "link.csv", "hard.csv", "folder/../in.csv", "no/../in.csv", "./in.csv"])
+def test_an_output_that_is_an_input_is_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / "folder").mkdir()
     (tmp_path / "in.csv").write_text("x")
     (tmp_path / "link.csv").symlink_to("in.csv")
     (tmp_path / "hard.csv").hardlink_to(tmp_path / "in.csv")
     with pytest.raises(UsageError, match=r"--csv .* is one of the inputs"):
-        refuse_inputs_as_outputs([tmp_path / "in.csv"], [("--csv", tmp_path / given)])
+        claim_outputs([tmp_path / "in.csv"], [OutputFile("--csv", f"{tmp_path}/{name}", TABLE)], force=True)
 
 
 def test_an_output_in_an_input_folder_is_refused_where_it_is_one_of_its_files(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("x")
     with pytest.raises(UsageError):
-        refuse_inputs_as_outputs([tmp_path], [("--csv", tmp_path / "a.csv")])
+        claim_outputs([tmp_path], [OutputFile("--csv", tmp_path / "a.csv", TABLE)], force=True)
+
+
+def test_an_output_that_is_the_file_of_an_open_input_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "in.csv").write_text("x")
+    with (tmp_path / "in.csv").open() as file, pytest.raises(UsageError, match="standard input"):
+        claim_outputs([file.fileno()], [OutputFile("--csv", tmp_path / "in.csv", TABLE)], force=True)
+
+
+@pytest.mark.parametrize("second", ["a.csv", "no/../a.csv", "link.csv"])
+def test_two_outputs_are_two_files(tmp_path: Path, second: str) -> None:
+    (tmp_path / "link.csv").symlink_to("a.csv")
+    outputs = [OutputFile("--csv", tmp_path / "a.csv", TABLE), OutputFile("--state", f"{tmp_path}/{second}", TABLE)]
+    with pytest.raises(UsageError, match=r"--state .* is the file of --csv as well"):
+        claim_outputs([], outputs, force=True)
 
 
 def test_another_output_is_not_refused(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("x")
-    refuse_inputs_as_outputs([tmp_path / "a.csv"], [("--csv", tmp_path / "b.csv"), ("--annotate", None)])
+    outputs = [OutputFile("--csv", tmp_path / "b.csv", TABLE), OutputFile("--annotate", None, TABLE)]
+    claim_outputs([tmp_path / "a.csv"], outputs)
+
+
+@pytest.mark.parametrize("held", ["", "a,b\n1,2\n"])
+def test_a_file_of_the_same_output_and_an_empty_one_are_replaced(tmp_path: Path, held: str) -> None:
+    (tmp_path / "o.csv").write_text(held)
+    claim_outputs([], [OutputFile("--csv", tmp_path / "o.csv", TABLE)])
+
+
+def test_another_file_is_replaced_with_force_only(tmp_path: Path) -> None:
+    (tmp_path / "o.csv").write_text("a,b,c\n")
+    outputs = [OutputFile("--csv", tmp_path / "o.csv", TABLE)]
+    with pytest.raises(UsageError, match=r"--csv .* exists and is not a table") as refused:
+        claim_outputs([], outputs)
+    assert "--force" in refused.value.remedy
+    claim_outputs([], outputs, force=True)
+
+
+def test_an_empty_mark_marks_nothing(tmp_path: Path) -> None:
+    (tmp_path / "o").write_text("x")
+    with pytest.raises(UsageError):
+        claim_outputs([], [OutputFile("the export", tmp_path / "o", OutputKind.marked("is not one", ""))])
+
+
+def test_a_database_is_not_replaced_with_force_either(tmp_path: Path) -> None:
+    with contextlib.closing(sqlite3.connect(tmp_path / "any")) as database:
+        database.execute("CREATE TABLE kept (x)")
+    with pytest.raises(UsageError, match="is a database") as refused:
+        claim_outputs([], [OutputFile("--csv", tmp_path / "any", TABLE)], force=True)
+    assert "--force" not in refused.value.remedy
+
+
+def test_a_dash_is_not_the_name_of_an_output() -> None:
+    with pytest.raises(UsageError, match="--csv - is not the name of a file"):
+        claim_outputs([], [OutputFile("--csv", Path("-"), TABLE)])

@@ -8,16 +8,21 @@ from functools import partial
 from pathlib import Path
 
 from mlg_troubleshoot.cli import by_hand, history, options, output
+from mlg_troubleshoot.cli.claims import claim
 from mlg_troubleshoot.cli.flags import Flags, Wanted
 from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.remembered import Settings, settings
 from mlg_troubleshoot.cli.views import batch, notes, one_gear
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.outputs import OutputFile
 from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.diagnose import load_model_extension
+
+# Where the prompts write a report that was not asked for by a flag.
+_ASKED_FOR = Path("report")
 
 
 class Run:
@@ -29,17 +34,28 @@ class Run:
         if wanted.formats and wanted.report is None:
             output.say("Note: --format is for reports: without --report DIR none is written.")
         extensions, causes = wanted.extension or (), wanted.causes or ()
-        outputs = [("--csv", wanted.csv), ("--annotate", wanted.annotate)]
-        options.keep_inputs(tables.gear, [*files, *extensions, *causes], outputs, wanted.report)
-        self._shown = settings(wanted.show, wanted.page, tables.columns, keep=wanted.remember, quiet=wanted.quiet)
+        self._files, self._flags, self._wanted = files, flags, wanted
+        self._asks = not (files or flags.values)
+        outputs = [OutputFile("--csv", wanted.csv, task.VERDICTS)]
+        if wanted.annotate is not None:
+            from mlg_troubleshoot.records.annotate import ANNOTATED
+
+            outputs.append(OutputFile("--annotate", wanted.annotate, ANNOTATED))
+        claim(
+            tables.gear,
+            [*files, *extensions, *causes],
+            outputs,
+            wanted.report or (_ASKED_FOR if self._asks else None),
+            store=wanted.store,
+            force=wanted.force,
+        )
+        self._shown = settings(tables.gear, wanted.show, wanted.page, tables.columns, keep=wanted.remember)
         self._asked = task.CheckOptions(
             **tables.declared(self._shown.headers),
             remembered=self._shown.note or None,
             seed=wanted.seed,
             extension=load_model_extension(extensions, tables.gear, causes),
         )
-        self._files, self._flags, self._wanted = files, flags, wanted
-        self._asks = not (files or flags.values)
         self._place = Store(wanted.store) if wanted.keep or self._asks else None
 
     def run(self) -> int:
@@ -81,7 +97,7 @@ class Run:
             self._publish(result, entered_in)
             if self._wanted.report is not None or self._wanted.as_json:
                 return by_hand.Ending(result, None)
-            return by_hand.Ending(result, partial(self._write_reports, result, Path("report"), self._seen(entered_in)))
+            return by_hand.Ending(result, partial(self._write_reports, result, _ASKED_FOR, self._seen(entered_in)))
 
         wanted = self._wanted
         return by_hand.ask(self._flags, self._asked, publish, self._keep, resume=wanted.resume, place=wanted.store)
@@ -96,7 +112,8 @@ class Run:
         if wanted.as_json:
             from mlg_troubleshoot.reporting.json_form import check_as_json, check_json_pieces
 
-            found = (result.gear, result.judgements, result.problems, result.notes, result.seed)
+            warnings = (*filter(None, [self._asked.remembered]), *result.notes)
+            found = (result.gear, result.judgements, result.problems, warnings, result.seed)
             output.write_json(check_json_pieces(*found) if len(result.judgements) > 1 else check_as_json(*found))
         else:
             self._show(result, seen.show)

@@ -40,6 +40,7 @@ def diagnose(
     ] = 999,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all randomness.")] = 0,
     tables: options.Tables,
+    force: options.Force = False,
     show: options.Show = None,
     remember: options.Remember = False,
     as_json: options.Json = False,
@@ -50,15 +51,19 @@ def diagnose(
 
     Exit codes: 0 nothing found · 1 something found · 3 cannot be concluded from this table · 2 usage.
     """
+    from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.cli.views.notes import show_notes, show_problems
+    from mlg_troubleshoot.diagnosis import EXTENSION
     from mlg_troubleshoot.diagnosis import write_extension as keep_extension
+    from mlg_troubleshoot.outputs import OutputFile
     from mlg_troubleshoot.reporting.json_form import SCHEMA_VERSION, diagnosis_as_json
     from mlg_troubleshoot.workflows import diagnose as task
 
-    options.keep_inputs(tables.gear, [*files, *(causes or ())], [("--write-extension", write_extension)], report)
-    shown = settings(show, page, tables.columns, keep=remember, quiet=quiet)
+    written = OutputFile("--write-extension", write_extension, EXTENSION)
+    claim(tables.gear, [*files, *(causes or ())], [written], report, force=force)
+    shown = settings(tables.gear, show, page, tables.columns, keep=remember)
     asked = task.DiagnoseOptions(
         **tables.declared(shown.headers),
         remembered=shown.note or None,
@@ -77,7 +82,8 @@ def diagnose(
             output.write_json({"schema_version": SCHEMA_VERSION, "verdict": None, **reason})
         raise
     if as_json:
-        output.write_json(diagnosis_as_json(result.diagnosis, result.extension))
+        warnings = (*filter(None, [asked.remembered]), *result.notes)
+        output.write_json(diagnosis_as_json(result.diagnosis, result.extension, warnings))
     else:
         if not quiet:
             show_notes(result.notes)
@@ -91,8 +97,8 @@ def diagnose(
         keep_extension(result.extension, write_extension)
         output.say(f"Extension: {write_extension}. Use it: mlg check FILE --extension {write_extension}")
     if report is not None:
-        written = task.write_diagnosis_report(result, asked, report, str(shown.page), unit=shown.show)
-        output.say_written([written], quiet=quiet)
+        made = task.write_diagnosis_report(result, asked, report, str(shown.page), unit=shown.show)
+        output.say_written([made], quiet=quiet)
     nothing = result.diagnosis.verdict == "NONE" and not result.diagnosis.faults
     raise typer.Exit(NOTHING_FOUND if nothing else SOMETHING_FOUND)
 

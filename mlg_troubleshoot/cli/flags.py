@@ -77,6 +77,7 @@ class Wanted:
     every: Annotated[bool, typer.Option("--all", help="A batch: every inspection, not the latest of each gear.")] = (
         False
     )
+    force: options.Force = False
     show: options.Show = None
     remember: options.Remember = False
     seed: Annotated[
@@ -151,6 +152,7 @@ class StudyFlags:
         typer.Option("--report", metavar="DIR", help="Write a printable report with figures, statements and bound."),
     ] = None
     page: options.Paper = None
+    force: options.Force = False
     show: options.Show = None
     as_json: options.Json = False
     quiet: options.Quiet = False

@@ -19,18 +19,22 @@ def fleet(
     no_forecast: history.NoForecast = False,
     report: options.Report = None,
     page: options.Paper = None,
+    force: options.Force = False,
     show: options.Show = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Show every gear that was kept: verdict, landings left, next inspection due; worst first."""
+    from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.store import Store
     from mlg_troubleshoot.workflows import history as task
 
-    known, shown = load_gear(gear), settings(show, page, {}, keep=False, quiet=quiet)
+    known = load_gear(gear)
+    claim(gear, (), (), report, store=store, force=force)
+    shown = settings(gear, show, page)
     with stages(quiet=quiet) as bar:
         bar("Reading the store", 0, None)
         found = list(task.lives(Store(store)).values())
@@ -46,7 +50,16 @@ def fleet(
     else:
         _show(told["gears"], known)
     if report is not None:
-        written = task.write_pages(found, ahead, known, report, fleet=True, page=shown.page.value, unit=shown.show)
+        written = task.write_pages(
+            found,
+            ahead,
+            known,
+            report,
+            fleet=True,
+            page=shown.page.value,
+            unit=shown.show,
+            remembered=shown.note or None,
+        )
         output.say_written(written, quiet=quiet)
 
 

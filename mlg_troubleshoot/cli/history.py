@@ -69,16 +69,19 @@ def show(
     no_forecast: NoForecast = False,
     report: options.Report = None,
     page: options.Paper = None,
+    force: options.Force = False,
     show_in: options.Show = None,
     as_json: options.Json = False,
 ) -> None:
     """Show what was kept: the gears and their latest state, or one gear's life with the forecast of each joint."""
+    from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.workflows import history as task
 
     place, known = _kept_in(store), load_gear(gear)
-    shown = settings(show_in, page, {}, keep=False, quiet=as_json)
+    claim(gear, (), (), report, store=store, force=force)
+    shown = settings(gear, show_in, page)
     if tail is None and report is not None:
         raise UsageError("--report needs a gear", "Give TAIL, or write the page of all gears: mlg fleet --report DIR")
     if tail is None:
@@ -105,9 +108,17 @@ def show(
             _show_life(everything[key], ahead[key], known, shown.show)
     if report is not None:
         lives = [everything[key] for key in wanted]
-        output.say_written(
-            task.write_pages(lives, ahead, known, report, fleet=False, page=shown.page.value, unit=shown.show)
+        written = task.write_pages(
+            lives,
+            ahead,
+            known,
+            report,
+            fleet=False,
+            page=shown.page.value,
+            unit=shown.show,
+            remembered=shown.note or None,
         )
+        output.say_written(written)
 
 
 def _show_gears(found: Sequence[GearLife], place: str) -> None:
@@ -335,14 +346,15 @@ def verify(store: Place = None) -> None:
     output.write(f"{count} records fit the chain.")
 
 
-def export(file: Chain, store: Place = None) -> None:
+def export(file: Chain, store: Place = None, force: options.Force = False) -> None:
     """Write the whole chain as JSON Lines."""
-    from mlg_troubleshoot.outputs import refuse_inputs_as_outputs, write_text
+    from mlg_troubleshoot.cli.claims import claim
+    from mlg_troubleshoot.outputs import OutputFile, OutputKind, write_text
 
-    place = _kept_in(store)
-    if "://" not in place.place:
-        refuse_inputs_as_outputs([place.place], [("the export", file)])
-    lines = list(place.export())
+    lines = list(_kept_in(store).export())
+    # An export of another store may be all that is left of it.
+    own = OutputKind.marked("is not an export of this store", lines[0] if lines else "")
+    claim(None, (), [OutputFile("the export", file, own)], store=store, force=force)
     write_text(file, "".join(lines))
     output.say(f"Written: {file}, {len(lines)} records.")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from enum import StrEnum
 from functools import wraps
@@ -81,6 +81,9 @@ Show = Annotated[
 Remember = Annotated[
     bool, typer.Option("--remember", help="Keep --show, --page and --map in mlg.toml here, for later runs.")
 ]
+Force = Annotated[
+    bool, typer.Option("--force", help="Replace a file that is not of an earlier run; never an input or a store.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Write the result as JSON to stdout.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no notes.")]
 
@@ -142,33 +145,3 @@ def flat(command: Callable[..., None]) -> Callable[..., None]:
     run.__annotations__ = {each.name: each.annotation for each in shown}
     run.__dict__["__signature__"] = Signature(shown)
     return run
-
-
-def keep_inputs(
-    gear: str,
-    inputs: Iterable[str | Path | None],
-    outputs: Sequence[tuple[str, str | Path | None]],
-    report: Path | None = None,
-    *,
-    writes_table: bool = False,
-) -> None:
-    """Refuse, before anything is read, an output that is one of the inputs: tables, gear, extensions, causes.
-
-    A report is a file of its own name: in its folder no input may be one that a report could replace.
-    """
-    from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.outputs import refuse_inputs_as_outputs
-    from mlg_troubleshoot.records import expand
-
-    written = [(option, path) for option, path in outputs if path is not None]
-    if report is not None and report.is_dir():
-        written += [("--report", path) for path in report.iterdir() if path.suffix.lower() in {".html", ".pdf"}]
-    if written or writes_table:
-        known = load_gear(gear)
-        files = [Path(str(file)) for name in inputs if name not in (None, "-") for file in expand(str(name))]
-        files += [
-            file for file in known.files if file == known.path or not (writes_table and file == known.indices_file)
-        ]
-        if writes_table:
-            written.append(("--write-table", known.indices_file))
-        refuse_inputs_as_outputs(files, written)

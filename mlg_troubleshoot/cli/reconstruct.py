@@ -33,6 +33,7 @@ def reconstruct(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="OUT.toml", help="Write the linkage as a member of an ensemble.")
     ] = None,
+    force: options.Force = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     _version: options.Version = False,
@@ -41,11 +42,13 @@ def reconstruct(
 
     Exit codes: 0 found · 1 polished, but not everything is met · 3 nothing found in time.
     """
+    from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.progress import stages
+    from mlg_troubleshoot.outputs import OutputFile
     from mlg_troubleshoot.workflows import reconstruct as task
 
     gear = context.obj or options.DEFAULT_GEAR
-    options.keep_inputs(gear, [targets], [("--out", out)])
+    claim(gear, [targets], [OutputFile("--out", out, task.LINKAGE)], force=force)
     with stages(quiet=quiet) as advance:
         found, text = task.reconstruct_linkage(
             gear, targets=targets, seed=seed, start=start, name=name, minutes=minutes, out=out, progress=advance

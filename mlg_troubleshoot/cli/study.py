@@ -15,10 +15,17 @@ EPILOG = (
 def study(flags: StudyFlags, _version: options.Version = False) -> None:
     """Recompute the sensitivity and amplification indices of every joint."""
     from mlg_troubleshoot.cli import study_run
+    from mlg_troubleshoot.cli.claims import WRITE_TABLE, claim
     from mlg_troubleshoot.cli.remembered import settings
+    from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.outputs import CONTINUED, OutputFile
+    from mlg_troubleshoot.studies.index_table import INDEX_TABLE
+    from mlg_troubleshoot.workflows.study import STUDY_CSV
 
-    shown = settings(flags.show, flags.page, {}, keep=False, quiet=flags.quiet)
-    outputs = [("--csv", flags.csv), ("--state", flags.state)]
-    options.keep_inputs(flags.gear, [flags.given], outputs, flags.report, writes_table=flags.write_table)
+    outputs = [OutputFile("--csv", flags.csv, STUDY_CSV), OutputFile("--state", flags.state, CONTINUED)]
+    if flags.write_table:
+        outputs.append(OutputFile(WRITE_TABLE, load_gear(flags.gear).indices_file, INDEX_TABLE))
+    claim(flags.gear, [flags.given], outputs, flags.report, force=flags.force)
+    shown = settings(flags.gear, flags.show, flags.page)
     with study_run.asked(flags) as (known, wanted):
         study_run.run(known, wanted, flags, shown)

@@ -79,7 +79,13 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
     if flags.csv is not None:
         task.write_study_csv(findings, flags.csv)
     if flags.report is not None:
-        written = task.write_study_report(findings, flags.report, settings.page.value, unit=settings.show)
+        written = task.write_study_report(
+            findings,
+            flags.report,
+            settings.page.value,
+            unit=settings.show,
+            remembered=settings.note or None,
+        )
         output.say_written([written])
     if flags.write_table:
         output.say(f"Table written: {task.write_study_table(findings)}")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mlg_troubleshoot.cli import options, output
-from mlg_troubleshoot.errors import OutputError, UsageError
+from mlg_troubleshoot.errors import UsageError
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.studies.survey_result import SurveyResult
@@ -39,7 +39,7 @@ def survey(
         typer.Option("--for", metavar="INSPECTIONS", help="Narrow the displacement of these, not the indices."),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the starts and draws.")] = 0,
-    force: Annotated[bool, typer.Option("--force", help="Replace a template that exists.")] = False,
+    force: options.Force = False,
     report: options.Report = None,
     page: options.Paper = None,
     show: options.Show = None,
@@ -51,18 +51,18 @@ def survey(
 
     Exit codes: 0 fits · 1 something does not fit · 3 nothing follows from the table.
     """
+    from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.cli.remembered import settings
+    from mlg_troubleshoot.outputs import TO_FILL_IN, OutputFile
     from mlg_troubleshoot.workflows import survey as task
 
-    shown = settings(show, page, {}, keep=False, quiet=quiet)
     gear = context.obj or options.DEFAULT_GEAR
+    shown = settings(gear, show, page)
     if file in ("template", "ask") and template is None and not Path(file).exists():
         raise UsageError(f"{file} needs the name of a file", f"Give for example: mlg gear survey {file} survey.csv")
     if file == "template" and template is not None:
-        if template.exists() and not force:
-            raise OutputError(f"{template} exists already", "Give another name, or --force to replace it.")
-        options.keep_inputs(gear, (), [("the template", template)])
+        claim(gear, (), [OutputFile("the template", template, TO_FILL_IN)], force=force)
         task.write_survey_template(template, gear, shown.show)
         output.write(
             f"Written: {template}. Fill in what you read, then: mlg gear survey {template} --write my-gear.toml"
@@ -72,7 +72,8 @@ def survey(
         file = _asked(template, gear, shown.show)
     elif template is not None:
         raise UsageError(f"unexpected {str(template)!r}", "Give one survey, or: mlg gear survey template FILE.csv")
-    options.keep_inputs(gear, [file, inspections], [("--write", write)], report)
+    outputs = () if write is None else task.written_with(write)
+    claim(gear, [file, inspections], outputs, report, force=force)
     with stages(quiet=quiet) as bar:
         result = task.survey_gear(
             file, gear, write=write, inspections=inspections, seed=seed, told=partial(bar, "Fitting")
@@ -81,7 +82,11 @@ def survey(
         output.write_json(task.survey_values(result))
     else:
         _show(result, output.console(unit=shown.show))
-    written = None if report is None else task.write_survey_report(result, Path(file), report, shown.page, shown.show)
+    written = None
+    if report is not None:
+        written = task.write_survey_report(
+            result, Path(file), report, shown.page, shown.show, remembered=shown.note or None
+        )
     if written is not None:
         output.say_written([written], quiet=quiet)
     raise typer.Exit(result.exit_code)
@@ -89,14 +94,16 @@ def survey(
 
 def _asked(file: Path, gear: str, unit: LengthUnit) -> str:
     """Ask for the readings on the terminal; the file keeps them, so that a later run goes on where this one stopped."""
+    from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.prompts import RichTerminal
     from mlg_troubleshoot.cli.survey_prompts import ask_survey
     from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.outputs import CONTINUED, OutputFile
     from mlg_troubleshoot.workflows.survey import write_survey_template
 
     if not output.can_ask():
         raise UsageError("this is not a terminal to ask on", "Fill in a template: mlg gear survey template FILE.csv")
-    options.keep_inputs(gear, (), [("the survey", file)])
+    claim(gear, (), [OutputFile("the survey", file, CONTINUED)])
     if not file.exists():
         write_survey_template(file, gear, unit)
     again = f"Kept: {file}. Go on: mlg gear survey ask {file}"

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from mlg_troubleshoot.cli import options, output
-from mlg_troubleshoot.errors import OutputError, UsageError
+from mlg_troubleshoot.errors import UsageError
 
 
 def template(
@@ -16,21 +16,21 @@ def template(
         Path, typer.Argument(metavar="FILE.xlsx|FILE.pdf", help="Where to write it: a workbook, or a form to print.")
     ],
     gear: options.Gear = options.DEFAULT_GEAR,
-    force: Annotated[bool, typer.Option("--force", help="Replace a file that exists.")] = False,
+    force: options.Force = False,
     page: options.Paper = None,
     show: options.Show = None,
     _version: options.Version = False,
 ) -> None:
     """Write an empty inspection workbook that mlg check reads back, or a one-page form (.pdf, .html) for the hand."""
+    from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.remembered import settings
+    from mlg_troubleshoot.outputs import TO_FILL_IN, OutputFile
     from mlg_troubleshoot.workflows import check as task
 
     if file.suffix.lower() not in (".xlsx", ".pdf", ".html"):
         raise UsageError(f"{file.name!r} is no workbook and no form", "Give a name that ends in .xlsx, .pdf or .html.")
-    if file.exists() and not force:
-        raise OutputError(f"{file} exists already", "Give another name, or --force to replace it.")
-    options.keep_inputs(gear, (), [("the template", file)])
-    shown = settings(show, page, {}, keep=False, quiet=False)
+    claim(gear, (), [OutputFile("the template", file, TO_FILL_IN)], force=force)
+    shown = settings(gear, show, page)
     task.write_template(file, gear, page=str(shown.page), unit=shown.show)
     if file.suffix.lower() == ".xlsx":
         output.write(f"Written: {file}. Fill it in, then: mlg check {file} --report DIR")

@@ -2,7 +2,7 @@
 
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate, Cause, Scene, load_causes
 from mlg_troubleshoot.diagnosis.diagnose import Diagnosis, NamedCause, diagnose
-from mlg_troubleshoot.diagnosis.extension import ModelExtension, Term, load_extension, write_extension
+from mlg_troubleshoot.diagnosis.extension import EXTENSION, ModelExtension, Term, load_extension, write_extension
 from mlg_troubleshoot.diagnosis.simulation import (
     HeldOutGain,
     SimulationDiagnosis,
@@ -15,6 +15,7 @@ from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspecti
 
 __all__ = [
     "CATALOGUE",
+    "EXTENSION",
     "Candidate",
     "Cause",
     "Diagnosis",

@@ -21,9 +21,11 @@ from mlg_troubleshoot.errors import GearFileError, TroubleshootError
 from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
 from mlg_troubleshoot.gear.gear import Discrepancies, Gear
 from mlg_troubleshoot.gear.model import LinkageModel
-from mlg_troubleshoot.outputs import write_text
+from mlg_troubleshoot.outputs import OutputKind, write_text
 
 SCHEMA = 1
+_HEADING = "# Extension of the model by a diagnosis of measured displacements.\n"
+EXTENSION = OutputKind.marked("is not an extension of the model", _HEADING)
 # No plunger moves further; a larger scatter would clear nothing and reject nothing. [in]
 MOST_IN = 1.0
 
@@ -165,7 +167,7 @@ def write_extension(extension: ModelExtension, file: Path) -> None:
         "unread_joints": list(extension.unread),
         "terms": terms,
     }
-    write_text(file, "# Extension of the model by a diagnosis of measured displacements.\n" + tomli_w.dumps(whole))
+    write_text(file, _HEADING + tomli_w.dumps(whole))
 
 
 def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ()) -> ModelExtension:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mlg_troubleshoot.records.gate import admit, judge_again, judge_length
+from mlg_troubleshoot.records.layout import why_not_remembered
 from mlg_troubleshoot.records.model import ColumnReading, FileRead, ReadOptions, ReadResult, SheetLayout
 from mlg_troubleshoot.records.read import expand, read_many
 
@@ -17,4 +18,5 @@ __all__ = [
     "judge_again",
     "judge_length",
     "read_many",
+    "why_not_remembered",
 ]

@@ -5,11 +5,13 @@ from __future__ import annotations
 import io
 import re
 import warnings
+import zlib
 from collections import Counter
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 from types import MappingProxyType
+from typing import BinaryIO
 from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile
 
 from openpyxl import Workbook, load_workbook
@@ -23,7 +25,7 @@ from openpyxl.writer.excel import ExcelWriter
 
 from mlg_troubleshoot.decision.inspection import RowSource
 from mlg_troubleshoot.errors import OutputError, Problem, UsageError
-from mlg_troubleshoot.outputs import write_bytes
+from mlg_troubleshoot.outputs import OutputKind, write_bytes
 from mlg_troubleshoot.records.cells import column_letters, writable
 from mlg_troubleshoot.records.columns import Field, Kind
 from mlg_troubleshoot.records.model import ReadResult, SheetLayout
@@ -42,8 +44,24 @@ _TEXT_WIDTH, _NUMBER_WIDTH, _LONG_WIDTH, _ON_A_LINE = 17, 11, 52, 58
 # At which the verdicts fit on the width of a landscape page. [%]
 _LANDSCAPE_SCALE = 55
 
+# Who saved a workbook last: another program puts its own user here.
+_SAVED_BY = "mlg check --annotate"
+_SAVED = f"<cp:lastModifiedBy>{_SAVED_BY}</cp:lastModifiedBy>".encode()
+_PROPERTIES, _MOST_BYTES = "docProps/core.xml", 100_000
+
 VerdictColumns = Mapping[RowSource, Mapping[str, str | float | None]]
 OverLimit = Mapping[RowSource, Mapping[int, float]]
+
+
+def _is_annotated(file: BinaryIO) -> bool:
+    try:
+        with ZipFile(file) as package, package.open(_PROPERTIES) as properties:
+            return _SAVED in properties.read(_MOST_BYTES)
+    except (BadZipFile, KeyError, ValueError, RuntimeError, NotImplementedError, EOFError, zlib.error):
+        return False
+
+
+ANNOTATED = OutputKind("is not an annotated workbook as it was written", _is_annotated)
 
 
 def annotate_workbook(
@@ -67,6 +85,7 @@ def annotate_workbook(
             macros = Path(out).suffix.lower() == ".xlsm"
             book = load_workbook(io.BytesIO(data), keep_vba=macros, rich_text=True)
             _annotate(book, label, result, verdicts, over_limit)
+            book.properties.lastModifiedBy = _SAVED_BY
             ExcelWriter(book, package).save()
     except (BadZipFile, KeyError, ValueError, TypeError, AttributeError, IndexError, SyntaxError, OSError) as error:
         raise OutputError(

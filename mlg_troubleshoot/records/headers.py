@@ -312,7 +312,7 @@ def recognise(header: str, joint_numbers: tuple[int, ...], joint_names: Mapping[
 
 def near_miss(header: str, joint_numbers: tuple[int, ...]) -> Recognition:
     """Look for the canonical column that an unknown header is a slip of the pen away from."""
-    snake = re.sub(r"[\s\-]+", "_", tidy(header))
+    snake = _snake(header)
     bare = re.sub(r"_(in|thou|mm)$", "", snake)
     candidates = [k.value for k in Kind if k not in PER_JOINT and k not in (Kind.UNIT, Kind.SIDE, Kind.JOINT)]
     candidates += [f"{k.value}_{n}" for k in (Kind.CLEARANCE, Kind.AXIAL_FLOAT) for n in joint_numbers]
@@ -326,8 +326,12 @@ def near_miss(header: str, joint_numbers: tuple[int, ...]) -> Recognition:
     return Recognition(nearest=close[0])
 
 
+def _snake(name: str) -> str:
+    return re.sub(r"[\s\-]+", "_", tidy(name))
+
+
 def parse_target(name: str, joint_numbers: tuple[int, ...]) -> Field | None:
-    text = re.sub(r"[\s\-]+", "_", tidy(name))
+    text = _snake(name)
     if text == "carry":
         return None
     field = parse_canonical(text, joint_numbers)

@@ -8,7 +8,16 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise, zip_longest
 
 from mlg_troubleshoot.records.cells import Cell, column_letters, show, writable
-from mlg_troubleshoot.records.columns import ALONG, CARRIED, IDENTITY, LENGTHS, PER_JOINT, REQUIRED, Kind
+from mlg_troubleshoot.records.columns import (
+    ALONG,
+    CARRIED,
+    IDENTITY,
+    LENGTHS,
+    PER_JOINT,
+    REQUIRED,
+    VERDICT_BEARING,
+    Kind,
+)
 from mlg_troubleshoot.records.headers import UNKNOWN, Recognition, near_miss, parse_target, recognise, tidy
 from mlg_troubleshoot.records.model import ReadOptions, TableInHand
 from mlg_troubleshoot.records.refusals import HEADER_SEARCH_ROWS
@@ -149,6 +158,27 @@ def _unit_row(header: Header, cells: Sequence[Cell], options: ReadOptions) -> tu
     return tuple(units) if any(units) else None
 
 
+def why_not_remembered(header: str, column: str, options: ReadOptions) -> str:
+    """Say why a mapping must be given anew with each table; empty if it may be remembered.
+
+    A header that is understood by itself has no other meaning; one in doubt is not passed over.
+    """
+    found = _understood(header, options)
+    if found.field is not None:
+        return f"is read as {found.field.name}"
+    if found.reason:
+        target = parse_target(column, options.joint_numbers)
+        if target is None or target.kind not in VERDICT_BEARING | PER_JOINT:
+            return f"is doubtful: {found.reason}"
+    return ""
+
+
+def _understood(header: str, options: ReadOptions) -> Recognition:
+    """Return what a header is understood as by itself, with no mapping."""
+    found = recognise(header, options.joint_numbers, options.joint_names)
+    return near_miss(header, options.joint_numbers) if found is UNKNOWN and header else found
+
+
 class ColumnReader:
     def __init__(self, table: TableInHand, *, by_hand: bool = False) -> None:
         self._table = table
@@ -159,11 +189,12 @@ class ColumnReader:
     def _recognise(self, text: str, index: int) -> tuple[Recognition, bool]:
         """Read one header; True if the caller mapped it."""
         options = self._options
-        for key, target in {**options.remembered_map, **options.column_map}.items():
-            if tidy(key) == tidy(text) or key == column_letters(index):
+        for key, target in (*options.column_map.items(), *options.remembered_map.items()):
+            # Letters name a place in this table: nothing that was remembered from another knows it.
+            placed = key == column_letters(index) and key in options.column_map
+            if tidy(key) == tidy(text) or placed:
                 return Recognition(parse_target(target, options.joint_numbers)), True
-        found = recognise(text, options.joint_numbers, options.joint_names)
-        return near_miss(text, options.joint_numbers) if found is UNKNOWN and text else found, False
+        return _understood(text, options), False
 
     def place(
         self,

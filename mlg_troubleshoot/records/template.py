@@ -14,13 +14,14 @@ from openpyxl.worksheet.pagebreak import Break
 from openpyxl.worksheet.properties import PageSetupProperties
 from openpyxl.worksheet.worksheet import Worksheet
 
+from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.joints import JointSpec
 from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.records.cells import column_letters
-from mlg_troubleshoot.records.columns import CARRIED, LENGTHS, Field, Kind
+from mlg_troubleshoot.records.columns import CARRIED, LENGTHS, PER_JOINT, Field, Kind
 from mlg_troubleshoot.records.forms import FORM_TITLE
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
-
-JointLine = tuple[int, str, str]
 
 _ROWS = 500
 # The font and the colour of headers of what this program writes into workbooks.
@@ -40,7 +41,7 @@ _CHOICES: dict[Kind, tuple[str, ...]] = {
     Kind.APPROACH: ("EXTENDING", "RETRACTING"),
     Kind.OUTCOME: ("RETRACTED", "FAILED"),
 }
-# What each column holds, in the order of the columns.
+# What each column holds, in the order of the columns; in braces the numbers of `_numbers`.
 _MEANING: dict[Kind, str] = {
     Kind.RECORD_ID: "Required. Your own unique name of this inspection.",
     Kind.TAIL_NO: "Required. Tail number, kept as text.",
@@ -51,12 +52,12 @@ _MEANING: dict[Kind, str] = {
     Kind.DATE: "Optional. Year-month-day, for example 2026-03-04.",
     Kind.OUTCOME: "Optional. What the gear did: RETRACTED or FAILED.",
     Kind.LANDINGS: "Optional. Landings since overhaul, 0 or more.",
-    Kind.GAUGE_U: "Optional. Standard uncertainty of one reading, as read. Blank: 0.0005 in is assumed.",
+    Kind.GAUGE_U: "Optional. Standard uncertainty of one reading, as read. Blank: {gauge_u} radial is assumed.",
     Kind.PLUNGER_DISPLACEMENT: "Optional. Measured change of the plunger position at mid-position, over-travel "
     "positive, under-travel negative. Repeat readings have their own columns.",
-    Kind.PLUNGER_DOWN_LOCK: "Optional. Measured plunger position at Down Lock; 0.01 to 0.05 in is allowed.",
+    Kind.PLUNGER_DOWN_LOCK: "Optional. Measured plunger position at Down Lock; {down_lock} is allowed.",
     Kind.PLUNGER_GAUGE_U: "Optional. Repeatability of one plunger reading.",
-    Kind.MARGIN: "Optional. This gear's margin as found at rigging. Blank: 0.03 in.",
+    Kind.MARGIN: "Optional. This gear's margin as found at rigging. Blank: {margin}.",
     Kind.MARGIN_U: "Optional. Standard uncertainty of that margin. Blank: 0.",
     Kind.TEMPERATURE: "Optional. Temperature in degrees Celsius, -60 to 60.",
     Kind.PRESSURE: "Optional. Hydraulic pressure in psi, 0 to 4000.",
@@ -83,7 +84,7 @@ _INSTRUCTIONS = (
     *(f"  {c.value}: {c.meaning}" for c in ClearanceConvention),
     "",
     "Lengths: in the sheet Inspections the unit is the last word of the column's name (_in, _thou, _mm). "
-    "To enter millimetres, change _in to _mm in the header of that column.",
+    "To enter another unit, change that word in the header of that column.",
     "In the sheet Form choose the unit in the line Unit.",
     "Use a decimal point or your program's own decimal mark, and no fractions.",
     "Dates: year-month-day. Columns of your own may be added; they are carried to the report unchanged.",
@@ -95,12 +96,13 @@ _INSTRUCTIONS = (
 )
 
 
-def write_template(path: str | Path, joints: Sequence[JointLine], *, unit: LengthUnit = LengthUnit.INCH) -> None:
+def write_template(path: str | Path, gear: Gear, *, unit: LengthUnit = LengthUnit.INCH) -> None:
+    """Write the workbook of a gear: columns in a unit, and in it the numbers that explain them."""
     book = Workbook()
     book.properties.title = "Main landing gear: joint clearance inspections"
-    _instructions(book, joints)
-    _table(book, joints, unit)
-    _form(book, joints)
+    _instructions(book, gear.joints)
+    _table(book, gear, unit)
+    _form(book, gear, unit)
     book.active = 1
     write_book(path, book)
 
@@ -111,28 +113,43 @@ def write_book(path: str | Path, book: Workbook) -> None:
     write_bytes(path, buffer.getvalue())
 
 
-def _fields(joints: Sequence[JointLine], unit: LengthUnit | None) -> list[Field]:
+def _fields(gear: Gear, unit: LengthUnit | None) -> list[Field]:
     """Return the columns in one unit, or the lines of the form: these say their unit on a line of its own."""
-    numbers = [number for number, _, _ in joints]
+    numbers = gear.joint_numbers
     several = {Kind.CLEARANCE: numbers, Kind.PLUNGER_DISPLACEMENT: (1, 2, 3), Kind.AXIAL_FLOAT: numbers}
     kinds = [kind for kind in _MEANING if kind is not Kind.UNIT or unit is None]
     return [Field(kind, n, unit if kind in LENGTHS else None) for kind in kinds for n in several.get(kind, (None,))]
 
 
-def _explain(field: Field, joints: Sequence[JointLine]) -> str:
-    text = _MEANING[field.kind]
-    if field.kind in (Kind.CLEARANCE, Kind.AXIAL_FLOAT):
-        name, place = next(((name, place) for number, name, place in joints if number == field.number), ("", ""))
-        text = f"Joint {field.number}: {name}. {place}. {text}"
-    return text
+def _explain(field: Field, gear: Gear, unit: LengthUnit) -> str:
+    text = _MEANING[field.kind].format(**_numbers(gear, unit))
+    if field.number is None or field.kind not in PER_JOINT:
+        return text
+    joint = gear.joint(field.number)
+    if field.kind is Kind.CLEARANCE:
+        text += f" Limit: {_length(joint.limit.value, unit)} radial."
+    return f"Joint {joint.number}: {joint.name}. {joint.location}. {text}"
 
 
-def _instructions(book: Workbook, joints: Sequence[JointLine]) -> None:
+def _numbers(gear: Gear, unit: LengthUnit) -> dict[str, str]:
+    low, high = (_length(end, unit) for end in gear.down_lock_range)
+    return {
+        "gauge_u": _length(DEFAULT_GAUGE_U_IN, unit),
+        "down_lock": f"{low} to {high}",
+        "margin": _length(gear.margin.value, unit),
+    }
+
+
+def _length(value_in: float, unit: LengthUnit) -> str:
+    return f"{unit.shown(value_in)} {unit}"
+
+
+def _instructions(book: Workbook, joints: Sequence[JointSpec]) -> None:
     sheet = book.worksheets[0]
     sheet.title = "Instructions"
     sheet.column_dimensions["A"].width = 74
     # One cell a line: labels beside values would look like a form.
-    lines = [*_INSTRUCTIONS, *(f"  #{number} {name}: {place}" for number, name, place in joints)]
+    lines = [*_INSTRUCTIONS, *(f"  {joint.label}: {joint.location}" for joint in joints)]
     for row, line in enumerate(lines, 1):
         cell = sheet.cell(row, 1, line)
         cell.data_type = "s"
@@ -155,9 +172,9 @@ def _fit_to_width(sheet: Worksheet) -> None:
     sheet.sheet_properties.pageSetUpPr = PageSetupProperties(fitToPage=True)
 
 
-def _table(book: Workbook, joints: Sequence[JointLine], unit: LengthUnit) -> None:
+def _table(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
     sheet = book.create_sheet("Inspections")
-    fields = _fields(joints, unit)
+    fields = _fields(gear, unit)
     for index, field in enumerate(fields):
         letters = column_letters(index)
         cell = sheet.cell(1, index + 1, field.name)
@@ -165,7 +182,7 @@ def _table(book: Workbook, joints: Sequence[JointLine], unit: LengthUnit) -> Non
         cell.fill = PatternFill("solid", fgColor=_REQUIRED_FILL if field.kind in _MUST else HEADER_FILL)
         cell.alignment = Alignment(wrap_text=True, vertical="center", horizontal="center")
         cell.border = Border(bottom=_LINE, right=_LINE)
-        cell.comment = Comment(_explain(field, joints), "mlg", width=320, height=120)
+        cell.comment = Comment(_explain(field, gear, unit), "mlg", width=320, height=120)
         sheet.column_dimensions[letters].width = 30 if field.kind is Kind.REMARKS else 13
         for row in range(2, _ROWS + 2) if field.kind in _NUMBER_FORMATS else ():
             sheet.cell(row, index + 1).number_format = _NUMBER_FORMATS[field.kind]
@@ -195,14 +212,14 @@ def _validate(sheet: Worksheet, kind: Kind, cells: str) -> None:
     rule.add(cells)
 
 
-def _form(book: Workbook, joints: Sequence[JointLine]) -> None:
+def _form(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
     sheet = book.create_sheet("Form")
     sheet["A1"] = FORM_TITLE
     sheet["A1"].font = Font(name=FONT, bold=True, size=14)
     sheet["A2"] = "One sheet is one inspection. Yellow lines must be filled in; blank means not measured."
     for letters, width in (("A", 28), ("B", 24), ("C", 66)):
         sheet.column_dimensions[letters].width = width
-    for row, field in enumerate(_fields(joints, None), 4):
+    for row, field in enumerate(_fields(gear, None), 4):
         label, value, hint = sheet.cell(row, 1, field.label), sheet.cell(row, 2), sheet.cell(row, 3)
         must = field.kind in _MUST
         value.fill = PatternFill("solid", fgColor=_REQUIRED_FILL if must else "FFFFFFFF")
@@ -210,7 +227,7 @@ def _form(book: Workbook, joints: Sequence[JointLine]) -> None:
         value.number_format = _NUMBER_FORMATS.get(field.kind, "General")
         value.alignment = label.alignment = Alignment(horizontal="left", vertical="top")
         label.font = Font(name=FONT, bold=must)
-        hint.value = _explain(field, joints)
+        hint.value = _explain(field, gear, unit)
         hint.data_type = "s"
         hint.alignment = Alignment(wrap_text=True, vertical="top")
         hint.font = Font(name=FONT, size=9, color="FF52606D")

@@ -148,7 +148,9 @@ def _course(judgement: Judgement) -> dict[str, Any]:
     return {"next_action": steps[0], "plan": steps, "end": judgement.end.value}
 
 
-def diagnosis_as_json(diagnosis: Diagnosis, extension: ModelExtension | None) -> dict[str, Any]:
+def diagnosis_as_json(
+    diagnosis: Diagnosis, extension: ModelExtension | None, warnings: Sequence[str] = ()
+) -> dict[str, Any]:
     d = diagnosis
     return {
         "schema_version": SCHEMA_VERSION,
@@ -173,6 +175,7 @@ def diagnosis_as_json(diagnosis: Diagnosis, extension: ModelExtension | None) ->
             "expected_from_gauges_in": plain(d.expected_scatter_in),
         },
         **chosen(d, "seed", "permutations"),
+        "warnings": list(warnings),
     }
 
 

@@ -13,9 +13,10 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import BinaryIO
 
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.outputs import write_bytes
+from mlg_troubleshoot.outputs import OutputKind, write_bytes
 from mlg_troubleshoot.reporting.glyphs import missing_characters, spell_out
 from mlg_troubleshoot.reporting.html import Document, render
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
@@ -25,6 +26,28 @@ Progress = Callable[[int, int], None]
 FORMATS = ("html", "pdf", "pdf-ua")
 USUAL_FORMATS = ("html", "pdf")
 PAGES = ("A4", "Letter")
+_NAME = re.compile(r"(mlg-.*|fleet)\.(html|pdf)", re.IGNORECASE)
+# How a report is known: base.html.j2 writes the one into the head of a page; the other stands as a
+# comment before the last lines of a PDF, and no longer there when another program has added to it.
+_IN_PAGE, _IN_PDF = b'<meta name="generator" content="mlg-troubleshoot">', b"%mlg-troubleshoot\n"
+_HEAD, _END = 1000, 64
+
+
+def _is_report(file: BinaryIO) -> bool:
+    start = file.read(_HEAD)
+    if not start.startswith(b"%PDF"):
+        return _IN_PAGE in start
+    size = file.seek(0, os.SEEK_END)
+    file.seek(max(size - _END, 0))
+    return _IN_PDF in file.read()
+
+
+REPORT = OutputKind("is not a report of this program as it was written", _is_report)
+
+
+def could_be_report(path: Path) -> bool:
+    """Tell whether a file has a name that a report can have."""
+    return _NAME.fullmatch(path.name) is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +105,7 @@ def publish(
         if "pdf-ua" in wanted:
             try:
                 tagged = make_tagged_pdf(render(document, page, for_pdf=True))
-                made["pdf-ua"] = _written(directory / f"{document.stem}-ua.pdf", tagged)
+                made["pdf-ua"] = _written(directory / f"{document.stem}-ua.pdf", _marked(tagged))
             except PdfError as error:
                 notes.append(f"No tagged PDF: {error}. {instead}")
                 wanted |= {"html", "pdf"}
@@ -90,7 +113,7 @@ def publish(
             try:
                 pdf, found = _pdf(document, page, running)
                 notes += found
-                made["pdf"] = _written(directory / f"{document.stem}.pdf", pdf)
+                made["pdf"] = _written(directory / f"{document.stem}.pdf", _marked(pdf))
             except PdfError as error:
                 notes.append(f"No PDF: {error}. {instead}")
                 wanted.add("html")
@@ -105,6 +128,11 @@ def publish(
 def _written(file: Path, data: bytes) -> Path:
     write_bytes(file, data)
     return file
+
+
+def _marked(pdf: bytes) -> bytes:
+    before, end, after = pdf.rpartition(b"startxref")
+    return before + _IN_PDF + end + after
 
 
 def _pdf(document: Document, page: str, engine: PdfEngine) -> tuple[bytes, list[str]]:

@@ -1,6 +1,6 @@
 """What is kept of a gear's life: an append-only, hash-chained store on SQLite or PostgreSQL."""
 
-from mlg_troubleshoot.store.database import Added, Broken, Kind, Record, Store, StoreError, own_file, packed
+from mlg_troubleshoot.store.database import Added, Broken, Kind, Record, Store, StoreError, files_of, own_file, packed
 from mlg_troubleshoot.store.drafts import Draft, Drafts
 from mlg_troubleshoot.store.inspections import inspection_from, inspection_record, same_inspection
 
@@ -13,6 +13,7 @@ __all__ = [
     "Record",
     "Store",
     "StoreError",
+    "files_of",
     "inspection_from",
     "inspection_record",
     "own_file",

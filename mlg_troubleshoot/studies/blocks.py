@@ -239,7 +239,7 @@ def _resumed(study: BlockStudy, path: Path) -> dict[Block, BlockSums]:
     if not path.exists() or path.stat().st_size == 0:
         _append(path, study.key())
         return {}
-    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)
     if lines[0] != json.dumps(study.key()) + "\n":
         raise UsageError(f"{path}: belongs to another study", "Give another file, or delete this one.")
     if not lines[-1].endswith("\n"):

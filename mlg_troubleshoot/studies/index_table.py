@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from mlg_troubleshoot.datafile import MOST_ENTRIES, DataTable, read_json
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
-from mlg_troubleshoot.outputs import write_text
+from mlg_troubleshoot.outputs import OutputKind, write_text
 
 SCHEMA_VERSION = 1
 # A sampled index may lie a little outside 0 to 1, its interval further.
@@ -141,9 +142,19 @@ def load_index_table(gear: Gear) -> IndexTable:
     return table
 
 
+def _text(values: Mapping[str, Any]) -> str:
+    return json.dumps(values, indent=1, allow_nan=False) + "\n"
+
+
+# How every table begins, up to the name of its gear.
+INDEX_TABLE = OutputKind.marked(
+    "is not a table of indices", _text({"schema_version": SCHEMA_VERSION, "gear": {"id": ""}}).partition('""')[0]
+)
+
+
 def write_index_table(table: IndexTable, path: Path) -> None:
     """Write a table of indices, whole or not at all."""
-    write_text(path, json.dumps(table.as_dict(), indent=1, allow_nan=False) + "\n")
+    write_text(path, _text(table.as_dict()))
 
 
 def _remedy(gear: Gear) -> str:

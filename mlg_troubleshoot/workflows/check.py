@@ -20,7 +20,7 @@ from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
-from mlg_troubleshoot.outputs import write_csv
+from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
 from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.studies.index_table import load_index_table
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
@@ -320,7 +320,7 @@ def write_template(
         return
     from mlg_troubleshoot.records.template import write_template as write
 
-    write(file, [(joint.number, joint.name, joint.location) for joint in loaded.joints])
+    write(file, loaded, unit=unit)
 
 
 # Columns of the verdicts that bear the names of what an assessment holds; margin_used_in is its margin.
@@ -328,6 +328,12 @@ _NUMBERS = (
     *("predicted_displacement_in", "over_travel_in", "under_travel_in", "margin_used_in", "remaining_in"),
     *("probability_within_margin", "probability_exceed_random_directions"),
 )
+_VERDICT_HEADER = (
+    *("record_id", "tail_no", "side"),
+    *("verdict", "basis", *_NUMBERS, "joints_over_limit", "next_action", "end"),
+    *("file", "sheet", "row"),
+)
+VERDICTS = OutputKind.marked("is not a table of verdicts", csv_text(_VERDICT_HEADER, ()))
 
 
 def _verdict_columns(judgement: Judgement) -> dict[str, str | float | None]:
@@ -350,8 +356,7 @@ def write_verdicts(result: CheckResult, file: Path) -> None:
         identity = (row.record_id, row.tail_no, None if row.side is None else str(row.side))
         place = (row.source.file, row.source.sheet, row.source.row)
         rows.append((*identity, *_verdict_columns(judgement).values(), *place))
-    columns = ("verdict", "basis", *_NUMBERS, "joints_over_limit", "next_action", "end")
-    write_csv(file, ("record_id", "tail_no", "side", *columns, "file", "sheet", "row"), rows)
+    write_csv(file, _VERDICT_HEADER, rows)
 
 
 def annotate(result: CheckResult, source: Path, out: Path) -> tuple[str, ...]:

@@ -687,12 +687,14 @@ def write_pages(
     fleet: bool,
     page: str = "A4",
     unit: LengthUnit = LengthUnit.INCH,
+    remembered: str | None = None,
 ) -> list[WrittenReport]:
     """Write the page of each gear's life and, for a fleet, the page that links them."""
     from mlg_troubleshoot.reporting import fleet_report, provenance_of, publish
 
     last = max((record for life in found for record in life.records), key=lambda r: r.seq, default=None)
-    made = provenance_of(gear, {} if last is None else {f"store up to record {last.seq}": last.digest})
+    hashes = {} if last is None else {f"store up to record {last.seq}": last.digest}
+    made = provenance_of(gear, hashes, remembered=remembered)
     written = []
     if fleet:
         series = {

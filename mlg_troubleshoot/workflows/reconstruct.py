@@ -12,13 +12,15 @@ import tomli_w
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.design import member_values
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.outputs import write_text
+from mlg_troubleshoot.outputs import OutputKind, write_text
 from mlg_troubleshoot.studies.targets import load_targets, targets_file
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.studies.reconstruct import Reconstruction
 
 _SOURCE = "Found by mlg gear reconstruct (reconstructed): chosen to meet numbers, not measured."
+_HEADING = tomli_w.dumps({"source": _SOURCE}) + "\n"
+LINKAGE = OutputKind.marked("is not a linkage that was reconstructed", _HEADING)
 
 
 def reconstruct_linkage(
@@ -46,7 +48,7 @@ def reconstruct_linkage(
     found = reconstruct(known, wanted, np.random.default_rng(seed), seed, begin, minutes, progress)
     text = tomli_w.dumps({"members": {name: member_values(found.linkage)}})
     if out is not None:
-        write_text(out, tomli_w.dumps({"source": _SOURCE}) + "\n" + text)
+        write_text(out, _HEADING + text)
     return found, text
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
-from mlg_troubleshoot.outputs import write_csv
+from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
 from mlg_troubleshoot.studies.index_table import write_index_table
 from mlg_troubleshoot.studies.targets import targets_file
 
@@ -145,14 +145,19 @@ def given_data_study(file: Path, gear: Gear, seed: int) -> GivenDataResult:
 
 
 def write_study_report(
-    findings: StudyFindings, directory: Path, page: str, *, unit: LengthUnit = LengthUnit.INCH
+    findings: StudyFindings,
+    directory: Path,
+    page: str,
+    *,
+    unit: LengthUnit = LengthUnit.INCH,
+    remembered: str | None = None,
 ) -> WrittenReport:
     from mlg_troubleshoot.reporting import provenance_of, publish
     from mlg_troubleshoot.reporting.study_report import study_document
 
     targets = targets_file(findings.gear)
     hashes = {targets.name: sha256(targets.read_bytes()).hexdigest()} if findings.statements else {}
-    made = provenance_of(findings.gear, hashes, seed=findings.options.seed)
+    made = provenance_of(findings.gear, hashes, seed=findings.options.seed, remembered=remembered)
     return publish(study_document(findings, made, unit), directory, page=page)
 
 
@@ -205,12 +210,15 @@ def study_values(findings: StudyFindings, given: GivenDataResult | None = None) 
     return cleaned
 
 
+_HEADS = (
+    "joint", "name", "first_order", "first_order_low", "first_order_high", "total_order", "total_order_low",
+    "total_order_high", "plunger_amplification", "max_amplification_index", "rank", "rank_least", "rank_greatest",
+    "first_order_least", "first_order_greatest",
+)  # fmt: skip
+STUDY_CSV = OutputKind.marked("is not a table of a study", csv_text(_HEADS, ()))
+
+
 def write_study_csv(findings: StudyFindings, path: Path) -> None:
-    heads = [
-        "joint", "name", "first_order", "first_order_low", "first_order_high", "total_order", "total_order_low",
-        "total_order_high", "plunger_amplification", "max_amplification_index", "rank", "rank_least", "rank_greatest",
-        "first_order_least", "first_order_greatest",
-    ]  # fmt: skip
     rows = []
     for joint, e in zip(findings.gear.joints, findings.result.table.joints, strict=True):
         numbers = (
@@ -219,4 +227,4 @@ def write_study_csv(findings: StudyFindings, path: Path) -> None:
         )  # fmt: skip
         known = [v if math.isfinite(v) else None for v in (*numbers, *e.first_order_spread)]
         rows.append((e.joint, joint.name, *known[: len(numbers)], e.rank, *e.rank_range, *known[len(numbers) :]))
-    write_csv(path, heads, rows)
+    write_csv(path, _HEADS, rows)

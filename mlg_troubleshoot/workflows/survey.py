@@ -17,8 +17,8 @@ from mlg_troubleshoot.errors import GearFileError, MechanismError, UsageError
 from mlg_troubleshoot.gear.design import member_values
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
-from mlg_troubleshoot.outputs import refuse_inputs_as_outputs, write_text
-from mlg_troubleshoot.studies.index_table import write_index_table
+from mlg_troubleshoot.outputs import OutputFile, OutputKind, claim_outputs, write_text
+from mlg_troubleshoot.studies.index_table import INDEX_TABLE, write_index_table
 from mlg_troubleshoot.studies.targets import targets_file
 from mlg_troubleshoot.units import LengthUnit
 
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.studies.survey import Survey
     from mlg_troubleshoot.studies.survey_result import SurveyResult
 
+_HEADING = "# Written by mlg gear survey.\n"
+SURVEYED = OutputKind.marked("is not of a gear that was surveyed", _HEADING)
 # Members of the ensemble that a surveyed gear file gets beside its reference: their range holds most of the posterior.
 _MEMBERS = 11
 _DECIMALS = 6
@@ -72,7 +74,7 @@ def survey_gear(
 
     known = gear if isinstance(gear, Gear) else load_gear(gear)
     if write is not None:
-        _check_target(write, known)
+        claim_outputs(known.files, written_with(write), force=True)
     linkage, rng = SurveyedLinkage(known), np.random.default_rng(seed)
     cases = _clearances(inspections, known)
     readings, problems, digest = read_survey(Path(file), linkage)
@@ -114,10 +116,13 @@ def survey_gear(
     return SurveyResult(*read, suggestion, judged, warnings, path, digest, seed)
 
 
-def _check_target(write: Path, gear: Gear) -> None:
+def written_with(write: Path) -> list[OutputFile]:
+    """What is written for a surveyed gear: its file, its ensemble, its table of indices."""
     if write.suffix.lower() != ".toml" or not is_name(write.stem) or len(write.stem) > LONGEST_NAME:
         raise UsageError(f"{write.name!r} cannot be the name of a gear file", "Give a short name that ends in .toml.")
-    refuse_inputs_as_outputs(gear.files, [("the surveyed gear", path) for path in (write, *_beside(write))])
+    ensemble, indices = _beside(write)
+    kinds = ((write, SURVEYED), (ensemble, SURVEYED), (indices, INDEX_TABLE))
+    return [OutputFile("--write", path, kind) for path, kind in kinds]
 
 
 def _beside(path: Path) -> tuple[Path, Path]:
@@ -194,8 +199,8 @@ def _write_gear(gear: Gear, found: Survey, path: Path, source: str) -> Path:
     _put(values, found, source)
     drawn = {"source": f"Drawn from the posterior of survey {source}.", "members": members}
     try:
-        write_text(ensemble, tomli_w.dumps(drawn))
-        write_text(path, tomli_w.dumps(values))
+        write_text(ensemble, _HEADING + tomli_w.dumps(drawn))
+        write_text(path, _HEADING + tomli_w.dumps(values))
         write_index_table(run_study(load_gear(path), StudyOptions()).table, indices)
     except (GearFileError, MechanismError) as error:
         raise UsageError(f"the surveyed gear cannot be written: {error.message}", error.remedy) from error
@@ -296,7 +301,13 @@ def survey_values(result: SurveyResult) -> dict[str, Any]:
 
 
 def write_survey_report(
-    result: SurveyResult, file: Path, directory: Path, page: str = "A4", unit: LengthUnit = LengthUnit.INCH
+    result: SurveyResult,
+    file: Path,
+    directory: Path,
+    page: str = "A4",
+    unit: LengthUnit = LengthUnit.INCH,
+    *,
+    remembered: str | None = None,
 ) -> WrittenReport | None:
     """Write the report of a survey; None if nothing follows from the table."""
     from mlg_troubleshoot.reporting import provenance_of, publish
@@ -304,5 +315,6 @@ def write_survey_report(
 
     if result.survey is None:
         return None
-    provenance = provenance_of(result.gear, {file.name: result.input_sha256}, seed=result.seed)
+    hashes = {file.name: result.input_sha256}
+    provenance = provenance_of(result.gear, hashes, seed=result.seed, remembered=remembered)
     return publish(survey_document(result, result.survey, provenance, unit), directory, page=page)

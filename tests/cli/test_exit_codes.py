@@ -78,7 +78,7 @@ def test_a_template_that_cannot_be_written_exits_5(occupied: Path) -> None:
 def test_a_template_does_not_replace_a_file_unasked(tmp_path: Path) -> None:
     path = tmp_path / "mine.xlsx"
     path.write_text("mine", encoding="utf-8")
-    assert (mlg("template", path).code, path.read_text(encoding="utf-8")) == (5, "mine")
+    assert (mlg("template", path).code, path.read_text(encoding="utf-8")) == (2, "mine")
 
 
 def test_a_template_replaces_a_file_by_force(tmp_path: Path) -> None:

@@ -1,10 +1,11 @@
-"""No output replaces an input: refused with exit code 2 before anything is read."""
+"""No output replaces an input, a store or a file of another kind: refused with exit code 2 before anything is read."""
 
 from __future__ import annotations
 
 import os
 import shutil
 import stat
+import subprocess
 import sys
 from pathlib import Path
 
@@ -111,7 +112,7 @@ def test_a_study_may_write_its_table_again_but_not_over_the_gear(own_gear: Path)
 
 
 def test_a_report_does_not_replace_an_input_of_its_name(measured: Path) -> None:
-    table = measured.rename(measured.with_suffix(".html"))
+    table = measured.rename(measured.with_name("mlg-258-003-LH.html"))
     before = table.read_bytes()
     kept(mlg("check", table, "--report", table.parent), table, before, "--report")
 
@@ -147,3 +148,258 @@ def test_an_output_respects_the_umask_and_the_mode_of_the_old_file(old: bool, tm
 @pytest.mark.parametrize("command", ["check", "diagnose"])
 def test_the_help_of_causes_says_that_the_file_is_run(command: str) -> None:
     assert "Runs this file" in " ".join(mlg(command, "--help").out.replace("│", " ").split())
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Path:
+    """A store that holds an inspection."""
+    place = tmp_path / "st.sqlite"
+    assert mlg("check", FAILURE, "-q", "--keep", "--store", place).code == 1
+    return place
+
+
+@pytest.fixture
+def text(tmp_path: Path) -> Path:
+    """A file that somebody wrote with another program."""
+    path = tmp_path / "letter.txt"
+    path.write_text("Dear Sir,", encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def extended(tmp_path: Path) -> tuple[object, ...]:
+    """A diagnosis that writes an extension, up to the name of the file."""
+    return ("diagnose", DATA / "measured_pressure.csv", "-q", "--permutations", 99, "--write-extension")
+
+
+@pytest.mark.parametrize(
+    "command", [("check", "--csv"), ("diagnose", "--permutations", 99, "--write-extension")], ids=lambda c: c[0]
+)
+def test_a_table_is_not_replaced_through_a_folder_that_is_missing(
+    command: tuple[object, ...], measured: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(measured.parent)
+    before = measured.read_bytes()
+    found = mlg(command[0], "in.csv", *command[1:], "no/../in.csv", "--force")
+    kept(found, measured, before, str(command[-1]))
+
+
+def test_a_gear_file_is_not_replaced_through_a_folder_that_is_missing(own_gear: Path) -> None:
+    before = own_gear.read_bytes()
+    found = mlg("check", FAILURE, "--gear", own_gear, "--csv", f"{own_gear.parent}/no/../{own_gear.name}")
+    kept(found, own_gear, before, "--csv")
+
+
+def test_an_export_does_not_replace_its_store_through_a_folder_that_is_missing(store: Path) -> None:
+    before = store.read_bytes()
+    kept(mlg("history", "export", f"{store.parent}/no/../{store.name}", "--store", store), store, before, "export")
+
+
+@pytest.mark.parametrize("option", ["--csv", "--annotate"])
+@pytest.mark.parametrize("named", ["path", "url", "environment"])
+def test_a_check_does_not_replace_the_store(
+    option: str, named: str, store: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = store.read_bytes()
+    given = ("--keep", "--store", store if named == "path" else f"sqlite:///{store}")
+    if named == "environment":
+        monkeypatch.setenv("MLG_STORE", str(store))
+        given = ()
+    table = DATA / "failure_case.xlsx"
+    kept(mlg("check", table, "-q", "--force", *given, option, store), store, before, option)
+
+
+def test_an_output_is_not_the_store_that_the_run_would_make(tmp_path: Path) -> None:
+    found = mlg("check", FAILURE, "-q", "--keep", "--store", tmp_path / "new", "--csv", tmp_path / "new")
+    assert found.code == 2
+    assert "is one of the inputs" in found.err
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize(
+    "place", ["sqlite:///{}", "sqlite+pysqlite:///{}?timeout=3", "sqlite:///file:{}?mode=ro&uri=true"]
+)
+def test_an_export_does_not_replace_its_store_by_url(place: str, store: Path) -> None:
+    before = store.read_bytes()
+    kept(mlg("history", "export", store, "--store", place.format(store), "--force"), store, before, "export")
+
+
+@pytest.mark.parametrize("force", [(), ("--force",)])
+def test_another_store_is_not_replaced_by_an_export(force: tuple[str, ...], store: Path) -> None:
+    other = Path(shutil.copy(store, store.with_name("other.sqlite")))
+    found = mlg("history", "export", other, "--store", store, *force)
+    assert found.code == 2
+    assert "is a database" in found.err
+    assert other.read_bytes() == store.read_bytes()
+
+
+def test_an_export_may_be_written_again_and_not_over_that_of_another_store(store: Path, tmp_path: Path) -> None:
+    file = tmp_path / "chain.jsonl"
+    assert mlg("history", "export", file, "--store", store).code == 0
+    assert mlg("history", "export", file, "--store", store).code == 0
+    before = file.read_bytes()
+    assert mlg("check", DATA / "fleet_batch.csv", "-q", "--keep", "--store", tmp_path / "b").code == 1
+    for other in (tmp_path / "b", tmp_path / "empty"):
+        found = mlg("history", "export", file, "--store", other)
+        assert found.code == 2
+        assert "is not an export of this store" in found.err
+    assert file.read_bytes() == before
+    assert mlg("history", "export", file, "--store", tmp_path / "b", "--force").code == 0
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("check", FAILURE, "--csv"),
+        ("check", DATA / "failure_case.xlsx", "--annotate"),
+        ("diagnose", DATA / "measured_pressure.csv", "--permutations", 99, "--write-extension"),
+        ("study", "--csv"),
+        ("gear", "reconstruct", "--minutes", "0.01", "--out"),
+        ("history", "export"),
+        ("template",),
+        ("gear", "survey", "template"),
+    ],
+    ids=lambda command: " ".join(str(word) for word in command if not isinstance(word, Path)),
+)
+def test_a_file_that_something_else_wrote_is_not_replaced(command: tuple[object, ...], text: Path) -> None:
+    path = text.rename(text.with_name("letter.xlsx"))
+    found = mlg(*command, path)
+    assert found.code == 2, found.err
+    assert "--force" in found.err
+    assert found.out == ""
+    assert path.read_text(encoding="utf-8") == "Dear Sir,"
+
+
+@pytest.mark.parametrize("name", ["mine.toml", "mine-ensemble.toml", "mine-indices.json"])
+def test_a_surveyed_gear_does_not_replace_a_file_that_something_else_wrote(name: str, tmp_path: Path) -> None:
+    mlg("gear", "survey", "template", tmp_path / "s.csv")
+    (tmp_path / name).write_text("mine", encoding="utf-8")
+    found = mlg("gear", "survey", tmp_path / "s.csv", "--write", tmp_path / "mine.toml")
+    assert found.code == 2
+    assert f"--write {tmp_path / name} exists" in found.err
+    assert (tmp_path / name).read_text(encoding="utf-8") == "mine"
+
+
+def test_a_table_of_a_study_does_not_replace_a_file_that_something_else_wrote(own_gear: Path) -> None:
+    indices = own_gear.with_name("hawker-800xp-indices.json")
+    indices.write_text("{}", encoding="utf-8")
+    found = mlg("study", "--gear", own_gear, "--write-table")
+    assert found.code == 2
+    assert "is not a table of indices" in found.err
+
+
+def test_the_shipped_table_of_indices_is_known_as_one() -> None:
+    from mlg_troubleshoot.studies.index_table import INDEX_TABLE
+
+    with (GEAR / "hawker-800xp-indices.json").open("rb") as file:
+        assert INDEX_TABLE.is_own(file)
+
+
+def test_a_file_is_replaced_where_that_is_asked_for(text: Path) -> None:
+    assert mlg("check", FAILURE, "-q", "--csv", text, "--force").code == 1
+    assert text.read_text(encoding="utf-8").startswith("record_id,")
+
+
+def test_an_earlier_table_of_verdicts_and_an_earlier_copy_are_replaced(tmp_path: Path) -> None:
+    command = ("check", DATA / "failure_case.xlsx", "-q")
+    outputs = ("--csv", tmp_path / "o.csv", "--annotate", tmp_path / "o.xlsx")
+    assert [mlg(*command, *outputs).code for _ in range(2)] == [1, 1]
+
+
+def test_an_annotated_workbook_that_another_program_saved_is_not_replaced(tmp_path: Path) -> None:
+    import openpyxl
+
+    command = ("check", DATA / "failure_case.xlsx", "-q", "--annotate", tmp_path / "o.xlsx")
+    mlg(*command)
+    book = openpyxl.load_workbook(tmp_path / "o.xlsx")
+    book.properties.lastModifiedBy = "A. Technician"
+    book.save(tmp_path / "o.xlsx")
+    found = mlg(*command)
+    assert found.code == 2
+    assert "is not an annotated workbook as it was written" in found.err
+
+
+def test_an_earlier_extension_is_replaced(extended: tuple[object, ...], tmp_path: Path) -> None:
+    assert [mlg(*extended, tmp_path / "e.toml").code for _ in range(2)] == [1, 1]
+
+
+@pytest.mark.parametrize("suffix", [".html", ".pdf"])
+def test_an_earlier_report_is_replaced_and_another_file_of_its_name_is_not(suffix: str, tmp_path: Path) -> None:
+    command = ("check", FAILURE, "-q", "--report", tmp_path, "--format", suffix[1:])
+    assert [mlg(*command).code for _ in range(2)] == [1, 1]
+    (report,) = tmp_path.glob(f"*{suffix}")
+    added = report.read_bytes() + b"%" + b"signed by an inspector " * 5
+    if suffix == ".html":
+        added = added.replace(b'content="mlg-troubleshoot"', b'content="an editor"')
+    report.write_bytes(added)
+    found = mlg(*command)
+    assert found.code == 2
+    assert f"--report {report} exists" in found.err
+    assert report.read_bytes() == added
+    assert mlg(*command, "--force").code == 1
+
+
+def test_a_report_in_a_folder_through_one_that_is_missing_does_not_replace_another_file(tmp_path: Path) -> None:
+    command = ("check", FAILURE, "-q", "--format", "html", "--report")
+    mlg(*command, tmp_path)
+    (report,) = tmp_path.glob("*.html")
+    report.write_text("mine", encoding="utf-8")
+    assert mlg(*command, f"{tmp_path}/no/..").code == 2
+    assert report.read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.parametrize("option", ["--annotate", "--report"])
+def test_two_outputs_of_one_run_are_two_files(option: str, tmp_path: Path) -> None:
+    csv = tmp_path / ("mlg-x.html" if option == "--report" else "o.xlsx")
+    found = mlg("check", DATA / "failure_case.xlsx", "--csv", csv, option, tmp_path if option == "--report" else csv)
+    assert found.code == 2
+    assert found.out == ""
+    assert not csv.exists()
+
+
+@pytest.mark.parametrize("command", [("check", FAILURE, "--csv"), ("history", "export")], ids=lambda c: c[0])
+def test_a_dash_is_not_taken_for_a_file(
+    command: tuple[object, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    found = mlg(*command, "-")
+    assert found.code == 2
+    assert "- is not the name of a file" in found.err
+    assert not (tmp_path / "-").exists()
+
+
+def test_a_table_that_is_standard_input_is_not_replaced(measured: Path) -> None:
+    before = measured.read_bytes()
+    with measured.open("rb") as file:
+        found = subprocess.run(
+            [sys.executable, "-m", "mlg_troubleshoot", "check", "-", "--csv", measured, "--force"],
+            stdin=file,
+            capture_output=True,
+            check=False,
+            cwd=ROOT,
+        )
+    assert found.returncode == 2
+    assert b"is one of the inputs (standard input)" in found.stderr
+    assert measured.read_bytes() == before
+
+
+def test_the_settings_are_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mlg.toml").write_text('show = "in"\n', encoding="utf-8")
+    kept(mlg("check", FAILURE, "--csv", "mlg.toml", "--force"), tmp_path / "mlg.toml", b'show = "in"\n', "--csv")
+
+
+def test_a_template_that_was_filled_in_is_not_replaced(tmp_path: Path) -> None:
+    mlg("template", tmp_path / "t.xlsx")
+    before = (tmp_path / "t.xlsx").read_bytes()
+    found = mlg("template", tmp_path / "t.xlsx")
+    assert found.code == 2
+    assert "may have been filled in" in found.err
+    assert (tmp_path / "t.xlsx").read_bytes() == before
+
+
+def test_a_state_file_that_is_not_text_is_refused(text: Path) -> None:
+    text.write_bytes(b"\xff\xfe\x00")
+    found = mlg("study", "--design", "lhs", "--state", text, "--iterations", 1, "--n1", 2, "--n2", 2)
+    assert found.code == 2
+    assert text.read_bytes() == b"\xff\xfe\x00"

@@ -63,7 +63,7 @@ def test_the_workbook_has_the_rows_and_a_sketch_of_the_linkage(tmp_path: Path) -
 
 def test_a_template_does_not_replace_a_file_unasked(tmp_path: Path) -> None:
     (tmp_path / "s.csv").write_text("mine")
-    assert survey("template", tmp_path / "s.csv").code == 5
+    assert survey("template", tmp_path / "s.csv").code == 2
     assert (tmp_path / "s.csv").read_text() == "mine"
 
 

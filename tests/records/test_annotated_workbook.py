@@ -194,10 +194,11 @@ def test_macros_are_kept_in_a_macro_workbook(tmp_path, xlsx):
 
 
 def test_a_form_gets_its_verdict_beside_it(tmp_path):
+    from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.records.template import write_template
 
     path, out = tmp_path / "t.xlsx", tmp_path / "o.xlsx"
-    write_template(path, [(n, "n", "p") for n in range(1, 11)])
+    write_template(path, load_gear())
     book = openpyxl.load_workbook(path)
     for cell, value in zip(
         ("B4", "B5", "B6", "B7", "B8", "B11"), ("F1", "N1", "LH", "RADIAL", "in", 0.013), strict=True

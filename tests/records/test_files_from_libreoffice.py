@@ -10,16 +10,15 @@ import zipfile
 import openpyxl
 import pytest
 
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.records.template import write_template
 from tests.records.reading import read_inspections
 
-JOINTS = [(n, f"name {n}", f"place {n}") for n in range(1, 11)]
-
 
 def fill(path):
     """Write the template with one row of the table and one form filled in."""
-    write_template(path, JOINTS)
+    write_template(path, load_gear())
     book = openpyxl.load_workbook(path)
     sheet = book["Inspections"]
     values = {"record_id": "R1", "tail_no": "007", "side": "LH", "clearance_convention": "TOTAL_PLAY"}

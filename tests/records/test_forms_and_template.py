@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import io
+import shutil
 
 import openpyxl
 import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.errors import OutputError
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.records.annotate import annotate_workbook
 from mlg_troubleshoot.records.template import write_template
 from mlg_troubleshoot.units import LengthUnit
+from tests.cli.conftest import mlg
 from tests.records.reading import read_inspections
 
-JOINTS = [(n, f"name {n}", f"place {n}") for n in range(1, 11)]
+GEAR = load_gear()
 FILLED = {
     "Record id": "F1",
     "Tail no": "007",
@@ -34,7 +37,7 @@ FILLED = {
 def template(tmp_path):
     """Write the template and return its path."""
     path = tmp_path / "template.xlsx"
-    write_template(path, JOINTS)
+    write_template(path, GEAR)
     return path
 
 
@@ -77,7 +80,7 @@ def test_every_header_of_the_template_is_canonical(template):
 @pytest.mark.parametrize("unit", list(LengthUnit))
 def test_a_filled_in_table_reads_back_in_its_unit(tmp_path, unit):
     path = tmp_path / "t.xlsx"
-    write_template(path, JOINTS, unit=unit)
+    write_template(path, GEAR, unit=unit)
     book = openpyxl.load_workbook(path)
     values = {"record_id": "R1", "tail_no": "007", "side": "LH", "clearance_convention": "RADIAL"}
     values[f"clearance_3_{unit.value}"] = unit.from_inches(0.013)
@@ -188,7 +191,7 @@ def test_the_template_has_lists_of_choices_and_explains_each_column(template):
     choices = {rule.formula1 for rule in sheet.data_validations.dataValidation if rule.type == "list"}
     assert {'"LH,RH"', '"RADIAL,DIAMETRAL,TOTAL_PLAY"', '"EXTENDING,RETRACTING"', '"RETRACTED,FAILED"'} <= choices
     assert all(cell.comment is not None for cell in sheet[1])
-    assert "place 3" in next(c.comment.text for c in sheet[1] if c.value == "clearance_3_in")
+    assert GEAR.joint(3).location in next(c.comment.text for c in sheet[1] if c.value == "clearance_3_in")
     assert sheet.freeze_panes == "D2"
 
 
@@ -196,7 +199,7 @@ def test_on_paper_the_clearances_of_the_template_stand_together_on_the_first_pag
     sheet = openpyxl.load_workbook(template)["Inspections"]
     headers = [cell.value for cell in sheet[1]]
     first = min(brk.id for brk in sheet.col_breaks.brk)
-    assert headers[first - 1 : first + 1] == [f"clearance_{JOINTS[-1][0]}_in", "inspection_date"]
+    assert headers[first - 1 : first + 1] == [f"clearance_{GEAR.joint_numbers[-1]}_in", "inspection_date"]
 
 
 @pytest.mark.parametrize("name", ["Instructions", "Form"])
@@ -227,4 +230,52 @@ def test_the_template_holds_no_formula(template):
 def test_a_template_that_cannot_be_written_is_an_output_error(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match="cannot be written"):
-        write_template(tmp_path / "file" / "t.xlsx", JOINTS)
+        write_template(tmp_path / "file" / "t.xlsx", GEAR)
+
+
+def own_gear(tmp_path, *changes):
+    """The shipped gear with other numbers, as a file."""
+    for file in GEAR.files:
+        shutil.copy(file, tmp_path)
+    path = tmp_path / GEAR.path.name
+    text = path.read_text(encoding="utf-8")
+    for section, old, new in changes:
+        head, found, rest = text.partition(section)
+        assert found
+        assert old in rest
+        text = head + found + rest.replace(old, new, 1)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def headers_and_comments(path):
+    sheet = openpyxl.load_workbook(path)["Inspections"]
+    return {cell.value: cell.comment.text for cell in sheet[1]}
+
+
+@pytest.mark.parametrize("unit", list(LengthUnit))
+def test_a_template_is_in_the_unit_that_is_asked_for(tmp_path, unit):
+    assert mlg("template", tmp_path / "t.xlsx", "--show", unit.value).code == 0
+    lengths = [name for name in headers_and_comments(tmp_path / "t.xlsx") if name.startswith(("clearance_1", "margin"))]
+    assert lengths[:2] == [f"clearance_1_{unit}", f"clearance_10_{unit}"]
+    assert {f"margin_{unit}", f"margin_u_{unit}"} <= {*lengths}
+
+
+def test_a_template_says_the_numbers_of_its_gear(tmp_path):
+    gear = own_gear(
+        tmp_path,
+        ("[margin]", "value = 0.03", "value = 0.05"),
+        ("down_lock_range", "[0.01, 0.05]", "[0.02, 0.04]"),
+    )
+    assert mlg("template", tmp_path / "t.xlsx", "--gear", gear).code == 0
+    explained = headers_and_comments(tmp_path / "t.xlsx")
+    assert "Blank: 0.0500 in." in explained["margin_in"]
+    assert "0.0200 in to 0.0400 in is allowed" in explained["plunger_down_lock_in"]
+    assert f"Limit: {GEAR.joint(3).limit.value:.4f} in radial." in explained["clearance_3_in"]
+
+
+def test_a_template_in_millimetres_explains_in_millimetres(tmp_path):
+    write_template(tmp_path / "t.xlsx", GEAR, unit=LengthUnit.MILLIMETRE)
+    explained = headers_and_comments(tmp_path / "t.xlsx")
+    assert "Blank: 0.762 mm." in explained["margin_mm"]
+    assert "Blank: 0.013 mm radial is assumed." in explained["gauge_u_mm"]

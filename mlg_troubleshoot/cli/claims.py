@@ -1,0 +1,85 @@
+"""Which files a command may write: checked before anything is read."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from mlg_troubleshoot.cli import remembered
+from mlg_troubleshoot.errors import OutputError, UsageError
+from mlg_troubleshoot.outputs import OutputFile
+
+WRITE_TABLE = "--write-table"
+_STANDARD_INPUT = "-"
+
+
+def claim(
+    gear: str | None,
+    inputs: Iterable[str | Path | None],
+    outputs: Sequence[OutputFile],
+    report: Path | None = None,
+    *,
+    store: str | None = None,
+    force: bool = False,
+) -> None:
+    """Refuse, before anything is read, an output that would replace what it must not.
+
+    Inputs of every command are the store, `mlg.toml`, the gear file and what it names. A report is a
+    file of its own name: of the files in its folder only those that a report could replace count.
+    """
+    from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.outputs import claim_outputs
+    from mlg_troubleshoot.store import files_of
+
+    wanted = [each for each in outputs if each.path is not None]
+    if report is not None:
+        wanted += _reports(report, wanted)
+    if not wanted:
+        return
+    files: list[str | Path | int] = [*remembered.files(), *files_of(store)]
+    for name in inputs:
+        files += _read(name)
+    if gear is not None:
+        known = load_gear(gear)
+        writes_table = any(each.option == WRITE_TABLE for each in wanted)
+        # The table of indices may be written again, unless it is the gear file that is named so.
+        own = {known.indices_file} - {known.path} if writes_table else set()
+        files += [file for file in known.files if file not in own]
+    claim_outputs(files, wanted, force=force)
+
+
+def _read(name: str | Path | None) -> Sequence[str | Path | int]:
+    """Return the files that an argument stands for; standard input by its descriptor."""
+    from mlg_troubleshoot.records import expand
+
+    if name is None:
+        return ()
+    if str(name) != _STANDARD_INPUT:
+        return [Path(str(file)) for file in expand(str(name))]
+    try:
+        return [sys.stdin.fileno()]
+    except (OSError, ValueError):
+        return ()
+
+
+def _reports(folder: Path, others: Sequence[OutputFile]) -> list[OutputFile]:
+    from mlg_troubleshoot.reporting.publish import REPORT, could_be_report
+
+    real = Path(os.path.realpath(folder))
+    for each in others:
+        path = Path(os.path.realpath(str(each.path)))
+        if could_be_report(path) and path.parent == real:
+            raise UsageError(
+                f"{each.option} {each.path} has the name of a report in --report {folder}",
+                f"Give {each.option} another name.",
+            )
+    try:
+        known = [*real.iterdir()] if real.is_dir() else []
+    except OSError as error:
+        raise OutputError(
+            f"--report {folder} cannot be read: {error.strerror}",
+            "Give a folder that you may read and write.",
+        ) from error
+    return [OutputFile("--report", path, REPORT) for path in known if could_be_report(path)]
