@@ -515,7 +515,8 @@ def _due_now(life: GearLife, gear: Gear) -> Forecast | None:
     if not (over or outside):
         return None
     listed = ", ".join(f"#{n}" for n in over)
-    why = " and ".join(["outside the margin"] * outside + [f"{listed} over the limit"] * bool(over))
+    reasons = ["outside the margin at the last inspection"] * outside
+    why = ", and ".join([*reasons, *[f"{listed} over the limit when last read"] * bool(over)])
     nothing = Samples(np.zeros(1))
     worst = max(over, key=lambda n: over[n] / gear.joint(n).limit.value, default=None)
     return Forecast(dict.fromkeys(over, nothing), nothing, worst, nothing, 0.0, why)
@@ -667,7 +668,7 @@ def landings_shown(count: float | None, gear: Gear) -> str:
 def outlook_words(life: GearLife, ahead: Forecast, gear: Gear) -> str:
     """Say what is left to a gear, of which margin and which joint; empty where nothing was forecast."""
     if ahead.due_now:
-        return f"No landings left: {ahead.due_now} at the last inspection. Next inspection due now."
+        return f"No landings left: {ahead.due_now}. Next inspection due now."
     if life.latest is not None and life.latest.inspection.gear_landings is None:
         return "No forecast: the last inspection does not state its landings (gear_landings)."
     if ahead.limit is None:
@@ -815,9 +816,9 @@ def side_by_side(life: GearLife, now: Assessment | None = None) -> list[dict[str
         rows = [r for r in rows if r[0].record_id != found.record_id and r[1] < at]
         rows += [(found, at, now.predicted_displacement_in, now.verdict.value)] if rows else []
     steps: list[dict[str, Any]] = []
-    before = ("9999", 0)
+    before: tuple[str, int] | None = None
     for inspection, at, worst_in, verdict in rows:
-        since = [r for r in life.repairs if before < (r.day, r.seq) < at]
+        since = [r for r in life.repairs if before and before < (r.day, r.seq) < at]
         steps.append(
             {
                 "record_id": inspection.record_id,
@@ -830,7 +831,7 @@ def side_by_side(life: GearLife, now: Assessment | None = None) -> list[dict[str
                 "verdict": verdict,
             }
         )
-        before = at
+        before = max(before or at, at)
     return steps[-_SIDE_BY_SIDE:]
 
 

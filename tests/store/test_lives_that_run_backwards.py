@@ -192,6 +192,14 @@ def test_an_undated_inspection_is_placed_by_its_landings() -> None:
     assert [each.inspection.gear_landings for each in found.inspections] == [100, 400, 900, 1500]
 
 
+def test_an_undated_inspection_between_others_does_not_repeat_what_was_restored_before() -> None:
+    seen = [("2024-01-01", 100), ("2025-01-01", 900), ("", 1000), ("2025-06-01", 1200)]
+    Store().add([inspection_record(inspection(n, *each)) for n, each in enumerate(seen)])
+    mlg("history", "repair", "N507", "LH", "--joint", "3", "--date", "2024-06-01", "--landings", "500")
+    steps = task.side_by_side(task.life_of(Store(), "N507", "LH"))
+    assert [step["restored"] for step in steps] == [[], [3], [], []]
+
+
 def test_the_higher_landings_of_one_date_are_the_later_ones() -> None:
     seen = [("2024-01-01", 802), ("2024-01-01", 800)]
     Store().add([inspection_record(inspection(n, *each)) for n, each in enumerate(seen)])
@@ -345,5 +353,5 @@ def test_a_joint_that_was_restored_is_over_its_limit_no_more() -> None:
 def test_history_says_in_words_why_a_gear_is_due_now(tmp_path: Path) -> None:
     kept(tmp_path, {})
     said = re.sub(r"\s+", " ", mlg("history", "N507", "LH").out)
-    assert "No landings left: outside the margin and #3, #5 over the limit at the last inspection" in said
+    assert "outside the margin at the last inspection, and #3, #5 over the limit when last read" in said
     assert "Next inspection due now" in said
