@@ -674,7 +674,7 @@ def outlook_words(life: GearLife, ahead: Forecast, gear: Gear) -> str:
     if ahead.limit is None:
         return ""
     told = _outlook(life, ahead)
-    joint = "" if ahead.limit_joint is None else f" (#{ahead.limit_joint} most likely reaches its limit first)"
+    joint = "" if ahead.limit_joint is None else f", where #{ahead.limit_joint} most likely reaches its limit first"
     after, day = ahead.next_inspection, told["due_date"]
     due = "beyond the horizon" if after is None else f"in {landings_shown(after, gear)} landings"
     return (
