@@ -172,3 +172,5 @@ class Run:
         added = keep(result, self._asked, self._place, asked if tails is None else lambda _new, _kept: tails == "same")
         if not self._wanted.quiet:
             output.say(f"Kept in {self._place.place}: {added.new} new records, {added.known} known already.")
+        for warning in added.warnings:
+            output.say(f"Warning: {warning}")

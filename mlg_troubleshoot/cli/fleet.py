@@ -48,7 +48,7 @@ def fleet(
     if as_json:
         output.write_json(told)
     else:
-        _show(told["gears"], known)
+        _show(told, known)
     if report is not None:
         written = task.write_pages(
             found,
@@ -63,8 +63,10 @@ def fleet(
         output.say_written(written, quiet=quiet)
 
 
-def _show(gears: list[dict[str, Any]], gear: Gear) -> None:
-    console = output.console()
+def _show(told: dict[str, Any], gear: Gear) -> None:
+    from mlg_troubleshoot.workflows.history import landings_shown
+
+    console, gears = output.console(), told["gears"]
     headings = ("tail", "side", "last seen", "verdict", "look at", "to limit", "to margin", "next due")
     table = output.plain_table(console, *headings, right=("to limit", "to margin", "next due"))
     for line in gears[:_LINES]:
@@ -76,17 +78,28 @@ def _show(gears: list[dict[str, Any]], gear: Gear) -> None:
             line["inspection_date"] or "no date",
             str(line["verdict"]),
             "-" if joint is None else f"#{joint}",
-            _left(line["landings_to_limit"], gear),
+            _left(line["landings_to_limit"], gear) + _first(line["limit_joint"]),
             _left(line["landings_to_margin"], gear),
-            "-" if due is None else history.landings_shown(due, gear),
+            "-" if due is None else landings_shown(due, gear),
         )
-    console.print(f"{len(gears)} gears; landings left are those from the last inspection, median (5 %).")
+    console.print(
+        f"{len(gears)} gears; landings left are those from the last inspection, median (5 %): to the limit of any "
+        "joint, with the one that most likely reaches its limit first; to the margin by the worst-case bound. "
+        "'look at' is the joint to look at first today."
+    )
+    history.show_warnings(console, told["warnings"])
     console.print(table)
     if len(gears) > _LINES:
         console.print(f"… and {len(gears) - _LINES} more; --json lists all of them.")
 
 
 def _left(ends: dict[str, float | None] | None, gear: Gear) -> str:
+    from mlg_troubleshoot.workflows.history import landings_shown
+
     if ends is None:
         return "-"
-    return f"{history.landings_shown(ends['p50'], gear)} ({history.landings_shown(ends['p05'], gear)})"
+    return f"{landings_shown(ends['p50'], gear)} ({landings_shown(ends['p05'], gear)})"
+
+
+def _first(joint: int | None) -> str:
+    return "" if joint is None else f" #{joint}"

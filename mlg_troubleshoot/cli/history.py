@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -144,26 +144,24 @@ def _show_gears(found: Sequence[GearLife], place: str) -> None:
             str(len(life.inspections)),
             str(len(life.repairs)),
         )
+    show_warnings(console, [warning for life in found for warning in life.warnings])
     console.print(table)
     advice = task.advice(found)
     if advice.asked:
         console.print(advice.words)
 
 
-def span(samples: Any, gear: Gear) -> str:
-    """Median and 90 % interval of landings, the horizon standing for what lies beyond it."""
-    from mlg_troubleshoot.workflows import history as task
-
-    ends = task.quantiles(samples)
-    if ends is None:
-        return "-"
-    low, middle, high = (landings_shown(end, gear) for end in ends.values())
-    return middle if low == high else f"{middle} ({low} to {high})"
+def show_warnings(console: output.DataConsole, warnings: Iterable[str]) -> None:
+    for warning in warnings:
+        console.print(output.text(f"Warning: {warning}"))
 
 
-def landings_shown(count: float | None, gear: Gear) -> str:
-    """Landings to two digits: a forecast has no more; None lies beyond the horizon."""
-    return f"> {gear.horizon.value:.0f}" if count is None else f"{float(f'{count:.2g}'):.0f}"
+def say_warnings(place: Store, keys: Collection[tuple[str, str]]) -> None:
+    """Say on stderr which records of gears that were just added to disagree."""
+    from mlg_troubleshoot.workflows.history import warnings_of
+
+    for warning in warnings_of(place, keys):
+        output.say(f"Warning: {warning}")
 
 
 def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) -> None:
@@ -183,16 +181,9 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
             event["hash"][:10],
         )
     console.print(table)
-    if ahead.limit is None and life.latest is not None and life.latest.inspection.gear_landings is None:
-        console.print("No forecast: the last inspection does not state its landings (gear_landings).")
-    elif ahead.limit is not None:
-        after = ahead.next_inspection
-        due = "beyond the horizon" if after is None else f"in {landings_shown(after, gear)} landings"
-        console.print(
-            f"Landings left from the last inspection: to a joint's limit {span(ahead.limit, gear)}, to the margin "
-            f"{span(ahead.margin, gear)}. Next inspection due {due} (accepted chance "
-            f"{gear.accepted_chance.value:.0%})."
-        )
+    show_warnings(console, life.warnings)
+    if outlook := task.outlook_words(life, ahead, gear):
+        console.print(outlook)
     headings = ("joint", f"limit {unit}", f"readings since restored (landings: {unit})", "landings to its limit")
     joints = output.plain_table(console, *headings)
     unread = [f"#{joint['joint']}" for joint in told["joints"] if not joint["readings"]]
@@ -205,7 +196,7 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
             f"#{joint['joint']}",
             console.length(joint["limit_in"]),
             ("… " if len(joint["readings"]) > len(shown) else "") + read,
-            span(ahead.joints.get(joint["joint"]), gear),
+            task.span(joint["landings_to_limit"], gear),
         )
     console.print(joints)
     if unread:
@@ -250,8 +241,10 @@ def repair(
     known = load_gear(gear)
     _refuse_unknown(joints, known)
     done = {"joints": sorted(set(joints)), "landings": landings}
-    record = task.work(_kept_in(store), Kind.REPAIR, (tail, side_of(side)), _day(day), work_order, **done)
+    place = _kept_in(store)
+    record = task.work(place, Kind.REPAIR, (tail, side_of(side)), _day(day), work_order, **done)
     output.say(f"Kept: repair of {tail} {record.side}, {', '.join(f'#{j}' for j in record.body['joints'])}.")
+    say_warnings(place, [(tail, record.side)])
 
 
 def rerig(
@@ -261,9 +254,10 @@ def rerig(
     from mlg_troubleshoot.store import Kind
     from mlg_troubleshoot.workflows import history as task
 
-    key = (tail, side_of(side))
-    record = task.work(_kept_in(store), Kind.RERIG, key, _day(day), work_order, landings=landings)
+    key, place = (tail, side_of(side)), _kept_in(store)
+    record = task.work(place, Kind.RERIG, key, _day(day), work_order, landings=landings)
     output.say(f"Kept: re-rigging of {tail} {record.side}.")
+    say_warnings(place, [key])
 
 
 def _refuse_unknown(joints: Sequence[int], gear: Gear) -> None:
@@ -299,8 +293,10 @@ def correct(
     asked = CheckOptions(gear=gear, unit=unit, convention=convention, sheet=sheet)
     result = check_files([file], asked)
     notes.show_problems(result.problems)
-    added = task.correct(_kept_in(store), record, result, asked)
+    place = _kept_in(store)
+    added = task.correct(place, record, result, asked)
     output.say(f"Kept: correction of {record} ({added.tail_no} {added.side}).")
+    say_warnings(place, [(added.tail_no, added.side)])
 
 
 def void(

@@ -29,12 +29,12 @@ def settle_duplicates(
         if all(b is not None and b == bare[0] for b in bare):
             for place in places[1:]:
                 row = rows[place]
-                note = f"the same inspection as {_where(found[0].source)}"
+                note = f"the same inspection as {where(found[0].source)}"
                 rows[place] = replace(row, warnings=(*row.warnings, note))
             continue
         for place, row in zip(places, found, strict=True):
-            others = [_where(other.source) for other in found if other is not row]
-            header, cell = _column(row.source, layouts)
+            others = [where(other.source) for other in found if other is not row]
+            header, cell = cell_of(row.source, layouts, Kind.RECORD_ID)
             problems.append(_problem(record_id, row.source, others, header, cell))
             correct = row.correct if isinstance(row, InvalidRow) else ()
             columns = tuple(dict.fromkeys((header, *correct)))
@@ -48,18 +48,19 @@ def _content(row: Inspection | InvalidRow, invalid_content: Mapping[RowSource, i
     return replace(row, source=RowSource(), warnings=(), entered={})
 
 
-def _where(source: RowSource) -> str:
+def where(source: RowSource) -> str:
     sheet = f" of sheet {source.sheet!r}" if source.sheet is not None else ""
     return f"row {source.row}{sheet} of {source.file or 'the input'}"
 
 
-def _column(source: RowSource, layouts: Sequence[SheetLayout]) -> tuple[str, str | None]:
+def cell_of(source: RowSource, layouts: Sequence[SheetLayout], kind: Kind) -> tuple[str, str | None]:
+    """Header of a column as it was written, and its cell in a row or a form; no cell if the table does not have it."""
     for layout in layouts:
         if (layout.file, layout.sheet) == (source.file, source.sheet):
             for column in layout.columns:
-                if column.read_as == Kind.RECORD_ID:
-                    return column.header, f"{column_letters(column.index)}{source.row}"
-    return Kind.RECORD_ID.value, None
+                if column.read_as == kind:
+                    return column.header, f"{column_letters(column.index)}{column.row or source.row}"
+    return kind.value, None
 
 
 def _problem(record_id: str, source: RowSource, others: list[str], header: str, cell: str | None) -> Problem:

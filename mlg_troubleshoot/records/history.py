@@ -1,4 +1,4 @@
-"""Rows compared with the other inspections of the same gear: slips that would explain a jump."""
+"""Rows compared with the other inspections of the same gear: slips that would explain a jump, and the order of time."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from statistics import median
 
+from mlg_troubleshoot.decision.chronology import Moment, contradictions
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Side
+from mlg_troubleshoot.records.columns import Kind
+from mlg_troubleshoot.records.duplicates import cell_of, where
+from mlg_troubleshoot.records.model import SheetLayout
 from mlg_troubleshoot.units import SLIPS
 
 # Rows of a gear before and after that a row is compared with: enough for a median, few enough to follow the wear.
@@ -48,6 +52,25 @@ def history_warnings(rows: Sequence[Inspection | InvalidRow]) -> dict[int, tuple
             slip = _slip(clearances[at], expected, usual[other], other[1])
             if slip:
                 found[place] = (slip,)
+    return found
+
+
+def order_warnings(rows: Sequence[Inspection | InvalidRow], layouts: Sequence[SheetLayout]) -> dict[int, str]:
+    """Name the rows of one gear whose landings run backwards as its dates go on, each with its cell."""
+    gears: dict[Gear, list[tuple[int, Inspection]]] = {}
+    for place, row in enumerate(rows):
+        if isinstance(row, Inspection):
+            gears.setdefault((row.tail_no, row.side), []).append((place, row))
+    found: dict[int, str] = {}
+    for (tail, side), seen in gears.items():
+
+        def name(n: int, seen: list[tuple[int, Inspection]] = seen) -> str:
+            source = seen[n][1].source
+            cells = [cell for kind in (Kind.LANDINGS, Kind.DATE) if (cell := cell_of(source, layouts, kind)[1])]
+            return ", ".join([where(source), *cells])
+
+        for n, said in contradictions([Moment.of(row) for _place, row in seen], name).items():
+            found[seen[n][0]] = f"{tail} {side}: {said}. Correct the landings or the date."
     return found
 
 

@@ -17,7 +17,7 @@ from mlg_troubleshoot.records.cells import writable
 from mlg_troubleshoot.records.csvfile import csv_book
 from mlg_troubleshoot.records.duplicates import settle_duplicates
 from mlg_troubleshoot.records.forms import Form, find_form, read_form
-from mlg_troubleshoot.records.history import history_warnings
+from mlg_troubleshoot.records.history import history_warnings, order_warnings
 from mlg_troubleshoot.records.layout import Header, find_header, header_score
 from mlg_troubleshoot.records.model import FileRead, Progress, ReadOptions, ReadResult
 from mlg_troubleshoot.records.refusals import FileRefusedError
@@ -291,11 +291,14 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
     problems += settle_duplicates(rows, layouts, contents)
     for place, warnings in history_warnings(rows).items():
         rows[place] = replace(rows[place], warnings=(*rows[place].warnings, *warnings))
+    backwards = order_warnings(rows, layouts)
+    for place, warning in backwards.items():
+        rows[place] = replace(rows[place], warnings=(*rows[place].warnings, warning))
     problems.sort(key=_places(results))
     return ReadResult(
         tuple(rows),
         tuple(problems),
-        tuple(note for _, found in results for note in found.notes),
+        (*(note for _, found in results for note in found.notes), *dict.fromkeys(backwards.values())),
         layouts,
         tuple(file for file, _ in results),
     )

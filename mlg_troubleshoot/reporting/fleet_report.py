@@ -74,12 +74,18 @@ def fleet_document(
         }
         for line in fleet["gears"]
     ]
-    context = {**head("Fleet", "Fleet", gear, provenance, lengths), "lines_of": lines, "advice": advice}
+    context = {
+        **head("Fleet", "Fleet", gear, provenance, lengths),
+        "lines_of": lines,
+        "advice": advice,
+        "notes": fleet["warnings"],
+    }
     return Document("fleet.html.j2", context, "fleet", landscape=True)
 
 
 def life_document(
     life: Mapping[str, Any],
+    outlook: str,
     steps: Sequence[Mapping[str, Any]],
     gear: Gear,
     provenance: ReportProvenance,
@@ -87,6 +93,6 @@ def life_document(
 ) -> Document:
     """Make one gear's life: its last inspections side by side, what was restored between, landings left."""
     name = f"{life['tail_no']} {life['side']}"
-    shown = {"life": life, "steps": steps}
+    shown = {"life": life, "outlook": outlook, "steps": steps}
     context = {**head(f"Life of {name}", name, gear, provenance, Lengths(unit)), **shown}
     return Document("life.html.j2", context, safe_stem("life", life["tail_no"], life["side"]))

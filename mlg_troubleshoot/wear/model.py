@@ -16,7 +16,7 @@ from mlg_troubleshoot.wear.posterior import members, posterior
 
 # Posterior draws that every forecast is averaged over. [1]
 _DRAWS = 128
-# Simulated paths of a unit when few and when many units are asked for at once. [1]
+# Simulated paths of a unit of a population of few units and of many. [1]
 _PATHS, _PATHS_OF_MANY, _MANY = 4096, 256, 64
 # Units read twice or more, and other units, that the population is learnt from at most: more would not narrow it. [1]
 _LEARN_FROM, _LEARN_FROM_OTHERS = 160, 40
@@ -96,7 +96,7 @@ class WearModel:
         wanted = np.broadcast_to(np.atleast_1d(asked), (len(units), np.atleast_1d(asked).shape[-1]))
         rng = np.random.default_rng(self.seed)
         parts = []
-        for chosen, count in _chunks(len(units)):
+        for chosen, count in self._chunks(len(units)):
             names = [units[i] for i in chosen]
             order = np.argsort(wanted[chosen], axis=1)
             ascending = np.take_along_axis(wanted[chosen], order, axis=1) / self.scale.usage
@@ -119,13 +119,19 @@ class WearModel:
         limits = np.broadcast_to((np.asarray(limit, float) - self.scale.start) / self.scale.value, (len(units),))
         rng = np.random.default_rng(self.seed)
         parts = []
-        for chosen, count in _chunks(len(units)):
+        for chosen, count in self._chunks(len(units)):
             last = self._last([units[i] for i in chosen])
             ends = self._ends([units[i] for i in chosen], count, rng)
             found = np.concatenate([end.crossing(limits[chosen], last, rng) for end in ends])
             parts.append(np.moveaxis(found, 1, 0).reshape(len(chosen), -1))
         samples = np.concatenate(parts) * self.scale.usage
         return Samples(samples[0] if isinstance(unit, str) else samples)
+
+    def _chunks(self, units: int) -> Iterator[tuple[Places, int]]:
+        """Units that are worked out at once, and simulated paths of each: as many whoever is asked for beside it."""
+        size, count = (_MANY, _PATHS) if len(self.paths) <= _MANY else (250, _PATHS_OF_MANY)
+        for first in range(0, units, size):
+            yield np.arange(first, min(first + size, units)), count
 
     def _paths(self, unit: str) -> tuple[WearPath, ...]:
         return self.paths[unit] if unit in self.paths else (WearPath(unit, (), ()),)
@@ -270,12 +276,6 @@ def _gamma_passage(away: Array, rng: np.random.Generator) -> Array:
         over = shape * np.maximum(1.0 - 1.0 / (9.0 * shape) + z / (3.0 * np.sqrt(shape)), 0.0) ** 3 >= away
         low, high = np.where(over, low, middle), np.where(over, middle, high)
     return (low + high) / 2.0
-
-
-def _chunks(units: int) -> Iterator[tuple[Places, int]]:
-    size, count = (_MANY, _PATHS) if units <= _MANY else (250, _PATHS_OF_MANY)
-    for first in range(0, units, size):
-        yield np.arange(first, min(first + size, units)), count
 
 
 def fit_wear(paths: Sequence[WearPath], *, seed: int = 0) -> WearModel:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from datetime import date
@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
+from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected, Verdict
+from mlg_troubleshoot.decision.chronology import Moment, contradictions, in_order
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.order import WORST_FIRST
 from mlg_troubleshoot.errors import UsageError
@@ -75,15 +76,26 @@ class Seen:
         return {} if self.assessed is None else self.assessed.body["result"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class GearLife:
-    """What stands of one gear: inspections and repairs in the order of time, outcomes, and every record as it came."""
+    """What stands of one gear: inspections and repairs in the order of time, outcomes, and every record as it came.
+
+    warnings: the records whose dates and landings disagree, and how to correct them; with any there is no forecast.
+    """
 
     key: GearKey
     records: tuple[Record, ...]
-    inspections: tuple[Seen, ...]
-    repairs: tuple[Record, ...]
+    events: tuple[Seen | Record, ...]
     outcomes: tuple[Record, ...]
+    warnings: tuple[str, ...]
+
+    @cached_property
+    def inspections(self) -> tuple[Seen, ...]:
+        return tuple(event for event in self.events if isinstance(event, Seen))
+
+    @cached_property
+    def repairs(self) -> tuple[Record, ...]:
+        return tuple(event for event in self.events if isinstance(event, Record))
 
     @property
     def latest(self) -> Seen | None:
@@ -92,12 +104,18 @@ class GearLife:
 
 @dataclass(frozen=True, slots=True)
 class Forecast:
-    """Landings that remain from a gear's last inspection, of the joints ever read; infinite beyond the horizon."""
+    """Landings that remain from a gear's last inspection, of the joints ever read; infinite beyond the horizon.
+
+    limit_joint: the joint that most often is the first at its limit.
+    due_now: why nothing remains, in words; empty where something may.
+    """
 
     joints: Mapping[int, Samples] = field(default_factory=dict)
     limit: Samples | None = None
+    limit_joint: int | None = None
     margin: Samples | None = None
     next_inspection: float | None = None
+    due_now: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,9 +149,16 @@ class Advice:
         return {"right": self.right, "outcomes": self.asked, "p05": low, "p95": high}
 
 
+@dataclass(frozen=True, slots=True)
+class Kept(Added):
+    """What was added, and which records of these gears now disagree in dates and landings."""
+
+    warnings: tuple[str, ...]
+
+
 def keep(
     result: CheckResult, options: CheckOptions, store: Store, same_tail: Callable[[str, str], bool] | None = None
-) -> Added:
+) -> Kept:
     """Add the judged inspections of a check and their assessments, all or none.
 
     ``same_tail`` answers whether two spellings of a tail number mean one aircraft; without it they are refused.
@@ -146,7 +171,8 @@ def keep(
         inspection = replace(written, tail_no=tails.get(written.tail_no, written.tail_no))
         records.append(inspection_record(inspection))
         records.append(_assessment(result.gear, options, assessment, records[-1]))
-    return store.add(records, lambda kept, new: new.kind is not Kind.INSPECTION or _agrees(store, kept, new))
+    added = store.add(records, lambda kept, new: new.kind is not Kind.INSPECTION or _agrees(store, kept, new))
+    return Kept(added.new, added.known, tuple(warnings_of(store, {(r.tail_no, r.side) for r in records})))
 
 
 def _agrees(store: Store, kept: Record, new: Record) -> bool:
@@ -235,21 +261,57 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
                 seen[same[-1]] = replace(seen[same[-1]], assessed=record)
         else:
             events[record.digest] = record
-    ordered = sorted(seen.values(), key=_when_seen)
     repairs = [r for r in events.values() if r.kind in (Kind.REPAIR, Kind.RERIG)]
+    unordered: list[Seen | Record] = [*seen.values(), *repairs]
+    counted = sorted(unordered, key=lambda event: _record_of(event).seq)
+    moments = [_moment(event) for event in counted]
     return GearLife(
         key,
         tuple(records),
-        tuple(ordered),
-        tuple(sorted(repairs, key=lambda r: (r.day, r.seq))),
+        tuple(counted[place] for place in in_order(moments)),
         tuple(r for r in events.values() if r.kind is Kind.OUTCOME),
+        _disagreements(key, counted, moments),
     )
 
 
-def _when_seen(seen: Seen) -> tuple[str, float, int]:
-    """Order of inspections: by day, and as they were kept; without a day by landings, before those that have one."""
-    landings = None if seen.record.day else seen.inspection.gear_landings
-    return seen.record.day, -1.0 if landings is None else landings, seen.record.seq
+def _record_of(event: Seen | Record) -> Record:
+    return event.record if isinstance(event, Seen) else event
+
+
+def _moment(event: Seen | Record) -> Moment:
+    if isinstance(event, Seen):
+        return Moment.of(event.inspection)
+    return Moment(event.day, event.body.get("landings"))
+
+
+def _disagreements(key: GearKey, counted: Sequence[Seen | Record], moments: Sequence[Moment]) -> tuple[str, ...]:
+    """Name the records whose dates and landings disagree, each with how to correct it."""
+
+    def name(place: int) -> str:
+        record = _record_of(counted[place])
+        what = "" if isinstance(counted[place], Seen) else f"{record.kind} "
+        return f"{what}{record.record_id}, ".lstrip(", ") + record.digest[:10]
+
+    by_sentence: dict[str, list[int]] = {}
+    for place, said in contradictions(moments, name).items():
+        by_sentence.setdefault(said, []).append(place)
+    warnings = []
+    for said, places in by_sentence.items():
+        record = _record_of(counted[places[0]]).digest[:10] if len(places) == 1 else "RECORD"
+        voids = f"mlg history void {record} --why TEXT"
+        repaired = any(isinstance(counted[place], Record) for place in places)
+        corrects = f"{voids}, then mlg history repair" if repaired else f"mlg history correct {record} FILE, or {voids}"
+        warnings.append(f"{' '.join(key)}: {said}. No forecast until this is corrected: {corrects}")
+    return tuple(warnings)
+
+
+def warnings_of(store: Store, keys: Collection[GearKey]) -> list[str]:
+    """The records of some gears whose dates and landings disagree."""
+    if len(keys) > _GEARS_AT_ONCE:
+        found = lives(store)
+    else:
+        found = {key: life for wanted in keys for key, life in lives(store, *wanted).items()}
+    return [warning for key, life in found.items() if key in keys for warning in life.warnings]
 
 
 def find(store: Store, record_id: str) -> Record:
@@ -337,46 +399,63 @@ def _landings_of(record: Record, life: GearLife) -> float | None:
     stated = record.body.get("landings")
     if stated is not None:
         return float(stated)
-    dated = [
-        (date.fromisoformat(s.record.day).toordinal(), s.inspection.gear_landings)
-        for s in life.inspections
-        if s.record.day and s.inspection.gear_landings is not None
-    ]
+    dated = _placed_in_time(life)
     if not dated or not record.day:
         return None
     days, landings = zip(*dated, strict=True)
     return float(np.interp(date.fromisoformat(record.day).toordinal(), days, landings))
 
 
+def _placed_in_time(life: GearLife) -> list[tuple[int, float]]:
+    """Day and landings of the inspections that state both."""
+    return [
+        (date.fromisoformat(s.record.day).toordinal(), s.inspection.gear_landings)
+        for s in life.inspections
+        if s.record.day and s.inspection.gear_landings is not None
+    ]
+
+
+@dataclass(slots=True)
+class _Stretch:
+    """What was read of a joint between two restorations: landings (None: not stated), clearance and its uncertainty."""
+
+    begun: float
+    readings: list[tuple[float | None, float, float]]
+
+    @property
+    def placed(self) -> list[tuple[float, float, float]]:
+        """The readings whose landings are known."""
+        return [(at, value, u) for at, value, u in self.readings if at is not None]
+
+
+def _stretches(life: GearLife, joints: Sequence[int]) -> dict[int, list[_Stretch]]:
+    """Readings of each joint between its restorations, in the order of time."""
+    found = {joint: [_Stretch(0.0, [])] for joint in joints}
+    for event in life.events:
+        if isinstance(event, Seen):
+            seen = event.inspection
+            for joint in found.keys() & seen.clearance_in.keys():
+                reading = (seen.gear_landings, seen.clearance_in[joint], seen.gauge_u_of(joint))
+                found[joint][-1].readings.append(reading)
+        elif event.kind is Kind.REPAIR:
+            at = _landings_of(event, life)
+            for joint in found.keys() & set(event.body["joints"]):
+                found[joint].append(_Stretch(found[joint][-1].begun if at is None else at, []))
+    return found
+
+
 def wear_paths(life: GearLife, joints: Sequence[int]) -> dict[int, tuple[list[WearPath], float]]:
     """Paths of each joint between its restorations, and the landings at which the current one began."""
-    events: list[tuple[float, str, int, Seen | Record]] = [
-        (s.inspection.gear_landings, s.record.day, s.record.seq, s)
-        for s in life.inspections
-        if s.inspection.gear_landings is not None
-    ]
-    for record in life.repairs:
-        at = _landings_of(record, life)
-        if record.kind is Kind.REPAIR and at is not None:
-            events.append((at, record.day, record.seq, record))
-    events.sort(key=lambda event: event[:3])
     found = {}
-    for joint in joints:
-        unit, begun = unit_of(life.key, joint), 0.0
-        paths: list[WearPath] = []
-        usage: list[float] = []
-        value: list[float] = []
+    for joint, stretches in _stretches(life, joints).items():
+        paths = []
         reading_u: float | None = None
-        for landings, _day, _seq, event in events:
-            if isinstance(event, Record):
-                if joint in event.body["joints"]:
-                    paths.append(WearPath(unit, usage, value, reading_u))
-                    usage, value, begun = [], [], landings
-            elif joint in event.inspection.clearance_in:
-                usage.append(landings - begun)
-                value.append(event.inspection.clearance_in[joint])
-                reading_u = event.inspection.gauge_u_of(joint)
-        found[joint] = ([*paths, WearPath(unit, usage, value, reading_u)], begun)
+        for stretch in stretches:
+            placed = stretch.placed
+            reading_u = placed[-1][2] if placed else reading_u
+            usage = [max(at - stretch.begun, 0.0) for at, _value, _u in placed]
+            paths.append(WearPath(unit_of(life.key, joint), usage, [value for _at, value, _u in placed], reading_u))
+        found[joint] = paths, stretches[-1].begun
     return found
 
 
@@ -386,10 +465,11 @@ def unit_of(key: GearKey, joint: int) -> str:
 
 
 def fit_fleet(found: Iterable[GearLife], gear: Gear) -> WearModel | None:
-    """Learn the wear of all joints of all gears; None if no inspection states its landings."""
+    """Learn the wear of all joints of all gears whose dates and landings agree; None if none states its landings."""
     paths = [
         path
         for life in found
+        if not life.warnings
         for own, _begun in wear_paths(life, gear.joint_numbers).values()
         for path in own
         if len(own) > 1 or len(np.asarray(path.usage))
@@ -403,17 +483,43 @@ def forecast(
     gear: Gear,
     progress: Callable[[str, int, int], None] = lambda _name, _done, _total: None,
 ) -> dict[GearKey, Forecast]:
-    """Forecast gears from their last inspection on; one without landings has no forecast."""
-    known = [life for life in found if life.latest and life.latest.inspection.gear_landings is not None]
-    forecasts: dict[GearKey, Forecast] = {}
+    """Forecast gears from their last inspection on.
+
+    Nothing remains to one that is due now. One without landings, or whose dates and landings disagree, has no forecast.
+    """
+    forecasts = {life.key: _due_now(life, gear) or Forecast() for life in found if life.latest and not life.warnings}
+    known = [
+        life
+        for life in found
+        if life.key in forecasts
+        and not forecasts[life.key].due_now
+        and life.inspections[-1].inspection.gear_landings is not None
+    ]
     if model is not None:
+        done = 0
         parts = [known[first : first + _GEARS_AT_ONCE] for first in range(0, len(known), _GEARS_AT_ONCE)]
-        # Each part draws from the model's seed: the same whoever works it out, and NumPy lets others work meanwhile.
+        # NumPy lets others work meanwhile.
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             for part, some in zip(parts, pool.map(lambda p: [*_forecast_some(p, model, gear)], parts), strict=True):
                 forecasts.update(zip((life.key for life in part), some, strict=True))
-                progress("Looking ahead", len(forecasts), len(known))
+                done += len(part)
+                progress("Looking ahead", done, len(known))
     return {life.key: forecasts.get(life.key, Forecast()) for life in found}
+
+
+def _due_now(life: GearLife, gear: Gear) -> Forecast | None:
+    """The forecast of a gear that is outside its margin or has a joint over its limit: nothing remains of anything."""
+    last = {n: s[-1].readings[-1:] for n, s in _stretches(life, gear.joint_numbers).items()}
+    over = {n: read[0][1] for n, read in last.items() if read and gear.joint(n).is_over_limit(read[0][1])}
+    outside = life.inspections[-1].result.get("verdict") == Verdict.OUTSIDE_MARGIN.value
+    if not (over or outside):
+        return None
+    listed = ", ".join(f"#{n}" for n in over)
+    reasons = ["outside the margin at the last inspection"] * outside
+    why = ", and ".join([*reasons, *[f"{listed} over the limit when last read"] * bool(over)])
+    nothing = Samples(np.zeros(1))
+    worst = max(over, key=lambda n: over[n] / gear.joint(n).limit.value, default=None)
+    return Forecast(dict.fromkeys(over, nothing), nothing, worst, nothing, 0.0, why)
 
 
 def _forecast_some(part: Sequence[GearLife], model: WearModel, gear: Gear) -> Iterator[Forecast]:
@@ -422,9 +528,10 @@ def _forecast_some(part: Sequence[GearLife], model: WearModel, gear: Gear) -> It
     begun = np.array([[start for _own, start in wear_paths(life, numbers).values()] for life in part])
     ahead = gear.horizon.value * _AHEAD
     usage = np.maximum(now[:, None, None] + ahead - begun[:, :, None], 0.0)
-    units = [unit_of(life.key, number) for life in part for number in numbers]
-    wear = np.maximum(model.forecast(units, usage.reshape(-1, len(_AHEAD)), reading=False).samples, 0.0)
-    wear = wear.reshape(len(part), len(numbers), len(_AHEAD), -1)
+    # Gear by gear, each from the model's seed: the forecast of a gear is the same whoever is asked for beside it.
+    asked_of = [[unit_of(life.key, number) for number in numbers] for life in part]
+    wear = np.stack([model.forecast(u, at, reading=False).samples for u, at in zip(asked_of, usage, strict=True)])
+    wear = np.maximum(wear, 0.0)
     amplification = gear.model.plunger_amplification()
     read = np.array([[any(n in s.inspection.clearance_in for s in life.inspections) for n in numbers] for life in part])
     # A joint that was never read counts as it does in the prediction: not at all.
@@ -445,7 +552,9 @@ def _forecast_some(part: Sequence[GearLife], model: WearModel, gear: Gear) -> It
         of_joints = {number: Samples(to_limit[j]) for j, number in enumerate(numbers) if read[g, j]}
         to_margin, to_any = _first_passage(ahead, displacement, margin), to_limit.min(axis=0)
         due = float(Samples(np.minimum(to_any, to_margin)).quantile(gear.accepted_chance.value))
-        yield Forecast(of_joints, Samples(to_any), Samples(to_margin), due if np.isfinite(due) else None)
+        first = to_limit.argmin(axis=0)[np.isfinite(to_any)]
+        joint = numbers[int(np.bincount(first).argmax())] if len(first) else None
+        yield Forecast(of_joints, Samples(to_any), joint, Samples(to_margin), due if np.isfinite(due) else None)
 
 
 def _first_passage(ahead: Array, paths: Array, limit: float) -> Array:
@@ -465,7 +574,11 @@ def suggestions(found: Sequence[GearLife], model: WearModel | None, gear: Gear) 
     if model is None:
         return []
     # Seen twice, the last time with its landings.
-    kept = [f for f in found if len(f.inspections) > 1 and f.inspections[-1].inspection.gear_landings is not None]
+    kept = [
+        life
+        for life in found
+        if len(life.inspections) > 1 and not life.warnings and life.inspections[-1].inspection.gear_landings is not None
+    ]
     off = _departures([(life, life) for life in kept], model, gear)
     said: list[str] = []
     swapped: set[int] = set()
@@ -517,7 +630,7 @@ def _departures(pairs: Sequence[tuple[GearLife, GearLife]], model: WearModel, ge
     for n, (history, newest) in enumerate(pairs):
         last = newest.inspections[-1].inspection
         landings = last.gear_landings or 0.0
-        before = replace(history, inspections=history.inspections[:-1])
+        before = replace(history, events=tuple(event for event in history.events if event is not history.latest))
         for j, (own, begun) in enumerate(wear_paths(before, numbers).values()):
             if numbers[j] in last.clearance_in and len(np.asarray(own[-1].usage)):
                 paths[f"{n} {j}"] = tuple(own)
@@ -537,6 +650,39 @@ def quantiles(samples: Samples | None) -> dict[str, float | None] | None:
         return None
     ends = samples.quantile([0.05, 0.5, 0.95])
     return {n: float(end) if np.isfinite(end) else None for n, end in zip(("p05", "p50", "p95"), ends, strict=True)}
+
+
+def span(ends: Mapping[str, float | None] | None, gear: Gear) -> str:
+    """Median and 90 % interval of landings, the horizon standing for what lies beyond it."""
+    if ends is None:
+        return "-"
+    low, middle, high = (landings_shown(end, gear) for end in ends.values())
+    return middle if low == high else f"{middle} ({low} to {high})"
+
+
+def landings_shown(count: float | None, gear: Gear) -> str:
+    """Landings to two digits: a forecast has no more; None lies beyond the horizon."""
+    return f"> {gear.horizon.value:.0f}" if count is None else f"{float(f'{count:.2g}'):.0f}"
+
+
+def outlook_words(life: GearLife, ahead: Forecast, gear: Gear) -> str:
+    """Say what is left to a gear, of which margin and which joint; empty where nothing was forecast."""
+    if ahead.due_now:
+        return f"No landings left: {ahead.due_now}. Next inspection due now."
+    if life.latest is not None and life.latest.inspection.gear_landings is None:
+        return "No forecast: the last inspection does not state its landings (gear_landings)."
+    if ahead.limit is None:
+        return ""
+    told = _outlook(life, ahead)
+    joint = "" if ahead.limit_joint is None else f", where #{ahead.limit_joint} most likely reaches its limit first"
+    after, day = ahead.next_inspection, told["due_date"]
+    due = "beyond the horizon" if after is None else f"in {landings_shown(after, gear)} landings"
+    return (
+        f"Landings left from the last inspection: to a joint's limit {span(told['landings_to_limit'], gear)}{joint}; "
+        f"to the margin, by the worst-case bound, {span(told['landings_to_margin'], gear)}. "
+        f"Next inspection due {due}{f', about {day}' if day else ''} "
+        f"(accepted chance {gear.accepted_chance.value:.0%})."
+    )
 
 
 def worst_joint(seen: Seen) -> int | None:
@@ -560,14 +706,40 @@ def fleet_as_json(found: Sequence[GearLife], forecasts: Mapping[GearKey, Forecas
                 "gear_landings": seen.inspection.gear_landings,
                 "verdict": seen.result.get("verdict"),
                 "worst_joint": worst_joint(seen),
-                "landings_to_limit": quantiles(ahead.limit),
-                "landings_to_margin": quantiles(ahead.margin),
-                "next_inspection_landings": ahead.next_inspection,
+                **_outlook(life, ahead),
                 "repairs": len(life.repairs),
             }
         )
     lines.sort(key=_urgency)
-    return {"schema_version": 1, "gears": lines, "advice": advice(found).describe()}
+    warnings = [warning for life in found for warning in life.warnings]
+    return {"schema_version": 1, "gears": lines, "advice": advice(found).describe(), "warnings": warnings}
+
+
+def _outlook(life: GearLife, ahead: Forecast) -> dict[str, Any]:
+    """What is left to a gear, the same in its life and in the fleet."""
+    return {
+        "landings_to_limit": quantiles(ahead.limit),
+        "limit_joint": ahead.limit_joint,
+        "landings_to_margin": quantiles(ahead.margin),
+        "next_inspection_landings": ahead.next_inspection,
+        "due_date": _due_date(life, ahead),
+    }
+
+
+def _due_date(life: GearLife, ahead: Forecast) -> str | None:
+    """The day on which the next inspection is due if the gear goes on landing as often as between its inspections."""
+    last = life.latest
+    if last is None or not last.record.day or ahead.next_inspection is None:
+        return None
+    latest = date.fromisoformat(last.record.day).toordinal()
+    days = 0.0
+    if not ahead.due_now:
+        placed = _placed_in_time(life)
+        flown, passed = (placed[-1][1] - placed[0][1], placed[-1][0] - placed[0][0]) if placed else (0.0, 0)
+        if flown <= 0.0 or passed <= 0:
+            return None
+        days = ahead.next_inspection * passed / flown
+    return date.fromordinal(latest + int(days)).isoformat() if latest + days < date.max.toordinal() else None
 
 
 def _urgency(line: Mapping[str, Any]) -> tuple[int, float, str, str]:
@@ -601,20 +773,18 @@ def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
             event |= {name: value for name, value in body.items() if name != "landings"}
         events.append(event)
     joints = []
-    for number, (own, begun) in wear_paths(life, gear.joint_numbers).items():
-        current_path = own[-1]
-        readings = zip(np.asarray(current_path.usage) + begun, np.asarray(current_path.value), strict=True)
+    for number, stretches in _stretches(life, gear.joint_numbers).items():
         joints.append(
             {
                 "joint": number,
                 "limit_in": gear.joint(number).limit.value,
-                "readings": [[float(landings), float(clearance)] for landings, clearance in readings],
+                "readings": [[landings, clearance] for landings, clearance, _u in stretches[-1].placed],
                 "landings_to_limit": quantiles(ahead.joints.get(number)),
             }
         )
     tail, side = life.key
     told = {"schema_version": 1, "tail_no": tail, "side": side, "events": events, "joints": joints}
-    return {**told, "advice": advice([life]).describe()}
+    return {**told, **_outlook(life, ahead), "advice": advice([life]).describe(), "warnings": list(life.warnings)}
 
 
 def import_file(store: Store, file: Path) -> Added:
@@ -646,9 +816,9 @@ def side_by_side(life: GearLife, now: Assessment | None = None) -> list[dict[str
         rows = [r for r in rows if r[0].record_id != found.record_id and r[1] < at]
         rows += [(found, at, now.predicted_displacement_in, now.verdict.value)] if rows else []
     steps: list[dict[str, Any]] = []
-    before = ("9999", 0)
+    before: tuple[str, int] | None = None
     for inspection, at, worst_in, verdict in rows:
-        since = [r for r in life.repairs if before < (r.day, r.seq) < at]
+        since = [r for r in life.repairs if before and before < (r.day, r.seq) < at]
         steps.append(
             {
                 "record_id": inspection.record_id,
@@ -661,7 +831,7 @@ def side_by_side(life: GearLife, now: Assessment | None = None) -> list[dict[str
                 "verdict": verdict,
             }
         )
-        before = at
+        before = max(before or at, at)
     return steps[-_SIDE_BY_SIDE:]
 
 
@@ -711,6 +881,7 @@ def write_pages(
         # The pages behind the lines of a fleet are for the screen.
         formats = ("html",) if fleet else ("html", "pdf")
         told = life_as_json(life, forecasts.get(life.key, Forecast()), gear)
-        document = fleet_report.life_document(told, side_by_side(life), gear, made, unit)
+        outlook = outlook_words(life, forecasts.get(life.key, Forecast()), gear)
+        document = fleet_report.life_document(told, outlook, side_by_side(life), gear, made, unit)
         written.append(publish(document, directory, formats=formats, page=page))
     return written

@@ -60,7 +60,8 @@ def seeded(*visits: tuple[int, float]) -> None:
         seen = Inspection(
             f"N123-LH-{n}", "N123", Side.LH, RADIAL, {3: worn_in}, inspection_date=day, gear_landings=400.0 * n
         )
-        result = {"verdict": "OUTSIDE_MARGIN", "joints": [{"joint": 3, "rank": 1}], "predicted_displacement_in": 0.05}
+        verdict, worst_in = "OUTSIDE_MARGIN" if worn_in > 0.006 else "WITHIN_MARGIN", 5.0 * worn_in
+        result = {"verdict": verdict, "joints": [{"joint": 3, "rank": 1}], "predicted_displacement_in": worst_in}
         body = {
             "result": {**result, "margin_in": 0.03},
             "program_version": "0",

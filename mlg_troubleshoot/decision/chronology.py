@@ -1,0 +1,95 @@
+"""When the inspections and repairs of one gear took place, by their dates and their landings."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import inf
+
+from mlg_troubleshoot.decision.inspection import Inspection
+
+# More records than this are not listed in one sentence. [1]
+_MOST_NAMED = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """Date (ISO 8601, empty if there is none) and landings of one inspection or repair."""
+
+    day: str
+    landings: float | None
+
+    @classmethod
+    def of(cls, inspection: Inspection) -> Moment:
+        day = inspection.inspection_date
+        return cls("" if day is None else day.isoformat(), inspection.gear_landings)
+
+
+def in_order(moments: Sequence[Moment]) -> list[int]:
+    """Places in the order of time: by date, and by landings on one date and where there is no date.
+
+    What states no landings stands behind what came before it with the same date.
+    """
+    before: dict[str, float] = {}
+    at = []
+    for moment in moments:
+        before[moment.day] = before.get(moment.day, -inf) if moment.landings is None else moment.landings
+        at.append(before[moment.day])
+    by_time = sorted(range(len(moments)), key=lambda place: (moments[place].day, at[place]))
+    dated = [place for place in by_time if moments[place].day]
+    for earlier, place in pairwise(dated):
+        if moments[place].landings is None:
+            at[place] = at[earlier]
+    # An undated record follows every dated one with as many landings or fewer, and what is dated before that one.
+    for later, place in pairwise(reversed(dated)):
+        at[place] = min(at[place], at[later])
+    undated = [place for place in by_time if not moments[place].day]
+    return sorted(dated + undated, key=lambda place: at[place])
+
+
+def contradictions(moments: Sequence[Moment], name: Callable[[int], str]) -> dict[int, str]:
+    """Say of each record that may be wrong how its date and its landings disagree with those of the others.
+
+    Suspect is what has to go so that the landings of the others never fall as time goes on: the fewest records that do.
+    Where several choices are as few, every record of any of them is a suspect, and they share one sentence.
+    """
+    placed = [i for i, moment in enumerate(moments) if moment.day and moment.landings is not None]
+    placed.sort(key=lambda i: (moments[i].day, moments[i].landings))
+    landings = [moments[i].landings or 0.0 for i in placed]
+    if landings == sorted(landings):
+        return {}
+    up_to = _longest_rising(landings)
+    onwards = _longest_rising([-each for each in reversed(landings)])[::-1]
+    longest = max(up_to)
+    in_some = [n for n in range(len(placed)) if up_to[n] + onwards[n] - 1 == longest]
+    alone = Counter(up_to[n] for n in in_some)
+    trusted = [n for n in in_some if alone[up_to[n]] == 1]
+    suspects = [n for n in range(len(placed)) if n not in set(trusted)]
+
+    def said(n: int) -> str:
+        moment = moments[placed[n]]
+        return f"{moment.landings:g} landings on {moment.day} ({name(placed[n])})"
+
+    if len(trusted) < longest:
+        listed = ", ".join(map(said, suspects[:_MOST_NAMED])) + (" …" if len(suspects) > _MOST_NAMED else "")
+        return dict.fromkeys((placed[n] for n in suspects), f"{listed} cannot all be right: landings never fall")
+    found = {}
+    for n in suspects:
+        earlier = [m for m in trusted if m < n and landings[m] > landings[n]]
+        other = earlier[-1] if earlier else next(m for m in trusted if m > n and landings[m] < landings[n])
+        found[placed[n]] = f"{said(n)} disagree with {said(other)}: landings never fall"
+    return found
+
+
+def _longest_rising(values: Sequence[float]) -> list[int]:
+    """Length of the longest series that never falls and ends at each value."""
+    least: list[float] = []
+    lengths = []
+    for value in values:
+        at = bisect_right(least, value)
+        least[at : at + 1] = [value]
+        lengths.append(at + 1)
+    return lengths

@@ -1,0 +1,357 @@
+"""Landings and dates of one gear that disagree, and gears that are due now: what history and fleet say of them."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import date, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.store import Kind, Record, Store, inspection_record, packed
+from mlg_troubleshoot.units import ClearanceConvention
+from mlg_troubleshoot.workflows import history as task
+from tests.cli.conftest import mlg, row
+
+# Landings and the readings of #3 and #5 at the yearly inspections of one gear. [1, in, in]
+YEARS = ((14, 0.0011, 0.0010), (863, 0.0016, 0.0015), (1672, 0.0022, 0.0021), (2407, 0.0120, 0.0110))
+SLIP = {3: 240}
+QUANTILES = ("landings_to_limit", "landings_to_margin")
+
+
+@pytest.fixture(autouse=True)
+def _place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MLG_STORE", str(tmp_path / "store.sqlite"))
+
+
+def write(path: Path, rows: Sequence[Mapping[str, str]]) -> Path:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, fieldnames=list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    return path
+
+
+def years(folder: Path, landings: Mapping[int, float], *, only: Sequence[int] = range(4), name: str = "slip") -> Path:
+    """Four yearly inspections of N507 LH, of some years, some with other landings than they had."""
+    rows = []
+    for n in only:
+        stated, third, fifth = YEARS[n]
+        read = {"clearance_3_in": f"{third:.4f}", "clearance_5_in": f"{fifth:.4f}"}
+        when = {"inspection_date": f"{2023 + n}-03-01", "gear_landings": f"{landings.get(n, stated)}"}
+        rows.append(row(record_id=f"S{n + 1}", tail_no="N507", side="LH", **when, **read))
+    return write(folder / f"{name}.csv", rows)
+
+
+def kept(folder: Path, landings: Mapping[int, float]) -> None:
+    assert mlg("check", years(folder, landings), "--keep").code == 1
+
+
+def gear_of_the_fleet(*more: str) -> dict[str, Any]:
+    (found,) = mlg("fleet", "--json", *more).json["gears"]
+    return dict(found)
+
+
+def life(*more: str) -> dict[str, Any]:
+    return dict(mlg("history", "N507", "LH", "--json", *more).json)
+
+
+def words_of(page: Path) -> str:
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", page.read_text(encoding="utf-8")))
+
+
+# What a check says.
+
+
+def test_a_check_names_row_and_cell_of_landings_that_fall(tmp_path: Path) -> None:
+    file = years(tmp_path, SLIP)
+    said = f"240 landings on 2026-03-01 (row 5 of {file}, P5, O5) disagree with 1672 landings on 2025-03-01"
+    assert said in mlg("check", file).err
+
+
+def test_the_row_whose_landings_fall_carries_the_warning_in_json(tmp_path: Path) -> None:
+    rows = mlg("check", years(tmp_path, SLIP), "--json").json["inspections"]
+    assert [any("landings never fall" in text for text in each["warnings"]) for each in rows] == [False] * 3 + [True]
+
+
+def test_a_date_that_runs_backwards_is_named_as_landings_are(tmp_path: Path) -> None:
+    file = years(tmp_path, {})
+    file.write_text(file.read_text(encoding="utf-8").replace("2025-03-01", "2022-03-01"), encoding="utf-8")
+    assert f"1672 landings on 2022-03-01 (row 4 of {file}, P4, O4) disagree" in mlg("check", file).err
+
+
+def test_a_life_in_order_is_not_warned_of(tmp_path: Path) -> None:
+    run = mlg("check", years(tmp_path, {}), "--keep")
+    assert "landings never fall" not in run.err
+    assert life("--no-forecast")["warnings"] == []
+
+
+def test_inspections_of_two_gears_are_not_compared(tmp_path: Path) -> None:
+    text = years(tmp_path, SLIP).read_text(encoding="utf-8").replace("S4,N507,LH", "S4,N507,RH")
+    (tmp_path / "two.csv").write_text(text, encoding="utf-8")
+    assert "landings never fall" not in mlg("check", tmp_path / "two.csv").err
+
+
+def test_keeping_what_contradicts_the_store_keeps_it_and_warns(tmp_path: Path) -> None:
+    mlg("check", years(tmp_path, {}, only=[0, 1, 2], name="first"), "--keep")
+    run = mlg("check", years(tmp_path, SLIP, only=[3], name="last"), "--keep")
+    assert "2 new records" in run.err
+    assert "240 landings on 2026-03-01 (S4" in run.err
+    assert "mlg history correct" in run.err
+
+
+# What history and fleet say of a life that contradicts itself.
+
+
+def test_the_slip_of_one_typed_number_gives_no_forecast_in_history(tmp_path: Path) -> None:
+    kept(tmp_path, SLIP)
+    told = life()
+    assert [told[name] for name in (*QUANTILES, "next_inspection_landings", "due_date")] == [None] * 4
+    assert {joint["landings_to_limit"] is None for joint in told["joints"]} == {True}
+
+
+def test_the_slip_of_one_typed_number_gives_no_forecast_in_the_fleet(tmp_path: Path) -> None:
+    kept(tmp_path, SLIP)
+    told = gear_of_the_fleet()
+    assert [told[name] for name in (*QUANTILES, "next_inspection_landings", "due_date")] == [None] * 4
+
+
+@pytest.mark.parametrize("command", [("history", "N507", "LH"), ("fleet",)])
+@pytest.mark.parametrize("form", ["screen", "json", "report"])
+def test_every_view_names_the_record_and_how_to_correct_it(tmp_path: Path, command: tuple[str, ...], form: str) -> None:
+    kept(tmp_path, SLIP)
+    wrong = next(record.digest[:10] for record in Store().all() if record.record_id == "S4")
+    if form == "report":
+        mlg(*command, "--no-forecast", "--report", tmp_path / "pages")
+        page = "fleet.html" if command == ("fleet",) else "mlg-life-N507-LH.html"
+        text = words_of(next(path for path in (tmp_path / "pages").glob("*.html") if path.name.startswith(page[:8])))
+    elif form == "json":
+        (text,) = mlg(*command, "--json").json["warnings"]
+    else:
+        text = re.sub(r"\s+", " ", mlg(*command).out)
+    assert f"240 landings on 2026-03-01 (S4, {wrong})" in text
+    assert f"mlg history correct {wrong} FILE" in text
+
+
+def test_a_correction_brings_the_forecast_back(tmp_path: Path) -> None:
+    kept(tmp_path, SLIP)
+    mlg("history", "correct", "S4", years(tmp_path, {}, only=[3], name="right"))
+    told = life()
+    assert told["warnings"] == []
+    assert told["next_inspection_landings"] == 0.0
+
+
+def test_the_readings_of_a_life_that_contradicts_itself_stand_by_date(tmp_path: Path) -> None:
+    kept(tmp_path, SLIP)
+    third = life("--no-forecast")["joints"][2]
+    assert [landings for landings, _clearance in third["readings"]] == [14.0, 863.0, 1672.0, 240.0]
+
+
+def test_a_repair_whose_landings_contradict_the_inspections_is_named(tmp_path: Path) -> None:
+    kept(tmp_path, {})
+    run = mlg("history", "repair", "N507", "LH", "--joint", "3", "--date", "2025-06-01", "--landings", "81")
+    assert "81 landings on 2025-06-01 (repair" in run.err
+    assert "mlg history void" in run.err
+
+
+def test_a_life_that_contradicts_itself_teaches_the_fleet_nothing(tmp_path: Path) -> None:
+    kept(tmp_path, SLIP)
+    assert task.fit_fleet(task.lives(Store()).values(), load_gear()) is None
+
+
+def test_of_two_inspections_neither_is_called_the_right_one(tmp_path: Path) -> None:
+    mlg("check", years(tmp_path, SLIP, only=[2, 3]), "--keep")
+    (said,) = life("--no-forecast")["warnings"]
+    assert "1672 landings on 2025-03-01 (S3" in said
+    assert "240 landings on 2026-03-01 (S4" in said
+    assert "mlg history correct RECORD FILE" in said
+
+
+# The order of time.
+
+
+def inspection(n: int, day: str, landings: float | None, worn_in: float = 0.001) -> Inspection:
+    when = date.fromisoformat(day) if day else None
+    read = dict.fromkeys(range(1, 11), worn_in)
+    return Inspection(
+        f"R{n}", "N507", Side.LH, ClearanceConvention.RADIAL, read, inspection_date=when, gear_landings=landings
+    )
+
+
+def test_an_undated_inspection_is_placed_by_its_landings() -> None:
+    seen = [("2024-01-01", 100), ("2025-01-01", 900), ("", 400), ("", 1500)]
+    Store().add([inspection_record(inspection(n, *each)) for n, each in enumerate(seen)])
+    found = task.life_of(Store(), "N507", "LH")
+    assert [each.inspection.gear_landings for each in found.inspections] == [100, 400, 900, 1500]
+
+
+def test_an_undated_inspection_between_others_does_not_repeat_what_was_restored_before() -> None:
+    seen = [("2024-01-01", 100), ("2025-01-01", 900), ("", 1000), ("2025-06-01", 1200)]
+    Store().add([inspection_record(inspection(n, *each)) for n, each in enumerate(seen)])
+    mlg("history", "repair", "N507", "LH", "--joint", "3", "--date", "2024-06-01", "--landings", "500")
+    steps = task.side_by_side(task.life_of(Store(), "N507", "LH"))
+    assert [step["restored"] for step in steps] == [[], [3], [], []]
+
+
+def test_the_higher_landings_of_one_date_are_the_later_ones() -> None:
+    seen = [("2024-01-01", 802), ("2024-01-01", 800)]
+    Store().add([inspection_record(inspection(n, *each)) for n, each in enumerate(seen)])
+    found = task.life_of(Store(), "N507", "LH")
+    assert found.latest is not None
+    assert found.latest.inspection.gear_landings == 802
+    assert found.warnings == ()
+
+
+# One gear, one forecast.
+
+
+def fleet_of(gears: int, visits: int, seed: int) -> list[list[Inspection]]:
+    """Draw gears that wear, dated and with landings."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for gear in range(gears):
+        worn, own = np.full(10, 0.0005), []
+        pace = 4e-7 * np.exp(0.4 * rng.standard_normal(10))
+        for visit in range(visits):
+            worn = worn + rng.gamma(8.0, 400.0 * pace / 8.0)
+            read = {n + 1: float(value) for n, value in enumerate(np.round(worn, 4))}
+            first = inspection(visit, (date(2024, 1, 1) + timedelta(days=60 * visit)).isoformat(), 400.0 * (visit + 1))
+            own.append(replace(first, tail_no=f"N{gear}", record_id=f"{gear}-{visit}", clearance_in=read))
+        found.append(own)
+    return found
+
+
+def add(lives: Sequence[Sequence[Inspection]], place: Path | None = None) -> None:
+    Store(place).add([inspection_record(each) for own in lives for each in own])
+
+
+@dataclass(frozen=True)
+class Views:
+    """What the commands say of nine gears, of which N4 LH is looked at."""
+
+    lines: Mapping[str, Mapping[str, Any]]
+    lives: Mapping[str, Mapping[str, Any]]
+    texts: Mapping[str, str]
+
+
+@pytest.fixture(scope="module")
+def views(tmp_path_factory: pytest.TempPathFactory) -> Views:
+    folder = tmp_path_factory.mktemp("views")
+    place = ("--store", folder / "store.sqlite")
+    add(fleet_of(9, 4, 1), folder / "store.sqlite")
+    lines = {line["tail_no"]: line for line in mlg("fleet", "--json", *place).json["gears"]}
+    lives = {tail: mlg("history", tail, "LH", "--json", *place).json for tail in ("N0", "N4")}
+    texts = {}
+    for command in (("fleet",), ("history", "N4", "LH")):
+        texts[command[0]] = re.sub(r"\s+", " ", mlg(*command, "--report", folder / command[0], *place).out)
+        (page,) = (folder / command[0]).glob("fleet.html" if len(command) == 1 else "*life*.html")
+        texts[f"page of {command[0]}"] = words_of(page)
+    return Views(lines, lives, texts)
+
+
+@pytest.mark.parametrize("tail", ["N0", "N4"])
+def test_history_and_fleet_give_the_same_numbers_of_a_gear(views: Views, tail: str) -> None:
+    names = (*QUANTILES, "limit_joint", "next_inspection_landings", "due_date")
+    told, line = views.lives[tail], views.lines[tail]
+    assert {name: told[name] for name in names} == {name: line[name] for name in names}
+    assert line["next_inspection_landings"] > 0.0
+
+
+def test_the_gear_goes_to_its_limit_as_the_joint_that_is_named(views: Views) -> None:
+    told = views.lives["N4"]
+    medians = {joint["joint"]: joint["landings_to_limit"]["p50"] or 1e9 for joint in told["joints"]}
+    assert told["limit_joint"] == min(medians, key=lambda joint: medians[joint])
+
+
+def test_the_date_due_follows_from_the_landings_between_the_inspections(views: Views) -> None:
+    line = views.lines["N4"]
+    # 400 landings in 60 days.
+    days = line["next_inspection_landings"] * 60.0 / 400.0
+    due = date.fromisoformat(line["inspection_date"]) + timedelta(days=int(days))
+    assert line["due_date"] == due.isoformat()
+
+
+@pytest.mark.parametrize("view", ["fleet", "history", "page of fleet", "page of history"])
+def test_the_view_says_what_its_quantiles_are_of(views: Views, view: str) -> None:
+    assert "worst-case bound" in views.texts[view]
+    assert f"#{views.lives['N4']['limit_joint']}" in views.texts[view]
+    assert "most likely reaches its limit first" in views.texts[view]
+
+
+def test_without_a_date_there_is_no_date_due() -> None:
+    add([[replace(each, inspection_date=None) for each in own] for own in fleet_of(2, 3, 1)])
+    (one, _two) = mlg("fleet", "--json").json["gears"]
+    assert one["next_inspection_landings"] is not None
+    assert one["due_date"] is None
+
+
+# A gear that is outside its margin or has a joint over its limit is due now.
+
+
+def assessment(of: Record, verdict: str, basis: str = "PREDICTED") -> Record:
+    result = {"verdict": verdict, "basis": basis, "joints": [], "predicted_displacement_in": 0.04, "margin_in": 0.03}
+    body = {"result": result, "program_version": "0", "geometry_sha256": "0", "extension": None}
+    return replace(of, kind=Kind.ASSESSMENT, packed=packed(body), identity=(of.identity_hash.hex(),))
+
+
+def shown(told: Mapping[str, Any]) -> list[float]:
+    """Every number of landings left that a gear's line or life shows."""
+    ends = [told[name] or {} for name in QUANTILES]
+    ends += [joint["landings_to_limit"] or {} for joint in told.get("joints", ())]
+    return [value or 0.0 for each in ends for value in each.values()] + [told["next_inspection_landings"] or 0.0]
+
+
+def test_a_gear_that_is_due_now_shows_no_landings_left_in_200_lives() -> None:
+    rng = np.random.default_rng(29)
+    records = []
+    for n, own in enumerate(fleet_of(200, 4, 2)):
+        last = own[-1]
+        outside, over = ((True, False), (False, True), (True, True))[n % 3]
+        clearances = dict(last.clearance_in)
+        if over:
+            clearances[int(rng.integers(1, 11))] = 0.0076 + 0.01 * float(rng.random())
+        unknown = rng.random() < 0.2
+        own[-1] = replace(last, clearance_in=clearances, gear_landings=None if unknown else last.gear_landings)
+        for each in own:
+            records.append(inspection_record(each))
+            verdict = "OUTSIDE_MARGIN" if outside and each is own[-1] else "WITHIN_MARGIN"
+            records.append(assessment(records[-1], verdict, "MEASURED" if n % 2 else "PREDICTED"))
+    Store().add(records)
+    gear, lives = load_gear(), task.lives(Store())
+    model = task.fit_fleet(list(lives.values())[:5], gear)
+    fleet = task.fleet_as_json(list(lives.values()), task.forecast(list(lives.values()), model, gear))["gears"]
+    found = [task.life_as_json(lives[key], task.forecast([lives[key]], model, gear)[key], gear) for key in lives]
+    assert len(fleet) == len(found) == 200
+    assert max(value for told in (*fleet, *found) for value in shown(told)) == 0.0
+    assert {told["next_inspection_landings"] for told in (*fleet, *found)} == {0.0}
+    assert all(line["due_date"] == line["inspection_date"] for line in fleet)
+
+
+def test_a_joint_that_was_over_its_limit_before_and_is_not_read_again_still_counts() -> None:
+    worn = inspection(1, "2024-01-01", 400, 0.001)
+    worn = replace(worn, clearance_in={**worn.clearance_in, 3: 0.012})
+    later = inspection(2, "2024-06-01", 800, 0.001)
+    later = replace(later, clearance_in={n: value for n, value in later.clearance_in.items() if n != 3})
+    add([[worn, later]])
+    assert gear_of_the_fleet()["next_inspection_landings"] == 0.0
+
+
+def test_a_joint_that_was_restored_is_over_its_limit_no_more() -> None:
+    worn = inspection(1, "2024-01-01", 400, 0.001)
+    add([[replace(worn, clearance_in={**worn.clearance_in, 3: 0.012})]])
+    mlg("history", "repair", "N507", "LH", "--joint", "3", "--date", "2024-02-01", "--landings", "410")
+    assert gear_of_the_fleet()["next_inspection_landings"] > 0.0
+
+
+def test_history_says_in_words_why_a_gear_is_due_now(tmp_path: Path) -> None:
+    kept(tmp_path, {})
+    said = re.sub(r"\s+", " ", mlg("history", "N507", "LH").out)
+    assert "outside the margin at the last inspection, and #3, #5 over the limit when last read" in said
+    assert "Next inspection due now" in said
