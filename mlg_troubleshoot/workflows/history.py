@@ -485,14 +485,15 @@ def forecast(
 ) -> dict[GearKey, Forecast]:
     """Forecast gears from their last inspection on.
 
-    Nothing remains to one that is due now. One without landings, or whose dates and landings disagree, has no forecast.
+    Nothing remains to one that is due now, whatever else is wrong with its records. Another one without landings, or
+    whose dates and landings disagree, has no forecast.
     """
-    forecasts = {life.key: _due_now(life, gear) or Forecast() for life in found if life.latest and not life.warnings}
+    forecasts = {life.key: _due_now(life, gear) or Forecast() for life in found if life.latest}
     known = [
         life
         for life in found
         if life.key in forecasts
-        and not forecasts[life.key].due_now
+        and not (forecasts[life.key].due_now or life.warnings)
         and life.inspections[-1].inspection.gear_landings is not None
     ]
     if model is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date, timedelta
 from pathlib import Path
@@ -20,6 +20,7 @@ from mlg_troubleshoot.units import ClearanceConvention
 from mlg_troubleshoot.workflows import history as task
 from tests.cli.conftest import mlg, row
 
+View = Callable[[], Mapping[str, Any]]
 # Landings and the readings of #3 and #5 at the yearly inspections of one gear. [1, in, in]
 YEARS = ((14, 0.0011, 0.0010), (863, 0.0016, 0.0015), (1672, 0.0022, 0.0021), (2407, 0.0120, 0.0110))
 SLIP = {3: 240}
@@ -110,17 +111,29 @@ def test_keeping_what_contradicts_the_store_keeps_it_and_warns(tmp_path: Path) -
 # What history and fleet say of a life that contradicts itself.
 
 
-def test_the_slip_of_one_typed_number_gives_no_forecast_in_history(tmp_path: Path) -> None:
-    kept(tmp_path, SLIP)
-    told = life()
-    assert [told[name] for name in (*QUANTILES, "next_inspection_landings", "due_date")] == [None] * 4
-    assert {joint["landings_to_limit"] is None for joint in told["joints"]} == {True}
+VIEWS = pytest.mark.parametrize("view", [life, gear_of_the_fleet])
 
 
-def test_the_slip_of_one_typed_number_gives_no_forecast_in_the_fleet(tmp_path: Path) -> None:
+@VIEWS
+def test_a_slip_in_the_landings_of_a_worn_gear_leaves_it_due_now(tmp_path: Path, view: View) -> None:
     kept(tmp_path, SLIP)
-    told = gear_of_the_fleet()
+    told = view()
+    nothing = dict.fromkeys(("p05", "p50", "p95"), 0.0)
+    assert [told[name] for name in QUANTILES] == [nothing] * 2
+    assert (told["next_inspection_landings"], told["due_date"]) == (0.0, "2026-03-01")
+
+
+@VIEWS
+def test_a_slip_in_the_landings_of_a_sound_gear_gives_no_forecast(tmp_path: Path, view: View) -> None:
+    assert mlg("check", years(tmp_path, {2: 86}, only=range(3)), "--keep").code in (0, 1)
+    told = view()
     assert [told[name] for name in (*QUANTILES, "next_inspection_landings", "due_date")] == [None] * 4
+
+
+def test_a_slip_gives_no_joint_a_forecast_but_those_over_their_limit(tmp_path: Path) -> None:
+    kept(tmp_path, SLIP)
+    left = {joint["joint"]: joint["landings_to_limit"] for joint in life()["joints"]}
+    assert {n for n, ends in left.items() if ends is not None} == {3, 5}
 
 
 @pytest.mark.parametrize("command", [("history", "N507", "LH"), ("fleet",)])
