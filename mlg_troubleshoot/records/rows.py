@@ -35,9 +35,9 @@ from mlg_troubleshoot.records.columns import (
 )
 from mlg_troubleshoot.records.dates import DateOrder, readings
 from mlg_troubleshoot.records.model import TableInHand
-from mlg_troubleshoot.records.reading_scale import Scale, row_scale
 from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.slips import scale_slip
+from mlg_troubleshoot.records.unit_fit import UnitFit, judge_unit
 from mlg_troubleshoot.records.values import (
     NOT_MEASURED,
     AmbiguousDateError,
@@ -529,15 +529,15 @@ class RowReader:
         """Refuse readings that cannot be of the stated unit; return what must be asked before the gear is cleared."""
         if convention is None or self._options.small_readings_true or others.get(Kind.SMALL_READINGS_TRUE):
             return ""
-        found = row_scale(clearance, entered, convention, self._options)
-        if found.scale is Scale.TOO_SMALL and not self._options.asks:
+        found = judge_unit(clearance, entered, convention, self._options)
+        if found.scale is UnitFit.TOO_SMALL and not self._options.asks:
             (index,) = (i for joint, i, _ in self._clearances if joint == found.joints[0])
             expected = "readings of new or worn parts in the unit that is stated"
             remedy = f"{found.question[:1].upper()}{found.question[1:]}"
             self._fault(index, CellFaultError("readings_too_small", expected, remedy))
         elif found.question:
             warnings.append(found.question)
-        return found.question if found.scale in (Scale.DOUBTFUL, Scale.TOO_SMALL) else ""
+        return found.question if found.scale in (UnitFit.DOUBTFUL, UnitFit.TOO_SMALL) else ""
 
     def _correct(self) -> tuple[str, ...]:
         """Return the columns to correct, in the order of the table; missing columns stand last."""

@@ -28,7 +28,7 @@ CONFIRM_SMALL = (
 )
 
 
-class Scale(StrEnum):
+class UnitFit(StrEnum):
     """How the readings of a row fit the unit that is stated."""
 
     FITS = "fits"
@@ -38,47 +38,47 @@ class Scale(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class RowScale:
+class RowUnit:
     """How the readings of a row fit their unit, the joints whose readings do not, and what to ask about them."""
 
-    scale: Scale = Scale.FITS
+    scale: UnitFit = UnitFit.FITS
     joints: tuple[int, ...] = ()
     question: str = ""
 
 
-def row_scale(
+def judge_unit(
     radial_in: Mapping[int, float],
     entered: Mapping[int, EnteredClearance],
     convention: ClearanceConvention,
     options: ReadOptions,
-) -> RowScale:
+) -> RowUnit:
     """Judge whether the readings of a row can have been read in the unit that is stated. [in]"""
     read = {
         joint: value for joint, value in radial_in.items() if value > 0.0 and options.new_part_in.get(joint, 0.0) > 0.0
     }
     if not read:
-        return RowScale()
+        return RowUnit()
     ratios = {joint: value / options.new_part_in[joint] for joint, value in read.items()}
     units = [entered[joint].unit for joint in read]
     stated = max(LengthUnit, key=units.count)
     mean, enough = sum(ratios.values()) / len(ratios), len(read) >= _FEWEST
     small = tuple(joint for joint, ratio in ratios.items() if ratio < _TOO_SMALL)
-    scale = Scale.FITS
+    scale = UnitFit.FITS
     if stated is LengthUnit.INCH:
         # No unit is larger: single readings say nothing, a row of them may be of another convention.
         small = small if enough and mean < _TOO_SMALL else ()
     elif mean < _TOO_SMALL:
-        scale = Scale.TOO_SMALL if enough else Scale.DOUBTFUL
+        scale = UnitFit.TOO_SMALL if enough else UnitFit.DOUBTFUL
     elif enough and mean < 1.0 - _ROUNDING and max(ratios.values()) <= _CLEARLY_WORN:
-        scale = Scale.DOUBTFUL
+        scale = UnitFit.DOUBTFUL
         small = tuple(joint for joint, ratio in ratios.items() if ratio < 1.0)
     if small:
-        return RowScale(scale, small, _small_question(small, read, stated, convention, options))
+        return RowUnit(scale, small, _small_question(small, read, stated, convention, options))
     over = tuple(joint for joint, value in read.items() if value > options.limit_in[joint])
     mostly_over = sum(read.values()) > sum(options.limit_in[joint] for joint in read)
     if stated is not LengthUnit.THOU and enough and mostly_over:
-        return RowScale(Scale.LARGE, over, _large_question(over, read, stated, convention))
-    return RowScale()
+        return RowUnit(UnitFit.LARGE, over, _large_question(over, read, stated, convention))
+    return RowUnit()
 
 
 def _small_question(
