@@ -25,7 +25,7 @@ def fuzzed(cases: int, seed: int) -> str:
 
 
 def test_a_few_cases_of_every_kind_end_as_documented_and_change_nothing_else() -> None:
-    fuzzed(46, seed=1)
+    fuzzed(30, seed=1)
 
 
 @pytest.mark.slow

@@ -27,7 +27,19 @@ COLUMNS = (
     "tail_no",
     "clearance_convention",
 )
-READ_AS = ("carry", "remarks", "record_id", "tail_no", "outcome", "gear_landings", "clearance_3", "clearance_3_mm", "")
+# Without these two the measured gear that is outside looks as if it were within.
+DECISIVE = ("plunger_displacement_in", "outcome")
+READ_AS = (
+    *("carry",) * 4,
+    "remarks",
+    "record_id",
+    "tail_no",
+    "outcome",
+    "gear_landings",
+    "clearance_3",
+    "clearance_3_mm",
+    "",
+)
 
 
 def table(desk: Desk) -> Case:
@@ -136,8 +148,8 @@ def _settings_file(desk: Desk, place: Path) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     what = rng.random()
     if what < 0.45:
-        taken = rng.sample(COLUMNS, rng.randint(1, 4))
-        lines = [f'"{column}" = "{rng.choice(READ_AS)}"' for column in taken]
+        taken = {*rng.sample(COLUMNS, rng.randint(0, 3)), *rng.choice((DECISIVE, DECISIVE, COLUMNS[:1]))}
+        lines = [f'"{column}" = "{rng.choice(READ_AS)}"' for column in sorted(taken)]
         file.write_text("[headers]\n" + "\n".join(lines) + "\n", encoding="utf-8")
     elif what < 0.9:
         file.write_bytes(damaged(SETTINGS, rng))
