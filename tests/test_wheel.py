@@ -8,7 +8,7 @@ import subprocess
 import sys
 import venv
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pypdf
@@ -24,9 +24,15 @@ TABLE = (
 pytestmark = pytest.mark.slow
 
 
-def run(command: Sequence[str | Path], folder: Path) -> subprocess.CompletedProcess[str]:
+# As pytest was started: pip finds what its user has set up.
+FOR_PIP = dict(os.environ)
+
+
+def run(
+    command: Sequence[str | Path], folder: Path, environment: Mapping[str, str] = os.environ
+) -> subprocess.CompletedProcess[str]:
     """Run a command away from the source tree: nothing of this process's Python comes with it."""
-    clean = {key: value for key, value in os.environ.items() if not key.startswith(("PYTHON", "VIRTUAL_ENV"))}
+    clean = {key: value for key, value in environment.items() if not key.startswith(("PYTHON", "VIRTUAL_ENV"))}
     return subprocess.run(
         [str(part) for part in command],
         cwd=folder,
@@ -42,7 +48,7 @@ def run(command: Sequence[str | Path], folder: Path) -> subprocess.CompletedProc
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The wheel of this source tree."""
     folder = tmp_path_factory.mktemp("dist")
-    done = run([sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", folder, ROOT], folder)
+    done = run([sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", folder, ROOT], folder, FOR_PIP)
     assert done.returncode == 0, done.stderr
     (built,) = folder.glob("*.whl")
     return built
@@ -54,7 +60,7 @@ def scripts(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("installed")
     venv.create(folder / "env", with_pip=True)
     found = folder / "env" / ("Scripts" if sys.platform == "win32" else "bin")
-    done = run([found / "python", "-m", "pip", "install", "-q", wheel], folder)
+    done = run([found / "python", "-m", "pip", "install", "-q", wheel], folder, FOR_PIP)
     assert done.returncode == 0, done.stderr
     return found
 

@@ -1,0 +1,166 @@
+"""Cases of damaged inputs: tables, workbooks, names, gear files and what they name, extensions, drafts, settings."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from pathlib import Path
+
+from mlg_troubleshoot.cli.prompts.store import SessionStore
+from mlg_troubleshoot.errors import TroubleshootError
+from mlg_troubleshoot.store import Draft, Drafts, Store
+from tests.fuzz.case import Case
+from tests.fuzz.damage import HOSTILE, NUMBERS, damaged
+from tests.fuzz.desk import DATA, GEAR_FILES, SETTINGS, Desk
+
+DRAFT = """{"schema_version": 1, "id": "draft", "gear": "hawker-800xp", "started": "2026-03-04T10:00:00",
+"complete": false, "record_id": "R1", "tail_no": "N1", "side": "LH", "unit": "in", "convention": "RADIAL",
+"joints": {"3": {"text": ".013", "unit": "in", "confirmed": true}, "5": null}, "plunger_in": 0.02, "margin_in": null,
+"outcome": null}"""
+FAILURE = str(DATA / "failure_case.csv")
+COLUMNS = (
+    "plunger_displacement_in",
+    "outcome",
+    "clearance_3_in",
+    "record_id",
+    "side",
+    "tail_no",
+    "clearance_convention",
+)
+# Without these two the measured gear that is outside looks as if it were within.
+DECISIVE = ("plunger_displacement_in", "outcome")
+READ_AS = (
+    *("carry",) * 4,
+    "remarks",
+    "record_id",
+    "tail_no",
+    "outcome",
+    "gear_landings",
+    "clearance_3",
+    "clearance_3_mm",
+    "",
+)
+
+
+def table(desk: Desk) -> Case:
+    """A damaged table, in every form of output."""
+    form = desk.rng.choice((["--json"], [], ["--csv", "out.csv"], ["--detail"]))
+    return Case("table", [["check", desk.spoil("in.csv"), *form]], frozenset({"work/out.csv"}))
+
+
+def workbook(desk: Desk) -> Case:
+    """A workbook with one damaged part, judged and annotated."""
+    with zipfile.ZipFile(desk.shelf.folder / "work" / "in.xlsx") as packed:
+        parts = {name: packed.read(name) for name in packed.namelist()}
+    broken = desk.rng.choice([name for name in parts if name.endswith(".xml")])
+    with zipfile.ZipFile(desk.work / "in.xlsx", "w", zipfile.ZIP_DEFLATED) as packed:
+        for name, part in parts.items():
+            packed.writestr(name, damaged(part.decode(), desk.rng) if name == broken else part)
+    form = desk.rng.choice((["--json"], ["--annotate", "out.xlsx"]))
+    return Case("workbook", [["check", "in.xlsx", *form]], frozenset({"work/out.xlsx"}))
+
+
+def typed(text: str) -> str:
+    """A text as it can be given on a command line."""
+    return text.replace("\x00", "").encode("utf-8", "replace").decode()
+
+
+def name(desk: Desk) -> Case:
+    """Hostile names as flags."""
+    tail, record = map(typed, desk.rng.sample(HOSTILE, 2))
+    flags = ("--side", "LH", "--convention", "RADIAL", "--set", f"3={desk.rng.choice(NUMBERS)}in")
+    return Case("name", [["check", f"--tail={tail}", f"--record-id={record}", *flags]])
+
+
+def gear(desk: Desk) -> Case:
+    """A damaged gear file."""
+    desk.take(*GEAR_FILES)
+    whole = (desk.work / "hawker-800xp.toml").read_text(encoding="utf-8")
+    return Case("gear", [["gear", "--gear", desk.spoil("own.toml", whole)]])
+
+
+def beside(desk: Desk) -> Case:
+    """A good gear file with a damaged ensemble or table of indices."""
+    desk.take(*GEAR_FILES, "own.toml")
+    desk.spoil(desk.rng.choice(("hawker-800xp-ensemble.toml", "hawker-800xp-indices.json")))
+    return Case("beside", [["check", FAILURE, "--gear", "own.toml", "--json"]])
+
+
+def targets(desk: Desk) -> Case:
+    """Damaged numbers to meet; those that are still numbers give up at once."""
+    whole = (desk.shelf.folder / "work" / "hawker-800xp-targets.toml").read_text(encoding="utf-8")
+    file = desk.spoil("targets.toml", whole)
+    line = ["gear", "reconstruct", "--targets", file, "--start", "A", "--minutes", "0.01", "--quiet"]
+    return Case("targets", [line])
+
+
+def extension(desk: Desk) -> Case:
+    """A damaged extension."""
+    return Case("extension", [["check", FAILURE, "--extension", desk.spoil("ext.toml")]])
+
+
+def draft(desk: Desk) -> Case:
+    """A damaged draft: it is read, or refused with words."""
+    place = desk.work / "drafts.sqlite"
+    text = damaged(DRAFT, desk.rng).decode("utf-8", "replace")
+    owner = SessionStore(place).owner
+    Drafts(Store(place)).save(Draft("draft", owner, "", False, text), ("",))
+
+    def read() -> int:
+        try:
+            SessionStore(place).latest()
+        except TroubleshootError:
+            return 2
+        return 0
+
+    return Case("draft", [()], frozenset({"work/drafts.sqlite"}), action=read)
+
+
+def settings(desk: Desk) -> Case:
+    """A damaged or hostile mlg.toml, here or in the user's folder: it turns no verdict, and no other file changes."""
+    rng = desk.rng
+    place = "work/mlg.toml" if rng.random() < 0.7 else "home/.config/mlg-troubleshoot/mlg.toml"
+    _settings_file(desk, Path(place))
+    desk.take("outside.csv", "in.csv", "kept.sqlite")
+    if rng.random() < 0.6:
+        more = rng.choice(
+            ([], ["-q"], ["--json"], ["--remember", "--show", "mm"], ["--csv", "out.csv"], ["--map", "X=remarks"])
+        )
+        line = ["check", "outside.csv", *more]
+        writes = {"work/out.csv", "work/mlg.toml"} if "--remember" in more else {"work/out.csv"}
+        return Case("settings", [line], frozenset(writes), codes=frozenset({1, 2, 3}))
+    line = rng.choice(
+        (
+            ["history", "N1", "LH", "--no-forecast", "--store", "kept.sqlite"],
+            ["fleet", "--no-forecast", "--store", "kept.sqlite"],
+            ["template", "new.xlsx"],
+            ["diagnose", "in.csv", "--permutations", "99"],
+            ["diagnose", "in.csv", "--remember", "--show", "mm"],
+            ["gear"],
+        )
+    )
+    writes = {"work/new.xlsx"} | ({"work/mlg.toml"} if "--remember" in line else set())
+    return Case("settings", [line], frozenset(writes))
+
+
+def _settings_file(desk: Desk, place: Path) -> None:
+    rng, file = desk.rng, desk.folder / place
+    file.parent.mkdir(parents=True, exist_ok=True)
+    what = rng.random()
+    if what < 0.45:
+        taken = {*rng.sample(COLUMNS, rng.randint(0, 3)), *rng.choice((DECISIVE, DECISIVE, COLUMNS[:1]))}
+        lines = [f'"{column}" = "{rng.choice(READ_AS)}"' for column in sorted(taken)]
+        file.write_text("[headers]\n" + "\n".join(lines) + "\n", encoding="utf-8")
+    elif what < 0.9:
+        file.write_bytes(damaged(SETTINGS, rng))
+    elif what < 0.93:
+        os.mkfifo(file)
+    elif what < 0.96:
+        file.symlink_to("/dev/zero")
+    elif what < 0.98:
+        file.mkdir()
+    else:
+        file.symlink_to(desk.work / "in.csv")
+
+
+INPUTS = (table, workbook, name, gear, beside, extension, draft, settings)

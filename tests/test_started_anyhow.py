@@ -1,0 +1,55 @@
+"""The README's test command passes however it is started, and whatever its user has set up."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+ON_A_TERMINAL = (
+    "tests/cli/test_on_a_terminal.py::test_an_interrupt_says_how_to_go_on_and_exits_130",
+    "tests/prompts/test_prompt_terminal.py::test_no_question_loses_an_answer[joint-hang-up]",
+    "tests/cli/test_survey_prompts.py::test_an_interrupt_at_the_line_loses_nothing_and_says_how_to_go_on",
+)
+WHAT_A_USER_SETS = (
+    "tests/cli/test_views.py::test_the_screen_follows_columns_and_is_80_wide_without",
+    "tests/cli/test_streams.py::test_without_a_terminal_there_is_no_colour_and_no_progress_bar",
+    "tests/cli/test_exit_codes.py::test_an_interrupt_exits_130",
+    "tests/cli/test_inputs_are_kept.py::test_an_output_respects_the_umask_and_the_mode_of_the_old_file[old]",
+)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform == "win32", reason="needs signals and a shell of POSIX"),
+]
+
+
+def started(before: str, tests: tuple[str, ...], **environment: str) -> None:
+    """Run tests in a pytest that a shell starts after some commands, without a terminal."""
+    line = f'{before}; exec "$0" -m pytest -n 0 -q -p no:cacheprovider "$@"'
+    done = subprocess.run(
+        ["/bin/sh", "-c", line, sys.executable, *tests],
+        cwd=ROOT,
+        env={"PATH": os.environ["PATH"], **environment},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+    assert f"{len(tests)} passed" in done.stdout
+
+
+def test_in_the_background_and_under_nohup_where_signals_are_ignored() -> None:
+    started("trap '' INT HUP", ON_A_TERMINAL, LANG="C")
+
+
+def test_with_the_settings_of_a_user(tmp_path: Path) -> None:
+    kept = tmp_path / "mlg-troubleshoot" / "mlg.toml"
+    kept.parent.mkdir()
+    kept.write_text('show = "mm"\n')
+    narrow = {"COLUMNS": "40", "LINES": "10", "FORCE_COLOR": "1", "PYTHONUTF8": "0", "LC_ALL": "POSIX"}
+    started("umask 077", WHAT_A_USER_SETS, XDG_CONFIG_HOME=str(tmp_path), TZ="Pacific/Auckland", **narrow)
