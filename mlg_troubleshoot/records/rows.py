@@ -44,11 +44,6 @@ _EPS_IN = 1e-9
 _REMEMBERED = 20_000
 _NO_FLOATS: Mapping[int, float] = MappingProxyType({})
 
-_SIDES = {
-    **dict.fromkeys(("l", "lh", "lhs", "left", "lefthand", "port", "lhmlg", "leftmlg", "mlgl", "mlglh"), Side.LH),
-    **dict.fromkeys(("r", "rh", "rhs", "right", "righthand", "starboard", "stbd", "rhmlg", "rightmlg"), Side.RH),
-    **dict.fromkeys(("mlgr", "mlgrh"), Side.RH),
-}
 _OUTCOME_HINTS = {
     **dict.fromkeys(("retracts", "ok", "good", "pass", "passed"), "RETRACTED"),
     **dict.fromkeys(("fail", "fails", "failure", "no"), "FAILED"),
@@ -68,7 +63,7 @@ _MISSING_CONVENTION = (
 _NEVER_BLANK = (VERDICT_BEARING - {Kind.CLEARANCE}) | {*CARRIED, Kind.GAUGE_ID, Kind.TECHNICIAN_ID}
 _SIGNED = frozenset({Kind.PLUNGER_DOWN_LOCK, Kind.PLUNGER_POSITION, Kind.PLUNGER_DISPLACEMENT})
 # What else a row may say, read cell by cell; the flag says whether a comma is the decimal mark.
-_OTHERS: dict[Kind, Callable[[bool, str | float | OddCell], object]] = {
+LOOSE_CELLS: dict[Kind, Callable[[bool, str | float | OddCell], object]] = {
     Kind.LANDINGS: lambda comma, cell: read_number(
         cell, 0.0, 1e6, decimal_comma=comma, expected="landings since overhaul, 0 or more"
     ),
@@ -137,9 +132,9 @@ class RowReader:
         self._length_of = lru_cache(_REMEMBERED)(self._one_length)
         # Cells that bear no verdict, by the names under which they are found: what is read, and what is only carried.
         self._others: list[_Loose] = [
-            (index, field.kind.value, partial(_OTHERS[field.kind], self._comma))
+            (index, field.kind.value, partial(LOOSE_CELLS[field.kind], self._comma))
             for index, field in good
-            if field.kind in _OTHERS
+            if field.kind in LOOSE_CELLS
         ]
         self._carried: list[_Loose] = [
             (index, field.kind.value, _carried_text) for index, field in good if field.kind in CARRIED
@@ -294,8 +289,8 @@ class RowReader:
         def read(cell: Cell) -> Side:
             if cell is None:
                 raise CellFaultError("side_missing", "LH or RH", "Enter LH or RH; there is no default.")
-            bare = cell.lower().removesuffix("side").removesuffix("gear") if isinstance(cell, str) else ""
-            return _SIDES.get(re.sub(r"[^a-z]", "", bare)) or read_choice(cell, Side, "side_unknown", {})
+            spelt = Side.spelt(cell) if isinstance(cell, str) else None
+            return spelt or read_choice(cell, Side, "side_unknown", {})
 
         return self._required(Kind.SIDE, read)
 
