@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mlg_troubleshoot.records.gate import admit, judge_again, judge_length
+from mlg_troubleshoot.records.gate import admit, judge_again, judge_length, made_record_id
 from mlg_troubleshoot.records.model import ColumnReading, FileRead, ReadOptions, ReadResult, SheetLayout
 from mlg_troubleshoot.records.read import expand, read_many
 
@@ -16,5 +16,6 @@ __all__ = [
     "expand",
     "judge_again",
     "judge_length",
+    "made_record_id",
     "read_many",
 ]

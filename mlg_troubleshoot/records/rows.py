@@ -85,6 +85,15 @@ LOOSE_CELLS: dict[Kind, Callable[[bool, str | float | OddCell], object]] = {
 _Loose = tuple[int, str, Callable[[Any], object]]
 
 
+_MADE_FROM_A_ROW = re.compile(r"-\d+-[0-9a-f]{8}\Z")
+
+
+def place_in_file(record_id: str) -> str:
+    """Row and content of an id that was made for a row, whatever its file was called; empty for any other id."""
+    made = _MADE_FROM_A_ROW.search(record_id)
+    return "" if made is None else made[0]
+
+
 def _carried_text(cell: str | float | OddCell) -> str:
     is_shown = isinstance(cell, OddCell) and cell.kind in (OddKind.DATE, OddKind.BOOLEAN)
     return show(cell) if is_shown else read_text(cell, "text")

@@ -1,4 +1,4 @@
-"""What stands in a store is judged as a cell would be whenever it is read: a store or an export may come from anybody."""
+"""The content of kept records, judged as cells are whenever it is read: a store or an export may come from anybody."""
 
 from __future__ import annotations
 
@@ -247,10 +247,13 @@ def _source(column: str, value: Any) -> None:
         raise _WrongError(column, value, "a file, a sheet and a row")
 
 
+_WORDS: dict[type, str] = {dict: "a table", list: "a list", str: "a text"}
+
+
 def _taken(body: Mapping[str, Any], name: str, kind: type, default: Any = None) -> Any:
     value = body.get(name, default)
     if not isinstance(value, kind):
-        raise _WrongError(name, value, {dict: "a table", list: "a list", str: "a text"}[kind])
+        raise _WrongError(name, value, _WORDS[kind])
     return value
 
 

@@ -223,7 +223,7 @@ def test_the_fleet_page_is_printed_on_the_paper_that_was_asked_for(tmp_path: Pat
 
 def test_verify_says_what_fits_and_names_what_does_not(tmp_path: Path, place: Path) -> None:
     seeded((1, 0.001), (2, 0.002))
-    assert mlg("history", "verify").out == "4 records fit the chain.\n"
+    assert mlg("history", "verify").out.startswith("4 records fit the chain.\n")
     data = bytearray(place.read_bytes())
     at = data.rindex(b"N123-LH-2")
     data[at] = ord("M")
@@ -241,7 +241,7 @@ def test_an_export_is_imported_with_its_chain(tmp_path: Path, place: Path) -> No
     assert kinds == ["inspection", "assessment", "inspection", "assessment", "repair"]
     other = ("--store", tmp_path / "other.sqlite")
     assert mlg("history", "import", tmp_path / "chain.jsonl", *other).code == 0
-    assert mlg("history", "verify", *other).out == "5 records fit the chain.\n"
+    assert mlg("history", "verify", *other).out.startswith("5 records fit the chain.\n")
 
 
 @pytest.mark.parametrize("line", ["[" * 5000 + "]" * 5000, "9" * 5000, "[]", "{", "\x00"])
@@ -249,7 +249,7 @@ def test_what_is_no_exported_record_is_refused_with_its_line(tmp_path: Path, lin
     (tmp_path / "chain.jsonl").write_text(line + "\n", encoding="utf-8")
     run = mlg("history", "import", tmp_path / "chain.jsonl", "--store", tmp_path / "other.sqlite")
     assert run.code == 5
-    assert "chain.jsonl, line 1 is no exported record" in run.err
+    assert "chain.jsonl, line 1 is not an exported record" in run.err
 
 
 def test_an_export_does_not_replace_the_store(tmp_path: Path, place: Path) -> None:
