@@ -353,7 +353,7 @@ def verify(
         output.write(f"Not as it should be: {each}.")
     if found.wrong:
         output.write(
-            "What to do: void a record that cannot be read (mlg history void HASH --why TEXT). For anything else export "
+            "What to do: void a record that cannot be read (mlg history void HASH --why TEXT). Otherwise export "
             "the chain, and import it into a new store."
         )
     if found.broken is not None or found.wrong or (noted is not None and found.expected is None):

@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -460,17 +459,33 @@ class Store:
     def export(self) -> Iterator[str]:
         """The chain as JSON Lines: every column as it stands, and under ``content`` what the body says.
 
-        A chain that does not fit is refused.
+        A chain that does not fit is refused, and content that is not void and that nobody could import again.
         """
+        wrong: dict[str, StoreError] = {}
         with self.transaction(writing=False) as connection:
             try:
                 for row in self._walk(connection):
                     record = replace(self._record(row), judge=None)
+                    content = record.body
+                    self._note(wrong, record, content, f"store {self.place}, nothing was exported")
                     columns = {name: getattr(row, name) for name in ("seq", *_TEXTS)}
                     exact = {name: bytes(getattr(row, name)).hex() for name in _BYTES}
-                    yield _canonical({**columns, **exact, "content": record.body}) + "\n"
+                    yield _canonical({**columns, **exact, "content": content}) + "\n"
             except _Misfit as misfit:
                 raise self._broken(misfit) from None
+        for first in wrong.values():
+            raise first
+
+    def _note(self, wrong: dict[str, StoreError], record: Record, content: Any, at: str) -> None:
+        """Note content that is wrong, and that which is void after all."""
+        why = "" if self.judge is None else self.judge(record, content)
+        if why:
+            wrong[record.digest] = StoreError(
+                f"{at}: {record.named}: {why}",
+                "Void the record where it stands: mlg history void HASH --why TEXT. All of them: mlg history verify",
+            )
+        elif record.kind is Kind.VOID:
+            wrong.pop(content["voids"], None)
 
     def restore(self, lines: Iterable[str], name: str) -> Added:
         """Add an exported chain to what is here: whole to an empty store, or the rest of the same chain.
@@ -478,23 +493,20 @@ class Store:
         The chain must fit from its first record on, and its content be that of such records unless a later one voids
         it; a line of which that is not true is named, and nothing is added.
         """
+        rows = list(self._fitting(lines, name))
         with self.transaction(writing=True) as connection:
             self._head(connection)
-            here = connection.execute(sql.select(_records.c.hash).order_by(_records.c.seq)).scalars().all()
-            total = 0
-            rows = self._fitting(lines, name)
-            for some in iter(lambda: list(islice(rows, _AT_ONCE)), []):
-                known = here[total : total + len(some)]
-                if [bytes(found) for found in known] != [row["hash"] for row in some[: len(known)]]:
-                    raise StoreError(
-                        f"{name} and the store are two different chains; nothing was imported",
-                        "Import into an empty store: --store NEW.sqlite",
-                    )
-                total += len(some)
-                if some[len(known) :]:
-                    connection.execute(_records.insert(), some[len(known) :])
-        common = min(len(here), total)
-        return Added(total - common, common)
+            hashes = connection.execute(sql.select(_records.c.hash).order_by(_records.c.seq)).scalars()
+            here = [bytes(found) for found in hashes]
+            common = min(len(here), len(rows))
+            if here[:common] != [row["hash"] for row in rows[:common]]:
+                raise StoreError(
+                    f"{name} and the store are two different chains; nothing was imported",
+                    "Import into an empty store: --store NEW.sqlite",
+                )
+            if rows[common:]:
+                connection.execute(_records.insert(), rows[common:])
+        return Added(len(rows) - common, common)
 
     def _fitting(self, lines: Iterable[str], name: str) -> Iterator[dict[str, Any]]:
         """Rows of an exported chain, each judged; what is wrong and not void is refused at the end."""
@@ -502,6 +514,8 @@ class Store:
         wrong: dict[str, StoreError] = {}
         for number, line in enumerate(lines, 1):
             at = f"{name}, line {number}"
+            if number > _MOST_IMPORTED:
+                raise StoreError(f"{at}: at most {_MOST_IMPORTED} records are imported", "Copy the store itself.")
             row, content = _imported(line, at)
             if row["seq"] != number or _chained(before, row) != row["hash"]:
                 raise StoreError(
@@ -511,14 +525,7 @@ class Store:
             before = row["hash"]
             texts = row["record_id"], row["tail_no"], row["side"], row["day"]
             record = Record(Kind(row["kind"]), *texts, row["body"], seq=number, digest=before.hex())
-            why = "" if self.judge is None else self.judge(record, content)
-            if why:
-                wrong[record.digest] = StoreError(
-                    f"{at}, {record.named}: {why}; nothing was imported",
-                    "Void the record where the chain came from (mlg history void HASH --why TEXT), and export again.",
-                )
-            elif record.kind is Kind.VOID:
-                wrong.pop(content["voids"], None)
+            self._note(wrong, record, content, f"{at}, nothing was imported")
             if len(wrong) > _MOST_WRONG:
                 break
             yield row
@@ -537,8 +544,8 @@ class _Misfit(Exception):  # noqa: N818
 _VERIFY = "Run: mlg history verify"
 _FOREIGN = "Give --store the name of a new file, or of one that mlg wrote."
 _EXTRA = "Install the extra: pip install 'mlg-troubleshoot[server]'"
-# Wrong records of an import that wait for a later one to void them. [1]
-_MOST_WRONG = 1_000
+# Records of one import, and wrong ones among them that wait for a later one to void them. [1]
+_MOST_IMPORTED, _MOST_WRONG = 100_000, 1_000
 
 
 def _as_bytes_are(raw: Any, _record: Any) -> None:

@@ -48,8 +48,8 @@ if TYPE_CHECKING:
 GearKey = tuple[str, str]
 # Letters of a hash by which a record may be named. [1]
 _LEAST_OF_A_HASH = 6
-# An exported chain: what is judged in ten seconds, and the longest record. [bytes, characters]
-_MOST_BYTES, _LONGEST_LINE = 200_000_000, 4_000_000
+# An exported chain, which is judged in 5 s, and its longest line. [bytes, characters]
+_MOST_BYTES, _LONGEST_LINE = 120_000_000, 4_000_000
 # Where a forecast stands between the last inspection and the horizon. [1]
 _AHEAD = np.concatenate([[0.0], np.geomspace(0.00125, 1.0, 28)])
 # Where the gear's model is asked about the worst case of clearances that go on to wear. [landings]
@@ -248,6 +248,9 @@ def life_of(store: Store, tail: str, side: str) -> GearLife:
             f"no records of {tail} {side} in {store.place}",
             f"There is {', '.join(near)}." if near else "See which gears are kept: mlg history",
         )
+    for seen in found.inspections:
+        # What stands there and cannot be read is named before anything is added to it.
+        _ = seen.inspection
     return found
 
 

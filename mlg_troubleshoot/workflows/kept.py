@@ -79,7 +79,7 @@ class KeptGate:
                 raise _WrongError("content", body, "a table of names and values")
             # Whatever stands there can be voided under the names that it has.
             if record.kind is not RecordKind.VOID:
-                _one_of(Side)("side", record.side)
+                self._fields["side"]("side", record.side)
                 _text("tail_no", record.tail_no)
                 if record.day:
                     self._fields["inspection_date"]("day", record.day)
@@ -98,7 +98,7 @@ class KeptGate:
                 raise _WrongError(name, value, "a column of an inspection")
             check(name, value)
         beside = {"record_id": record.record_id, "tail_no": record.tail_no, "side": record.side}
-        for name, value in {**beside, "inspection_date": record.day or None}.items():
+        for name, value in (*beside.items(), ("inspection_date", record.day or None)):
             if found.get(name) != value:
                 raise _WrongError(name, found.get(name), f"what the record is filed under ({value!r})")
 
@@ -109,15 +109,15 @@ class KeptGate:
     def _assessment(self, _record: Record, body: Mapping[str, Any]) -> None:
         result = _taken(body, "result", dict)
         if result.get("verdict") is not None:
-            _one_of(Verdict)("verdict", result["verdict"])
+            _verdict("verdict", result["verdict"])
         for name in _NUMBERS_OF_A_RESULT:
             if result.get(name) is not None:
-                _number()(name, result[name])
+                _any_number(name, result[name])
         for finding in _taken(result, "joints", list, []):
             if not isinstance(finding, dict):
                 raise _WrongError("joints", finding, "a joint of a result")
             self._joint("joint", finding.get("joint"))
-            _number()("rank", finding.get("rank"))
+            _any_number("rank", finding.get("rank"))
         action = result.get("next_action")
         if action is not None:
             _each(self._joint)("next_action", _taken(_taken(result, "next_action", dict), "joints", list, []))
@@ -135,8 +135,8 @@ class KeptGate:
     def _outcome(self, _record: Record, body: Mapping[str, Any]) -> None:
         _hash(body, "of")
         _taken(body, "found", str)
-        if body.get("joint") is not None:
-            self._joint("joint", body["joint"])
+        if body.get("joint", "nothing") is not None:
+            self._joint("joint", body.get("joint"))
 
     def _joint(self, column: str, value: Any) -> None:
         if isinstance(value, bool) or not isinstance(value, int) or value not in self._joints:
@@ -189,6 +189,9 @@ def _number(low: float = -1e12, high: float = 1e12) -> _Check:
     return check
 
 
+_any_number = _number()
+
+
 def _one_of(words: type[Side | ClearanceConvention | Verdict]) -> _Check:
     known = frozenset(word.value for word in words)
 
@@ -197,6 +200,9 @@ def _one_of(words: type[Side | ClearanceConvention | Verdict]) -> _Check:
             raise _WrongError(column, value, f"one of {', '.join(word.value for word in words)}")
 
     return check
+
+
+_verdict = _one_of(Verdict)
 
 
 def _cell(read: Callable[[bool, Any], object]) -> _Check:
@@ -226,12 +232,14 @@ def _each(check: _Check) -> _Check:
     return every
 
 
+_UNITS = frozenset(unit.value for unit in LengthUnit)
+
+
 def _entered(column: str, value: Any) -> None:
-    known = {unit.value for unit in LengthUnit}
     if not (isinstance(value, list) and len(value) == 2 and all(isinstance(v, str) for v in value)):
         raise _WrongError(column, value, "a text and its unit")
-    if value[1] not in known:
-        raise _WrongError(column, value[1], f"one of {', '.join(known)}")
+    if value[1] not in _UNITS:
+        raise _WrongError(column, value[1], f"one of {', '.join(sorted(_UNITS))}")
 
 
 def _texts_by_name(column: str, value: Any) -> None:

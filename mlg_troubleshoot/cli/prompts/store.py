@@ -75,7 +75,7 @@ class SessionStore:
 
     def __post_init__(self) -> None:
         self._kept = Drafts(Store(self.place, patience_s=_PATIENCE_S))
-        self._waiting = (Drafts(Store(own_file())),) if self._kept.store.file is None else ()
+        self._waiting = (Drafts(Store(own_file())),) if "://" in self._kept.store.place else ()
 
     def save(self, session: Session) -> Session:
         """Write a session whole or not at all; `SessionTakenError` if another run has written it meanwhile."""
