@@ -478,7 +478,9 @@ class Store:
 
     def _note(self, wrong: dict[str, StoreError], record: Record, content: Any, at: str) -> None:
         """Note content that is wrong, and that which is void after all."""
-        why = "" if self.judge is None else self.judge(record, content)
+        if self.judge is None:
+            return
+        why = self.judge(record, content)
         if why:
             wrong[record.digest] = StoreError(
                 f"{at}: {record.named}: {why}",

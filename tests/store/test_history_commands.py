@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import re
 import shutil
@@ -23,6 +22,8 @@ from mlg_troubleshoot.store import Kind, Record, Store, inspection_record, packe
 from mlg_troubleshoot.units import ClearanceConvention
 from tests.cli.conftest import Run, mlg, row
 
+from .places import table
+
 RADIAL = ClearanceConvention.RADIAL
 
 
@@ -30,15 +31,6 @@ RADIAL = ClearanceConvention.RADIAL
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("MLG_STORE", str(tmp_path / "store.sqlite"))
     return tmp_path / "store.sqlite"
-
-
-def table(folder: Path, *rows: Mapping[str, str], name: str = "table.csv") -> Path:
-    path = folder / name
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, fieldnames=list(dict.fromkeys(c for r in rows for c in r)))
-        writer.writeheader()
-        writer.writerows(rows)
-    return path
 
 
 def visit(n: int, worn_in: float, tail: str = "N123", side: str = "LH", **more: str) -> dict[str, str]:
