@@ -85,7 +85,7 @@ def show(
         else:
             _show_gears(list(found.values()), place.place)
         return
-    tail, meant = task.key_of(tail, side or "LH")
+    tail, meant = task.key_of(tail, "LH" if side is None else side)
     sides = ["LH", "RH"] if side is None else [meant]
     wanted = [key for key in place.gears() if key[0] == tail and key[1] in sides]
     if not wanted:
