@@ -42,7 +42,9 @@ class KeptGate:
         options = ReadOptions.of(gear)
         self._joints = options.joint_numbers
         most = options.plunger_hard_max_in
-        lengths = {f"{kind.value}_in": _number(*ends) for kind, ends in LENGTH_RANGE_IN.items()}
+        lengths = {
+            f"{kind.value}_in": _number(*ends, above=kind is Kind.MARGIN) for kind, ends in LENGTH_RANGE_IN.items()
+        }
         loose = {kind.value: _cell(read) for kind, read in LOOSE_CELLS.items()}
         known = {field.name: _anything for field in fields(Inspection)}
         self._fields: dict[str, _Check] = {
@@ -54,13 +56,13 @@ class KeptGate:
             "side": _one_of(Side),
             "convention": _one_of(ClearanceConvention),
             "clearance_in": self._by_joint(_number(0.0, options.clearance_hard_max_in)),
-            "gauge_u_by_joint_in": self._by_joint(_number(*LENGTH_RANGE_IN[Kind.GAUGE_U])),
+            "gauge_u_by_joint_in": self._by_joint(_number(*LENGTH_RANGE_IN[Kind.GAUGE_U], above=True)),
             "axial_float_in": self._by_joint(_number(*LENGTH_RANGE_IN[Kind.AXIAL_FLOAT])),
             "entered": self._by_joint(_entered),
             "readings_in": _each(_number(-most, most)),
             "gauge_u_is_default": _flag,
             "carried": _texts_by_name,
-            "warnings": _each(_text),
+            "warnings": _each(_some_text),
             "source": _source,
         }
         self._of_kind: dict[RecordKind, Callable[[Record, Mapping[str, Any]], None]] = {
@@ -173,17 +175,22 @@ def _text(column: str, value: Any) -> None:
     raise _WrongError(column, value, "a text")
 
 
+def _some_text(column: str, value: Any) -> None:
+    if not isinstance(value, str):
+        raise _WrongError(column, value, "a text")
+
+
 def _flag(column: str, value: Any) -> None:
     if not isinstance(value, bool):
         raise _WrongError(column, value, "true or false")
 
 
-def _number(low: float = -1e12, high: float = 1e12) -> _Check:
-    expected = f"a number from {low:g} to {high:g}"
+def _number(low: float = -1e12, high: float = 1e12, *, above: bool = False) -> _Check:
+    expected = f"a number from {low:g} to {high:g}" if not above else f"a number above {low:g}, at most {high:g}"
 
     def check(column: str, value: Any) -> None:
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not low - _EPS_IN <= value <= high + _EPS_IN:
+        if not number or not low - _EPS_IN <= value <= high + _EPS_IN or (above and value <= low):
             raise _WrongError(column, value, expected)
 
     return check
