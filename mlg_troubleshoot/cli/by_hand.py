@@ -28,10 +28,10 @@ class Ending:
 
 
 def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
-    needed = (("--tail", flags.tail), ("--side", flags.side), ("--convention", declared.convention))
-    missing = [flag for flag, value in needed if value is None]
     from mlg_troubleshoot.records import made_record_id
 
+    needed = (("--tail", flags.tail), ("--side", flags.side), ("--convention", declared.convention))
+    missing = [flag for flag, value in needed if value is None]
     if missing or flags.side is None:
         raise UsageError(
             f"--set needs {', '.join(missing)}",

@@ -177,9 +177,15 @@ _canonical = json.JSONEncoder(
 
 
 def packed(body: Mapping[str, Any]) -> bytes:
-    """Compress the content of a record."""
+    """Compress the content of a record; one that could not be read again is refused."""
+    text = _canonical(body).encode()
+    if len(text) > MOST_BYTES:
+        raise StoreError(
+            f"a record of {len(text)} bytes cannot be kept, at most {MOST_BYTES}",
+            "Shorten its remarks and texts.",
+        )
     press = zlib.compressobj(9, zdict=_OFTEN)
-    return press.compress(_canonical(body).encode()) + press.flush()
+    return press.compress(text) + press.flush()
 
 
 def _unpacked(body: bytes) -> Any:
@@ -274,8 +280,7 @@ class Store:
 
     def _prepare(self, connection: sql.Connection, *, writing: bool) -> None:
         """Make the tables of an empty store, mark one that is not marked yet, or bring an older one forward."""
-        tables = sql.inspect(connection)
-        self._ready = tables.has_table(_meta.name)
+        self._ready = sql.inspect(connection).has_table(_meta.name)
         if not self._postgres:
             self._mark(connection, writing=writing)
         if not self._ready:
@@ -331,16 +336,16 @@ class Store:
         )
 
     def _walk(self, connection: sql.Connection, after: int = 0) -> Iterator[Any]:
-        """Rows of the chain from one on, each of which fits the one before; `_Misfit` where one does not."""
+        """Rows of the chain from one on, each of which fits the one before; `_MisfitError` where one does not."""
         before = bytes.fromhex(GENESIS) if after == 0 else b""
         count = max(after - 1, 0)
         for row in self._rows(connection, _records.c.seq > count):
             found = row._mapping
             values = {**found, **{name: _bytes(found[name]) for name in _BYTES}}
             if row.seq != count + 1:
-                raise _Misfit(row, f"record {count + 1} is missing before it")
+                raise _MisfitError(row, f"record {count + 1} is missing before it")
             if before and _chained(before, values) != values["hash"]:
-                raise _Misfit(row, "its content, its hash or the record before it was changed")
+                raise _MisfitError(row, "its content, its hash or the record before it was changed")
             before, count = values["hash"], count + 1
             yield row
 
@@ -350,14 +355,14 @@ class Store:
         before = bytes.fromhex(GENESIS)
         try:
             if count != (last or 0):
-                raise _Misfit(None, f"it holds {count} records, and the last one is number {last}")
+                raise _MisfitError(None, f"it holds {count} records, and the last one is number {last}")
             for row in self._walk(connection, max(count - _NEWEST, 0)):
                 before = bytes(row.hash)
-        except _Misfit as misfit:
+        except _MisfitError as misfit:
             raise self._broken(misfit) from None
         return count, before
 
-    def _broken(self, misfit: _Misfit) -> StoreError:
+    def _broken(self, misfit: _MisfitError) -> StoreError:
         at = "" if misfit.row is None else f" at record {misfit.row.seq}"
         return StoreError(f"store {self.place}: the chain does not fit{at}: {misfit.why}", _VERIFY)
 
@@ -439,7 +444,7 @@ class Store:
                     if visit is not None:
                         visit(self._record(row))
                     count += 1
-            except _Misfit as misfit:
+            except _MisfitError as misfit:
                 row = misfit.row
                 return count, Broken(row.seq, str(row.kind), str(row.record_id), misfit.why)
         return count, None
@@ -454,8 +459,9 @@ class Store:
                 return []
         found = {name: text for _type, name, text in rows}
         dropped = [f"the trigger {n} was dropped or changed" for n, text in _TRIGGERS.items() if found.get(n) != text]
-        foreign = [f"the {kind} {name!r} is not one of a store" for kind, name, _ in rows if name not in _OWN]
-        return dropped + [each for each in foreign if "'sqlite_" not in each]
+        # SQLite's own names begin so, and nobody else's can.
+        foreign = [(kind, name) for kind, name, _ in rows if name not in _OWN and not name.startswith("sqlite_")]
+        return dropped + [f"the {kind} {name!r} is not one of a store" for kind, name in foreign]
 
     def export(self) -> Iterator[str]:
         """The chain as JSON Lines: every column as it stands, and under ``content`` what the body says.
@@ -472,7 +478,7 @@ class Store:
                     columns = {name: getattr(row, name) for name in ("seq", *_TEXTS)}
                     exact = {name: bytes(getattr(row, name)).hex() for name in _BYTES}
                     yield _canonical({**columns, **exact, "content": content}) + "\n"
-            except _Misfit as misfit:
+            except _MisfitError as misfit:
                 raise self._broken(misfit) from None
         for first in wrong.values():
             raise first
@@ -536,7 +542,7 @@ class Store:
             raise first
 
 
-class _Misfit(Exception):  # noqa: N818
+class _MisfitError(Exception):
     """Where a chain does not fit: the row, and why."""
 
     def __init__(self, row: Any, why: str) -> None:

@@ -257,7 +257,7 @@ def life_of(store: Store, tail: str, side: str) -> GearLife:
 def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
     seen: dict[str, Seen] = {}
     events: dict[str, Record] = {}
-    records = _readable_or_counting(records)
+    records = _readable_or_not_void(records)
     for record in records:
         if record.kind is Kind.INSPECTION:
             seen[record.digest] = Seen(record)
@@ -286,7 +286,7 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
     )
 
 
-def _readable_or_counting(records: Sequence[Record]) -> list[Record]:
+def _readable_or_not_void(records: Sequence[Record]) -> list[Record]:
     """Leave out what is void and cannot be read: that is how such a record is put aside."""
     void: set[str] = set()
     kept = []
@@ -719,7 +719,7 @@ def import_file(store: Store, file: Path) -> Added:
     remedy = "Give a file written by: mlg history export"
     try:
         # A pipe that nobody writes to would be waited for.
-        with os.fdopen(os.open(file, os.O_RDONLY | os.O_NONBLOCK), encoding="utf-8") as chain:
+        with os.fdopen(os.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), encoding="utf-8") as chain:
             found = os.fstat(chain.fileno())
             if not stat.S_ISREG(found.st_mode):
                 raise UsageError(f"{file} is not a regular file", remedy)

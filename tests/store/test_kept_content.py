@@ -202,19 +202,20 @@ COMMANDS: list[tuple[object, ...]] = [
     ("history", "outcome", "R2", "--found", "x"),
     ("history", "repair", "N1", "LH", "--joint", "3", "--date", "2026-02-01"),
 ]
-READ_WRONGLY = {
+READ_WRONGLY: dict[str, tuple[str, tuple[object, ...]]] = {
     "a kind that is none": ("UPDATE mlg_records SET kind = 'inspektion' WHERE seq = 1", ()),
     "a body that is none": ("UPDATE mlg_records SET body = ? WHERE seq = 1", (b"\x00\x01",)),
     "a body that is a number": ("UPDATE mlg_records SET body = 99999999999 WHERE seq = 1", ()),
     "a body that is a text": ("UPDATE mlg_records SET body = 'text' WHERE seq = 1", ()),
     "a hash that is a number": ("UPDATE mlg_records SET hash = 99999999999 WHERE seq = 1", ()),
 }
-NOT_A_CHAIN = {
+NOT_A_CHAIN: dict[str, tuple[str, tuple[object, ...]]] = {
     "a middle record is gone": ("DELETE FROM mlg_records WHERE seq = 3", ()),
     "the first record is gone": ("DELETE FROM mlg_records WHERE seq = 1", ()),
     "a hash was changed": ("UPDATE mlg_records SET hash = ? WHERE seq = 3", (b"\x00" * 32,)),
     "a content was changed": ("UPDATE mlg_records SET record_id = 'R9' WHERE seq = 3", ()),
 }
+BROKEN = {**READ_WRONGLY, **NOT_A_CHAIN}
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: " ".join(map(str, command)))
@@ -230,26 +231,26 @@ def test_a_record_that_cannot_be_read_is_named_with_what_to_do(
     assert len(sqlite3.connect(place).execute("SELECT seq FROM mlg_records").fetchall()) == 6
 
 
-@pytest.mark.parametrize("change", {**READ_WRONGLY, **NOT_A_CHAIN})
+@pytest.mark.parametrize("change", BROKEN)
 def test_nothing_is_kept_on_a_chain_that_does_not_fit(tmp_path: Path, place: Path, change: str) -> None:
-    statement, values = {**READ_WRONGLY, **NOT_A_CHAIN}[change]
+    statement, values = BROKEN[change]
     tampered(place, statement, *values)
     run = mlg("check", places.table(tmp_path, row()), "--keep")
     assert run.code == 5
     assert "mlg history verify" in run.err
 
 
-@pytest.mark.parametrize("change", {**READ_WRONGLY, **NOT_A_CHAIN})
+@pytest.mark.parametrize("change", BROKEN)
 def test_a_chain_that_does_not_fit_is_not_exported(tmp_path: Path, place: Path, change: str) -> None:
-    statement, values = {**READ_WRONGLY, **NOT_A_CHAIN}[change]
+    statement, values = BROKEN[change]
     tampered(place, statement, *values)
     run = mlg("history", "export", tmp_path / "chain.jsonl")
     assert (run.code, (tmp_path / "chain.jsonl").exists()) == (5, False)
 
 
-@pytest.mark.parametrize("change", {**READ_WRONGLY, **NOT_A_CHAIN})
+@pytest.mark.parametrize("change", BROKEN)
 def test_verify_finds_it(place: Path, change: str) -> None:
-    statement, values = {**READ_WRONGLY, **NOT_A_CHAIN}[change]
+    statement, values = BROKEN[change]
     tampered(place, statement, *values)
     assert mlg("history", "verify").code == 1
 
@@ -278,6 +279,14 @@ def test_a_record_that_unpacks_to_more_than_a_megabyte_is_refused_before_it_is_u
     assert "record 7" in run.err
     assert "more than 1000000 bytes" in run.err
     assert peak_mb < 50
+
+
+def test_a_record_that_could_not_be_read_again_is_not_kept(tmp_path: Path, place: Path) -> None:
+    long = places.table(tmp_path, row(**{f"note {n}": "ü" * 6_000 for n in range(40)}))
+    run = mlg("check", long, "--keep")
+    assert run.code == 5
+    assert "cannot be kept, at most 1000000" in run.err
+    assert len(Store(place).all()) == 6
 
 
 def test_a_packed_record_of_more_than_a_megabyte_is_not_fetched(place: Path) -> None:
