@@ -12,6 +12,8 @@ from enum import StrEnum
 
 from mlg_troubleshoot.errors import UsageError
 
+# The one table of how a minus sign is written; the hyphen stands first, as in a set of a regular expression.
+MINUS = "-\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"
 MM_PER_IN = 25.4
 THOU_PER_IN = 1000.0
 
@@ -163,7 +165,7 @@ def parse_length(text: str) -> WrittenLength:
             raise UsageError(
                 f"{stripped!r} has a decimal comma", f"Write it with a point: {stripped.replace(',', '.')}"
             )
-        if re.match(r"^[-\u2212\u2013]\s*[\d.]", stripped):
+        if re.match(rf"^[{MINUS}]\s*[\d.]", stripped):
             raise UsageError(f"{stripped!r} is negative", "A clearance is zero or more.")
         if re.fullmatch(r"\d+\s*/\s*\d+.*", stripped):
             raise UsageError(f"{stripped!r} is a fraction", "Write a decimal number, for example 0.125.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import TYPE_CHECKING
 
@@ -28,6 +28,8 @@ class Ending:
 
 
 def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
+    from mlg_troubleshoot.records import made_record_id
+
     needed = (("--tail", flags.tail), ("--side", flags.side), ("--convention", declared.convention))
     missing = [flag for flag, value in needed if value is None]
     if missing or flags.side is None:
@@ -36,12 +38,7 @@ def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
             "Say which gear (--tail N123 --side LH) and what a clearance reading is (--convention RADIAL, DIAMETRAL "
             "or TOTAL_PLAY): there is no default.",
         )
-    side = flags.side.strip().upper()
-    values: dict[str, object] = {
-        "record_id": flags.record_id or f"{flags.tail}-{side}-{datetime.now():%Y%m%dT%H%M%S}",
-        "tail_no": flags.tail,
-        "side": flags.side,
-    }
+    values: dict[str, object] = {"record_id": flags.record_id or "-", "tail_no": flags.tail, "side": flags.side}
     labels: dict[str, str] = {}
     for text in flags.values or ():
         name, sign, written = text.partition("=")
@@ -52,7 +49,9 @@ def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
         if column in values:
             raise UsageError(f"--set gives joint {int(number)} twice", "Give each joint once.")
         values[column], labels[column] = written, f"--set {text!r}"
-    return _judged(values, labels, flags, declared)
+    read = _judged(values, labels, flags, declared)
+    made = made_record_id(read.tail_no, read.side, datetime.now())
+    return replace(read, record_id=flags.record_id or made)
 
 
 def _judged(

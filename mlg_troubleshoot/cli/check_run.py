@@ -16,7 +16,6 @@ from mlg_troubleshoot.cli.views import batch, notes, one_gear
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.outputs import OutputFile
-from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.diagnose import load_model_extension
@@ -56,7 +55,7 @@ class Run:
             seed=wanted.seed,
             extension=load_model_extension(extensions, tables.gear, causes),
         )
-        self._place = Store(wanted.store) if wanted.keep or self._asks else None
+        self._place = history.kept_in(wanted.store, tables.gear) if wanted.keep or self._asks else None
 
     def run(self) -> int:
         """Judge, show and keep; the exit code is returned."""

@@ -29,7 +29,6 @@ def fleet(
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.store import Store
     from mlg_troubleshoot.workflows import history as task
 
     known = load_gear(gear)
@@ -37,7 +36,7 @@ def fleet(
     shown = settings(gear, show, page)
     with stages(quiet=quiet) as bar:
         bar("Reading the store", 0, None)
-        found = list(task.lives(Store(store)).values())
+        found = list(task.lives(history.kept_in(store, gear)).values())
         bar("Learning how joints wear", 0, None)
         model = None if no_forecast else task.fit_fleet(found, known)
         ahead = task.forecast(found, model, known, bar)

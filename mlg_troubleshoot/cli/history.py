@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterable, Sequence
-from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,7 +17,7 @@ from mlg_troubleshoot.units import LengthUnit, in_unit
 if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
     from mlg_troubleshoot.store import Store
-    from mlg_troubleshoot.workflows.history import Forecast, GearLife
+    from mlg_troubleshoot.workflows.history import Forecast, GearLife, Verified
 
 EPILOG = (
     "Example: [b]mlg history N123 LH[/b] · [b]mlg history repair N123 LH --joint 3 --date 2026-05-04[/b] · "
@@ -34,7 +34,7 @@ Tail = Annotated[str, typer.Argument(metavar="TAIL", help="Tail number.")]
 Side = Annotated[str, typer.Argument(metavar="LH|RH", help="Which gear.")]
 RecordId = Annotated[str, typer.Argument(metavar="RECORD", help="Record id, or the start of its hash.")]
 Day = Annotated[str, typer.Option("--date", metavar="YYYY-MM-DD", help="Day of the repair.")]
-Landings = Annotated[float | None, typer.Option("--landings", min=0, help="Landings at the repair.")]
+Landings = Annotated[str | None, typer.Option("--landings", metavar="N", help="Landings at the repair.")]
 WorkOrder = Annotated[str | None, typer.Option("--work-order", help="Work order.")]
 Chain = Annotated[Path, typer.Argument(metavar="FILE", help="JSON Lines, one record a line.")]
 NoForecast = Annotated[bool, typer.Option("--no-forecast", help="What was kept only, without looking ahead: faster.")]
@@ -49,16 +49,13 @@ class HistoryGroup(TyperGroup):
         return super().parse_args(ctx, args)
 
 
-def _kept_in(place: str | None) -> Store:
+def kept_in(place: str | None, gear: str) -> Store:
+    """The store, in which every content is judged as it is read."""
+    from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.store import Store
+    from mlg_troubleshoot.workflows.kept import KeptGate
 
-    return Store(place)
-
-
-def side_of(text: str) -> str:
-    if text.strip().upper() not in ("LH", "RH"):
-        raise UsageError(f"side {text!r} is not LH or RH", "Give LH or RH.")
-    return text.strip().upper()
+    return Store(place, judge=KeptGate(load_gear(gear)))
 
 
 def show(
@@ -79,7 +76,7 @@ def show(
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.workflows import history as task
 
-    place, known = _kept_in(store), load_gear(gear)
+    place, known = kept_in(store, gear), load_gear(gear)
     claim(gear, (), (), report, store=store, force=force)
     shown = settings(gear, show_in, page)
     if tail is None and report is not None:
@@ -91,7 +88,8 @@ def show(
         else:
             _show_gears(list(found.values()), place.place)
         return
-    sides = ["LH", "RH"] if side is None else [side_of(side)]
+    tail, meant = task.key_of(tail, "LH" if side is None else side)
+    sides = ["LH", "RH"] if side is None else [meant]
     wanted = [key for key in place.gears() if key[0] == tail and key[1] in sides]
     if not wanted:
         task.life_of(place, tail, sides[0])
@@ -240,24 +238,30 @@ def repair(
 
     known = load_gear(gear)
     _refuse_unknown(joints, known)
-    done = {"joints": sorted(set(joints)), "landings": landings}
-    place = _kept_in(store)
-    record = task.work(place, Kind.REPAIR, (tail, side_of(side)), _day(day), work_order, **done)
-    output.say(f"Kept: repair of {tail} {record.side}, {', '.join(f'#{j}' for j in record.body['joints'])}.")
-    say_warnings(place, [(tail, record.side)])
+    restored = sorted(set(joints))
+    place = kept_in(store, gear)
+    record = task.work(place, Kind.REPAIR, (tail, side), day, work_order, landings, restored)
+    output.say(f"Kept: repair of {record.tail_no} {record.side}, {', '.join(f'#{j}' for j in restored)}.")
+    say_warnings(place, [(record.tail_no, record.side)])
 
 
 def rerig(
-    tail: Tail, side: Side, day: Day, landings: Landings = None, work_order: WorkOrder = None, store: Place = None
+    tail: Tail,
+    side: Side,
+    day: Day,
+    landings: Landings = None,
+    work_order: WorkOrder = None,
+    store: Place = None,
+    gear: options.Gear = options.DEFAULT_GEAR,
 ) -> None:
     """Record that the reversing valve was re-rigged; the wear of the joints goes on."""
     from mlg_troubleshoot.store import Kind
     from mlg_troubleshoot.workflows import history as task
 
-    key, place = (tail, side_of(side)), _kept_in(store)
-    record = task.work(place, Kind.RERIG, key, _day(day), work_order, landings=landings)
-    output.say(f"Kept: re-rigging of {tail} {record.side}.")
-    say_warnings(place, [key])
+    place = kept_in(store, gear)
+    record = task.work(place, Kind.RERIG, (tail, side), day, work_order, landings)
+    output.say(f"Kept: re-rigging of {record.tail_no} {record.side}.")
+    say_warnings(place, [(record.tail_no, record.side)])
 
 
 def _refuse_unknown(joints: Sequence[int], gear: Gear) -> None:
@@ -267,13 +271,6 @@ def _refuse_unknown(joints: Sequence[int], gear: Gear) -> None:
             f"--joint {unknown[0]}: {gear.name} has no joint {unknown[0]}",
             f"Its joints are {', '.join(map(str, gear.joint_numbers))}.",
         )
-
-
-def _day(text: str) -> date:
-    try:
-        return date.fromisoformat(text)
-    except ValueError:
-        raise UsageError(f"--date {text!r} is no date", "Write it as 2026-05-04.") from None
 
 
 def correct(
@@ -293,7 +290,7 @@ def correct(
     asked = CheckOptions(gear=gear, unit=unit, convention=convention, sheet=sheet)
     result = check_files([file], asked)
     notes.show_problems(result.problems)
-    place = _kept_in(store)
+    place = kept_in(store, gear)
     added = task.correct(place, record, result, asked)
     output.say(f"Kept: correction of {record} ({added.tail_no} {added.side}).")
     say_warnings(place, [(added.tail_no, added.side)])
@@ -303,11 +300,12 @@ def void(
     record: RecordId,
     why: Annotated[str, typer.Option("--why", metavar="TEXT", help="Why the record does not count.")],
     store: Place = None,
+    gear: options.Gear = options.DEFAULT_GEAR,
 ) -> None:
     """Append that a record does not count; it stays in the chain."""
     from mlg_troubleshoot.workflows import history as task
 
-    added = task.void(_kept_in(store), record, why)
+    added = task.void(kept_in(store, gear), record, why)
     output.say(f"Kept: {record} ({added.tail_no} {added.side}) does not count.")
 
 
@@ -324,30 +322,73 @@ def outcome(
 
     if joint is not None:
         _refuse_unknown([joint], load_gear(gear))
-    added = task.outcome(_kept_in(store), record, found, joint)
+    added = task.outcome(kept_in(store, gear), record, found, joint)
     output.say(f"Kept: outcome of {record} ({added.tail_no} {added.side}).")
 
 
-def verify(store: Place = None) -> None:
-    """Walk the chain; the first record that does not fit is named (exit code 1). It proves no identity."""
+def verify(
+    store: Place = None,
+    expect: Annotated[
+        str | None,
+        typer.Option("--expect", metavar="HASH", help="A last hash noted before: it must still stand in the chain."),
+    ] = None,
+    gear: options.Gear = options.DEFAULT_GEAR,
+) -> None:
+    """Walk the chain; the first record that does not fit is named (exit code 1). It does not prove who wrote a record.
 
-    place = _kept_in(store)
-    count, broken = place.verify()
-    if broken is not None:
+    The last hash is printed: noted elsewhere and given to --expect, it shows that no record was taken away since.
+    """
+    from mlg_troubleshoot.workflows import history as task
+
+    noted = None if expect is None else expect.strip().lower()
+    if noted is not None and not re.fullmatch(r"[0-9a-f]{64}", noted):
+        raise UsageError(f"--expect {expect!r} is not a hash", "Give the 64 letters and digits that verify printed.")
+    found = task.verify(kept_in(store, gear), noted)
+    if found.broken is None:
+        output.write(f"{found.count} records fit the chain.")
+    else:
+        broken = found.broken
         output.write(
             f"Record {broken.seq} ({broken.kind} {broken.record_id!r}) does not fit the chain: {broken.why}. "
-            f"{count} records before it fit."
+            f"{found.count} records before it fit."
         )
+    if found.last:
+        output.write(f"The last hash is {found.last}")
+    if noted is not None:
+        output.write(_expected(found))
+    for each in found.wrong:
+        output.write(f"Not as it should be: {each}.")
+    if found.wrong:
+        output.write(
+            "What to do: void a record that cannot be read (mlg history void HASH --why TEXT). Otherwise export "
+            "the chain, and import it into a new store."
+        )
+    if found.broken is not None or found.wrong or (noted is not None and found.expected is None):
         raise typer.Exit(BROKEN)
-    output.write(f"{count} records fit the chain.")
 
 
-def export(file: Chain, store: Place = None, force: options.Force = False) -> None:
+def _expected(found: Verified) -> str:
+    if found.expected is None:
+        return (
+            "The expected hash is not in the chain: records were taken away or changed, or this is another store or an "
+            "older copy."
+        )
+    since = found.count - found.expected
+    return (
+        f"The expected hash is that of record {found.expected}; {since} were added since."
+        if since
+        else "The expected hash is the last one."
+    )
+
+
+def export(
+    file: Chain, store: Place = None, gear: options.Gear = options.DEFAULT_GEAR, force: options.Force = False
+) -> None:
     """Write the whole chain as JSON Lines."""
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.outputs import OutputFile, OutputKind, write_text
 
-    lines = list(_kept_in(store).export())
+    lines = list(kept_in(store, gear).export())
     # An export of another store may be all that is left of it.
     own = OutputKind.marked("is not an export of this store", lines[0] if lines else "")
     claim(None, (), [OutputFile("the export", file, own)], store=store, force=force)
@@ -355,11 +396,11 @@ def export(file: Chain, store: Place = None, force: options.Force = False) -> No
     output.say(f"Written: {file}, {len(lines)} records.")
 
 
-def import_chain(file: Chain, store: Place = None) -> None:
+def import_chain(file: Chain, store: Place = None, gear: options.Gear = options.DEFAULT_GEAR) -> None:
     """Read an exported chain into an empty store, or the rest of it into a store that holds its beginning."""
     from mlg_troubleshoot.workflows import history as task
 
-    added = task.import_file(_kept_in(store), file)
+    added = task.import_file(kept_in(store, gear), file)
     output.say(f"Imported: {added.new} records; {added.known} were there already.")
 
 

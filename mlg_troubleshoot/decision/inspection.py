@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import date
 from enum import StrEnum
 
+from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 DEFAULT_GAUGE_U_IN = 0.0005
@@ -17,6 +19,28 @@ class Side(StrEnum):
 
     LH = "LH"
     RH = "RH"
+
+    @classmethod
+    def spelt(cls, text: str) -> Side | None:
+        """Read a side as people write it: ``LH``, ``left``, ``L/H side``, ``port``; None if it is not one."""
+        bare = text.lower().removesuffix("side").removesuffix("gear")
+        return _SIDES.get(re.sub(r"[^a-z]", "", bare))
+
+    @classmethod
+    def parse(cls, text: str) -> Side:
+        """Read a side as people write it, or refuse it."""
+        found = cls.spelt(text)
+        if found is None:
+            raise UsageError(f"side {text!r} is not LH or RH", "Give LH or RH.")
+        return found
+
+
+# The one table of how sides are written, in lower case and letters only: for cells, prompts, flags and arguments.
+_SIDES = {
+    **dict.fromkeys(("l", "lh", "lhs", "left", "lefthand", "port", "lhmlg", "leftmlg", "mlgl", "mlglh"), Side.LH),
+    **dict.fromkeys(("r", "rh", "rhs", "right", "righthand", "starboard", "stbd", "rhmlg", "rightmlg"), Side.RH),
+    **dict.fromkeys(("mlgr", "mlgrh"), Side.RH),
+}
 
 
 class Outcome(StrEnum):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mlg_troubleshoot.records.gate import admit, judge_again, judge_length
+from mlg_troubleshoot.records.gate import admit, judge_again, judge_length, made_record_id
 from mlg_troubleshoot.records.layout import why_not_remembered
 from mlg_troubleshoot.records.model import ColumnReading, FileRead, ReadOptions, ReadResult, SheetLayout
 from mlg_troubleshoot.records.read import expand, read_many
@@ -17,6 +17,7 @@ __all__ = [
     "expand",
     "judge_again",
     "judge_length",
+    "made_record_id",
     "read_many",
     "why_not_remembered",
 ]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from datetime import date
+from datetime import date, datetime
 from numbers import Real
 
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource, Side
 from mlg_troubleshoot.errors import Problem, UsageError
 from mlg_troubleshoot.records.cells import Cell, OddCell, OddKind, iso_date_cell
 from mlg_troubleshoot.records.columns import Kind
@@ -15,6 +15,7 @@ from mlg_troubleshoot.records.headers import no_joint
 from mlg_troubleshoot.records.layout import ColumnReader
 from mlg_troubleshoot.records.model import ReadOptions, TableInHand
 from mlg_troubleshoot.records.rows import RowReader
+from mlg_troubleshoot.records.values import CellFaultError, read_text
 
 # Fields of an inspection that a column of the same name holds, and the convention.
 _AS_IN_A_TABLE = (
@@ -58,6 +59,21 @@ def admit(values: Mapping[str, object], options: ReadOptions, labels: Mapping[st
 def judge_length(column: str, text: str, options: ReadOptions) -> tuple[Inspection | InvalidRow, list[Problem]]:
     """Judge one length alone, before it is known whose it is."""
     return judge_row({**_NOBODY, column: text}, options)
+
+
+def judge_text(label: str, text: str, remedy: str) -> None:
+    """Refuse a text that is empty, or that no file can carry."""
+    if not text.strip():
+        raise UsageError(f"{label} is empty", remedy)
+    try:
+        read_text(text, "a text")
+    except CellFaultError as fault:
+        raise UsageError(f"{label} {text!r} is not a text", fault.remedy) from None
+
+
+def made_record_id(tail_no: str | None, side: Side | None, at: datetime) -> str:
+    """The id of an inspection that was entered by hand without one, by flags or at the prompts."""
+    return f"{tail_no}-{side}-{at:%Y%m%d-%H%M%S}"
 
 
 def judge_again(inspection: Inspection, options: ReadOptions) -> Inspection:

@@ -59,11 +59,6 @@ _EPS_IN = 1e-9
 _REMEMBERED = 20_000
 _NO_FLOATS: Mapping[int, float] = MappingProxyType({})
 
-_SIDES = {
-    **dict.fromkeys(("l", "lh", "lhs", "left", "lefthand", "port", "lhmlg", "leftmlg", "mlgl", "mlglh"), Side.LH),
-    **dict.fromkeys(("r", "rh", "rhs", "right", "righthand", "starboard", "stbd", "rhmlg", "rightmlg"), Side.RH),
-    **dict.fromkeys(("mlgr", "mlgrh"), Side.RH),
-}
 _APPROACH_HINTS = {**dict.fromkeys(("extend", "ext"), "EXTENDING"), **dict.fromkeys(("retract", "ret"), "RETRACTING")}
 _CONVENTION_HINTS = {
     **dict.fromkeys(("radius", "rad", "offset"), "RADIAL"),
@@ -83,7 +78,7 @@ _NEVER_BLANK = frozenset((*IDENTITY, *CARRIED, Kind.CONVENTION, Kind.UNIT, Kind.
 }
 _SIGNED = frozenset({Kind.PLUNGER_DOWN_LOCK, Kind.PLUNGER_POSITION, Kind.PLUNGER_DISPLACEMENT})
 # What else a row may say, read cell by cell; the flag says whether a comma is the decimal mark, the text is the header.
-_OTHERS: dict[Kind, Callable[[bool, str, str | float | OddCell], object]] = {
+LOOSE_CELLS: dict[Kind, Callable[[bool, str, str | float | OddCell], object]] = {
     Kind.LANDINGS: lambda comma, _, cell: read_number(
         cell, 0.0, 1e6, decimal_comma=comma, expected="landings since overhaul, 0 or more"
     ),
@@ -103,6 +98,15 @@ _OTHERS: dict[Kind, Callable[[bool, str, str | float | OddCell], object]] = {
 
 # A column, the name of what it holds, and how a cell of it is read.
 _Loose = tuple[int, str, Callable[[Any], object]]
+
+
+_MADE_FROM_A_ROW = re.compile(r"-\d+-[0-9a-f]{8}\Z")
+
+
+def place_in_file(record_id: str) -> str:
+    """Row and content of an id that was made for a row, whatever its file was called; empty for any other id."""
+    made = _MADE_FROM_A_ROW.search(record_id)
+    return "" if made is None else made[0]
 
 
 def _carried_text(cell: str | float | OddCell) -> str:
@@ -164,9 +168,9 @@ class RowReader:
         self._length_of = lru_cache(_REMEMBERED)(self._one_length)
         # Cells that bear no verdict, by the names under which they are found: what is read, and what is only carried.
         self._others: list[_Loose] = [
-            (index, field.kind.value, partial(_OTHERS[field.kind], self._comma, self._placed[index].header))
+            (index, field.kind.value, partial(LOOSE_CELLS[field.kind], self._comma, self._placed[index].header))
             for index, field in good
-            if field.kind in _OTHERS
+            if field.kind in LOOSE_CELLS
         ]
         self._others += [(i, Kind.DATE.value, self._read_date) for i, f in good if f.kind is Kind.DATE]
         self._carried: list[_Loose] = [
@@ -330,8 +334,8 @@ class RowReader:
         def read(cell: Cell) -> Side:
             if cell is None:
                 raise CellFaultError("side_missing", "LH or RH", "Enter LH or RH; there is no default.")
-            bare = cell.lower().removesuffix("side").removesuffix("gear") if isinstance(cell, str) else ""
-            return _SIDES.get(re.sub(r"[^a-z]", "", bare)) or read_choice(cell, Side, "side_unknown", {})
+            spelt = Side.spelt(cell) if isinstance(cell, str) else None
+            return spelt or read_choice(cell, Side, "side_unknown", {})
 
         return self._required(Kind.SIDE, read)
 

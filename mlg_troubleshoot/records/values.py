@@ -13,7 +13,7 @@ from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.records.cells import UNWRITABLE, OddCell, OddKind, show, show_number
 from mlg_troubleshoot.records.dates import DateOrder, readings, written_day
-from mlg_troubleshoot.units import LengthUnit, parse_length
+from mlg_troubleshoot.units import MINUS, LengthUnit, parse_length
 
 
 class CellFaultError(Exception):
@@ -53,8 +53,7 @@ _USUAL = {
 }
 
 
-_MINUS = "-\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"
-_SIGNED = re.compile(rf"^\s*([{_MINUS}+])\s*(?=[\d.,])")
+_SIGNED = re.compile(rf"^\s*([{MINUS}+])\s*(?=[\d.,])")
 _COMMA_NUMBER = re.compile(r"\s*[+\-]?\d*,\d+(?![\d,.])[^,.]*")
 _UNCLEAR_GROUP = re.compile(r"[+\-]?[1-9]\d{0,2}[,.]\d{3}")
 _PLAIN = re.compile(r"[+\-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+\-]?\d+)?", re.ASCII)

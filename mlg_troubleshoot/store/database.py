@@ -13,7 +13,7 @@ import os
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -23,14 +23,22 @@ import sqlalchemy as sql
 from sqlalchemy.exc import DBAPIError, NoSuchModuleError, SQLAlchemyError
 
 from mlg_troubleshoot.errors import OutputError, UsageError
+from mlg_troubleshoot.store.place import Place
 
 SCHEMA_VERSION = 1
+# What SQLite writes into the head of a file so that it can be told from another program's: "mlg1". [1]
+APPLICATION_ID = 0x6D6C6731
 GENESIS = "0" * 64
 # How long a writer waits for others. [s]
 _PATIENCE_S = 120
 # Any number that other programs on the same server hardly use for their advisory locks. [1]
 _ADVISORY_LOCK = 0x6D6C675F73746F72
 _AT_ONCE = 500
+# The content of a record, packed and unpacked. [bytes]
+MOST_BYTES = 1_000_000
+# How many of the newest records are walked before another is added: 0.1 s and 6 MB from a server; `verify` and `export`
+# walk all of them. [1]
+_NEWEST = 10_000
 
 # What records of this schema version often say, given to zlib in advance: it belongs to the version, as columns do.
 _OFTEN = Path(__file__).with_name(f"often-{SCHEMA_VERSION}.txt").read_bytes()
@@ -66,6 +74,15 @@ DRAFTS = sql.Table(
 _MIGRATIONS: Mapping[int, Callable[[sql.Connection], None]] = {}
 
 
+# What SQLite itself keeps records by; dropped or changed, nothing there refuses to change a record.
+_TRIGGERS = {
+    f"mlg_no_{change.lower()}": f"CREATE TRIGGER mlg_no_{change.lower()} BEFORE {change} ON mlg_records "
+    "BEGIN SELECT RAISE(ABORT, 'records are only ever added'); END"
+    for change in ("UPDATE", "DELETE")
+}
+_OWN = {*_tables.tables, *_TRIGGERS, *(str(index.name) for index in _records.indexes)}
+
+
 class StoreError(OutputError):
     """The store cannot be used, or refuses what it was given (exit code 5)."""
 
@@ -82,11 +99,20 @@ class Kind(StrEnum):
     OUTCOME = "outcome"
 
 
+_KINDS = frozenset(kind.value for kind in Kind)
+_TEXTS = ("kind", "record_id", "tail_no", "side", "day")
+_BYTES = ("identity", "body", "hash")
+# A body that is too large is not fetched at all.
+_BOUNDED = sql.case((sql.func.length(_records.c.body) <= MOST_BYTES, _records.c.body), else_=None).label("body")
+_COLUMNS = [_BOUNDED if column.name == "body" else column for column in _records.c]
+
+
 @dataclass(frozen=True, slots=True)
 class Record:
     """One record; ``day`` is ISO 8601 or empty, ``packed`` its content as compressed JSON.
 
-    ``identity`` names what must not stand twice in the store; without one, the whole content does.
+    ``identity`` names what must not stand twice in the store; without one, the whole content does. ``judge`` says what
+    is wrong with the content of a record that was read, empty if nothing is.
     """
 
     kind: Kind
@@ -98,17 +124,33 @@ class Record:
     identity: tuple[str, ...] = ()
     seq: int = 0
     digest: str = ""
+    judge: Judge | None = field(default=None, compare=False, repr=False)
 
     @property
     def body(self) -> Any:
-        """The content as plain JSON values."""
-        return _unpacked(self.packed)
+        """The content as plain JSON values; `StoreError` if it is not the content of such a record."""
+        try:
+            found = _unpacked(self.packed)
+            wrong = "" if self.judge is None else self.judge(self, found)
+        except (ValueError, RecursionError, zlib.error) as error:
+            wrong = f"its content cannot be unpacked: {error}"
+        if wrong:
+            raise StoreError(f"{self.named}: {wrong}", _VERIFY)
+        return found
+
+    @property
+    def named(self) -> str:
+        """The record in words, for messages."""
+        return f"record {self.seq} ({self.kind} {self.record_id!r}, hash {self.digest[:10]})"
 
     @property
     def identity_hash(self) -> bytes:
         """Hash of the identity, or of the whole content where there is none."""
         what = self.identity or (self.record_id, self.tail_no, self.side, self.day, self.packed.hex())
         return hashlib.sha256(_canonical([self.kind.value, *what]).encode()).digest()
+
+
+Judge = Callable[[Record, Any], str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,24 +178,29 @@ _canonical = json.JSONEncoder(
 
 
 def packed(body: Mapping[str, Any]) -> bytes:
-    """Compress the content of a record."""
+    """Compress the content of a record; one that could not be read again is refused."""
+    text = _canonical(body).encode()
+    if len(text) > MOST_BYTES:
+        raise StoreError(
+            f"a record of {len(text)} bytes cannot be kept, at most {MOST_BYTES}",
+            "Shorten its remarks and texts.",
+        )
     press = zlib.compressobj(9, zdict=_OFTEN)
-    return press.compress(_canonical(body).encode()) + press.flush()
+    return press.compress(text) + press.flush()
 
 
 def _unpacked(body: bytes) -> Any:
-    return json.loads(zlib.decompressobj(zdict=_OFTEN).decompress(body))
+    press = zlib.decompressobj(zdict=_OFTEN)
+    text = press.decompress(body, MOST_BYTES + 1)
+    if len(text) > MOST_BYTES:
+        raise ValueError(f"it has more than {MOST_BYTES} bytes")
+    return json.loads(text)
 
 
 def _chained(before: bytes, row: Mapping[str, Any]) -> bytes:
     """Hash of a record with all of its columns, and of the record before it."""
-    texts = [row["seq"], *(row[name] for name in ("kind", "record_id", "tail_no", "side", "day"))]
+    texts = [row["seq"], *(row[name] for name in _TEXTS)]
     return hashlib.sha256(before + _canonical(texts).encode() + row["identity"] + row["body"]).digest()
-
-
-def _record(row: Any) -> Record:
-    texts = row.record_id, row.tail_no, row.side, row.day
-    return Record(Kind(row.kind), *texts, bytes(row.body), seq=row.seq, digest=bytes(row.hash).hex())
 
 
 def own_file() -> str:
@@ -179,22 +226,23 @@ def files_of(place: str | Path | None = None) -> tuple[Path, ...]:
 
 
 class Store:
-    """The store at a path (SQLite) or a URL (``postgresql+psycopg://…``)."""
+    """The store at a path (SQLite) or a URL (``postgresql+psycopg://…``).
 
-    def __init__(self, place: str | Path | None = None, patience_s: int = _PATIENCE_S) -> None:
+    ``judge`` says what is wrong with the content of a record whenever it is read.
+    """
+
+    def __init__(
+        self, place: str | Path | None = None, patience_s: int = _PATIENCE_S, judge: Judge | None = None
+    ) -> None:
         # Where nobody says: ``MLG_STORE``, or the user's own file.
-        self.place = str(place or os.environ.get("MLG_STORE") or own_file())
-        is_url = "://" in self.place
-        self._file = None if is_url else Path(self.place)
+        self._at = Place(str(place) if place is not None else os.environ.get("MLG_STORE") or own_file())
+        self.judge = judge
+        self._postgres = self._at.file is None
+        wait = {"connect_timeout" if self._postgres else "timeout": patience_s}
         try:
-            url = sql.make_url(self.place) if is_url else sql.URL.create("sqlite", database=self.place)
-            self._postgres = url.get_backend_name() == "postgresql"
-            if not self._postgres and url.get_backend_name() != "sqlite":
-                raise UsageError(f"--store {url.render_as_string()} is neither SQLite nor PostgreSQL", _PLACES)
-            wait = {"connect_timeout" if self._postgres else "timeout": patience_s}
-            self._engine = sql.create_engine(url, connect_args=wait, poolclass=sql.NullPool)
-        except (sql.exc.ArgumentError, NoSuchModuleError) as error:
-            raise UsageError(f"--store {self.place!r} is no place for a store: {error}", _PLACES) from error
+            self._engine = sql.create_engine(self._at.url, connect_args=wait, poolclass=sql.NullPool)
+        except NoSuchModuleError as error:
+            raise UsageError(f"--store {self.place}: there is no such driver", Place.REMEDY) from error
         except ModuleNotFoundError as error:
             raise UsageError(f"--store needs {error.name}, which is not installed", _EXTRA) from error
         # The driver begins transactions late and reads without one; here every one begins when it is told to.
@@ -203,16 +251,26 @@ class Store:
         self._ready = False
 
     @property
+    def place(self) -> str:
+        """Where it is, as it may be shown: without a password."""
+        return self._at.shown
+
+    @property
+    def file(self) -> Path | None:
+        """The file that holds it; None on a server."""
+        return self._at.file
+
+    @property
     def is_new(self) -> bool:
         """True if nothing was ever kept here: there is no file, or an empty one."""
-        return self._file is not None and (not self._file.exists() or self._file.stat().st_size == 0)
+        return self.file is not None and (not self.file.exists() or self.file.stat().st_size == 0)
 
     @contextmanager
     def transaction(self, *, writing: bool) -> Iterator[sql.Connection]:
         """One transaction; what the database refuses becomes an error that says what to do."""
         try:
-            if writing and self._file is not None:
-                self._file.parent.mkdir(parents=True, exist_ok=True)
+            if writing and self.file is not None:
+                self.file.parent.mkdir(parents=True, exist_ok=True)
             # Reading does not make a file.
             engine = self._engine if writing or not self.is_new else sql.create_engine("sqlite://")
             with engine.connect() as connection:
@@ -225,44 +283,104 @@ class Store:
                 yield connection
                 connection.commit()
         except OSError as error:
-            raise StoreError(f"store {self.place}: {error.strerror}: nothing was kept", _PLACES) from error
+            raise StoreError(f"store {self.place}: {error.strerror}: nothing was kept", Place.REMEDY) from error
         except SQLAlchemyError as error:
             said = str(error.orig if isinstance(error, DBAPIError) else error).strip().splitlines()[0]
+            foreign = "not a database" in said
             raise StoreError(
-                f"store {self._engine.url.render_as_string()}: {said}: nothing was kept",
-                "Check the place, the permissions and the free space; what was kept before is untouched.",
+                f"store {self.place}: {self._at.masked(said)}: nothing was kept",
+                _FOREIGN
+                if foreign
+                else "Check the place, the permissions and the free space; what was kept before is untouched.",
             ) from error
 
     def _prepare(self, connection: sql.Connection, *, writing: bool) -> None:
-        """Make the tables of an empty store, or bring an older one forward."""
+        """Make the tables of an empty store, mark one that is not marked yet, or bring an older one forward."""
         self._ready = sql.inspect(connection).has_table(_meta.name)
+        if not self._postgres:
+            self._mark(connection, writing=writing)
         if not self._ready:
             if not writing:
                 return
             _tables.create_all(connection)
             connection.execute(_meta.insert().values(schema_version=SCHEMA_VERSION))
             if not self._postgres:
-                for change in ("UPDATE", "DELETE"):
-                    connection.exec_driver_sql(
-                        f"CREATE TRIGGER mlg_no_{change.lower()} BEFORE {change} ON mlg_records "
-                        "BEGIN SELECT RAISE(ABORT, 'records are only ever added'); END"
-                    )
+                for trigger in _TRIGGERS.values():
+                    connection.exec_driver_sql(trigger)
         found = connection.execute(sql.select(sql.func.max(_meta.c.schema_version))).scalar_one()
-        if found is None or found > SCHEMA_VERSION:
+        if not isinstance(found, int) or not 1 <= found <= SCHEMA_VERSION:
             raise StoreError(
-                f"store {self.place} has schema version {found}, and this program knows {SCHEMA_VERSION}",
+                f"store {self.place} has schema version {found!r}, and this program knows {SCHEMA_VERSION}",
                 "Use the program that wrote it, or a newer one.",
             )
         for version in range(found, SCHEMA_VERSION):
             if not writing:
-                raise StoreError(f"store {self.place} has schema version {version}", "Bring it forward by keeping.")
+                raise StoreError(
+                    f"store {self.place} has schema version {version}", "Run mlg check --keep once to upgrade it."
+                )
             _MIGRATIONS[version](connection)
             connection.execute(_meta.insert().values(schema_version=version + 1))
         self._ready = True
 
+    def _mark(self, connection: sql.Connection, *, writing: bool) -> None:
+        """Refuse a database of another program; mark one of ours, which has our tables or nothing at all."""
+        found = connection.exec_driver_sql("PRAGMA application_id").scalar_one()
+        if not self._ready:
+            others = connection.exec_driver_sql("SELECT count(*) FROM sqlite_master").scalar_one()
+            if others or found not in (0, APPLICATION_ID):
+                raise StoreError(f"{self.place} is a database of another program: nothing was read or kept", _FOREIGN)
+        if writing and found == 0:
+            connection.exec_driver_sql(f"PRAGMA application_id = {APPLICATION_ID}")
+
     def _rows(self, connection: sql.Connection, *where: Any) -> Iterator[Any]:
         if self._ready:
-            yield from connection.execute(sql.select(_records).where(*where).order_by(_records.c.seq))
+            yield from connection.execute(sql.select(*_COLUMNS).where(*where).order_by(_records.c.seq))
+
+    def _record(self, row: Any) -> Record:
+        """A row as a record; a column that cannot be one is named."""
+        columns = row._mapping
+        odd = next((name for name in _TEXTS if not isinstance(columns[name], str)), None)
+        odd = odd or next((name for name in _BYTES if not isinstance(columns[name], bytes | memoryview)), None)
+        if odd is None and row.kind not in _KINDS:
+            odd = "kind"
+        if odd is not None:
+            found = "too large" if columns[odd] is None else repr(columns[odd])[:60]
+            raise StoreError(f"store {self.place}: record {row.seq}, column {odd!r} cannot be read: {found}", _VERIFY)
+        texts = row.record_id, row.tail_no, row.side, row.day
+        return Record(
+            Kind(row.kind), *texts, bytes(row.body), seq=row.seq, digest=bytes(row.hash).hex(), judge=self.judge
+        )
+
+    def _walk(self, connection: sql.Connection, after: int = 0) -> Iterator[Any]:
+        """Rows of the chain from one on, each of which fits the one before; `_MisfitError` where one does not."""
+        before = bytes.fromhex(GENESIS) if after == 0 else b""
+        count = max(after - 1, 0)
+        for row in self._rows(connection, _records.c.seq > count):
+            found = row._mapping
+            values = {**found, **{name: _bytes(found[name]) for name in _BYTES}}
+            if row.seq != count + 1:
+                raise _MisfitError(row, f"record {count + 1} is missing before it")
+            if before and _chained(before, values) != values["hash"]:
+                raise _MisfitError(row, "its content, its hash or the record before it was changed")
+            before, count = values["hash"], count + 1
+            yield row
+
+    def _head(self, connection: sql.Connection) -> tuple[int, bytes]:
+        """Number and hash of the last record; a chain whose newest records do not fit takes no more."""
+        count, last = connection.execute(sql.select(sql.func.count(), sql.func.max(_records.c.seq))).one()
+        before = bytes.fromhex(GENESIS)
+        try:
+            if count != (last or 0):
+                raise _MisfitError(None, f"it holds {count} records, and the last one is number {last}")
+            for row in self._walk(connection, max(count - _NEWEST, 0)):
+                before = bytes(row.hash)
+        except _MisfitError as misfit:
+            raise self._broken(misfit) from None
+        return count, before
+
+    def _broken(self, misfit: _MisfitError) -> StoreError:
+        at = "" if misfit.row is None else f" at record {misfit.row.seq}"
+        return StoreError(f"store {self.place}: the chain does not fit{at}: {misfit.why}", _VERIFY)
 
     def add(self, records: Sequence[Record], judge: Callable[[Record, Record], bool] | None = None) -> Added:
         """Add records in one transaction; those that stand there already are left out.
@@ -282,16 +400,13 @@ class Store:
                     "its own record_id or date.",
                 )
             new = [record for identity, record in distinct.items() if identity not in known]
-            last = connection.execute(
-                sql.select(_records.c.seq, _records.c.hash).order_by(_records.c.seq.desc()).limit(1)
-            ).first()
-            seq, before = (last.seq, bytes(last.hash)) if last else (0, bytes.fromhex(GENESIS))
+            seq, before = self._head(connection)
             rows = []
             for seq_new, record in enumerate(new, seq + 1):
                 row = {
                     "seq": seq_new,
                     "kind": record.kind.value,
-                    **{name: getattr(record, name) for name in ("record_id", "tail_no", "side", "day")},
+                    **{name: getattr(record, name) for name in _TEXTS[1:]},
                     "identity": record.identity_hash,
                     "body": record.packed,
                 }
@@ -301,12 +416,17 @@ class Store:
                 connection.execute(_records.insert(), rows)
         return Added(len(new), len(records) - len(new))
 
+    def known(self, identities: Sequence[bytes]) -> dict[bytes, Record]:
+        """Records that stand here under these identities."""
+        with self.transaction(writing=False) as connection:
+            return self._known(connection, identities)
+
     def _known(self, connection: sql.Connection, identities: Sequence[bytes]) -> dict[bytes, Record]:
         known = {}
         for first in range(0, len(identities), _AT_ONCE):
             wanted = identities[first : first + _AT_ONCE]
             for row in self._rows(connection, _records.c.identity.in_(wanted)):
-                known[bytes(row.identity)] = _record(row)
+                known[bytes(row.identity)] = self._record(row)
         return known
 
     def gears(self) -> list[tuple[str, str]]:
@@ -315,61 +435,94 @@ class Store:
             if not self._ready:
                 return []
             pairs = sql.select(_records.c.tail_no, _records.c.side).distinct()
-            return sorted((row.tail_no, row.side) for row in connection.execute(pairs))
+            return sorted((str(row.tail_no), str(row.side)) for row in connection.execute(pairs))
 
     def of_gear(self, tail_no: str, side: str | None = None) -> list[Record]:
         """All records of a gear, or of both gears of an aircraft, in the order of the chain."""
         where = [_records.c.tail_no == tail_no] + ([_records.c.side == side] if side else [])
         with self.transaction(writing=False) as connection:
-            return [_record(row) for row in self._rows(connection, *where)]
+            return [self._record(row) for row in self._rows(connection, *where)]
 
     def all(self) -> list[Record]:
         """All records in the order of the chain."""
         with self.transaction(writing=False) as connection:
-            return [_record(row) for row in self._rows(connection)]
+            return [self._record(row) for row in self._rows(connection)]
 
-    def verify(self) -> tuple[int, Broken | None]:
-        """Walk the chain; return how many records fit and the first one that does not."""
-        before, count = bytes.fromhex(GENESIS), 0
+    def verify(self, visit: Callable[[Record], None] | None = None) -> tuple[int, Broken | None]:
+        """Walk the chain; return how many records fit and the first one that does not.
+
+        ``visit`` is shown each record that fits.
+        """
+        count = 0
         with self.transaction(writing=False) as connection:
-            for row in self._rows(connection):
-                found = row._mapping
-                values = {**found, **{name: _bytes(found[name]) for name in ("identity", "body", "hash")}}
-                why = ""
-                if row.seq != count + 1:
-                    why = f"record {count + 1} is missing before it"
-                elif _chained(before, values) != values["hash"]:
-                    why = "its content, its hash or the record before it was changed"
-                if why:
-                    return count, Broken(row.seq, str(row.kind), str(row.record_id), why)
-                before, count = values["hash"], count + 1
+            try:
+                for row in self._walk(connection):
+                    if visit is not None:
+                        visit(self._record(row))
+                    count += 1
+            except _MisfitError as misfit:
+                row = misfit.row
+                return count, Broken(row.seq, str(row.kind), str(row.record_id), misfit.why)
         return count, None
 
-    def export(self) -> Iterator[str]:
-        """The chain as JSON Lines: every column as it stands, and under ``content`` what the body says."""
+    def departures(self) -> list[str]:
+        """What a store file should have and has not, or has and should not; nothing is said of a server's."""
+        if self._postgres:
+            return []
         with self.transaction(writing=False) as connection:
-            for row in self._rows(connection):
-                columns = {name: getattr(row, name) for name in ("seq", "kind", "record_id", "tail_no", "side", "day")}
-                exact = {name: bytes(getattr(row, name)).hex() for name in ("identity", "hash", "body")}
-                yield _canonical({**columns, **exact, "content": _unpacked(row.body)}) + "\n"
+            rows = connection.exec_driver_sql("SELECT type, name, sql FROM sqlite_master ORDER BY name").all()
+            if not self._ready:
+                return []
+        found = {name: text for _type, name, text in rows}
+        dropped = [f"the trigger {n} was dropped or changed" for n, text in _TRIGGERS.items() if found.get(n) != text]
+        # SQLite's own names begin so, and nobody else's can.
+        foreign = [(kind, name) for kind, name, _ in rows if name not in _OWN and not name.startswith("sqlite_")]
+        return dropped + [f"the {kind} {name!r} is not one of a store" for kind, name in foreign]
+
+    def export(self) -> Iterator[str]:
+        """The chain as JSON Lines: every column as it stands, and under ``content`` what the body says.
+
+        A chain that does not fit is refused, and content that is not void and that nobody could import again.
+        """
+        wrong: dict[str, StoreError] = {}
+        with self.transaction(writing=False) as connection:
+            try:
+                for row in self._walk(connection):
+                    record = replace(self._record(row), judge=None)
+                    content = record.body
+                    self._note(wrong, record, content, f"store {self.place}, nothing was exported")
+                    columns = {name: getattr(row, name) for name in ("seq", *_TEXTS)}
+                    exact = {name: bytes(getattr(row, name)).hex() for name in _BYTES}
+                    yield _canonical({**columns, **exact, "content": content}) + "\n"
+            except _MisfitError as misfit:
+                raise self._broken(misfit) from None
+        for first in wrong.values():
+            raise first
+
+    def _note(self, wrong: dict[str, StoreError], record: Record, content: Any, at: str) -> None:
+        """Note content that is wrong, and that which is void after all."""
+        if self.judge is None:
+            return
+        why = self.judge(record, content)
+        if why:
+            wrong[record.digest] = StoreError(
+                f"{at}: {record.named}: {why}",
+                "Void the record where it stands: mlg history void HASH --why TEXT. All of them: mlg history verify",
+            )
+        elif record.kind is Kind.VOID:
+            wrong.pop(content["voids"], None)
 
     def restore(self, lines: Iterable[str], name: str) -> Added:
         """Add an exported chain to what is here: whole to an empty store, or the rest of the same chain.
 
-        The chain must fit from its first record on; a line that does not is named, and nothing is added.
+        The chain must fit from its first record on, and its content be that of such records unless a later one voids
+        it; a line of which that is not true is named, and nothing is added.
         """
-        before, rows = bytes.fromhex(GENESIS), []
-        for number, line in enumerate(lines, 1):
-            row = _imported(line, f"{name}, line {number}")
-            if row["seq"] != number or _chained(before, row) != row["hash"]:
-                raise StoreError(
-                    f"{name}, line {number} ({row['record_id']!r}) does not fit the chain; nothing was imported",
-                    "Export again from the store that it came from.",
-                )
-            before = row["hash"]
-            rows.append(row)
+        rows = list(self._fitting(lines, name))
         with self.transaction(writing=True) as connection:
-            here = [bytes(row.hash) for row in connection.execute(sql.select(_records.c.hash).order_by("seq"))]
+            self._head(connection)
+            hashes = connection.execute(sql.select(_records.c.hash).order_by(_records.c.seq)).scalars()
+            here = [bytes(found) for found in hashes]
             common = min(len(here), len(rows))
             if here[:common] != [row["hash"] for row in rows[:common]]:
                 raise StoreError(
@@ -380,9 +533,44 @@ class Store:
                 connection.execute(_records.insert(), rows[common:])
         return Added(len(rows) - common, common)
 
+    def _fitting(self, lines: Iterable[str], name: str) -> Iterator[dict[str, Any]]:
+        """Rows of an exported chain, each judged; what is wrong and not void is refused at the end."""
+        before = bytes.fromhex(GENESIS)
+        wrong: dict[str, StoreError] = {}
+        for number, line in enumerate(lines, 1):
+            at = f"{name}, line {number}"
+            if number > _MOST_IMPORTED:
+                raise StoreError(f"{at}: at most {_MOST_IMPORTED} records are imported", "Copy the store itself.")
+            row, content = _imported(line, at)
+            if row["seq"] != number or _chained(before, row) != row["hash"]:
+                raise StoreError(
+                    f"{at} ({row['record_id']!r}) does not fit the chain; nothing was imported",
+                    "Export again from the store that it came from.",
+                )
+            before = row["hash"]
+            texts = row["record_id"], row["tail_no"], row["side"], row["day"]
+            record = Record(Kind(row["kind"]), *texts, row["body"], seq=number, digest=before.hex())
+            self._note(wrong, record, content, f"{at}, nothing was imported")
+            if len(wrong) > _MOST_WRONG:
+                break
+            yield row
+        for first in wrong.values():
+            raise first
 
-_PLACES = "Give a file that you may write to, or postgresql+psycopg://USER@HOST/DATABASE."
+
+class _MisfitError(Exception):
+    """Where a chain does not fit: the row, and why."""
+
+    def __init__(self, row: Any, why: str) -> None:
+        super().__init__(why)
+        self.row, self.why = row, why
+
+
+_VERIFY = "Run: mlg history verify"
+_FOREIGN = "Give --store the name of a new file, or of one that mlg wrote."
 _EXTRA = "Install the extra: pip install 'mlg-troubleshoot[server]'"
+# Records of one import, and wrong ones among them that wait for a later one to void them. [1]
+_MOST_IMPORTED, _MOST_WRONG = 100_000, 1_000
 
 
 def _as_bytes_are(raw: Any, _record: Any) -> None:
@@ -393,17 +581,25 @@ def _as_bytes_are(raw: Any, _record: Any) -> None:
 
 def _bytes(value: Any) -> bytes:
     """A column as bytes, whatever was put there by another program."""
-    return value.encode() if isinstance(value, str) else bytes(value)
+    return bytes(value) if isinstance(value, bytes | memoryview) else repr(value).encode()
 
 
-def _imported(line: str, place: str) -> dict[str, Any]:
+def _imported(line: str, place: str) -> tuple[dict[str, Any], Any]:
+    """The columns of an exported record, and its content."""
     try:
         given = json.loads(line)
-        row = {name: given[name] for name in ("seq", "kind", "record_id", "tail_no", "side", "day")}
+        row = {name: given[name] for name in ("seq", *_TEXTS)}
         Kind(row["kind"])
-        row |= {name: bytes.fromhex(given[name]) for name in ("identity", "hash", "body")}
-        if _unpacked(row["body"]) != given["content"]:
+        if type(row["seq"]) is not int:
+            raise ValueError("seq is not a whole number")
+        for name in _TEXTS:
+            row[name].encode()
+        row |= {name: bytes.fromhex(given[name]) for name in _BYTES}
+        content = _unpacked(row["body"])
+        if content != given["content"]:
             raise ValueError("content and body differ")
-    except (ValueError, KeyError, TypeError, RecursionError, zlib.error) as error:
-        raise StoreError(f"{place} is no exported record: {error}; nothing was imported", "Export again.") from error
-    return row
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, zlib.error) as error:
+        raise StoreError(
+            f"{place} is not an exported record: {error}; nothing was imported", "Export again."
+        ) from error
+    return row, content

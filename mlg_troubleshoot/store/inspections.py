@@ -13,7 +13,7 @@ from mlg_troubleshoot.store.database import Kind, Record, packed
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 # What says where and how an inspection was entered, not what was found.
-_NOT_CONTENT = ("source", "warnings", "entered")
+_NOT_CONTENT = ("source", "warnings", "entered", "unit_question")
 _BY_JOINT = ("clearance_in", "gauge_u_by_joint_in", "axial_float_in")
 
 

@@ -4,27 +4,32 @@ from __future__ import annotations
 
 import os
 import re
+import stat
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from datetime import date
-from functools import cached_property
+from datetime import date, timedelta
+from functools import cached_property, partial
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected, Verdict
 from mlg_troubleshoot.decision.chronology import Moment, contradictions, in_order
-from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.decision.order import WORST_FIRST
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.records import ReadOptions, admit
+from mlg_troubleshoot.records.gate import judge_text
+from mlg_troubleshoot.records.rows import place_in_file
 from mlg_troubleshoot.store import (
     Added,
+    Broken,
     Kind,
     Record,
     Store,
@@ -42,6 +47,10 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.reporting import WrittenReport
 
 GearKey = tuple[str, str]
+# Letters of a hash by which a record may be named. [1]
+_LEAST_OF_A_HASH = 6
+# An exported chain, which is judged in 5 s, and its longest line. [bytes, characters]
+_MOST_BYTES, _LONGEST_LINE = 120_000_000, 4_000_000
 # Where a forecast stands between the last inspection and the horizon. [1]
 _AHEAD = np.concatenate([[0.0], np.geomspace(0.00125, 1.0, 28)])
 # Where the gear's model is asked about the worst case of clearances that go on to wear. [landings]
@@ -165,14 +174,38 @@ def keep(
     """
     judged = [j for j in result.judgements if isinstance(j, Assessment)]
     tails = _settled_tails(judged, store, same_tail)
+    written = [replace(j.inspection, tail_no=tails.get(j.inspection.tail_no, j.inspection.tail_no)) for j in judged]
+    found = [inspection_record(inspection) for inspection in _under_first_ids(written, store)]
+    known = store.known([record.identity_hash for record in found])
     records: list[Record] = []
-    for assessment in judged:
-        written = assessment.inspection
-        inspection = replace(written, tail_no=tails.get(written.tail_no, written.tail_no))
-        records.append(inspection_record(inspection))
-        records.append(_assessment(result.gear, options, assessment, records[-1]))
+    for assessment, record in zip(judged, found, strict=True):
+        # Wherever an inspection was entered again, it is the first entry that was assessed.
+        first = known.setdefault(record.identity_hash, record)
+        records += [record, _assessment(result.gear, options, assessment, record, first)]
     added = store.add(records, lambda kept, new: new.kind is not Kind.INSPECTION or _agrees(store, kept, new))
     return Kept(added.new, added.known, tuple(warnings_of(store, {(r.tail_no, r.side) for r in records})))
+
+
+def _under_first_ids(inspections: Sequence[Inspection], store: Store) -> list[Inspection]:
+    """The same row of a renamed file has another made id: it is the inspection that was kept first."""
+    gears: set[GearKey] = set()
+    first: dict[tuple[str, ...], Record] = {}
+
+    def under_first_id(inspection: Inspection) -> Inspection:
+        row, key = place_in_file(inspection.record_id), (inspection.tail_no, inspection.side.value)
+        if not row:
+            return inspection
+        if key not in gears:
+            gears.add(key)
+            for kept in store.of_gear(*key):
+                if kept.kind is Kind.INSPECTION:
+                    first.setdefault((*key, kept.day, place_in_file(kept.record_id)), kept)
+        record = inspection_record(inspection)
+        kept = first.setdefault((*key, record.day, row), record)
+        renamed = replace(inspection, record_id=kept.record_id)
+        return renamed if same_inspection(kept, inspection_record(renamed)) else inspection
+
+    return [under_first_id(inspection) for inspection in inspections]
 
 
 def _agrees(store: Store, kept: Record, new: Record) -> bool:
@@ -183,14 +216,16 @@ def _agrees(store: Store, kept: Record, new: Record) -> bool:
     )
 
 
-def _assessment(gear: Gear, options: CheckOptions, assessment: Assessment, of: Record) -> Record:
+def _assessment(
+    gear: Gear, options: CheckOptions, assessment: Assessment, of: Record, first: Record | None = None
+) -> Record:
     from mlg_troubleshoot.reporting.json_form import kept_as_json
     from mlg_troubleshoot.reporting.provenance import program_version
 
     extension = None if options.extension is None else options.extension.describe()
     by = {"program_version": program_version(), "geometry_sha256": gear.geometry_sha256, "extension": extension}
     body = packed({**by, "result": kept_as_json(assessment)})
-    identity = (of.identity_hash.hex(), *(str(value) for value in by.values()), of.packed.hex())
+    identity = (of.identity_hash.hex(), *(str(value) for value in by.values()), (first or of).packed.hex())
     return replace(of, kind=Kind.ASSESSMENT, packed=body, identity=identity)
 
 
@@ -231,19 +266,24 @@ def lives(store: Store, tail: str | None = None, side: str | None = None) -> dic
 
 def life_of(store: Store, tail: str, side: str) -> GearLife:
     """One gear's life; a gear that nothing is kept of is a usage error that names near spellings."""
+    side = Side.parse(side).value
     found = lives(store, tail, side).get((tail, side))
     if found is None:
         near = [f"{t} {s}" for t, s in store.gears() if _tail_key(t) == _tail_key(tail)]
         raise UsageError(
-            f"nothing is kept of {tail} {side} in {store.place}",
+            f"no records of {tail} {side} in {store.place}",
             f"There is {', '.join(near)}." if near else "See which gears are kept: mlg history",
         )
+    for seen in found.inspections:
+        # What stands there and cannot be read is named before anything is added to it.
+        _ = seen.inspection
     return found
 
 
 def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
     seen: dict[str, Seen] = {}
     events: dict[str, Record] = {}
+    records = _readable_or_not_void(records)
     for record in records:
         if record.kind is Kind.INSPECTION:
             seen[record.digest] = Seen(record)
@@ -272,6 +312,26 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
         tuple(r for r in events.values() if r.kind is Kind.OUTCOME),
         _disagreements(key, counted, moments),
     )
+
+
+def _readable_or_not_void(records: Sequence[Record]) -> list[Record]:
+    """Leave out what is void and cannot be read: that is how such a record is put aside."""
+    void: set[str] = set()
+    kept = []
+    # A record is void by a later one.
+    for record in reversed(records):
+        if record.digest not in void or _is_readable(record):
+            kept.append(record)
+            if record.kind is Kind.VOID:
+                void.add(record.body["voids"])
+    return kept[::-1]
+
+
+def _is_readable(record: Record) -> bool:
+    try:
+        return bool(record.body)
+    except StoreError:
+        return False
 
 
 def _record_of(event: Seen | Record) -> Record:
@@ -322,7 +382,7 @@ def find(store: Store, record_id: str) -> Record:
         for record in (*(s.record for s in life.inspections), *life.repairs, *life.outcomes)
     ]
     found = [r for r in live if r.record_id == record_id and r.kind in (Kind.INSPECTION, Kind.CORRECTION)]
-    found = found or [r for r in live if len(record_id) >= 6 and r.digest.startswith(record_id.lower())]
+    found = found or [r for r in live if len(record_id) >= _LEAST_OF_A_HASH and r.digest.startswith(record_id.lower())]
     if len(found) == 1:
         return found[0]
     if not found:
@@ -331,11 +391,40 @@ def find(store: Store, record_id: str) -> Record:
     raise UsageError(f"{len(found)} records are called {record_id!r}: {named}", "Name one by the start of its hash.")
 
 
-def work(store: Store, kind: Kind, key: GearKey, day: date, work_order: str | None, **done: Any) -> Record:
+def key_of(tail: str, side: str) -> GearKey:
+    """Judge which gear is meant as a table would: a tail number, and a side in any spelling."""
+    found = admit({**_ANY, "tail_no": tail, "side": side}, ReadOptions())
+    return found.tail_no, found.side.value
+
+
+def work(
+    store: Store,
+    kind: Kind,
+    gear: GearKey,
+    day: date | str,
+    work_order: str | None,
+    landings: float | str | None = None,
+    joints: Sequence[int] | None = None,
+) -> Record:
     """Record that joints were restored, or the reversing valve re-rigged: the joints wear on, the plunger moved."""
+    key = key_of(*gear)
+    said = {"inspection_date": day, "gear_landings": landings, "work_order": work_order}
+    flags = {"inspection_date": "--date", "gear_landings": "--landings", "work_order": "--work-order"}
+    labels = {column: f"{flags[column]} {str(value)!r}" for column, value in said.items()}
+    found = admit({**_ANY, **said}, ReadOptions(), labels)
+    done = found.inspection_date
+    if done is None or done > date.today() + timedelta(days=1):
+        wrong = "says no day" if done is None else "is after tomorrow"
+        raise UsageError(f"{labels['inspection_date']} {wrong}", "Give the day on which it was done.")
     life_of(store, *key)
-    body = packed({**done, "work_order": work_order})
-    return _added(store, Record(kind, work_order or "", *key, day.isoformat(), body))
+    body: dict[str, Any] = {"landings": found.gear_landings, "work_order": work_order}
+    if joints is not None:
+        body["joints"] = list(joints)
+    return _added(store, Record(kind, work_order or "", *key, done.isoformat(), packed(body)))
+
+
+# What a row must have besides what is to be judged.
+_ANY = {"record_id": "-", "tail_no": "-", "side": "LH", "clearance_convention": "RADIAL"}
 
 
 def correct(store: Store, record_id: str, result: CheckResult, options: CheckOptions) -> Record:
@@ -360,15 +449,23 @@ def correct(store: Store, record_id: str, result: CheckResult, options: CheckOpt
 
 def void(store: Store, record_id: str, why: str) -> Record:
     """Append that a record does not count."""
-    wrong = find(store, record_id)
-    if not why.strip():
-        raise UsageError("--why is empty", "Say why the record does not count.")
+    judge_text("--why", why, "Say why the record does not count.")
+    wrong = _unreadable(store, record_id) or find(store, record_id)
     body = {"voids": wrong.digest, "why": why}
     return _added(store, replace(wrong, kind=Kind.VOID, packed=packed(body), identity=()))
 
 
+def _unreadable(store: Store, digest: str) -> Record | None:
+    """The record of which the hash begins so, if its content cannot be read."""
+    if len(digest) < _LEAST_OF_A_HASH:
+        return None
+    found = [record for record in store.all() if record.digest.startswith(digest.lower())]
+    return found[0] if len(found) == 1 and not _is_readable(found[0]) else None
+
+
 def outcome(store: Store, record_id: str, found: str, joint: int | None) -> Record:
     """Record what was found after the advice."""
+    judge_text("--found", found, "Say what was found.")
     of = find(store, record_id)
     if of.kind not in (Kind.INSPECTION, Kind.CORRECTION):
         raise UsageError(f"{record_id!r} is a {of.kind}", "Give the record of the inspection that advised.")
@@ -766,7 +863,7 @@ def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
         if record.kind is Kind.ASSESSMENT:
             result = body["result"]
             event |= {name: result.get(name) for name in ("verdict", "predicted_displacement_in", "margin_in")}
-            event |= {name: body[name] for name in ("program_version", "geometry_sha256", "extension")}
+            event |= {name: body.get(name) for name in ("program_version", "geometry_sha256", "extension")}
         elif record.kind in (Kind.INSPECTION, Kind.CORRECTION):
             event |= {"counts": record.digest in current, "supersedes": body.get("supersedes")}
             event["clearance_in"] = body["inspection"].get("clearance_in", {})
@@ -789,12 +886,62 @@ def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
 
 
 def import_file(store: Store, file: Path) -> Added:
-    """Add an exported chain."""
+    """Add an exported chain from a regular file of sane size."""
+    remedy = "Give a file written by: mlg history export"
     try:
-        with file.open(encoding="utf-8") as lines:
-            return store.restore(lines, file.name)
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"{file} cannot be read: {error}", "Give a file written by: mlg history export") from error
+        # A pipe that nobody writes to would be waited for.
+        with os.fdopen(os.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), encoding="utf-8") as chain:
+            found = os.fstat(chain.fileno())
+            if not stat.S_ISREG(found.st_mode):
+                raise UsageError(f"{file} is not a regular file", remedy)
+            if found.st_size > _MOST_BYTES:
+                raise UsageError(f"{file} has {found.st_size} bytes, at most {_MOST_BYTES} are read", remedy)
+            return store.restore(_lines(chain, file.name), file.name)
+    except (OSError, ValueError) as error:
+        raise UsageError(f"{file} cannot be read: {error}", remedy) from error
+
+
+def _lines(chain: TextIO, name: str) -> Iterator[str]:
+    for number, line in enumerate(iter(partial(chain.readline, _LONGEST_LINE), ""), 1):
+        if len(line) == _LONGEST_LINE:
+            raise StoreError(
+                f"{name}, line {number} has more than {_LONGEST_LINE} characters; nothing was imported", "Export again."
+            )
+        yield line
+
+
+@dataclass(frozen=True, slots=True)
+class Verified:
+    """What a walk along the chain showed.
+
+    ``count`` records fit, the hash of the last of them is ``last``, and that of number ``expected`` is the one that was
+    asked for (None if there is none); ``wrong`` says what else departs from a store as it should be.
+    """
+
+    count: int
+    last: str
+    broken: Broken | None
+    expected: int | None
+    wrong: tuple[str, ...]
+
+
+def verify(store: Store, expect: str | None = None) -> Verified:
+    """Walk the chain, read every content that is not void, and look whether a hash noted before still stands there."""
+    last, expected = "", None
+    wrong: dict[str, str] = {}
+
+    def visit(record: Record) -> None:
+        nonlocal last, expected
+        last = record.digest
+        expected = record.seq if last == expect else expected
+        try:
+            if record.body and record.kind is Kind.VOID:
+                wrong.pop(record.body["voids"], None)
+        except StoreError as error:
+            wrong[last] = error.message
+
+    count, broken = store.verify(visit)
+    return Verified(count, last, broken, expected, (*store.departures(), *wrong.values()))
 
 
 # Inspections that stand side by side on the page of a gear's life.

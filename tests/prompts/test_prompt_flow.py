@@ -51,7 +51,10 @@ def test_no_question_of_the_heading_has_a_default(flow: Flow, place: int) -> Non
     assert "Enter alone enters nothing" in said(after)
 
 
-@pytest.mark.parametrize(("typed", "side"), [("l", Side.LH), ("R", Side.RH), ("lh", Side.LH), ("right", Side.RH)])
+@pytest.mark.parametrize(
+    ("typed", "side"),
+    [("l", Side.LH), ("R", Side.RH), ("lh", Side.LH), ("right", Side.RH), ("port", Side.LH), ("L/H", Side.LH)],
+)
 def test_a_side_is_one_key_or_its_name(flow: Flow, typed: str, side: Side) -> None:
     assert play(flow, ["N1", typed], Answers()).state.answers.side is side
 
@@ -443,7 +446,15 @@ def test_the_optional_answers_fit_on_one_line(flow: Flow) -> None:
 
 @pytest.mark.parametrize(
     ("typed", "stands_in"),
-    [("p .041", 0.041), ("p +.041", 0.041), ("p −41 thou", -0.041), ("p=1mm", 1 / 25.4), ("plunger 0.1", 0.1)],
+    [
+        ("p .041", 0.041),
+        ("p +.041", 0.041),
+        ("p −41 thou", -0.041),
+        ("p ‐.041", -0.041),
+        ("p －.041", -0.041),
+        ("p=1mm", 1 / 25.4),
+        ("plunger 0.1", 0.1),
+    ],
 )
 def test_the_plunger_displacement_is_signed(gear: Gear, flow: Flow, typed: str, stands_in: float) -> None:
     assert plunger_in(play(flow, [*TEN, typed]).state.answers, gear) == pytest.approx(stands_in)

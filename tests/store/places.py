@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import shutil
 import socket
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from datetime import date, timedelta
 from pathlib import Path
@@ -50,6 +51,16 @@ def records(first: int, last: int) -> list[Record]:
             Record(Kind.ASSESSMENT, kept.record_id, kept.tail_no, kept.side, kept.day, body, identity),
         ]
     return found
+
+
+def table(folder: Path, *rows: Mapping[str, str], name: str = "table.csv") -> Path:
+    """Write rows as a CSV file."""
+    path = folder / name
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, fieldnames=list(dict.fromkeys(c for r in rows for c in r)))
+        writer.writeheader()
+        writer.writerows(rows)
+    return path
 
 
 @contextmanager

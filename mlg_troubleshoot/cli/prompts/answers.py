@@ -11,7 +11,7 @@ from mlg_troubleshoot.cli.prompts.lines import Line, Tone, line
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, WrittenLength, parse_length
+from mlg_troubleshoot.units import MINUS, ClearanceConvention, LengthUnit, WrittenLength, parse_length
 
 # Columns that an entry may have beside its heading and its clearances, in the order in which they are shown.
 LENGTHS = ("plunger_displacement", "margin")
@@ -169,9 +169,9 @@ def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> 
 
 # The optional answers at the end, typed on one line: what the gear did, the plunger, the margin.
 _ITEM = re.compile(
-    r"""\s*[,;]?\s*(?:
+    rf"""\s*[,;]?\s*(?:
         (?P<outcome>failed|fail|f|retracted|r|x)(?![a-z])
-      | (?P<name>plunger|margin|p|m)\s*[=:]?\s*(?P<sign>[-+\u2212\u2013]?)\s*
+      | (?P<name>plunger|margin|p|m)\s*[=:]?\s*(?P<sign>[{MINUS}+]?)\s*
         (?P<number>\d+[.,]\d+|\d+\.|[.,]?\d+)
         \s*(?P<unit>(?:in|inch|inches|thou|thous|mils?|mm)(?![a-z])|["″”])?
     )\s*""",
@@ -192,7 +192,7 @@ def read_more(answers: Answers, typed: str, gear: Gear) -> tuple[Answers, tuple[
         at = item.end()
         if item["outcome"] is None:
             column = LENGTHS[item["name"][0].lower() == "m"]
-            sign = "-" if item["sign"] in ("-", "\u2212", "\u2013") else ""
+            sign = "-" if item["sign"] and item["sign"] in MINUS else ""
             written = f"{sign}{item['number']} {item['unit'] or answers.unit or LengthUnit.INCH}"
             judge_more(column, written, answers.unit, gear)
             answers = answers.with_more(**{column: written})

@@ -159,4 +159,6 @@ def _stopped(terminal: RichTerminal, saver: _Saver) -> EntryInterruptedError:
 
 
 def _record_id(session: Session) -> str:
-    return f"{session.answers.tail_no}-{session.answers.side}-{session.started:%Y%m%d-%H%M%S}"
+    from mlg_troubleshoot.records import made_record_id
+
+    return made_record_id(session.answers.tail_no, session.answers.side, session.started)

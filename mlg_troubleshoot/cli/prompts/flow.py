@@ -106,7 +106,6 @@ class Turn:
 
 _WORDS = {"b": "b", "back": "b", "?": "?", "help": "?", "q": "q", "quit": "q"}
 _YES, _NO = ("y", "yes"), ("n", "no")
-_SIDES = {**dict.fromkeys(("l", "lh", "left"), Side.LH), **dict.fromkeys(("r", "rh", "right"), Side.RH)}
 _UNITS = {"i": LengthUnit.INCH, "t": LengthUnit.THOU, "m": LengthUnit.MILLIMETRE}
 _CONVENTIONS = {c.value[0].lower(): c for c in ClearanceConvention}
 
@@ -172,7 +171,7 @@ class Flow:
         return self.begin(replace(answers, tail_no=typed or answers.tail_no), state.from_review)
 
     def _side(self, state: State, typed: str) -> Turn:
-        side = _SIDES.get(typed.lower()) if typed else state.answers.side
+        side = Side.spelt(typed) if typed else state.answers.side
         if side is None:
             return _again(state, _not_taken(typed, "Type l for the left gear or r for the right."))
         return self.begin(replace(state.answers, side=side), state.from_review)

@@ -1,0 +1,279 @@
+"""Where a store may be, how it is named without its password, and what verify says of it."""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.store import Store, StoreError
+from tests.cli.conftest import Run, mlg, row
+
+from . import places
+
+OLD = Path(__file__).parent / "data" / "version-1.sqlite"
+ID = 0x6D6C6731
+AWAY = "127.0.0.1:1/mlg"
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    Store(tmp_path / "store.sqlite").add(places.records(1, 4))
+    return tmp_path / "store.sqlite"
+
+
+def keep(folder: Path, where: object) -> Run:
+    return mlg("check", places.table(folder, row()), "--keep", "--store", where)
+
+
+@pytest.mark.parametrize(
+    "where",
+    [
+        "",
+        "  ",
+        ":memory:",
+        "sqlite://",
+        "sqlite:///",
+        "sqlite:///:memory:",
+        "sqlite:///x?mode=memory",
+        "sqlite://host/x",
+    ],
+)
+def test_a_place_where_nothing_would_stay_is_refused(tmp_path: Path, where: str) -> None:
+    run = keep(tmp_path, where)
+    assert run.code == 2
+    assert "nothing would be kept" in run.err
+
+
+def test_a_place_with_a_zero_byte_is_refused() -> None:
+    with pytest.raises(UsageError, match="nothing would be kept"):
+        Store("x\0")
+
+
+@pytest.mark.parametrize("command", [("history",), ("history", "verify"), ("fleet",)])
+def test_a_pipe_is_not_a_store(tmp_path: Path, command: tuple[str, ...]) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    run = mlg(*command, "--store", tmp_path / "pipe")
+    assert run.code == 2
+    assert "not a file" in run.err
+
+
+@pytest.mark.parametrize("where", ["/dev/null", "/dev/zero", "/"])
+def test_a_device_or_a_folder_is_not_a_store(tmp_path: Path, where: str) -> None:
+    assert keep(tmp_path, where).code == 2
+
+
+def test_the_home_folder_is_found_behind_quotes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.chdir(tmp_path)
+    assert keep(tmp_path, "~/store.sqlite").code == 0
+    assert (tmp_path / "home" / "store.sqlite").exists()
+    assert not (tmp_path / "~").exists()
+
+
+def test_a_url_of_a_file_is_that_file(place: Path) -> None:
+    assert Store(f"sqlite:///{place}").file == place
+    assert Store(f"sqlite:///{place}").verify() == (6, None)
+
+
+def test_reading_at_the_url_of_no_file_makes_none(tmp_path: Path) -> None:
+    assert Store(f"sqlite:///{tmp_path}/none.sqlite").gears() == []
+    assert not (tmp_path / "none.sqlite").exists()
+
+
+# Another program's files.
+
+
+def application_id(path: Path) -> int:
+    with sqlite3.connect(path) as raw:
+        return int(raw.execute("PRAGMA application_id").fetchone()[0])
+
+
+def test_a_new_store_is_marked(place: Path) -> None:
+    assert application_id(place) == ID
+
+
+def test_a_store_of_before_is_taken_and_marked_by_the_first_that_is_kept(tmp_path: Path) -> None:
+    copied = tmp_path / "store.sqlite"
+    copied.write_bytes(OLD.read_bytes())
+    assert application_id(copied) == 0
+    assert mlg("history", "verify", "--store", copied).code == 0
+    assert application_id(copied) == 0
+    assert keep(tmp_path, copied).code == 0
+    assert application_id(copied) == ID
+
+
+@pytest.mark.parametrize("command", ["history", "keep", "verify"])
+@pytest.mark.parametrize("marked", [0, 252006674])
+def test_the_database_of_another_program_is_not_taken_as_a_store(tmp_path: Path, command: str, marked: int) -> None:
+    other = tmp_path / "other.sqlite"
+    with sqlite3.connect(other) as raw:
+        raw.execute("CREATE TABLE accounts (name TEXT)")
+        raw.execute(f"PRAGMA application_id = {marked}")
+    before = other.read_bytes()
+    runs = {"history": ("history",), "verify": ("history", "verify")}
+    run = keep(tmp_path, other) if command == "keep" else mlg(*runs[command], "--store", other)
+    assert run.code == 5
+    assert "a database of another program" in run.err
+    assert "What to do: Give --store the name of a new file" in run.err
+    assert other.read_bytes() == before
+
+
+def test_an_empty_database_that_another_program_has_marked_is_not_taken(tmp_path: Path) -> None:
+    with sqlite3.connect(tmp_path / "other.sqlite") as raw:
+        raw.execute("PRAGMA application_id = 252006674")
+    assert keep(tmp_path, tmp_path / "other.sqlite").code == 5
+
+
+def test_a_file_that_is_not_a_database_is_refused_with_what_to_give(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("notes " * 500, encoding="utf-8")
+    run = keep(tmp_path, tmp_path / "notes.txt")
+    assert run.code == 5
+    assert "Give --store the name of a new file" in run.err
+
+
+# What verify finds beside the chain.
+
+
+def changed(place: Path, *statements: str) -> None:
+    with sqlite3.connect(place) as raw:
+        for statement in statements:
+            raw.execute(statement)
+
+
+NO_DELETE = "CREATE TRIGGER mlg_no_delete BEFORE DELETE ON mlg_records BEGIN SELECT 1; END"
+
+
+@pytest.mark.parametrize(
+    ("statements", "named"),
+    [
+        (("DROP TRIGGER mlg_no_update",), "the trigger mlg_no_update was dropped or changed"),
+        (("DROP TRIGGER mlg_no_delete", NO_DELETE), "the trigger mlg_no_delete was dropped or changed"),
+        (("CREATE TABLE accounts (name TEXT)",), "the table 'accounts' is not one of a store"),
+        (("CREATE VIEW seen AS SELECT 1",), "the view 'seen' is not one of a store"),
+        (
+            ("CREATE TRIGGER quiet AFTER INSERT ON mlg_meta BEGIN SELECT 1; END",),
+            "the trigger 'quiet' is not one of a store",
+        ),
+    ],
+)
+def test_what_a_store_should_have_and_has_not_is_named(place: Path, statements: tuple[str, ...], named: str) -> None:
+    changed(place, *statements)
+    run = mlg("history", "verify", "--store", place)
+    assert run.code == 1
+    assert named in run.out
+
+
+def test_nothing_is_named_in_a_store_that_is_as_it_should_be(place: Path) -> None:
+    run = mlg("history", "verify", "--store", place)
+    assert (run.code, run.out.count("\n")) == (0, 2)
+
+
+def last_hash(place: Path) -> str:
+    return Store(place).all()[-1].digest
+
+
+def test_verify_prints_the_last_hash_and_the_count(place: Path) -> None:
+    told = mlg("history", "verify", "--store", place).out
+    assert told == f"6 records fit the chain.\nThe last hash is {last_hash(place)}\n"
+
+
+def test_the_hash_that_is_the_last_is_as_expected(place: Path) -> None:
+    run = mlg("history", "verify", "--store", place, "--expect", last_hash(place))
+    assert run.code == 0
+    assert "The expected hash is the last one." in run.out
+
+
+def test_a_hash_with_records_after_it_is_as_expected_and_they_are_counted(place: Path) -> None:
+    noted = last_hash(place)
+    Store(place).add(places.records(4, 6))
+    run = mlg("history", "verify", "--store", place, "--expect", noted.upper())
+    assert run.code == 0
+    assert "The expected hash is that of record 6; 4 were added since." in run.out
+
+
+def test_records_taken_away_from_the_end_are_found_by_the_hash_noted_before(place: Path) -> None:
+    noted = last_hash(place)
+    changed(place, "DROP TRIGGER mlg_no_delete", "DELETE FROM mlg_records WHERE seq > 4")
+    run = mlg("history", "verify", "--store", place, "--expect", noted)
+    assert run.code == 1
+    assert "4 records fit the chain." in run.out
+    assert "The expected hash is not in the chain" in run.out
+
+
+def test_an_older_copy_in_place_of_the_store_is_found_by_the_hash_noted_before(place: Path) -> None:
+    older = place.read_bytes()
+    Store(place).add(places.records(4, 6))
+    noted = last_hash(place)
+    place.write_bytes(older)
+    assert mlg("history", "verify", "--store", place, "--expect", noted).code == 1
+
+
+def test_of_a_store_that_is_gone_the_expected_hash_is_missed(tmp_path: Path) -> None:
+    assert mlg("history", "verify", "--store", tmp_path / "gone.sqlite", "--expect", "0" * 64).code == 1
+
+
+@pytest.mark.parametrize("noted", ["", "abc", "x" * 64])
+def test_what_is_not_a_hash_cannot_be_expected(place: Path, noted: str) -> None:
+    assert mlg("history", "verify", "--store", place, "--expect", noted).code == 2
+
+
+# Passwords.
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        f"postgresql+psycopg://anna:S3cret9@{AWAY}",
+        f"postgresql+psycopg://anna@{AWAY}?password=S3cret9",
+        f"postgresql+psycopg://anna@{AWAY}?sslpassword=S3cret9",
+        f"postgresql+nosuch://anna:S3cret9@{AWAY}",
+        f"mysql://anna:S3cret9@{AWAY}",
+        "postgresql+psycopg://anna:S3cret9@127.0.0.1:notaport/mlg",
+        f"postgresql+psycopg://anna:x@S3cret9@{AWAY}",
+        f"postgresql+psycopg://anna:x/S3cret9@{AWAY}",
+        "postgresql+psycopg://anna:S3cret9",
+        f"sqlite://anna:S3cret9@{AWAY}",
+    ],
+)
+def test_a_password_is_never_shown(tmp_path: Path, url: str) -> None:
+    for run in (
+        keep(tmp_path, url),
+        mlg("history", "--store", url),
+        mlg("history", "correct", "R1", places.table(tmp_path, row()), "--store", url),
+    ):
+        assert run.code in (2, 5)
+        assert "S3cret9" not in run.out + run.err
+        assert "***" in run.err
+
+
+def test_what_a_driver_says_is_shown_without_the_password() -> None:
+    store = Store(f"postgresql+psycopg://anna:S3cret9@{AWAY}?password=0ther")
+    assert store._at.masked("no S3cret9 and no 0ther here") == "no *** and no *** here"
+
+
+def test_who_and_where_a_store_is_stays_readable() -> None:
+    shown = Store(f"postgresql+psycopg://anna:S3cret9@{AWAY}?sslmode=require&password=x").place
+    assert shown == f"postgresql+psycopg://anna:***@{AWAY}?password=***&sslmode=require"
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "postgresql+psycopg://anna:S3cret9@127.0.0.1:notaport/mlg",
+        f"postgresql+nosuch://anna@{AWAY}",
+        f"postgresql+psycopg://anna:x@y@{AWAY}",
+    ],
+)
+def test_a_url_that_cannot_be_meant_is_a_usage_error(url: str) -> None:
+    run = mlg("history", "--store", url)
+    assert run.code == 2
+    assert "What to do:" in run.err
+
+
+def test_a_server_that_cannot_be_reached_is_not_a_usage_error() -> None:
+    with pytest.raises(StoreError):
+        Store(f"postgresql+psycopg://anna@{AWAY}", patience_s=1).gears()

@@ -1,0 +1,176 @@
+"""A side, a day, a number and an id are the same wherever they are typed."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from datetime import date, datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from mlg_troubleshoot.decision.inspection import Side
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.records import made_record_id
+from mlg_troubleshoot.store import Record, Store, inspection_from, inspection_record
+from mlg_troubleshoot.workflows import history
+from tests.cli.conftest import Run, mlg, row
+
+from . import places
+
+BY_HAND = ("check", "--tail", "N1", "--convention", "RADIAL", "--set", "3=0.001in", "-q", "--keep")
+SPELLINGS = ["LH", "lh", "left", "L", "L/H", "Left side", "port", "MLG L", "left gear"]
+REPAIR = ("history", "repair", "N1", "LH", "--joint", "3")
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("MLG_STORE", str(tmp_path / "store.sqlite"))
+    Store().add(places.records(1, 2))
+    return tmp_path / "store.sqlite"
+
+
+def last(place: Path) -> Record:
+    return Store(place).all()[-1]
+
+
+@pytest.mark.parametrize("side", SPELLINGS)
+def test_a_side_is_the_same_gear_in_a_flag_and_as_an_argument(place: Path, side: str) -> None:
+    assert mlg(*BY_HAND, "--side", side).code in (0, 1)
+    assert last(place).side == "LH"
+    assert len(mlg("history", "N1", side, "--no-forecast", "--json").json["events"]) == 4
+    assert mlg("history", "repair", "N1", side, "--joint", "3", "--date", "2026-02-01").code == 0
+    assert mlg("history", "rerig", "N1", side, "--date", "2026-02-01").code == 0
+    assert history.life_of(Store(place), "N1", side).key == ("N1", "LH")
+
+
+@pytest.mark.parametrize("side", ["XX", "middle", "", "\udcff"])
+def test_what_is_not_a_side_is_refused_wherever_it_is_typed(place: Path, side: str) -> None:
+    for command in (
+        (*BY_HAND, "--side", side),
+        ("history", "N1", side),
+        ("history", "rerig", "N1", side, "--date", "2026-02-01"),
+    ):
+        assert mlg(*command).code == 2
+
+
+def test_a_side_from_python_is_refused_with_the_same_words() -> None:
+    with pytest.raises(UsageError, match="side 'XX' is not LH or RH"):
+        Side.parse("XX")
+
+
+def test_a_record_id_that_was_made_by_flags_says_tail_side_and_time(place: Path) -> None:
+    mlg(*BY_HAND, "--side", "left")
+    assert re.fullmatch(r"N1-LH-\d{8}-\d{6}", last(place).record_id)
+
+
+def test_made_record_ids_have_one_format() -> None:
+    assert made_record_id("N1", Side.RH, datetime(2026, 3, 4, 5, 6, 7)) == "N1-RH-20260304-050607"
+
+
+@pytest.mark.parametrize("day", ["2026-03-04", "4-Mar-2026", "4 Mar 2026", "March 4, 2026"])
+def test_a_day_is_written_as_in_a_cell(place: Path, day: str) -> None:
+    assert mlg(*REPAIR, "--date", day).code == 0
+    assert last(place).day == "2026-03-04"
+
+
+def refused(*more: object, command: tuple[str, ...] = REPAIR) -> Run:
+    run = mlg(*command, *more)
+    assert run.code == 2, run.err
+    assert len(Store().all()) == 2
+    return run
+
+
+@pytest.mark.parametrize(
+    "day", ["20260101", "9999-12-31", "0001-01-01", "1949-12-31", "2026-02-30", "03/04/2026", "n/a", "", "4 Mar 1026"]
+)
+@pytest.mark.parametrize("command", [REPAIR, ("history", "rerig", "N1", "LH")])
+def test_a_day_that_cannot_be_meant_is_refused(place: Path, command: tuple[str, ...], day: str) -> None:
+    assert f"--date {day!r}" in refused("--date", day, command=command).err
+
+
+def test_work_can_be_dated_until_tomorrow_and_not_later(place: Path) -> None:
+    today = date.today()
+    assert "is after tomorrow" in refused("--date", (today + timedelta(days=2)).isoformat()).err
+    assert mlg(*REPAIR, "--date", (today + timedelta(days=1)).isoformat()).code == 0
+
+
+@pytest.mark.parametrize("landings", ["inf", "-inf", "nan", "1e400", "1e308", "-1", "many", "1,5"])
+def test_landings_that_cannot_be_meant_are_refused(place: Path, landings: str) -> None:
+    assert f"--landings '{landings}'" in refused("--date", "2026-02-01", f"--landings={landings}").err
+
+
+def test_landings_are_kept_as_a_number(place: Path) -> None:
+    mlg(*REPAIR, "--date", "2026-02-01", "--landings", "805")
+    assert last(place).body == {"joints": [3], "landings": 805.0, "work_order": None}
+
+
+@pytest.mark.parametrize("found", ["", "  ", "\udcff"])
+def test_an_outcome_without_words_is_refused(place: Path, found: str) -> None:
+    assert "--found" in refused("--found", found, command=("history", "outcome", "R1")).err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("history", "\udcff", "LH"),
+        ("history", "\udcff"),
+        ("history", "repair", "\udcff", "LH", "--joint", "3", "--date", "2026-02-01"),
+        ("history", "rerig", "\udcff", "LH", "--date", "2026-02-01"),
+        ("history", "rerig", "N1", "LH", "--date", "2026-02-01", "--work-order", "\udcff"),
+        ("history", "void", "R1", "--why", "\udcff"),
+        ("history", "void", "\udcff", "--why", "x"),
+    ],
+)
+def test_what_is_not_utf8_is_refused_as_usage(place: Path, command: tuple[str, ...]) -> None:
+    refused(command=command)
+
+
+# The same inspection from another file.
+
+
+def kept(folder: Path, name: str, *rows: dict[str, str]) -> str:
+    run = mlg("check", places.table(folder, *rows, name=name), "--keep")
+    assert run.code in (0, 1), run.err
+    return run.err
+
+
+ROWS = [row(record_id=f"W{n}", tail_no="N7", inspection_date="2025-03-03") for n in range(3)]
+NAMELESS = [{k: v for k, v in each.items() if k != "record_id"} | {"tail_no": f"N{n}"} for n, each in enumerate(ROWS)]
+
+
+@pytest.mark.parametrize("rows", [ROWS, NAMELESS], ids=["with ids", "with made ids"])
+def test_the_same_inspections_from_a_renamed_file_add_nothing(
+    tmp_path: Path, place: Path, rows: list[dict[str, str]]
+) -> None:
+    assert "6 new records, 0 known" in kept(tmp_path, "one.csv", *rows)
+    assert "0 new records, 6 known" in kept(tmp_path, "other.csv", *rows)
+
+
+@pytest.mark.parametrize("rows", [ROWS, NAMELESS], ids=["with ids", "with made ids"])
+def test_the_same_inspections_from_two_files_of_one_call_are_kept_once(
+    tmp_path: Path, place: Path, rows: list[dict[str, str]]
+) -> None:
+    files = [places.table(tmp_path, *rows, name=name) for name in ("one.csv", "other.csv")]
+    assert "6 new records, 6 known" in mlg("check", *files, "--keep").err
+
+
+def test_another_inspection_of_the_day_in_a_file_without_ids_is_kept(tmp_path: Path, place: Path) -> None:
+    kept(tmp_path, "one.csv", NAMELESS[0])
+    assert "2 new records, 0 known" in kept(tmp_path, "other.csv", {**NAMELESS[0], "clearance_3_in": "0.002"})
+
+
+def test_the_identity_of_an_assessment_is_that_of_earlier_versions(tmp_path: Path, place: Path) -> None:
+    kept(tmp_path, "one.csv", ROWS[0])
+    inspection, assessment = Store(place).all()[-2:]
+    by = [str(assessment.body[name]) for name in ("program_version", "geometry_sha256", "extension")]
+    of = inspection_record(inspection_from(inspection)).identity_hash.hex()
+    before = replace(assessment, identity=(of, *by, inspection.packed.hex()))
+    assert Store(place).known([before.identity_hash])
+
+
+def test_bodies_and_hashes_of_records_are_those_of_earlier_versions(tmp_path: Path) -> None:
+    (tmp_path / "old.sqlite").write_bytes((Path(__file__).parent / "data" / "version-1.sqlite").read_bytes())
+    Store(tmp_path / "new.sqlite").add(places.records(1, 4))
+    old, new = (list(Store(tmp_path / f"{name}.sqlite").export()) for name in ("old", "new"))
+    assert old == new
