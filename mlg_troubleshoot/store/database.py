@@ -329,6 +329,10 @@ class Store:
             others = connection.exec_driver_sql("SELECT count(*) FROM sqlite_master").scalar_one()
             if others or found not in (0, APPLICATION_ID):
                 raise StoreError(f"{self.place} is a database of another program: nothing was read or kept", _FOREIGN)
+        # A view under the name of a table may compute without end.
+        views = connection.exec_driver_sql("SELECT name FROM sqlite_master WHERE type = 'view'").scalars()
+        if not _tables.tables.keys().isdisjoint(views):
+            raise StoreError(f"{self.place} has a view in place of a table: nothing was read or kept", _FOREIGN)
         if writing and found == 0:
             connection.exec_driver_sql(f"PRAGMA application_id = {APPLICATION_ID}")
 

@@ -167,6 +167,19 @@ def test_what_a_store_should_have_and_has_not_is_named(place: Path, statements: 
     assert named in run.out
 
 
+ENDLESS = (
+    "CREATE VIEW mlg_records AS WITH RECURSIVE n(seq) AS (SELECT 1 UNION ALL SELECT seq + 1 FROM n) "
+    "SELECT n.seq, o.* FROM n, mlg_old AS o"
+)
+
+
+def test_a_view_in_place_of_a_table_is_refused_and_not_computed(place: Path) -> None:
+    changed(place, "ALTER TABLE mlg_records RENAME TO mlg_old", ENDLESS)
+    run = mlg("history", "--store", place)
+    assert run.code == 5
+    assert "a view in place of a table" in run.err
+
+
 def test_nothing_is_named_in_a_store_that_is_as_it_should_be(place: Path) -> None:
     run = mlg("history", "verify", "--store", place)
     assert (run.code, run.out.count("\n")) == (0, 2)
