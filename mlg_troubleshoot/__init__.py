@@ -48,10 +48,10 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear as Gear
     from mlg_troubleshoot.gear.gear_file import load_gear as load_gear
     from mlg_troubleshoot.gear.gear_file import shipped_gears as shipped_gears
+    from mlg_troubleshoot.indices.index_table import load_index_table as load_index_table
+    from mlg_troubleshoot.paper.study import StudyFindings as StudyFindings
+    from mlg_troubleshoot.paper.study import StudyOptions as StudyOptions
     from mlg_troubleshoot.schemas import schema as schema
-    from mlg_troubleshoot.studies.index_table import load_index_table as load_index_table
-    from mlg_troubleshoot.studies.study import StudyFindings as StudyFindings
-    from mlg_troubleshoot.studies.study import StudyOptions as StudyOptions
     from mlg_troubleshoot.units import ClearanceConvention as ClearanceConvention
     from mlg_troubleshoot.units import LengthUnit as LengthUnit
     from mlg_troubleshoot.units import parse_length as parse_length
@@ -75,8 +75,8 @@ _HOME = {
     "gear.gear": "Gear",
     "gear.gear_file": "load_gear shipped_gears",
     "schemas": "schema",
-    "studies.index_table": "load_index_table",
-    "studies.study": "StudyFindings StudyOptions",
+    "indices.index_table": "load_index_table",
+    "paper.study": "StudyFindings StudyOptions",
     "units": "ClearanceConvention LengthUnit parse_length",
     "workflows.check": "CheckOptions CheckResult check check_files predict write_reports",
     "workflows.diagnose": "DiagnoseOptions DiagnoseResult diagnose_files load_model_extension",

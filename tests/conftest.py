@@ -11,7 +11,7 @@ from hypothesis import settings
 
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.studies.index_table import IndexTable, load_index_table
+from mlg_troubleshoot.indices.index_table import IndexTable, load_index_table
 
 settings.register_profile("everyday", deadline=None, max_examples=40, derandomize=True, database=None)
 settings.load_profile("everyday")

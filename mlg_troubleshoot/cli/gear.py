@@ -11,7 +11,7 @@ from mlg_troubleshoot.cli import options, output
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
-    from mlg_troubleshoot.studies.targets import Computed
+    from mlg_troubleshoot.paper.targets import Computed
 
 
 def show(
@@ -90,7 +90,7 @@ def _as_json(gear: Gear) -> dict[str, object]:
 def verify(context: typer.Context, as_json: options.Json = False, _version: options.Version = False) -> None:
     """Print every number the paper prints beside what the model gives; exit 1 if one that should hold does not."""
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.studies import verification
+    from mlg_troubleshoot.paper import verification
 
     gear = load_gear(context.obj)
     numbers = verification.verify(gear)

@@ -10,7 +10,7 @@ import typer
 from mlg_troubleshoot.cli import options, output
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.studies.reconstruct import Reconstruction
+    from mlg_troubleshoot.paper.reconstruct import Reconstruction
 
 EPILOG = (
     "Example: [b]mlg gear reconstruct --seed 7 --out new-member.toml[/b] · with your own numbers: "

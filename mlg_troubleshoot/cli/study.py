@@ -18,8 +18,8 @@ def study(flags: StudyFlags, _version: options.Version = False) -> None:
     from mlg_troubleshoot.cli.claims import WRITE_TABLE, claim
     from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.gear.gear_file import load_gear
+    from mlg_troubleshoot.indices.index_table import INDEX_TABLE
     from mlg_troubleshoot.outputs import CONTINUED, OutputFile
-    from mlg_troubleshoot.studies.index_table import INDEX_TABLE
     from mlg_troubleshoot.workflows.study import STUDY_CSV
 
     outputs = [OutputFile("--csv", flags.csv, STUDY_CSV), OutputFile("--state", flags.state, CONTINUED)]

@@ -21,8 +21,8 @@ from mlg_troubleshoot.cli.remembered import Settings
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.studies.study import Design, Directions, StudyFindings, StudyOptions, StudyResult
-from mlg_troubleshoot.studies.targets import targets_file
+from mlg_troubleshoot.paper.study import Design, Directions, StudyFindings, StudyOptions, StudyResult
+from mlg_troubleshoot.paper.targets import targets_file
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import study as task
 

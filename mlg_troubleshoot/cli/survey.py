@@ -12,7 +12,7 @@ from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import UsageError
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.studies.survey_result import SurveyResult
+    from mlg_troubleshoot.surveying.result import SurveyResult
     from mlg_troubleshoot.units import LengthUnit
 
 EPILOG = (

@@ -12,7 +12,7 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.outputs import write_csv
 from mlg_troubleshoot.records.survey_table import COLUMNS, read_survey
-from mlg_troubleshoot.studies.survey_readings import SurveyedLinkage
+from mlg_troubleshoot.surveying.readings import SurveyedLinkage
 from mlg_troubleshoot.units import THOU_PER_IN
 
 _KEYS = keys(("Enter", "not read"), ("b", "back"), ("done", "no more"), ("q", "stop; what was read is kept"))

@@ -37,7 +37,7 @@ from mlg_troubleshoot.decision.repair import calibrated, repair_sets, rigging_al
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import verdict
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.studies.index_table import IndexTable
+from mlg_troubleshoot.indices.index_table import IndexTable
 
 _CHUNK = 1024
 

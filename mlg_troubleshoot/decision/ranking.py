@@ -9,7 +9,7 @@ from mlg_troubleshoot.decision.assessment import JointFinding
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.joints import ROUNDING_IN
-from mlg_troubleshoot.studies.index_table import IndexTable
+from mlg_troubleshoot.indices.index_table import IndexTable
 
 
 def rank_joints(

@@ -3,7 +3,8 @@
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate, Cause, Scene, load_causes
 from mlg_troubleshoot.diagnosis.diagnose import Diagnosis, NamedCause, diagnose
 from mlg_troubleshoot.diagnosis.extension import EXTENSION, ModelExtension, Term, load_extension, write_extension
-from mlg_troubleshoot.diagnosis.simulation import (
+from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
+from mlg_troubleshoot.misfit import (
     HeldOutGain,
     SimulationDiagnosis,
     Suspect,
@@ -11,7 +12,6 @@ from mlg_troubleshoot.diagnosis.simulation import (
     Verdict,
     diagnose_simulation,
 )
-from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
 
 __all__ = [
     "CATALOGUE",

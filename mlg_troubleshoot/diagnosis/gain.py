@@ -8,10 +8,10 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.diagnosis.causes.together import Block
-from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
-from mlg_troubleshoot.diagnosis.evidence.held_out import folds_of, held_out_part
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
+from mlg_troubleshoot.misfit.covariance import NoiseModel
+from mlg_troubleshoot.misfit.held_out import folds_of, held_out_part
 
 # With fewer tails none can be held out.
 LEAST_TAILS = 4

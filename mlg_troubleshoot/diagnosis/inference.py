@@ -18,16 +18,16 @@ from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.bank import WITHIN, Bank
 from mlg_troubleshoot.diagnosis.causes.base import Candidate
 from mlg_troubleshoot.diagnosis.causes.together import Block
-from mlg_troubleshoot.diagnosis.evidence.chance import Chance, smallest_rms
-from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
-from mlg_troubleshoot.diagnosis.evidence.held_out import held_out_part, likelier
-from mlg_troubleshoot.diagnosis.evidence.one_by_one import one_by_one
-from mlg_troubleshoot.diagnosis.evidence.rivals import near_and_behind
-from mlg_troubleshoot.diagnosis.evidence.screen import Fit, Screen, fit
-from mlg_troubleshoot.diagnosis.evidence.verdict import ALARM, NAME, REMAINS, Verdict, refutes, verdict_of
 from mlg_troubleshoot.diagnosis.gain import folds
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, Rows, build_noise
 from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.misfit.chance import Chance, smallest_rms
+from mlg_troubleshoot.misfit.covariance import NoiseModel
+from mlg_troubleshoot.misfit.held_out import held_out_part, likelier
+from mlg_troubleshoot.misfit.one_by_one import one_by_one
+from mlg_troubleshoot.misfit.rivals import near_and_behind
+from mlg_troubleshoot.misfit.screen import Fit, Screen, fit
+from mlg_troubleshoot.misfit.verdict import ALARM, NAME, REMAINS, Verdict, refutes, verdict_of
 
 Key = tuple[str, str | None]
 

@@ -11,14 +11,14 @@ from scipy.stats import chi2
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.causes.together import Block
-from mlg_troubleshoot.diagnosis.evidence.chance import Chance
-from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
-from mlg_troubleshoot.diagnosis.evidence.held_out import held_out_part, likelier
-from mlg_troubleshoot.diagnosis.evidence.screen import Screen, fit
-from mlg_troubleshoot.diagnosis.evidence.verdict import NAME, Verdict, verdict_of
 from mlg_troubleshoot.diagnosis.gain import folds
 from mlg_troubleshoot.diagnosis.inference import SECOND_SHARE, Finding, Inference, Key
 from mlg_troubleshoot.diagnosis.noise import Rows, build_noise
+from mlg_troubleshoot.misfit.chance import Chance
+from mlg_troubleshoot.misfit.covariance import NoiseModel
+from mlg_troubleshoot.misfit.held_out import held_out_part, likelier
+from mlg_troubleshoot.misfit.screen import Screen, fit
+from mlg_troubleshoot.misfit.verdict import NAME, Verdict, verdict_of
 
 # Thresholds, in log-likelihood if not said otherwise: set in 2026 on departures' fleets of other seeds than those that
 # judge them; not re-tuned.

@@ -9,13 +9,13 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.along import displaced, predicted, travel, unknown_along
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Scene
-from mlg_troubleshoot.diagnosis.evidence.screen import fit
 from mlg_troubleshoot.diagnosis.noise import Rows, build_noise, measured_uncertainty, small_trends
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.diagnosis.wear import HEAVY_LEAD, UNREAD_IN, LikelyClearances, likely_clearances, wear_of_gears
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
+from mlg_troubleshoot.misfit.screen import fit
 
 # Doubt whether clearances were read as well as declared: standard deviation of the share of the declared error. [1]
 _SHARE_DOUBT = 0.35

@@ -23,7 +23,7 @@ from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.source import NumberedRow
 from mlg_troubleshoot.records.template import write_book
 from mlg_troubleshoot.records.values import CellFaultError, read_choice, read_number, read_text
-from mlg_troubleshoot.studies.survey_readings import Kind, Reading, SurveyedLinkage, default_u
+from mlg_troubleshoot.surveying.readings import Kind, Reading, SurveyedLinkage, default_u
 from mlg_troubleshoot.units import LengthUnit
 
 _UNITS = ("in", "mm", "deg")

@@ -12,6 +12,8 @@ import numpy as np
 from markupsafe import Markup
 
 from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.paper.statements import Outcome
+from mlg_troubleshoot.paper.study import Directions, StudyFindings
 from mlg_troubleshoot.reporting import study_figures as drawn
 from mlg_troubleshoot.reporting.common import head
 from mlg_troubleshoot.reporting.figures import Style
@@ -20,8 +22,6 @@ from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.reporting.study_figures import BarSeries
-from mlg_troubleshoot.studies.statements import Outcome
-from mlg_troubleshoot.studies.study import Directions, StudyFindings
 from mlg_troubleshoot.units import LengthUnit
 
 # A reason that explains less than a third of an excess is not its reason.

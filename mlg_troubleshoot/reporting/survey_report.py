@@ -15,8 +15,8 @@ from mlg_troubleshoot.reporting.formats import Lengths, number
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.reporting.publish import safe_stem
-from mlg_troubleshoot.studies.survey import Survey
-from mlg_troubleshoot.studies.survey_result import SurveyResult
+from mlg_troubleshoot.surveying.result import SurveyResult
+from mlg_troubleshoot.surveying.survey import Survey
 from mlg_troubleshoot.units import LengthUnit
 
 _WIDTH, _EDGE = 330.0, 26.0

@@ -13,10 +13,10 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.design import member_values
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.outputs import OutputKind, write_text
-from mlg_troubleshoot.studies.targets import load_targets, targets_file
+from mlg_troubleshoot.paper.targets import load_targets, targets_file
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.studies.reconstruct import Reconstruction
+    from mlg_troubleshoot.paper.reconstruct import Reconstruction
 
 _SOURCE = "Found by mlg gear reconstruct (reconstructed): chosen to meet numbers, not measured."
 _HEADING = tomli_w.dumps({"source": _SOURCE}) + "\n"
@@ -35,7 +35,7 @@ def reconstruct_linkage(
     progress: Callable[[str, int, int | None], None] | None = None,
 ) -> tuple[Reconstruction, str]:
     """Search a linkage, or polish the one named `start`; return it with its text for an ensemble file."""
-    from mlg_troubleshoot.studies.reconstruct import reconstruct
+    from mlg_troubleshoot.paper.reconstruct import reconstruct
 
     if not name.isidentifier():
         raise UsageError(f"name {name!r}", "Use letters and digits, beginning with a letter.")

@@ -17,15 +17,15 @@ import numpy as np
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.indices.index_table import write_index_table
 from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
-from mlg_troubleshoot.studies.index_table import write_index_table
-from mlg_troubleshoot.studies.targets import targets_file
+from mlg_troubleshoot.paper.targets import targets_file
 
 if TYPE_CHECKING:
+    from mlg_troubleshoot.indices.given_data import GivenDataIndices
+    from mlg_troubleshoot.paper.study import StudyFindings, StudyOptions
+    from mlg_troubleshoot.paper.worst_search import WorstSearch
     from mlg_troubleshoot.reporting import WrittenReport
-    from mlg_troubleshoot.studies.given_data import GivenDataIndices
-    from mlg_troubleshoot.studies.study import StudyFindings, StudyOptions
-    from mlg_troubleshoot.studies.worst_search import WorstSearch
 
 from mlg_troubleshoot.units import LengthUnit
 
@@ -79,8 +79,8 @@ def run_study(
     UsageError
         If the options do not fit together, or statements are asked for that the gear does not have.
     """
-    from mlg_troubleshoot.studies import study
-    from mlg_troubleshoot.studies.statements import check_statements
+    from mlg_troubleshoot.paper import study
+    from mlg_troubleshoot.paper.statements import check_statements
 
     known = gear if isinstance(gear, Gear) else load_gear(gear)
     wanted = options or study.StudyOptions()
@@ -101,7 +101,7 @@ def run_study(
 
 
 def _searches(gear: Gear, options: StudyOptions, told: Progress) -> tuple[WorstSearch, ...]:
-    from mlg_troubleshoot.studies.worst_search import search_worst
+    from mlg_troubleshoot.paper.worst_search import search_worst
 
     found = []
     for k, sense in enumerate((1.0, -1.0)):
@@ -133,8 +133,8 @@ def write_study_table(findings: StudyFindings) -> Path:
 def given_data_study(file: Path, gear: Gear, seed: int) -> GivenDataResult:
     """Estimate first-order indices from the inspections of a table: no model, only what was measured."""
     from mlg_troubleshoot.diagnosis import table_from_inspections
+    from mlg_troubleshoot.indices.given_data import given_data_indices
     from mlg_troubleshoot.records import ReadOptions, read_many
-    from mlg_troubleshoot.studies.given_data import given_data_indices
 
     read = read_many([file], ReadOptions.of(gear))
     measured = [each for each in read.inspections if each.measured_displacement_in is not None]

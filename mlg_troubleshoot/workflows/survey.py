@@ -17,15 +17,15 @@ from mlg_troubleshoot.errors import GearFileError, MechanismError, UsageError
 from mlg_troubleshoot.gear.design import member_values
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.indices.index_table import INDEX_TABLE, write_index_table
 from mlg_troubleshoot.outputs import OutputFile, OutputKind, claim_outputs, write_text
-from mlg_troubleshoot.studies.index_table import INDEX_TABLE, write_index_table
-from mlg_troubleshoot.studies.targets import targets_file
+from mlg_troubleshoot.paper.targets import targets_file
 from mlg_troubleshoot.units import LengthUnit
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.reporting import WrittenReport
-    from mlg_troubleshoot.studies.survey import Survey
-    from mlg_troubleshoot.studies.survey_result import SurveyResult
+    from mlg_troubleshoot.surveying.result import SurveyResult
+    from mlg_troubleshoot.surveying.survey import Survey
 
 _HEADING = "# Written by mlg gear survey.\n"
 SURVEYED = OutputKind.marked("is not of a gear that was surveyed", _HEADING)
@@ -43,8 +43,8 @@ _STAND_FOR_ALL = 20
 def write_survey_template(file: Path, gear: str | Path = DEFAULT_GEAR, unit: LengthUnit = LengthUnit.INCH) -> None:
     """Write the rows that are worth reading on a gear, as CSV or xlsx, in inches or millimetres."""
     from mlg_troubleshoot.records.survey_table import write_survey_template as write
-    from mlg_troubleshoot.studies.survey_plan import planned
-    from mlg_troubleshoot.studies.survey_readings import SurveyedLinkage
+    from mlg_troubleshoot.surveying.plan import planned
+    from mlg_troubleshoot.surveying.readings import SurveyedLinkage
 
     if file.suffix.lower() not in (".csv", ".xlsx"):
         raise UsageError(f"{file.name!r} ends neither in .csv nor in .xlsx", "Give a name that ends in one of them.")
@@ -67,10 +67,10 @@ def survey_gear(
     of their displacement, in place of the indices.
     """
     from mlg_troubleshoot.records.survey_table import read_survey
-    from mlg_troubleshoot.studies.survey import FEW, Prior, fit
-    from mlg_troubleshoot.studies.survey_plan import suggested, suggested_early
-    from mlg_troubleshoot.studies.survey_readings import SurveyedLinkage
-    from mlg_troubleshoot.studies.survey_result import InspectedGear, SurveyResult
+    from mlg_troubleshoot.surveying.plan import suggested, suggested_early
+    from mlg_troubleshoot.surveying.readings import SurveyedLinkage
+    from mlg_troubleshoot.surveying.result import InspectedGear, SurveyResult
+    from mlg_troubleshoot.surveying.survey import FEW, Prior, fit
 
     known = gear if isinstance(gear, Gear) else load_gear(gear)
     if write is not None:
@@ -170,7 +170,7 @@ def _assemblies(found: Survey) -> tuple[str, ...]:
 
 def _left_targets(before: Gear, path: Path) -> tuple[str, ...]:
     """Published numbers that the surveyed gear leaves: they are another gear's, or the paper's alone."""
-    from mlg_troubleshoot.studies.verification import verify
+    from mlg_troubleshoot.paper.verification import verify
 
     targets = targets_file(before)
     if not targets.exists():
@@ -185,7 +185,7 @@ def _left_targets(before: Gear, path: Path) -> tuple[str, ...]:
 
 def _write_gear(gear: Gear, found: Survey, path: Path, source: str) -> Path:
     """Write the gear file, its ensemble and its table of indices."""
-    from mlg_troubleshoot.studies.study import StudyOptions, run_study
+    from mlg_troubleshoot.paper.study import StudyOptions, run_study
 
     linkage = found.linkage
     ensemble, indices = _beside(path)

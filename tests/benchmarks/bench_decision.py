@@ -34,7 +34,7 @@ from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import verdict
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.studies.index_table import load_index_table
+from mlg_troubleshoot.indices.index_table import load_index_table
 from mlg_troubleshoot.units import ClearanceConvention
 from tests.benchmarks import worn_gears
 

@@ -26,8 +26,8 @@ from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.indices.index_table import load_index_table
 from mlg_troubleshoot.store import Record, Store, inspection_record
-from mlg_troubleshoot.studies.index_table import load_index_table
 from mlg_troubleshoot.units import ClearanceConvention
 from mlg_troubleshoot.workflows import history
 from mlg_troubleshoot.workflows.check import CheckOptions

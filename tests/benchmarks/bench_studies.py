@@ -28,10 +28,10 @@ from numpy.typing import NDArray
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.geometry.kernel import Kernel, numba_is_installed
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Mechanism, Output, Plane, Point, Slider
-from mlg_troubleshoot.studies.chaos import chaos_indices
-from mlg_troubleshoot.studies.displacement import HeldDirections, worst_directions
-from mlg_troubleshoot.studies.inputs import Inputs
-from mlg_troubleshoot.studies.tensor import tensor_indices
+from mlg_troubleshoot.indices.chaos import chaos_indices
+from mlg_troubleshoot.indices.displacement import HeldDirections, worst_directions
+from mlg_troubleshoot.indices.inputs import Inputs
+from mlg_troubleshoot.indices.tensor import tensor_indices
 
 Array = NDArray[np.float64]
 ACCURACY = 1e-3
@@ -320,7 +320,7 @@ def paper_study(response: HeldDirections) -> list[Line]:
     """The paper-size total-order study on two cores."""
     import resource
 
-    from mlg_troubleshoot.studies.blocks import BlockStudy, total_order_study
+    from mlg_troubleshoot.paper.blocks import BlockStudy, total_order_study
 
     gear = load_gear()
     study = BlockStudy(response, Inputs(gear.limits_in), gear.geometry_sha256, 0)

@@ -28,10 +28,10 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from mlg_troubleshoot.errors import TroubleshootError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.studies.survey import Fitting, Prior
-from mlg_troubleshoot.studies.survey_plan import planned, suggested_early
-from mlg_troubleshoot.studies.survey_readings import Kind, Reading, SurveyedLinkage
-from mlg_troubleshoot.studies.survey_result import SurveyResult
+from mlg_troubleshoot.surveying.plan import planned, suggested_early
+from mlg_troubleshoot.surveying.readings import Kind, Reading, SurveyedLinkage
+from mlg_troubleshoot.surveying.result import SurveyResult
+from mlg_troubleshoot.surveying.survey import Fitting, Prior
 from mlg_troubleshoot.workflows.survey import survey_gear, write_survey_template
 from tests.gear.independent_solver import LoopClosure
 

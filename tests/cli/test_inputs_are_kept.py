@@ -289,7 +289,7 @@ def test_a_table_of_a_study_does_not_replace_a_file_that_something_else_wrote(ow
 
 
 def test_the_shipped_table_of_indices_is_known_as_one() -> None:
-    from mlg_troubleshoot.studies.index_table import INDEX_TABLE
+    from mlg_troubleshoot.indices.index_table import INDEX_TABLE
 
     with (GEAR / "hawker-800xp-indices.json").open("rb") as file:
         assert INDEX_TABLE.is_own(file)

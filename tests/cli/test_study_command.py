@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.studies.certified import CertifiedBound
-from mlg_troubleshoot.studies.worst_search import WorstSearch
+from mlg_troubleshoot.paper.certified import CertifiedBound
+from mlg_troubleshoot.paper.worst_search import WorstSearch
 
 from .conftest import FAILURE, mlg
 
@@ -22,7 +22,7 @@ def proved_at_once(_model: object, _clearance: object, sense: float, *_: Any) ->
 
 
 def test_a_report_is_written_as_html_and_pdf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mlg_troubleshoot.studies.worst_search.search_worst", proved_at_once)
+    monkeypatch.setattr("mlg_troubleshoot.paper.worst_search.search_worst", proved_at_once)
     run = mlg("study", *SMALL, "--report", tmp_path / "out")
     assert run.code == 0, run.err
     assert sorted(path.suffix for path in (tmp_path / "out").iterdir()) == [".html", ".pdf"]
@@ -30,7 +30,7 @@ def test_a_report_is_written_as_html_and_pdf(tmp_path: Path, monkeypatch: pytest
 
 
 def test_a_report_does_not_change_what_stdout_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mlg_troubleshoot.studies.worst_search.search_worst", proved_at_once)
+    monkeypatch.setattr("mlg_troubleshoot.paper.worst_search.search_worst", proved_at_once)
     assert mlg("study", *SMALL, "--report", tmp_path).out == mlg("study", *SMALL).out
 
 
@@ -42,7 +42,7 @@ def test_an_unknown_paper_is_refused_before_the_study(tmp_path: Path) -> None:
 
 
 def test_the_worst_case_is_said_in_the_unit_that_the_user_reads(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mlg_troubleshoot.studies.worst_search.search_worst", proved_at_once)
+    monkeypatch.setattr("mlg_troubleshoot.paper.worst_search.search_worst", proved_at_once)
     said = " ".join(mlg("study", *SMALL, "--bound", "--show", "mm").out.split())
     assert "2.54000 mm, proved ≤ 2.54000 mm over all directions" in said
     assert "(sequential rule 2.54000 mm, global search 2.54000 mm)" in said

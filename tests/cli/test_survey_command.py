@@ -12,9 +12,9 @@ import openpyxl
 import pytest
 
 from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.indices.index_table import load_index_table
 from mlg_troubleshoot.records.survey_table import read_survey, write_survey_template
-from mlg_troubleshoot.studies.index_table import load_index_table
-from mlg_troubleshoot.studies.survey_readings import Kind, Reading, SurveyedLinkage
+from mlg_troubleshoot.surveying.readings import Kind, Reading, SurveyedLinkage
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows.survey import survey_gear, survey_values
 

@@ -15,7 +15,7 @@ from mlg_troubleshoot.cli.survey_prompts import ask_survey
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records.survey_table import read_survey, write_survey_template
-from mlg_troubleshoot.studies.survey_readings import Kind, Reading, SurveyedLinkage
+from mlg_troubleshoot.surveying.readings import Kind, Reading, SurveyedLinkage
 from tests.cli.conftest import ROOT, mlg
 from tests.keys import interrupt
 

@@ -13,8 +13,8 @@ from mlg_troubleshoot.decision.sentences import confidence_words, rigging_senten
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import links_from
+from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.reporting.json_form import check_as_json
-from mlg_troubleshoot.studies.index_table import IndexTable
 from tests.decision.conftest import Judge, Shifted, every_joint, inspected
 
 

@@ -8,8 +8,8 @@ from mlg_troubleshoot.decision.inspection import InvalidRow, Side
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.reporting.json_form import check_as_json
-from mlg_troubleshoot.studies.index_table import IndexTable
 from tests.decision.conftest import Judge, every_joint
 
 INSPECTION = {

@@ -33,7 +33,7 @@ from mlg_troubleshoot.decision.wear_levels import (
 from mlg_troubleshoot.gear.directions import random_directions, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import links_from
-from mlg_troubleshoot.studies.index_table import IndexTable
+from mlg_troubleshoot.indices.index_table import IndexTable
 from tests.decision.conftest import Judge, every_joint, inspected
 
 MARGIN_IN = 0.03

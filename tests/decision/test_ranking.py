@@ -8,7 +8,7 @@ import pytest
 from mlg_troubleshoot.decision.ranking import rank_joints
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.studies.index_table import IndexTable
+from mlg_troubleshoot.indices.index_table import IndexTable
 from tests.decision.conftest import Judge, every_joint
 
 

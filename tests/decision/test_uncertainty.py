@@ -16,7 +16,7 @@ from mlg_troubleshoot.decision.prediction import predict
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.studies.index_table import IndexTable
+from mlg_troubleshoot.indices.index_table import IndexTable
 from tests.decision.conftest import Judge, Shifted, every_joint, inspected
 
 WORN = every_joint(0.002, j3=0.005, j8=0.0)

@@ -17,8 +17,8 @@ from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.prediction import predict
 from mlg_troubleshoot.decision.verdict_rule import verdict, zone
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.reporting.json_form import check_as_json
-from mlg_troubleshoot.studies.index_table import IndexTable
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from tests.decision.conftest import Judge, every_joint, inspected
 

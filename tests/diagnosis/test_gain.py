@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.diagnosis import Diagnosis, diagnose
-from mlg_troubleshoot.diagnosis.evidence import held_out
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.misfit import held_out
 
 from .conftest import Array, DiagnosisTable, fleet
 

@@ -12,10 +12,10 @@ import pytest
 from mlg_troubleshoot.diagnosis import inference
 from mlg_troubleshoot.diagnosis.bank import build_bank
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE
-from mlg_troubleshoot.diagnosis.evidence.one_by_one import one_by_one
 from mlg_troubleshoot.diagnosis.inference import SECOND_SHARE, Inference, _Together
 from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.misfit.one_by_one import one_by_one
 
 from .conftest import Array, DiagnosisTable, fleet
 

@@ -16,8 +16,6 @@ from mlg_troubleshoot.diagnosis.causes.convention import as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, LoadDirections, OtherGeometry
 from mlg_troubleshoot.diagnosis.diagnose import _expected_scatter, _single_slips
 from mlg_troubleshoot.diagnosis.diagnose import _interval as interval_of
-from mlg_troubleshoot.diagnosis.evidence.chance import Chance
-from mlg_troubleshoot.diagnosis.evidence.verdict import ALARM, NAME, REMAINS
 from mlg_troubleshoot.diagnosis.extension import adjustment_of
 from mlg_troubleshoot.diagnosis.faults import DataFault
 from mlg_troubleshoot.diagnosis.gain import _interval
@@ -29,6 +27,8 @@ from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.misfit.chance import Chance
+from mlg_troubleshoot.misfit.verdict import ALARM, NAME, REMAINS
 
 from .conftest import fleet
 

@@ -26,10 +26,10 @@ from mlg_troubleshoot.geometry.intervals import Box
 from mlg_troubleshoot.geometry.kernel import numba_is_installed
 from mlg_troubleshoot.geometry.mechanism import Crank, Mechanism, Output, Plane, Point
 from mlg_troubleshoot.geometry.program import write_program
+from mlg_troubleshoot.indices.index_table import IndexTable
+from mlg_troubleshoot.paper.targets import load_targets, targets_file
 from mlg_troubleshoot.reporting import ReportProvenance, inspection_document
 from mlg_troubleshoot.reporting.html import render
-from mlg_troubleshoot.studies.index_table import IndexTable
-from mlg_troubleshoot.studies.targets import load_targets, targets_file
 from mlg_troubleshoot.units import ClearanceConvention
 from tests.machine import SLOWER
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.paper.certified import CertifiedBound
+from mlg_troubleshoot.paper.statements import check_statements
+from mlg_troubleshoot.paper.study import Directions, StudyFindings, StudyOptions, compare_designs, run_study
+from mlg_troubleshoot.paper.worst_search import WorstSearch
 from mlg_troubleshoot.reporting import ReportProvenance, publish
 from mlg_troubleshoot.reporting.study_report import study_document
-from mlg_troubleshoot.studies.certified import CertifiedBound
-from mlg_troubleshoot.studies.statements import check_statements
-from mlg_troubleshoot.studies.study import Directions, StudyFindings, StudyOptions, compare_designs, run_study
-from mlg_troubleshoot.studies.worst_search import WorstSearch
 
 from .conftest import readable
 

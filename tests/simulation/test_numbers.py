@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.diagnosis import SimulationDiagnosis, Suspect, Verdict, diagnose_simulation
-from mlg_troubleshoot.diagnosis.simulation import scatter
-from mlg_troubleshoot.diagnosis.simulation.runner import Runner
-from mlg_troubleshoot.diagnosis.simulation.search import RULED_OUT
+from mlg_troubleshoot.misfit import scatter
+from mlg_troubleshoot.misfit.runner import Runner
+from mlg_troubleshoot.misfit.search import RULED_OUT
 
 X = np.linspace(-1.0, 1.0, 60)
 SCATTER = 0.02

@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.studies.displacement import HeldDirections, Response, worst_directions
-from mlg_troubleshoot.studies.inputs import Inputs
-from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
+from mlg_troubleshoot.indices.displacement import HeldDirections, Response, worst_directions
+from mlg_troubleshoot.indices.inputs import Inputs
+from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
 
 Array = NDArray[np.float64]
 

@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.studies.chaos import chaos_indices, legendre_terms, total_degree
-from mlg_troubleshoot.studies.displacement import Response
-from mlg_troubleshoot.studies.inputs import beyond_margin
-from mlg_troubleshoot.studies.saltelli import fast_indices
-from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
+from mlg_troubleshoot.indices.chaos import chaos_indices, legendre_terms, total_degree
+from mlg_troubleshoot.indices.displacement import Response
+from mlg_troubleshoot.indices.inputs import beyond_margin
+from mlg_troubleshoot.indices.saltelli import fast_indices
+from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
 
 
 def _rng(seed: int = 0) -> np.random.Generator:

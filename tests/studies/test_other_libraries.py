@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.studies.displacement import Response
-from mlg_troubleshoot.studies.tensor import TensorIndices
+from mlg_troubleshoot.indices.displacement import Response
+from mlg_troubleshoot.indices.tensor import TensorIndices
 
 
 def test_scipy_agrees(on_cube: Response, exact: TensorIndices) -> None:

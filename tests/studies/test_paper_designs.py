@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.studies.displacement import Response
-from mlg_troubleshoot.studies.paper import PAPER_DESIGNS, PaperDesign, bias_corrected, replicated_first_order
-from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
+from mlg_troubleshoot.indices.displacement import Response
+from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
+from mlg_troubleshoot.paper.replicated import PAPER_DESIGNS, PaperDesign, bias_corrected, replicated_first_order
 
 from .conftest import Oracle
 

@@ -14,8 +14,8 @@ from mlg_troubleshoot.errors import GearFileError, InconclusiveDataError, UsageE
 from mlg_troubleshoot.gear.design import member_values
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.studies.reconstruct import Reconstruction, reconstruct
-from mlg_troubleshoot.studies.targets import Target, load_targets, targets_file
+from mlg_troubleshoot.paper.reconstruct import Reconstruction, reconstruct
+from mlg_troubleshoot.paper.targets import Target, load_targets, targets_file
 
 
 @pytest.fixture(scope="module")

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.studies.displacement import Response
-from mlg_troubleshoot.studies.indices import Indices
-from mlg_troubleshoot.studies.inputs import Inputs, joint_groups, with_random_directions
-from mlg_troubleshoot.studies.saltelli import fast_indices, saltelli_indices
-from mlg_troubleshoot.studies.tensor import TensorIndices
+from mlg_troubleshoot.indices.displacement import Response
+from mlg_troubleshoot.indices.estimators import Indices
+from mlg_troubleshoot.indices.inputs import Inputs, joint_groups, with_random_directions
+from mlg_troubleshoot.indices.saltelli import fast_indices, saltelli_indices
+from mlg_troubleshoot.indices.tensor import TensorIndices
 
 from .conftest import Oracle
 

@@ -7,8 +7,8 @@ import pytest
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.studies.index_table import IndexTable
-from mlg_troubleshoot.studies.study import Design, Directions, StudyOptions, run_study
+from mlg_troubleshoot.indices.index_table import IndexTable
+from mlg_troubleshoot.paper.study import Design, Directions, StudyOptions, run_study
 
 
 def test_the_fast_study_agrees_with_the_shipped_table_on_every_joint(gear: Gear, table: IndexTable) -> None:

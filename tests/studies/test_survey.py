@@ -12,9 +12,9 @@ import pytest
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.studies.survey import Fitting, Prior, Survey, fit
-from mlg_troubleshoot.studies.survey_plan import planned, suggested, suggested_early
-from mlg_troubleshoot.studies.survey_readings import Kind, Reading, SurveyedLinkage
+from mlg_troubleshoot.surveying.plan import planned, suggested, suggested_early
+from mlg_troubleshoot.surveying.readings import Kind, Reading, SurveyedLinkage
+from mlg_troubleshoot.surveying.survey import Fitting, Prior, Survey, fit
 
 FOUR_BAR = Path(__file__).parents[1] / "geometry" / "data" / "four-bar.toml"
 CRANK, COUPLER, ROCKER, GROUND, TURN, LATER = 2.1, 7.15, 9.1, 6.05, np.radians(12.0), 0.4

@@ -10,10 +10,10 @@ import pytest
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.studies.blocks import BlockStudy, compute_block, total_order_study
-from mlg_troubleshoot.studies.displacement import HeldDirections
-from mlg_troubleshoot.studies.inputs import Inputs
-from mlg_troubleshoot.studies.tensor import TensorIndices
+from mlg_troubleshoot.indices.displacement import HeldDirections
+from mlg_troubleshoot.indices.inputs import Inputs
+from mlg_troubleshoot.indices.tensor import TensorIndices
+from mlg_troubleshoot.paper.blocks import BlockStudy, compute_block, total_order_study
 
 
 @pytest.fixture
@@ -53,7 +53,7 @@ def test_a_resumed_study_does_not_compute_finished_blocks_again(
 ) -> None:
     state = tmp_path / "state.jsonl"
     total_order_study(study, state=state)
-    monkeypatch.setattr("mlg_troubleshoot.studies.blocks.compute_block", lambda *_: pytest.fail("computed again"))
+    monkeypatch.setattr("mlg_troubleshoot.paper.blocks.compute_block", lambda *_: pytest.fail("computed again"))
     assert total_order_study(study, state=state).iterations == study.iterations
 
 

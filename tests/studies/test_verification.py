@@ -8,8 +8,8 @@ import pytest
 
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.studies.targets import Computed, load_targets, targets_file
-from mlg_troubleshoot.studies.verification import verify
+from mlg_troubleshoot.paper.targets import Computed, load_targets, targets_file
+from mlg_troubleshoot.paper.verification import verify
 
 
 @pytest.fixture(scope="module")

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.random import Generator
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.studies.chaos import ChaosFit, chaos_indices
-from mlg_troubleshoot.studies.displacement import Response
-from mlg_troubleshoot.studies.indices import Indices, failed_note, student_half, without_numbers
+from mlg_troubleshoot.indices.chaos import ChaosFit, chaos_indices
+from mlg_troubleshoot.indices.displacement import Response
+from mlg_troubleshoot.indices.estimators import Indices, failed_note, student_half, without_numbers
 
 SCRAMBLES = 8
 _ROWS = 1 << 14

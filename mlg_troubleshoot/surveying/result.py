@@ -8,8 +8,8 @@ from pathlib import Path
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.studies.survey import Survey
-from mlg_troubleshoot.studies.survey_plan import Suggested
+from mlg_troubleshoot.surveying.plan import Suggested
+from mlg_troubleshoot.surveying.survey import Survey
 
 
 @dataclass(frozen=True, slots=True)

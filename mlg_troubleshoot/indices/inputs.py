@@ -10,7 +10,7 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, frozen
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
-from mlg_troubleshoot.studies.displacement import Response
+from mlg_troubleshoot.indices.displacement import Response
 
 
 def _half_normal(u: Array) -> Array:

@@ -13,18 +13,18 @@ from scipy.stats import t as student
 from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
-from mlg_troubleshoot.diagnosis.evidence.chance import Chance, smallest_rms
-from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
-from mlg_troubleshoot.diagnosis.evidence.held_out import folds_of, likelier
-from mlg_troubleshoot.diagnosis.evidence.one_by_one import one_by_one, settled
-from mlg_troubleshoot.diagnosis.evidence.rivals import near_and_behind
-from mlg_troubleshoot.diagnosis.evidence.screen import Screen
-from mlg_troubleshoot.diagnosis.evidence.verdict import ALARM, NAME, Verdict, refutes, verdict_of
-from mlg_troubleshoot.diagnosis.simulation import scatter
-from mlg_troubleshoot.diagnosis.simulation.inputs import checked
-from mlg_troubleshoot.diagnosis.simulation.result import HeldOutGain, SimulationDiagnosis, Suspect, SuspectFound
-from mlg_troubleshoot.diagnosis.simulation.runner import Runner, held_out, least_squares
-from mlg_troubleshoot.diagnosis.simulation.scatter import Whitener, basis_of, build_whitener
+from mlg_troubleshoot.misfit import scatter
+from mlg_troubleshoot.misfit.chance import Chance, smallest_rms
+from mlg_troubleshoot.misfit.covariance import NoiseModel
+from mlg_troubleshoot.misfit.held_out import folds_of, likelier
+from mlg_troubleshoot.misfit.one_by_one import one_by_one, settled
+from mlg_troubleshoot.misfit.rivals import near_and_behind
+from mlg_troubleshoot.misfit.runner import Runner, held_out, least_squares
+from mlg_troubleshoot.misfit.scatter import Whitener, basis_of, build_whitener
+from mlg_troubleshoot.misfit.screen import Screen
+from mlg_troubleshoot.misfit.simulation_inputs import checked
+from mlg_troubleshoot.misfit.simulation_result import HeldOutGain, SimulationDiagnosis, Suspect, SuspectFound
+from mlg_troubleshoot.misfit.verdict import ALARM, NAME, Verdict, refutes, verdict_of
 
 # Thresholds: set in 2026 on five simulated rigs (tests/simulation/rigs.py; groups, far readings, gaps; other seeds than
 # the benchmark's) and the three sets of measured data in docs/tutorial/data; lower ones name more, and name patterns.

@@ -14,18 +14,18 @@ from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
-from mlg_troubleshoot.studies.amplification import Amplification, amplification
-from mlg_troubleshoot.studies.displacement import HeldDirections, Response, worst_directions, worst_sense
-from mlg_troubleshoot.studies.index_table import IndexTable, JointIndices, rank_ranges, ranks
-from mlg_troubleshoot.studies.indices import GroupIndices, Indices, group_indices, student_half
-from mlg_troubleshoot.studies.inputs import Inputs, beyond_margin, joint_groups, with_random_directions
-from mlg_troubleshoot.studies.saltelli import fast_indices, saltelli_indices
-from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
+from mlg_troubleshoot.indices.amplification import Amplification, amplification
+from mlg_troubleshoot.indices.displacement import HeldDirections, Response, worst_directions, worst_sense
+from mlg_troubleshoot.indices.estimators import GroupIndices, Indices, group_indices, student_half
+from mlg_troubleshoot.indices.index_table import IndexTable, JointIndices, rank_ranges, ranks
+from mlg_troubleshoot.indices.inputs import Inputs, beyond_margin, joint_groups, with_random_directions
+from mlg_troubleshoot.indices.saltelli import fast_indices, saltelli_indices
+from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.studies.paper import PaperDesign, ReplicatedIndices
-    from mlg_troubleshoot.studies.statements import Statement
-    from mlg_troubleshoot.studies.worst_search import WorstSearch
+    from mlg_troubleshoot.paper.replicated import PaperDesign, ReplicatedIndices
+    from mlg_troubleshoot.paper.statements import Statement
+    from mlg_troubleshoot.paper.worst_search import WorstSearch
 
 Progress = Callable[[str, int, int | None], None]
 Stages = Callable[[str], Callable[[int, int | None], None]]
@@ -262,8 +262,8 @@ def _of_tensor(tensor: TensorIndices, coarse: TensorIndices | None, seed: int) -
 
 def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _Run:
     """Run the paper's design for the first order and, for ``lhs``, its study of the total order."""
-    from mlg_troubleshoot.studies.blocks import BlockStudy, total_order_study
-    from mlg_troubleshoot.studies.paper import ITERATIONS, PAPER_DESIGNS, replicated_first_order
+    from mlg_troubleshoot.paper.blocks import BlockStudy, total_order_study
+    from mlg_troubleshoot.paper.replicated import ITERATIONS, PAPER_DESIGNS, replicated_first_order
 
     if options.directions is Directions.RANDOM:
         raise UsageError(
@@ -297,7 +297,7 @@ def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _
 
 def _sized(paper: PaperDesign, n: int, options: StudyOptions) -> PaperDesign:
     """Return a paper design in the size asked for, with the composite points of this number of variables."""
-    from mlg_troubleshoot.studies.designs import central_composite
+    from mlg_troubleshoot.paper.designs import central_composite
 
     return replace(
         paper,
@@ -311,7 +311,7 @@ def compare_designs(
     gear: Gear, options: StudyOptions, progress: Progress | None = None
 ) -> tuple[ReplicatedIndices, ...]:
     """Estimate the first-order indices of the reference with each design of the paper (Fig. 13c)."""
-    from mlg_troubleshoot.studies.paper import ITERATIONS, PAPER_DESIGNS, replicated_first_order
+    from mlg_troubleshoot.paper.replicated import ITERATIONS, PAPER_DESIGNS, replicated_first_order
 
     if options.directions is Directions.RANDOM:
         return ()

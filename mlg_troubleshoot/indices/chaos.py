@@ -2,7 +2,7 @@
 
 The response is fitted by orthonormal Legendre polynomials of the unit cube; Eqs. 1 and 2 are then sums of
 squared coefficients. Points that took no part in the fit, and corners of the range, say whether to trust it:
-a clipped or otherwise kinked response is handed to :mod:`~mlg_troubleshoot.studies.saltelli`.
+a clipped or otherwise kinked response is handed to :mod:`~mlg_troubleshoot.indices.saltelli`.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 from numpy.random import Generator
 
 from mlg_troubleshoot.arrays import Array, Wholes
-from mlg_troubleshoot.studies.displacement import Response
-from mlg_troubleshoot.studies.indices import Indices, failed_note, without_numbers
+from mlg_troubleshoot.indices.displacement import Response
+from mlg_troubleshoot.indices.estimators import Indices, failed_note, without_numbers
 
 _HELD_OUT = 48
 _CORNERS = 16

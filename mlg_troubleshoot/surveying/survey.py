@@ -21,7 +21,7 @@ from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Slider
-from mlg_troubleshoot.studies.survey_readings import DEFAULT_U, Kind, Reading, SurveyedLinkage
+from mlg_troubleshoot.surveying.readings import DEFAULT_U, Kind, Reading, SurveyedLinkage
 from mlg_troubleshoot.units import MM_PER_IN, SLIPS, Slip
 
 # The share of the ensemble's covariances that is believed.

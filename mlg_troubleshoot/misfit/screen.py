@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Places
-from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
+from mlg_troubleshoot.misfit.covariance import NoiseModel
 
 
 class Screen:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mlg_troubleshoot.arrays import Array, Wholes
-from mlg_troubleshoot.diagnosis.simulation.result import Suspect
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.misfit.simulation_result import Suspect
 
 _LEAST_PERMUTATIONS = 19
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.studies.displacement import Response
+from mlg_troubleshoot.indices.displacement import Response
 
 _MOST_POINTS = 2_000_000
 _ROWS = 1 << 16

@@ -20,8 +20,8 @@ from mlg_troubleshoot.errors import InconclusiveDataError, MechanismError, Usage
 from mlg_troubleshoot.gear.design import DesignSpace
 from mlg_troubleshoot.gear.gear import Gear, Linkage
 from mlg_troubleshoot.geometry.mechanism import Dyad
-from mlg_troubleshoot.studies.targets import INSIDE, Computed, Target
-from mlg_troubleshoot.studies.verification import Facts
+from mlg_troubleshoot.paper.targets import INSIDE, Computed, Target
+from mlg_troubleshoot.paper.verification import Facts
 
 Told = Callable[[str, int, int | None], None]
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Wholes
-from mlg_troubleshoot.diagnosis.simulation.runner import least_squares
+from mlg_troubleshoot.misfit.runner import least_squares
 
 # Readings further out than this many standard deviations count less.
 _FAR = 3.0

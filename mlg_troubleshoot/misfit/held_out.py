@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Wholes
-from mlg_troubleshoot.diagnosis.evidence.covariance import NoiseModel
-from mlg_troubleshoot.diagnosis.evidence.screen import fit, shrunk
+from mlg_troubleshoot.misfit.covariance import NoiseModel
+from mlg_troubleshoot.misfit.screen import fit, shrunk
 
 _FOLDS = 10
 # Share of what a cause does that must remain in the rows it is learned from. [1]

@@ -8,8 +8,8 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.studies.survey import Prior
-from mlg_troubleshoot.studies.survey_readings import DEFAULT_U, MINUTES, Kind, Quantity, Reading, SurveyedLinkage
+from mlg_troubleshoot.surveying.readings import DEFAULT_U, MINUTES, Kind, Quantity, Reading, SurveyedLinkage
+from mlg_troubleshoot.surveying.survey import Prior
 
 # Between each two members of the ensemble a template is planned for so many linkages, where they close. An index
 # known to two percent needs no better reading.

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.studies.targets import Target, load_targets, targets_file
-from mlg_troubleshoot.studies.verification import Facts
+from mlg_troubleshoot.paper.targets import Target, load_targets, targets_file
+from mlg_troubleshoot.paper.verification import Facts
 
 
 class Outcome(StrEnum):

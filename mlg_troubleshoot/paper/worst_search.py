@@ -2,7 +2,7 @@
 
 The paper's conclusion leaves "more advanced algorithms such as a genetic algorithm" as future work. Differential
 evolution searches all directions and the whole stroke at once; the proof of
-:mod:`~mlg_troubleshoot.studies.certified` says how much any search can have missed.
+:mod:`~mlg_troubleshoot.paper.certified` says how much any search can have missed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.random import Generator
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
-from mlg_troubleshoot.studies.certified import CertifiedBound, certified_bound
+from mlg_troubleshoot.paper.certified import CertifiedBound, certified_bound
 
 
 @dataclass(frozen=True, slots=True)

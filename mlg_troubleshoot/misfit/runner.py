@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Wholes
-from mlg_troubleshoot.diagnosis.simulation.result import Suspect
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.misfit.simulation_result import Suspect
 
 Predict = Callable[[Mapping[str, float]], Any]
 

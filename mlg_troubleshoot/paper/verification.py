@@ -13,10 +13,10 @@ from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
-from mlg_troubleshoot.studies.amplification import STROKES, Amplification, amplification
-from mlg_troubleshoot.studies.displacement import HeldDirections, worst_directions
-from mlg_troubleshoot.studies.targets import Computed, Target, load_targets, targets_file
-from mlg_troubleshoot.studies.tensor import TensorIndices, tensor_indices
+from mlg_troubleshoot.indices.amplification import STROKES, Amplification, amplification
+from mlg_troubleshoot.indices.displacement import HeldDirections, worst_directions
+from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
+from mlg_troubleshoot.paper.targets import Computed, Target, load_targets, targets_file
 
 _CURVE = 401
 _QUICK_CURVE = 61

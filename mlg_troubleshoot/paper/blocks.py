@@ -23,10 +23,10 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.geometry.kernel import numba_is_installed
-from mlg_troubleshoot.studies.designs import middle_of_level, replicated_levels
-from mlg_troubleshoot.studies.displacement import HeldDirections
-from mlg_troubleshoot.studies.indices import failed_note
-from mlg_troubleshoot.studies.inputs import Inputs
+from mlg_troubleshoot.indices.displacement import HeldDirections
+from mlg_troubleshoot.indices.estimators import failed_note
+from mlg_troubleshoot.indices.inputs import Inputs
+from mlg_troubleshoot.paper.designs import middle_of_level, replicated_levels
 
 LEVELS_PER_BLOCK = 50
 

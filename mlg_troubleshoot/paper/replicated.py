@@ -2,7 +2,7 @@
 
 A group mean over n1 samples still carries 1/n1 of the variance within the group, so that the variance of the
 group means is too large: the plain index exceeds the true one by (1 − S)/n1 on average. Both columns are
-given. The total-order study of Fig. 5b is in :mod:`~mlg_troubleshoot.studies.blocks`.
+given. The total-order study of Fig. 5b is in :mod:`~mlg_troubleshoot.paper.blocks`.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.studies.designs import central_composite, first_order_design
-from mlg_troubleshoot.studies.displacement import Response
+from mlg_troubleshoot.indices.displacement import Response
+from mlg_troubleshoot.paper.designs import central_composite, first_order_design
 
 
 @dataclass(frozen=True, slots=True)

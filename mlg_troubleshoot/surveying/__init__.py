@@ -1,0 +1,1 @@
+"""The geometry of a gear from readings of a real one."""
