@@ -22,7 +22,8 @@ Field = str | float | int | bool | None
 # that knows it keeps our quotation marks. The wide forms of the signs start a formula in some
 # language versions of Excel.
 _BREAKS = r"\t-\r\x1c-\x1e\x85\u2028\u2029"
-_FORMULA = re.compile(rf'(\A|[;|{_BREAKS}])(?=(?:[^\S{_BREAKS}]|")*[=+\-@＝＋－＠])')
+_SIGNS = r"=+\-@＝＋－＠"
+_FORMULA = re.compile(rf'(\A(?=[{_BREAKS}])|(?:\A|[;|{_BREAKS}])(?=(?:[^\S{_BREAKS}]|")*[{_SIGNS}]))')
 # How a file of SQLite begins: such a file is a store, of this program or of another.
 _DATABASE = b"SQLite format 3\0"
 _STANDARD_OUTPUT = "-"

@@ -43,7 +43,6 @@ def test_the_linter_finds_nothing() -> None:
     run("-m", "ruff", "check", ".")
 
 
-@pytest.mark.slow
 def test_the_types_are_right() -> None:
     run("-m", "mypy")
 

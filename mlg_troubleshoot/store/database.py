@@ -17,7 +17,6 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import sqlalchemy as sql
 from sqlalchemy.exc import DBAPIError, NoSuchModuleError, SQLAlchemyError
@@ -212,17 +211,11 @@ def own_file() -> str:
 
 def files_of(place: str | Path | None = None) -> tuple[Path, ...]:
     """Return the files of a store, with those that SQLite lays beside it; none for a server."""
-    where = str(place or os.environ.get("MLG_STORE") or own_file())
-    if "://" in where:
-        try:
-            url = sql.make_url(where)
-        except (sql.exc.ArgumentError, ValueError):
-            return ()
-        if url.get_backend_name() != "sqlite" or not url.database:
-            return ()
-        is_uri = url.database.startswith("file:")
-        where = unquote(url.database[5:].partition("?")[0]) if is_uri else url.database
-    return tuple(Path(where + end) for end in ("", "-journal", "-wal", "-shm"))
+    try:
+        file = Place(str(place or os.environ.get("MLG_STORE") or own_file())).file
+    except UsageError:
+        return ()
+    return () if file is None else tuple(Path(f"{file}{end}") for end in ("", "-journal", "-wal", "-shm"))
 
 
 class Store:

@@ -216,12 +216,18 @@ def test_an_output_is_not_the_store_that_the_run_would_make(tmp_path: Path) -> N
     assert not (tmp_path / "new").exists()
 
 
-@pytest.mark.parametrize(
-    "place", ["sqlite:///{}", "sqlite+pysqlite:///{}?timeout=3", "sqlite:///file:{}?mode=ro&uri=true"]
-)
+@pytest.mark.parametrize("place", ["sqlite:///{}", "sqlite+pysqlite:///{}"])
 def test_an_export_does_not_replace_its_store_by_url(place: str, store: Path) -> None:
     before = store.read_bytes()
     kept(mlg("history", "export", store, "--store", place.format(store), "--force"), store, before, "export")
+
+
+@pytest.mark.parametrize("place", ["sqlite+pysqlite:///{}?timeout=3", "sqlite:///file:{}?mode=ro&uri=true"])
+def test_a_store_by_a_url_with_parameters_is_refused_and_stays(place: str, store: Path) -> None:
+    before = store.read_bytes()
+    run = mlg("history", "export", store, "--store", place.format(store), "--force")
+    assert run.code == 2
+    assert store.read_bytes() == before
 
 
 @pytest.mark.parametrize("force", [(), ("--force",)])
