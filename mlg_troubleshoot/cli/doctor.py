@@ -7,6 +7,7 @@ from dataclasses import asdict
 import typer
 
 from mlg_troubleshoot.cli import options, output
+from mlg_troubleshoot.schemas import SCHEMA_VERSION
 
 
 def doctor(
@@ -17,7 +18,7 @@ def doctor(
 
     findings = task.examine_installation(gear)
     if as_json:
-        output.write_json({"schema_version": 1, "abilities": [asdict(f) for f in findings]})
+        output.write_json({"schema_version": SCHEMA_VERSION, "abilities": [asdict(f) for f in findings]})
     else:
         console = output.console()
         for finding in findings:

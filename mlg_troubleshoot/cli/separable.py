@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from mlg_troubleshoot.cli import options, output
+from mlg_troubleshoot.schemas import SCHEMA_VERSION
 
 EPILOG = "Example: [b]mlg gear separable --columns tail_no,side,gear_landings,clearance_3_in,clearance_5_in[/b]"
 
@@ -28,7 +29,9 @@ def separable(
     gear = context.obj or options.DEFAULT_GEAR
     causes = planned(gear, names)
     if as_json:
-        output.write_json({"schema_version": 1, "columns": names, "causes": [asdict(cause) for cause in causes]})
+        output.write_json(
+            {"schema_version": SCHEMA_VERSION, "columns": names, "causes": [asdict(cause) for cause in causes]}
+        )
         return
     console = output.console()
     console.print(

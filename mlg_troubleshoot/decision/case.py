@@ -23,7 +23,6 @@ from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.directions import chance_beyond
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.joints import ROUNDING_IN
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +75,7 @@ class Cases:
 
     @property
     def over_limit(self) -> Mask:
-        return self.clearance_in > self.gear.limits_in + ROUNDING_IN
+        return self.gear.over_limit(self.clearance_in)
 
     @property
     def critical_missing(self) -> Mask:

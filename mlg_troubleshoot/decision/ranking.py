@@ -8,7 +8,6 @@ from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.assessment import JointFinding
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.joints import ROUNDING_IN
 from mlg_troubleshoot.indices.index_table import IndexTable
 
 
@@ -21,7 +20,7 @@ def rank_joints(
     ties go to the larger total-order index.
     """
     measured = np.isfinite(clearance_in)
-    over = clearance_in > gear.limits_in + ROUNDING_IN
+    over = gear.over_limit(clearance_in)
     assumed = np.where(measured, clearance_in, 0.5 * gear.limits_in)
     contribution = np.array([linkage.amplification for linkage in responses(gear)]) * assumed[:, None, :]
     places = _places(over[:, None, :], contribution, table.total_order)

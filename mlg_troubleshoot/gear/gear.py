@@ -10,7 +10,7 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.gear.cycle import RetractionCycle
-from mlg_troubleshoot.gear.joints import JointSpec
+from mlg_troubleshoot.gear.joints import ROUNDING_IN, JointSpec
 from mlg_troubleshoot.gear.model import Calibration, LinkageModel
 from mlg_troubleshoot.gear.sources import Sourced
 from mlg_troubleshoot.geometry.mechanism import Mechanism
@@ -157,6 +157,10 @@ class Gear:
     def limits_in(self) -> Array:
         """Largest allowed radial clearance of each joint, shape (n_joints,). [in]"""
         return np.array([joint.limit.value for joint in self.joints])
+
+    def over_limit(self, clearance_in: Array) -> Mask:
+        """Which clearances are above their limits, shape (…, n_joints): as `JointSpec.is_over_limit`. [in]"""
+        return np.asarray(clearance_in > self.limits_in + ROUNDING_IN)
 
     @property
     def new_parts_in(self) -> Array:

@@ -17,8 +17,8 @@ from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judge
 from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension, NamedCause
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.schemas import SCHEMA_VERSION
 
-SCHEMA_VERSION = 1
 _AS_THEY_ARE = frozenset((str, int, bool, type(None)))
 _SINGLE = (Enum, np.generic)
 _NUMBERS = (

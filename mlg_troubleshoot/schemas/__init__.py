@@ -9,6 +9,8 @@ from typing import Any
 from mlg_troubleshoot.errors import UsageError
 
 NAMES = ("check", "diagnose", "study")
+# Of every JSON output: raised when a name or a meaning changes.
+SCHEMA_VERSION = 1
 
 
 def schema(name: str) -> dict[str, Any]:
@@ -36,4 +38,4 @@ def schema(name: str) -> dict[str, Any]:
     return loaded
 
 
-__all__ = ["NAMES", "schema"]
+__all__ = ["NAMES", "SCHEMA_VERSION", "schema"]

@@ -27,6 +27,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records import ReadOptions, admit
 from mlg_troubleshoot.records.gate import judge_text
 from mlg_troubleshoot.records.rows import place_in_file
+from mlg_troubleshoot.schemas import SCHEMA_VERSION
 from mlg_troubleshoot.store import (
     Added,
     Broken,
@@ -810,7 +811,7 @@ def fleet_as_json(found: Sequence[GearLife], forecasts: Mapping[GearKey, Forecas
         )
     lines.sort(key=_urgency)
     warnings = [warning for life in found for warning in life.warnings]
-    return {"schema_version": 1, "gears": lines, "advice": advice(found).describe(), "warnings": warnings}
+    return {"schema_version": SCHEMA_VERSION, "gears": lines, "advice": advice(found).describe(), "warnings": warnings}
 
 
 def _outlook(life: GearLife, ahead: Forecast) -> dict[str, Any]:
@@ -881,7 +882,7 @@ def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
             }
         )
     tail, side = life.key
-    told = {"schema_version": 1, "tail_no": tail, "side": side, "events": events, "joints": joints}
+    told = {"schema_version": SCHEMA_VERSION, "tail_no": tail, "side": side, "events": events, "joints": joints}
     return {**told, **_outlook(life, ahead), "advice": advice([life]).describe(), "warnings": list(life.warnings)}
 
 

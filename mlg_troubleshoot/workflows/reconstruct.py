@@ -14,6 +14,7 @@ from mlg_troubleshoot.gear.design import member_values
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.outputs import OutputKind, write_text
 from mlg_troubleshoot.paper.targets import load_targets, targets_file
+from mlg_troubleshoot.schemas import SCHEMA_VERSION
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.paper.reconstruct import Reconstruction
@@ -56,7 +57,7 @@ def reconstruction_values(found: Reconstruction, text: str) -> dict[str, object]
     from mlg_troubleshoot.reporting.json_form import chosen
 
     return {
-        "schema_version": 1,
+        "schema_version": SCHEMA_VERSION,
         "seed": found.seed,
         "linkages_tried": found.evaluations,
         **chosen(found, "meets_all", "numbers", "determined"),

@@ -20,6 +20,7 @@ from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
 from mlg_troubleshoot.indices.index_table import INDEX_TABLE, write_index_table
 from mlg_troubleshoot.outputs import OutputFile, OutputKind, claim_outputs, write_text
 from mlg_troubleshoot.paper.targets import targets_file
+from mlg_troubleshoot.schemas import SCHEMA_VERSION
 from mlg_troubleshoot.units import LengthUnit
 
 if TYPE_CHECKING:
@@ -249,7 +250,7 @@ def survey_values(result: SurveyResult) -> dict[str, Any]:
     mode = None if found is None else found.modes[0]
     rows = zip(result.gear.joints, result.amplification, result.interval, result.before, strict=True)
     values: dict[str, Any] = {
-        "schema_version": 1,
+        "schema_version": SCHEMA_VERSION,
         "gear_file": None if result.gear_file is None else str(result.gear_file),
         "joints": [
             {

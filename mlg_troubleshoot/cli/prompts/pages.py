@@ -165,7 +165,7 @@ def confirm_page(gear: Gear, reading: Reading, number: int, unit: LengthUnit | N
     said = judge(reading.written.text, number, reading.unit, reading.convention, gear).said
     shown = (
         line((f"#{number}  {length(reading.radial_in, unit)} radial {what}.", Tone.WARN)),
-        line(in_unit(said, reading.unit), indent=3),
+        line(in_unit(f"{said[:1].upper()}{said[1:]}", reading.unit), indent=3),
         choice("y", f"yes, it is really {length(reading.as_read_in, unit)} {CONVENTION_NAMES[reading.convention]}"),
         line(("or type the value again", Tone.QUIET), indent=3),
     )
