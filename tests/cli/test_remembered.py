@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import shutil
 from pathlib import Path
 
@@ -41,6 +42,13 @@ def test_a_flag_wins_over_what_is_remembered(here: Path) -> None:
     assert "0.0472 in" in mlg("check", FAILURE, "--show", "in").out
 
 
+def test_the_page_of_a_flag_wins_over_the_one_that_is_remembered(here: Path) -> None:
+    (here / "mlg.toml").write_text('page = "Letter"', encoding="utf-8")
+    mlg("check", FAILURE, "--report", here, "--format", "html", "--page", "A4")
+    (page,) = here.glob("*.html")
+    assert re.findall(r"size: (A4|Letter)", page.read_text(encoding="utf-8")) == ["A4"]
+
+
 def test_the_working_folder_wins_over_the_configuration_of_the_user(here: Path) -> None:
     own = here.parent / "config" / "mlg-troubleshoot"
     own.mkdir(parents=True)
@@ -56,6 +64,14 @@ def test_how_a_header_is_read_is_remembered_and_said(here: Path, table: Table) -
     found = mlg("check", path, "--unit", "in", "--json")
     assert found.one["joints"][2]["clearance_in"] == 0.002
     assert "header 'Spiel Drei' read as clearance_3" in found.err
+
+
+def test_what_is_remembered_stays_beside_what_is_remembered_later(here: Path, table: Table) -> None:
+    path = table(row(clearance_3_in=None, **{"Spiel Drei": "0.002"}))
+    mlg("check", path, "--map", "Spiel Drei=clearance_3", "--unit", "in", "--show", "thou", "--remember")
+    mlg("check", FAILURE, "--page", "Letter", "--remember")
+    said = mlg("check", path, "--unit", "in").err
+    assert "lengths shown in thou, page Letter, header 'Spiel Drei' read as clearance_3" in said
 
 
 def test_a_remembered_header_that_is_not_there_is_no_problem(here: Path, table: Table) -> None:

@@ -71,3 +71,10 @@ def test_the_record_that_alone_may_be_wrong_is_named_with_the_nearest_it_contrad
 ) -> None:
     found = contradictions(moments(pairs), str)
     assert {place: text[: len(said[place])] for place, text in found.items()} == said
+
+
+@pytest.mark.parametrize(("count", "named", "more"), [(6, 6, False), (8, 6, True)])
+def test_of_many_suspects_six_are_named(count: int, named: int, more: bool) -> None:
+    (said,) = set(contradictions(moments([(n + 1, count - n) for n in range(count)]), str).values())
+    assert said.count("landings on") == named
+    assert (" …" in said) == more

@@ -69,6 +69,15 @@ def test_the_own_uncertainty_of_a_joint_is_in_the_monte_carlo_value(
     assert abs(checked.monte_carlo - checked.analytic) < 0.01
 
 
+def test_the_uncertainty_of_the_margin_is_in_the_monte_carlo_value(judge: Judge) -> None:
+    sure = judge(every_joint(0.0015), advice=True).confidence
+    unsure = judge(every_joint(0.0015), advice=True, margin_u_in=0.01).confidence
+    assert sure is not None
+    assert unsure is not None
+    assert unsure.monte_carlo < sure.monte_carlo - 0.02
+    assert abs(unsure.monte_carlo - unsure.analytic) < 0.01
+
+
 @pytest.mark.parametrize(("shift_in", "chance"), [(-0.02, 0.0), (0.02, 1.0)])
 def test_re_rigging_takes_back_what_shifts_the_plunger_already(gear: Gear, shift_in: float, chance: float) -> None:
     one = Cases.of(gear, [inspected(every_joint(0.0))], Shifted(0.02))

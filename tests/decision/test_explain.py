@@ -69,6 +69,12 @@ def test_the_interval_of_a_measured_joint_is_its_reading_with_its_uncertainty(ge
     assert (found.low_in, found.high_in) == pytest.approx((0.004 - 1.645 * 0.0005, 0.004 + 1.645 * 0.0005), abs=1e-4)
 
 
+def test_no_joint_is_taken_to_be_worn_beyond_twice_its_limit(gear: Gear) -> None:
+    # Three times its limit would explain the reading better.
+    found = explained(gear, {j: 0.0005 for j in range(1, 11) if j != 2}, 0.035).intervals[1]
+    assert gear.joint(2).limit.value < found.high_in <= 2.0 * gear.joint(2).limit.value
+
+
 def test_the_two_ends_of_an_unmeasured_link_get_the_same_interval(gear: Gear) -> None:
     sound = {j: 0.0005 for j in range(1, 11) if j not in (3, 5)}
     one, other = (explained(gear, sound, 0.01).intervals[j - 1] for j in (3, 5))

@@ -136,6 +136,15 @@ def test_an_entry_error_that_this_entry_cannot_have_is_not_suggested(factor: flo
     assert "entry error" not in text
 
 
+@pytest.mark.parametrize(("off", "suggested"), [(0.96, True), (1.04, True), (0.9, False), (1.1, False)])
+def test_an_entry_error_is_suggested_where_it_explains_the_displacement_to_a_twentieth(
+    off: float, suggested: bool
+) -> None:
+    text = disagreement(inspected({}, readings_in=(0.02 * 10.0 * off,)), 0.02, -0.02, 0.001)
+    assert text is not None
+    assert ("a slipped decimal point" in text) == suggested
+
+
 @pytest.mark.parametrize("factor", [25.4, 10.0, 2.0])
 def test_a_displacement_below_the_bound_suggests_no_entry_error(factor: float) -> None:
     text = disagreement(inspected({}, readings_in=(0.1 / factor,), **AS_TOTAL_PLAY), 0.1, -0.1, 0.001)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from mlg_troubleshoot.diagnosis import Diagnosis, diagnose
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.misfit import held_out
+from mlg_troubleshoot.reporting.json_form import diagnosis_as_json
 
 from .conftest import Array, DiagnosisTable, fleet
 
@@ -103,6 +105,15 @@ def test_decisions_are_counted_against_what_was_measured(found: Diagnosis) -> No
 @pytest.fixture(scope="module")
 def nothing(gear: Gear, plain: DiagnosisTable) -> Diagnosis:
     return diagnose(gear.model, plain, gear.discrepancies, permutations=199)
+
+
+def test_wrong_verdicts_of_a_model_that_stays_are_counted_by_their_sense(nothing: Diagnosis) -> None:
+    # Every row is measured beyond its margin and predicted within it.
+    margin, none = np.full(len(nothing.predicted_in), 1e-9), np.zeros_like(nothing.predicted_in)
+    kept = replace(nothing, used=replace(nothing.used, margin_in=margin), predicted_in=none)
+    told = diagnosis_as_json(kept, None)["gain"]
+    assert told["false_within_before"] == told["false_within_after"] == len(margin)
+    assert told["false_outside_before"] == told["false_outside_after"] == 0
 
 
 @pytest.fixture(scope="module")

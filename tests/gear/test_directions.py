@@ -134,6 +134,13 @@ def test_with_two_worn_joints_the_chance_is_what_their_two_angles_give(gear: Gea
     assert chance == pytest.approx(np.mean(np.abs(moved) > MARGIN_IN), abs=0.003)
 
 
+@pytest.mark.parametrize("offset_in", [0.012, -0.012])
+def test_what_moves_the_plunger_besides_is_added_with_its_sign(gear: Gear, offset_in: float) -> None:
+    moved = gear.model.displacement(links_from(FAILURE, random_directions(10, 64))) + offset_in
+    chance = chance_beyond(gear.model, FAILURE, np.array([MARGIN_IN]), 64, offset_in=np.array([offset_in]))[0]
+    assert chance == np.mean(np.abs(moved) > MARGIN_IN)
+
+
 @pytest.fixture(scope="module")
 def worn_gears() -> np.ndarray:
     """Gears with clearances spread evenly over 0 to 0.0075 in."""

@@ -159,6 +159,11 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
         ("schema = 1\n", 'schema = "1"\n', r"schema: expected a whole number"),
         ("driven = true", 'driven = "yes"', r"steps\[1\]\.driven: expected true or false"),
         ("virtual_links = [1]", "virtual_links = 1", r"steps\[1\]\.virtual_links: expected a list of whole numbers"),
+        (
+            "virtual_links = [1]",
+            "virtual_links = [0]",
+            r"steps\[1\]\.virtual_links: .* from 1 to 999",
+        ),
         ('type = "slot"', 'type = "groove"', r"steps\[3\]\.type: expected crank, dyad, lever, slot or slider"),
         ('kind = "position"', 'kind = "speed"', r"output\.kind: expected position or angle"),
         ('id = "hawker-800xp"', "id = 800", r"id: expected a text, found 800"),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -48,6 +50,13 @@ def test_values_slopes_and_bends_of_a_formula_lie_inside(name: str) -> None:
     found = FUNCTIONS[name](*Box(low, high).variables())
     grid = np.stack(np.meshgrid(np.linspace(1.0, 1.9, 31), np.linspace(0.6, 1.3, 31))).reshape(2, -1)
     _inside(found, FUNCTIONS[name], grid)
+
+
+def test_a_sum_that_no_number_of_the_machine_equals_lies_inside() -> None:
+    low = np.array([[0.1], [0.2]])
+    found = operator.add(*Box(low, low).variables())
+    exact = Fraction(0.1) + Fraction(0.2)
+    assert Fraction(float(found.value[0][0])) < exact < Fraction(float(found.value[1][0]))
 
 
 @pytest.mark.parametrize("name", list(FUNCTIONS))

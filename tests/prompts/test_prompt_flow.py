@@ -257,6 +257,11 @@ def test_b_leads_to_the_question_before(flow: Flow, place: int) -> None:
     assert (back.ask, back.at) == (before.ask, before.at)
 
 
+def test_b_never_leads_back_into_a_confirmation_that_was_given(flow: Flow) -> None:
+    confirmed = play(flow, [*TEN, "p -.3", "y"])
+    assert flow.answer(confirmed.state, "b").state.ask is not Ask.CONFIRM_MORE
+
+
 # Values that cannot or can hardly be.
 
 
@@ -739,6 +744,10 @@ def test_a_yes_takes_the_readings_in_their_unit(flow: Flow, gear: Gear) -> None:
     turn = in_millimetres(flow, "y")
     assert turn.effect is Effect.COMPUTE
     assert turn.state.answers.inspection(gear, "R1").unit_question == ""
+
+
+def test_b_after_a_yes_does_not_ask_about_the_unit_again(flow: Flow) -> None:
+    assert flow.answer(in_millimetres(flow, "y").state, "b").state.ask is not Ask.CONFIRM_UNIT
 
 
 def test_a_no_goes_back_to_the_table(flow: Flow) -> None:

@@ -92,6 +92,11 @@ def test_the_limit_of_a_gauge_uncertainty_counts_on_its_radial_value(tmp_path, g
     assert isinstance(row, Inspection) is taken
 
 
+def test_without_a_convention_a_gauge_uncertainty_may_be_one_of_total_play(tmp_path, gear):
+    read = read_many([table(tmp_path, clearance_convention="", gauge_u_in=0.0373)], ReadOptions.of(gear))
+    assert [problem.column for problem in read.problems] == ["clearance_convention"]
+
+
 def test_a_large_uncertainty_in_total_play_is_the_same_as_half_of_it_in_radial(tmp_path, gear):
     total = one(tmp_path, gear, clearance_convention="TOTAL_PLAY", gauge_u_in=0.0373)
     radial = one(tmp_path, gear, clearance_convention="RADIAL", gauge_u_in=0.01865)

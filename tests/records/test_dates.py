@@ -38,10 +38,23 @@ def days(tmp_path, *texts, **options):
         ("12/31/2025", date(2025, 12, 31)),
         ("25.01.24", date(2024, 1, 25)),
         ("05/05/2024", date(2024, 5, 5)),
+        ("31/12/2025 10:30", date(2025, 12, 31)),
     ],
 )
 def test_a_date_that_can_be_read_in_one_way_only_is_read(text, day):
     assert read_date(text) == day
+
+
+@pytest.mark.parametrize("year", [1950, 2100])
+def test_years_from_1950_to_2100_are_read(year):
+    assert read_date(f"{year}-12-31").year == year
+
+
+@pytest.mark.parametrize("year", [1949, 2101])
+def test_a_year_outside_these_is_refused(year):
+    with pytest.raises(CellFaultError) as fault:
+        read_date(f"{year}-12-31")
+    assert fault.value.code == "date_out_of_range"
 
 
 @pytest.mark.parametrize("text", ["03/04/2026", "3.4.26", "01-02-03", "24/01/25"])

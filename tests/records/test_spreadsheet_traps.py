@@ -145,6 +145,11 @@ def test_09_millimetres_under_an_inch_header_are_an_error_that_names_the_factor(
     assert "millimetres" in problem.remedy
 
 
+def test_09_a_slip_to_the_play_of_a_new_part_is_suggested(read, table):
+    row = read(table(rows=[(*GOOD[:4], 0.0254, 0.007)])).rows[0]
+    assert any("0.001 in: was it read in millimetres" in warning for warning in row.warnings)
+
+
 def test_10_a_header_without_a_unit_is_refused(read, table):
     header = [h.removesuffix("_in") for h in HEADER]
     result = read(table(header))
@@ -768,7 +773,7 @@ def test_44_an_exported_text_is_no_formula(tmp_path, text):
 
     write_csv(tmp_path / "out.csv", ["remarks", "n"], [[text, -0.5]])
     lines = (tmp_path / "out.csv").read_text().splitlines()
-    assert lines[1].lstrip('"').startswith("'")
+    assert lines[1].lstrip('"\t').startswith("'")
     assert lines[1].endswith(",-0.5")
 
 

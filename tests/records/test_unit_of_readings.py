@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -81,6 +82,14 @@ def test_confirmed_small_readings_are_judged(gear, confirmed):
     assert not row.unit_question
 
 
+def test_who_can_be_asked_has_the_row_of_too_small_readings_with_its_question(gear):
+    values = {f"clearance_{n}_mm": 0.004 for n in range(1, 11)}
+    heading = {"record_id": "R1", "tail_no": "N1", "side": "LH", "clearance_convention": "RADIAL"}
+    row, problems = judge_row({**heading, **values}, replace(ReadOptions.of(gear), asks=True))
+    assert not problems
+    assert row.unit_question.startswith("10 of 10 readings")
+
+
 def test_an_answer_that_confirms_nothing_leaves_the_row_invalid(gear):
     row, _ = judged(gear, WORN_IN, LengthUnit.INCH, LengthUnit.MILLIMETRE, small_readings_true="no")
     assert isinstance(row, InvalidRow)
@@ -98,6 +107,34 @@ def test_new_parts_in_their_own_unit_are_judged_without_a_question(gear, unit):
     assert not problems
     assert row.unit_question == ""
     assert not [warning for warning in row.warnings if "play of new parts" in warning]
+
+
+def test_one_reading_twice_that_of_a_new_part_shows_that_the_unit_is_right(gear):
+    row, _ = judged(gear, (*NEW_IN[:-1], 0.001), *2 * [LengthUnit.MILLIMETRE])
+    small = [value * 0.8 for value in NEW_IN[:-1]]
+    beside, _ = judged(gear, (*small, 0.001), *2 * [LengthUnit.MILLIMETRE])
+    alone, _ = judged(gear, small, *2 * [LengthUnit.MILLIMETRE])
+    assert (row.unit_question, beside.unit_question) == ("", "")
+    assert alone.unit_question
+
+
+def test_of_a_doubtful_row_only_the_readings_below_a_new_part_are_named(gear):
+    row, _ = judged(gear, (0.0004, 0.0004, 0.0006), *2 * [LengthUnit.MILLIMETRE])
+    assert row.unit_question.startswith("2 of 3 readings (#1, #2) are below the play of new parts")
+
+
+def test_readings_in_thou_are_not_asked_about_as_those_of_a_smaller_unit(gear):
+    row, _ = judged(gear, ALL_WORN_OUT_IN, *2 * [LengthUnit.THOU])
+    assert isinstance(row, Inspection)
+    assert not [warning for warning in row.warnings if "were they read in" in warning]
+
+
+def test_the_play_of_new_parts_is_stated_in_the_convention_of_the_row(gear):
+    diametral = [2 * value for value in (0.0004, 0.0004, 0.0004)]
+    row, _ = judged(
+        gear, diametral, *2 * [LengthUnit.MILLIMETRE], clearance_convention=ClearanceConvention.DIAMETRAL.value
+    )
+    assert "below the play of new parts (0.0254 mm diametral)" in row.unit_question
 
 
 @pytest.mark.parametrize(("read_in", "declared"), TOO_LARGE)

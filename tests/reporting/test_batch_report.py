@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
-from mlg_troubleshoot.decision.order import latest_of_each_gear
+from mlg_troubleshoot.decision.order import latest_of_each_gear, worst_first
 from mlg_troubleshoot.errors import OutputError, Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import ReportProvenance, WrittenReport, batch_document, publish
@@ -88,6 +88,13 @@ def test_the_worst_gear_stands_first(summary: tuple[str, bytes]) -> None:
 
 def test_a_gear_measured_beyond_its_margin_stands_before_all_others(summary: tuple[str, bytes]) -> None:
     assert records(summary[0])[0] == "little"
+
+
+def test_of_gears_outside_the_margin_the_one_farther_beyond_its_own_stands_first(judge: Judge) -> None:
+    # The gear that moves the plunger farther is allowed to do so.
+    wide, narrow = judge(WORN, margin_in=0.05), judge(FAILURE, tail_no="N2")
+    assert wide.predicted_displacement_in > narrow.predicted_displacement_in
+    assert worst_first([wide, narrow], [0, 1]) == [1, 0]
 
 
 def test_problems_of_the_input_are_listed(summary: tuple[str, bytes]) -> None:

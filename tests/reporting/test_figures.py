@@ -86,6 +86,13 @@ def test_an_axis_around_values_holds_them_all() -> None:
     assert axis.high > 3.0
 
 
+@pytest.mark.parametrize("value", [0.02, -0.02, 3000.0])
+def test_an_axis_around_one_value_is_no_wider_than_the_value(value: float) -> None:
+    axis = Axis.around("x", [value])
+    assert axis.low < value < axis.high
+    assert axis.high - axis.low < abs(value)
+
+
 @given(st.floats(-1e6, 1e6), st.floats(1e-6, 1e6))
 def test_ticks_lie_within_their_axis(low: float, span: float) -> None:
     high = low + span

@@ -5,10 +5,10 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import date, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -17,6 +17,7 @@ from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.store import Kind, Record, Store, inspection_record, packed
 from mlg_troubleshoot.units import ClearanceConvention
+from mlg_troubleshoot.wear import Samples, WearModel, WearPath
 from mlg_troubleshoot.workflows import history as task
 from tests.cli.conftest import mlg, row
 
@@ -303,6 +304,73 @@ def test_without_a_date_there_is_no_date_due() -> None:
     (one, _two) = mlg("fleet", "--json").json["gears"]
     assert one["next_inspection_landings"] is not None
     assert one["due_date"] is None
+
+
+def test_gears_without_landings_stand_behind_those_that_are_due_some_day() -> None:
+    (first, *others) = fleet_of(3, 4, 1)
+    add([[replace(each, gear_landings=None) for each in first], *others])
+    lines = mlg("fleet", "--json").json["gears"]
+    assert [line["next_inspection_landings"] is None for line in lines] == [False, False, True]
+
+
+def test_a_joint_that_was_never_read_takes_no_landings_from_those_that_were() -> None:
+    (first, *others) = fleet_of(3, 4, 1)
+    add([[replace(each, clearance_in={3: each.clearance_in[3]}) for each in first], *others])
+    told = mlg("history", "N0", "LH", "--json").json
+    (of_joint,) = [joint["landings_to_limit"] for joint in told["joints"] if joint["readings"]]
+    assert of_joint["p05"] is not None
+    assert (told["limit_joint"], told["landings_to_limit"]) == (3, of_joint)
+    # What the others could add would bring the margin nearer than this one alone can.
+    assert told["landings_to_margin"]["p50"] is None
+
+
+# Last inspections that do not fit the wear of their gear.
+
+
+@dataclass(frozen=True)
+class Steady:
+    """A forecast that every joint reads as it did last, with a standard deviation of 0.001 in."""
+
+    paths: Mapping[str, Sequence[WearPath]] = field(default_factory=dict)
+
+    def forecast(self, units: Sequence[str], _usage: np.ndarray) -> Samples:
+        last = [np.asarray(self.paths[unit][-1].value)[-1] for unit in units]
+        return Samples(np.add.outer(last, np.array([[-0.001, 0.001]])))
+
+
+def suggested(*gears: tuple[float, float]) -> list[str]:
+    """What is suggested of the gears of one aircraft by what joint 3 read first and last."""
+    own = [
+        [
+            replace(
+                inspection(n, f"2024-0{n + 1}-01", 400.0 * n),
+                side=side,
+                record_id=f"{side} {n}",
+                clearance_in={3: worn_in},
+            )
+            for n, worn_in in enumerate(read)
+        ]
+        for side, read in zip(Side, gears, strict=False)
+    ]
+    add(own)
+    model = cast(WearModel, Steady())
+    return task.suggestions(list(task.lives(Store()).values()), model, load_gear("hawker-800xp"))
+
+
+@pytest.mark.parametrize(("deviations", "told"), [(3.0, 0), (5.0, 1)])
+def test_a_reading_five_standard_deviations_tighter_is_taken_for_a_restoration_and_three_are_not(
+    deviations: float, told: int
+) -> None:
+    found = suggested((0.006, 0.006 - 0.001 * deviations))
+    assert len([words for words in found if "#3 read far tighter than before: restored" in words]) == told
+
+
+@pytest.mark.parametrize(("deviations", "told"), [(2.5, 0), (3.5, 1)])
+def test_two_gears_are_exchanged_where_that_is_e_to_the_8_times_as_likely(deviations: float, told: int) -> None:
+    # On both gears together the exchange gains the square of the deviation in the log likelihood.
+    apart = 0.001 * deviations
+    found = suggested((0.003, 0.003 + apart), (0.003 + apart, 0.003))
+    assert len([words for words in found if "were they exchanged?" in words]) == told
 
 
 # A gear that is outside its margin or has a joint over its limit is due now.

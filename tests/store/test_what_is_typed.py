@@ -155,6 +155,13 @@ def test_the_same_inspections_from_two_files_of_one_call_are_kept_once(
     assert "6 new records, 6 known" in mlg("check", *files, "--keep").err
 
 
+def test_the_same_reading_written_in_another_unit_is_the_same_inspection(tmp_path: Path, place: Path) -> None:
+    kept(tmp_path, "one.csv", ROWS[0])
+    in_thou = {**ROWS[0], "clearance_3_thou": "1"}
+    assert in_thou.pop("clearance_3_in") == "0.001"
+    assert "0 new records, 2 known" in kept(tmp_path, "other.csv", in_thou)
+
+
 def test_another_inspection_of_the_day_in_a_file_without_ids_is_kept(tmp_path: Path, place: Path) -> None:
     kept(tmp_path, "one.csv", NAMELESS[0])
     assert "2 new records, 0 known" in kept(tmp_path, "other.csv", {**NAMELESS[0], "clearance_3_in": "0.002"})

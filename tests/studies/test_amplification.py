@@ -44,6 +44,12 @@ def test_eq_9_is_the_exact_gradient_where_no_pivot_moves(growth: Amplification) 
     )
 
 
+def test_eq_9_is_the_size_of_the_gradient_where_the_output_turns_the_other_way(gear: Gear) -> None:
+    linkage = next(model for model in gear.ensemble_models if model.rate < 0.0)
+    found = amplification(gear, linkage)
+    assert np.delete(found.local_plunger, [3, 7]) == pytest.approx(np.delete(found.exact, [3, 7]), rel=1e-7)
+
+
 def test_eq_9_misses_a_moving_pivot_by_less_than_a_twentieth(growth: Amplification) -> None:
     assert growth.local_plunger[[3, 7]] == pytest.approx(growth.exact[[3, 7]], rel=0.05)
     assert np.all(np.abs(growth.local_plunger[[3, 7]] - growth.exact[[3, 7]]) > 0.01)

@@ -9,7 +9,7 @@ import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.displacement import Response
-from mlg_troubleshoot.indices.estimators import Indices
+from mlg_troubleshoot.indices.estimators import Indices, student_half
 from mlg_troubleshoot.indices.inputs import Inputs, joint_groups, with_random_directions
 from mlg_troubleshoot.indices.saltelli import fast_indices, saltelli_indices
 from mlg_troubleshoot.indices.tensor import TensorIndices
@@ -28,6 +28,12 @@ def test_analytic_indices_are_met_within_0_002(
     found = route(oracle.function, oracle.n, np.random.default_rng(1), 1)
     assert np.abs(found.first_order - oracle.first_order).max() < 0.002
     assert np.abs(found.total_order - oracle.total_order).max() < 0.002
+
+
+@pytest.mark.parametrize(("count", "quantile"), [(2, 12.7062), (5, 2.7764), (10, 2.2622)])
+def test_a_mean_has_as_many_degrees_of_freedom_as_values_but_one(count: int, quantile: float) -> None:
+    # Table of Student's distribution, 97.5 %.
+    assert student_half(np.ones(1), count) == pytest.approx(quantile / np.sqrt(count), rel=1e-4)
 
 
 def test_sampling_stops_by_itself_at_the_accuracy(on_cube: Response) -> None:
