@@ -51,7 +51,7 @@ class Predicted:
 
     @property
     def loaded(self) -> bool:
-        """True where the prediction is an expectation and no bound."""
+        """True where the prediction is an expectation, not a bound."""
         return self.displacement_in != self.bound_in
 
     def __str__(self) -> str:
@@ -77,7 +77,7 @@ def measured(measured_in: float, margin_in: float, where: str) -> str:
 def explained(explained_in: float, unexplained_in: float) -> str:
     if unexplained_in <= 0.0:
         return "Joint clearances can explain all of it."
-    return f"Joint clearances can explain {explained_in:.4f} in of it at most; {unexplained_in:.4f} in they cannot."
+    return f"Joint clearances explain at most {explained_in:.4f} in of it; {unexplained_in:.4f} in has another cause."
 
 
 def within(margin_in: float, said: Predicted, *, failed: bool) -> str:
@@ -151,7 +151,7 @@ def joint_list(joints: Sequence[int]) -> str:
 
 
 def confidence_words(confidence: Confidence | None) -> str:
-    """Say beside a probability what Monte Carlo with the curved response gives."""
+    """Say after a probability what Monte Carlo with the curved response gives."""
     if confidence is None:
         return ""
     error = max(100.0 * confidence.standard_error, 0.01)
