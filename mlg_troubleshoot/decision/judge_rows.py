@@ -199,7 +199,8 @@ def _headline(cases: Cases, judged: Judged, i: int) -> str:
     if found is Verdict.OUTSIDE_MARGIN:
         return sentences.outside(margin, said)
     if found is Verdict.WITHIN_MARGIN:
-        return sentences.within(margin, said, failed=bool(cases.failed[i]))
+        done = bool(cases.take(np.array([i])).joints_done[0])
+        return sentences.within(margin, said, failed=bool(cases.failed[i]), joints_done=done)
     return sentences.inconclusive(margin, said, float(judged.p_within[i]))
 
 

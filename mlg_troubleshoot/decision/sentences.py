@@ -23,6 +23,7 @@ GO_ON = {
 }
 
 
+JOINTS_DONE = "Joints are within limits. No further action on the joints; this is not a release to service."
 FAILED_BUT_WITHIN = "Joint clearances do not explain this failure: check hydraulics, reversing valve, doors."
 
 
@@ -36,8 +37,10 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.{1 if near_an_end else 0}f} %"
 
 
-def go_on(end: End, *, failed: bool) -> str:
+def go_on(end: End, *, failed: bool, joints_done: bool) -> str:
     """Step CONTINUE."""
+    if joints_done and end is End.WITHIN:
+        return JOINTS_DONE
     return FAILED_BUT_WITHIN if failed and end is End.NOT_EXPLAINED else GO_ON[end]
 
 
@@ -80,9 +83,10 @@ def explained(explained_in: float, unexplained_in: float) -> str:
     return f"Joint clearances explain at most {explained_in:.4f} in of it; {unexplained_in:.4f} in has another cause."
 
 
-def within(margin_in: float, said: Predicted, *, failed: bool) -> str:
+def within(margin_in: float, said: Predicted, *, failed: bool, joints_done: bool) -> str:
     """Headline of WITHIN_MARGIN."""
     then = FAILED_BUT_WITHIN if failed else "Continue fault isolation; not a release."
+    then = JOINTS_DONE if joints_done else then
     if not said.loaded:
         return f"Even the worst case stays within the margin of {margin_in:.4f} in ({said}). {then}"
     loads = f"Other loads than this fleet's could push it to {said.bound_in:.4f} in."
