@@ -24,7 +24,7 @@ LONGEST_NAME, LONGEST_TEXT, LARGEST = 40, 2_000, 1e12
 _SHOWN = 80
 
 
-def read_toml(path: Path, missing: str = "Put it beside the gear file that names it.") -> DataTable:
+def read_toml(path: Path, missing: str = "Put it next to the gear file that names it.") -> DataTable:
     """Read a TOML file; `missing` is the remedy if it does not exist."""
     return _read(path, missing, "TOML", _parsed_toml)
 
@@ -46,7 +46,7 @@ def _read(path: Path, missing: str, form: str, parse: Callable[[str], Any]) -> D
     try:
         found = path.stat()
         if not stat.S_ISREG(found.st_mode):
-            raise GearFileError(f"{path}: is no regular file", "Give the name of a file.")
+            raise GearFileError(f"{path} is not a regular file", "Give the name of a file.")
         if found.st_size > MOST_BYTES:
             raise GearFileError(f"{path}: has {found.st_size} bytes, at most {MOST_BYTES} are read", remedy)
         raw = parse(path.read_text(encoding="utf-8-sig"))
@@ -144,7 +144,7 @@ class DataTable:
         """A file in the same folder, by its name alone."""
         value = self.text(key, default)
         if value in ("", ".", "..") or "/" in value or "\\" in value or "\n" in value:
-            raise self.fail(key, "the name of a file beside this one, without a folder")
+            raise self.fail(key, "the name of a file in the same folder, without a folder")
         return self._file.with_name(value)
 
     def number(

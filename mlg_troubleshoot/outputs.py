@@ -65,7 +65,7 @@ def write_bytes(path: str | Path, data: bytes) -> None:
     """Write a file so that it appears whole or not at all.
 
     A link is followed, so that it stays one. A file that is replaced keeps its mode; a new one gets what the umask
-    leaves. Folders that are missing are made. Anything that is no regular file is refused with an `OutputError`.
+    leaves. Folders that are missing are made. Anything that is not a regular file is refused with an `OutputError`.
     """
     target = Path(os.path.realpath(path))
     scratch = None

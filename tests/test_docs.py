@@ -50,7 +50,7 @@ def test_continuous_integration_takes_the_test_command_from_here() -> None:
 
 def test_exit_code_1_is_explained_beside_the_command() -> None:
     after = TEXT.partition(CHECK_COMMAND)[2][:200]
-    assert 'exit code 1. That is no error: it means "not within margin"' in after
+    assert 'exit code 1. That is not an error: it means "not within margin"' in after
 
 
 # Pages of many long commands: run with the slow part.

@@ -36,7 +36,7 @@ class Program(TyperGroup):
             raise SystemExit(code if given else USAGE)
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command behind the boundary, too: on its way out typer says nothing of an interrupt."""
+        """Also run the command behind the boundary: on its way out typer says nothing of an interrupt."""
         with Boundary():
             return super().invoke(ctx)
 

@@ -123,7 +123,7 @@ def _what_now(terminal: RichTerminal) -> str:
 
 
 def _advice(gear: Gear) -> Callable[[Mapping[int, float], Sequence[int]], tuple[str, int | None] | None]:
-    """Say after each critical joint which one is worth most next, or that one may stop."""
+    """Say after each critical joint which reading is most useful next, or that one may stop."""
 
     def advise(measured: Mapping[int, float], left: Sequence[int]) -> tuple[str, int | None] | None:
         advice = task.next_joint(gear, measured)
@@ -134,6 +134,6 @@ def _advice(gear: Gear) -> Callable[[Mapping[int, float], Sequence[int]], tuple[
             return None
         if advice.expected is not None and joint == advice.joint:
             return f"{advice.text} Or done.", joint
-        return f"Worth most next: {gear.joint(joint).label}.", joint
+        return f"Most useful next reading: {gear.joint(joint).label}.", joint
 
     return advise

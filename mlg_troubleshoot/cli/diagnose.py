@@ -36,7 +36,7 @@ def diagnose(
     page: options.Paper = None,
     causes: options.Causes = None,
     permutations: Annotated[
-        int, typer.Option("--permutations", min=99, max=99999, help="Data sets drawn with nothing wrong.")
+        int, typer.Option("--permutations", min=99, max=99999, help="Number of null simulations.")
     ] = 999,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all randomness.")] = 0,
     tables: options.Tables,

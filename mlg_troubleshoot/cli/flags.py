@@ -58,9 +58,9 @@ class Wanted:
         typer.Option("--annotate", metavar="OUT.xlsx", help="Your workbook with bad cells marked and verdicts added."),
     ] = None
     csv: Annotated[
-        Path | None, typer.Option("--csv", metavar="OUT.csv", help="Verdicts as a CSV, one line a gear.")
+        Path | None, typer.Option("--csv", metavar="OUT.csv", help="Verdicts as a CSV, one line per gear.")
     ] = None
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the last unfinished entry.")] = False
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the last unfinished entry.")] = False
     keep: Annotated[bool, typer.Option("--keep", help="Add the inspections to the store; the prompts always do.")] = (
         False
     )
@@ -101,10 +101,10 @@ class StudyFlags:
             "the others are the paper's.",
         ),
     ] = "fast"
-    accuracy: Annotated[float, typer.Option("--accuracy", help="Wanted error of every index.")] = 1e-3
+    accuracy: Annotated[float, typer.Option("--accuracy", help="Maximum error of every index.")] = 1e-3
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")] = 0
     directions: Annotated[
-        str, typer.Option("--directions", metavar="worst|over|under|random", help="How the clearances are turned.")
+        str, typer.Option("--directions", metavar="worst|over|under|random", help="Direction of the clearances.")
     ] = "worst"
     fixed: Annotated[
         str | None, typer.Option("--fixed", metavar="DEG,DEG,…", help="Directions set by a load, one for each joint.")
@@ -116,7 +116,7 @@ class StudyFlags:
         ),
     ] = "uniform"
     limit: Annotated[
-        float | None, typer.Option("--limit", metavar="IN", help="One limit for all joints, in, for the gear's.")
+        float | None, typer.Option("--limit", metavar="IN", help="One limit for all joints, in, instead of the gear's.")
     ] = None
     beyond_margin: Annotated[
         bool, typer.Option("--beyond-margin", help="Indices of exceeding the margin, not of the displacement.")
@@ -128,7 +128,7 @@ class StudyFlags:
         bool,
         typer.Option("--bound", help="Worst displacement at the limits: sequential rule, global search, proved bound."),
     ] = False
-    most: Annotated[int, typer.Option("--most", min=1, help="Evaluations to stop at.")] = 1 << 24
+    most: Annotated[int, typer.Option("--most", min=1, help="Maximum number of evaluations.")] = 1 << 24
     n1: Annotated[int | None, typer.Option("--n1", help="Repetitions of a paper design, 100.")] = None
     n2: Annotated[int | None, typer.Option("--n2", help="Levels of a paper design, 1000 or 862.")] = None
     iterations: Annotated[int | None, typer.Option("--iterations", help="Iterations of a paper design, 10.")] = None
@@ -139,13 +139,15 @@ class StudyFlags:
     scheduler: Annotated[
         str | None, typer.Option("--scheduler", metavar="ADDRESS", help="Dask cluster for the total order of lhs.")
     ] = None
-    csv: Annotated[Path | None, typer.Option("--csv", metavar="OUT.csv", help="One line a joint.")] = None
+    csv: Annotated[Path | None, typer.Option("--csv", metavar="OUT.csv", help="One line per joint.")] = None
     write_table: Annotated[
-        bool, typer.Option("--write-table", help="Write the table that mlg check uses, beside the gear file.")
+        bool, typer.Option("--write-table", help="Write the table that mlg check uses, next to the gear file.")
     ] = False
     given: Annotated[
         Path | None,
-        typer.Option("--given", metavar="FILE", help="Beside them the indices of measured inspections, without model."),
+        typer.Option(
+            "--given", metavar="FILE", help="Also estimate indices from measured inspections, without a model."
+        ),
     ] = None
     report: Annotated[
         Path | None,

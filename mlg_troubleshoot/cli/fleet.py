@@ -1,4 +1,4 @@
-"""``mlg fleet``: one line a gear, its latest inspection only, worst first."""
+"""``mlg fleet``: one line per gear, its latest inspection only, worst first."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def fleet(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Show every gear that was kept: verdict, landings left, next inspection due; worst first."""
+    """Show every gear in the store: verdict, landings left, next inspection due; worst first."""
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.cli.remembered import settings

@@ -88,7 +88,7 @@ def _as_json(gear: Gear) -> dict[str, object]:
 
 
 def verify(context: typer.Context, as_json: options.Json = False, _version: options.Version = False) -> None:
-    """Print every number the paper prints beside what the model gives; exit 1 if one that should hold does not."""
+    """Print every number of the paper with the value of the model; exit 1 if a required value does not hold."""
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.paper import verification
 
@@ -115,7 +115,7 @@ def verify(context: typer.Context, as_json: options.Json = False, _version: opti
             style="bold red" if n in failed else "",
         )
     console.print(table)
-    verdict = "all that should hold do" if not failed else f"{len(failed)} that should hold do not"
+    verdict = "all required values hold" if not failed else f"{len(failed)} required values do not hold"
     console.print(f"{len(numbers)} numbers: {verdict}.")
     raise typer.Exit(1 if failed else 0)
 

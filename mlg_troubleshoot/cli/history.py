@@ -1,4 +1,4 @@
-"""``mlg history``: what was kept of each gear, and what is added to it later."""
+"""``mlg history``: the records of each gear, and what is added to them later."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ RecordId = Annotated[str, typer.Argument(metavar="RECORD", help="Record id, or t
 Day = Annotated[str, typer.Option("--date", metavar="YYYY-MM-DD", help="Day of the repair.")]
 Landings = Annotated[str | None, typer.Option("--landings", metavar="N", help="Landings at the repair.")]
 WorkOrder = Annotated[str | None, typer.Option("--work-order", help="Work order.")]
-Chain = Annotated[Path, typer.Argument(metavar="FILE", help="JSON Lines, one record a line.")]
-NoForecast = Annotated[bool, typer.Option("--no-forecast", help="What was kept only, without looking ahead: faster.")]
+Chain = Annotated[Path, typer.Argument(metavar="FILE", help="JSON Lines, one record per line.")]
+NoForecast = Annotated[bool, typer.Option("--no-forecast", help="Records only, without a forecast: faster.")]
 
 
 class HistoryGroup(TyperGroup):
@@ -70,7 +70,7 @@ def show(
     show_in: options.Show = None,
     as_json: options.Json = False,
 ) -> None:
-    """Show what was kept: the gears and their latest state, or one gear's life with the forecast of each joint."""
+    """Show the records: the gears and their latest state, or one gear's life with the forecast of each joint."""
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.gear.gear_file import load_gear
@@ -124,7 +124,7 @@ def _show_gears(found: Sequence[GearLife], place: str) -> None:
 
     console = output.console()
     if not found:
-        console.print(f"Nothing is kept in {place}. Keep inspections with: mlg check FILE --keep")
+        console.print(f"No records in {place}. Keep inspections with: mlg check FILE --keep")
         return
     headings = ("tail", "side", "last seen", "landings", "verdict", "look at", "inspections", "repairs")
     table = output.plain_table(console, *headings, right=("landings", "inspections", "repairs"))
@@ -330,7 +330,7 @@ def verify(
     store: Place = None,
     expect: Annotated[
         str | None,
-        typer.Option("--expect", metavar="HASH", help="A last hash noted before: it must still stand in the chain."),
+        typer.Option("--expect", metavar="HASH", help="A last hash noted earlier; it must still be in the chain."),
     ] = None,
     gear: options.Gear = options.DEFAULT_GEAR,
 ) -> None:
@@ -357,7 +357,7 @@ def verify(
     if noted is not None:
         output.write(_expected(found))
     for each in found.wrong:
-        output.write(f"Not as it should be: {each}.")
+        output.write(f"Not as expected: {each}.")
     if found.wrong:
         output.write(
             "What to do: void a record that cannot be read (mlg history void HASH --why TEXT). Otherwise export "
@@ -412,7 +412,7 @@ def history_app() -> typer.Typer:
     app = typer.Typer(
         name="history",
         cls=HistoryGroup,
-        help="What was kept of each gear: [b]mlg history[/b] · [b]mlg history TAIL LH[/b], and what is added later.",
+        help="Records of each gear: [b]mlg history[/b] · [b]mlg history TAIL LH[/b], and what is added later.",
         epilog=EPILOG,
     )
     app.command(_SHOW, hidden=True)(show)

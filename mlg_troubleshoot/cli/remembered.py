@@ -80,7 +80,7 @@ def _recall(gear: str, show: str | None, page: Page | None) -> Settings:
 
 
 def _remember(gear: str, show: str | None, page: Page | None, headers: Mapping[str, str]) -> Path:
-    """Keep what flags said in the working folder, beside what is kept there already."""
+    """Keep what flags said in the working folder, with what is already kept there."""
     import tomli_w
 
     from mlg_troubleshoot.outputs import write_text
@@ -99,11 +99,11 @@ def _remember(gear: str, show: str | None, page: Page | None, headers: Mapping[s
 
 def _read(file: Path, gear: str) -> Settings:
     if not file.is_file() or file.stat().st_size > _MOST_BYTES:
-        raise UsageError(f"{file} is no file of at most {_MOST_BYTES} bytes", "Delete it, or write it anew.")
+        raise UsageError(f"{file} is not a file of at most {_MOST_BYTES} bytes", "Delete it, or write it anew.")
     try:
         raw = tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise UsageError(f"{file} cannot be read as TOML: {str(error)[:200]}", "Mend or delete it.") from error
+        raise UsageError(f"{file} cannot be read as TOML: {str(error)[:200]}", "Correct or delete it.") from error
     return _judged(file, raw, gear)
 
 
@@ -116,11 +116,11 @@ def _judged(file: Path, raw: Mapping[str, object], gear: str) -> Settings:
         )
     headers = raw.get("headers", {})
     if not isinstance(headers, dict) or len(headers) > _MOST_HEADERS:
-        raise UsageError(f"{file}: headers is no table of at most {_MOST_HEADERS} entries", "Mend or delete it.")
+        raise UsageError(f"{file}: headers is not a table of at most {_MOST_HEADERS} entries", "Correct or delete it.")
     for header, column in headers.items():
         texts = (header, column)
         if not all(isinstance(t, str) and len(t) <= _MOST_CHARACTERS and t.isprintable() for t in texts):
-            raise UsageError(f"{file}: headers: {header!r} = {column!r} is no text", "Mend or delete it.")
+            raise UsageError(f"{file}: headers: {header!r} = {column!r} is not a text", "Correct or delete it.")
         if _TURNS_A_VERDICT.search(column):
             raise UsageError(
                 f"{file}: headers: {header!r} = {column!r} states a unit, convention, side or margin: never remembered",

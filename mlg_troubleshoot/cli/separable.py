@@ -1,4 +1,4 @@
-"""``mlg gear separable``: which causes planned columns could tell apart."""
+"""``mlg gear separable``: which causes planned columns could distinguish."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def separable(
     as_json: options.Json = False,
     _version: options.Version = False,
 ) -> None:
-    """Say which causes the planned columns could tell apart, at which size, before anything is measured."""
+    """Say which causes the planned columns could distinguish, and at which size, before anything is measured."""
     from mlg_troubleshoot.workflows.separable import separable as planned
 
     names = None if columns is None else [name.strip() for name in columns.split(",") if name.strip()]
@@ -35,11 +35,11 @@ def separable(
         return
     console = output.console()
     console.print(
-        "Effects, rms in thou over 200 rows of 20 aircraft, that would be found, and told from what looks most "
-        "like them, four times in five:"
+        "Smallest effects, rms in thou over 200 rows of 20 aircraft, that are detected, and distinguished from the "
+        "nearest alternative, with 80 % power:"
     )
-    headings = ("cause", "found", "looks most like", "told apart", "cheapest column that splits them")
-    table = output.plain_table(None, *headings, right=("found", "told apart"))
+    headings = ("cause", "detected", "looks most like", "distinguished", "cheapest column that splits them")
+    table = output.plain_table(None, *headings, right=("detected", "distinguished"))
     for cause in (c for c in causes if c.missing_column is None):
         table.add_row(
             " ".join(part for part in (cause.cause, cause.target) if part),

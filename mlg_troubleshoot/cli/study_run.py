@@ -90,7 +90,7 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
     if flags.write_table:
         output.say(f"Table written: {task.write_study_table(findings)}")
     if not findings.result.finished:
-        output.say("Interrupted: the numbers above are of what was done.")
+        output.say("Interrupted: these are partial results.")
         raise typer.Exit(INTERRUPTED)
 
 
@@ -185,8 +185,8 @@ def _show_given(gear: Gear, given: task.GivenDataResult) -> None:
     )
     output.console().print(
         f"Without a model, from {given.rows_used} measured of {given.rows_read} inspections in {given.file}, "
-        f"first order with 95 % intervals: {each}. Where joints wear together each explains what the others do, too, "
-        "and these add to more than 1."
+        f"first order with 95 % intervals: {each}. Where joints wear together each also explains what the others "
+        "do, and these add to more than 1."
     )
 
 

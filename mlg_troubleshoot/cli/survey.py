@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 EPILOG = (
     "Example: [b]mlg gear survey template survey.xlsx[/b] · "
     "filled in: [b]mlg gear survey survey.xlsx --write my-gear.toml[/b] · "
-    "asked for at the line: [b]mlg gear survey ask survey.csv[/b]"
+    "asked for at the prompt: [b]mlg gear survey ask survey.csv[/b]"
 )
 
 
@@ -49,7 +49,7 @@ def survey(
 ) -> None:
     """A geometry from measurements: your own gear in place of the reconstructed one.
 
-    Exit codes: 0 fits · 1 something does not fit · 3 nothing follows from the table.
+    Exit codes: 0 fits · 1 something does not fit · 3 the table has no usable reading.
     """
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.progress import stages
@@ -122,7 +122,7 @@ def _show(result: SurveyResult, console: output.DataConsole) -> None:
         output.say(f"{problem.place()}: {problem.value}: expected {problem.expected}. {problem.remedy}")
     found = result.survey
     if found is None:
-        console.print("Nothing follows from this table: it holds no reading that can be used.")
+        console.print("This table contains no usable reading.")
     else:
         console.print(f"{result.gear.name}: {found.words}", style="bold")
         numbers = ("index", "90 % interval", "before")

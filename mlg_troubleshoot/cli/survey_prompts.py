@@ -28,7 +28,7 @@ def ask_survey(file: Path, gear: Gear, terminal: RichTerminal) -> bool:
     with file.open(newline="", encoding="utf-8-sig", errors="replace") as text:
         header, *rows = [*csv.reader(text)] or [[]]
     if not set(COLUMNS) <= set(header):
-        raise UsageError(f"{file} is no template of a survey", "Give a new name, or one that mlg gear survey wrote.")
+        raise UsageError(f"{file} is not a survey template", "Give a new name, or one that mlg gear survey wrote.")
     rows = [[*row, *[""] * (len(header) - len(row))] for row in rows]
     values = [i for i, name in enumerate(header) if name.startswith("value_")]
     terminal.say([_KEYS, BLANK])

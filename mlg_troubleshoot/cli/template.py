@@ -21,14 +21,16 @@ def template(
     show: options.Show = None,
     _version: options.Version = False,
 ) -> None:
-    """Write an empty inspection workbook that mlg check reads back, or a one-page form (.pdf, .html) for the hand."""
+    """Write an empty inspection workbook for mlg check, or a one-page form (.pdf, .html) to fill in by hand."""
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.outputs import TO_FILL_IN, OutputFile
     from mlg_troubleshoot.workflows import check as task
 
     if file.suffix.lower() not in (".xlsx", ".pdf", ".html"):
-        raise UsageError(f"{file.name!r} is no workbook and no form", "Give a name that ends in .xlsx, .pdf or .html.")
+        raise UsageError(
+            f"{file.name!r} is not the name of a workbook or a form", "Give a name that ends in .xlsx, .pdf or .html."
+        )
     claim(gear, (), [OutputFile("the template", file, TO_FILL_IN)], force=force)
     shown = settings(gear, show, page)
     task.write_template(file, gear, page=str(shown.page), unit=shown.show)

@@ -40,7 +40,7 @@ class JointFinding:
     first_order, total_order: sensitivity indices of the precomputed table (Eqs. 1 and 2). [1]
     plunger_amplification: A_iP at mid-position in the limit of small clearance (Eq. 8). [1]
     rank, rank_range: order in which to inspect, from 1, and how it varies over the ensemble of geometries.
-    alike: joints at the other end of the same link: plunger data alone cannot tell them apart.
+    alike: joints at the other end of the same link: plunger data alone cannot distinguish them.
     allowance_in: how much further this joint alone may wear until the worst case reaches the margin; None if it is
         not measured or the worst case is beyond the margin already. [in]
     """
@@ -171,7 +171,7 @@ class UncertaintyBudget:
 
 @dataclass(frozen=True, slots=True)
 class GroupChance:
-    """Chance that a joint, or one of two that the plunger cannot tell apart, is worn beyond its limit. [1]"""
+    """Chance that a joint, or one of two that the plunger cannot distinguish, is worn beyond its limit. [1]"""
 
     joints: tuple[int, ...]
     probability: float
@@ -255,7 +255,7 @@ class Assessment(_Planned):
     budget : UncertaintyBudget or None
         What the standard uncertainty is made of.
     over_directions_rad, under_directions_rad : tuple of float
-        Worst directions, one a joint, for the curve and the schematic; empty where nothing closes. [rad]
+        Worst directions, one per joint, for the curve and the schematic; empty where nothing closes. [rad]
     joints : tuple of JointFinding
         Ranked table, in the order of the joints' numbers.
     plan : Plan
@@ -322,7 +322,7 @@ class Assessment(_Planned):
 
     @property
     def as_loaded(self) -> bool:
-        """True where the prediction is the displacement as loaded: an expectation, with the bound beside it."""
+        """True where the prediction is the displacement as loaded: an expectation, with the bound also given."""
         return self.predicted_displacement_in != self.bound_in
 
     @property

@@ -83,6 +83,11 @@ class Cases:
         return np.asarray((~self.measured & self.gear.critical).any(axis=1))
 
     @property
+    def joints_done(self) -> Mask:
+        """True for a gear that retracted, with every joint read and none over its limit."""
+        return np.asarray(self.retracted & (self.measured & ~self.over_limit).all(axis=1))
+
+    @property
     def unit_doubtful(self) -> Mask:
         """True for a gear whose readings may be of another unit than the one that is stated."""
         return np.array([bool(inspection.unit_question) for inspection in self.inspections])

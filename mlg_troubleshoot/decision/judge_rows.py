@@ -199,7 +199,8 @@ def _headline(cases: Cases, judged: Judged, i: int) -> str:
     if found is Verdict.OUTSIDE_MARGIN:
         return sentences.outside(margin, said)
     if found is Verdict.WITHIN_MARGIN:
-        return sentences.within(margin, said, failed=bool(cases.failed[i]))
+        done = bool(cases.take(np.array([i])).joints_done[0])
+        return sentences.within(margin, said, failed=bool(cases.failed[i]), joints_done=done)
     return sentences.inconclusive(margin, said, float(judged.p_within[i]))
 
 
@@ -238,7 +239,9 @@ def _warnings(
         if differs is not None:
             warnings.append(differs)
     if inspection.gauge_u_is_default:
-        warnings.append(f"Gauge uncertainty not stated: {inspection.gauge_u_in:.5f} in radial taken as the default.")
+        warnings.append(
+            f"Standard uncertainty of the gauge not stated: {inspection.gauge_u_in:.5f} in radial taken as the default."
+        )
     if inspection.outcome is Outcome.FAILED and inspection.measured_displacement_in is None:
         warnings.append("The gear failed and no plunger displacement was measured: measure it at mid-position.")
     return tuple(warnings)
@@ -256,7 +259,7 @@ def allowances(cases: Cases, lower: Prediction) -> Array:
     sense = np.where(lower.worst.over_in >= -lower.worst.under_in, 1.0, -1.0)[:, None]
     left = (cases.margin_in - worst)[:, None]
     room = np.maximum(gear.limits_in - start, 0.0)
-    # Root of slope·t + ½·bend·t² = left, in the form that stays good where the curvature is none.
+    # Root of slope·t + ½·bend·t² = left, in the form that stays good where the curvature is zero.
     root = np.sqrt(np.maximum(slopes**2 + 2.0 * sense * bend * left, 0.0))
     wear = np.minimum(2.0 * left / np.maximum(slopes + root, 1e-9), room)
     if cases.extension is None:

@@ -133,7 +133,7 @@ def _text(chances: Sequence[GroupChance], called: Sequence[tuple[int, ...]], non
     if called:
         return f"The measured displacement points to wear: most likely worn {ranked}.{also}"
     if not likely:
-        return f"No joint is likely worn beyond its limit ({percent(none)} that none is).{also}"
+        return f"Probably no joint is beyond its limit ({percent(none)}).{also}"
     return (
         f"The measured displacement does not show which joint is worn: no joint beyond its limit {percent(none)}; "
         f"most likely worn {ranked}.{also}"

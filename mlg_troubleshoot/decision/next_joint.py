@@ -202,7 +202,7 @@ def _text(one: Cases, ahead: Outlook) -> str:
         )
     if ahead.enough is None:
         if best.risk_drop > 0.0:
-            return f"Worth most next: {name} ({minutes})."
+            return f"Most useful next reading: {name} ({minutes})."
         return f"Next: {name} ({minutes}); no single reading decides, it removes most of the uncertainty per minute."
     likely = within > 0.5
     chance = percent(within if likely else 1.0 - within)

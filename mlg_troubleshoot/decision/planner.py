@@ -71,6 +71,7 @@ class _Facts:
         gear, measured, over = cases.gear, cases.measured, cases.over_limit
         plunger, ahead = judged.plunger, _Ahead(cases, judged)
         self.cases, self.judged = cases, judged
+        self.joints_done = cases.joints_done
         self.complaint = cases.failed | ((plunger.beyond | over.any(axis=1)) & ~cases.retracted)
         open_critical = ~measured & gear.critical
         missing = np.asarray(open_critical.any(axis=1))
@@ -153,8 +154,9 @@ class _Course:
 
     def end(self, where: End) -> Plan:
         """Go on: the plan ends."""
-        failed = bool(self.cases.failed[self.row])
-        self.steps.append(Step(Action.CONTINUE, (), 0.0, None, sentences.go_on(where, failed=failed)))
+        failed, done = bool(self.cases.failed[self.row]), bool(self.facts.joints_done[self.row])
+        text = sentences.go_on(where, failed=failed, joints_done=done)
+        self.steps.append(Step(Action.CONTINUE, (), 0.0, None, text))
         return Plan(tuple(self.steps), where)
 
     def _measure(self, joints: tuple[int, ...]) -> None:

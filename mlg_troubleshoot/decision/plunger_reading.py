@@ -1,4 +1,4 @@
-"""A measured plunger displacement beside the prediction."""
+"""A measured plunger displacement compared with the prediction."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mlg_troubleshoot.units import SLIPS, ClearanceConvention, LengthUnit
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compared:
-    """Measured displacements of n gears beside what the joints can explain, unmeasured joints at their limit.
+    """Measured displacements of n gears compared with what the joints can explain, unmeasured joints at their limit.
 
     beyond, clears: measured beyond the margin; within it by two standard uncertainties.
     explained: false where the displacement is beyond what the joints can explain by two standard uncertainties.

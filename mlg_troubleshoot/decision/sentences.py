@@ -23,6 +23,7 @@ GO_ON = {
 }
 
 
+JOINTS_DONE = "Joints are within limits. No further action on the joints; this is not a release to service."
 FAILED_BUT_WITHIN = "Joint clearances do not explain this failure: check hydraulics, reversing valve, doors."
 
 
@@ -36,8 +37,10 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.{1 if near_an_end else 0}f} %"
 
 
-def go_on(end: End, *, failed: bool) -> str:
+def go_on(end: End, *, failed: bool, joints_done: bool) -> str:
     """Step CONTINUE."""
+    if joints_done and end is End.WITHIN:
+        return JOINTS_DONE
     return FAILED_BUT_WITHIN if failed and end is End.NOT_EXPLAINED else GO_ON[end]
 
 
@@ -51,7 +54,7 @@ class Predicted:
 
     @property
     def loaded(self) -> bool:
-        """True where the prediction is an expectation and no bound."""
+        """True where the prediction is an expectation, not a bound."""
         return self.displacement_in != self.bound_in
 
     def __str__(self) -> str:
@@ -77,12 +80,13 @@ def measured(measured_in: float, margin_in: float, where: str) -> str:
 def explained(explained_in: float, unexplained_in: float) -> str:
     if unexplained_in <= 0.0:
         return "Joint clearances can explain all of it."
-    return f"Joint clearances can explain {explained_in:.4f} in of it at most; {unexplained_in:.4f} in they cannot."
+    return f"Joint clearances explain at most {explained_in:.4f} in of it; {unexplained_in:.4f} in has another cause."
 
 
-def within(margin_in: float, said: Predicted, *, failed: bool) -> str:
+def within(margin_in: float, said: Predicted, *, failed: bool, joints_done: bool) -> str:
     """Headline of WITHIN_MARGIN."""
     then = FAILED_BUT_WITHIN if failed else "Continue fault isolation; not a release."
+    then = JOINTS_DONE if joints_done else then
     if not said.loaded:
         return f"Even the worst case stays within the margin of {margin_in:.4f} in ({said}). {then}"
     loads = f"Other loads than this fleet's could push it to {said.bound_in:.4f} in."
@@ -151,7 +155,7 @@ def joint_list(joints: Sequence[int]) -> str:
 
 
 def confidence_words(confidence: Confidence | None) -> str:
-    """Say beside a probability what Monte Carlo with the curved response gives."""
+    """Say after a probability what Monte Carlo with the curved response gives."""
     if confidence is None:
         return ""
     error = max(100.0 * confidence.standard_error, 0.01)

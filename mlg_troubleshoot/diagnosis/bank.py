@@ -1,4 +1,4 @@
-"""A bank of shapes that are no listed cause: does the remainder still move with a variable, and with which?"""
+"""A bank of shapes that do not belong to a listed cause: does the residual vary with a variable, and which?"""
 
 from __future__ import annotations
 

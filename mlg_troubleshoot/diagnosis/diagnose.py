@@ -40,14 +40,14 @@ from mlg_troubleshoot.misfit.verdict import Verdict
 from mlg_troubleshoot.units import MM_PER_IN
 
 LEAST_ROWS = 20
-# Share of rows from which data faults are no slips of single cells. [1]
+# Share of rows from which data faults are not errors in single cells. [1]
 _MANY_FAULTS = 0.15
-# Measured over predicted displacement: further from 1 than this, or negative, is no misfit. [1]
+# Measured over predicted displacement: further from 1 than this, or negative, is not a misfit. [1]
 _MOST_RATIO = 4.0
-# Mean square left by factors of all joints, over that left by one scale or by a constant, from which they explain; rows
+# Mean square left by all-joint effects, over that left by one scale or by a constant, from which they explain; rows
 # further off than so many standard deviations are slips and do not count. Ten factors take 5 % off by chance. [1]
 _CLEARLY_LESS, _SLIP = 0.7, 4.0
-# Above this ratio readings against the prediction are no slip of the sign, which gives -0.9 to -1.1 (20 simulated
+# Above this ratio readings against the prediction are not an error of the sign, which gives -0.9 to -1.1 (20 simulated
 # tables with one cause or none), nor of a unit: that the clearances tell of them beyond chance is enough. [1]
 _SIGN_SLIP, _BY_CHANCE = -0.75, 0.05
 # And where one scale leaves more than this of the variance, which a slip of the unit does not (of 60 tables with one
@@ -66,7 +66,7 @@ class NamedCause(Term):
     effect_in : ndarray, shape (n_used,)
         Its effect in each row used. [in]
     p_value : float or None
-        Chance of as much if nothing is wrong. [1]
+        p-value. [1]
     aliases : tuple of Candidate
         What these rows cannot tell from it, one cause or two together: the class is named by its likeliest member.
     """
@@ -117,7 +117,7 @@ class Diagnosis:
     also_possible : tuple of NamedCause
         The whole set that the data cannot separate; empty unless AMBIGUOUS.
     beside : tuple of NamedCause
-        The set of which something acts beside what is named; empty unless NAMED.
+        The set of which something acts in addition to what is named; empty unless NAMED.
     unlisted_variables : tuple of str
         Columns that an effect outside the catalogue moves with.
     not_testable : tuple of (str, str)
@@ -141,19 +141,19 @@ class Diagnosis:
     repeatability_source : str
         repeat readings, declared or unknown.
     smallest_rms_in : float
-        Smallest effect that would have been found four times in five. [in]
+        Smallest effect that is detected with 80 % power. [in]
     gain : Gain or None
-        Gain of the extension on rows not used for the fit.
+        Gain of the extension on held-out rows.
     terms : tuple of Term
         The extension; empty if the model is not extended.
     residual_u_in : float
-        Scatter of what is left. [in]
+        Scatter of the residual. [in]
     expected_scatter_in : float or None
         What reading and clearance gauges alone would leave. [in]
     remainder_p : float
         Chance of as much left if only noise is left. [1]
     remainder_is_noise : bool
-        True if what is left looks like noise.
+        True if the residual looks like noise.
     used : DiagnosisTable
         The rows behind the verdict.
     predicted_in, misfit_in : ndarray, shape (n_used,)
@@ -161,7 +161,7 @@ class Diagnosis:
     seed : int
         Seed.
     permutations : int
-        Data sets drawn with nothing wrong.
+        Number of null simulations.
     """
 
     verdict: Verdict
@@ -221,11 +221,11 @@ def diagnose(
     where : Discrepancies, optional
         Where inside the linkage causes act; without it only causes that need no place are tried.
     own_causes : sequence of Cause
-        A user's own causes, beside the catalogue.
+        A user's own causes, in addition to the catalogue.
     ensemble : sequence of LinkageModel
         Other linkages that the true one may be instead, from which the cause `geometry` is made.
     permutations : int
-        Data sets drawn with nothing wrong.
+        Number of null simulations.
     seed : int
         Seed of all randomness.
     progress : callable, optional
@@ -248,7 +248,7 @@ def diagnose(
         table = _answerable(table)
         (scene, rows), faults = _without_faults(model, table, where, None)
         catalogue = (*CATALOGUE, *own_causes)
-        # What never varies cannot be told from a linkage of other dimensions.
+        # What never varies cannot be distinguished from a linkage of other dimensions.
         same = {
             name for name, values in scene.table.quantities.items() if len(np.unique(values[np.isfinite(values)])) < 2
         }
@@ -363,12 +363,12 @@ def _answerable(table: DiagnosisTable) -> DiagnosisTable:
 
 
 def _single_slips(faults: tuple[DataFault, ...], read: int) -> None:
-    """Refuse a table in which so many rows look wrong that it is the table and no slip of the pen."""
+    """Refuse a table in which so many rows look wrong that the whole table is wrong, not single cells."""
     wrong = len({fault.place for fault in faults})
     if wrong > max(_MANY_FAULTS * read, 5):
         column = Counter(fault.column for fault in faults).most_common(1)[0][0]
         raise InconclusiveDataError(
-            f"{wrong} of {read} rows look wrong, most often in {column}: these are no slips of single cells",
+            f"{wrong} of {read} rows look wrong, most often in {column}: these are not errors in single cells",
             "Check the unit and the convention of the clearances, and the unit of the displacements, column by column.",
         )
 
@@ -380,7 +380,7 @@ def _comparable(measured_in: Array, predicted_in: Array, contribution_in: Array,
         return
     if np.ptp(measured_in) == 0.0:
         raise InconclusiveDataError(
-            "every measured plunger displacement is the same, which no gauge that moves shows",
+            "every measured plunger displacement is the same, but a working gauge would vary",
             "Check the gauge and the column; record what was read at each inspection.",
         )
     large = predicted_in >= np.median(predicted_in)
@@ -397,7 +397,7 @@ def _comparable(measured_in: Array, predicted_in: Array, contribution_in: Array,
     elif ratio >= _MOST_RATIO:
         check = "Check the unit of the displacements."
     raise InconclusiveDataError(
-        f"the measured displacements are {ratio:.2g} times the predicted ones: no cause on any list does that", check
+        f"the measured displacements are {ratio:.2g} times the predicted ones: no known cause does that", check
     )
 
 
@@ -406,7 +406,8 @@ def _explained_by_clearances(
 ) -> bool:
     """Tell whether factors of −1 to 1, joint by joint, explain readings that no one scale of the prediction does.
 
-    Nor one scale with one joint that was written in millimetres. What is no slip is only to be told of beyond chance.
+    Nor one scale with one joint that was written in millimetres. What is not an entry error is reported only beyond
+    chance.
     """
     near = np.ones(len(measured_in), bool)
     for _ in range(4):
@@ -430,7 +431,7 @@ def _unsaid(table: DiagnosisTable) -> tuple[str, ...]:
     if len(np.unique(table.tails)) < LEAST_TAILS:
         found.append(
             f"With fewer than {LEAST_TAILS} aircraft it cannot be said whether other gears do the same, nor where this "
-            "plunger rod should be rigged; what is gained is told on rows of the same gears."
+            "plunger rod should be rigged; the gain is measured on rows of the same gears."
         )
     if not np.isfinite(table.clearance_in).any() and len(np.unique(table.gears)) > 1:
         found.append(
@@ -453,7 +454,7 @@ def _enough(table: DiagnosisTable) -> None:
     tails = len(np.unique(table.tails))
     if "tail_no" in table.factors and tails < LEAST_TAILS:
         raise InconclusiveDataError(
-            f"all rows are of {tails} aircraft: what is wrong with the model cannot be told from what is theirs alone",
+            f"all rows are of {tails} aircraft: model errors cannot be distinguished from effects of single aircraft",
             f"Record inspections of at least {LEAST_TAILS} aircraft.",
         )
     if not np.nan_to_num(table.clearance_in).any():
@@ -511,7 +512,7 @@ def _report(  # noqa: PLR0913 - everything that a diagnosis says
         residual_u_in=float(np.std(left)),
         expected_scatter_in=_expected_scatter(model, table, repeatability),
         remainder_p=finding.remainder_p,
-        # Where nothing stands out beyond chance, what is left is noise by the same test.
+        # Where nothing stands out beyond chance, the residual is noise by the same test.
         remainder_is_noise=verdict is Verdict.NONE or (finding.verdict is Verdict.NAMED and finding.remainder_p > 0.05),
         used=table,
         predicted_in=case.scene.over_in,

@@ -180,7 +180,7 @@ def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ())
     gear : Gear
         The gear that is to be predicted.
     own : sequence of Cause
-        A user's own causes, beside the catalogue.
+        A user's own causes, in addition to the catalogue.
 
     Returns
     -------
@@ -256,7 +256,7 @@ def _term(entry: DataTable, known: Mapping[str, Cause], gear: Gear) -> Term:
 
 
 def _setting(setting: DataTable) -> dict[str, Any]:
-    """What a cause fixes beside its parameter: texts, numbers, lists of joints, numbers by name."""
+    """What a cause fixes in addition to its parameter: texts, numbers, lists of joints, numbers by name."""
     read: dict[str, Any] = {}
     for key in setting.names:
         value = setting.get(key)

@@ -189,7 +189,7 @@ def _bend(table: DiagnosisTable, left: Array) -> Array:
     for _ in range(_BEND_ROUNDS):
         if near.sum() < LEAST_ALONG:
             break
-        # A curve through fewer places than it has coefficients is none.
+        # A curve through fewer places than it has coefficients is not determined.
         places = len(np.unique(np.round(at[near] / max(float(np.ptp(at[near])), 1e-9), 2)))
         curve = np.polynomial.Polynomial.fit(at[near], left[near], min(_BEND, int(near.sum()) // 4, places - 1))
         off = np.abs(left - curve(at))
@@ -233,7 +233,7 @@ def _gathers(table: DiagnosisTable, misfit: Array, centre: float, scale: float, 
             continue
         same = texts == texts[place]
         others = int(np.sum(alike & same)) - 1
-        # By chance few rows stand out; two more in one small group, or many in a large one, are no chance.
+        # By chance few rows stand out; two more in one small group, or many in a large one, are not chance.
         rate = float(np.mean(alike & ~same)) if np.any(~same) else 0.0
         if others >= max(2.0, 3.0 * rate * same.sum() + 2.0):
             return True
@@ -296,7 +296,7 @@ def _convincing(row_evidence: float, slip: _Slip) -> bool:
     if row_evidence >= _ROW_ALONE and cell >= _LEAST_ROW_ALONE:
         return True
     largest = max(written for _c, written, _r in slip.cells)
-    # A joint may be worn as badly as that: then the plunger must speak for a slip, too.
+    # A joint may be worn as badly as that: then the plunger must also speak for a slip.
     return cell > _CLEARANCE_ALONE and row_evidence > (-1.0 if largest > _NEVER_WORN_IN else 1.0) and largest > 0.02
 
 
@@ -314,7 +314,7 @@ _TOO_LARGE = (("mm_as_in", 1.0 / _UNIT), ("factor_10", 1.0 / _POINT))
 
 
 def _slips(model: LinkageModel, table: DiagnosisTable, usual: _Usual, place: int, clearance: Array) -> list[_Slip]:
-    """Every slip of the pen that a row may hold."""
+    """Every entry error that a row may hold."""
     written = table.clearance_in[place]
     seen = table.readings_in[place][np.isfinite(table.readings_in[place])]
     measured = float(np.median(seen))

@@ -21,7 +21,7 @@ LEAST_TAILS = 4
 class Gain:
     """Held-out misfit and decisions before and after.
 
-    rms_before_in, rms_after_in: root mean square misfit of rows that were not used for the fit. [in]
+    rms_before_in, rms_after_in: root mean square misfit of held-out rows. [in]
     share_interval: 95 % interval of the share of the mean square misfit that is removed, over tails. [1]
     false_within_before, false_within_after: rows predicted within whose measured displacement is outside.
     false_outside_before, false_outside_after: rows predicted outside whose measured displacement is within.

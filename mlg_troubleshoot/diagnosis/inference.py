@@ -1,6 +1,6 @@
 """Which cause explains the misfit beyond chance, which rivals are ruled out, and whether anything is left.
 
-The alarm is a maximum over all candidates against data sets drawn with nothing wrong, which controls the
+The alarm is a maximum over all candidates against null simulations, which controls the
 family-wise error. A name is unique only if every rival explains clearly less; otherwise the whole set is
 reported. Candidates of one cause share its prior, so a cause with many targets must explain more.
 """
@@ -62,17 +62,17 @@ class Finding:
     chosen: candidates that are named, or the leading one of an ambiguous set.
     rivals: the best candidate of each further cause and target that the data cannot rule out.
     sure: of an ambiguous set, those of `chosen` that are there whatever the rest is.
-    p_values: chance of as much if nothing is wrong, for each of `chosen`. [1]
+    p_values: p-value of each of `chosen`. [1]
     variables: variables of an unlisted effect.
     remainder_p: chance of as much left if only noise is left. [1]
     noise: the noise with what is named removed.
     fit: fit of the chosen columns.
-    smallest_rms_in: root mean square of the smallest effect that would be found four times in five. [in]
+    smallest_rms_in: root mean square of the smallest effect that is detected with 80 % power. [in]
     ruled_out: causes and targets that explain clearly less, best first.
-    block, aliases, rival: factors of all joints that are part of the model; what these data cannot tell from them, the
-        other cause that changes all joints, or two causes together; and factors of all joints that explain as much as
+    block, aliases, rival: all-joint effects that are part of the model; what these data cannot tell from them, the
+        other cause that changes all joints, or two causes together; and all-joint effects that explain as much as
         what is chosen.
-    block_p: chance of as much by factors of all joints if nothing is wrong. [1]
+    block_p: p-value of all-joint effects. [1]
     """
 
     verdict: Verdict
@@ -102,9 +102,9 @@ class Inference:
 
     misfit, shape (n,): measured less predicted. [in]
     columns, shape (n, n_candidates): effects of the candidates. [in / unit]
-    permutations: data sets drawn with nothing wrong.
+    permutations: number of null simulations.
     progress: called with the share that is done.
-    block: factors of all joints that are part of the model, shrunk by what is known of them.
+    block: all-joint effects that are part of the model, shrunk by what is known of them.
     columns_in: effects of the candidates in another linkage, each asked for once; the same if not given. [in / unit]
     """
 
@@ -142,11 +142,11 @@ class Inference:
         self.penalty = np.where([c.stands_in for c in candidates], np.inf, self.prior)
 
     def columns_beside(self, block: Block) -> Array:
-        """Effects of the candidates beside factors of all joints: in another linkage they differ."""
+        """Effects of the candidates given all-joint effects: in another linkage they differ."""
         return self.columns if block.model is None else self.columns_in(block.model)
 
     def beside(self, block: Block, kept: Sequence[int], rng: np.random.Generator) -> Inference:
-        """The same data with some of the candidates, factors of all joints being part of the model."""
+        """The same data with some of the candidates, all-joint effects being part of the model."""
         candidates, columns = [self.candidates[k] for k in kept], self.columns_beside(block)[:, list(kept)]
         return Inference(self.observed, self.rows, candidates, columns, self.bank, self.permutations, rng, None, block)
 
@@ -180,14 +180,14 @@ class Inference:
         return build_noise(self.misfit, self.rows, explained, None if self.block is None else self.block.effects_in)
 
     def _strongest(self, screen: Screen, null: Array, barred: Array | None = None) -> tuple[int, float]:
-        """Place of the shape that stands out most, of those that are not barred, and its chance if nothing is wrong."""
+        """Place of the shape that stands out most, of those that are not barred, and its p-value."""
         barred = np.zeros(screen.columns.shape[1]) if barred is None else barred
         gain = screen.run(self.misfit[:, None])[0][:, 0] - barred
         top = int(np.argmax(gain))
         return top, Chance(screen.largest(null, barred)).of(float(gain[top]))
 
     def null(self, noise: NoiseModel, screen: Screen, aside: bool = False) -> Array:
-        """Draw data sets with nothing wrong; aside from the stream that the rest of the diagnosis draws from."""
+        """Draw null simulations; aside from the stream that the rest of the diagnosis draws from."""
         ratio, scale = screen.tail_ratio(self.misfit)
         rng = self.rng.spawn(1)[0] if aside else self.rng
         normal = rng.standard_normal(4096)
@@ -195,7 +195,7 @@ class Inference:
         return noise.draw(normal, ratio, max(scale, 2.0 * noise.floor_in), self.permutations, rng)
 
     def _smallest(self, at_random: Chance, scale: float) -> float:
-        """Effect whose gain, half its squared t, clears the alarm four times in five."""
+        """Effect whose gain, half its squared t, clears the alarm with 80 % power."""
         penalty = self.penalty[np.isfinite(self.penalty)]
         # Where nothing can be named nothing is searched: then the bar is that of one test.
         bar = at_random.bar(ALARM) + float(np.median(penalty)) if len(penalty) else 0.5 * 1.96**2
@@ -210,7 +210,7 @@ class Inference:
             return Finding(Verdict.UNLISTED, p, self.bare, smallest, p_values=(p_alarm,), variables=variables)
         finding = self._with(several, smallest)
         if finding.verdict is Verdict.UNLISTED:
-            # What is left may be a weaker cause of the catalogue: a listed cause goes before an unlisted one.
+            # The residual may hold a weaker cause of the catalogue: a listed cause goes before an unlisted one.
             weaker = one_by_one(replace(alone, least_share=WEAK_SHARE), _MOST_CAUSES)
             if len(weaker.chosen) > 1:
                 again = self._with(weaker, smallest)
@@ -275,7 +275,7 @@ class Inference:
         return min(p, ALARM), variables
 
     def _shifted(self, chosen: Sequence[int]) -> bool:
-        """Tell whether a shift of all rows alike still stands out beside causes; beside a single one it did."""
+        """Tell whether a shift of all rows alike still stands out given causes; given a single one it did."""
         noise, _fitted = self.refit(chosen)
         screen = _of_shapes(noise, np.ones((len(self.misfit), 1)), self.columns[:, list(chosen)])
         return len(chosen) < 2 or float(screen.run(self.misfit[:, None])[0][0, 0]) > CONSTANT
@@ -307,7 +307,7 @@ class Inference:
         return abs(float(first @ second)) > ALIKE * float(np.linalg.norm(first) * np.linalg.norm(second))
 
     def remainder(self, chosen: Sequence[int]) -> tuple[float, tuple[str, ...], bool]:
-        """Chance of the strongest shape in what is left, its variables, and whether it refutes what is named.
+        """p-value of the strongest shape in the residual, its variables, and whether it refutes what is named.
 
         A large remainder of any shape does; a smaller one does if it moves with the named cause's own variable.
         """
@@ -359,7 +359,7 @@ class Inference:
         return found
 
     def _explained(self, noise: NoiseModel, known: Array) -> float:
-        """Root mean square of what single causes explain, and factors of all joints that are part of the model. [in]"""
+        """Root mean square of what single causes explain, and all-joint effects that are part of the model. [in]"""
         block = 0.0 if self.block is None else noise.share_of(self.block.effects_in, self.misfit - known)
         return float(np.sqrt(np.mean((known + block) ** 2)))
 
@@ -371,7 +371,7 @@ class Inference:
 
 @dataclass(frozen=True)
 class _Together:
-    """Single causes that explain the misfit together, the chance of as much of each, and how small one may be beside
+    """Single causes that explain the misfit together, the p-value of each, and how small one may be compared with
     the largest."""
 
     whole: Inference
@@ -380,14 +380,14 @@ class _Together:
     least_share: float
 
     def further(self) -> _Together | None:
-        """The same with the next cause; beside one the best pair of all, since two may hide each other."""
+        """The same with the next cause; after one the best pair of all, since two may hide each other."""
         if len(self.chosen) == 1:
             return self._added(self._pair)
         polished = self._polished()
         return polished._added(polished._next)
 
     def _polished(self) -> _Together:
-        """The same, each in the form that explains most beside the others."""
+        """The same, each in the form that explains most given the others."""
         chosen = list(self.chosen)
         for place, k in enumerate(chosen):
             chosen[place] = self.whole.rivals(k, [*chosen[:place], *chosen[place + 1 :]], clear=True)[0]
@@ -414,7 +414,7 @@ class _Together:
         return replace(self, chosen=chosen, p_values=p_values)
 
     def chances(self) -> list[float]:
-        """Chance of as much as each explains beside the others if it is not there."""
+        """p-value of each cause given the others."""
         whole, found = self.whole, []
         noise, _fitted = whole.refit(self.chosen)
         for k in self.chosen:
@@ -425,7 +425,7 @@ class _Together:
         return found
 
     def _chance(self, noise: NoiseModel, kept: Array, gain: float, aside: bool) -> float:
-        """Chance of as much by any candidate beside some columns if nothing more is wrong."""
+        """p-value of the best candidate given some columns."""
         whole = self.whole
         screen = Screen(noise, whole.columns, whole.signs, kept, whole.exact)
         return Chance(screen.largest(whole.null(noise, screen, aside), whole.penalty)).of(gain)
@@ -438,7 +438,7 @@ class _Together:
         return likelier(noise, before, after, fold)
 
     def _sound(self, chosen: list[int]) -> bool:
-        """Tell whether each has the sign that it can have, and is no slip of the form of the largest."""
+        """Tell whether each has the sign that it can have, and is not an error in the form of the largest."""
         whole = self.whole
         values = whole.refit(chosen)[1].values
         if np.any((whole.signs[chosen] != 0) & (np.sign(values) != whole.signs[chosen])):
@@ -447,7 +447,7 @@ class _Together:
         return bool(sizes.min() >= self.least_share * sizes.max())
 
     def _next(self, noise: NoiseModel) -> tuple[list[int], float] | None:
-        """The cause that explains most beside those chosen, after them, and its gain."""
+        """The cause that explains most given those chosen, after them, and its gain."""
         whole, chosen = self.whole, list(self.chosen)
         screen = Screen(noise, whole.columns, whole.signs, whole.columns[:, chosen], whole.exact)
         score = screen.run(whole.misfit[:, None])[0][:, 0] - whole.penalty
@@ -477,5 +477,5 @@ class _Together:
 
 
 def _of_shapes(noise: NoiseModel, shapes: Array, held: Array | None = None) -> Screen:
-    """Screen of shapes that may have any sign, beside columns that are always fitted."""
+    """Screen of shapes that may have any sign, given columns that are always fitted."""
     return Screen(noise, shapes, np.zeros(shapes.shape[1]), held)

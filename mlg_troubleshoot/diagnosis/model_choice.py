@@ -1,4 +1,4 @@
-"""Single causes, or factors of all joints with single ones beside them: the smallest model that data do not reject."""
+"""Single causes, or all-joint effects with single ones in addition: the smallest model that data do not reject."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from mlg_troubleshoot.misfit.verdict import NAME, Verdict, verdict_of
 # Thresholds, in log-likelihood if not said otherwise: set in 2026 on departures' fleets of other seeds than those that
 # judge them; not re-tuned.
 _BLOCK_ROUNDS = 2
-# By which factors of all joints must beat the best of single causes, and two causes of single joints, which their prior
+# By which all-joint effects must beat the best of single causes, and two causes of single joints, which their prior
 # covers dearly; and from which they are a rival of one cause, and of one scale for all.
 BLOCK_LEAD, PAIR_LEAD, BLOCK_RIVAL, SCALE_RIVAL = 3.0, -8.0, -1.0, -3.5
 # By which directions must beat one joint's cause, and one scale; from which they are a rival of these. 40° apart (400
@@ -31,7 +31,7 @@ BLOCK_LEAD, PAIR_LEAD, BLOCK_RIVAL, SCALE_RIVAL = 3.0, -8.0, -1.0, -3.5
 # 156; where just that is wrong (S = 10 to 25, seeds 8,950,000) they are ahead by more than -2.0 in 1 of 119, more than
 # -1.0 in 2 of 44, and behind by 4.0 or more in 92 %, by 4.6 or more in 45 %.
 SKEWED_LEAD, SCALE_ALONE, SKEWED_RIVAL, BOUND_RIVAL = -2.0, -1.0, -4.0, -4.6
-# From which factors of all joints are a rival of any cause but one scale that no longer stands out beside them; and
+# From which all-joint effects are a rival of any cause but one scale that no longer stands out given them; and
 # directions of a scale and a direction, or two directions: 40° apart (40 fleets, seeds 3,600,000) the two are 5 to 11
 # ahead, where just the two are wrong (9, 3,700,000) 8 to 13. The data cannot tell; that load moves the pins is one
 # cause, that two meet which look like it is far rarer (some 60 to 1): they become its alias.
@@ -39,21 +39,21 @@ HIDDEN_RIVAL, NESTED = -5.0, -12.0
 # By which they may be behind two causes of which they spare one: on 56 fleets of other linkages with one cause (seeds
 # 3,400,000) they are by 0 to 1.4, on 70 of the drawn one with two causes (3,460,000) by 2.9 and more.
 SECOND_LEAD = -2.0
-# That a cause about no joint must add to factors of all joints to have a say in which they are: with none, where
+# That a cause about no joint must add to all-joint effects to have a say in which they are: with none, where
 # directions lie 40° apart (80 fleets, seeds 8,900,000), two of 75 became a linkage with a chance cause. And from which
-# directions and linkage are told apart.
+# directions and linkage are distinguished.
 CLEARLY, CLASS_APART = 8.0, 5.0
-# By which a joint's cause beside another linkage must lead factors of all joints, a direction's further, being one of
+# By which a joint's cause given another linkage must lead all-joint effects, a direction's further, being one of
 # them, and may be behind two causes. Where directions are the truth (400 fleets, seeds 8,940,000) one leads by 3.8 at
 # most, a direction by 6.0; where it is the truth (another linkage, seeds 8,941,200) by 5.8 to 26, 7.9 to 18 in 7 of 9.
 JOINT_LEAD, DIRECTION_LEAD, PAIR_RIVAL = 4.0, 6.5, -3.0
-# Standard errors by which readings are beyond a bound for certain; change of all predictions that is no error of the
-# rate alone: the study's fleets end at 0.2, linkages that nobody calibrated begin at 0.7; loss of all predictions that
+# Standard errors by which readings are beyond a bound for certain; change of all predictions that the rate alone does
+# not explain: the study's fleets end at 0.2, linkages that nobody calibrated begin at 0.7; loss of all predictions that
 # no linkage brings: the departures' end at 0.15, where directions all around were named so it was 1.2 to 1.6. [1]
 _BEYOND, MOST_RATE, MOST_LOSS = 2.0, 0.4, 0.6
 # How far the rate of a valve may be off, supposed: one standard deviation. [1]
 _RATE_SPREAD = 0.1
-# Square of what is left of held-out tails over that of two causes of single joints, up to which factors win. [1]
+# Squared residual of held-out tails over that of two causes of single joints, up to which factors win. [1]
 PAIR_WORSE = 1.2
 # Chance below which one scale for all joints is rejected, and below which it is doubted; by which the factors may be
 # behind it all the same: on 44 fleets that are one scale and were rejected or nearly so (seeds 3,210,000 and 4,210,000)
@@ -62,9 +62,9 @@ SCALE_REJECTED, SCALE_DOUBTED, SCALE_LEAD = 0.02, 0.1, -2.5
 
 
 def infer(whole: Inference, blocks: Sequence[Block]) -> Finding:
-    """Name what explains the misfit: single causes, or factors of all joints with single causes beside them.
+    """Name what explains the misfit: single causes, or all-joint effects with single causes in addition.
 
-    The smallest model that the data do not reject is named: factors of all joints only where their marginal
+    The smallest model that the data do not reject is named: all-joint effects only where their marginal
     likelihood is clearly beyond that of the best single causes, each paying for how many of its kind are tried.
     """
     candidates, columns, rows, plain = whole.candidates, whole.columns, whole.rows, whole.run()
@@ -126,7 +126,7 @@ def _keys(whole: Inference, places: Iterable[int]) -> set[Key]:
 
 
 def _possible(whole: Inference, held: Array, blocks: Sequence[Block]) -> list[Block]:
-    """Factors of all joints that one scale for all allows: none below a bound that readings are beyond.
+    """All-joint effects that one scale for all allows: none below a bound that readings are beyond.
 
     Nor a linkage where readings are hardly as large as predicted, or against it; nor one that nobody calibrated, where
     the scale may be an error of the rate.
@@ -145,7 +145,7 @@ def _possible(whole: Inference, held: Array, blocks: Sequence[Block]) -> list[Bl
 def _score(whole: Inference, plain: Finding, own: Sequence[int], blocks: Sequence[Block]) -> tuple[float, Array, Array]:
     """Log-likelihood of models less what their causes pay, all under the noise that the widest block leaves. [1]
 
-    Of what is chosen without factors of all joints; of each block, (n_blocks,), with the best cause beside it that is
+    Of what is chosen without all-joint effects; of each block, (n_blocks,), with the best further cause that is
     about no joint where that is clearly there; and of each with the best joint's, -inf for directions, being one.
     """
     misfit, held = whole.misfit, whole.columns[:, list(own)]
@@ -165,10 +165,10 @@ def _score(whole: Inference, plain: Finding, own: Sequence[int], blocks: Sequenc
 def _beside_linkage(
     whole: Inference, plain: Finding, block: Block, lead: float, over: float, rng: np.random.Generator
 ) -> Finding | None:
-    """One joint's cause, alone or beside another linkage, where that explains clearly more than factors of all joints.
+    """One joint's cause, alone or given another linkage, where that explains clearly more than all-joint effects.
 
     lead, over: log-likelihood by which it does, and by which it beats what is chosen without them: to infer what stands
-        beside each linkage would take too long.
+        given each linkage would take too long.
     """
     if lead < JOINT_LEAD or over < PAIR_RIVAL:
         return None
@@ -184,7 +184,7 @@ def _beside_linkage(
 
 
 def _fitted(whole: Inference, found: Finding, block: Block, noise: NoiseModel) -> Finding:
-    """Single causes that are chosen beside a block, fitted with it as they act in the linkage that is extended."""
+    """Single causes chosen in addition to a block, fitted with it as they act in the linkage that is extended."""
     chosen, remainder_p = list(found.chosen), found.remainder_p
     if block.model is not None and chosen:
         drawn = whole.beside(replace(block, model=None), range(len(whole.candidates)), whole.rng.spawn(1)[0])
@@ -196,7 +196,7 @@ def _fitted(whole: Inference, found: Finding, block: Block, noise: NoiseModel) -
 def _single(
     whole: Inference, plain: Finding, found: Finding, noise: NoiseModel, block: Block, lead: float
 ) -> Finding | None:
-    """The finding without factors of all joints, where the data do not reject it for them; ambiguous where they may."""
+    """The finding without all-joint effects, where the data do not reject it for them; ambiguous where they may."""
     if plain.verdict in {Verdict.NONE, Verdict.UNLISTED}:
         return plain if lead < BLOCK_LEAD or found.verdict is Verdict.UNLISTED else None
     causes, columns, chosen = [c.cause for c in whole.candidates], whole.columns, found.chosen
@@ -227,7 +227,7 @@ def _single(
     rival = BLOCK_RIVAL if named else np.inf
     if one_scale:
         rival = BOUND_RIVAL if block.cause.bounded else SCALE_RIVAL
-    # Beside factors of all joints it may stand out no more: then they are a rival of anything.
+    # Given all-joint effects it may stand out no more: then they are a rival of anything.
     if not one_scale and (instead or (not chosen and found.verdict is not Verdict.UNLISTED)):
         rival = min(rival, HIDDEN_RIVAL if block.changes is None else SKEWED_RIVAL)
     rival = NESTED if nested else rival
@@ -236,19 +236,19 @@ def _single(
     near |= any(causes[k].one_scale and abs(value) > MOST_RATE for k, value in zip(plain.chosen, values, strict=True))
     if not near:
         return plain
-    # Beside factors of all joints only what is about no joint is sure, and only if it stands beside them, too.
+    # Given all-joint effects only what is about no joint is sure, and only if it also stands out given them.
     firm = _keys(whole, found.firm)
     sure = tuple(k for k in plain.firm if whole.candidates[k].key in firm and not causes[k].of_joints)
     return replace(plain, verdict=Verdict.AMBIGUOUS, rival=block, sure=sure)
 
 
 def _nested(causes: Iterable[Cause]) -> bool:
-    """Tell whether two causes are factors of all joints at their fewest: one scale, one joint's direction."""
+    """Tell whether two causes are all-joint effects at their fewest: one scale, one joint's direction."""
     return sum(cause.one_scale or (cause.of_joints and cause.sign < 0) for cause in causes) > 1
 
 
 def _slips(noise: NoiseModel, held: Array, block: Block, misfit: Array) -> bool:
-    """Tell whether factors of all joints do no more than the form of the largest single cause may slip."""
+    """Tell whether all-joint effects do no more than the form of the largest single cause may slip."""
     wide = noise.beside(block.effects_in)
     known = held * fit(wide, held, misfit).values
     left = wide.share_of(block.effects_in, misfit - known.sum(axis=1))
@@ -265,7 +265,7 @@ def _one_scale_rejected(noise: NoiseModel, held: Array, scale: Array, block: Blo
 def _class_of(
     misfit: Array, rows: Rows, held: Array, noise: NoiseModel, blocks: Sequence[Block]
 ) -> tuple[Block, Block | None]:
-    """The cause that changes all joints, and the other one if these data cannot tell them apart.
+    """The cause that changes all joints, and the other one if these data cannot distinguish them.
 
     Where they cannot, directions are named first if the readings are smaller than the prediction: a worst direction is
     a bound. The linkage is named first otherwise.
@@ -295,7 +295,7 @@ def _judged(misfit: Array, rows: Rows, held: Array, block: Block) -> NoiseModel:
 
 
 def _marginal(noise: NoiseModel, held: Array, block: Block, misfit: Array) -> float:
-    """Marginal log-likelihood of factors of all joints beside single causes, less its penalty."""
+    """Marginal log-likelihood of all-joint effects and single causes, less its penalty."""
     found = fit(noise.beside(block.effects_in), held, misfit)
     if block.changes is None:
         return found.log_likelihood - block.penalty

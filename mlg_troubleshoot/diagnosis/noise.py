@@ -18,7 +18,7 @@ from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 
-# What is no cause yet: set in 2026 on healthy fleets of the study's tuning seeds (iid, heavy tails, scatter between
+# What is not a cause yet: set in 2026 on healthy fleets of the study's tuning seeds (iid, heavy tails, scatter between
 # tails, confounded, growing noise) so that at most 2 % alarm; more of it costs power at S below 10. Not re-tuned.
 
 # Pins scatter by up to some 6° about the worst direction, so a healthy fleet reads less than the bound by this
@@ -35,7 +35,7 @@ LEAST_SCATTER = 0.01
 # Scatter between the gears of one tail, in units of the scatter of a row, and what the errors of reading leave in
 # the level of wear of each.
 GEAR_RATIO, READ_GEAR_RATIO = 0.08, 0.28
-# Trends over a quantity, and habits of a side or an approach, that are no cause yet, in the same units.
+# Trends over a quantity, and habits of a side or an approach, that are not a cause yet, in the same units.
 TREND, READ_TREND = 0.03, 0.03
 HABIT, READ_HABIT = 0.04, 0.04
 # Scatter between gauges, and between technicians, over that of a row, before the data are looked at: median, and
@@ -43,7 +43,7 @@ HABIT, READ_HABIT = 0.04, 0.04
 HABIT_OF_ONE, HABIT_SPREAD = 0.1, 0.7
 GEAR_SPREAD = 0.5
 _RATIOS = np.geomspace(0.02, 1.0, 24)
-# Common error of a gear's rows, over the scatter of a row, from which it is told from that of single rows. [1]
+# Common error of a gear's rows, over the scatter of a row, from which it is distinguished from that of single rows. [1]
 _SHARED = 0.2
 # With fewer levels nothing can be told.
 _LEAST_LEVELS = 4
@@ -149,7 +149,7 @@ def _levels(table: DiagnosisTable, name: str) -> Array:
 def build_noise(
     misfit: Array, rows: Rows, explained: Array | None = None, effects_in: Array | None = None
 ) -> NoiseModel:
-    """Estimate the noise from the misfit; effects of unknown size, and of the curve, are no scatter but its doubt."""
+    """Estimate the noise from the misfit; effects of unknown size, and of the curve, are not scatter but its doubt."""
     rest = misfit if explained is None else misfit - explained
     wide = rows.along_in if effects_in is None else np.hstack([rows.along_in, effects_in])
     noise, unread = _scatter(rest, rest, rows), np.empty((len(rest), 0))
@@ -163,7 +163,7 @@ def build_noise(
 
 
 def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
-    """Noise of the rows; `alone` is what is left without what joints that nobody read most likely add to gears. [in]"""
+    """Noise of the rows; `alone` is the residual without what unread joints most likely add to gears. [in]"""
     predicted = rows.predicted_in
     numbers = tail_numbers(rows.tails)
     centred = alone.copy()
@@ -208,7 +208,7 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
 
 
 def _shared(relative: Array, gears: Wholes) -> tuple[Array, Array]:
-    """Loadings of gears whose unread joints make all their rows wrong alike, and what is left to single rows. [1]"""
+    """Loadings of gears whose unread joints make all their rows wrong alike, and the residual of single rows. [1]"""
     largest = np.zeros(gears.max() + 1)
     np.maximum.at(largest, gears, relative)
     large = np.flatnonzero(largest > _SHARED)
@@ -271,7 +271,7 @@ def _tail_ratios(standard: Array, tails: Wholes, gear_ratio: float) -> tuple[flo
 
 
 def _companion(values: Array, tails: Wholes) -> Array:
-    """Distance of each row to the nearest other row of its tail: rows that stand out together are no outliers. [in]"""
+    """Distance of each row to the nearest other row of its tail: rows that stand out together are not outliers. [in]"""
     nearest = np.full(len(values), np.inf)
     for tail in range(tails.max() + 1):
         rows = np.flatnonzero(tails == tail)
@@ -291,7 +291,7 @@ def _growth(centred: Array, predicted: Array) -> Array:
         return np.ones(len(at))
     slope, level = np.polyfit(at, size, 1)
     fitted = np.maximum(level + slope * at, 0.3 * np.median(size) + 1e-12)
-    # A slope within its own error is no growth.
+    # A slope within its own error is not growth.
     error = np.std(size - level - slope * at) / (np.std(at) * np.sqrt(len(at)))
     if slope < 1.0 * error:
         return np.ones(len(at))

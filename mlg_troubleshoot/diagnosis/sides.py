@@ -49,7 +49,7 @@ def swapped_sides(table: DiagnosisTable) -> list[tuple[int, str, str]]:
             for row in rows[own]
             if _on_the_other_line(day, landings, int(row), rows[own], rows[other])
         ]
-        # Two lines that fit this badly are no evidence; one row off its line and on the other one is.
+        # Two lines that fit this badly are not evidence; one row off its line and on the other one is.
         if len(off) == 1:
             swapped += off
     return [(row, str(side[row]), "RH" if side[row] == "LH" else "LH") for row in swapped]
@@ -134,7 +134,7 @@ def _line(x: Array, y: Array, at: float, usual_slope: float = 0.0) -> tuple[floa
 
 
 def _surprise(values: Sequence[float], typical: Sequence[float]) -> float:
-    """How unlikely clearances are beside the typical ones of their gear, as minus a log-likelihood. [1]"""
+    """How unlikely clearances are given the typical ones of their gear, as minus a log-likelihood. [1]"""
     total = 0.0
     for value, usual in zip(values, typical, strict=True):
         ratio = np.log((value + 0.0005) / (usual + 0.0005)) / _LOG_SPREAD

@@ -23,7 +23,7 @@ ALONG = "actuator_extension_in"
 
 @dataclass(frozen=True)
 class DiagnosisTable:
-    """Rows of measured output beside the inputs of the model, as columns.
+    """Rows of measured output with the inputs of the model, as columns.
 
     A column that the source does not have is absent; a missing cell is NaN or an empty text.
 

@@ -24,7 +24,7 @@ _LEAST_LEVEL = 0.25
 _TIGHT_IN = 1e-5
 # Scatter of wear about its line at the start, as a share of the level. [1]
 _SCATTER = 0.15
-# Rows of gears with three readings or more that are needed to tell errors of reading from scatter of wear.
+# Rows of gears with three readings or more that are needed to distinguish errors of reading from scatter of wear.
 _LEAST_ROWS = 20
 # No reading is exact. [in²]
 _LEAST_READING_IN2 = 1e-12

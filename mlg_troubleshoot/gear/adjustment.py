@@ -22,7 +22,7 @@ class Adjustment:
     rate_factor, shape (n,): factor on the calibration rate. [1]
     offset_in, shape (n,): displacement that comes on top, whatever the clearances. [in]
     direction_factors, shape (n_joints,): share of each clearance that acts along its worst direction where loads rest
-        the pin elsewhere, −1 to 1: the prediction is then the displacement as loaded, an expectation and no bound. [1]
+        the pin elsewhere, −1 to 1: the prediction is then the displacement as loaded, an expectation, not a bound. [1]
     """
 
     clearance_in: Array

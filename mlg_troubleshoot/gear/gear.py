@@ -179,7 +179,7 @@ class Gear:
 
     @property
     def link_groups(self) -> tuple[tuple[int, ...], ...]:
-        """Joints at both ends of one link together, which the plunger cannot tell apart, the others one by one."""
+        """Joints at both ends of one link together, which the plunger cannot distinguish, the others each alone."""
         return self.reference.mechanism.alike
 
     @cached_property

@@ -90,7 +90,7 @@ class Kernel:
     def batch(self, position: float, clearance_in: Array, directions: Array, *, compiled: bool = False) -> Array:
         """Output for a large batch of clearances in fixed directions, as fast as this machine allows.
 
-        clearance_in, shape (n_virtual_links, n): lengths of the virtual links, one row a joint. [in]
+        clearance_in, shape (n_virtual_links, n): lengths of the virtual links, one row per joint. [in]
         Returns, shape (n,): output; NaN where the mechanism does not close. [in or rad]
         """
         clearance = np.ascontiguousarray(clearance_in, float)

@@ -210,7 +210,7 @@ class Mechanism:
 
     @property
     def alike(self) -> tuple[tuple[int, ...], ...]:
-        """Virtual links that displace the same link, together, and the others one by one, in order."""
+        """Virtual links that displace the same link, together, and the others each alone, in order."""
         ends = {number: tuple(sorted(step.virtual_links)) for step in self.steps for number in step.virtual_links}
         return tuple(dict.fromkeys(ends.get(number, (number,)) for number in self.virtual_links))
 

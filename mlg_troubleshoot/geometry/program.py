@@ -53,7 +53,7 @@ class Program:
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Names that the formulas take, beside ``s``: virtual links, then parameters."""
+        """Names that the formulas take, in addition to ``s``: virtual links, then parameters."""
         links = [f"v{axis}{i}" for i in range(self.virtual_links) for axis in "xy"]
         return (*links, *(f"p{i}" for i in range(len(self.parameters))))
 

@@ -6,7 +6,7 @@ displaces (*current clearance*, ``csc θ``), is handed on by the next links (*pr
 
 The stage of a clearance runs from its joint to the first joint of a higher number that moves: A_i,i+1 of
 Eq. 9. The two ends of one link act alike (Fig. 10), so both have the stage of the upstream end.
-Differs from the paper: a fixed pivot that has a clearance is no case of Eq. 10; its stage is the exact
+Differs from the paper: a fixed pivot that has a clearance is not a case of Eq. 10; its stage is the exact
 derivative. In a slider the guide stands for an infinitely long second link, so that its csc θ is the secant
 of the angle between link and axis.
 """

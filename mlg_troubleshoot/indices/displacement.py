@@ -34,7 +34,7 @@ class HeldDirections:
         return self.by_rows(np.ascontiguousarray(clearance_in.T))
 
     def by_rows(self, clearance_in: Array) -> Array:
-        """Displacement for a batch that is laid out one row a joint, as the kernel reads it.
+        """Displacement for a batch that is laid out one row per joint, as the kernel reads it.
 
         clearance_in, shape (n_joints, n): radial clearances. [in]
         Returns, shape (n,): displacement in this sense; NaN where the linkage does not close. [in]

@@ -17,7 +17,7 @@ _SHORT = 0.84
 
 @dataclass(frozen=True)
 class Chance:
-    """Largest statistic of each of many data sets with nothing wrong: the error rate holds for all that is tried."""
+    """Largest statistic of each of many null simulations: the error rate holds for all that is tried."""
 
     largest: Array
 
@@ -50,5 +50,5 @@ class Chance:
 
 
 def smallest_rms(bar: float, scatter: float, n: int) -> float:
-    """Root mean square over n rows of an effect whose squared t clears a bar four times in five. [unit of scatter]"""
+    """Root mean square over n rows of an effect whose squared t clears a bar with 80 % power. [unit of scatter]"""
     return float(scatter * (np.sqrt(max(bar, 0.0)) + _SHORT) / np.sqrt(n))

@@ -1,4 +1,4 @@
-"""Rows that are not used for a fit: which stand together, and what a model explains of them."""
+"""Held-out rows: which stand together, and what a model explains of them."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def folds_of(row: Wholes, group: Wholes | None, columns: Array, shuffled: Wholes
 
 
 def likelier(noise: NoiseModel, before: Array, after: Array, fold: Wholes, allowed: float = 1.0) -> bool:
-    """Tell whether what is left of held-out rows is likelier after than before, what a fold has in common being noise.
+    """Tell whether the residual of held-out rows is likelier after than before, what a fold has in common being noise.
 
-    allowed: square of what is left after over that before, from which it is not. [1]
+    allowed: squared residual after over that before, from which it is not. [1]
 
     Far readings decide no more than others: where noise is estimated they scatter more.
     """

@@ -1,4 +1,4 @@
-"""Several causes at once: added one by one while each earns its place, left out again where others make it idle."""
+"""Several causes at once: added stepwise while each earns its place, left out again where others make it idle."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ class Explanation(Protocol):
         """The causes."""
 
     def further(self) -> Self | None:
-        """The same with one more, if one earns its place: it stands out beyond chance beside the others, and helps."""
+        """The same with one more, if one earns its place: it stands out beyond chance given the others, and helps."""
 
     def without_idle(self) -> Self | None:
-        """The same without the one that stands out least, if it does so no more than by chance beside the others."""
+        """The same without the one that stands out least, if it does so no more than by chance given the others."""
 
 
 E = TypeVar("E", bound=Explanation)
@@ -38,7 +38,7 @@ def one_by_one(explanation: E, most: int) -> E:
 
 
 def settled(explanation: E) -> E:
-    """Leave out again what no longer stands out beside the others."""
+    """Leave out again what no longer stands out given the others."""
     while len(explanation.chosen) > 1 and (fewer := explanation.without_idle()) is not None:
         explanation = fewer
     return explanation

@@ -21,7 +21,7 @@ def near_and_behind(
         for being one of many; -inf where it is not asked. [1]
     causes: cause of each candidate.
     ruled_out: log-likelihood by which a rival must fall behind to be ruled out; clear: whether the evidence is enough
-        for a name; alike: whether the data hardly tell two candidates apart.
+        for a name; alike: whether the data hardly distinguish two candidates.
     """
     others: dict[Hashable, list[int]] = {}
     for k in np.argsort(-score).tolist():
@@ -29,7 +29,7 @@ def near_and_behind(
             others.setdefault(causes[k], []).append(k)
     near, behind = [], {}
     for first, *rest in others.values():
-        # Where the data hardly tell two apart, which one has more targets must not decide.
+        # Where the data hardly distinguish two, which one has more targets must not decide.
         apart = [gain[winner] - gain[k] for k in (first, *rest) if alike(winner, k)]
         distance = float(min([score[winner] - score[first], *apart]))
         # A rival that explains more is never ruled out, however many targets its cause has.

@@ -57,7 +57,7 @@ class Runner:
         return self.everything(values)[self.row, self.output]
 
     def nominal_prediction(self) -> Array:
-        """Predict all rows at the nominal values, and refuse what is no number where a reading is."""
+        """Predict all rows at the nominal values, and refuse what is not a number where a reading is."""
         predicted = self.everything(self.nominal)
         bad = np.flatnonzero(~np.isfinite(predicted[self.row, self.output]))
         if len(bad):

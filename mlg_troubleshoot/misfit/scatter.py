@@ -1,6 +1,6 @@
 """What readings do when nothing is wrong: each its own scatter, scatter between groups, and smooth discrepancy.
 
-Smooth discrepancy is what a simulation gets wrong without any suspect being the reason; it is no noise, but a cause
+Smooth discrepancy is what a simulation gets wrong without any suspect being the reason; it is not noise, but a cause
 must stand out against it, not only against what a repeat reading scatters (Kennedy and O'Hagan 2001).
 """
 
@@ -145,7 +145,7 @@ def smooth_shapes(predicted: Array, sensitivities: Array, group: Wholes | None) 
     """Shapes in which a discrepancy may move with the rows, each as factors of a covariance, shape (n, r).
 
     Near in prediction, near in all sensitivities, near in the order of the rows; the same in every group or not.
-    What has few values only (a direction, a place) is no quantity along which something could move smoothly.
+    What has few values only (a direction, a place) is not a quantity along which something could move smoothly.
     """
     n = len(predicted)
     features = [predicted, sensitivities, np.arange(n, dtype=float)[:, None]]

@@ -118,7 +118,7 @@ class Screen:
             own = np.maximum(square, 1e-300)
             apart = square[:, None] * own[pool] - cross**2
             clear = apart > 1e-3 * own[:, None] * own[pool]
-            # Least squares for both at once; a pair one of which would have the wrong sign is no pair.
+            # Least squares for both at once; a pair is refused if one of them would have the wrong sign.
             apart = np.where(clear, apart, 1.0)
             value = (along * own[pool] - cross * along[pool, 0]) / apart
             partner = (along[pool, 0] * own[:, None] - cross * along) / apart

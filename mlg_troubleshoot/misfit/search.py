@@ -1,4 +1,4 @@
-"""Which parameters of a simulation are wrong: added one by one while each stands out and helps on rows not used."""
+"""Which parameters of a simulation are wrong: added stepwise while each stands out and helps on held-out rows."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from mlg_troubleshoot.misfit.verdict import ALARM, NAME, Verdict, refutes, verdi
 SMOOTH = 0.002
 # Log-likelihood by which a rival must fall behind to be ruled out; at 2.5 one of 1,000 simulated sets had a wrong name.
 RULED_OUT = 5.0
-# Share of its effect that a suspect keeps beside the nuisance parameters, below which it cannot be tested; and of
+# Share of its effect that a suspect keeps given the nuisance parameters, below which it cannot be tested; and of
 # the square of an effect by which two must differ not to be one.
 TESTABLE = 0.03
 ALIKE = 1e-3
@@ -42,7 +42,7 @@ _CONTENDS, _CONTENDERS = 0.6, 4
 _MOST_CAUSES = 12
 # Share of a suspect's largest effect from which a reading counts as one where it acts.
 _ACTS = 0.05
-# Beside a pattern that no suspect explains a cause must be at least this share of what is left, root mean square: to be
+# Given a pattern that no suspect explains a cause must be at least this share of the residual, root mean square: to be
 # named against the pattern, and to be named although the pattern could take its form (without groups, in which it
 # must hold anew: all of it).
 _BESIDE, _LARGE = 0.25, 0.57
@@ -123,7 +123,7 @@ class Metric:
         self._left = np.sum(drawn**2, axis=0) - np.sum((everything.T @ drawn) ** 2, axis=0)
 
     def stands_out(self, fixed: Sequence[int], data: Array) -> tuple[Array, Chance]:
-        """Squared t of each suspect beside fixed ones, and the largest of all where nothing is wrong. [1]
+        """Squared t of each suspect given fixed ones, and the largest of all where nothing is wrong. [1]
 
         Squared t is given what all columns leave of the data; where there is no room for all at once, what it leaves
         itself.
@@ -188,7 +188,7 @@ class Point:
         return np.hstack([self.columns[:, self.fixed], self.columns[:, others] @ across[told][small].T])
 
     def draws(self, white: Whitener) -> tuple[Array, Array, int]:
-        """Data sets with nothing wrong: what all columns leave, its rows exchanged and turned.
+        """Null simulations: what all columns leave, its rows exchanged and turned.
 
         Also an orthonormal basis of these columns, and the spare readings.
         """
@@ -245,10 +245,10 @@ class Point:
         return (plain,) if self.white is self.plain else (plain, Metric(self, self.white, *self.draws(self.white)))
 
     def evidence(self, fixed: Sequence[int], data: Array | None = None) -> Evidence:
-        """How much each suspect stands out beside fixed ones.
+        """How much each suspect stands out given fixed ones.
 
-        Where a pattern is left that no suspect explains, a cause must stand out against that too, or be large beside
-        what is left; and it must not be small beside it, because what the pattern looks like nearer by is not known.
+        Where a pattern is left that no suspect explains, a cause must stand out against that too, or be large compared
+        with the residual; and it must not be small compared with it, because the pattern nearby is not known.
         """
         found = [metric.stands_out(fixed, self.rest if data is None else data) for metric in self.metrics]
         surprises = np.array([chance.surprise(score) for score, chance in found])
@@ -293,7 +293,7 @@ class Point:
         return Point(study, fits[k][0], (*self.chosen, k))
 
     def _nearer(self, told: Evidence) -> Point | None:
-        """Try the cause that stands out where what is left looks like a pattern: it may be the bend of its effect."""
+        """Try the cause that stands out where the residual looks like a pattern: it may be the bend of its effect."""
         k = int(np.argmax(told.score[0]))
         if len(told.score) == 1 or told.chances[0].of(float(told.score[0, k])) > NAME or not self.helps(k):
             return None
@@ -302,7 +302,7 @@ class Point:
         return there if k in there.chosen and there.white is there.plain else None
 
     def without_idle(self) -> Point | None:
-        """The point without the cause that no longer stands out beside the others; None if all do."""
+        """The point without the cause that no longer stands out given the others; None if all do."""
         surprise, k = min((float(self.beside_others(k).surprise[k]), k) for k in self.chosen)
         if surprise > -np.log(NAME):
             return None
@@ -409,8 +409,8 @@ def diagnose_simulation(
     """Find which parameters of a simulation its measured data show to be wrong.
 
     What no data of these rows could tell is stated first, from the sensitivities alone: classes of suspects that are
-    one to these rows, and suspects that the nuisance parameters absorb. Then causes are added one by one, large
-    changes by relinearising, while each stands out from everything that is drawn with nothing wrong (the largest
+    one to these rows, and suspects that the nuisance parameters absorb. Then causes are added stepwise, large
+    changes by relinearising, while each stands out from every null simulation (the largest
     statistic of all suspects, so the chance holds for the family) and makes the misfit of held-out rows smaller.
     A pattern that no suspect explains counts as discrepancy against which a cause must stand out, and is UNLISTED.
     Linear algebra runs on one thread meanwhile, in the simulation as well.
@@ -432,7 +432,7 @@ def diagnose_simulation(
         Standard uncertainty of a reading by which readings are weighed; without it each output's is estimated.
         [unit of the readings]
     permutations : int, optional
-        Data sets drawn with nothing wrong.
+        Number of null simulations.
     seed : int, optional
         Seed.
 
@@ -455,7 +455,7 @@ def diagnose_simulation(
 
 
 def _report(study: Study, start: Point, point: Point, permutations: int, seed: int) -> SimulationDiagnosis:
-    """Say what was found, with its rivals, its gain and what is left."""
+    """Say what was found, with its rivals, its gain and the residual."""
     runner = study.runner
     names = runner.names
     causes = [_found(study, point, k) for k in point.chosen]
@@ -468,7 +468,7 @@ def _report(study: Study, start: Point, point: Point, permutations: int, seed: i
     told = point.evidence(point.fixed)
     lead = int(np.argmax(told.surprise))
     p = 0.0 if causes else float(np.exp(-told.surprise[lead]))
-    # The simulation itself is fitted: no part of what is left is a slip of a suspect's form.
+    # The simulation itself is fitted: no part of the residual is an error in a suspect's form.
     verdict = verdict_of(p, bool(possible), refutes(remainder_p))
     if verdict is Verdict.AMBIGUOUS and not causes:
         score = told.score[told.by[lead]]
@@ -497,7 +497,7 @@ def _report(study: Study, start: Point, point: Point, permutations: int, seed: i
 
 
 def _found(study: Study, point: Point, k: int) -> SuspectFound:
-    """Describe a cause, or a rival as it would be in the place of what it rivals or beside what is named."""
+    """Describe a cause, or a rival as it would be in the place of what it rivals or in addition to what is named."""
     run = study.runner
     if k in point.chosen:
         told = point.beside_others(k)

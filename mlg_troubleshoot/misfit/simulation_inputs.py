@@ -36,7 +36,7 @@ def checked(
     readings = int(np.isfinite(data).sum())
     if readings < len(nuisance) + 3:
         raise UsageError(
-            f"{readings} readings are too few beside {len(nuisance)} nuisance parameters",
+            f"{readings} readings are too few for {len(nuisance)} nuisance parameters",
             f"measure {len(nuisance) + 3 - readings} more at least",
         )
     if permutations < _LEAST_PERMUTATIONS:
@@ -48,7 +48,7 @@ def _numbers(values: ArrayLike, name: str) -> Array:
     try:
         return np.array(values, float)
     except (TypeError, ValueError) as error:
-        raise UsageError(f"{name} is no array of numbers: {error}", "give numbers, NaN where not read") from error
+        raise UsageError(f"{name} is not an array of numbers: {error}", "give numbers, NaN where not read") from error
 
 
 def _suspects(suspects: Sequence[Suspect], nuisance: Sequence[Suspect]) -> None:
@@ -56,7 +56,7 @@ def _suspects(suspects: Sequence[Suspect], nuisance: Sequence[Suspect]) -> None:
         raise UsageError("No suspects were given", "name at least one parameter that may be wrong")
     twice = [name for name, count in Counter(s.name for s in [*suspects, *nuisance]).items() if count > 1]
     if twice:
-        raise UsageError(f"{', '.join(twice)} stands twice among suspects and nuisance parameters", "name each once")
+        raise UsageError(f"{', '.join(twice)} is named twice among suspects and nuisance parameters", "name each once")
     for s in [*suspects, *nuisance]:
         if not (np.isfinite(s.nominal) and np.isfinite(s.trial)) or s.trial == 0.0:
             raise UsageError(

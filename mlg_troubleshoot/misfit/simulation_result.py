@@ -27,7 +27,7 @@ class Suspect:
     inspect : str, optional
         What to inspect if it is named.
     separates : str, optional
-        The reading that would tell it from what looks like it.
+        The reading that would distinguish it from what looks like it.
     """
 
     name: str
@@ -74,13 +74,13 @@ class SuspectFound:
 
     @property
     def separates(self) -> str:
-        """The reading that would tell it from its aliases."""
+        """The reading that would distinguish it from its aliases."""
         return self.suspect.separates
 
 
 @dataclass(frozen=True, slots=True)
 class HeldOutGain:
-    """Misfit of rows that were not used for the fit.
+    """Misfit of held-out rows.
 
     Parameters
     ----------
@@ -110,24 +110,24 @@ class SimulationDiagnosis:
     also_possible : tuple of SuspectFound
         The whole set that the data leave possible, where there are rivals that no alias class says; else empty.
     aliases : tuple of tuple of str
-        Classes of suspects that these rows cannot tell apart, known before a measured value is looked at.
+        Classes of suspects that these rows cannot distinguish, known before a measured value is looked at.
     untestable : tuple of str
         Suspects that do nothing in these rows which the nuisance parameters do not absorb.
     gain : HeldOutGain
-        Gain on rows not used for the fit.
+        Gain on held-out rows.
     parameters : mapping of str to float
         Value of every suspect and nuisance parameter, to predict with.
     remainder_p : float
-        Chance of as much pattern in what is left if only noise is left. [1]
+        p-value of the pattern in the residual. [1]
     smallest_detectable_rms : float
-        Root mean square of the smallest effect that would have been found four times in five. [unit of the readings]
+        Root mean square of the smallest effect that is detected with 80 % power. [unit of the readings]
     noise : tuple of float
         Standard deviation of a reading of each output, as it is estimated with all suspects fitted.
         [unit of the readings]
     calls : int
         Times that the simulation was called.
     permutations : int
-        Data sets drawn with nothing wrong.
+        Number of null simulations.
     seed : int
         Seed.
     """

@@ -16,20 +16,20 @@ class Verdict(StrEnum):
     UNLISTED = "UNLISTED"
 
 
-# Chance, if nothing is wrong, below which something is (alarm), below which a cause is named, and below which what is
-# left is no noise: set in 2026 on the tuning seeds of the study of hidden effects (at most 2 % of healthy fleets alarm)
+# p-value below which something is wrong (alarm), below which a cause is named, and below which the residual
+# is not noise: set in 2026 on the tuning seeds of the study of hidden effects (at most 2 % of healthy fleets alarm)
 # and on five simulated rigs. A lower bar names more at S = 5 to 7 and names more wrongly; a higher one leaves more sets
 # undecided.
 ALARM, NAME, REMAINS = 0.012, 0.002, 0.002
 
 
 def refutes(p: float, size: float = np.inf, slip: float = 0.0) -> bool:
-    """Tell whether what is left refutes what is named: it is no noise, and larger than a cause's form may slip."""
+    """Tell whether the residual refutes what is named: it is not noise, and larger than an error in a cause's form."""
     return p <= REMAINS and size >= slip
 
 
 def verdict_of(p: float, rivals: bool, refuted: bool) -> Verdict:
-    """What follows from the chance of as much if nothing is wrong, from rivals of what is named, and from what is left.
+    """What follows from the p-value, from rivals of what is named, and from the residual.
 
     A name needs clearer evidence than an alarm does.
     """

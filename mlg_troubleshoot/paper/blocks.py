@@ -1,7 +1,7 @@
 """The paper-size total-order study (Fig. 5b) in blocks: resumable, on several cores or a Dask cluster.
 
 Each of the n1 · n2 samples of a modified Latin hypercube keeps all joints but one while that joint takes the
-n1 clearances of its level: n1² · n2 solutions a joint. A block is a range of levels of one iteration. It
+n1 clearances of its level: n1² · n2 solutions per joint. A block is a range of levels of one iteration. It
 depends on nothing but the study and its number, so that blocks computed anywhere and in any order add up to
 the same bits.
 """

@@ -44,7 +44,7 @@ def central_composite(n: int) -> Array:
 
     The paper has 138 points in ten joints and does not say how they are made up. 128 corners are the
     resolution V fraction 2^(10−3) of the two-level factorial; the ten points that remain are taken as one
-    axial point a joint, all others in mid-range: the first joint at its limit, the second at zero, and so
+    axial point per joint, all others in mid-range: the first joint at its limit, the second at zero, and so
     on. (With all ten at their limits a joint in mid-range would go with high values of the others, which
     adds 0.004 to every first-order index.)
 

@@ -1,4 +1,4 @@
-"""The study of one gear: a design, indices of every joint, their spread over the ensemble, what goes beside them."""
+"""The study of one gear: a design, indices of every joint, their spread over the ensemble, what goes with them."""
 
 from __future__ import annotations
 
@@ -65,13 +65,13 @@ class StudyOptions:
     limits_in : ndarray, shape (n_joints,), or None
         Limits in place of the gear's. [in]
     directions : Directions
-        How the virtual links are turned.
+        Directions of the virtual links.
     fixed_rad : ndarray, shape (n_joints,), or None
         Directions set by a load, with ``fixed``. [rad]
     beyond_margin : bool
         Look at exceeding the margin instead of the displacement.
     most : int
-        Evaluations to stop at.
+        Maximum number of evaluations.
     n1, n2, iterations : int or None
         Size of a paper design in place of the paper's.
     workers : int
@@ -132,7 +132,7 @@ class StudyResult:
 
 @dataclass(frozen=True, slots=True)
 class StudyFindings:
-    """A study and what was found beside it.
+    """A study and what was found with it.
 
     Parameters
     ----------
@@ -255,8 +255,8 @@ def _of_tensor(tensor: TensorIndices, coarse: TensorIndices | None, seed: int) -
     if coarse is not None:
         half = np.abs([first - coarse.first_order, total - coarse.total_order])
         evaluations += coarse.evaluations
-        note = "intervals are the difference to two Gauss points a joint"
-    design, estimates = f"tensor of {len(tensor.weights)} Gauss points a joint", ((first, half[0]), (total, half[1]))
+        note = "intervals are the difference to two Gauss points per joint"
+    design, estimates = f"tensor of {len(tensor.weights)} Gauss points per joint", ((first, half[0]), (total, half[1]))
     return Indices.around(design, seed, *estimates, tensor.mean, tensor.variance, evaluations, tensor.failed, note)
 
 
@@ -288,7 +288,7 @@ def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _
         if totals.note:
             note += f"; {totals.note}"
     if not finished:
-        note += "; interrupted, averages of what was done"
+        note += "; interrupted, averages of the finished part"
     name = f"{design.name}: n1 = {n1}, n2 = {n2}, nCCD = {design.n_ccd}, mean of {found.iterations} iterations"
     estimates = (found.corrected, half), (total, spread)
     indices = Indices.around(name, options.seed, *estimates, np.nan, np.nan, evaluations, failed, note)

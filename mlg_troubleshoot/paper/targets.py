@@ -55,7 +55,7 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Computed:
-    """A printed number beside the computed one. [unit of the target]"""
+    """A printed number and the computed one. [unit of the target]"""
 
     target: Target
     computed: float
@@ -81,12 +81,12 @@ class Computed:
 
 
 def targets_file(gear: Gear) -> Path:
-    """Return where the targets of a gear stand: beside its gear file."""
+    """Return where the targets of a gear stand: next to its gear file."""
     return gear.path.with_name(f"{gear.path.stem}-targets.toml")
 
 
 def load_targets(path: Path) -> tuple[Target, ...]:
-    remedy = "Write one like hawker-800xp-targets.toml beside the gear file."
+    remedy = "Write one like hawker-800xp-targets.toml next to the gear file."
     if not path.exists():
         raise GearFileError(f"{path.name}: there are no printed numbers to compare with", remedy)
     table = read_toml(path)
@@ -106,7 +106,7 @@ def _target(entry: DataTable) -> Target:
         value, width = entry.number("value"), entry.number("tolerance")
         low, high, tolerance = value - width, value + width, f"± {width:g}"
         if not low < high:
-            raise entry.fail("tolerance", "a number above 0 that the value can be told from")
+            raise entry.fail("tolerance", "a number above 0 that the value can be distinguished from")
     elif entry.has("at_least"):
         low = entry.number("at_least")
         tolerance = f"≥ {low:g}"

@@ -1,4 +1,4 @@
-"""Every number that the paper prints, beside what the model gives."""
+"""Every number that the paper prints, with the value of the model."""
 
 from __future__ import annotations
 

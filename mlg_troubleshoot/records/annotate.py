@@ -135,7 +135,7 @@ def _not_taken_over(before: bytes, after: bytes) -> tuple[str, ...]:
 
 
 def _beside_cells(package: bytes) -> Counter[str]:
-    """Count what a package holds beside its cells, by what a user calls it."""
+    """Count what a package holds in addition to its cells, by what a user calls it."""
     with ZipFile(io.BytesIO(package)) as archive:
         names = [name for name in archive.namelist() if "_rels" not in name]
         held = Counter(what for folder, what in _DROPPABLE for name in names if name.lower().startswith(folder))
@@ -152,7 +152,7 @@ def _load(source: str | Path, out: str | Path) -> bytes:
         data = path.read_bytes()
         if not data.startswith(b"PK") or b"opendocument" in data[:200]:
             raise UsageError(
-                f"{source} is no .xlsx workbook, so it cannot be annotated",
+                f"{source} is not an .xlsx workbook, so it cannot be annotated",
                 "Save it as .xlsx first, or use --csv for the results.",
             )
         # The same guard as in reading: nothing dangerous reaches the library that writes.

@@ -65,7 +65,7 @@ def cell_of(source: RowSource, layouts: Sequence[SheetLayout], kind: Kind) -> tu
 
 def _problem(record_id: str, source: RowSource, others: list[str], header: str, cell: str | None) -> Problem:
     shown = ", ".join(others[:3]) + (f" and {len(others) - 3} more" if len(others) > 3 else "")
-    expected = f"a record id that no other inspection of the file has; {shown} has it too"
+    expected = f"a record id that no other inspection of the file has; {shown} also has it"
     remedy = "Keep the right row, or give each inspection its own record id."
     place = source.file, source.sheet, source.row, header, cell
     return Problem("record_id_duplicate", *place, record_id, expected, remedy)

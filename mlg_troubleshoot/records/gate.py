@@ -52,7 +52,7 @@ def admit(values: Mapping[str, object], options: ReadOptions, labels: Mapping[st
     if problems or isinstance(read, InvalidRow):
         said = [f"{_label(p, labels or {})}: expected {p.expected}" for p in problems]
         remedies = dict.fromkeys(p.remedy for p in problems if p.remedy)
-        raise UsageError("; ".join(said) or "the values make no inspection", " ".join(remedies))
+        raise UsageError("; ".join(said) or "the values do not form an inspection", " ".join(remedies))
     return read
 
 

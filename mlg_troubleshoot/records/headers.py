@@ -210,11 +210,11 @@ def _resembles_clearance(
 
 def _with_unit(field: Field, units: set[LengthUnit], foreign: list[str], odd: list[str]) -> Recognition:
     if foreign:
-        return _doubt(f"the unit {foreign[0]!r} is none of in, thou, mm", field.name)
+        return _doubt(f"the unit {foreign[0]!r} is not in, thou or mm", field.name)
     if len(units) > 1:
         return _doubt("it names two units", field.name)
     if odd:
-        return _doubt(f"{' '.join(odd)!r} beside it leaves open what was measured", field.name)
+        return _doubt(f"{' '.join(odd)!r} next to it leaves open what was measured", field.name)
     return Recognition(replace(field, unit=next(iter(units), None)))
 
 
@@ -261,7 +261,7 @@ def _numbered(  # noqa: PLR0911 - each return is one reason to doubt
     allowed = _CLEARANCE_WORDS | _JOINT_WORDS | _FILLERS | (_FLOAT_WORDS if is_float else frozenset())
     extra = said - allowed
     if extra:
-        return _doubt(f"{' '.join(sorted(extra))!r} may make it something else than the clearance", nearest)
+        return _doubt(f"{' '.join(sorted(extra))!r} may mean something other than the clearance", nearest)
     if after and not is_float and set(after) <= _CLEARANCE_WORDS:
         after = []
     return _check_name(kind, number, after, names)
@@ -276,7 +276,7 @@ def _check_name(kind: Kind, number: int, after: list[str], names: tuple[tuple[in
     nearest = f"{kind.value}_{number}"
     said = set(after) - _FILLERS
     if said - _vocabulary(names):
-        return _doubt(f"{' '.join(after)!r} may make it something else than the clearance", nearest)
+        return _doubt(f"{' '.join(after)!r} may mean something other than the clearance", nearest)
     own = next((_name_words(name) for n, name in names if n == number), frozenset())
     if not said <= own:
         others = [n for n, name in names if n != number and said <= _name_words(name)]
@@ -311,7 +311,7 @@ def recognise(header: str, joint_numbers: tuple[int, ...], joint_names: Mapping[
 
 
 def near_miss(header: str, joint_numbers: tuple[int, ...]) -> Recognition:
-    """Look for the canonical column that an unknown header is a slip of the pen away from."""
+    """Look for the canonical column that an unknown header is one entry error away from."""
     snake = _snake(header)
     bare = re.sub(r"_(in|thou|mm)$", "", snake)
     candidates = [k.value for k in Kind if k not in PER_JOINT and k not in (Kind.UNIT, Kind.SIDE, Kind.JOINT)]
@@ -322,7 +322,7 @@ def near_miss(header: str, joint_numbers: tuple[int, ...]) -> Recognition:
     field = parse_canonical(close[0], joint_numbers)
     if field is not None and field.kind in VERDICT_BEARING:
         unit = snake[len(bare) :]
-        return _doubt(f"it looks like a slip of the pen for {close[0]}{unit}", close[0] + unit)
+        return _doubt(f"it looks like an entry error for {close[0]}{unit}", close[0] + unit)
     return Recognition(nearest=close[0])
 
 

@@ -268,7 +268,7 @@ class ColumnReader:
                 columns,
                 p,
                 "joint_missing",
-                "a joint's number in the header, such as clearance_3_in, or a column joint beside it",
+                "a joint's number in the header, such as clearance_3_in, or a column joint next to it",
                 "The header does not say which joint. "
                 f'Correct it, or pass --map "{p.header}=COLUMN" with a column such as clearance_3_in.',
             )

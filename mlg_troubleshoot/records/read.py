@@ -82,7 +82,7 @@ def expand(source: Source) -> list[Source]:
 
 
 def _is_scratch(path: Path) -> bool:
-    """Tell the lock files that spreadsheet programs lay beside an open workbook."""
+    """Tell the lock files that spreadsheet programs lay next to an open workbook."""
     return path.name.startswith(("~$", ".~lock", "."))
 
 

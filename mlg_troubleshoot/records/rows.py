@@ -234,7 +234,9 @@ class RowReader:
         gauge_u = gauge_us.pop(0, None)
         idle = [f"#{joint}" for joint in gauge_us if joint not in clearance]
         if idle:
-            warnings.append(f"gauge uncertainty of joint {', '.join(idle)} is not used: the joint has no reading")
+            warnings.append(
+                f"the gauge's standard uncertainty of joint {', '.join(idle)} is not used: the joint has no reading"
+            )
         readings = sorted(_taken(lengths, Kind.PLUNGER_DISPLACEMENT).items())
         floats = _taken(lengths, Kind.AXIAL_FLOAT)
         # Columns bear the names of the fields that they fill.

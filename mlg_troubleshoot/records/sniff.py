@@ -1,4 +1,4 @@
-"""What kind of file it is, told from its first bytes, not from its name."""
+"""What kind of file it is, by its first bytes, not by its name."""
 
 from __future__ import annotations
 

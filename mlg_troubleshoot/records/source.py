@@ -18,7 +18,7 @@ MACROS = "the workbook holds macros: they are ignored, the values are read"
 
 @dataclass(slots=True)
 class SheetFacts:
-    """What was noticed beside the values while the rows were read; it fills up as they come.
+    """What was noticed in addition to the values while the rows were read; it fills up as they come.
 
     hidden_rows: rows with something in them that are hidden or filtered out, counted from 1.
     hidden_columns: first and last column of each hidden block, counted from 0.

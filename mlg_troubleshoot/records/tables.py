@@ -23,7 +23,7 @@ _PROGRESS_ROWS = 500
 class Collected:
     """What the sheets of one file gave.
 
-    invalid_content: a hash of the cells of each row that cannot be judged, to tell a repeated row from another one.
+    invalid_content: a hash of the cells of each row that cannot be judged, to recognize a repeated row.
     """
 
     rows: list[Inspection | InvalidRow] = field(default_factory=list)
@@ -166,10 +166,10 @@ def _hidden_notes(sheet: Sheet, columns: Columns, header_row: int) -> list[str]:
     facts, width = sheet.facts, len(columns.placed)
     hidden = sum(1 for row in facts.hidden_rows if row > header_row)
     if hidden:
-        notes.append(f"{hidden} hidden or filtered {'rows were' if hidden > 1 else 'row was'} read too")
+        notes.append(f"{hidden} hidden or filtered {'rows were' if hidden > 1 else 'row was'} also read")
     for first, last in facts.hidden_columns:
         ends = dict.fromkeys(column_letters(index) for index in (first, min(last, width - 1)))
-        notes += [f"hidden column {' to '.join(ends)} was read too"] * (first < width)
+        notes += [f"hidden column {' to '.join(ends)} was also read"] * (first < width)
     counts = [f"{column_letters(index)} ({n})" for index, n in sorted(facts.formulas.items()) if index < width]
     if counts:
         notes.append(f"formulas were read by their last calculated values: column {', '.join(counts)}")

@@ -148,7 +148,7 @@ def _instructions(book: Workbook, joints: Sequence[JointSpec]) -> None:
     sheet = book.worksheets[0]
     sheet.title = "Instructions"
     sheet.column_dimensions["A"].width = 74
-    # One cell a line: labels beside values would look like a form.
+    # One cell per line: labels next to values would look like a form.
     lines = [*_INSTRUCTIONS, *(f"  {joint.label}: {joint.location}" for joint in joints)]
     for row, line in enumerate(lines, 1):
         cell = sheet.cell(row, 1, line)

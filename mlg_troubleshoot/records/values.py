@@ -60,7 +60,7 @@ _PLAIN = re.compile(r"[+\-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+\-]?\d+)?", re.ASCII
 _NOT_FINITE = re.compile(r"[+\-]?\s*(nan|inf|infinity|1\.#\w+)", re.IGNORECASE)
 _INVISIBLE = {ord(c): None for c in "\u200b\u200c\u200d\u2060\ufeff"}
 
-# What people write where nothing was measured; the error value #N/A is none of them.
+# What people write where nothing was measured; the error value #N/A is not one of them.
 NOT_MEASURED = frozenset(
     (
         *("-", "--", "\u2010", "\u2011", "\u2012", "\u2013", "\u2014", "\u2212", "n/a", "na", "n.a.", "nm", "n/m"),

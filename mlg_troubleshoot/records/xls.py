@@ -54,7 +54,7 @@ def _sheets(data: bytes) -> tuple[_XlsSheet, ...]:
         if "encrypted" in str(error).lower():
             raise password_protected() from None
         if "find workbook" in str(error).lower():
-            raise FileRefusedError("file_kind", "an old Office file that is no workbook") from None
+            raise FileRefusedError("file_kind", "an old Office file that is not a workbook") from None
         raise damaged("its records cannot be read") from None
     except _PARSER_ERRORS:
         raise damaged("its records are incomplete") from None
@@ -136,7 +136,7 @@ class _XlsSheet(Sheet):
 
 
 def _formulas(stream: bytes, at: int) -> Counter[int]:
-    """Count the formulas of a sheet by column, which xlrd does not tell apart from numbers."""
+    """Count the formulas of a sheet by column, which xlrd does not distinguish from numbers."""
     found: Counter[int] = Counter()
     depth = 0
     while at + 4 <= len(stream):

@@ -3,7 +3,7 @@
 Openpyxl finds the sheets and walks over the rows. What stands in a cell is taken here, since it would hide a formula
 without a result (blank), a date outside the calendar (an error value) and the escaped characters of a text, refuse a
 whole sheet for ``NaN`` in a number, and tell neither hidden rows nor which results are of formulas. Texts and styles
-are taken here, too: its model of the styles refuses workbooks of other programs for a colour it does not know, and a
+are also taken here: its model of the styles refuses workbooks of other programs for a colour it does not know, and a
 text with ``x005F_`` in it would lose that.
 """
 
@@ -137,7 +137,7 @@ class XlsxFile(Workbook):
 
 
 def _refuse_other_kinds(kinds: str) -> None:
-    """Refuse what is packed like a workbook and is none that can be read."""
+    """Refuse what is packed like a workbook and cannot be read as one."""
     for mark, what, remedy in (
         ("wordprocessingml", "a text document or presentation", "Read the workbook."),
         ("presentationml", "a text document or presentation", "Read the workbook."),

@@ -109,7 +109,7 @@ class GuardedZip:
 
 
 class Stream:
-    """A part as a file, refused before what is kept of it until a row or a text ends becomes too much."""
+    """A part as a file, refused before the buffer up to the end of a row or a text becomes too large."""
 
     def __init__(self, archive: GuardedZip, part: str) -> None:
         self._part = part
@@ -150,7 +150,7 @@ def outside_limits(sheet: str | None, column: int, row: int) -> FileRefusedError
         "cell_outside_limits",
         f"something stands in cell {cell}",
         f"nothing beyond column {LETTERS[-1]} ({MAX_COLUMNS} columns) and row {MAX_ROWS}",
-        "Delete what stands far outside the table, or copy the table into a new workbook.",
+        "Delete the cells far outside the table, or copy the table into a new workbook.",
         sheet=sheet,
         row=row,
         cell=cell,

@@ -56,7 +56,7 @@ def column_words(name: str) -> str:
 
 
 def chance_words(chance: float, permutations: int) -> str:
-    """Write a chance as far as the data sets drawn with nothing wrong can tell it."""
+    """Write a chance as far as the null simulations can resolve it."""
     least = 1.0 / (permutations + 1)
     return f"{chance:.2g}" if chance > 1.001 * least else f"≤ {least:.2g}"
 
@@ -71,14 +71,14 @@ def cause_words(cause: NamedCause) -> str:
     words = candidate.cause.words(candidate.target)
     if cause.aliases:
         others = " with ".join(name_words(other.cause.name) for other in cause.aliases)
-        words += f" (these rows cannot tell it from {others})"
+        words += f" (these rows cannot distinguish it from {others})"
     if not candidate.stands_in:
         return words
     return f"{words} (not testable without {' and '.join(map(column_words, candidate.cause.needs))})"
 
 
 def seven_lines(d: Diagnosis, unit: LengthUnit = LengthUnit.THOU) -> tuple[Line, ...]:
-    """Say what a diagnosis found: data, misfit, cause, model, gain, what is left, what to do."""
+    """Say what a diagnosis found: data, misfit, cause, model, gain, residual, what to do."""
     # Blanks of every kind break a line of the terminal, and long words where they must.
     texts = [" ".join(text.split()) for text in _said(d, unit, *_WORDS)]
     return tuple(Line(k, word, text) for k, (word, text) in enumerate(zip(_WORDS, texts, strict=True), 1))
@@ -97,7 +97,7 @@ def _said(d: Diagnosis, unit: LengthUnit, *parts: str) -> Iterator[str]:
 
 
 def by_slip(faults: Sequence[DataFault]) -> list[list[DataFault]]:
-    """Gather the cells of one slip of the pen in a row."""
+    """Gather the cells of one entry error in a row."""
     slips: dict[tuple[int, str], list[DataFault]] = {}
     for fault in faults:
         slips.setdefault((fault.row, fault.kind), []).append(fault)

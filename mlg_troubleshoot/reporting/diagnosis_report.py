@@ -33,7 +33,7 @@ from mlg_troubleshoot.units import LengthUnit
 
 _WORDS = {
     "NAMED": ("CAUSE NAMED", "outside-margin"),
-    "AMBIGUOUS": ("CANNOT BE TOLD APART", "inconclusive"),
+    "AMBIGUOUS": ("CANNOT BE DISTINGUISHED", "inconclusive"),
     "UNLISTED": ("REAL, BUT NOT ON THE LIST", "inconclusive"),
     "NONE": ("NOTHING FOUND", "within-margin"),
 }
@@ -123,7 +123,7 @@ def _plots(residuals: Residuals) -> list[PlotPair]:
             )
             for c in d.also_possible[:_MOST_PANELS]
         ]
-        return [(panels[0], panels[1] if len(panels) > 1 else scatter, "What the data cannot tell apart")]
+        return [(panels[0], panels[1] if len(panels) > 1 else scatter, "What the data cannot distinguish")]
     if d.unlisted_variables:
         return [_unlisted_plots(residuals, d.unlisted_variables, scatter)]
     left = drawn.residual_plot(residuals, drawn.against_column(residuals, "predicted"), "")

@@ -63,7 +63,7 @@ def fleet_document(
     provenance: ReportProvenance,
     unit: LengthUnit = LengthUnit.INCH,
 ) -> Document:
-    """Make one page: a line a gear, worst first, with what is left and the worst case over its inspections."""
+    """Make one page: one line per gear, worst first, with its landings left and the worst case over its inspections."""
     lengths = Lengths(unit)
     lines = [
         {

@@ -86,5 +86,5 @@ def landings(ends: Mapping[str, float | None] | None) -> str:
 
 
 def minutes(value: float) -> str:
-    """Write a time of work; less than half a minute is none."""
+    """Write a time of work; less than half a minute is written as none."""
     return f"{value:.0f}\u00a0min" if value >= 0.5 else ""

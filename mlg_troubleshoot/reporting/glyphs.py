@@ -1,4 +1,4 @@
-"""Text that a page can show: long words made breakable, missing glyphs told apart."""
+"""Text that a page can show: long words made breakable, missing glyphs distinguished."""
 
 from __future__ import annotations
 

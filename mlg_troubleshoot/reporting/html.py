@@ -81,7 +81,7 @@ def _readable(value: Any) -> Any:
 
 
 def address(file_name: str) -> Markup:
-    """Write the name of a file beside the document as a link's address, which nothing may be added to."""
+    """Write the name of a file next to the document as a link's address, which nothing may be added to."""
     return Markup(quote(file_name, safe=""))
 
 

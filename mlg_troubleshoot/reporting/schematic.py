@@ -1,4 +1,4 @@
-"""The linkage drawn in its planes: joints numbered in place, told apart by shape, clearances exaggerated."""
+"""The linkage drawn in its planes: joints numbered in place, distinguished by shape, clearances exaggerated."""
 
 from __future__ import annotations
 
@@ -221,7 +221,7 @@ class _PlaneDrawing:
                     canvas.marker("circle", *at(point), 3.0)
 
     def _apart(self, at: _At) -> dict[int, Place]:
-        """Places of the joints' markers: at the joints, or beside them where two would overlap."""
+        """Places of the joints' markers: at the joints, or next to them where two would overlap."""
         places = {j.number: at(j.point) for j in self.gear.joints if j.point in self.points}
         least = 2.0 * _MARKER + 2.0
         for _ in range(30):

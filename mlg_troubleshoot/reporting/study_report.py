@@ -27,10 +27,10 @@ from mlg_troubleshoot.units import LengthUnit
 # A reason that explains less than a third of an excess is not its reason.
 _CLEARLY = 3.0
 _DIRECTIONS = {
-    Directions.WORST: "turned to move the plunger farthest, in the worse of the two senses",
-    Directions.OVER: "turned for the largest over-travel",
-    Directions.UNDER: "turned for the largest under-travel",
-    Directions.RANDOM: "turned at random, every direction alike",
+    Directions.WORST: "in the directions that move the plunger farthest, in the worse of the two senses",
+    Directions.OVER: "in the directions of the largest over-travel",
+    Directions.UNDER: "in the directions of the largest under-travel",
+    Directions.RANDOM: "in random directions, every direction alike",
     Directions.FIXED: "in directions set by a load",
 }
 
@@ -99,7 +99,7 @@ def _orders(f: StudyFindings) -> Markup:
             BarSeries("total order", f.result.table.total_order, "mid"),
         ],
         "First- and total-order index of each joint",
-        "Two bars a joint; the line through the first is its range over all linkages",
+        "Two bars per joint; the line through the first is its range over all linkages",
     )
 
 
@@ -136,7 +136,7 @@ def _methods(f: StudyFindings) -> Markup | None:
             BarSeries("amplification, mid-position", local, "open"),
         ],
         "Index by computation and by the amplification method",
-        "Three bars a joint: first order, share by the largest indices of the release, share by those at mid-position",
+        "Three bars per joint: first order, share by the largest indices of the release, share at mid-position",
     )
 
 
@@ -177,7 +177,7 @@ def _designs(f: StudyFindings) -> Markup | None:
             for found, style in zip(f.designs, styles, strict=True)
         ],
         "Share of each joint by the designs of the paper",
-        "Three bars a joint: Latin hypercube, with composite points, composite points only; normalised to 1 in total",
+        "Three bars per joint: Latin hypercube, with composite points, composite points only; normalised to 1 in total",
     )
 
 

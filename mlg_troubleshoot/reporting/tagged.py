@@ -15,7 +15,7 @@ VARIANT = "pdf/ua-1"
 
 def tagged_pdf_engine() -> tuple[bool, str]:
     try:
-        # A system library that it will need one day is no fault of this document.
+        # A system library that it will need one day is not a fault of this document.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)
             import weasyprint

@@ -1,4 +1,4 @@
-"""What is kept of a gear's life: an append-only, hash-chained store on SQLite or PostgreSQL."""
+"""The records of a gear's life: an append-only, hash-chained store on SQLite or PostgreSQL."""
 
 from mlg_troubleshoot.store.database import Added, Broken, Kind, Record, Store, StoreError, files_of, own_file, packed
 from mlg_troubleshoot.store.drafts import Draft, Drafts

@@ -1,8 +1,8 @@
 """The chain of records and the database that holds it.
 
 Records are only ever added. Each carries the hash of its own content together with the hash of the record before it, so
-that a change anywhere is found by walking the chain. That shows tampering; it does not show who did it, and it is no
-electronic signature. All records of one call are one transaction, and writers wait for each other.
+that a change anywhere is found by walking the chain. That shows tampering; it does not show who did it, and it is not
+an electronic signature. All records of one call are one transaction, and writers wait for each other.
 """
 
 from __future__ import annotations
@@ -170,7 +170,7 @@ class Broken:
     why: str
 
 
-# Made once; whatever another program may have put into a column has a form, too.
+# Made once; whatever another program may have put into a column also has a form.
 _canonical = json.JSONEncoder(
     ensure_ascii=True, allow_nan=False, sort_keys=True, separators=(",", ":"), default=repr
 ).encode
@@ -210,7 +210,7 @@ def own_file() -> str:
 
 
 def files_of(place: str | Path | None = None) -> tuple[Path, ...]:
-    """Return the files of a store, with those that SQLite lays beside it; none for a server."""
+    """Return the files of a store, with those that SQLite adds; none for a server."""
     try:
         file = Place(str(place or os.environ.get("MLG_STORE") or own_file())).file
     except UsageError:
@@ -284,7 +284,7 @@ class Store:
                 f"store {self.place}: {self._at.masked(said)}: nothing was kept",
                 _FOREIGN
                 if foreign
-                else "Check the place, the permissions and the free space; what was kept before is untouched.",
+                else "Check the place, the permissions and the free space; existing records are unchanged.",
             ) from error
 
     def _prepare(self, connection: sql.Connection, *, writing: bool) -> None:
@@ -571,7 +571,7 @@ _MOST_IMPORTED, _MOST_WRONG = 100_000, 1_000
 
 
 def _as_bytes_are(raw: Any, _record: Any) -> None:
-    """Let a SQLite connection begin when it is told to, and read texts that are none as they are."""
+    """Let a SQLite connection begin when it is told to, and read bytes that are not text as they are."""
     raw.isolation_level = None
     raw.text_factory = lambda found: found.decode("utf-8", "surrogateescape")
 

@@ -1,4 +1,4 @@
-"""Entries of the prompts that are not finished, in the store beside the records: each is one row, written over."""
+"""Entries of the prompts that are not finished, in the store with the records: each is one row, written over."""
 
 from __future__ import annotations
 

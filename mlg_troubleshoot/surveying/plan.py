@@ -16,10 +16,10 @@ from mlg_troubleshoot.surveying.survey import Prior
 _BETWEEN, _WELL_KNOWN = (0.25, 0.5, 0.75), 0.02
 # A reading counts as checked by the others if they predict it to three times its own uncertainty.
 _CHECKED, _SWEEPS = 0.1, 8
-# What a check by the others is worth beside a well-known index.
+# What a check by the others is worth compared with a well-known index.
 _BRACING, _LOOSE = 0.2, 0.02
 
-# A reading that narrows less than this is not worth taking; one that so many of the draws cannot reach is none.
+# A reading that narrows less than this is not worth taking; one that so many of the draws cannot reach is not possible.
 _LEAST_NARROWING, _OPEN = 0.01, 0.05
 
 
@@ -93,7 +93,7 @@ class _Design:
         return wanted, covariance, moved, size
 
     def best(self, taken: list[int]) -> int:
-        """The distance to read beside those taken."""
+        """The distance to read in addition to those taken."""
         rows, others = [*self.given, *taken], [j for j in self.free if j not in taken]
         wanted, covariance, moved, size = self.after(rows, others)
         known = self.slopes[:, rows]
@@ -103,7 +103,7 @@ class _Design:
         return others[int(np.argmin(cost.mean(axis=0)))]
 
     def exchanged(self, taken: list[int], count: int) -> list[int]:
-        """Fill up a choice and exchange its distances one by one."""
+        """Fill up a choice and exchange its distances stepwise."""
         while len(taken) < count:
             taken = [*taken, self.best(taken)]
         for _ in range(_SWEEPS if count < len(self.free) else 0):

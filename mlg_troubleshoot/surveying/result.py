@@ -41,7 +41,7 @@ class SurveyResult:
     before, interval, shape (n_joints, 2): 90 % intervals of the amplification indices, before and after. [1]
     amplification, shape (n_joints,): indices of the surveyed linkage. [1]
     suggestion: the reading to take next; None if none would narrow anything.
-    inspections: what is left open of given inspections.
+    inspections: joints that given inspections leave open.
     warnings: assemblies, published numbers that this gear leaves, and what else a reader must know.
     gear_file: the gear file that was written.
     input_sha256: hash of the table.

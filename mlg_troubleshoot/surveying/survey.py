@@ -31,7 +31,7 @@ _ALONE_SIZE, _ALONE_ANGLE = 0.5, float(np.radians(30.0))
 _LEAST_SPREAD = 0.01
 # Robust fit: uncertainties widened by these factors in turn, with so many steps each; then few starts are left.
 _WIDENED, _STEPS, _KEPT = (300.0, 100.0, 30.0, 10.0, 3.0, 1.0), 6, 6
-# Draws of the prior that are starts beside the ensemble. The loss of a reading where the linkage is open.
+# Draws of the prior that are starts in addition to the ensemble. The loss of a reading where the linkage is open.
 _AROUND, _OPEN, _LAST_STEPS, _TRIALS = 80, 100.0, 25, 8
 # The best few are left and fitted again with uncertainties widened so far, from so many points around each.
 _REHEATED, _TRIED, _AGAIN, _REHEAT_STEPS, _BESIDE = (10.0, 3.0), 100, 12, 4, 0.03
@@ -161,14 +161,14 @@ class Prior:
         gear: Gear = linkage.gear
         members = np.array([linkage.vector(each) for each in gear.ensemble])
         angles = linkage.angles
-        # The same direction, one turn further, is no distance.
+        # The same direction, one turn further, is not a distance.
         members[:, angles] -= 2 * np.pi * np.round((members[:, angles] - members[0, angles]) / (2 * np.pi))
         self.members, self.linkage = members, linkage
         size = float(np.std([c for p in gear.reference.mechanism.points for c in (p.x, p.y)]))
         alone = np.where(angles, _ALONE_ANGLE, _ALONE_SIZE * size)
         least = _LEAST_SPREAD * alone
         if linkage.travel is not None:
-            # What the technical order prescribes is no number of the ensemble: wide here, a reading elsewhere.
+            # What the technical order prescribes is not a number of the ensemble: wide here, a reading elsewhere.
             least[-1] = 0.1 * linkage.travel
         covariance = np.diag(alone**2)
         if len(members) > 2:
@@ -320,7 +320,7 @@ class Fitting:
     def reheated(self, points: Array, rng: Generator, kept: Any = True, noise: Any = 0.0) -> tuple[Array, Array]:
         """Fit once more from around each point, as far as wider uncertainties would let it go; the best few remain.
 
-        Beside a valley there often lies a better one, behind a low ridge or where more of the readings close.
+        Next to a valley there often lies a better one, behind a low ridge or where more of the readings close.
         kept, shape (n_points, n_readings): what each is fitted to at first; all of the readings judge in the end.
         noise, shape (n_points, n_readings): how far each takes the readings to be off where two are exchanged.
         """
@@ -353,7 +353,7 @@ class Fitting:
         return points, loss
 
     def _apart(self, points: Array, loss: Array, most: int) -> list[int]:
-        """The best points that are not beside a better one."""
+        """The best points that are not near a better one."""
         found: list[int] = []
         whitened = points @ self.prior.whiten.T
         for k in map(int, np.argsort(loss)):
@@ -408,7 +408,7 @@ class Fitting:
     def with_mirrored(self, modes: tuple[Mode, ...], kept: Mask) -> tuple[Mode, ...]:
         """Try the other side of each joint on two links: where the readings allow it, both assemblies are kept.
 
-        The ensemble's side is no knowledge of this gear's: the prior's middle is mirrored with its joint. A linkage
+        The ensemble's side says nothing of this gear's: the prior's middle is mirrored with its joint. A linkage
         that a crank drives moves otherwise if all of it is mirrored.
         """
         best, names = modes[0], list(self.linkage.names)
@@ -545,7 +545,7 @@ class Fitting:
             losses = [self.loss(x, means, 1.0, kept, False, noise) for x in steps]
             begun.append((np.choose(np.argmin(losses, axis=0)[:, None], steps), means, noise))
         points, means, noise = (np.concatenate(parts) for parts in zip(*begun, strict=True))
-        # What is left of the loss of a draw that arrived is chi-squared, with as many degrees as readings.
+        # The remaining loss of a draw that arrived is chi-squared, with as many degrees as readings.
         enough = kept.sum() + _FAR * np.sqrt(2.0 * kept.sum())
         loss, late = np.full(len(points), np.inf), np.arange(len(points))
         for _ in range(_BEGUN):
@@ -600,7 +600,7 @@ def fit(
         held, off = np.concatenate([nothing == 0.0, held]), np.concatenate([nothing, off])
         points, loss = fitting.reheated(np.concatenate([points, without]), rng, held, off)
         kept = np.abs(fitting.residuals(points[:1])[0]) < _TRUSTED
-    # What is that much less likely, each slip counted, is no mode: without what was exchanged it might seem one.
+    # What is that much less likely, each slip counted, is not a mode: without what was exchanged it might seem one.
     points = points[loss <= loss[0] - 2.0 * np.log(_LEAST_WEIGHT)]
     told(2, _STAGES)
     modes = fitting.modes(points, np.broadcast_to(prior.mean, points.shape), kept)

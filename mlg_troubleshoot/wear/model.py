@@ -84,7 +84,7 @@ class WearModel:
         """Forecast readings of the current path of a unit, or of n units at once.
 
         unit: one that is not known is a new one of the same population.
-        usage, shape (m,) or (n, m): usage since the last restoration, the same for all units or one row a unit; before
+        usage, shape (m,) or (n, m): usage since the last restoration, the same for all or one row per unit; before
           the last reading the path is followed back along its drift. [usage]
         reading: of a new reading, with its error; otherwise of the wear itself. Along the usages a sample is one path.
         Returns samples of shape (m, n_samples) or (n, m, n_samples). [value]
@@ -128,7 +128,7 @@ class WearModel:
         return Samples(samples[0] if isinstance(unit, str) else samples)
 
     def _chunks(self, units: int) -> Iterator[tuple[Places, int]]:
-        """Units that are worked out at once, and simulated paths of each: as many whoever is asked for beside it."""
+        """Units that are worked out at once, and simulated paths of each: as many whoever else is asked for."""
         size, count = (_MANY, _PATHS) if len(self.paths) <= _MANY else (250, _PATHS_OF_MANY)
         for first in range(0, units, size):
             yield np.arange(first, min(first + size, units)), count

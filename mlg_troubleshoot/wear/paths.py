@@ -45,7 +45,7 @@ class WearPath:
         usage, value = (np.array(numbers, float).ravel() for numbers in (self.usage, self.value))
         if len(usage) != len(value):
             raise UsageError(
-                f"path of {self.unit}: {len(usage)} usages and {len(value)} values", "Give one value a usage."
+                f"path of {self.unit}: {len(usage)} usages and {len(value)} values", "Give one value per usage."
             )
         if not (np.isfinite(usage).all() and np.isfinite(value).all()):
             raise UsageError(f"path of {self.unit}: a usage or a value is not a finite number", "Leave it out.")

@@ -34,7 +34,7 @@ ALL_JUDGED, NOT_ALL_WITHIN, NOTHING_JUDGED = 0, 1, 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckOptions(TableOptions):
-    """What the user asks of a check, beside what :class:`TableOptions` declare about its tables.
+    """What the user asks of a check, in addition to what :class:`TableOptions` declare about its tables.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class CheckOptions(TableOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckResult(TableResult):
-    """What a check found, beside what :class:`TableResult` tells of its tables.
+    """What a check found, in addition to what :class:`TableResult` tells of its tables.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def predict(clearance_in: Mapping[int, float] | ArrayLike, gear: Gear | str | Pa
     Returns
     -------
     WorstCase
-        Over-travel, under-travel, the larger of the two and the directions, one row a gear. [in, rad]
+        Over-travel, under-travel, the larger of the two and the directions, one row per gear. [in, rad]
 
     Raises
     ------
@@ -210,15 +210,15 @@ def predict(clearance_in: Mapping[int, float] | ArrayLike, gear: Gear | str | Pa
     rows = np.atleast_2d(np.asarray(clearance_in, float))
     if rows.ndim != 2 or rows.shape[1] != len(numbers):
         raise UsageError(
-            f"clearances of shape {rows.shape} do not fit {len(numbers)} joints", "Give one column a joint."
+            f"clearances of shape {rows.shape} do not fit {len(numbers)} joints", "Give one column per joint."
         )
     if not np.all(rows >= 0.0):
-        raise UsageError(f"a clearance of {rows[~(rows >= 0.0)][0]:g} in is none", "Give zero or more.")
+        raise UsageError(f"{rows[~(rows >= 0.0)][0]:g} in is not a valid clearance", "Give zero or more.")
     return worst_case(known.model, rows)
 
 
 def next_joint(gear: Gear, measured: Mapping[int, float]) -> MeasuringAdvice:
-    """Say which joint's reading is worth most next, and whether one may stop measuring."""
+    """Say which joint's reading is most useful next, and whether one may stop measuring."""
     return advise(Cases.of(gear, [replace(trial_inspection(gear), clearance_in=dict(measured))]))
 
 
@@ -349,7 +349,7 @@ def _verdict_columns(judgement: Judgement) -> dict[str, str | float | None]:
 
 
 def write_verdicts(result: CheckResult, file: Path) -> None:
-    """Write the verdicts as CSV, one line a row of the input, in its order."""
+    """Write the verdicts as CSV, one line per row of the input, in its order."""
     rows = []
     for judgement in result.judgements:
         row = judgement.row

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DiagnoseOptions(TableOptions):
-    """What the user asks of a diagnosis, beside what :class:`TableOptions` declare about its tables.
+    """What the user asks of a diagnosis, in addition to what :class:`TableOptions` declare about its tables.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class DiagnoseOptions(TableOptions):
     cause_files : tuple of Path
         Python files with the user's own causes.
     permutations : int
-        Data sets drawn with nothing wrong.
+        Number of null simulations.
     seed : int
         Seed of all randomness.
     """
@@ -47,7 +47,7 @@ class DiagnoseOptions(TableOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DiagnoseResult(TableResult):
-    """What a diagnosis found, beside what :class:`TableResult` tells of its tables.
+    """What a diagnosis found, in addition to what :class:`TableResult` tells of its tables.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def diagnose_files(
         first = read.problems[0] if read.problems else None
         why = "no row could be read" if first is None else f"{first.place()}: expected {first.expected}"
         raise InconclusiveDataError(f"nothing to diagnose: {why}", "" if first is None else first.remedy)
-    # The same inspection again is no further evidence. Rows that share an id and differ were refused.
+    # The same inspection again is not further evidence. Rows that share an id and differ were refused.
     once = list({(i.source.file, i.record_id): i for i in reversed(valid)}.values())[::-1]
     notes = (*read.notes, *_evidence_notes(once, len(valid) - len(once), gear))
     diagnosis = diagnose(
@@ -156,7 +156,7 @@ def _as_written(fault: DataFault, inspection: Inspection) -> DataFault:
 def _evidence_notes(inspections: Sequence[Inspection], again: int, gear: Gear) -> Iterator[str]:
     """What a diagnosis cannot use: inspections that stand twice, joints that nobody measured."""
     if again:
-        yield f"inspections that stand twice count once: rows left out: {again}"
+        yield f"duplicate inspections count once: rows left out: {again}"
     unread = [n for n in gear.model.joint_numbers if all(i.clearance_in.get(n) is None for i in inspections)]
     if len(unread) == len(gear.joint_numbers):
         yield "no clearance was read in any row: what wear adds is left open"

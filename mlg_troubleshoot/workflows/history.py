@@ -59,7 +59,7 @@ _ASKED = _AHEAD[[0, 8, 14, 18, 22, 25, 28]]
 _GEARS_AT_ONCE = 100
 # Stands for the worst case of a linkage that does not close: beyond any margin. [in]
 _NOT_CLOSING_IN = 1e3
-# A drop of this many forecast standard deviations is no wear: a restoration that nobody recorded. [1]
+# A drop of this many forecast standard deviations is not wear: a restoration that nobody recorded. [1]
 _DROP = 4.0
 # Two gears that both fit their own wear as badly as this share of sound ones, and each other's better by this much of
 # the log likelihood, were exchanged. [1]
@@ -266,7 +266,7 @@ def lives(store: Store, tail: str | None = None, side: str | None = None) -> dic
 
 
 def life_of(store: Store, tail: str, side: str) -> GearLife:
-    """One gear's life; a gear that nothing is kept of is a usage error that names near spellings."""
+    """One gear's life; a gear without records is a usage error that names near spellings."""
     side = Side.parse(side).value
     found = lives(store, tail, side).get((tail, side))
     if found is None:
@@ -627,7 +627,7 @@ def _forecast_some(part: Sequence[GearLife], model: WearModel, gear: Gear) -> It
     begun = np.array([[start for _own, start in wear_paths(life, numbers).values()] for life in part])
     ahead = gear.horizon.value * _AHEAD
     usage = np.maximum(now[:, None, None] + ahead - begun[:, :, None], 0.0)
-    # Gear by gear, each from the model's seed: the forecast of a gear is the same whoever is asked for beside it.
+    # Gear by gear, each from the model's seed: the forecast of a gear is the same whoever else is asked for.
     asked_of = [[unit_of(life.key, number) for number in numbers] for life in part]
     wear = np.stack([model.forecast(u, at, reading=False).samples for u, at in zip(asked_of, usage, strict=True)])
     wear = np.maximum(wear, 0.0)
@@ -703,7 +703,7 @@ def suggestions(found: Sequence[GearLife], model: WearModel | None, gear: Gear) 
         if dropped and i not in swapped:
             listed = ", ".join(f"#{number}" for number in dropped)
             said.append(
-                f"{' '.join(life.key)}: {listed} read far tighter than before: restored, and not recorded? "
+                f"{' '.join(life.key)}: {listed} read much tighter than before. Was it restored without a record? "
                 f"mlg history repair {' '.join(life.key)} --joint {dropped[0]} --date D"
             )
     return said
@@ -765,7 +765,7 @@ def landings_shown(count: float | None, gear: Gear) -> str:
 
 
 def outlook_words(life: GearLife, ahead: Forecast, gear: Gear) -> str:
-    """Say what is left to a gear, of which margin and which joint; empty where nothing was forecast."""
+    """Say how many landings a gear has left, to which margin and by which joint; empty where nothing was forecast."""
     if ahead.due_now:
         return f"No landings left: {ahead.due_now}. Next inspection due now."
     if life.latest is not None and life.latest.inspection.gear_landings is None:
@@ -790,7 +790,7 @@ def worst_joint(seen: Seen) -> int | None:
 
 
 def fleet_as_json(found: Sequence[GearLife], forecasts: Mapping[GearKey, Forecast]) -> dict[str, Any]:
-    """One line a gear, worst first: verdict, then landings to its next inspection."""
+    """One line per gear, worst first: verdict, then landings to its next inspection."""
     lines = []
     for life in found:
         if (seen := life.latest) is None:
@@ -815,7 +815,7 @@ def fleet_as_json(found: Sequence[GearLife], forecasts: Mapping[GearKey, Forecas
 
 
 def _outlook(life: GearLife, ahead: Forecast) -> dict[str, Any]:
-    """What is left to a gear, the same in its life and in the fleet."""
+    """The landings that a gear has left, the same in its life and in the fleet."""
     return {
         "landings_to_limit": quantiles(ahead.limit),
         "limit_joint": ahead.limit_joint,

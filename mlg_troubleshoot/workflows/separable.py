@@ -1,4 +1,4 @@
-"""Which causes planned columns could tell apart, before anything is measured."""
+"""Which causes planned columns could distinguish, before anything is measured."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ from mlg_troubleshoot.records.headers import parse_canonical
 # The planned fleet: two years of twenty aircraft (assumed), and what one row scatters, tail by tail [in]
 # (docs/explanation/diagnosis.md: a gauge that repeats to 1.5 thou, and what clearances and pins add).
 TAILS, VISITS, ROW_IN = 20, 5, 0.0025
-# Expected distance in log-likelihood at which two are told apart four times in five: d²/2 − 0.84 d = RULED_OUT.
+# Expected distance in log-likelihood at which two are distinguished with 80 % power: d²/2 − 0.84 d = RULED_OUT.
 _APART = 0.84 + float(np.sqrt(0.84**2 + 2.0 * RULED_OUT))
-# Effect over the error of its mean (S) from which some hundred candidates let one stand out four times in five.
+# Effect over the error of its mean (S) from which some hundred candidates let one stand out with 80 % power.
 _FOUND = 5.0
-# Columns beside clearances, cheapest first: what is written down anyway, what is read off, what must be measured.
+# Columns in addition to clearances, cheapest first: written down anyway, read off, to be measured.
 FURTHER = {
     "side": Kind.SIDE,
     "tail_no": Kind.TAIL_NO,
@@ -49,7 +49,7 @@ FURTHER = {
     ALONG: Kind.ACTUATOR_EXTENSION,
     "axial_float": Kind.AXIAL_FLOAT,
 }
-# Of what is tried for factors of all joints, the middle one: directions spread by 45°, linkages half as far apart.
+# Of what is tried for all-joint effects, the middle one: directions spread by 45°, linkages half as far apart.
 _MIDDLE = 1
 _JOINT = re.compile(r"clearance_(\d+)_in")
 _NAMES = {kind: name for name, kind in FURTHER.items()} | {Kind.PLUNGER_POSITION: ALONG}
@@ -60,11 +60,11 @@ Key = tuple[str, str | None]
 class CausePlanned:
     """What the planned columns could say about one cause.
 
-    found_from_in: root mean square from which it stands out four times in five; None if it cannot be tested. [in]
-    told_apart_from_in: root mean square from which it is found and told from that four times in five; None if never.
+    found_from_in: root mean square from which it is detected with 80 % power; None if it cannot be tested. [in]
+    told_apart_from_in: root mean square from which it is distinguished from that with 80 % power; None if never.
         [in]
     further_column: cheapest column that halves that size, or makes it finite.
-    separating_reading: the reading that tells them apart whatever the columns.
+    separating_reading: the reading that distinguishes them whatever the columns.
     """
 
     cause: str
@@ -78,7 +78,7 @@ class CausePlanned:
 
 
 def separable(gear: str = DEFAULT_GEAR, columns: Sequence[str] | None = None) -> tuple[CausePlanned, ...]:
-    """Say which causes the planned columns can and cannot tell apart; without clearance columns all joints are read."""
+    """Say which causes the planned columns can distinguish; without clearance columns all joints are read."""
     model = load_gear(gear)
     recorded, joints = _planned(columns, model)
     here = _Plan(model, recorded, joints)
@@ -111,7 +111,7 @@ def _planned(columns: Sequence[str] | None, gear: Gear) -> tuple[set[str], set[i
     for name in columns:
         field = parse_canonical(name, gear.joint_numbers)
         if field is None:
-            raise UsageError(f"{name} is no column of an inspection table", "see docs/reference/columns.md")
+            raise UsageError(f"{name} is not a column of an inspection table", "see docs/reference/columns.md")
         if field.kind in _NAMES:
             recorded.add(_NAMES[field.kind])
         elif field.kind is Kind.CLEARANCE and field.number in gear.joint_numbers:
@@ -132,7 +132,7 @@ class _Plan:
         tails = TAIL_RATIOS[1] * (table.tails[:, None] == np.unique(table.tails))
         tails = np.hstack([tails, rows.along_in / ROW_IN])
         common = np.linalg.cholesky(np.eye(len(table)) + tails @ tails.T)
-        # A slope of the prediction is a cause of its own; a shift of all rows is none.
+        # A slope of the prediction is a cause of its own; a shift of all rows is not.
 
         def whitened(x: Array) -> Array:
             return np.asarray(np.linalg.solve(common, x), float)
@@ -169,7 +169,7 @@ class _Plan:
         return self.candidates[self.keys[key][0]].separates
 
     def nearest(self, key: Key) -> tuple[str | None, float]:
-        """The cause that looks most like one, and the size from which they are told apart; infinite if never. [in]"""
+        """The cause that looks most like one, and the size that distinguishes them; infinite if never. [in]"""
         if key in self.blocks:
             rival = next(other for other in self.blocks if other != key)
             lead = partial(_divergence, true=self.blocks[key], other=self.blocks[rival])
@@ -179,7 +179,7 @@ class _Plan:
             if other != key:
                 mine = self.keys[key]
                 cosine = self.unit[:, mine].T @ self.unit[:, places]
-                # Physics allows some causes one sign only: two that push apart are no rivals.
+                # Physics allows some causes one sign only: two that push apart are not rivals.
                 one_way = (self.sign[mine][:, None] * self.sign[places]) != 0
                 alike = float(np.max(np.where(one_way, np.maximum(cosine, 0.0), cosine) ** 2))
                 if alike > best:
@@ -199,7 +199,7 @@ class _Plan:
 
 
 def _divergence(size_in: float, true: Array, other: Array) -> float:
-    """Log-likelihood by which factors of all joints of one kind lead those of another, of the size that fits best. [1]
+    """Log-likelihood by which all-joint effects of one kind lead those of another, of the size that fits best. [1]
 
     true, other, shape (n, k): independent effects of one kind, of root mean square 1 together, whitened.
     """

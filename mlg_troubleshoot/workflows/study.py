@@ -1,4 +1,4 @@
-"""A study and what goes beside it: statements, proofs, indices of measured inspections, table, report.
+"""A study and what goes with it: statements, proofs, indices of measured inspections, table, report.
 
 What computes is imported where it is needed: a check must not wait for scipy.
 """
@@ -52,7 +52,7 @@ def run_study(
     designs: bool = False,
     progress: Progress | None = None,
 ) -> StudyFindings:
-    """Recompute the sensitivity and amplification indices of a gear, and what is asked for beside them.
+    """Recompute the sensitivity and amplification indices of a gear, and what is asked for with them.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def run_study(
     Returns
     -------
     StudyFindings
-        The study; an interrupted one has ``result.finished`` false and nothing beside it.
+        The study; an interrupted one has ``result.finished`` false and nothing else.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def run_study(
     wanted = options or study.StudyOptions()
     told = progress or (lambda _stage, _done, _total: None)
     if statements and not targets_file(known).exists():
-        raise UsageError(f"{known.name} has no printed statements", f"Write {targets_file(known).name} beside it.")
+        raise UsageError(f"{known.name} has no printed statements", f"Write {targets_file(known).name} next to it.")
     findings = study.StudyFindings(known, wanted, study.run_study(known, wanted, told))
     if not findings.result.finished:
         return findings

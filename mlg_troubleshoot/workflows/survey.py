@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 
 _HEADING = "# Written by mlg gear survey.\n"
 SURVEYED = OutputKind.marked("is not of a gear that was surveyed", _HEADING)
-# Members of the ensemble that a surveyed gear file gets beside its reference: their range holds most of the posterior.
+# Further members of the ensemble of a surveyed gear file: their range holds most of the posterior.
 _MEMBERS = 11
 _DECIMALS = 6
-# A second assembly with less than this share of the posterior is no doubt worth naming.
+# A second assembly with less than this share of the posterior is not worth naming.
 _WORTH_NAMING = 0.02
 # Draws of the prior that stand for a gear of which nothing was read yet.
 _UNREAD = 2000

@@ -141,7 +141,7 @@ def test_a_joint_that_was_just_skipped_is_not_asked_for_next(start: Start) -> No
     child = start("check", "--tail", "N77", "--side", "RH", "--unit", "in", "--convention", "RADIAL")
     answer(child, ".001", ".001", ".001", ".001", "s")
     child.expect_exact("joint 6 of 10")
-    assert "Worth most next: #5" not in child.before
+    assert "Most useful next reading: #5" not in child.before
     interrupt(child)
     finish(child)
 

@@ -36,7 +36,7 @@ def test_what_the_joints_explain_and_what_they_cannot_add_up_to_what_was_measure
     assert found.explained_at_most_in == pytest.approx(-(found.under_travel_in or 0.0))
     assert found.explained_at_most_in + (found.unexplained_in or 0.0) == pytest.approx(0.060)
     most, rest = found.explained_at_most_in, found.unexplained_in or 0.0
-    assert f"can explain {most:.4f} in of it at most; {rest:.4f} in they cannot" in found.headline
+    assert f"explain at most {most:.4f} in of it; {rest:.4f} in has another cause" in found.headline
 
 
 def test_an_unmeasured_joint_may_explain_a_displacement_up_to_its_limit(judge: Judge) -> None:

@@ -38,7 +38,7 @@ NEEDS = {
     "load_directions": (),
     "geometry": (),
 }
-# What a fleet with nothing wrong has candidates of: no group in doubt, and factors of all joints are fitted together.
+# What a fleet with nothing wrong has candidates of: no group in doubt, and all-joint effects are fitted together.
 SINGLE = [name for name in NEEDS if name not in {"convention_slip", "load_directions", "geometry"}]
 ONE_SIGN = {
     "out_of_plane_tilt": 1,

@@ -2,7 +2,7 @@
 
     python -m tests.hidden_effect.departures_ceiling --write
 
-The fleets are the departures' own, without slips of the pen. The oracle is told the covariance of the noise as it came
+The fleets are the departures' own, without entry errors. The oracle is told the covariance of the noise as it came
 out in the fleet, the share that the scatter of the pins takes off the bound, and how large the effect is; scatter to be
 estimated, slips and unknown sizes only make it harder.
 
@@ -300,7 +300,7 @@ def markdown(result: dict[str, Any], departed: dict[str, Any]) -> tuple[str, str
         return f"{100 * rate['rate']:.1f} % ({100 * rate['low']:.1f}–{100 * rate['high']:.1f})"
 
     linkages = [
-        "| one cause, S = 15, on another linkage | fleets | S left beside it | told the linkage: clearly first "
+        "| one cause, S = 15, on another linkage | fleets | S left besides | told the linkage: clearly first "
         "| told the spread: first | clearly first | named by the program |",
         "|---|---|---|---|---|---|---|",
     ]
@@ -310,7 +310,7 @@ def markdown(result: dict[str, Any], departed: dict[str, Any]) -> tuple[str, str
         named = text(departed["by_cause"][cause])
         linkages.append(f"| {cause} | {row['first']['n']} | {row['left']:.1f} | {' | '.join(shown)} | {named} |")
     directed = [
-        "| directions 40° apart, told from | fleets where a regression beats one scale | all fleets |",
+        "| directions 40° apart, distinguished from | fleets where a regression beats one scale | all fleets |",
         "|---|---|---|",
         *(f"| {name} | {band(row['beats'])} | {band(row['all'])} |" for name, row in result["directions"].items()),
     ]

@@ -158,7 +158,7 @@ def test_a_killed_terminal_loses_no_answer(start: Start) -> None:
 @pytest.mark.parametrize(
     ("typed", "kept"),
     [
-        ((".004", "s"), "1 of 10 joints measured, 1 said to be not measured"),
+        ((".004", "s"), "1 of 10 joints measured, 1 marked not measured"),
         ((".004", ".0205"), "1 of 10 joints measured"),
         ((".004", "done", "f p .041"), "outcome FAILED"),
         ((".004", "done", "", "A. Smith", "WO-7"), "A. Smith"),

@@ -152,7 +152,7 @@ def test_the_page_on_trust_states_the_limits_that_hold() -> None:
         f"{zipguard.MAX_MEMBERS:,} parts",
         f"{zipguard.MAX_OPEN_BYTES // 10**6} MB of its XML; {zipguard.MAX_ITEMS:,} rows, texts or merged ranges",
         f"{cells.MAX_ROWS:,} rows × {cells.MAX_COLUMNS} columns",
-        f"{datafile.MOST_BYTES // 10**6} MB, {datafile.LONGEST_LINE:,} characters a line, {datafile.DEEPEST} levels",
+        f"{datafile.MOST_BYTES // 10**6} MB, {datafile.LONGEST_LINE:,} characters per line, {datafile.DEEPEST} levels",
         f"{datafile.LONGEST_NAME} printable characters",
         f"{pdf.TIME_LIMIT_S:.0f} s",
     ]

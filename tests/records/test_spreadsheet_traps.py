@@ -506,7 +506,7 @@ def test_30_hidden_rows_are_read_and_counted(read, xlsx):
 
     result = read(xlsx([HEADER, GOOD, ("R2", *GOOD[1:])], change), "t.xlsx")
     assert len(result.inspections) == 2
-    assert any("1 hidden or filtered row was read" in note for note in result.notes)
+    assert any("1 hidden or filtered row was also read" in note for note in result.notes)
 
 
 # 31 to 35: text files

@@ -161,7 +161,7 @@ def test_there_is_a_handover_line(failure: Made) -> None:
         "not hydraulics, friction, doors, switches or structure",
         "reconstructed from published figures, not drawing data",
         "not a validation set",
-        "its position cannot tell them apart",
+        "its position cannot distinguish them",
     ],
 )
 def test_the_report_says_what_it_is_not(words: str, failure: Made) -> None:

@@ -13,7 +13,7 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import MINUS, ClearanceConvention, LengthUnit, WrittenLength, parse_length
 
-# Columns that an entry may have beside its heading and its clearances, in the order in which they are shown.
+# Columns that an entry may have in addition to its heading and its clearances, in the order in which they are shown.
 LENGTHS = ("plunger_displacement", "margin")
 SIGN_OFF = ("technician_id", "work_order", "gauge_id", "inspection_date")
 MORE = ("outcome", *LENGTHS, *SIGN_OFF, "small_readings_true")

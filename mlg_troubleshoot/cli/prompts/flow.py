@@ -112,7 +112,7 @@ _CONVENTIONS = {c.value[0].lower(): c for c in ClearanceConvention}
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """The course of one inspection; `find_saved` looks for an unfinished one, `advice` names the joint worth most."""
+    """The course of one inspection; `find_saved` looks for an unfinished one, `advice` names the most useful joint."""
 
     gear: Gear
     find_saved: FindSaved | None = None
@@ -444,7 +444,7 @@ class Flow:
         skipped = len(answers.joints) - len(answers.radial_in)
         parts = [f"{len(answers.radial_in)} of {len(self.order)} joints measured"]
         if skipped:
-            parts.append(f"{skipped} said to be not measured")
+            parts.append(f"{skipped} marked not measured")
         if answers.unit is not None:
             parts.append(f"in {answers.unit.words}")
         if answers.convention is not None:

@@ -48,7 +48,7 @@ class Page:
 
 
 def length(length_in: float, unit: LengthUnit | None) -> str:
-    """Write a length in the user's unit; one in inches in millimetres, too."""
+    """Write a length in the user's unit; one in inches also in millimetres."""
     return " = ".join(f"{u.shown(length_in)} {u}" for u in _units_shown(unit))
 
 
@@ -295,7 +295,7 @@ def detail_page(answers: Answers, column: str, today: date | None) -> Page:
 
 
 MORE_HELP = (
-    line("f or r: what the gear did. A failure that clearances do not explain is said so.", indent=3),
+    line("f or r: what the gear did. If clearances do not explain a failure, the result says so.", indent=3),
     line("p: plunger position minus mid-position with the Down Lock released; − is under-travel.", indent=3),
     line("m: the displacement that this gear allows, as found at rigging.", indent=3),
     line("All on one line is fine: f p .041 m .028. x takes all of them away.", indent=3),

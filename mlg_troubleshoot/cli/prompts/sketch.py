@@ -35,7 +35,7 @@ _Mark = tuple[int, str, Tone]
 def sketch(gear: Gear, current: int, width: int) -> tuple[Line, ...]:
     """Draw the linkage from the input to the output with one joint marked.
 
-    Levers are double bars with their pivot below, links are single bars. A mechanism that is no simple
+    Levers are double bars with their pivot below, links are single bars. A mechanism that is not a simple
     chain, or a narrow terminal, gets a row of joint numbers.
     """
     numbers = {joint.point: joint.number for joint in gear.joints}

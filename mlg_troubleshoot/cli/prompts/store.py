@@ -31,7 +31,7 @@ class SessionFileError(TroubleshootError):
 
 
 class DamagedSessionError(SessionFileError):
-    """A saved session that is none."""
+    """A file that is not a saved session."""
 
 
 class SessionTakenError(TroubleshootError):
@@ -217,7 +217,7 @@ def _from_json(raw: Any) -> Session:
     else:
         raise ValueError(f"schema_version {_SCHEMA} was expected")
     if not set(more) <= set(MORE):
-        raise ValueError(f"{sorted(set(more) - set(MORE))[0]!r} is no column of an entry")
+        raise ValueError(f"{sorted(set(more) - set(MORE))[0]!r} is not a column of an entry")
     heading: dict[str, Any] = {n: None if raw[n] is None else read(raw[n]) for n, read in _HEADING.items()}
     answers = Answers(
         **heading,

@@ -1,4 +1,4 @@
-"""A batch: one line a gear, worst first; two inspections of one gear side by side."""
+"""A batch: one line per gear, worst first; two inspections of one gear side by side."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def _body(judgement: Judgement, screen: DataConsole, *, detail: bool) -> Text:
 
 
 def _numbers(a: Assessment) -> Iterator[str]:
-    """What stands beside the prediction: probability, spread over the linkages, unmeasured joints."""
+    """What stands with the prediction: probability, spread over the linkages, unmeasured joints."""
     if a.geometry_spread_in is not None and a.probability_within_margin is not None:
         low, high = a.geometry_spread_in
         yield (

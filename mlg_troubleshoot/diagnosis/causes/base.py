@@ -122,7 +122,7 @@ class Cause(ABC):
     sign: ClassVar[int] = 0
     """+1 or −1 where physics allows one sign of the parameter only, else 0."""
     of_joints: ClassVar[bool] = False
-    """True if it changes what joints contribute: it is a special case of factors of all joints."""
+    """True if it changes what joints contribute: it is a special case of all-joint effects."""
     one_scale: ClassVar[bool] = False
     """True if it scales what all joints contribute alike."""
     exact: ClassVar[float | None] = None

@@ -114,7 +114,7 @@ class UnlistedWear(Cause):
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield a few exponents of wear where the gear says which number it shifts."""
         if scene.where.wear_shift:
-            # Joints that nobody reads wear with landings likewise: beside them it is a rival, never a name.
+            # Joints that nobody reads wear with landings likewise: given them it is a rival, never a name.
             rival = share_never_read(scene) > MOST_UNREAD
             for exponent in _WEAR_EXPONENTS:
                 yield Candidate(self, None, {"wear_exponent": exponent}, stands_in=rival)

@@ -1,9 +1,9 @@
 """Causes that change what every joint contributes: where loads rest the pins, and another linkage than the drawn one.
 
-Ten factors cannot be had from 200 rows one by one. They are drawn from what is known before the data are looked at (a
-prior with a covariance), which shrinks them as far as the data leave them open; the marginal likelihood then says
-whether all ten are worth it beside one cause, or one scale for all. For that the prior of directions is skewed, as they
-are: of joints near their worst direction, which lose little, and far from it.
+Ten factors cannot be estimated separately from 200 rows. A prior with a covariance shrinks them as far as the data
+leave them open. The marginal likelihood then says whether all ten are worth it compared with one cause, or one scale
+for all. The prior of directions is skewed, as directions are: of joints near their worst direction, which lose little,
+and far from it.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ SPREADS_DEG = (25.0, 45.0, 70.0, 180.0)
 # another member, one half as far, and one that nobody has calibrated on the published failure, as the ensemble is:
 # halfway to another member, linkages move the plunger up to 1.8 times as far. [1]
 LINKAGES = ((1.0, 0.0), (0.5, 0.0), (1.0, 0.5))
-# What a true linkage may differ beside the ensemble's spread, each joint on its own: an eighth of the largest. [1]
+# Difference of a true linkage in addition to the ensemble's spread, each joint alone: an eighth of the largest. [1]
 ALONE = 0.03
-# And beside the way from the drawn one to a member of the ensemble, supposed: a third of that. [1]
+# And in addition to the way from the drawn one to a member of the ensemble, supposed: a third of that. [1]
 NEAR = 0.01
 # Changes of one joint that stand for all; rounds that settle the evidence to 0.02, but of a spread far behind another.
 _LIKELY, _ROUNDS = 1000, 8
@@ -44,7 +44,7 @@ _DEGREE = 6
 
 @dataclass(frozen=True)
 class Block:
-    """Factors of all joints with what is known of them beforehand.
+    """All-joint effects with what is known of them beforehand.
 
     cause: `LoadDirections` or `OtherGeometry`.
     joints: joints that were read.
@@ -116,7 +116,7 @@ class JointFactors(Cause):
         return self.bounds[1] <= 1.0
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
-        """Yield nothing: the factors of all joints are fitted together."""
+        """Yield nothing: the all-joint effects are fitted together."""
         yield from ()
 
     @abstractmethod

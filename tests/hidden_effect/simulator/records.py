@@ -1,4 +1,4 @@
-"""What is written down: readings with their errors, rounded, with blanks and slips of the pen."""
+"""What is written down: readings with their errors, rounded, with blanks and entry errors."""
 
 from __future__ import annotations
 

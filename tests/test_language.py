@@ -1,0 +1,95 @@
+"""What users and maintainers read is plain English: none of the phrases that once stood here comes back."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+# The reason of each is the phrase to write instead.
+INSTEAD = {
+    r"(?<![Tt]here )\b(?:is|are|was|were) (?:no|none)\b(?! longer| more\b)": "is not a …",
+    r"\bthan (?:is|are) none\b": "is not a …",
+    r"\b(?:[Oo]ne|a|each) (?:line|row|column|page) an? [a-z]": "one line per …",
+    r"\b(?:nothing|what) (?:is|was) kept of\b": "no records of …",
+    r"\bt(?:ell|ells|elling|old) (?:[\w#{}]+ ){0,5}apart\b": "distinguish",
+    r"\btold from\b": "distinguished from",
+    r"\btell (?:it|them|one|that) from\b": "distinguish … from",
+    r"\b(?:asked for|typed|rows|readings) at the line\b": "at the prompt",
+    r", too(?=[.;:)\"]|$)": "also …",
+    r"\b[Mm]end(?:s|ed|ing)?\b": "correct",
+    r"\bslips? of the pen\b": "entry error",
+    r"\b(?:four|4) times in (?:five|5)\b": "with 80 % power",
+    r"\b[Cc]hance (?:of as much )?if nothing is wrong\b": "p-value",
+    r"\b(?:sets|drawn) with nothing wrong\b": "null simulations",
+    r"\bnot used for (?:the|a) fit\b": "held-out rows",
+    r"\b[Ww]hat is left\b": "residual, remaining …",
+    r"\b[Gg]auge uncertainty (?:not stated|if known|of)\b": "standard uncertainty of the gauge",
+    r"\b[Ff]actors of all joints\b": "all-joint effect",
+    r"\b[Oo]ne by one\b": "stepwise",
+    r"\bare turned\b": "direction of …",
+    r"\bby keeping\b": "Run mlg check --keep once to upgrade it.",
+    r"\bat most; .{0,40}\bcannot\b": "… has another cause",
+    r"\bthat none is\b": "Probably no joint …",
+    r"\brestored, and not recorded\b": "Was it restored without a record?",
+    r"\bthat should hold do\b": "all required values hold",
+    r"\b[Bb]eside (?:it|them|one|those|others|the others|what is named|the named)\b": "in addition to …",
+    r"\b[Ee]valuations to stop at\b": "Maximum number of evaluations",
+    r"\bfor the hand\b": "to fill in by hand",
+    r"\bNothing follows from\b": "… contains no usable reading",
+    r"\bof what was done\b": "partial results",
+    r"\bproves no\b": "does not prove …",
+    r"\botherwise than entered\b": "Corrected for this analysis",
+    r"\bno chance and none\b": "significant but matches no listed cause",
+    r"\bthat the data cannot tell\b": "that these data cannot identify",
+    r"\bno gauge that moves\b": "a working gauge would vary",
+    r"\bno cause on any list\b": "no known cause",
+    r"\b[Ww]orth most\b": "Most useful next reading",
+    r"\bcomes out right\b": "a correct prediction of it proves nothing",
+    r"\bkept before is untouched\b": "existing records are unchanged",
+}
+
+
+def strings(source: str) -> Iterator[tuple[int, str]]:
+    """Every text of a module, docstrings too; what an f-string fills in stands as {}."""
+    tree = ast.parse(source)
+    parts = {id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            yield (
+                node.lineno,
+                "".join(str(part.value) if isinstance(part, ast.Constant) else "{}" for part in node.values),
+            )
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in parts:
+            yield node.lineno, node.value
+
+
+@cache
+def texts() -> tuple[tuple[str, str], ...]:
+    found = []
+    for path in sorted((ROOT / "mlg_troubleshoot").rglob("*.py")):
+        place = path.relative_to(ROOT).as_posix()
+        found += [(f"{place}:{line}", text) for line, text in strings(path.read_text(encoding="utf-8"))]
+    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "templates").glob("*.j2")]
+    pages += [*(ROOT / "mlg_troubleshoot").rglob("*.toml"), *(ROOT / "mlg_troubleshoot").rglob("*.schema.json")]
+    for path in sorted(pages):
+        # Of Jinja's tests, "is none" is a word of the language, not of the reader.
+        text = re.sub(r"\bis (not )?none\b", "", path.read_text(encoding="utf-8")) if path.suffix == ".j2" else None
+        text = path.read_text(encoding="utf-8") if text is None else text
+        found += [(path.relative_to(ROOT).as_posix(), paragraph) for paragraph in text.split("\n\n")]
+    return tuple((place, " ".join(text.split())) for place, text in found)
+
+
+@pytest.mark.parametrize("phrase", INSTEAD, ids=INSTEAD.values())
+def test_no_text_holds_a_phrase_that_has_a_plainer_one(phrase: str) -> None:
+    hits = [
+        f"{place}: …{text[max(0, hit.start() - 60) : hit.end() + 60]}…"
+        for place, text in texts()
+        for hit in re.finditer(phrase, text)
+    ]
+    assert not hits, f"write {INSTEAD[phrase]!r} instead:\n" + "\n".join(hits)
