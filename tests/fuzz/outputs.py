@@ -55,7 +55,19 @@ OUTPUTS = (
     Output(["gear", "reconstruct", "--start", "A", "--minutes", "0.01", "-q", "--out"], (), "", rare=True),
 )
 FOREIGN = ("mine.txt", "other.sqlite", "in.xlsx", "in.csv", "far.csv", "old-marked.xlsx", "old-chain.jsonl", "own.toml")
-NEW = ("new.csv", "new.xlsx", "new.jsonl", "new.html", "new.toml", "new", "a/b/new.csv", "no/../new.csv", "new/", " ", "-x")
+NEW = (
+    "new.csv",
+    "new.xlsx",
+    "new.jsonl",
+    "new.html",
+    "new.toml",
+    "new",
+    "a/b/new.csv",
+    "no/../new.csv",
+    "new/",
+    " ",
+    "-x",
+)
 NOT_FILES = ("-", "pipe", "folder", "/dev/full", "/dev/null", ".", "..", "", "in.csv/x", "x" * 300)
 
 
