@@ -1,7 +1,8 @@
 """Old Excel workbooks (.xls), read by xlrd behind a guard.
 
-Python-calamine, ten times faster, gives an error value as a blank cell, which would be "not measured", and ends the
-process on some damaged files. Xlrd does not tell which values are results of formulas.
+Python-calamine, ten times faster, gives an error value as a blank cell, which would be "not
+measured", and ends the process on some damaged files. Xlrd does not tell which values are results
+of formulas.
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ def xls_book(data: bytes) -> Workbook:
 def _sheets(data: bytes) -> list[_XlsSheet]:
     try:
         with damage("its records are incomplete"):
-            book = xlrd.open_workbook(file_contents=data, formatting_info=True, logfile=io.StringIO())
+            log = io.StringIO()
+            book = xlrd.open_workbook(file_contents=data, formatting_info=True, logfile=log)
     except xlrd.XLRDError as error:
         if "encrypted" in str(error).lower():
             raise password_protected() from None

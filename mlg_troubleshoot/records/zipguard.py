@@ -25,9 +25,9 @@ MAX_OPEN_BYTES = 2_000_000
 MAX_ITEMS = 1 << 20
 # What zipfile raises: NotImplementedError for compression that it lacks, RuntimeError for encrypted members.
 _ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError, ValueError, RuntimeError)
-# What openpyxl, xlrd and the parser of XML raise on damaged bytes: a part or an attribute that is missing, a wrong kind
-# of element or value, a place outside the texts or the bytes, XML that is not well-formed, a text in no known encoding,
-# arithmetic on wrong lengths, their own checks.
+# What openpyxl, xlrd and the parser of XML raise on damaged bytes: a part or an attribute that is
+# missing, a wrong kind of element or value, a place outside the texts or the bytes, XML that is not
+# well-formed, a text in no known encoding, arithmetic on wrong lengths, their own checks.
 _PARSER_ERRORS = (
     ArithmeticError,
     AssertionError,

@@ -104,9 +104,8 @@ def publish(
                 notes += found
                 made["pdf"] = _written(directory / f"{document.stem}.pdf", _marked(pdf))
             except PdfError as error:
-                notes.append(
-                    f"No PDF: {error}. Open {web.name} in a web browser and print it; it is laid out for {page} paper."
-                )
+                instead = f"Open {web.name} in a web browser and print it"
+                notes.append(f"No PDF: {error}. {instead}; it is laid out for {page} paper.")
                 wanted.add("html")
         if "html" in wanted:
             made["html"] = _written(web, render(document, page).encode("utf-8"))

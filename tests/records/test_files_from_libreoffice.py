@@ -53,10 +53,10 @@ def test_the_template_saved_by_libreoffice_reads_back(samples, suffix):
     check(samples / f"template_filled.{suffix}")
 
 
-def open_document(path, part, old, new):
+def open_document(file, part, old, new):
     """Return an OpenDocument file with something replaced in one of its parts."""
     buffer = io.BytesIO()
-    with zipfile.ZipFile(path) as source, zipfile.ZipFile(buffer, "w") as changed:
+    with zipfile.ZipFile(file) as source, zipfile.ZipFile(buffer, "w") as changed:
         for name in source.namelist():
             content = source.read(name)
             if name == part:
@@ -68,11 +68,13 @@ def open_document(path, part, old, new):
 
 def test_a_password_protected_open_document_is_named_as_such(samples, read):
     end = b"</manifest:manifest>"
-    data = open_document(samples / "sample.ods", "META-INF/manifest.xml", end, b"<manifest:encryption-data/>" + end)
+    said = b"<manifest:encryption-data/>" + end
+    readable = open_document(samples / "sample.ods", "META-INF/manifest.xml", end, said)
+    data = open_document(io.BytesIO(readable), "content.xml", b"<", b"\x93\x1f")
     assert [p.code for p in read(data, "t.ods").problems] == ["password_protected"]
 
 
-def test_an_open_document_s_false_shown_for_a_zero_is_no_clearance(samples, read):
+def test_an_open_document_s_false_shown_for_a_zero_is_not_a_clearance(samples, read):
     true, false = (
         f'office:value="{n}" calcext:value-type="float"><text:p>{shown}'.encode()
         for n, shown in ((1, "TRUE"), (0, "FALSE"))
@@ -82,8 +84,9 @@ def test_an_open_document_s_false_shown_for_a_zero_is_no_clearance(samples, read
 
 
 def test_an_open_document_s_formula_without_a_result_is_a_problem(samples, read):
-    result_of = b' office:value-type="float" office:value="0.0065" calcext:value-type="float"><text:p>0.0065</text:p>'
-    result = read(open_document(samples / "sample.ods", "content.xml", result_of, b">"), "t.ods")
+    kind, shown = b'calcext:value-type="float"', b"<text:p>0.0065</text:p>"
+    held = b' office:value-type="float" office:value="0.0065" ' + kind + b">" + shown
+    result = read(open_document(samples / "sample.ods", "content.xml", held, b">"), "t.ods")
     assert ("F2", "formula_without_value") in [(p.cell, p.code) for p in result.problems]
 
 

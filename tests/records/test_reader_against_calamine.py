@@ -1,4 +1,4 @@
-"""The readers of workbooks against an independent one, python-calamine, and against what may come inside a package."""
+"""The readers of workbooks against python-calamine, and against what may come inside a package."""
 
 from __future__ import annotations
 
