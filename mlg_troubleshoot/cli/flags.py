@@ -44,7 +44,10 @@ class Wanted:
     formats: Annotated[
         list[ReportFormat] | None,
         typer.Option(
-            "--format", help="Report format, may repeat; default html and pdf. pdf-ua: tagged, for screen readers."
+            "--format",
+            metavar="html|pdf",
+            parser=options.report_format,
+            help="Report format, may repeat; default html and pdf. HTML is the accessible form.",
         ),
     ] = None
     page: options.Paper = None

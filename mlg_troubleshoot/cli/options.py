@@ -21,7 +21,14 @@ DEFAULT_GEAR = "hawker-800xp"
 class ReportFormat(StrEnum):
     HTML = "html"
     PDF = "pdf"
-    PDF_UA = "pdf-ua"
+
+
+def report_format(text: str) -> ReportFormat:
+    try:
+        return ReportFormat(text)
+    except ValueError:
+        remedy = "Give html or pdf; the HTML report is the accessible form."
+        raise UsageError(f"a report cannot be written as {text!r}", remedy) from None
 
 
 class Page(StrEnum):

@@ -1,4 +1,8 @@
-"""OpenDocument spreadsheets (.ods), read row by row."""
+"""OpenDocument spreadsheets (.ods), read row by row.
+
+Python-calamine gives an error value and a formula without a result as a blank cell, and FALSE,
+where it is a number shown so, as 0: "not measured" and a clearance of 0 that nobody measured.
+"""
 
 from __future__ import annotations
 

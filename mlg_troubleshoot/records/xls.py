@@ -1,10 +1,13 @@
-"""Old Excel workbooks (.xls), read by xlrd behind a guard."""
+"""Old Excel workbooks (.xls), read by xlrd behind a guard.
+
+Python-calamine, ten times faster, gives an error value as a blank cell, which would be "not
+measured", and ends the process on some damaged files. Xlrd does not tell which values are results
+of formulas.
+"""
 
 from __future__ import annotations
 
 import io
-import struct
-from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import xlrd
@@ -22,10 +25,9 @@ from mlg_troubleshoot.records.cells import (
 )
 from mlg_troubleshoot.records.refusals import COPY_THE_TABLE, FileRefusedError
 from mlg_troubleshoot.records.source import MACROS, MergedRange, NumberedRow, Sheet, Workbook
-from mlg_troubleshoot.records.zipguard import damaged, outside_limits, password_protected
+from mlg_troubleshoot.records.zipguard import damage, damaged, outside_limits, password_protected
 
 MAX_BYTES = 20_000_000
-_BOF, _EOF, _FORMULA = 0x0809, 0x000A, 0x0006
 _UTF16 = "utf-16-le"
 
 
@@ -38,60 +40,33 @@ def xls_book(data: bytes) -> Workbook:
     return Workbook("xls", _sheets(data), [MACROS] if "_VBA_PROJECT".encode(_UTF16) in data else [])
 
 
-def _sheets(data: bytes) -> tuple[_XlsSheet, ...]:
-    """Read the sheets: the one place where what xlrd raises becomes a problem.
-
-    On damaged bytes xlrd raises almost anything; what its parser was seen to raise is listed in `_PARSER_ERRORS`.
-    """
+def _sheets(data: bytes) -> list[_XlsSheet]:
     try:
-        book = xlrd.open_workbook(file_contents=data, formatting_info=True, logfile=io.StringIO(), on_demand=True)
-        sheets = tuple(
-            _XlsSheet(book, book.sheet_by_index(i), _formulas(book.mem, book._sh_abs_posn[i]))
-            for i in range(book.nsheets)
-        )
-        book.release_resources()
+        with damage("its records are incomplete"):
+            log = io.StringIO()
+            book = xlrd.open_workbook(file_contents=data, formatting_info=True, logfile=log)
     except xlrd.XLRDError as error:
         if "encrypted" in str(error).lower():
             raise password_protected() from None
         if "find workbook" in str(error).lower():
             raise FileRefusedError("file_kind", "an old Office file that is not a workbook") from None
         raise damaged("its records cannot be read") from None
-    except _PARSER_ERRORS:
+    except xlrd.compdoc.CompDocError:
         raise damaged("its records are incomplete") from None
-    return sheets
-
-
-# Arithmetic on wrong lengths, places outside the bytes, wrong types of cells, texts in no code page, its own checks.
-_PARSER_ERRORS = (
-    ArithmeticError,
-    AssertionError,
-    AttributeError,
-    EOFError,
-    LookupError,
-    MemoryError,
-    NameError,
-    OSError,
-    RuntimeError,
-    TypeError,
-    ValueError,
-    struct.error,
-    xlrd.compdoc.CompDocError,
-)
+    return [_XlsSheet(book, sheet) for sheet in book.sheets()]
 
 
 class _XlsSheet(Sheet):
-    def __init__(self, book: xlrd.Book, sheet: xlrd.sheet.Sheet, formulas: Counter[int]) -> None:
+    def __init__(self, book: xlrd.Book, sheet: xlrd.sheet.Sheet) -> None:
         super().__init__(sheet.name, hidden=bool(sheet.visibility))
         self._book = book
         self._sheet = sheet
-        self._formulas = formulas
 
     def merged(self) -> Sequence[MergedRange]:
         return [(top + 1, left, bottom, right - 1) for top, bottom, left, right in self._sheet.merged_cells]
 
     def _read(self) -> Iterator[NumberedRow]:
         sheet = self._sheet
-        self.facts.formulas.update(self._formulas)
         for column, info in sheet.colinfo_map.items():
             if info.hidden:
                 self.facts.hidden_columns.append((column, column))
@@ -133,18 +108,3 @@ class _XlsSheet(Sheet):
             return None
         known = self._book.format_map.get(self._book.xf_list[index].format_key)
         return None if known is None else known.format_str
-
-
-def _formulas(stream: bytes, at: int) -> Counter[int]:
-    """Count the formulas of a sheet by column, which xlrd does not distinguish from numbers."""
-    found: Counter[int] = Counter()
-    depth = 0
-    while at + 4 <= len(stream):
-        kind, size = struct.unpack_from("<HH", stream, at)
-        if kind == _FORMULA and size >= 4:
-            found[struct.unpack_from("<H", stream, at + 6)[0]] += 1
-        depth += (kind == _BOF) - (kind == _EOF)
-        if depth <= 0:
-            break
-        at += 4 + size
-    return found

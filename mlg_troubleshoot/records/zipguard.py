@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import struct
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -24,9 +25,24 @@ MAX_OPEN_BYTES = 2_000_000
 MAX_ITEMS = 1 << 20
 # What zipfile raises: NotImplementedError for compression that it lacks, RuntimeError for encrypted members.
 _ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError, ValueError, RuntimeError)
-# What openpyxl and the parser of XML raise on damaged parts: a part or an attribute that is missing, a wrong kind of
-# element or value, an index outside the texts, XML that is not well-formed or in no known encoding.
-_PARSER_ERRORS = (AttributeError, LookupError, OSError, OverflowError, ParseError, TypeError, ValueError)
+# What openpyxl, xlrd and the parser of XML raise on damaged bytes: a part or an attribute that is
+# missing, a wrong kind of element or value, a place outside the texts or the bytes, XML that is not
+# well-formed, a text in no known encoding, arithmetic on wrong lengths, their own checks.
+_PARSER_ERRORS = (
+    ArithmeticError,
+    AssertionError,
+    AttributeError,
+    EOFError,
+    LookupError,
+    MemoryError,
+    NameError,
+    OSError,
+    ParseError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+    struct.error,
+)
 
 
 def damaged(what: str) -> FileRefusedError:

@@ -20,11 +20,9 @@ from mlg_troubleshoot.outputs import OutputKind, write_bytes
 from mlg_troubleshoot.reporting.glyphs import missing_characters, spell_out
 from mlg_troubleshoot.reporting.html import Document, render
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
-from mlg_troubleshoot.reporting.tagged import make_tagged_pdf
 
 Progress = Callable[[int, int], None]
-FORMATS = ("html", "pdf", "pdf-ua")
-USUAL_FORMATS = ("html", "pdf")
+FORMATS = ("html", "pdf")
 PAGES = ("A4", "Letter")
 _NAME = re.compile(r"(mlg-.*|fleet)\.(html|pdf)", re.IGNORECASE)
 # How a report is known: base.html.j2 writes the one into the head of a page; the other stands as a
@@ -54,17 +52,16 @@ def could_be_report(path: Path) -> bool:
 class WrittenReport:
     """Files of one report.
 
-    html, pdf, tagged: the files; None if it was not asked for, or could not be made.
+    html, pdf: the files; None if it was not asked for, or could not be made.
     """
 
     html: Path | None
     pdf: Path | None
-    tagged: Path | None
     notes: tuple[str, ...]
 
     @property
     def files(self) -> tuple[Path, ...]:
-        return tuple(path for path in (self.html, self.pdf, self.tagged) if path is not None)
+        return tuple(path for path in (self.html, self.pdf) if path is not None)
 
 
 def safe_stem(*identity: str | None) -> str:
@@ -84,7 +81,7 @@ def publish(
     document: Document,
     directory: Path,
     *,
-    formats: Sequence[str] = USUAL_FORMATS,
+    formats: Sequence[str] = FORMATS,
     page: str = "A4",
     engine: PdfEngine | None = None,
 ) -> WrittenReport:
@@ -96,30 +93,23 @@ def publish(
     wanted, notes = set(formats), []
     made: dict[str, Path] = {}
     web = directory / f"{document.stem}.html"
-    instead = f"Open {web.name} in a web browser and print it; it is laid out for {page} paper."
     try:
         if "pdf" in wanted:
             # The child starts while the HTML is being made; if it cannot, the job says so.
             with suppress(PdfError):
                 running.start()
-        if "pdf-ua" in wanted:
-            try:
-                tagged = make_tagged_pdf(render(document, page, for_pdf=True))
-                made["pdf-ua"] = _written(directory / f"{document.stem}-ua.pdf", _marked(tagged))
-            except PdfError as error:
-                notes.append(f"No tagged PDF: {error}. {instead}")
-                wanted |= {"html", "pdf"}
         if "pdf" in wanted:
             try:
                 pdf, found = _pdf(document, page, running)
                 notes += found
                 made["pdf"] = _written(directory / f"{document.stem}.pdf", _marked(pdf))
             except PdfError as error:
-                notes.append(f"No PDF: {error}. {instead}")
+                instead = f"Open {web.name} in a web browser and print it"
+                notes.append(f"No PDF: {error}. {instead}; it is laid out for {page} paper.")
                 wanted.add("html")
         if "html" in wanted:
             made["html"] = _written(web, render(document, page).encode("utf-8"))
-        return WrittenReport(made.get("html"), made.get("pdf"), made.get("pdf-ua"), tuple(notes))
+        return WrittenReport(made.get("html"), made.get("pdf"), tuple(notes))
     finally:
         if engine is None:
             running.close()

@@ -268,7 +268,7 @@ def write_reports(
     directory : Path
         Folder to write to; it is made if it does not exist.
     formats : sequence of str
-        Any of ``html``, ``pdf`` and ``pdf-ua`` (tagged).
+        ``html``, ``pdf`` or both.
     page : str
         ``A4`` or ``Letter``.
     on_written : callable, optional

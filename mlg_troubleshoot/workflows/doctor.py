@@ -29,7 +29,6 @@ def examine_installation(gear: str = DEFAULT_GEAR) -> tuple[Ability, ...]:
     import tempfile
 
     from mlg_troubleshoot.geometry.kernel import numba_is_installed
-    from mlg_troubleshoot.reporting.tagged import tagged_pdf_engine
 
     python = f"{sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
     found = [Ability("Python", python, sys.version_info >= (3, 11), remedy="Install Python 3.11 or later.")]
@@ -51,7 +50,4 @@ def examine_installation(gear: str = DEFAULT_GEAR) -> tuple[Ability, ...]:
     found.append(
         Ability("fast kernel", speed, numba_is_installed(), needed=False, remedy="pip install 'mlg-troubleshoot[fast]'")
     )
-    tagged, detail = tagged_pdf_engine()
-    remedy = "pip install 'mlg-troubleshoot[tagged]'; on Debian also libpango-1.0-0 and libpangoft2-1.0-0"
-    found.append(Ability("tagged PDF/UA", detail, tagged, needed=False, remedy=remedy))
     return tuple(found)

@@ -123,3 +123,9 @@ def batch() -> Run:
 
 def test_the_fleet_needs_attention(batch: Run) -> None:
     assert batch.code == 1
+
+
+def test_the_former_format_for_screen_readers_names_the_accessible_form(tmp_path: Path) -> None:
+    found = mlg("check", FAILURE, "--report", tmp_path, "--format", "pdf-ua")
+    assert (found.code, found.out, list(tmp_path.iterdir())) == (2, "", [])
+    assert "the HTML report is the accessible form" in found.err

@@ -1,4 +1,4 @@
-"""The reader of workbooks against an independent one, python-calamine, and against what may come inside a package."""
+"""The readers of workbooks against python-calamine, and against what may come inside a package."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ import io
 import random
 import zipfile
 
+import pytest
 import python_calamine
 
+from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.records.cells import OddCell
-from mlg_troubleshoot.records.xlsx import XlsxFile
+from mlg_troubleshoot.records.read import open_book
 
 MAIN = 'xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"'
 
@@ -19,7 +21,7 @@ def ours(data):
     """Return the cells of the first sheet by row."""
     return {
         number: [c.day if isinstance(c, OddCell) and c.day else c for c in cells]
-        for number, cells in XlsxFile(data).sheets[0].rows()
+        for number, cells in open_book(data, "", ReadOptions()).sheets[0].rows()
     }
 
 
@@ -57,8 +59,11 @@ def test_values_and_places_agree_with_calamine(xlsx):
         assert ours(data) == theirs(data)
 
 
-def test_files_of_libreoffice_agree_with_calamine(samples):
-    data = (samples / "sample.xlsx").read_bytes()
+@pytest.mark.parametrize(
+    "name", [f"{n}.{kind}" for n in ("sample", "template_filled") for kind in ("xlsx", "xls", "ods")]
+)
+def test_files_of_libreoffice_agree_with_calamine(samples, name):
+    data = (samples / name).read_bytes()
     mine, other = ours(data), theirs(data)
     for number, row in other.items():
         for index, value in enumerate(row):
