@@ -7,10 +7,15 @@ from dataclasses import dataclass
 
 from mlg_troubleshoot.decision.assessment import Assessment, Confidence, Rigging
 from mlg_troubleshoot.decision.plan import End
+from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.gear.gear import Gear
 
 NO_CLOSURE = "With these clearances the linkage does not close in its worst position: outside any margin."
 CHECK_ENTRIES = "Do not use. Correct: the linkage does not close with these clearances; check the entries."
+_SET_THAT_HOLDS = (
+    f"set of joints, restored to new, brings the worst case within the margin with {100.0 * CONFORMANCE:.0f} % "
+    "probability."
+)
 GO_ON = {
     End.WITHIN: "Go on with fault isolation: within margin is not a release to service.",
     End.NOT_EXPLAINED: "Joint clearances do not explain it: check rigging, lock roller, reversing valve, hydraulics, "
@@ -18,8 +23,7 @@ GO_ON = {
     End.TOO_CLOSE: "Go on: too close to the margin for the model to decide. Look again at the next inspection; record "
     "its date or landings.",
     End.OUTSIDE_NO_COMPLAINT: "Go on: clearances could contribute, but no failure is recorded. Engineering decides.",
-    End.CANNOT_CLEAR: "Go on to engineering: no set of joints, restored to new, brings the worst case within the "
-    "margin with 95 % probability.",
+    End.CANNOT_CLEAR: f"Go on to engineering: no {_SET_THAT_HOLDS}",
 }
 
 
@@ -172,6 +176,18 @@ def chance_wrong_sentence(a: Assessment) -> str | None:
         f"Called {a.verdict.words.lower()}, the {what} of this gear lies on the other side of the margin with a chance "
         f"of {percent(a.chance_wrong)}{unread}."
     )
+
+
+def no_repair_set(a: Assessment) -> str:
+    """Why no repair is offered."""
+    unread = [finding.joint for finding in a.joints if finding.clearance_in is None]
+    if (a.probability_within_margin or 0.0) >= CONFORMANCE:
+        of_which = " of the measured joints" if unread else ""
+        return f"None needed: the worst case{of_which} is within the margin already."
+    if unread:
+        are = "is" if len(unread) == 1 else "are"
+        return f"No set is sure to hold while {joint_list(unread)} {are} not measured: they count at their limit here."
+    return f"No {_SET_THAT_HOLDS}"
 
 
 def rigging_sentence(rigging: Rigging) -> str:

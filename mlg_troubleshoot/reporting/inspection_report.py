@@ -10,7 +10,7 @@ from typing import Any
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Outcome, RowSource, Side
 from mlg_troubleshoot.decision.order import WORST_FIRST, latest_of_each_gear
-from mlg_troubleshoot.decision.sentences import chance_wrong_sentence
+from mlg_troubleshoot.decision.sentences import chance_wrong_sentence, no_repair_set, rigging_sentence
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import inspection_figures as drawn
@@ -93,6 +93,8 @@ def _inspection(a: Assessment, gear: Gear, provenance: ReportProvenance, lengths
         "legend": [(joint_mark("", state), words) for state, words in JOINT_STATES.items()],
         "extended": bool(provenance.extension),
         "wrong": chance_wrong_sentence(a),
+        "no_repair": no_repair_set(a),
+        "rigging": None if a.rigging is None else lengths.said(rigging_sentence(a.rigging)),
         "rows": _joints(gear, a, lengths),
         "curve": drawn.plunger_curve(gear, a, lengths),
         "cases": _sequence(gear, a, lengths),

@@ -10,6 +10,7 @@ import pytest
 from mlg_troubleshoot.decision.assessment import Rejected
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.decision.judge_rows import assess
+from mlg_troubleshoot.decision.sentences import rigging_sentence
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.sources import SourceKind
@@ -238,6 +239,13 @@ def test_a_sound_gear_needs_no_repair(judge: Judge, make: Make) -> None:
 def test_unread_joints_are_named_where_they_keep_a_repair_from_being_sure(failure: Made) -> None:
     section = failure.text.replace("\u00a0", " ").split("Repair sets")[1]
     assert "No set is sure to hold while #1, #2, #4" in section
+
+
+def test_the_report_says_of_re_rigging_what_the_screen_says(judge: Judge, make: Make) -> None:
+    found = judge(WORN)
+    assert found.rigging is not None
+    section = make(found, formats=("html",)).text.split("Repair sets")[1]
+    assert rigging_sentence(found.rigging) in section
 
 
 def test_re_rigging_alone_stands_under_the_repairs(failure: Made) -> None:
