@@ -36,7 +36,7 @@ INSTEAD = {
     r"\bby keeping\b": "Run mlg check --keep once to upgrade it.",
     r"\bat most; .{0,40}\bcannot\b": "… has another cause",
     r"\bthat none is\b": "Probably no joint …",
-    r"\brestored, and not recorded\b": "Was it restored without a record?",
+    r"\brestored, and not recorded\b": "Restored without a record?",
     r"\bthat should hold do\b": "all required values hold",
     r"\b[Bb]eside (?:it|them|one|those|others|the others|what is named|the named)\b": "in addition to …",
     r"\b[Ee]valuations to stop at\b": "Maximum number of evaluations",

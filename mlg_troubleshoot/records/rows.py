@@ -235,7 +235,7 @@ class RowReader:
         idle = [f"#{joint}" for joint in gauge_us if joint not in clearance]
         if idle:
             warnings.append(
-                f"the gauge's standard uncertainty of joint {', '.join(idle)} is not used: the joint has no reading"
+                f"standard uncertainty of the gauge at joint {', '.join(idle)} is not used: the joint has no reading"
             )
         readings = sorted(_taken(lengths, Kind.PLUNGER_DISPLACEMENT).items())
         floats = _taken(lengths, Kind.AXIAL_FLOAT)

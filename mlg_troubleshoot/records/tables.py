@@ -148,9 +148,11 @@ class _Table:
             again = f"{self._repeated} repeated header rows were" if self._repeated > 1 else "a repeated header row was"
             notes.append(f"{again} skipped")
         if self._aside:
-            count = f"{len(self._aside)} rows are" if len(self._aside) > 1 else "1 row is"
+            count = (
+                f"{len(self._aside)} rows are not inspections" if len(self._aside) > 1 else "1 row is not an inspection"
+            )
             shown = ", ".join(self._aside[:5]) + (", …" if len(self._aside) > 5 else "")
-            notes.append(f"{count} no inspection and set aside: {shown}")
+            notes.append(f"{count}, set aside: {shown}")
         if self._dates:
             notes.append(self._dates)
         words = self._reader.not_measured

@@ -703,7 +703,7 @@ def suggestions(found: Sequence[GearLife], model: WearModel | None, gear: Gear) 
         if dropped and i not in swapped:
             listed = ", ".join(f"#{number}" for number in dropped)
             said.append(
-                f"{' '.join(life.key)}: {listed} read much tighter than before. Was it restored without a record? "
+                f"{' '.join(life.key)}: {listed} read much tighter than before. Restored without a record? "
                 f"mlg history repair {' '.join(life.key)} --joint {dropped[0]} --date D"
             )
     return said

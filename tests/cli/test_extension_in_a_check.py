@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -56,7 +57,7 @@ def test_a_diagnosis_that_finds_something_exits_1(diagnosed: Run) -> None:
 
 def test_a_diagnosis_speaks_in_seven_lines(diagnosed: Run) -> None:
     lines = diagnosed.out.splitlines()
-    numbered = [line.split()[1] for line in lines if line[:1].isdigit() and line[1:2] == " "]
+    numbered = [line.split()[1] for line in lines if re.match(r"\d [A-Z]", line)]
     assert numbered == ["DATA", "MISFIT", "CAUSE", "MODEL", "GAIN", "LEFT", "DO"]
 
 

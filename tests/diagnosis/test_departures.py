@@ -436,5 +436,5 @@ def test_what_is_in_the_set_is_not_said_to_be_ruled_out() -> None:
 
 def test_the_lines_say_what_may_act_beside_a_sure_cause_and_what_to_read() -> None:
     lines = {line.word: line.text for line in seven_lines(found("a gauge and a scale"))}
-    assert "Beside it something acts that the data cannot tell" in lines["CAUSE"]
-    assert "To tell what acts beside it, take" in lines["DO"]
+    assert "A further cause acts that these data cannot identify" in lines["CAUSE"]
+    assert "To identify the further cause, take" in lines["DO"]

@@ -157,10 +157,14 @@ def edited(gear: Gear, tmp_path: Path) -> Edit:
         ),
         ('name = "locking pin"', f'name = "{"p" * 41}"', r"joints\[2\]\.name: expected a name of 1 to 40"),
         ('provenance = "', r'provenance = "\u001b[31m', r"provenance: expected a text .* printable"),
-        ('ensemble = "hawker', 'ensemble = "../hawker', r"ensemble: expected the name of a file beside"),
-        ('ensemble = "hawker-800xp-ensemble.toml"', 'ensemble = ""', r"ensemble: expected the name of a file beside"),
-        ('indices = "hawker', 'indices = "/etc/hawker', r"indices: expected the name of a file beside"),
-        ('indices = "hawker', r'indices = "a\\hawker', r"indices: expected the name of a file beside"),
+        ('ensemble = "hawker', 'ensemble = "../hawker', r"ensemble: expected the name of a file in the same folder"),
+        (
+            'ensemble = "hawker-800xp-ensemble.toml"',
+            'ensemble = ""',
+            r"ensemble: expected the name of a file in the same folder",
+        ),
+        ('indices = "hawker', 'indices = "/etc/hawker', r"indices: expected the name of a file in the same folder"),
+        ('indices = "hawker', r'indices = "a\\hawker', r"indices: expected the name of a file in the same folder"),
         ("at = [-1.8, -11.85]", "at = [1e308, -11.85]", r"points\[F\]\.at: expected two numbers"),
         ("at = [-1.8, -11.85]", "at = [1e5, -11.85]", r"points\[F\]\.at: expected two numbers from -10000 to 10000"),
         ("at = [-1.8, -11.85]", f"at = [1{'0' * 400}, 1]", r"points\[F\]\.at: expected two numbers"),
@@ -230,12 +234,12 @@ def test_a_json_file_that_is_too_deep_or_no_table_is_refused(tmp_path: Path, tex
 def test_a_pipe_in_place_of_a_gear_file_is_refused_and_not_waited_for(tmp_path: Path) -> None:
     pipe = tmp_path / "gear.toml"
     os.mkfifo(pipe)
-    with pytest.raises(GearFileError, match="is no regular file"):
+    with pytest.raises(GearFileError, match="is not a regular file"):
         load_gear(pipe)
 
 
 def test_a_folder_in_place_of_a_gear_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(GearFileError, match="is no regular file"):
+    with pytest.raises(GearFileError, match="is not a regular file"):
         read_toml(tmp_path)
 
 

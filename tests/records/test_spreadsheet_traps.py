@@ -866,7 +866,7 @@ def test_50_a_row_of_totals_or_a_signature_is_set_aside(read, table, word):
     result = read(table(rows=rows))
     assert [row.source.row for row in result.rows] == [2, 4]
     assert not result.problems
-    assert any(f"1 row is no inspection and set aside: row 3 {word!r}" in note for note in result.notes)
+    assert any(f"1 row is not an inspection, set aside: row 3 {word!r}" in note for note in result.notes)
 
 
 def test_50_a_row_of_a_gear_is_no_totals_row_however_its_record_is_called(read, table):

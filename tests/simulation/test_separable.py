@@ -98,7 +98,7 @@ def test_load_directions_and_another_linkage_are_each_others_nearest() -> None:
 
 
 def test_a_column_that_no_table_has_is_refused() -> None:
-    with pytest.raises(UsageError, match="oil_colour is no column"):
+    with pytest.raises(UsageError, match="oil_colour is not a column"):
         separable(columns=["oil_colour"])
 
 
