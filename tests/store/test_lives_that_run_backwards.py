@@ -324,6 +324,16 @@ def test_a_joint_that_was_never_read_takes_no_landings_from_those_that_were() ->
     assert told["landings_to_margin"]["p50"] is None
 
 
+def test_landings_are_left_to_the_margin_that_the_last_inspection_states(tmp_path: Path) -> None:
+    (first, *others) = fleet_of(3, 4, 1)
+    left = []
+    for margin_in in (None, 0.02):
+        place = tmp_path / f"{margin_in}.sqlite"
+        add([[replace(each, margin_in=margin_in) for each in first], *others], place)
+        left.append(mlg("history", "N0", "LH", "--json", "--store", place).json["landings_to_margin"]["p05"])
+    assert left[1] < 0.8 * left[0]
+
+
 # Last inspections that do not fit the wear of their gear.
 
 
@@ -338,19 +348,20 @@ class Steady:
         return Samples(np.add.outer(last, np.array([[-0.001, 0.001]])))
 
 
-def suggested(*gears: tuple[float, float]) -> list[str]:
-    """What is suggested of the gears of one aircraft by what joint 3 read first and last."""
+def suggested(*gears: tuple[float, float], tails: str = "AA", days: str = "11") -> list[str]:
+    """What is suggested of gears, each of its aircraft, by what joint 3 read at first and on its day of February."""
     own = [
         [
             replace(
-                inspection(n, f"2024-0{n + 1}-01", 400.0 * n),
+                inspection(n, f"2024-0{n + 1}-0{day}", 400.0 * n),
+                tail_no=tail,
                 side=side,
-                record_id=f"{side} {n}",
+                record_id=f"{tail} {side} {n}",
                 clearance_in={3: worn_in},
             )
             for n, worn_in in enumerate(read)
         ]
-        for side, read in zip(Side, gears, strict=False)
+        for side, read, tail, day in zip(Side, gears, tails, days, strict=False)
     ]
     add(own)
     model = cast(WearModel, Steady())
@@ -370,6 +381,12 @@ def test_two_gears_are_exchanged_where_that_is_e_to_the_8_times_as_likely(deviat
     # On both gears together the exchange gains the square of the deviation in the log likelihood.
     apart = 0.001 * deviations
     found = suggested((0.003, 0.003 + apart), (0.003 + apart, 0.003))
+    assert len([words for words in found if "were they exchanged?" in words]) == told
+
+
+@pytest.mark.parametrize(("tails", "days", "told"), [("AA", "12", 1), ("AB", "11", 1), ("AB", "12", 0)])
+def test_gears_are_exchanged_on_one_aircraft_or_on_the_sheets_of_one_day(tails: str, days: str, told: int) -> None:
+    found = suggested((0.003, 0.0065), (0.0065, 0.003), tails=tails, days=days)
     assert len([words for words in found if "were they exchanged?" in words]) == told
 
 
