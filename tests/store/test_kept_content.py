@@ -270,6 +270,15 @@ def test_of_a_long_chain_the_newest_records_are_walked_before_another_is_added(
         Store(place).add(places.records(8, 9))
 
 
+def test_of_a_long_chain_an_old_record_that_was_taken_away_is_missed_by_the_count(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mlg_troubleshoot.store.database._NEWEST", 2)
+    tampered(place, "DELETE FROM mlg_records WHERE seq = ?", 2)
+    with pytest.raises(StoreError, match="it holds 5 records, and the last one is number 6"):
+        Store(place).add(places.records(7, 8))
+
+
 def bomb(megabytes: int) -> bytes:
     press = zlib.compressobj(9, zdict=database._OFTEN)
     spaces = b"".join(press.compress(b" " * 1_000_000) for _ in range(megabytes))

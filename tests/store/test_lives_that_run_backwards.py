@@ -214,6 +214,12 @@ def test_an_undated_inspection_between_others_does_not_repeat_what_was_restored_
     assert [step["restored"] for step in steps] == [[], [3], [], []]
 
 
+def test_the_last_four_inspections_stand_side_by_side() -> None:
+    add([[inspection(n, f"2024-0{n}-01", 100.0 * n) for n in range(1, 7)]])
+    steps = task.side_by_side(task.life_of(Store(), "N507", "LH"))
+    assert [step["record_id"] for step in steps] == ["R3", "R4", "R5", "R6"]
+
+
 def test_the_higher_landings_of_one_date_are_the_later_ones() -> None:
     seen = [("2024-01-01", 802), ("2024-01-01", 800)]
     Store().add([inspection_record(inspection(n, *each)) for n, each in enumerate(seen)])
@@ -221,6 +227,13 @@ def test_the_higher_landings_of_one_date_are_the_later_ones() -> None:
     assert found.latest is not None
     assert found.latest.inspection.gear_landings == 802
     assert found.warnings == ()
+
+
+def test_a_repair_that_states_no_landings_has_those_of_its_day_between_the_inspections() -> None:
+    add([[inspection(1, "2024-01-01", 100.0), inspection(2, "2024-01-21", 300.0)]])
+    assert mlg("history", "repair", "N507", "LH", "--joint", "3", "--date", "2024-01-06").code == 0
+    (_paths, begun) = task.wear_paths(task.life_of(Store(), "N507", "LH"), [3])[3]
+    assert begun == pytest.approx(150.0)
 
 
 # One gear, one forecast.
