@@ -363,6 +363,12 @@ def test_two_outputs_of_one_run_are_two_files(option: str, tmp_path: Path) -> No
     assert not csv.exists()
 
 
+def test_a_table_may_have_the_name_of_a_report_in_another_folder_than_the_reports(tmp_path: Path) -> None:
+    csv = tmp_path / "mlg-x.html"
+    assert mlg("check", FAILURE, "--csv", csv, "--report", tmp_path / "reports", "--format", "html").code == 1
+    assert csv.exists()
+
+
 @pytest.mark.parametrize("command", [("check", FAILURE, "--csv"), ("history", "export")], ids=lambda c: c[0])
 def test_a_dash_is_not_taken_for_a_file(
     command: tuple[object, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

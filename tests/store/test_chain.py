@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from mlg_troubleshoot.decision.inspection import Outcome
+from mlg_troubleshoot.decision.inspection import Outcome, Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.store import Kind, Record, Store, StoreError, inspection_from, inspection_record, same_inspection
 
@@ -48,6 +48,12 @@ def test_the_same_inspection_twice_is_one(store: Store) -> None:
 def test_the_same_inspection_twice_in_one_call_is_one(place: Path) -> None:
     added = Store(place).add([*places.records(1, 3), *places.records(1, 3)], same_inspection)
     assert (added.new, added.known) == (len(places.records(1, 3)), len(places.records(1, 3)))
+
+
+def test_the_records_of_one_side_are_asked_for_without_those_of_the_other(store: Store) -> None:
+    store.add([inspection_record(replace(places.inspection(1), side=Side.RH))])
+    assert {record.side for record in store.of_gear("N1")} == {"LH", "RH"}
+    assert {record.side for record in store.of_gear("N1", "LH")} == {"LH"}
 
 
 def test_while_one_writes_no_other_begins_to(store: Store) -> None:

@@ -49,7 +49,9 @@ WRONG_INSPECTIONS = {
     "a day that is none": with_field(inspection_date="9999-99-99"),
     "a margin of zero": with_field(margin_in=0.0),
     "an uncertainty of zero": with_field(gauge_u_by_joint_in={"3": 0.0}),
-    "a reading beyond any": with_field(readings_in=[7.0]),
+    "a reading that no cell may hold": with_field(readings_in=[0.51]),
+    "a number as a text": with_field(gear_landings="400"),
+    "another day than its record": with_field(inspection_date="2026-01-03"),
     "an entry without a unit": with_field(entered={"3": ["4"]}),
     "a source that is none": with_field(source=["file"]),
     "remarks that are no texts": with_field(carried={"remarks": 3}),
@@ -63,6 +65,8 @@ OTHERS: dict[str, tuple[Kind, Any]] = {
     "an assessment whose advice is a text": (Kind.ASSESSMENT, {"result": {**NUMBER, "next_action": "3"}}),
     "a repair without joints": (Kind.REPAIR, {"landings": None}),
     "a repair of a joint that is none": (Kind.REPAIR, {"joints": [99], "landings": None}),
+    "a repair of a joint that is true": (Kind.REPAIR, {"joints": [True], "landings": None}),
+    "a repair at endless landings": (Kind.REPAIR, {"joints": [3], "landings": 1e308}),
     "a re-rigging at endless landings": (Kind.RERIG, {"landings": 1e308}),
     "a void of nothing": (Kind.VOID, {"why": "x"}),
     "an outcome without a joint": (Kind.OUTCOME, {"of": "0" * 64, "found": "x"}),
@@ -266,6 +270,15 @@ def test_of_a_long_chain_the_newest_records_are_walked_before_another_is_added(
         Store(place).add(places.records(8, 9))
 
 
+def test_of_a_long_chain_an_old_record_that_was_taken_away_is_missed_by_the_count(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mlg_troubleshoot.store.database._NEWEST", 2)
+    tampered(place, "DELETE FROM mlg_records WHERE seq = ?", 2)
+    with pytest.raises(StoreError, match="it holds 5 records, and the last one is number 6"):
+        Store(place).add(places.records(7, 8))
+
+
 def bomb(megabytes: int) -> bytes:
     press = zlib.compressobj(9, zdict=database._OFTEN)
     spaces = b"".join(press.compress(b" " * 1_000_000) for _ in range(megabytes))
@@ -302,7 +315,7 @@ def test_a_schema_version_that_is_none_is_named(place: Path, version: object) ->
     tampered(place, "UPDATE mlg_meta SET schema_version = ?", version)
     run = mlg("history")
     assert run.code == 5
-    assert "has schema version" in run.err
+    assert f"has schema version {version!r}, and this program knows 1" in run.err
 
 
 def measured(*arguments: object) -> tuple[Run, float, float]:

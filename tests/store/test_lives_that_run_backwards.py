@@ -214,6 +214,12 @@ def test_an_undated_inspection_between_others_does_not_repeat_what_was_restored_
     assert [step["restored"] for step in steps] == [[], [3], [], []]
 
 
+def test_the_last_four_inspections_stand_side_by_side() -> None:
+    add([[inspection(n, f"2024-0{n}-01", 100.0 * n) for n in range(1, 7)]])
+    steps = task.side_by_side(task.life_of(Store(), "N507", "LH"))
+    assert [step["record_id"] for step in steps] == ["R3", "R4", "R5", "R6"]
+
+
 def test_the_higher_landings_of_one_date_are_the_later_ones() -> None:
     seen = [("2024-01-01", 802), ("2024-01-01", 800)]
     Store().add([inspection_record(inspection(n, *each)) for n, each in enumerate(seen)])
@@ -221,6 +227,13 @@ def test_the_higher_landings_of_one_date_are_the_later_ones() -> None:
     assert found.latest is not None
     assert found.latest.inspection.gear_landings == 802
     assert found.warnings == ()
+
+
+def test_a_repair_that_states_no_landings_has_those_of_its_day_between_the_inspections() -> None:
+    add([[inspection(1, "2024-01-01", 100.0), inspection(2, "2024-01-21", 300.0)]])
+    assert mlg("history", "repair", "N507", "LH", "--joint", "3", "--date", "2024-01-06").code == 0
+    (_paths, begun) = task.wear_paths(task.life_of(Store(), "N507", "LH"), [3])[3]
+    assert begun == pytest.approx(150.0)
 
 
 # One gear, one forecast.
@@ -324,6 +337,16 @@ def test_a_joint_that_was_never_read_takes_no_landings_from_those_that_were() ->
     assert told["landings_to_margin"]["p50"] is None
 
 
+def test_landings_are_left_to_the_margin_that_the_last_inspection_states(tmp_path: Path) -> None:
+    (first, *others) = fleet_of(3, 4, 1)
+    left = []
+    for margin_in in (None, 0.02):
+        place = tmp_path / f"{margin_in}.sqlite"
+        add([[replace(each, margin_in=margin_in) for each in first], *others], place)
+        left.append(mlg("history", "N0", "LH", "--json", "--store", place).json["landings_to_margin"]["p05"])
+    assert left[1] < 0.8 * left[0]
+
+
 # Last inspections that do not fit the wear of their gear.
 
 
@@ -338,19 +361,20 @@ class Steady:
         return Samples(np.add.outer(last, np.array([[-0.001, 0.001]])))
 
 
-def suggested(*gears: tuple[float, float]) -> list[str]:
-    """What is suggested of the gears of one aircraft by what joint 3 read first and last."""
+def suggested(*gears: tuple[float, float], tails: str = "AA", days: str = "11") -> list[str]:
+    """What is suggested of gears, each of its aircraft, by what joint 3 read at first and on its day of February."""
     own = [
         [
             replace(
-                inspection(n, f"2024-0{n + 1}-01", 400.0 * n),
+                inspection(n, f"2024-0{n + 1}-0{day}", 400.0 * n),
+                tail_no=tail,
                 side=side,
-                record_id=f"{side} {n}",
+                record_id=f"{tail} {side} {n}",
                 clearance_in={3: worn_in},
             )
             for n, worn_in in enumerate(read)
         ]
-        for side, read in zip(Side, gears, strict=False)
+        for side, read, tail, day in zip(Side, gears, tails, days, strict=False)
     ]
     add(own)
     model = cast(WearModel, Steady())
@@ -370,6 +394,12 @@ def test_two_gears_are_exchanged_where_that_is_e_to_the_8_times_as_likely(deviat
     # On both gears together the exchange gains the square of the deviation in the log likelihood.
     apart = 0.001 * deviations
     found = suggested((0.003, 0.003 + apart), (0.003 + apart, 0.003))
+    assert len([words for words in found if "were they exchanged?" in words]) == told
+
+
+@pytest.mark.parametrize(("tails", "days", "told"), [("AA", "12", 1), ("AB", "11", 1), ("AB", "12", 0)])
+def test_gears_are_exchanged_on_one_aircraft_or_on_the_sheets_of_one_day(tails: str, days: str, told: int) -> None:
+    found = suggested((0.003, 0.0065), (0.0065, 0.003), tails=tails, days=days)
     assert len([words for words in found if "were they exchanged?" in words]) == told
 
 
