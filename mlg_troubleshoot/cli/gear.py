@@ -115,7 +115,7 @@ def verify(context: typer.Context, as_json: options.Json = False, _version: opti
             style="bold red" if n in failed else "",
         )
     console.print(table)
-    verdict = "all required values hold" if not failed else f"{len(failed)} required values do not hold"
+    verdict = "all required values hold" if not failed else f"required values that do not hold: {len(failed)}"
     console.print(f"{len(numbers)} numbers: {verdict}.")
     raise typer.Exit(1 if failed else 0)
 
