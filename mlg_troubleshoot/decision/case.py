@@ -88,9 +88,12 @@ class Cases:
         return np.asarray(self.retracted & (self.measured & ~self.over_limit).all(axis=1))
 
     @property
-    def unit_doubtful(self) -> Mask:
-        """True for a gear whose readings may be of another unit than the one that is stated."""
-        return np.array([bool(inspection.unit_question) for inspection in self.inspections])
+    def questions(self) -> tuple[str, ...]:
+        """What must be answered about the entry of each gear before it can be cleared; empty if nothing."""
+        return tuple(
+            inspection.unit_question or _disagreement(inspection, float(margin_in))
+            for inspection, margin_in in zip(self.inspections, self.margin_in, strict=True)
+        )
 
     def filled(self, unmeasured: Array | float) -> Array:
         """Clearances with something in place of those not measured. [in]"""
@@ -108,6 +111,19 @@ class Cases:
             if f.name not in ("gear", "inspections", "extension")
         }
         return replace(self, inspections=tuple(self.inspections[int(i)] for i in rows), **arrays)
+
+
+def _disagreement(inspection: Inspection, margin_in: float) -> str:
+    """Plunger readings of which one is outside the margin and the mean is not."""
+    mean, one_u = inspection.measured_displacement_in, inspection.plunger_gauge_u_in
+    beyond = margin_in + 2.0 * (DEFAULT_PLUNGER_U_IN if one_u is None else one_u)
+    far = [reading for reading in inspection.readings_in if abs(reading) > beyond]
+    if mean is None or not far or abs(mean) > margin_in:
+        return ""
+    return (
+        f"the plunger readings disagree: {far[0]:.4f} in is outside the margin of {margin_in:.4f} in, their mean of "
+        f"{mean:.4f} in is not. Read the plunger again."
+    )
 
 
 def plunger_u(inspection: Inspection) -> float:

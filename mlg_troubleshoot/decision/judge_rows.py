@@ -72,8 +72,8 @@ def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Ass
     p_lower = batch.lower.probability_within(cases.margin_in, cases.margin_u_in)
     p_upper = batch.upper.probability_within(cases.margin_in, cases.margin_u_in)
     plunger = plunger_reading.compare(cases, batch.upper)
-    # A gear whose readings may be of another unit cannot be cleared either.
-    absent = cases.critical_missing | cases.unit_doubtful
+    # A gear whose entry leaves a question cannot be cleared either.
+    absent = cases.critical_missing | np.array([bool(question) for question in cases.questions])
     verdicts = [
         Verdict.OUTSIDE_MARGIN if beyond else verdict(float(low), float(high), critical_missing=bool(missing))
         for beyond, low, high, missing in zip(plunger.beyond, p_lower, p_upper, absent, strict=True)
@@ -194,8 +194,8 @@ def _headline(cases: Cases, judged: Judged, i: int) -> str:
         return sentences.NO_CLOSURE
     if found is Verdict.INCOMPLETE:
         open_joints = [n for n, read in zip(cases.gear.joint_numbers, cases.measured[i], strict=True) if not read]
-        question = cases.inspections[i].unit_question
-        return sentences.unit_doubtful(question, said) if question else sentences.incomplete(open_joints, said)
+        (question,) = cases.take(np.array([i])).questions
+        return sentences.entry_in_question(question, said) if question else sentences.incomplete(open_joints, said)
     if found is Verdict.OUTSIDE_MARGIN:
         return sentences.outside(margin, said)
     if found is Verdict.WITHIN_MARGIN:

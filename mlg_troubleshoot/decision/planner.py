@@ -39,7 +39,7 @@ def correct(row: InvalidRow) -> Plan:
     return Plan((Step(Action.CORRECT, (), 0.0, None, sentences.correct(row.correct)),), End.CORRECT)
 
 
-CONFIRM_UNIT = Plan((Step(Action.CORRECT, (), 0.0, None, sentences.CONFIRM_UNIT),), End.CORRECT)
+CONFIRM = Plan((Step(Action.CORRECT, (), 0.0, None, sentences.CONFIRM),), End.CORRECT)
 NOT_CLOSING = Plan((Step(Action.CORRECT, (), 0.0, None, sentences.CHECK_ENTRIES),), End.CORRECT)
 
 
@@ -71,7 +71,7 @@ class _Facts:
         gear, measured, over = cases.gear, cases.measured, cases.over_limit
         plunger, ahead = judged.plunger, _Ahead(cases, judged)
         self.cases, self.judged = cases, judged
-        self.joints_done = cases.joints_done
+        self.joints_done, self.questions = cases.joints_done, cases.questions
         self.complaint = cases.failed | ((plunger.beyond | over.any(axis=1)) & ~cases.retracted)
         open_critical = ~measured & gear.critical
         missing = np.asarray(open_critical.any(axis=1))
@@ -99,8 +99,8 @@ class _Course:
         f, i = self.facts, self.row
         if not np.isfinite(self.judged.batch.lower.displacement_in[i]):
             return NOT_CLOSING
-        if self.cases.unit_doubtful[i]:
-            return CONFIRM_UNIT
+        if f.questions[i] and not self.judged.plunger.beyond[i]:
+            return CONFIRM
         if f.settled_by_plunger[i]:
             return self._restore_over_limit().end(End.NOT_EXPLAINED)
         failed = self.cases.failed[i]

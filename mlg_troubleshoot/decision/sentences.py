@@ -102,12 +102,12 @@ def incomplete(open_joints: Sequence[int], said: Predicted) -> str:
     return f"Cannot clear: not measured {joint_list(open_joints)} ({said} from the measured joints alone)."
 
 
-def unit_doubtful(question: str, said: Predicted) -> str:
-    """Headline of a gear whose readings may be of another unit."""
-    return f"Cannot clear before the unit of the readings is confirmed: {question} ({said} as entered)."
+def entry_in_question(question: str, said: Predicted) -> str:
+    """Headline of a gear whose readings must be confirmed first."""
+    return f"Cannot clear before the readings are confirmed: {question} ({said} as entered)."
 
 
-CONFIRM_UNIT = "Do not use. Confirm that the readings were taken in the unit that is stated, or correct the unit."
+CONFIRM = "Do not use. Confirm the readings in question and their unit, or correct them."
 
 
 def inconclusive(margin_in: float, said: Predicted, p_within: float) -> str:

@@ -110,6 +110,9 @@ class _CsvSheet(Sheet):
             self._budget -= len(record)
             if self._budget < 0 or len(record) > _MAX_LINE_CHARACTERS:
                 break
+            # A line inside the quotation marks with as many separators as a row is a row that they would swallow.
+            if usual > 2 and lines[more].partition('"')[0].count(self._delimiter) >= usual - 1:
+                break
             fields = self._parse(record) if '"' in lines[more] else None
             if fields is not None and usual in (0, len(fields)):
                 for _ in range(more + 1):

@@ -66,7 +66,9 @@ _ALIASES: dict[str, Kind] = {
         (
             Kind.OUTCOME,
             "result|test result|retraction result|retraction|retracted|gear retracted|failed|gear failed|"
-            "failed to retract|did it retract|retracted y n|gear retracted y n|failed y n|gear failed y n",
+            "failed to retract|did it retract|did the gear retract|retracted y n|gear retracted y n|failed y n|"
+            "gear failed y n|failure|retraction failed|not retracted|retraction ok|retraction outcome|retraction test|"
+            "gear result|ergebnis",
         ),
         (Kind.GAUGE_ID, "gauge id no|gauge s n|gauge|gauge no|gauge number|gauge set"),
         (
@@ -80,7 +82,11 @@ _ALIASES: dict[str, Kind] = {
         (Kind.GAUGE_U, "gauge uncertainty|standard uncertainty of one reading"),
         (Kind.PLUNGER_GAUGE_U, "plunger gauge uncertainty|repeatability of the plunger reading"),
         (Kind.PLUNGER_DOWN_LOCK, "plunger at down lock|plunger position at down lock"),
-        (Kind.PLUNGER_DISPLACEMENT, "plunger displacement at mid position|measured plunger displacement"),
+        (
+            Kind.PLUNGER_DISPLACEMENT,
+            "plunger displacement at mid position|measured plunger displacement|plunger|"
+            "plunger reading|measured plunger|plunger measured|plunger travel|plunger offset|plunger disp",
+        ),
         (Kind.MARGIN, "plunger margin|margin found at rigging|margin as found at rigging"),
         (Kind.MARGIN_U, "margin uncertainty|standard uncertainty of the margin"),
     )
@@ -146,6 +152,8 @@ def _recognise(header: str, joint_numbers: tuple[int, ...], names: tuple[tuple[i
     numbered = _numbered(words, joint_numbers, names)
     if numbered is None:
         found = _by_alias(plain, units, foreign, odd)
+        if found is UNKNOWN:
+            found = _resembles_plunger(words, bool(units))
         return _resembles_clearance(words, bool(units), joint_numbers, names) if found is UNKNOWN else found
     return numbered if numbered.field is None else _with_unit(numbered.field, units, foreign, odd)
 
@@ -185,6 +193,13 @@ def _by_alias(plain: str, units: set[LengthUnit], foreign: list[str], odd: list[
         return UNKNOWN
     field = Field(kind, 1 if kind is Kind.PLUNGER_DISPLACEMENT else None)
     return _with_unit(field, units, foreign, odd)
+
+
+def _resembles_plunger(words: list[str], has_unit: bool) -> Recognition:
+    """Doubt a length of the plunger that none of its columns names."""
+    if has_unit and "plunger" in words and not set(words) & _OTHER_MATTER:
+        return _doubt("it may be the measured displacement of the plunger", "plunger_displacement")
+    return UNKNOWN
 
 
 def _resembles_clearance(

@@ -213,7 +213,7 @@ class ColumnReader:
             if known is not None and index < len(units) and units[index] is not None:
                 known = replace(known, unit=known.unit or units[index])
             readings.append((found, mapped))
-            placed = PlacedField(index, text, known, bool(found.reason), cell, header_row)
+            placed = PlacedField(index, text, known, bool(found.reason), cell, header_row, mapped)
             columns.placed.append(placed)
             if placed.refused:
                 self._doubt(placed, found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -82,6 +83,7 @@ class ReadOptions(TableOptions):
     plunger_hard_max_in: a measured plunger displacement beyond this, either way, is refused. [in]
     new_part_in, limit_in: radial clearance of a new part, and the largest one allowed, by joint; empty where no gear
         says them. [in]
+    margin_in: largest displacement that the gear allows; infinite where no gear says it. [in]
     asks: a person is there to confirm what is unusual.
     """
 
@@ -92,6 +94,7 @@ class ReadOptions(TableOptions):
     plunger_hard_max_in: float = 0.5
     new_part_in: Mapping[int, float] = field(default_factory=dict)
     limit_in: Mapping[int, float] = field(default_factory=dict)
+    margin_in: float = math.inf
     asks: bool = False
 
     @classmethod
@@ -103,6 +106,7 @@ class ReadOptions(TableOptions):
             joint_numbers=gear.joint_numbers,
             joint_names={joint.number: joint.name for joint in gear.joints},
             new_part_in={joint.number: joint.new_part.value for joint in gear.joints},
+            margin_in=gear.margin.value,
             limit_in={joint.number: joint.limit.value for joint in gear.joints},
             clearance_hard_max_in=gear.hard_limit.value,
             clearance_confirm_above_in=gear.confirm_above.value,

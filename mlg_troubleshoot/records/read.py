@@ -44,6 +44,7 @@ class _Candidate:
     header: Header | None
     form: Form | None
     has_rows: bool
+    has_cells: bool
 
 
 def _ticker(progress: Progress | None) -> Callable[[int], None]:
@@ -61,7 +62,22 @@ def _ticker(progress: Progress | None) -> Callable[[int], None]:
 def read_many(sources: Iterable[Source], options: ReadOptions, *, progress: Progress | None = None) -> ReadResult:
     """Read the inspections of several files, folders and patterns as one batch."""
     ticker = _ticker(progress)
-    return _finish([_read_file(item, options, ticker) for source in sources for item in expand(source)])
+    given = list(sources)
+    read = _finish([_read_file(item, options, ticker) for source in given for item in expand(source)])
+    passed_over = [note for source in given if (note := _subfolders_note(source))]
+    return replace(read, notes=(*passed_over, *read.notes))
+
+
+def _subfolders_note(source: Source) -> str:
+    """Say which folders in a folder hold tables that were not read."""
+    try:
+        if not isinstance(source, str | Path) or not Path(source).is_dir():
+            return ""
+        folders = [folder for folder in sorted(Path(source).iterdir()) if folder.is_dir()]
+        names = [f.name for f in folders if any(p.suffix.lower() in _SUFFIXES for p in f.iterdir())]
+    except OSError:
+        return ""
+    return f"{source}: folders in it were not read: {', '.join(map(writable, names))}" if names else ""
 
 
 def expand(source: Source) -> list[Source]:
@@ -169,7 +185,7 @@ def _candidate(sheet: Sheet, options: ReadOptions) -> _Candidate:
     header = None if told else find_header(peeked, options, sheet.merged)
     form = None if told or header is not None else find_form(peeked, options)
     has_rows = header is not None and any(number > header.row for number, _ in peeked)
-    return _Candidate(sheet, chain(peeked, rows), header, form, has_rows)
+    return _Candidate(sheet, chain(peeked, rows), header, form, has_rows, bool(peeked) and not told)
 
 
 def _is_instructions(rows: Sequence[NumberedRow]) -> bool:
@@ -214,6 +230,12 @@ def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Can
     filled = [c for c in tables if c.has_rows]
     forms = [c for c in candidates if c.form is not None and not c.form.is_untouched(options)]
     chosen = [c for c in candidates if c in filled or c in forms]
+    hidden = ", ".join(repr(sheet.name) for sheet in book.sheets if sheet.hidden)
+    if hidden:
+        found.notes.append(f"hidden sheets were not read: {hidden}")
+    filled_otherwise = [c.sheet.name for c in candidates if c.header is None and c.form is None and c.has_cells]
+    if filled_otherwise:
+        found.notes.append(f"no header of inspections, not read: sheet {', '.join(map(repr, filled_otherwise))}")
     if options.sheet == "*":
         return chosen or tables
     if len(filled) > 1:
@@ -224,9 +246,6 @@ def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Can
             "one table, or the sheet to read",
             f'Name the sheet, for example --sheet "{filled[0].sheet.name}", or --sheet "*" for all of them.',
         )
-    hidden = ", ".join(repr(sheet.name) for sheet in book.sheets if sheet.hidden)
-    if hidden:
-        found.notes.append(f"hidden sheets were not read: {hidden}")
     if chosen:
         if len(visible) > 1:
             names = ", ".join(repr(c.sheet.name) for c in chosen)

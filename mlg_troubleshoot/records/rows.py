@@ -7,7 +7,7 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import date
+from datetime import date, timedelta
 from functools import lru_cache, partial
 from pathlib import PurePath
 from types import MappingProxyType
@@ -37,7 +37,7 @@ from mlg_troubleshoot.records.dates import DateOrder, readings
 from mlg_troubleshoot.records.model import TableInHand
 from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.slips import scale_slip
-from mlg_troubleshoot.records.unit_fit import UnitFit, judge_unit
+from mlg_troubleshoot.records.unit_fit import UnitFit, judge_unit, plunger_question
 from mlg_troubleshoot.records.values import (
     NOT_MEASURED,
     AmbiguousDateError,
@@ -50,6 +50,7 @@ from mlg_troubleshoot.records.values import (
     read_outcome,
     read_text,
     read_yes_no,
+    says_failed,
 )
 from mlg_troubleshoot.units import UNIT_SPELLINGS, ClearanceConvention, LengthUnit
 
@@ -139,6 +140,7 @@ class PlacedField:
     refused: bool = False
     header_cell: str | None = None
     header_row: int | None = None
+    is_mapped: bool = False
 
     @property
     def read_as(self) -> str | None:
@@ -182,6 +184,10 @@ class RowReader:
                 while any(name == carried for _, carried, _ in self._carried):
                     name = f"{name} (again)"
                 self._carried.append((p.index, name, lambda cell: writable(show(cell))))
+        # What was not understood, and may still say that the gear failed.
+        self._unknown = [
+            p for p in placed if p.field is None and not (p.refused or p.is_mapped or re.search(r"\d", p.header))
+        ]
         # In these cells a word says that nothing was measured; a margin or an identity is never left out by a word.
         self._blankable = [index for index, field in good if field.kind not in _NEVER_BLANK]
         self.not_measured: Counter[str] = Counter()
@@ -191,6 +197,10 @@ class RowReader:
         self._cells: Sequence[Cell] = ()
         self._bad: set[int] = set()
         self._faults: list[tuple[int, CellFaultError]] = []
+        # Somewhere it is tomorrow already.
+        self._latest = date.today() + timedelta(days=1)
+        # The plunger readings of the row, with the unit of each. [in]
+        self._plunger: list[tuple[float, LengthUnit]] = []
         # Which orders fit the dates that are written as numbers, and the dates of rows that wait for the others.
         self._date_orders = set(DateOrder)
         self._waiting: dict[RowSource, _WaitingDate] = {}
@@ -211,6 +221,8 @@ class RowReader:
         lengths = self._read_lengths(convention, row_unit)
         others, carried = self._read_loose(self._others), self._read_loose(self._carried)
 
+        if "outcome" not in others:
+            self._look_for_failure()
         source = self._table.source(row)
         question = self._unit_question(clearance, entered, convention, others, warnings)
         for place, found in sorted(self._faults, key=lambda fault: fault[0]):
@@ -296,6 +308,16 @@ class RowReader:
         self._row, self._places, self._cells = row, places, cells
         self._bad = {index for index in self._refused if cells[index] is not None}
         self._faults = []
+        self._plunger = []
+
+    def _look_for_failure(self) -> None:
+        """Stop a row in which a column that was not understood says that the gear failed."""
+        for placed in self._unknown:
+            cell = self._cells[placed.index]
+            if isinstance(cell, str) and says_failed(cell):
+                remedy = f'If it is the outcome, pass --map "{placed.header}=outcome"; else "{placed.header}=carry".'
+                expected = "the outcome in a column outcome"
+                self._fault(placed.index, CellFaultError("outcome_elsewhere", expected, remedy))
 
     def _read_loose(self, columns: Sequence[_Loose]) -> dict[str, Any]:
         found = {
@@ -446,14 +468,16 @@ class RowReader:
         for index, field in self._lengths.items():
             if self._cells[index] is not None:
                 read = partial(self._length_of, index, row_unit, scale)
-                value_in = self._noted(index, read, bearing=field.kind in VERDICT_BEARING)
-                if value_in is not None:
-                    found[field.quantity] = value_in
+                length = self._noted(index, read, bearing=field.kind in VERDICT_BEARING)
+                if length is not None:
+                    found[field.quantity] = length[0]
+                    if field.kind is Kind.PLUNGER_DISPLACEMENT:
+                        self._plunger.append(length)
         return found
 
     def _one_length(
         self, index: int, row_unit: LengthUnit | None, scale: ClearanceConvention, cell: str | float | OddCell
-    ) -> float:
+    ) -> tuple[float, LengthUnit]:
         field = self._lengths[index]
         most = self._options.plunger_hard_max_in
         low, high = LENGTH_RANGE_IN.get(field.kind, (-most, most))
@@ -474,7 +498,7 @@ class RowReader:
             raise CellFaultError(
                 f"{field.kind.value}_out_of_range", expected, slip or "Check the unit and the decimal point."
             )
-        return value_in + 0.0
+        return value_in + 0.0, found
 
     def _fault(self, index: int, fault: CellFaultError, *, bearing: bool = True) -> None:
         self._faults.append((index, fault))
@@ -506,7 +530,7 @@ class RowReader:
             orders = set(readings(plain_text(cell)) or ())
             # A year first says nothing of the order of day and month in other cells.
             self._date_orders &= orders if orders - {DateOrder.YMD} else self._date_orders
-        return read_date(cell, self._options.dates)
+        return read_date(cell, self._options.dates, self._latest)
 
     def settle_dates(self, rows: list[Inspection | InvalidRow]) -> str:
         """Date the rows whose numbers only the other rows of the column explain; what was understood is returned.
@@ -543,7 +567,12 @@ class RowReader:
             self._fault(index, CellFaultError("readings_too_small", expected, remedy))
         elif found.question:
             warnings.append(found.question)
-        return found.question if found.scale in (UnitFit.DOUBTFUL, UnitFit.TOO_SMALL) else ""
+        plunger = {plunger_question(value, unit, self._options) for value, unit in self._plunger}
+        asked = sorted(plunger - {""})
+        warnings += asked
+        if found.scale in (UnitFit.DOUBTFUL, UnitFit.TOO_SMALL):
+            asked.insert(0, found.question)
+        return " ".join(asked)
 
     def _correct(self) -> tuple[str, ...]:
         """Return the columns to correct, in the order of the table; missing columns stand last."""

@@ -17,11 +17,12 @@ from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 # Below this ratio to new parts a reading is clearly too small. Inches taken for millimetres stay below it
 # unless the joints are worn beyond their limits on average (0.6 x 25.4 x 0.0005 in = 0.0076 in).
 _TOO_SMALL = 0.6
-# A row with a mean below new parts and no reading clearly above them may be of a new gear, or of a gear with every
-# joint worn out that was read in another unit. The number is the largest reading, as a ratio to new parts.
-_CLEARLY_WORN = 1.5
+# A row whose mean lies between this and new parts may be of a new gear, or of a gear with its joints worn out on
+# average that was read in another unit: it is asked about.
 # Fewer readings than this do not show what the others of the row were read in.
 _FEWEST = 3
+# A plunger reading of this size or less would be that of a failure in a larger unit. [in]
+_PLUNGER_NEAR_ZERO_IN = 0.0025
 _ROUNDING = 1e-9
 CONFIRM_SMALL = (
     "Correct the unit, or confirm the readings: --small-readings-true, or yes in a column small_readings_true."
@@ -69,7 +70,7 @@ def judge_unit(
         small = small if enough and mean < _TOO_SMALL else ()
     elif mean < _TOO_SMALL:
         scale = UnitFit.TOO_SMALL if enough else UnitFit.DOUBTFUL
-    elif enough and mean < 1.0 - _ROUNDING and max(ratios.values()) <= _CLEARLY_WORN:
+    elif enough and mean < 1.0 - _ROUNDING:
         scale = UnitFit.DOUBTFUL
         small = tuple(joint for joint, ratio in ratios.items() if ratio < 1.0)
     if small:
@@ -79,6 +80,24 @@ def judge_unit(
     if stated is not LengthUnit.THOU and enough and mostly_over:
         return RowUnit(UnitFit.LARGE, over, _large_question(over, read, stated, convention))
     return RowUnit()
+
+
+def plunger_question(displacement_in: float, stated: LengthUnit, options: ReadOptions) -> str:
+    """Ask about a plunger reading near zero that would be outside the margin in a larger unit. [in]"""
+    if not 0.0 < abs(displacement_in) <= _PLUNGER_NEAR_ZERO_IN:
+        return ""
+    number = stated.from_inches(displacement_in)
+    others = [
+        unit.words
+        for unit in LengthUnit
+        if unit.per_inch < stated.per_inch
+        and options.margin_in < abs(unit.to_inches(number)) <= options.plunger_hard_max_in
+    ]
+    if not others:
+        return ""
+    confirm = "" if options.asks else f" {CONFIRM_SMALL}"
+    read = f"read in {' or '.join(others)}, not in {stated.words}"
+    return f"the plunger reading of {number:g} {stated} is {displacement_in:.4f} in: was it {read}?{confirm}"
 
 
 def _small_question(

@@ -33,6 +33,7 @@ _USUAL = {
     "cell as a number (or text) and enter the value again.",
     "date_ambiguous": "Which number is the day and which the month is not guessed. Enter year-month-day, for example "
     "2026-03-04, or say the order with --dates dmy, mdy or ymd.",
+    "date_in_the_future": "Check the year, and the clock of this computer.",
     "date_invalid": "Enter year-month-day, for example 2026-03-04.",
     "date_out_of_range": "Check the year.",
     "date_serial": "The cell holds a bare number. Format it as a date, or enter year-month-day as text.",
@@ -262,20 +263,28 @@ _OUTCOME_WORDS = {
 }
 
 
+def _outcome_word(text: str) -> Outcome | None:
+    return _OUTCOME_WORDS.get(re.sub(r"[\s_\-]+", " ", plain_text(text).replace(".", "")).casefold())
+
+
+def says_failed(text: str) -> bool:
+    """Whether a text says that the gear failed, wherever it stands."""
+    return _outcome_word(text) is Outcome.FAILED
+
+
 def read_outcome(cell: str | float | OddCell, header: str) -> Outcome:
     """Read what the gear did; yes and no count only where the header asks a question (`Retracted?`, `Failed?`)."""
     if isinstance(cell, str):
-        found = _OUTCOME_WORDS.get(re.sub(r"[\s_\-]+", " ", plain_text(cell).replace(".", "")).casefold())
+        found = _outcome_word(cell)
         if found is not None:
             return found
-    asked = re.search(r"retract|fail", header, re.IGNORECASE)
-    said = None if asked is None else _yes_no(cell)
-    if asked is None or said is None:
+    asks_failure = re.search(r"fail|not retract", header, re.IGNORECASE) is not None
+    said = _yes_no(cell) if asks_failure or "retract" in header.casefold() else None
+    if said is None:
         if isinstance(cell, OddCell):
             raise odd_cell_fault(cell, "RETRACTED or FAILED")
         raise CellFaultError("outcome_unknown", "RETRACTED or FAILED")
-    retracted = said is (asked[0].casefold() == "retract")
-    return Outcome.RETRACTED if retracted else Outcome.FAILED
+    return Outcome.FAILED if said is asks_failure else Outcome.RETRACTED
 
 
 class AmbiguousDateError(CellFaultError):
@@ -289,10 +298,11 @@ class AmbiguousDateError(CellFaultError):
         self.days = days
 
 
-def read_date(cell: str | float | OddCell, order: DateOrder | None = None) -> date:
+def read_date(cell: str | float | OddCell, order: DateOrder | None = None, latest: date = date.max) -> date:
     """Read a day: ISO 8601, a month as a word, numbers in one order, or a cell that is formatted as a date.
 
-    Numbers of which only one order makes a day need no `order`; others raise `AmbiguousDateError` without one.
+    A day after `latest` is refused. Numbers of which only one order makes a day need no `order`; others raise
+    `AmbiguousDateError` without one.
     """
     expected = "a date as 2026-03-04 (year-month-day) or 4 Mar 2026"
     if isinstance(cell, float):
@@ -305,6 +315,8 @@ def read_date(cell: str | float | OddCell, order: DateOrder | None = None) -> da
         day = _written_day(plain_text(cell), order, expected)
     if day is None or not 1950 <= day.year <= 2100:
         raise CellFaultError("date_out_of_range", expected)
+    if day > latest:
+        raise CellFaultError("date_in_the_future", f"{expected}, not after {latest.isoformat()}")
     return day
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import stat
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from sqlalchemy.exc import ArgumentError
 from mlg_troubleshoot.errors import UsageError
 
 _HIDDEN = "***"
+# A scheme or a user with a password: a name of a file that is never meant, and would be shown.
+_LIKE_A_URL = re.compile(r"[\w+.\-]+:.*@")
 
 
 class Place:
@@ -19,6 +22,8 @@ class Place:
     REMEDY = "Give a file that you may write to, or postgresql+psycopg://USER@HOST/DATABASE."
 
     def __init__(self, given: str) -> None:
+        if "://" not in given and _LIKE_A_URL.match(given):
+            raise UsageError(f"--store {_HIDDEN} looks like a URL without its //", self.REMEDY)
         self.url = _url(given) if "://" in given else sql.URL.create("sqlite", database=given)
         backend = self.url.get_backend_name()
         self._secrets = [

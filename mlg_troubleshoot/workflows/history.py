@@ -611,10 +611,18 @@ def _due_now(life: GearLife, gear: Gear) -> Forecast | None:
     last = {n: s[-1].readings[-1:] for n, s in _stretches(life, gear.joint_numbers).items()}
     over = {n: read[0][1] for n, read in last.items() if read and gear.joint(n).is_over_limit(read[0][1])}
     outside = life.inspections[-1].result.get("verdict") == Verdict.OUTSIDE_MARGIN.value
-    if not (over or outside):
+    reasons = ["outside the margin at the last inspection"] * outside
+    # Nobody can say that an inspection without a date is an earlier one, unless the gear was restored after it.
+    restored = max((record.seq for record in life.repairs), default=-1)
+    undated = [seen for seen in life.inspections[:-1] if not seen.record.day and seen.record.seq > restored]
+    for seen in undated:
+        read_over = {n: c for n, c in seen.inspection.clearance_in.items() if gear.joint(n).is_over_limit(c)}
+        over.update(read_over)
+        if read_over or seen.result.get("verdict") == Verdict.OUTSIDE_MARGIN.value:
+            reasons.append(f"inspection {seen.record.record_id} has no date and may be the last one")
+    if not (over or reasons):
         return None
     listed = ", ".join(f"#{n}" for n in over)
-    reasons = ["outside the margin at the last inspection"] * outside
     why = ", and ".join([*reasons, *[f"{listed} over the limit when last read"] * bool(over)])
     nothing = Samples(np.zeros(1))
     worst = max(over, key=lambda n: over[n] / gear.joint(n).limit.value, default=None)

@@ -187,3 +187,17 @@ def test_a_failed_gear_without_a_plunger_reading_is_asked_for_one(judge: Judge) 
 
 def test_what_the_reader_noticed_stays_with_the_judgement(judge: Judge) -> None:
     assert judge(every_joint(0.001), warnings=("joint 3 above 0.015 in",)).warnings[0] == "joint 3 above 0.015 in"
+
+
+@pytest.mark.parametrize("readings", [(0.045, -0.045), (0.045, 0.001), (0.060, 0.001, 0.001)])
+def test_plunger_readings_that_disagree_over_the_margin_do_not_clear_the_gear(
+    judge: Judge, readings: tuple[float, ...]
+) -> None:
+    found = judge(every_joint(0.0012), readings_in=readings)
+    assert found.verdict is Verdict.INCOMPLETE
+    assert "the plunger readings disagree" in found.headline
+    assert found.next_action.action is Action.CORRECT
+
+
+def test_plunger_readings_that_scatter_by_their_repeatability_agree(judge: Judge) -> None:
+    assert judge(every_joint(0.0012), readings_in=(0.0305, 0.029)).verdict is Verdict.WITHIN_MARGIN

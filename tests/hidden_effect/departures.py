@@ -204,7 +204,7 @@ LINES: dict[str, tuple[str, Callable[[Record], bool], str]] = {
         lambda r: _false(r, "geometry"),
         "≤ 2 %",
     ),
-    "another linkage, one cause, S = 15: named, geometry beside it or not": (
+    "another linkage, one cause, S = 15: named, with geometry or without": (
         "linkage, one",
         lambda r: _right(r, "geometry"),
         "≥ 90 %",

@@ -32,7 +32,7 @@ def test_the_figures_show_what_the_oracle_reaches_beside_what_the_program_does()
 
 def test_the_program_is_nowhere_better_than_the_oracle() -> None:
     lines, told = DEPARTED["lines"], COMMITTED["linkage"]["all"]["first"]
-    assert lines["another linkage, one cause, S = 15: named, geometry beside it or not"]["low"] <= told["rate"]
+    assert lines["another linkage, one cause, S = 15: named, with geometry or without"]["low"] <= told["rate"]
     told = COMMITTED["directions"]["one scale, and one joint's direction"]["beats"]
     line = "load directions, spread 40°: named (or their class), where a regression beats one scale"
     assert lines[line]["low"] <= told["rate"]

@@ -54,7 +54,7 @@ def test_a_hidden_cause_counts_as_named_with_the_linkage_beside_it_but_not_with_
     truth: list[list[str | None]] = [["gauge_bias", "gauge G-1"]]
     right = record("linkage, one cause", [*truth, ["geometry", None]], truth)
     wrong = record("linkage, one cause", [["gauge_bias", "gauge G-2"]], truth)
-    assert rate("another linkage, one cause, S = 15: named, geometry beside it or not", right, wrong) == 0.5
+    assert rate("another linkage, one cause, S = 15: named, with geometry or without", right, wrong) == 0.5
 
 
 def test_what_is_named_on_another_linkage_is_told_by_cause() -> None:
@@ -102,7 +102,7 @@ def test_a_table_that_is_refused_counts_as_not_named() -> None:
 
 def test_on_another_linkage_a_cause_is_named_although_a_single_joint_would_explain_the_rest() -> None:
     one = run(("linkage, one cause", 26, 3_400_026))
-    assert rate("another linkage, one cause, S = 15: named, geometry beside it or not", one) == 1.0
+    assert rate("another linkage, one cause, S = 15: named, with geometry or without", one) == 1.0
 
 
 def test_a_pin_that_rests_far_off_its_worst_direction_is_not_named_beside_another_linkage() -> None:
@@ -137,7 +137,7 @@ def test_directions_of_all_joints_are_not_taken_for_one_that_turns_beside_anothe
 
 def test_one_joint_beside_another_linkage_is_not_taken_for_directions_of_all() -> None:
     one = run(("linkage, one cause", 115, 6_201_315))
-    assert rate("another linkage, one cause, S = 15: named, geometry beside it or not", one) == 1.0
+    assert rate("another linkage, one cause, S = 15: named, with geometry or without", one) == 1.0
 
 
 def test_what_moves_with_temperature_on_one_aircraft_is_no_re_rigging_of_its_last_two_rows() -> None:

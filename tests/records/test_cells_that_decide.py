@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import openpyxl
 import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
@@ -101,3 +102,45 @@ def test_a_large_uncertainty_in_total_play_is_the_same_as_half_of_it_in_radial(t
     total = one(tmp_path, gear, clearance_convention="TOTAL_PLAY", gauge_u_in=0.0373)
     radial = one(tmp_path, gear, clearance_convention="RADIAL", gauge_u_in=0.01865)
     assert total.gauge_u_in == pytest.approx(radial.gauge_u_in)
+
+
+@pytest.mark.parametrize("header", ["Plunger (in)", "plunger_in", "plunger reading [in]", "Measured plunger (in)"])
+def test_usual_headers_of_a_plunger_reading_are_understood(tmp_path, gear, header):
+    assert one(tmp_path, gear, **{header: "0.045"}).readings_in == (0.045,)
+
+
+def test_a_length_of_the_plunger_that_no_column_names_is_in_doubt(tmp_path, gear):
+    assert isinstance(one(tmp_path, gear, **{"Plunger stroke (in)": "0.045"}), InvalidRow)
+
+
+@pytest.mark.parametrize("header", ["Status", "Finding", "Gear"])
+def test_a_failure_in_a_column_that_was_not_understood_stops_the_row(tmp_path, gear, header):
+    (problem,) = read_many([table(tmp_path, **{header: "FAILED"})], ReadOptions.of(gear)).problems
+    assert (problem.code, problem.column) == ("outcome_elsewhere", header)
+
+
+def test_a_column_that_the_user_leaves_unread_may_hold_any_word(tmp_path, gear):
+    file = table(tmp_path, Status="failed")
+    assert not read_many([file], ReadOptions.of(gear, column_map={"Status": "carry"})).problems
+
+
+@pytest.mark.parametrize(
+    ("header", "word", "outcome"),
+    [("Not retracted?", "yes", Outcome.FAILED), ("Did the gear retract?", "no", Outcome.FAILED)],
+)
+def test_a_question_is_answered_as_it_is_asked(tmp_path, gear, header, word, outcome):
+    assert one(tmp_path, gear, **{header: word}).outcome is outcome
+
+
+@pytest.mark.parametrize("sheet", [None, "*"])
+def test_a_sheet_that_is_not_read_is_named(tmp_path, gear, sheet):
+    book = openpyxl.Workbook()
+    columns = {"record_id": "R1", "tail_no": "N1", "side": "LH", "clearance_convention": "RADIAL", **HEALTHY}
+    book.active.append(list(columns))
+    book.active.append(list(columns.values()))
+    book.create_sheet("RH").append(["words of somebody"])
+    book.create_sheet("hidden").sheet_state = "hidden"
+    book.save(tmp_path / "t.xlsx")
+    notes = " ".join(read_many([tmp_path / "t.xlsx"], ReadOptions.of(gear, sheet=sheet)).notes)
+    assert "hidden sheets were not read: 'hidden'" in notes
+    assert "no header of inspections, not read: sheet 'RH'" in notes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import date
+from datetime import date, timedelta
 
 import pytest
 
@@ -130,3 +130,14 @@ def test_an_order_that_is_none_is_a_usage_error(tmp_path):
     run = mlg("check", column(tmp_path, "03/04/2024"), "--dates", "dym")
     assert run.code == 2
     assert "dmy, mdy or ymd" in run.err
+
+
+def test_a_date_after_tomorrow_is_refused(tmp_path):
+    found, read = days(tmp_path, (date.today() + timedelta(days=2)).isoformat())
+    assert found == [None]
+    assert [p.code for p in read.problems] == ["date_in_the_future"]
+
+
+def test_a_date_of_tomorrow_is_read_since_it_is_tomorrow_somewhere(tmp_path):
+    tomorrow = date.today() + timedelta(days=1)
+    assert days(tmp_path, tomorrow.isoformat())[0] == [tomorrow]

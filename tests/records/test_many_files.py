@@ -86,3 +86,11 @@ def test_each_file_is_identified_by_its_hash(folder):
 def test_an_open_file_is_called_by_its_name(folder):
     with (folder / "a.csv").open("rb") as file:
         assert read_many([file], ReadOptions()).files[0].name == str(folder / "a.csv")
+
+
+def test_folders_in_a_folder_that_hold_tables_are_named(folder):
+    (folder / "old").mkdir()
+    (folder / "old" / "e.csv").write_text(HEADER + "E1,N1,LH,RADIAL,0.013\n")
+    (folder / "pictures").mkdir()
+    (note,) = [note for note in read_many([folder], ReadOptions()).notes if "not read" in note]
+    assert note.endswith("folders in it were not read: old")

@@ -176,3 +176,14 @@ def test_one_clearance_in_any_unit_and_convention_is_the_same(value, unit, conve
     text = f"record_id,tail_no,side,clearance_convention,clearance_3_{unit}\nR1,N1,LH,{convention},{entered!r}\n"
     result = read_inspections(io.BytesIO(text.encode()), ReadOptions())
     assert result.inspections[0].clearance_in[3] == pytest.approx(value, rel=1e-12, abs=1e-18)
+
+
+def test_stray_quotation_marks_swallow_no_row(tmp_path):
+    good, bad = ",".join(["0.0012"] * 10), ",".join(["0.0012", "0.0012", "0.013", "0.0012", "0.007", *["0.0012"] * 5])
+    header = ",".join(["record_id", "tail_no", "side", "clearance_convention", *HEADER[4:14], "remarks"])
+    rows = [f'R1,N1,LH,RADIAL,{good},"worn bush', f"R2,N1,RH,RADIAL,{bad},", f'R3,N2,LH,RADIAL,{good},ok"']
+    file = tmp_path / "t.csv"
+    file.write_text("\n".join((header, *rows)) + "\n")
+    result = read_inspections(file, ReadOptions())
+    assert [row.source.row for row in result.rows] == [2, 3, 4]
+    assert [type(row) for row in result.rows] == [InvalidRow, Inspection, Inspection]

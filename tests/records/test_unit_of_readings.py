@@ -109,15 +109,6 @@ def test_new_parts_in_their_own_unit_are_judged_without_a_question(gear, unit):
     assert not [warning for warning in row.warnings if "play of new parts" in warning]
 
 
-def test_one_reading_twice_that_of_a_new_part_shows_that_the_unit_is_right(gear):
-    row, _ = judged(gear, (*NEW_IN[:-1], 0.001), *2 * [LengthUnit.MILLIMETRE])
-    small = [value * 0.8 for value in NEW_IN[:-1]]
-    beside, _ = judged(gear, (*small, 0.001), *2 * [LengthUnit.MILLIMETRE])
-    alone, _ = judged(gear, small, *2 * [LengthUnit.MILLIMETRE])
-    assert (row.unit_question, beside.unit_question) == ("", "")
-    assert alone.unit_question
-
-
 def test_of_a_doubtful_row_only_the_readings_below_a_new_part_are_named(gear):
     row, _ = judged(gear, (0.0004, 0.0004, 0.0006), *2 * [LengthUnit.MILLIMETRE])
     assert row.unit_question.startswith("2 of 3 readings (#1, #2) are below the play of new parts")
@@ -228,3 +219,33 @@ def test_a_sheet_of_inches_under_millimetre_headers_ends_with_nothing_judged(tmp
     run = mlg("check", file, "--json")
     assert run.code == 3
     assert {row["verdict"] for row in json.loads(run.out)["inspections"]} == {"INVALID"}
+
+
+# Half of the readings are above new parts: in inches, the joints are worn out on average.
+HALF_ABOVE = (0.0162, 0.0016, 0.0004, 0.0088, 0.0114, 0.0074, 0.0046, 0.0051, 0.0193, 0.0089)
+
+
+def test_inches_of_a_worn_gear_in_millimetres_do_not_clear_it_although_some_are_above_new_parts(gear):
+    row, _ = judged(gear, HALF_ABOVE, LengthUnit.INCH, LengthUnit.MILLIMETRE)
+    assert not isinstance(row, Inspection) or check(row, gear).verdict is Verdict.INCOMPLETE
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "unit"),
+    [
+        ("plunger_displacement_mm", 0.045, "inches"),
+        ("plunger_displacement_thou", 0.045, "inches"),
+        ("plunger_displacement_thou", 1.143, "millimetres"),
+    ],
+)
+def test_a_plunger_reading_near_zero_that_another_unit_puts_outside_is_asked_about(gear, column, value, unit):
+    row, _ = judged(gear, [0.0012] * 10, LengthUnit.INCH, LengthUnit.INCH, **{column: value})
+    found = check(row, gear)
+    assert found.verdict is Verdict.INCOMPLETE
+    assert f"was it read in {unit}" in found.headline
+
+
+@pytest.mark.parametrize(("column", "value"), [("plunger_displacement_mm", 0.25), ("plunger_displacement_in", 0.0018)])
+def test_a_plunger_reading_that_no_other_unit_explains_is_not_asked_about(gear, column, value):
+    row, _ = judged(gear, [0.0012] * 10, LengthUnit.INCH, LengthUnit.INCH, **{column: value})
+    assert row.unit_question == ""

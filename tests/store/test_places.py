@@ -10,7 +10,7 @@ import pytest
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.store import Store, StoreError
-from tests.cli.conftest import Run, mlg, row
+from tests.cli.conftest import FAILURE, Run, mlg, row
 
 from . import places
 
@@ -290,3 +290,10 @@ def test_a_url_that_cannot_be_meant_is_a_usage_error(url: str) -> None:
 def test_a_server_that_cannot_be_reached_is_not_a_usage_error() -> None:
     with pytest.raises(StoreError):
         Store(f"postgresql+psycopg://anna@{AWAY}", patience_s=1).gears()
+
+
+@pytest.mark.parametrize("given", ["postgresql+psycopg:/a:SECRET9@h/x", "postgresql:a:SECRET9@h/x", "a:SECRET9@h"])
+def test_a_url_without_its_slashes_is_refused_and_not_shown(given: str, tmp_path: Path) -> None:
+    run = mlg("check", FAILURE, "-q", "--keep", "--store", given)
+    assert run.code == 2
+    assert "SECRET9" not in run.out + run.err
