@@ -326,6 +326,9 @@ class Store:
         views = connection.exec_driver_sql("SELECT name FROM sqlite_master WHERE type = 'view'").scalars()
         if not _tables.tables.keys().isdisjoint(views):
             raise StoreError(f"{self.place} has a view in place of a table: nothing was read or kept", _FOREIGN)
+        triggers = connection.exec_driver_sql("SELECT name, sql FROM sqlite_master WHERE type = 'trigger'").all()
+        if writing and any(_TRIGGERS.get(name) != text for name, text in triggers):
+            raise StoreError(f"{self.place} has a trigger that may change records: nothing was kept", _VERIFY)
         if writing and found == 0:
             connection.exec_driver_sql(f"PRAGMA application_id = {APPLICATION_ID}")
 

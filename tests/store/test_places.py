@@ -180,6 +180,16 @@ def test_a_view_in_place_of_a_table_is_refused_and_not_computed(place: Path) -> 
     assert "a view in place of a table" in run.err
 
 
+def test_nothing_is_kept_where_a_trigger_would_take_the_records_away(place: Path) -> None:
+    taker = "CREATE TRIGGER t AFTER INSERT ON mlg_records BEGIN DELETE FROM mlg_records; END"
+    changed(place, "DROP TRIGGER mlg_no_delete", taker)
+    before = place.read_bytes()
+    run = mlg("history", "rerig", "N1", "LH", "--date", "2026-04-01", "--store", place)
+    assert run.code == 5
+    assert "mlg history verify" in run.err
+    assert place.read_bytes() == before
+
+
 def test_nothing_is_named_in_a_store_that_is_as_it_should_be(place: Path) -> None:
     run = mlg("history", "verify", "--store", place)
     assert (run.code, run.out.count("\n")) == (0, 2)
