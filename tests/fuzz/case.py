@@ -120,7 +120,8 @@ def _rows(store: Path) -> list[tuple[object, ...]]:
         return []
     try:
         with sqlite3.connect(f"file:{store}?mode=ro", uri=True) as raw:
-            if raw.execute("SELECT type FROM sqlite_master WHERE name = 'mlg_records'").fetchone() != ("table",):
+            raw.text_factory = bytes
+            if raw.execute("SELECT type FROM sqlite_master WHERE name = 'mlg_records'").fetchone() != (b"table",):
                 return []
             return raw.execute("SELECT CAST(seq AS TEXT), CAST(hash AS BLOB) FROM mlg_records ORDER BY 1").fetchall()
     except sqlite3.Error:
