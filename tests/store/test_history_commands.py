@@ -314,7 +314,7 @@ def test_a_missed_restoration_is_suggested(tmp_path: Path, place: Path) -> None:
     worn = [visit(n, 0.0005 + 0.0014 * n) for n in range(5)]
     keep(tmp_path, *others, *worn, visit(5, 0.0005))
     notes = mlg("fleet").err
-    assert "N123 LH: #3 read far tighter than before" in notes
+    assert "N123 LH: #3 read much tighter than before" in notes
     assert notes.count("read far tighter") == 1
 
 
