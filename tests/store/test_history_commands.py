@@ -315,7 +315,7 @@ def test_a_missed_restoration_is_suggested(tmp_path: Path, place: Path) -> None:
     keep(tmp_path, *others, *worn, visit(5, 0.0005))
     notes = mlg("fleet").err
     assert "N123 LH: #3 read much tighter than before" in notes
-    assert notes.count("read far tighter") == 1
+    assert notes.count("read much tighter") == 1
 
 
 @pytest.mark.slow
