@@ -277,6 +277,8 @@ class Store:
                 connection.commit()
         except OSError as error:
             raise StoreError(f"store {self.place}: {error.strerror}: nothing was kept", Place.REMEDY) from error
+        except UnicodeDecodeError as error:
+            raise StoreError(f"store {self.place} holds text that is not UTF-8: nothing was kept", _FOREIGN) from error
         except SQLAlchemyError as error:
             said = str(error.orig if isinstance(error, DBAPIError) else error).strip().splitlines()[0]
             foreign = "not a database" in said

@@ -36,7 +36,8 @@ OUTPUTS = (
     Output(["check", "in.csv", "-q", "--extension", "ext.toml", "--csv"], ("in.csv", "ext.toml"), "old-verdicts.csv"),
     Output(
         ["check", "in.csv", "-q", "--gear", "own.toml", "--csv"],
-        ("in.csv", *GEAR_FILES, "own.toml"),
+        # The printed numbers of the shipped gear are not those of own.toml.
+        ("in.csv", *(name for name in GEAR_FILES if "targets" not in name), "own.toml"),
         "old-verdicts.csv",
     ),
     Output(["check", "-", "-q", "--csv"], ("in.csv",), "old-verdicts.csv"),

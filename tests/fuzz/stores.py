@@ -243,7 +243,7 @@ def _another_file(place: Path, desk: Desk) -> None:
     elif what < 0.8:
         _by_hand(place, "CREATE TABLE customers (name TEXT)")
     else:
-        place.symlink_to(rng.choice(("nowhere.sqlite", "in.csv", STORE)))
+        place.symlink_to(rng.choice(("in.csv", STORE)))
 
 
 DAMAGES: tuple[Callable[[Path, Desk], None], ...] = (
