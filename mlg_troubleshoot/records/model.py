@@ -32,7 +32,7 @@ class TableOptions:
         Column by header (or by letter), for headers that are not understood: ``{"Spiel 3": "clearance_3_mm"}``; the
         target ``carry`` lets a column travel to the report unread.
     remembered_map : mapping of str to str
-        The same as remembered from another table: a header that is not there is no problem.
+        The same as remembered from another table: a header that is absent is not reported.
     decimal_comma : bool
         True if ``0,013`` means 0.013.
     small_readings_true : bool

@@ -16,9 +16,9 @@ from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 # Below this ratio to new parts a reading is clearly too small. Inches taken for millimetres stay below it
 # unless the joints are worn beyond their limits on average (0.6 x 25.4 x 0.0005 in = 0.0076 in).
-_TOO_SMALL = 0.6
 # A row whose mean lies between this and new parts may be of a new gear, or of a gear with its joints worn out on
 # average that was read in another unit: it is asked about.
+_TOO_SMALL = 0.6
 # Fewer readings than this do not show what the others of the row were read in.
 _FEWEST = 3
 # A plunger reading of this size or less would be that of a failure in a larger unit. [in]
