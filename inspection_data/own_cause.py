@@ -1,4 +1,6 @@
-"""A cause of your own: frozen grease drags on the plunger link, in proportion to the degrees below 0 °C."""
+"""A cause of your own: frozen grease drags on the plunger link, in proportion to the degrees below
+0 °C.
+"""
 
 import numpy as np
 

@@ -7,14 +7,14 @@ From a notebook or a script, everything that ``mlg`` does, without a terminal:
 >>> worst = predict({3: 0.013, 5: 0.007}, gear)
 >>> print(f"{worst.over_in[0]:+.4f} in, {worst.under_in[0]:+.4f} in")
 +0.0472 in, -0.0429 in
->>> found = check(
-...     Inspection("R1", "N123", Side.LH, ClearanceConvention.RADIAL, clearance_in={3: 0.013, 5: 0.007}), gear
-... )
+>>> worn = {3: 0.013, 5: 0.007}
+>>> row = Inspection("R1", "N123", Side.LH, ClearanceConvention.RADIAL, clearance_in=worn)
+>>> found = check(row, gear)
 >>> print(found.verdict, [joint.joint for joint in found.ranked][:2])
 OUTSIDE_MARGIN [3, 5]
 
-Clearances inside are radial, in inches: :func:`parse_length` reads them as people write them, and a reading
-taken as bore minus pin or as total play is divided by ``ClearanceConvention.per_radial``.
+Clearances inside are radial, in inches: :func:`parse_length` reads them as people write them, and a
+reading taken as bore minus pin or as total play is divided by ``ClearanceConvention.per_radial``.
 
 =======================  ==============================================================
 load_gear, Gear          a shipped gear, or a gear file of your own

@@ -1,4 +1,6 @@
-"""The arrays that every room computes with: numbers, which rows or joints, their places, whole numbers."""
+"""The arrays that every room computes with: numbers, which rows or joints, their places, whole
+numbers.
+"""
 
 from __future__ import annotations
 

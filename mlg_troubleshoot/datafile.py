@@ -1,8 +1,9 @@
 """The one place where TOML and JSON from outside are read: files that are data, never code.
 
-A gear file, an ensemble, targets, a table of indices and an extension may come from anybody. They are read as
-regular files of sane size and depth, and every value is checked for its type, finiteness and range; what is wrong
-is a `GearFileError` that says file, key, value and what was expected.
+A gear file, an ensemble, targets, a table of indices and an extension may come from anybody. They
+are read as regular files of sane size and depth, and every value is checked for its type,
+finiteness and range; what is wrong is a `GearFileError` that says file, key, value and what was
+expected.
 """
 
 from __future__ import annotations
@@ -17,14 +18,16 @@ from typing import Any
 
 from mlg_troubleshoot.errors import GearFileError
 
-# The shipped files have 25 kB, lines of 400 characters and tables four deep; reading dotted keys takes time with the
-# square of a line's length, and deep nesting ends in a full stack.
+# The shipped files have 25 kB, lines of 400 characters and tables four deep; reading dotted keys
+# takes time with the square of a line's length, and deep nesting ends in a full stack.
 MOST_BYTES, LONGEST_LINE, DEEPEST, MOST_ENTRIES = 2_000_000, 8_000, 24, 200
 LONGEST_NAME, LONGEST_TEXT, LARGEST = 40, 2_000, 1e12
 _SHOWN = 80
 
 
-def read_toml(path: Path, missing: str = "Put it next to the gear file that names it.") -> DataTable:
+def read_toml(
+    path: Path, missing: str = "Put it next to the gear file that names it."
+) -> DataTable:
     """Read a TOML file; `missing` is the remedy if it does not exist."""
     return _read(path, missing, "TOML", _parsed_toml)
 
@@ -48,18 +51,26 @@ def _read(path: Path, missing: str, form: str, parse: Callable[[str], Any]) -> D
         if not stat.S_ISREG(found.st_mode):
             raise GearFileError(f"{path} is not a regular file", "Give the name of a file.")
         if found.st_size > MOST_BYTES:
-            raise GearFileError(f"{path}: has {found.st_size} bytes, at most {MOST_BYTES} are read", remedy)
+            raise GearFileError(
+                f"{path}: has {found.st_size} bytes, at most {MOST_BYTES} are read", remedy
+            )
         raw = parse(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise GearFileError(f"{path}: there is no such file", missing) from None
     except RecursionError:
-        raise GearFileError(f"{path}: cannot be read as {form}: nested more than {DEEPEST} deep", remedy) from None
+        raise GearFileError(
+            f"{path}: cannot be read as {form}: nested more than {DEEPEST} deep", remedy
+        ) from None
     except (OSError, ValueError) as error:
         raise GearFileError(f"{path}: cannot be read as {form}: {error}", remedy) from error
     if not isinstance(raw, dict):
-        raise GearFileError(f"{path}: expected names with values at the top, found {_shown(raw)}", remedy)
+        raise GearFileError(
+            f"{path}: expected names with values at the top, found {_shown(raw)}", remedy
+        )
     if _is_deeper(raw, DEEPEST):
-        raise GearFileError(f"{path}: cannot be read as {form}: nested more than {DEEPEST} deep", remedy)
+        raise GearFileError(
+            f"{path}: cannot be read as {form}: nested more than {DEEPEST} deep", remedy
+        )
     return DataTable(raw, path)
 
 
@@ -98,7 +109,8 @@ class DataTable:
     def fail(self, key: str, expected: str) -> GearFileError:
         found = _shown(self.values[key]) if key in self.values else "nothing"
         return GearFileError(
-            f"{self._file.name}: {self._at(key)}: expected {expected}, found {found}", "Correct the file and run again."
+            f"{self._file.name}: {self._at(key)}: expected {expected}, found {found}",
+            "Correct the file and run again.",
         )
 
     def _at(self, key: str) -> str:
@@ -121,7 +133,9 @@ class DataTable:
         if not isinstance(value, str):
             raise self.fail(key, "a text")
         if len(value) > LONGEST_TEXT or not all(c.isprintable() or c == "\n" for c in value):
-            raise self.fail(key, f"a text of at most {LONGEST_TEXT} characters, all of them printable")
+            raise self.fail(
+                key, f"a text of at most {LONGEST_TEXT} characters, all of them printable"
+            )
         return value
 
     def name(self, key: str, default: str | None = None) -> str:
@@ -148,7 +162,12 @@ class DataTable:
         return self._file.with_name(value)
 
     def number(
-        self, key: str, default: float | None = None, *, least: float = -LARGEST, most: float = LARGEST
+        self,
+        key: str,
+        default: float | None = None,
+        *,
+        least: float = -LARGEST,
+        most: float = LARGEST,
     ) -> float:
         """A finite number in a range; without a default it must be there."""
         value = self.get(key)
@@ -184,7 +203,9 @@ class DataTable:
             raise self.fail(key, "true or false")
         return value
 
-    def pair(self, key: str, *, least: float = -LARGEST, most: float = LARGEST) -> tuple[float, float]:
+    def pair(
+        self, key: str, *, least: float = -LARGEST, most: float = LARGEST
+    ) -> tuple[float, float]:
         """Two finite numbers in a range."""
         value = self.get(key)
         if not isinstance(value, list) or len(value) != 2 or not all(_is_number(v) for v in value):
@@ -193,7 +214,9 @@ class DataTable:
             raise self.fail(key, _range_words("two numbers", least, most))
         return float(value[0]), float(value[1])
 
-    def rising(self, key: str, *, least: float = -LARGEST, most: float = LARGEST) -> tuple[float, float]:
+    def rising(
+        self, key: str, *, least: float = -LARGEST, most: float = LARGEST
+    ) -> tuple[float, float]:
         """Two finite numbers, the first not above the second."""
         low, high = self.pair(key, least=least, most=most)
         if low > high:
@@ -218,7 +241,9 @@ class DataTable:
         if self.get(key) is None:
             raise self.fail(key, "a list of texts")
         return self._list(
-            key, lambda v: isinstance(v, str) and len(v) <= LONGEST_TEXT and v.isprintable(), "a list of texts"
+            key,
+            lambda v: isinstance(v, str) and len(v) <= LONGEST_TEXT and v.isprintable(),
+            "a list of texts",
         )
 
     def _list(self, key: str, is_good: Callable[[Any], bool], expected: str) -> tuple[Any, ...]:
@@ -239,7 +264,9 @@ class DataTable:
         return DataTable(value, self._file, self._at(key))
 
     def tables(self, key: str) -> Iterator[DataTable]:
-        for i, entry in enumerate(self._list(key, lambda v: isinstance(v, dict), "an array of tables"), start=1):
+        for i, entry in enumerate(
+            self._list(key, lambda v: isinstance(v, dict), "an array of tables"), start=1
+        ):
             label = entry.get("name", entry.get("joint", entry.get("number", i)))
             shown = label if _is_whole(label) or (isinstance(label, str) and is_name(label)) else i
             yield DataTable(entry, self._file, f"{self._at(key)}[{shown}]")
@@ -253,7 +280,8 @@ class DataTable:
         """The keys of the table, each of them a name."""
         if len(self.values) > MOST_ENTRIES:
             raise GearFileError(
-                f"{self._file.name}: {self._place}: expected at most {MOST_ENTRIES} entries, found {len(self.values)}",
+                f"{self._file.name}: {self._place}: expected at most {MOST_ENTRIES} entries, found"
+                f" {len(self.values)}",
                 "Correct the file and run again.",
             )
         for key in self.values:
@@ -265,11 +293,16 @@ class DataTable:
         for key in self.values:
             if key not in self._read:
                 near = difflib.get_close_matches(key, self._read, n=1)
-                raise self.fail(key, f"one of the known keys; did you mean {near[0]!r}?" if near else "a known key")
+                raise self.fail(
+                    key,
+                    f"one of the known keys; did you mean {near[0]!r}?" if near else "a known key",
+                )
 
 
 def is_name(text: str) -> bool:
-    """Tell whether a text can be the name of a part: short, and without control characters or turned directions."""
+    """Tell whether a text can be the name of a part: short, and without control characters or
+    turned directions.
+    """
     return 0 < len(text) <= LONGEST_NAME and text.isprintable() and not text.isspace()
 
 

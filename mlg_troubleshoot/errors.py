@@ -27,7 +27,9 @@ class UsageError(TroubleshootError):
 
 
 class GearFileError(TroubleshootError):
-    """A gear file, a precomputed table or an extension is not valid or does not belong to this geometry."""
+    """A gear file, a precomputed table or an extension is not valid or does not belong to this
+    geometry.
+    """
 
 
 class MechanismError(TroubleshootError):

@@ -23,7 +23,9 @@ Field = str | float | int | bool | None
 # language versions of Excel.
 _BREAKS = r"\t-\r\x1c-\x1e\x85\u2028\u2029"
 _SIGNS = r"=+\-@＝＋－＠"
-_FORMULA = re.compile(rf'(\A(?=[{_BREAKS}])|(?:\A|[;|{_BREAKS}])(?=(?:[^\S{_BREAKS}]|")*[{_SIGNS}]))')
+_FORMULA = re.compile(
+    rf'(\A(?=[{_BREAKS}])|(?:\A|[;|{_BREAKS}])(?=(?:[^\S{_BREAKS}]|")*[{_SIGNS}]))'
+)
 # How a file of SQLite begins: such a file is a store, of this program or of another.
 _DATABASE = b"SQLite format 3\0"
 _STANDARD_OUTPUT = "-"
@@ -54,7 +56,9 @@ CONTINUED = OutputKind("", lambda _: True)
 
 @dataclass(frozen=True, slots=True)
 class OutputFile:
-    """A file that a run is asked to write: by which option, where, and what; none without a path."""
+    """A file that a run is asked to write: by which option, where, and what; none without a
+    path.
+    """
 
     option: str
     path: str | Path | None
@@ -64,8 +68,9 @@ class OutputFile:
 def write_bytes(path: str | Path, data: bytes) -> None:
     """Write a file so that it appears whole or not at all.
 
-    A link is followed, so that it stays one. A file that is replaced keeps its mode; a new one gets what the umask
-    leaves. Folders that are missing are made. Anything that is not a regular file is refused with an `OutputError`.
+    A link is followed, so that it stays one. A file that is replaced keeps its mode; a new one gets
+    what the umask leaves. Folders that are missing are made. Anything that is not a regular file is
+    refused with an `OutputError`.
     """
     target = Path(os.path.realpath(path))
     scratch = None
@@ -96,14 +101,20 @@ def write_csv(path: str | Path, header: Sequence[str], rows: Iterable[Sequence[F
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[Field]]) -> str:
-    """Return a table as CSV in which no text can become a formula, whatever separator a program takes it to have."""
+    """Return a table as CSV in which no text can become a formula, whatever separator a program
+    takes it to have.
+    """
     lines = [[_quoted(harmless(value)) for value in row] for row in (header, *rows)]
     return "".join(",".join(line) + "\n" for line in lines)
 
 
 def _quoted(field: str) -> str:
     """A field that stays one whichever separator a program takes the file to have."""
-    return '"' + field.replace('"', '""') + '"' if any(sign in field for sign in ',;|\t"\r\n') else field
+    return (
+        '"' + field.replace('"', '""') + '"'
+        if any(sign in field for sign in ',;|\t"\r\n')
+        else field
+    )
 
 
 def harmless(value: Field) -> str:
@@ -194,7 +205,9 @@ def _mode_of(target: Path, asked: str | Path) -> int:
         return 0o666 & ~umask
     if not stat.S_ISREG(found.st_mode):
         kind = "a folder" if stat.S_ISDIR(found.st_mode) else "a device, a pipe or a socket"
-        raise OutputError(f"{asked} is {kind}, not a file: nothing was written", "Give the name of a file.")
+        raise OutputError(
+            f"{asked} is {kind}, not a file: nothing was written", "Give the name of a file."
+        )
     return stat.S_IMODE(found.st_mode)
 
 
@@ -210,7 +223,9 @@ def _named(file: Path | int) -> str:
 
 
 def _identity(file: str | Path | int) -> tuple[int, int] | str:
-    """What makes two names one file: device and inode, or where a file that does not exist yet would stand."""
+    """What makes two names one file: device and inode, or where a file that does not exist yet
+    would stand.
+    """
     place = file if isinstance(file, int) else Path(os.path.realpath(file))
     try:
         found = os.fstat(place) if isinstance(place, int) else place.stat()

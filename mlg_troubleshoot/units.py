@@ -1,7 +1,7 @@
 """Lengths as people write them. The only place where 25.4 stands.
 
-Inside the program a length is in inches and a clearance is radial: the offset of the pin centre from the
-hole centre (section 3.2 of the paper).
+Inside the program a length is in inches and a clearance is radial: the offset of the pin centre
+from the hole centre (section 3.2 of the paper).
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from enum import StrEnum
 
 from mlg_troubleshoot.errors import UsageError
 
-# The one table of how a minus sign is written; the hyphen stands first, as in a set of a regular expression.
+# The one table of how a minus sign is written; the hyphen stands first, as in a set of a regular
+# expression.
 MINUS = "-\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"
 MM_PER_IN = 25.4
 THOU_PER_IN = 1000.0
@@ -61,17 +62,22 @@ class LengthUnit(StrEnum):
         return found
 
 
-# The one table of how units are written, in lower case: for values, headers, columns of units and flags.
+# The one table of how units are written, in lower case: for values, headers, columns of units and
+# flags.
 UNIT_SPELLINGS: dict[str, LengthUnit] = {
     **dict.fromkeys(("in", "inch", "inches", '"', "″", "”", "''"), LengthUnit.INCH),
     **dict.fromkeys(("thou", "thous", "mil", "mils"), LengthUnit.THOU),
-    **dict.fromkeys(("mm", "millimetre", "millimetres", "millimeter", "millimeters"), LengthUnit.MILLIMETRE),
+    **dict.fromkeys(
+        ("mm", "millimetre", "millimetres", "millimeter", "millimeters"), LengthUnit.MILLIMETRE
+    ),
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Slip:
-    """A slip of entry by a factor, and what makes a value that many times too large or too small."""
+    """A slip of entry by a factor, and what makes a value that many times too large or too
+    small.
+    """
 
     factor: float
     too_large: str
@@ -83,13 +89,17 @@ SLIPS: dict[str, Slip] = {
     "unit": Slip(MM_PER_IN, "millimetres read as inches", "inches read as millimetres"),
     "point": Slip(10.0, "a slipped decimal point", "a slipped decimal point"),
     "convention": Slip(
-        2.0, "a diametral clearance or total play read as radial", "a radial clearance read as diametral or total play"
+        2.0,
+        "a diametral clearance or total play read as radial",
+        "a radial clearance read as diametral or total play",
     ),
 }
 
 
 class ClearanceConvention(StrEnum):
-    """What a clearance reading is a reading of. There is no default: the factor 2 flips verdicts."""
+    """What a clearance reading is a reading of. There is no default: the factor 2 flips
+    verdicts.
+    """
 
     RADIAL = "RADIAL"
     DIAMETRAL = "DIAMETRAL"
@@ -118,7 +128,8 @@ class ClearanceConvention(StrEnum):
         except ValueError:
             raise UsageError(
                 f"clearance convention {text!r} is not known",
-                "Give RADIAL (centre offset), DIAMETRAL (bore minus pin) or TOTAL_PLAY (dial reading).",
+                "Give RADIAL (centre offset), DIAMETRAL (bore minus pin) or TOTAL_PLAY (dial"
+                " reading).",
             ) from None
 
 
@@ -139,9 +150,11 @@ _WRITTEN = re.compile(
 
 
 def parse_length(text: str) -> WrittenLength:
-    """Read a length as people write it: ``.013``, ``0.013 in``, ``.013"``, ``13 thou``, ``0.33 mm``.
+    """Read a length as people write it: ``.013``, ``0.013 in``, ``.013"``, ``13 thou``, ``0.33
+    mm``.
 
-    A decimal comma, a fraction, a minus sign or anything else that would have to be guessed is refused.
+    A decimal comma, a fraction, a minus sign or anything else that would have to be guessed is
+    refused.
 
     Parameters
     ----------
@@ -163,13 +176,18 @@ def parse_length(text: str) -> WrittenLength:
         stripped = text.strip()
         if re.fullmatch(r"[+]?\d*,\d+\s*\D*", stripped):
             raise UsageError(
-                f"{stripped!r} has a decimal comma", f"Write it with a point: {stripped.replace(',', '.')}"
+                f"{stripped!r} has a decimal comma",
+                f"Write it with a point: {stripped.replace(',', '.')}",
             )
         if re.match(rf"^[{MINUS}]\s*[\d.]", stripped):
             raise UsageError(f"{stripped!r} is negative", "A clearance is zero or more.")
         if re.fullmatch(r"\d+\s*/\s*\d+.*", stripped):
-            raise UsageError(f"{stripped!r} is a fraction", "Write a decimal number, for example 0.125.")
-        raise UsageError(f"{stripped!r} is not a length", "Write for example 0.013 in, 13 thou or 0.33 mm.")
+            raise UsageError(
+                f"{stripped!r} is a fraction", "Write a decimal number, for example 0.125."
+            )
+        raise UsageError(
+            f"{stripped!r} is not a length", "Write for example 0.013 in, 13 thou or 0.33 mm."
+        )
     written = match["unit"]
     unit = LengthUnit.parse(written) if written else None
     return WrittenLength(float(match["number"]), unit, text.strip())
@@ -186,8 +204,9 @@ _SAID = re.compile(
 def in_unit(sentence: str, unit: LengthUnit) -> str:
     """Say a sentence of this program, which is written in inches, in the unit that the user reads.
 
-    A length is a number with two decimals or more before ``in``, or two such numbers (``0.01 to 0.02 in``); it keeps
-    its resolution. What stands in quotation marks is somebody's entry and stays as it is.
+    A length is a number with two decimals or more before ``in``, or two such numbers (``0.01 to
+    0.02 in``); it keeps its resolution. What stands in quotation marks is somebody's entry and
+    stays as it is.
     """
     if unit is LengthUnit.INCH:
         return sentence

@@ -1,4 +1,6 @@
-"""What all tests share: a start as at a prompt, the shipped gear with its table, steady settings for properties."""
+"""What all tests share: a start as at a prompt, the shipped gear with its table, steady settings
+for properties.
+"""
 
 from __future__ import annotations
 
@@ -13,28 +15,41 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import IndexTable, load_index_table
 
-settings.register_profile("everyday", deadline=None, max_examples=40, derandomize=True, database=None)
+settings.register_profile(
+    "everyday", deadline=None, max_examples=40, derandomize=True, database=None
+)
 settings.load_profile("everyday")
 
 
 # What a user may have set that the program, or what it shows its pages with, reads.
 OF_THE_USER = (
     *("MLG_STORE", "MLG_DEBUG", "SOURCE_DATE_EPOCH", "XDG_CONFIG_HOME", "XDG_DATA_HOME"),
-    *("COLUMNS", "LINES", "TERMINAL_WIDTH", "NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"),
+    *(
+        "COLUMNS",
+        "LINES",
+        "TERMINAL_WIDTH",
+        "NO_COLOR",
+        "FORCE_COLOR",
+        "TTY_COMPATIBLE",
+        "TTY_INTERACTIVE",
+    ),
     *("PYTHONIOENCODING", "PYTHONUTF8", "PYTHONWARNINGS", "PYTHONOPTIMIZE"),
 )
 
 
 @pytest.fixture(scope="session", autouse=True)
 def as_at_a_prompt(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """However pytest was started: tests, and the programs that they start, find what a new user has at a prompt."""
+    """However pytest was started: tests, and the programs that they start, find what a new user has
+    at a prompt.
+    """
     ignored = [
         number
         for number in (signal.SIGINT, getattr(signal, "SIGHUP", signal.SIGINT))
         if signal.getsignal(number) is signal.SIG_IGN
     ]
     for number in ignored:
-        # Unlike a signal that is ignored, a handler is not inherited; one that does nothing goes on ignoring.
+        # Unlike a signal that is ignored, a handler is not inherited; one that does nothing goes on
+        # ignoring.
         signal.signal(number, lambda *_: None)
     umask = os.umask(0o022)
     with pytest.MonkeyPatch.context() as patch:

@@ -1,7 +1,7 @@
 """The examples and pictures of README.md and docs/: run, drawn, compared, and brought up to date.
 
-``python tests/docs_examples.py`` rewrites what the commands print and draws the pictures again (of pages that
-are named only those); ``test_docs.py`` fails while that would change anything.
+``python tests/docs_examples.py`` rewrites what the commands print and draws the pictures again (of
+pages that are named only those); ``test_docs.py`` fails while that would change anything.
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ class Session:
 
     def written(self) -> str:
         """The block as it stands in the README, without its fences."""
-        return "".join(f"{_PROMPT}{c}\n{p}" for c, p in zip(self.commands, self.printed, strict=True))
+        return "".join(
+            f"{_PROMPT}{c}\n{p}" for c, p in zip(self.commands, self.printed, strict=True)
+        )
 
 
 def sessions(text: str) -> Iterator[tuple[re.Match[str], Session]]:
@@ -44,14 +46,18 @@ def sessions(text: str) -> Iterator[tuple[re.Match[str], Session]]:
 
 
 def run(commands: tuple[str, ...], folder: Path) -> Session:
-    """Run the commands of a block one after the other in a shell, as a reader would; stderr is not shown."""
+    """Run the commands of a block one after the other in a shell, as a reader would; stderr is not
+    shown.
+    """
     for name in ("inspection_data", "mlg_troubleshoot", "tests", "docs"):
         if not (folder / name).exists():
             (folder / name).symlink_to(ROOT / name)
     here = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
     mark = "-- end of a command --"
     # Each command sees the exit code of the one before it, as at a prompt.
-    script = "\n".join(f"{command}\ncode=$?; printf '%s\\n' '{mark}'; (exit $code)" for command in commands)
+    script = "\n".join(
+        f"{command}\ncode=$?; printf '%s\\n' '{mark}'; (exit $code)" for command in commands
+    )
     done = subprocess.run(
         ["bash", "-c", script],
         cwd=folder,
@@ -62,7 +68,10 @@ def run(commands: tuple[str, ...], folder: Path) -> Session:
         encoding="utf-8",
         check=False,
     )
-    printed = ["\n".join(line.rstrip() for line in p.split("\n")) for p in done.stdout.split(f"{mark}\n")[:-1]]
+    printed = [
+        "\n".join(line.rstrip() for line in p.split("\n"))
+        for p in done.stdout.split(f"{mark}\n")[:-1]
+    ]
     return Session(commands, tuple(printed))
 
 
@@ -76,31 +85,40 @@ def refreshed(text: str, folder: Path) -> str:
 
 
 def pictures() -> dict[str, str]:
-    """Draw the pictures of the README: the linkage of the published failure, and what its plunger does."""
+    """Draw the pictures of the README: the linkage of the published failure, and what its plunger
+    does.
+    """
     from mlg_troubleshoot import ClearanceConvention, Inspection, Side, check, load_gear
     from mlg_troubleshoot.reporting.inspection_figures import plunger_curve
     from mlg_troubleshoot.reporting.schematic import schematic
 
     gear = load_gear()
     failure = {3: 0.013, 5: 0.007}
-    found = check(Inspection("PAPER-4.4", "not-stated", Side.LH, ClearanceConvention.RADIAL, failure), gear)
+    found = check(
+        Inspection("PAPER-4.4", "not-stated", Side.LH, ClearanceConvention.RADIAL, failure), gear
+    )
     drawn = schematic(gear, found, width=900.0)
     return {
         "linkage.svg": _standing_alone(
             [str(panel) for _plane, panel, _width in drawn.panels],
-            f"{gear.name}, linkage {gear.reference.name} at mid-position: {gear.provenance}. "
-            f"Arrows: worst-case clearances of the published failure, {drawn.exaggeration} times larger than life.",
+            f"{gear.name}, linkage {gear.reference.name} at mid-position: {gear.provenance}."
+            f" Arrows: worst-case clearances of the published failure, {drawn.exaggeration} times"
+            " larger than life.",
         ),
         "plunger.svg": _standing_alone(
             [str(plunger_curve(gear, found, width=620.0))],
-            "Plunger over the release stroke, nominal and with the clearances of the published failure.",
+            "Plunger over the release stroke, nominal and with the clearances of the published"
+            " failure.",
         ),
     }
 
 
 def _standing_alone(panels: list[str], caption: str) -> str:
     """Set drawings side by side in a file of their own, with a caption below."""
-    sizes = [tuple(map(float, re.search(r'width="([\d.]+)" height="([\d.]+)"', p).groups())) for p in panels]  # type: ignore[union-attr]
+    sizes = [
+        tuple(map(float, re.search(r'width="([\d.]+)" height="([\d.]+)"', p).groups()))
+        for p in panels
+    ]  # type: ignore[union-attr]
     gap, margin, below = 6.0, 12.0, 26.0
     width = sum(w for w, _ in sizes) + gap * (len(sizes) - 1) + 2 * margin
     height = max(h for _, h in sizes) + 2 * margin + below
@@ -109,10 +127,10 @@ def _standing_alone(panels: list[str], caption: str) -> str:
         parts.append(panel.replace("<svg ", f'<svg x="{x:g}" y="{margin:g}" ', 1))
         x += w + gap
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" width="{width:g}" '
-        f'height="{height:g}" font-family="{_FONTS}" role="img">'
-        f'<rect width="100%" height="100%" fill="#ffffff"/>{"".join(parts)}'
-        f'<text x="{margin:g}" y="{height - margin:g}" font-size="11" fill="#3c4650">{caption}</text></svg>\n'
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}"'
+        f' width="{width:g}" height="{height:g}" font-family="{_FONTS}" role="img"><rect'
+        f' width="100%" height="100%" fill="#ffffff"/>{"".join(parts)}<text x="{margin:g}"'
+        f' y="{height - margin:g}" font-size="11" fill="#3c4650">{caption}</text></svg>\n'
     )
 
 
@@ -126,7 +144,9 @@ def main() -> None:
     wanted = [Path(name).resolve() for name in sys.argv[1:]] or PAGES
     for page in wanted:
         with tempfile.TemporaryDirectory() as folder:
-            page.write_text(refreshed(page.read_text(encoding="utf-8"), Path(folder)), encoding="utf-8")
+            page.write_text(
+                refreshed(page.read_text(encoding="utf-8"), Path(folder)), encoding="utf-8"
+            )
 
 
 if __name__ == "__main__":

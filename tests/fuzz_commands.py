@@ -1,8 +1,9 @@
 """Commands fed with damaged and hostile files and asked to write where something stands already.
 
-``python -m tests.fuzz_commands --cases 20000`` runs each case in a child of this process, ``--commands`` as a command
-of its own; ``--seed S --only N`` runs one case again, in ``--folder`` to look at. Every case must end with an exit code
-of the contract, within 10 s of processor time and 500 MB, and no file may change that was not asked for.
+``python -m tests.fuzz_commands --cases 20000`` runs each case in a child of this process,
+``--commands`` as a command of its own; ``--seed S --only N`` runs one case again, in ``--folder``
+to look at. Every case must end with an exit code of the contract, within 10 s of processor time and
+500 MB, and no file may change that was not asked for.
 """
 
 from __future__ import annotations
@@ -44,7 +45,9 @@ class Asked:
 
 @dataclass
 class Found:
-    """What was found so far: how often each kind ended how, the worst figures, and each case that is wrong."""
+    """What was found so far: how often each kind ended how, the worst figures, and each case that
+    is wrong.
+    """
 
     codes: Counter[tuple[str, int]]
     classes: Counter[tuple[str, str]]
@@ -85,11 +88,10 @@ def cases(asked: Asked, numbers: Iterable[int]) -> Found:
             found.classes.update((case.kind, each) for each in wrong)
             lines = "; ".join(shlex.join(("mlg", *line)) for line in case.lines)
             print(
-                f"{case.kind}: {', '.join(wrong)}: {lines[:400]!r} {dict(case.environment)}\n"
-                f"    {ended.seconds:.1f} s, {ended.megabytes:.0f} MB: {ended.output.strip()[-400:]!r}\n"
-                f"    again: python -m tests.fuzz_commands --seed {asked.seed} --only {number} --folder DIR"
-                + " --commands"
-                * asked.commands,
+                f"{case.kind}: {', '.join(wrong)}: {lines[:400]!r} {dict(case.environment)}\n   "
+                f" {ended.seconds:.1f} s, {ended.megabytes:.0f} MB:"
+                f" {ended.output.strip()[-400:]!r}\n    again: python -m tests.fuzz_commands --seed"
+                f" {asked.seed} --only {number} --folder DIR" + " --commands" * asked.commands,
                 file=sys.stderr,
                 flush=True,
             )
@@ -103,8 +105,12 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", type=int, help="the number of one case")
     parser.add_argument("--kinds", default="", help="names of kinds, with commas")
-    parser.add_argument("--commands", action="store_true", help="start the command anew for each case")
-    parser.add_argument("--slower", type=float, default=1.0, help="how much slower this machine may be")
+    parser.add_argument(
+        "--commands", action="store_true", help="start the command anew for each case"
+    )
+    parser.add_argument(
+        "--slower", type=float, default=1.0, help="how much slower this machine may be"
+    )
     parser.add_argument("--folder", type=Path, help="a new folder to work in, which stays")
     given = parser.parse_args()
     numbers = range(given.cases) if given.only is None else [given.only]
@@ -122,8 +128,8 @@ def main() -> int:
     for (kind, wrong), count in sorted(found.classes.items()):
         print(f"WRONG {kind:10} {wrong}: {count}")
     print(
-        f"{found.codes.total()} cases, {found.wrong} not as documented, slowest {found.slowest:.2f} s, "
-        f"{found.largest:.0f} MB at most"
+        f"{found.codes.total()} cases, {found.wrong} not as documented, slowest {found.slowest:.2f}"
+        f" s, {found.largest:.0f} MB at most"
     )
     return int(found.wrong > 0)
 

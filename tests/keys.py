@@ -12,7 +12,8 @@ pexpect = pytest.importorskip("pexpect")
 def interrupt(child: Any, until: Any = pexpect.EOF) -> None:
     """Press Ctrl-C until a text, or the end, is seen.
 
-    One that comes between the prompt and the wait for a key is only seen with the next key: one presses it again.
+    One that comes between the prompt and the wait for a key is only seen with the next key: one
+    presses it again.
     """
     for _ in range(6):
         child.sendintr()

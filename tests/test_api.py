@@ -70,7 +70,10 @@ def test_importing_the_package_imports_nothing_heavy() -> None:
 
 
 def test_the_help_imports_no_model_and_no_table() -> None:
-    code = "from mlg_troubleshoot.cli import main\nsys.argv = ['mlg', '--help']\ntry: main()\nexcept SystemExit: pass"
+    code = (
+        "from mlg_troubleshoot.cli import main\nsys.argv = ['mlg', '--help']\ntry: main()\nexcept"
+        " SystemExit: pass"
+    )
     assert loaded_by(code) & {"numpy", "scipy", "pandas", "openpyxl", "jinja2"} == set()
 
 
@@ -98,7 +101,10 @@ def test_predict_takes_a_batch_in_the_order_of_the_joints() -> None:
 
 def test_predict_takes_a_gear_its_name_or_its_file() -> None:
     gear = mlg.load_gear()
-    found = {float(mlg.predict(FAILURE, g).over_in[0]) for g in (gear, gear.id, gear.path, str(gear.path))}
+    found = {
+        float(mlg.predict(FAILURE, g).over_in[0])
+        for g in (gear, gear.id, gear.path, str(gear.path))
+    }
     assert len(found) == 1
 
 

@@ -1,4 +1,6 @@
-"""README.md and docs/: their commands work, their sessions and pictures are what the program makes today."""
+"""README.md and docs/: their commands work, their sessions and pictures are what the program makes
+today.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ CHECK_COMMAND = (
     "python3 -m venv .venv && .venv/bin/pip install -q . && "
     ".venv/bin/mlg check inspection_data/failure_case.csv --report report"
 )
-TEST_COMMAND = "python3 -m venv .venv && .venv/bin/pip install -q -e '.[dev]' && .venv/bin/python -m pytest"
+TEST_COMMAND = (
+    "python3 -m venv .venv && .venv/bin/pip install -q -e '.[dev]' && .venv/bin/python -m pytest"
+)
 SESSIONS = {
     f"{page.relative_to(ROOT).as_posix()} {session.commands[0].split('|')[0].strip()[:50]}": session
     for page in PAGES
@@ -43,7 +47,11 @@ def test_continuous_integration_takes_the_test_command_from_here() -> None:
     script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     (line,) = [line for line in script.splitlines() if line.startswith("test_command=")]
     found = subprocess.run(
-        ["bash", "-c", f'{line}\nprintf %s "$test_command"'], cwd=ROOT, capture_output=True, text=True, check=True
+        ["bash", "-c", f'{line}\nprintf %s "$test_command"'],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert found.stdout == TEST_COMMAND
 
@@ -87,20 +95,34 @@ def test_a_picture_is_what_the_program_draws_today(name: str) -> None:
 
 
 def test_a_picture_says_where_the_geometry_comes_from() -> None:
-    assert "reconstructed from published figures, not drawing data" in (PICTURES / "linkage.svg").read_text("utf-8")
+    assert "reconstructed from published figures, not drawing data" in (
+        PICTURES / "linkage.svg"
+    ).read_text("utf-8")
 
 
 def anchors(text: str) -> set[str]:
     headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
-    return {"#" + re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+    return {
+        "#" + re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings
+    }
 
 
 def links() -> list[tuple[Path, str]]:
-    found = ((page, set(re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")))) for page in PAGES)
-    return [(page, link) for page, here in found for link in sorted(here) if not link.startswith("https:")]
+    found = (
+        (page, set(re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8"))))
+        for page in PAGES
+    )
+    return [
+        (page, link)
+        for page, here in found
+        for link in sorted(here)
+        if not link.startswith("https:")
+    ]
 
 
-@pytest.mark.parametrize(("page", "link"), links(), ids=lambda part: part.name if isinstance(part, Path) else part)
+@pytest.mark.parametrize(
+    ("page", "link"), links(), ids=lambda part: part.name if isinstance(part, Path) else part
+)
 def test_every_link_leads_somewhere(page: Path, link: str) -> None:
     name, _, heading = link.partition("#")
     target = page.parent / unquote(name) if name else page
@@ -121,13 +143,19 @@ def test_every_page_can_be_reached_from_the_readme() -> None:
 
 
 def test_every_script_that_is_named_exists() -> None:
-    scripts = {s for page in PAGES for s in re.findall(r"python ((?:\w+/)+\w+\.py)", page.read_text(encoding="utf-8"))}
+    scripts = {
+        s
+        for page in PAGES
+        for s in re.findall(r"python ((?:\w+/)+\w+\.py)", page.read_text(encoding="utf-8"))
+    }
     assert scripts
     assert [s for s in scripts if not (ROOT / s).is_file()] == []
 
 
 def test_the_python_version_is_that_of_the_project() -> None:
-    wanted = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["requires-python"]
+    wanted = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
+        "requires-python"
+    ]
     assert f"Python {wanted.removeprefix('>=')} or later" in TEXT
 
 
@@ -165,5 +193,9 @@ def test_the_readme_is_no_book() -> None:
 
 
 def test_every_room_of_the_package_is_named() -> None:
-    rooms = {p.name for p in (ROOT / "mlg_troubleshoot").iterdir() if p.is_dir() and not p.name.startswith("_")}
+    rooms = {
+        p.name
+        for p in (ROOT / "mlg_troubleshoot").iterdir()
+        if p.is_dir() and not p.name.startswith("_")
+    }
     assert {room for room in rooms if f"`{room}/`" not in TEXT} == set()

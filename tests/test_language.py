@@ -1,4 +1,6 @@
-"""What users and maintainers read is plain English: none of the phrases that once stood here comes back."""
+"""What users and maintainers read is plain English: none of the phrases that once stood here comes
+back.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,9 @@ INSTEAD = {
     r"\bthat none is\b": "Probably no joint …",
     r"\brestored, and not recorded\b": "Restored without a record?",
     r"\bthat should hold do\b": "all required values hold",
-    r"\b[Bb]eside (?:it|them|one|those|others|the others|what is named|the named)\b": "in addition to …",
+    r"\b[Bb]eside (?:it|them|one|those|others|the others|what is named|the named)\b": (
+        "in addition to …"
+    ),
     r"\b[Ee]valuations to stop at\b": "Maximum number of evaluations",
     r"\bfor the hand\b": "to fill in by hand",
     r"\bNothing follows from\b": "… contains no usable reading",
@@ -58,14 +62,24 @@ INSTEAD = {
 def strings(source: str) -> Iterator[tuple[int, str]]:
     """Every text of a module, docstrings too; what an f-string fills in stands as {}."""
     tree = ast.parse(source)
-    parts = {id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
+    parts = {
+        id(part)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.JoinedStr)
+        for part in node.values
+    }
     for node in ast.walk(tree):
         if isinstance(node, ast.JoinedStr):
             yield (
                 node.lineno,
-                "".join(str(part.value) if isinstance(part, ast.Constant) else "{}" for part in node.values),
+                "".join(
+                    str(part.value) if isinstance(part, ast.Constant) else "{}"
+                    for part in node.values
+                ),
             )
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in parts:
+        elif (
+            isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in parts
+        ):
             yield node.lineno, node.value
 
 
@@ -74,14 +88,25 @@ def texts() -> tuple[tuple[str, str], ...]:
     found = []
     for path in sorted((ROOT / "mlg_troubleshoot").rglob("*.py")):
         place = path.relative_to(ROOT).as_posix()
-        found += [(f"{place}:{line}", text) for line, text in strings(path.read_text(encoding="utf-8"))]
+        found += [
+            (f"{place}:{line}", text) for line, text in strings(path.read_text(encoding="utf-8"))
+        ]
     pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "templates").glob("*.j2")]
-    pages += [*(ROOT / "mlg_troubleshoot").rglob("*.toml"), *(ROOT / "mlg_troubleshoot").rglob("*.schema.json")]
+    pages += [
+        *(ROOT / "mlg_troubleshoot").rglob("*.toml"),
+        *(ROOT / "mlg_troubleshoot").rglob("*.schema.json"),
+    ]
     for path in sorted(pages):
         # Of Jinja's tests, "is none" is a word of the language, not of the reader.
-        text = re.sub(r"\bis (not )?none\b", "", path.read_text(encoding="utf-8")) if path.suffix == ".j2" else None
+        text = (
+            re.sub(r"\bis (not )?none\b", "", path.read_text(encoding="utf-8"))
+            if path.suffix == ".j2"
+            else None
+        )
         text = path.read_text(encoding="utf-8") if text is None else text
-        found += [(path.relative_to(ROOT).as_posix(), paragraph) for paragraph in text.split("\n\n")]
+        found += [
+            (path.relative_to(ROOT).as_posix(), paragraph) for paragraph in text.split("\n\n")
+        ]
     return tuple((place, " ".join(text.split())) for place, text in found)
 
 

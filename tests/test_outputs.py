@@ -1,4 +1,6 @@
-"""Files are written whole or not at all, and replace only what an earlier run of the same output wrote."""
+"""Files are written whole or not at all, and replace only what an earlier run of the same output
+wrote.
+"""
 
 from __future__ import annotations
 
@@ -100,9 +102,11 @@ def fields(text: str, separator: str) -> list[str]:
         return [field for row in csv.reader(file, delimiter=separator) for field in row]
 
 
-@pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@SUM(A1)", " =1", "\t=1", '"=1', "＝1", "＠SUM(A1)"])
+@pytest.mark.parametrize(
+    "text", ["=1+1", "+1", "-1", "@SUM(A1)", " =1", "\t=1", '"=1', "＝1", "＠SUM(A1)"]
+)
 def test_no_text_becomes_a_formula(text: str) -> None:
-    (_, field) = fields(csv_text(["a"], [[text]]), ",")
+    _, field = fields(csv_text(["a"], [[text]]), ",")
     assert field.strip().startswith("'")
 
 
@@ -117,7 +121,11 @@ def test_no_text_splits_into_a_formula_whatever_the_separator(separator: str, si
 
 @given(
     rows=st.lists(
-        st.lists(st.text(st.sampled_from(BEFORE + SIGNS + "x1()"), max_size=12) | st.just(-0.5), min_size=1, max_size=4)
+        st.lists(
+            st.text(st.sampled_from(BEFORE + SIGNS + "x1()"), max_size=12) | st.just(-0.5),
+            min_size=1,
+            max_size=4,
+        )
     )
 )
 @settings(max_examples=400, deadline=None)
@@ -147,17 +155,23 @@ def test_a_negative_number_stays_a_number() -> None:
 TABLE = OutputKind.marked("is not a table", "a,b\n")
 
 
-@pytest.mark.parametrize("name", ["in.csv", "link.csv", "hard.csv", "folder/../in.csv", "no/../in.csv", "./in.csv"])
+@pytest.mark.parametrize(
+    "name", ["in.csv", "link.csv", "hard.csv", "folder/../in.csv", "no/../in.csv", "./in.csv"]
+)
 def test_an_output_that_is_an_input_is_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / "folder").mkdir()
     (tmp_path / "in.csv").write_text("x")
     (tmp_path / "link.csv").symlink_to("in.csv")
     (tmp_path / "hard.csv").hardlink_to(tmp_path / "in.csv")
     with pytest.raises(UsageError, match=r"--csv .* is one of the inputs"):
-        claim_outputs([tmp_path / "in.csv"], [OutputFile("--csv", f"{tmp_path}/{name}", TABLE)], force=True)
+        claim_outputs(
+            [tmp_path / "in.csv"], [OutputFile("--csv", f"{tmp_path}/{name}", TABLE)], force=True
+        )
 
 
-def test_an_output_in_an_input_folder_is_refused_where_it_is_one_of_its_files(tmp_path: Path) -> None:
+def test_an_output_in_an_input_folder_is_refused_where_it_is_one_of_its_files(
+    tmp_path: Path,
+) -> None:
     (tmp_path / "a.csv").write_text("x")
     with pytest.raises(UsageError):
         claim_outputs([tmp_path], [OutputFile("--csv", tmp_path / "a.csv", TABLE)], force=True)
@@ -166,20 +180,28 @@ def test_an_output_in_an_input_folder_is_refused_where_it_is_one_of_its_files(tm
 def test_an_output_that_is_the_file_of_an_open_input_is_refused(tmp_path: Path) -> None:
     (tmp_path / "in.csv").write_text("x")
     with (tmp_path / "in.csv").open() as file, pytest.raises(UsageError, match="standard input"):
-        claim_outputs([file.fileno()], [OutputFile("--csv", tmp_path / "in.csv", TABLE)], force=True)
+        claim_outputs(
+            [file.fileno()], [OutputFile("--csv", tmp_path / "in.csv", TABLE)], force=True
+        )
 
 
 @pytest.mark.parametrize("second", ["a.csv", "no/../a.csv", "link.csv"])
 def test_two_outputs_are_two_files(tmp_path: Path, second: str) -> None:
     (tmp_path / "link.csv").symlink_to("a.csv")
-    outputs = [OutputFile("--csv", tmp_path / "a.csv", TABLE), OutputFile("--state", f"{tmp_path}/{second}", TABLE)]
+    outputs = [
+        OutputFile("--csv", tmp_path / "a.csv", TABLE),
+        OutputFile("--state", f"{tmp_path}/{second}", TABLE),
+    ]
     with pytest.raises(UsageError, match=r"--state .* is the file of --csv as well"):
         claim_outputs([], outputs, force=True)
 
 
 def test_another_output_is_not_refused(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("x")
-    outputs = [OutputFile("--csv", tmp_path / "b.csv", TABLE), OutputFile("--annotate", None, TABLE)]
+    outputs = [
+        OutputFile("--csv", tmp_path / "b.csv", TABLE),
+        OutputFile("--annotate", None, TABLE),
+    ]
     claim_outputs([tmp_path / "a.csv"], outputs)
 
 
@@ -201,7 +223,9 @@ def test_another_file_is_replaced_with_force_only(tmp_path: Path) -> None:
 def test_an_empty_mark_marks_nothing(tmp_path: Path) -> None:
     (tmp_path / "o").write_text("x")
     with pytest.raises(UsageError):
-        claim_outputs([], [OutputFile("the export", tmp_path / "o", OutputKind.marked("is not one", ""))])
+        claim_outputs(
+            [], [OutputFile("the export", tmp_path / "o", OutputKind.marked("is not one", ""))]
+        )
 
 
 def test_a_database_is_not_replaced_with_force_either(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """Claims of the paper, each quoted with its section, against the model.
 
-"Effect of Joint Clearance on Landing Gear Retraction Failure". What does not hold stands here too, with that said
-in the test's name.
+"Effect of Joint Clearance on Landing Gear Retraction Failure". What does not hold stands here too,
+with that said in the test's name.
 """
 
 from __future__ import annotations
@@ -37,8 +37,12 @@ def release(gear: Gear, n: int = 401) -> tuple[np.ndarray, np.ndarray]:
 
 
 class TestSection2TargetSystem:
-    def test_the_length_of_the_retraction_actuator_is_the_most_reduced_at_down_lock(self, gear: Gear) -> None:
-        """2.1: "The length of the retraction actuator is the most reduced when in the Down Lock state." """
+    def test_the_length_of_the_retraction_actuator_is_the_most_reduced_at_down_lock(
+        self, gear: Gear
+    ) -> None:
+        """2.1: "The length of the retraction actuator is the most reduced when in the Down Lock
+        state."
+        """
         stroke, _ = release(gear)
         place = gear.model.kernel.positions(stroke, gear.model.kernel.no_clearance())
         anchor = gear.reference.mechanism.point("F")
@@ -62,25 +66,35 @@ class TestSection2TargetSystem:
         assert np.all(np.diff(turned) < 0) or np.all(np.diff(turned) > 0)
 
     def test_the_release_pushes_the_plunger_from_in_to_mid(self, gear: Gear) -> None:
-        """2.1: "this change of structure pushes the plunger from the in-position to the mid-position." """
+        """2.1: "this change of structure pushes the plunger from the in-position to the
+        mid-position."
+        """
         _, plunger = release(gear)
         assert plunger[-1] - plunger[0] > 0.4
 
     def test_there_are_six_combinations_of_the_valve(self, gear: Gear) -> None:
-        """2.1: "There are six possible combinations when we consider the two directions that the hydraulic oil can
-        move." """
+        """2.1: "There are six possible combinations when we consider the two directions that the
+        hydraulic oil can move."
+        """
         assert gear.cycle is not None
         assert len({(state.plunger, state.flow) for state in gear.cycle.valve}) == 6
 
-    def test_a_total_order_index_is_never_less_than_the_first_order_index(self, table: IndexTable) -> None:
-        """2.3: "Total-order index is a value that considers the interaction, and first-order index is the one that
-        does not." """
+    def test_a_total_order_index_is_never_less_than_the_first_order_index(
+        self, table: IndexTable
+    ) -> None:
+        """2.3: "Total-order index is a value that considers the interaction, and first-order index
+        is the one that does not."
+        """
         assert np.all(table.total_order >= table.first_order - 1e-12)
 
 
 class TestSection3Modelling:
-    def test_a_joint_is_located_from_two_others_their_distances_and_the_plane(self, gear: Gear) -> None:
-        """3.1: "if we know the distance between these points, then we can coordinate the last node C" (Eq. 6)."""
+    def test_a_joint_is_located_from_two_others_their_distances_and_the_plane(
+        self, gear: Gear
+    ) -> None:
+        """3.1: "if we know the distance between these points, then we can coordinate the last node
+        C" (Eq. 6).
+        """
         mechanism = gear.reference.mechanism
         at = {name: mechanism.reference_in_space(name) for name in ("3", "4", "5")}
         lengths = np.linalg.norm(at["5"] - at["3"]), np.linalg.norm(at["5"] - at["4"])
@@ -88,41 +102,62 @@ class TestSection3Modelling:
         located = locate_joint(at["3"], at["4"], *lengths, np.array([0.0, 0.0, sign]))
         assert located == pytest.approx(at["5"], abs=1e-12)
 
-    def test_there_are_ten_clearances_numbered_in_the_order_of_the_mechanism(self, gear: Gear) -> None:
+    def test_there_are_ten_clearances_numbered_in_the_order_of_the_mechanism(
+        self, gear: Gear
+    ) -> None:
         """3.2: "we selected a total of ten clearance input points"."""
         assert gear.joint_numbers == NUMBERS
 
     def test_a_fixed_joint_is_moved_by_its_virtual_link(self, gear: Gear) -> None:
-        """3.2: "Fixed joints were coordinated preferentially, with the virtual links added" (A*, Fig. 8a)."""
+        """3.2: "Fixed joints were coordinated preferentially, with the virtual links added" (A*,
+        Fig. 8a).
+        """
         links = [0.0] * 20
         links[6:8] = 0.003, -0.002
-        pivot, place = gear.reference.mechanism.point("4"), gear.model.kernel.positions(0.5, links)["4"]
-        assert (float(place[0]), float(place[1])) == pytest.approx((pivot.x + 0.003, pivot.y - 0.002))
+        pivot, place = (
+            gear.reference.mechanism.point("4"),
+            gear.model.kernel.positions(0.5, links)["4"],
+        )
+        assert (float(place[0]), float(place[1])) == pytest.approx(
+            (pivot.x + 0.003, pivot.y - 0.002)
+        )
 
-    def test_joint_b_is_at_link_ab_from_a_moved_in_parallel_and_at_link_bc_from_c(self, gear: Gear) -> None:
-        """3.2: "B** was at a distance of link AB from A** and at a distance of link BC from C*" (Fig. 8b)."""
+    def test_joint_b_is_at_link_ab_from_a_moved_in_parallel_and_at_link_bc_from_c(
+        self, gear: Gear
+    ) -> None:
+        """3.2: "B** was at a distance of link AB from A** and at a distance of link BC from C*"
+        (Fig. 8b).
+        """
         rng = np.random.default_rng(16)
         v = rng.uniform(-0.01, 0.01, 20)
         place = gear.model.kernel.positions(0.4, v.tolist())
         a, b, c = (np.array([float(x) for x in place[name]]) for name in ("3", "5", "4"))
         at = {p.name: np.array([p.x, p.y]) for p in gear.reference.mechanism.points}
         moved_a = a + v[4:6] + v[8:10]
-        assert np.linalg.norm(b - moved_a) == pytest.approx(np.linalg.norm(at["5"] - at["3"]), abs=1e-12)
+        assert np.linalg.norm(b - moved_a) == pytest.approx(
+            np.linalg.norm(at["5"] - at["3"]), abs=1e-12
+        )
         assert np.linalg.norm(b - c) == pytest.approx(np.linalg.norm(at["5"] - at["4"]), abs=1e-12)
 
     def test_without_clearance_the_ends_of_adjacent_links_overlap(self, gear: Gear) -> None:
         """3.2: "If there was no clearance, the two points became one"."""
-        place = gear.model.kernel.positions(gear.reference.stroke[1], gear.model.kernel.no_clearance())
+        place = gear.model.kernel.positions(
+            gear.reference.stroke[1], gear.model.kernel.no_clearance()
+        )
         for point in gear.reference.mechanism.points:
-            assert (float(place[point.name][0]), float(place[point.name][1])) == pytest.approx((point.x, point.y))
+            assert (float(place[point.name][0]), float(place[point.name][1])) == pytest.approx(
+                (point.x, point.y)
+            )
 
     @pytest.mark.parametrize("later", NUMBERS)
     def test_later_joints_do_not_move_earlier_ones_except_the_pivot_eight_its_own_lever(
         self, gear: Gear, later: int
     ) -> None:
-        """3.2: "clearances of later numbered joints did not affect the coordinates of earlier numbered joints."
+        """3.2: "clearances of later numbered joints did not affect the coordinates of earlier
+        numbered joints."
 
-        Joint 7 stands on the lever that turns about joint 8, which is fixed and "coordinated preferentially".
+        Joint 7 stands on the lever that turns about joint 8, which is fixed and "coordinated
+        preferentially".
         """
         links = [0.0] * 20
         links[2 * later - 2 : 2 * later] = 0.006, 0.005
@@ -137,7 +172,9 @@ class TestSection3Modelling:
         ratio = worst_case(gear.model, small).magnitude_in / 1e-4
         assert ratio == pytest.approx(gear.model.plunger_amplification(), rel=2e-3)
 
-    def test_the_product_of_the_stages_is_the_plunger_amplification(self, growth: Amplification) -> None:
+    def test_the_product_of_the_stages_is_the_plunger_amplification(
+        self, growth: Amplification
+    ) -> None:
         """3.3, Eq. 9: "multiplying amplification indices suitable for the order of mechanisms".
 
         Not for the fixed pivots #4 and #8, which are no case of Eq. 10: there to 4 % only.
@@ -147,22 +184,30 @@ class TestSection3Modelling:
         assert growth.local_plunger[movable] == pytest.approx(exact[movable], rel=1e-6)
         assert growth.local_plunger == pytest.approx(exact, rel=0.04)
 
-    def test_current_clearance_is_never_less_than_one_so_joint_one_needs_a_lever(self, growth: Amplification) -> None:
-        """3.3: "the amplification index can be approximated as csc θ", against 0.84 for #1 in 4.3."""
+    def test_current_clearance_is_never_less_than_one_so_joint_one_needs_a_lever(
+        self, growth: Amplification
+    ) -> None:
+        """3.3: "the amplification index can be approximated as csc θ", against 0.84 for #1 in
+        4.3.
+        """
         assert growth.max_stage[0] < 1.0
         assert np.all(growth.max_stage[2:] >= 1.0)
 
 
 class TestSection4Results:
     def test_the_plunger_is_at_the_mean_of_its_normal_range_at_down_lock(self, gear: Gear) -> None:
-        """4.2: "The normal plunger displacement in the Down Lock state is 0.01~0.05 in. We adjusted parallel to 0.03
-        in"."""
+        """4.2: "The normal plunger displacement in the Down Lock state is 0.01~0.05 in. We adjusted
+        parallel to 0.03 in".
+        """
         assert gear.down_lock_range == (0.01, 0.05)
         assert float(gear.model.plunger(gear.reference.stroke[0])) == pytest.approx(0.03, abs=1e-15)
 
-    def test_the_travel_from_the_least_displacement_to_mid_position_is_0_45_in(self, gear: Gear) -> None:
-        """4.2: "the difference between the plunger displacement in its mid-position and its minimum displacement in
-        the process of releasing the Down Lock was 0.45 in." """
+    def test_the_travel_from_the_least_displacement_to_mid_position_is_0_45_in(
+        self, gear: Gear
+    ) -> None:
+        """4.2: "the difference between the plunger displacement in its mid-position and its minimum
+        displacement in the process of releasing the Down Lock was 0.45 in."
+        """
         for model in gear.ensemble_models:
             plunger = model.plunger(np.linspace(*model.stroke, 20001))
             assert plunger[-1] - plunger.min() == pytest.approx(0.45, abs=1e-7)
@@ -172,7 +217,9 @@ class TestSection4Results:
         assert all(0.0 < abs(model.rate) < 0.84 for model in gear.ensemble_models)
 
     def test_the_curve_is_convex_downward_over_the_whole_release(self, gear: Gear) -> None:
-        """4.3: "a fast-moving, convex downward function as it approaches near the end of the cycle"."""
+        """4.3: "a fast-moving, convex downward function as it approaches near the end of the
+        cycle".
+        """
         _, plunger = release(gear)
         assert np.all(np.diff(plunger, 2) > 0)
 
@@ -187,25 +234,37 @@ class TestSection4Results:
         """4.3: "0.0075 in is the maximum clearance allowed"."""
         assert set(gear.limits_in) == {0.0075}
 
-    def test_the_largest_indices_of_joints_one_and_two_are_the_printed_ones(self, growth: Amplification) -> None:
+    def test_the_largest_indices_of_joints_one_and_two_are_the_printed_ones(
+        self, growth: Amplification
+    ) -> None:
         """4.3: "the maximum amplification indices are 0.84 and 1.488, respectively." """
         assert growth.max_stage[:2] == pytest.approx([0.84, 1.488], abs=5e-4)
 
-    def test_the_largest_indices_of_joints_three_to_five_are_greater_than_five(self, growth: Amplification) -> None:
-        """4.3: "Joints #3, #4, and #5 correspond to the first case, and the maximum indices are greater than 5." """
+    def test_the_largest_indices_of_joints_three_to_five_are_greater_than_five(
+        self, growth: Amplification
+    ) -> None:
+        """4.3: "Joints #3, #4, and #5 correspond to the first case, and the maximum indices are
+        greater than 5."
+        """
         assert min(growth.max_stage[2:5]) > 5
 
-    def test_the_largest_indices_of_the_remaining_joints_are_less_than_two(self, growth: Amplification) -> None:
+    def test_the_largest_indices_of_the_remaining_joints_are_less_than_two(
+        self, growth: Amplification
+    ) -> None:
         """4.3: "Amplification indices of the remaining joints are less than 2." """
         assert max(growth.max_stage[5:]) < 2
 
     def test_joints_one_to_five_have_more_than_95_percent(self, table: IndexTable) -> None:
-        """4.3: "Joints #1 to #5 have a sensitivity index higher than 95%, and the rest … insignificant"."""
+        """4.3: "Joints #1 to #5 have a sensitivity index higher than 95%, and the rest …
+        insignificant".
+        """
         assert table.first_order[:5].sum() > 0.95
         assert table.first_order[5:].max() < 0.01
 
     def test_joints_two_to_five_have_nearly_20_percent_or_over(self, table: IndexTable) -> None:
-        """4.3: "Joints #2, #3, #4, and #5 have a sensitivity index nearly 20% or over in percentile." """
+        """4.3: "Joints #2, #3, #4, and #5 have a sensitivity index nearly 20% or over in
+        percentile."
+        """
         assert table.first_order[1:5].min() > 0.195
 
     def test_joints_two_to_five_lead_on_every_linkage_that_fits(self, table: IndexTable) -> None:
@@ -215,8 +274,9 @@ class TestSection4Results:
     def test_the_amplification_method_gives_joint_two_more_with_the_largest_indices(
         self, gear: Gear, growth: Amplification, table: IndexTable
     ) -> None:
-        """4.3: "similar to that found by the computational method, except that joint #2 recorded a higher
-        sensitivity (Figure 13b)"."""
+        """4.3: "similar to that found by the computational method, except that joint #2 recorded a
+        higher sensitivity (Figure 13b)".
+        """
         shares = growth.shares(growth.max_plunger, gear.limits_in)
         assert np.argmax(shares - table.first_order) == 1
         assert shares[1] > table.first_order[1] + 0.05
@@ -224,11 +284,19 @@ class TestSection4Results:
     def test_the_amplification_method_does_not_give_joint_two_more_with_the_local_indices(
         self, gear: Gear, growth: Amplification, table: IndexTable
     ) -> None:
-        """4.3, the same claim: not reproduced when the indices are taken where the plunger is judged."""
-        assert abs(growth.shares(growth.local_plunger, gear.limits_in)[1] - table.first_order[1]) < 0.01
+        """4.3, the same claim: not reproduced when the indices are taken where the plunger is
+        judged.
+        """
+        assert (
+            abs(growth.shares(growth.local_plunger, gear.limits_in)[1] - table.first_order[1])
+            < 0.01
+        )
 
-    def test_samples_at_the_boundary_make_great_indices_greater_and_small_ones_smaller(self, gear: Gear) -> None:
-        """4.3: "the sensitivity index that is relatively great becomes greater, and … small becomes smaller."
+    def test_samples_at_the_boundary_make_great_indices_greater_and_small_ones_smaller(
+        self, gear: Gear
+    ) -> None:
+        """4.3: "the sensitivity index that is relatively great becomes greater, and … small becomes
+        smaller."
 
         It holds after normalising to 100 %, and by little.
         """
@@ -259,13 +327,18 @@ class TestSection4Results:
         """4.3, Fig. 13a shows a visible difference: here it is below 1e-3 for every joint."""
         assert (table.total_order - table.first_order).max() < 1e-3
 
-    def test_the_order_of_the_indices_is_not_the_order_of_the_mechanism(self, table: IndexTable) -> None:
-        """4.3: "the sensitivity index is not at all great just because it was measured close to the starting point"."""
+    def test_the_order_of_the_indices_is_not_the_order_of_the_mechanism(
+        self, table: IndexTable
+    ) -> None:
+        """4.3: "the sensitivity index is not at all great just because it was measured close to the
+        starting point".
+        """
         assert table.first_order[0] < table.first_order[1:5].min()
 
     def test_the_published_failure_gives_0_0472_in_and_exceeds_0_03_in(self, gear: Gear) -> None:
-        """4.4: "the displacement (0.0472 in) of the plunger caused by the clearances exceeded the minimum extra
-        displacement (0.03 in)." """
+        """4.4: "the displacement (0.0472 in) of the plunger caused by the clearances exceeded the
+        minimum extra displacement (0.03 in)."
+        """
         found = worst_case(gear.model, FAILURE).magnitude_in[0]
         assert found == pytest.approx(0.0472, abs=5e-5)
         assert found > gear.margin.value == 0.03
@@ -275,7 +348,9 @@ class TestSection4Results:
         assert worst_case(gear.model, FAILURE).under_in[0] == pytest.approx(-0.0429, abs=5e-5)
 
     def test_the_published_failure_is_possible_and_not_certain(self, gear: Gear) -> None:
-        """4.4: "retraction failure can still happen" - in one of four random directions, so never "will"."""
+        """4.4: "retraction failure can still happen" - in one of four random directions, so never
+        "will".
+        """
         chance = chance_beyond(gear.model, FAILURE, np.array([0.03]), 4096)[0]
         assert chance == pytest.approx(0.25, abs=0.01)
 
@@ -284,15 +359,22 @@ class TestSection4Results:
         mechanism = gear.reference.mechanism
         points = tuple(replace(p, x=round(p.x, 2), y=round(p.y, 2)) for p in mechanism.points)
         coarse = replace(gear.reference, mechanism=replace(mechanism, points=points))
-        assert worst_case(gear.model_of(coarse), FAILURE).magnitude_in[0] == pytest.approx(0.0475, abs=5e-5)
+        assert worst_case(gear.model_of(coarse), FAILURE).magnitude_in[0] == pytest.approx(
+            0.0475, abs=5e-5
+        )
 
-    def test_if_the_printed_clearances_were_total_play_the_failure_would_stay_within(self, gear: Gear) -> None:
-        """4.4: "#3: 0.013 in, #5: 0.007 in" must be radial: half of them would stay within 0.03 in."""
+    def test_if_the_printed_clearances_were_total_play_the_failure_would_stay_within(
+        self, gear: Gear
+    ) -> None:
+        """4.4: "#3: 0.013 in, #5: 0.007 in" must be radial: half of them would stay within 0.03
+        in.
+        """
         assert worst_case(gear.model, FAILURE / 2).magnitude_in[0] < 0.03
 
 
 def test_choosing_the_larger_deviation_joint_by_joint_ends_on_the_wrong_side(gear: Gear) -> None:
-    """1: "selected sequentially from the most remotely located joint to the nearest joint", here for each sense alone.
+    """1: "selected sequentially from the most remotely located joint to the nearest joint", here
+    for each sense alone.
 
     Taken as "the larger |deviation|" from #10 backwards, the rule ends 12 % short.
     """
@@ -305,4 +387,6 @@ def test_choosing_the_larger_deviation_joint_by_joint_ends_on_the_wrong_side(gea
         tried[:, j] = turns
         chosen[j] = turns[np.argmax(np.abs(gear.model.displacement(links_from(active, tried))))]
     careless = abs(float(gear.model.displacement(links_from(clearance, chosen))))
-    assert careless / worst_case(gear.model, clearance).magnitude_in[0] == pytest.approx(0.88, abs=0.01)
+    assert careless / worst_case(gear.model, clearance).magnitude_in[0] == pytest.approx(
+        0.88, abs=0.01
+    )

@@ -1,4 +1,6 @@
-"""The project keeps its own rules: format, lint, types, layers, docstrings, constants, top level."""
+"""The project keeps its own rules: format, lint, types, layers, docstrings, constants, top
+level.
+"""
 
 from __future__ import annotations
 
@@ -26,12 +28,22 @@ import mlg_troubleshoot
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "mlg_troubleshoot"
-TOP_LEVEL = {"pyproject.toml", "mlg_troubleshoot", "inspection_data", "templates", "tests", "docs", "README.md"}
+TOP_LEVEL = {
+    "pyproject.toml",
+    "mlg_troubleshoot",
+    "inspection_data",
+    "templates",
+    "tests",
+    "docs",
+    "README.md",
+}
 
 
 def run(*arguments: str) -> None:
     """Run a tool on the project and show what it says if it is not content."""
-    done = subprocess.run([sys.executable, *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, *arguments], cwd=ROOT, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -59,7 +71,10 @@ def test_25_4_stands_only_in_units() -> None:
     found = set()
     for path in sources():
         tokens = tokenize.generate_tokens(io.StringIO(path.read_text(encoding="utf-8")).readline)
-        if any(token.type == tokenize.NUMBER and float_of(token.string) in {25.4, 1 / 25.4} for token in tokens):
+        if any(
+            token.type == tokenize.NUMBER and float_of(token.string) in {25.4, 1 / 25.4}
+            for token in tokens
+        ):
             found.add(path.relative_to(PACKAGE).as_posix())
     assert found == {"units.py"}
 
@@ -79,7 +94,8 @@ def test_nothing_catches_every_exception() -> None:
         if isinstance(node, ast.ExceptHandler)
         and (
             node.type is None
-            or {"Exception", "BaseException"} & {n.id for n in ast.walk(node.type) if isinstance(n, ast.Name)}
+            or {"Exception", "BaseException"}
+            & {n.id for n in ast.walk(node.type) if isinstance(n, ast.Name)}
         )
     ]
     assert found == []
@@ -104,22 +120,34 @@ def test_no_function_is_longer_than_sixty_lines() -> None:
 
 
 def test_the_linter_limits_parameters_and_branches_and_every_exception_has_its_reason() -> None:
-    lint = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["ruff"]["lint"]
+    lint = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["ruff"][
+        "lint"
+    ]
     assert (lint["pylint"]["max-args"], lint["mccabe"]["max-complexity"]) == (8, 15)
     assert not {"PLR0913", "C901"} & set(lint["ignore"])
-    marked = [line for path in sources() for line in path.read_text(encoding="utf-8").splitlines() if "# noqa" in line]
+    marked = [
+        line
+        for path in sources()
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if "# noqa" in line
+    ]
     assert [line for line in marked if not re.search(r"# noqa: [A-Z0-9, ]+ - \w", line)] == []
 
 
 def test_nothing_else_stands_at_the_top_level() -> None:
     visible = {entry.name for entry in ROOT.iterdir() if not entry.name.startswith(".")}
     # What the README's commands leave behind is ignored there and here.
-    left_behind = {line.rstrip("/") for line in (ROOT / ".gitignore").read_text(encoding="utf-8").split()}
+    left_behind = {
+        line.rstrip("/") for line in (ROOT / ".gitignore").read_text(encoding="utf-8").split()
+    }
     assert visible - TOP_LEVEL - left_behind == set()
 
 
 def test_the_geometry_knows_no_aircraft() -> None:
-    words = re.compile(r"hawker|landing|plunger|sidestay|bellcrank|valve|retract|down.?lock|\bgears?\b", re.IGNORECASE)
+    words = re.compile(
+        r"hawker|landing|plunger|sidestay|bellcrank|valve|retract|down.?lock|\bgears?\b",
+        re.IGNORECASE,
+    )
     found = [
         f"{path.name}:{number}: {line.strip()}"
         for path in (PACKAGE / "geometry").glob("*.py")
@@ -131,7 +159,9 @@ def test_the_geometry_knows_no_aircraft() -> None:
 
 @cache
 def modules() -> tuple[ModuleType, ...]:
-    names = [info.name for info in pkgutil.walk_packages(mlg_troubleshoot.__path__, "mlg_troubleshoot.")]
+    names = [
+        info.name for info in pkgutil.walk_packages(mlg_troubleshoot.__path__, "mlg_troubleshoot.")
+    ]
     return tuple(importlib.import_module(name) for name in names if not name.endswith("__main__"))
 
 
@@ -152,21 +182,37 @@ def public(module: ModuleType) -> Iterator[tuple[str, Any]]:
             yield name, thing
         elif inspect.isclass(thing):
             yield name, thing
-            yield from ((f"{name}.{part}", member) for part, member in members_of(thing) if inspect.isfunction(member))
+            yield from (
+                (f"{name}.{part}", member)
+                for part, member in members_of(thing)
+                if inspect.isfunction(member)
+            )
 
 
 def members_of(thing: Any) -> Iterator[tuple[str, Any]]:
     """Public methods and properties that a class itself defines."""
     for part, member in vars(thing).items() if inspect.isclass(thing) else ():
         function = member.__func__ if isinstance(member, classmethod | staticmethod) else member
-        if not part.startswith("_") and (inspect.isfunction(function) or isinstance(function, property)):
+        if not part.startswith("_") and (
+            inspect.isfunction(function) or isinstance(function, property)
+        ):
             yield part, function
 
 
 def documented(thing: Any, section: str = "Parameters") -> list[Parameter]:
-    """Entries of a docstring; those of a class and of what it extends, which are its parameters, too."""
-    described = [each for each in getattr(thing, "__mro__", (thing,)) if each.__module__.startswith("mlg_troubleshoot")]
-    return [entry for each in described for entry in NumpyDocString(inspect.cleandoc(vars_doc(each) or ""))[section]]
+    """Entries of a docstring; those of a class and of what it extends, which are its parameters,
+    too.
+    """
+    described = [
+        each
+        for each in getattr(thing, "__mro__", (thing,))
+        if each.__module__.startswith("mlg_troubleshoot")
+    ]
+    return [
+        entry
+        for each in described
+        for entry in NumpyDocString(inspect.cleandoc(vars_doc(each) or ""))[section]
+    ]
 
 
 def names_of(entries: list[Parameter]) -> list[str]:
@@ -175,7 +221,9 @@ def names_of(entries: list[Parameter]) -> list[str]:
 
 def accepted(thing: Any) -> list[str]:
     """Names of the parameters that a caller gives."""
-    if inspect.isclass(thing) and (thing.__init__ is object.__init__ or getattr(thing, "_is_protocol", False)):
+    if inspect.isclass(thing) and (
+        thing.__init__ is object.__init__ or getattr(thing, "_is_protocol", False)
+    ):
         return []
     try:
         parameters = inspect.signature(thing).parameters
@@ -193,7 +241,9 @@ ROOMS_FOR_SCRIPTS = ("diagnosis", "wear")
 
 
 def stands_in_the_public_api(label: str, thing: Any) -> bool:
-    """Names that a package lists for those who use it from Python; the others are read beside their code."""
+    """Names that a package lists for those who use it from Python; the others are read beside their
+    code.
+    """
     packages = ("mlg_troubleshoot", *(f"mlg_troubleshoot.{room}" for room in ROOMS_FOR_SCRIPTS))
     lists = [importlib.import_module(package) for package in packages]
     return any(label in package.__all__ and getattr(package, label) is thing for package in lists)
@@ -203,8 +253,12 @@ def stands_in_the_public_api(label: str, thing: Any) -> bool:
 def test_every_module_and_every_name_of_the_public_api_has_a_docstring(name: str) -> None:
     module = importlib.import_module(name)
     assert module.__doc__
-    in_api = [(label, thing) for label, thing in public(module) if stands_in_the_public_api(label, thing)]
-    parts = [(f"{label}.{part}", member) for label, thing in in_api for part, member in members_of(thing)]
+    in_api = [
+        (label, thing) for label, thing in public(module) if stands_in_the_public_api(label, thing)
+    ]
+    parts = [
+        (f"{label}.{part}", member) for label, thing in in_api for part, member in members_of(thing)
+    ]
     assert [label for label, thing in [*in_api, *parts] if not vars_doc(thing)] == []
 
 
@@ -234,7 +288,8 @@ NOT_NUMERIC = re.compile(r"\bof (?:str|int|bool)\b|\bmapping of str to str\b|dic
 HAS_UNIT = re.compile(r"\[[^\[\]]+\]\.?$")
 # Rooms whose numbers are lengths, angles and probabilities.
 ROOMS_WITH_UNITS = ("geometry", "gear", "decision")
-# A value in a unit that the object itself says, and the two results of a search that are named there.
+# A value in a unit that the object itself says, and the two results of a search that are named
+# there.
 UNIT_SAID_ELSEWHERE = {"LengthUnit.to_inches", "LengthUnit.from_inches", "WrittenLength", "Sourced"}
 
 
@@ -244,7 +299,9 @@ def test_every_numeric_line_of_a_docstring_ends_in_its_unit(name: str) -> None:
     for label, thing in public(importlib.import_module(name)):
         if label in UNIT_SAID_ELSEWHERE:
             continue
-        for entry in (e for s in ("Parameters", "Returns", "Attributes") for e in documented(thing, s)):
+        for entry in (
+            e for s in ("Parameters", "Returns", "Attributes") for e in documented(thing, s)
+        ):
             if NUMERIC.search(entry.type) and not NOT_NUMERIC.search(entry.type):
                 text = " ".join(entry.desc).strip()
                 if not HAS_UNIT.search(text):

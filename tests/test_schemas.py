@@ -58,7 +58,9 @@ def test_every_check_fits_its_schema(arguments: tuple[object, ...], stdin: bytes
 
 
 def test_a_linkage_that_does_not_close_has_no_displacement_and_a_warning() -> None:
-    found = mlg(*HAND, "--convention", "RADIAL", *(f"--set={n}=0.05in" for n in range(1, 11)), "--json").one
+    found = mlg(
+        *HAND, "--convention", "RADIAL", *(f"--set={n}=0.05in" for n in range(1, 11)), "--json"
+    ).one
     assert (found["verdict"], found["predicted_displacement_in"], found["over_travel_in"]) == (
         "OUTSIDE_MARGIN",
         None,

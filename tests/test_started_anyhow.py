@@ -51,5 +51,17 @@ def test_with_the_settings_of_a_user(tmp_path: Path) -> None:
     kept = tmp_path / "mlg-troubleshoot" / "mlg.toml"
     kept.parent.mkdir()
     kept.write_text('show = "mm"\n')
-    narrow = {"COLUMNS": "40", "LINES": "10", "FORCE_COLOR": "1", "PYTHONUTF8": "0", "LC_ALL": "POSIX"}
-    started("umask 077", WHAT_A_USER_SETS, XDG_CONFIG_HOME=str(tmp_path), TZ="Pacific/Auckland", **narrow)
+    narrow = {
+        "COLUMNS": "40",
+        "LINES": "10",
+        "FORCE_COLOR": "1",
+        "PYTHONUTF8": "0",
+        "LC_ALL": "POSIX",
+    }
+    started(
+        "umask 077",
+        WHAT_A_USER_SETS,
+        XDG_CONFIG_HOME=str(tmp_path),
+        TZ="Pacific/Auckland",
+        **narrow,
+    )

@@ -32,7 +32,11 @@ def run(
     command: Sequence[str | Path], folder: Path, environment: Mapping[str, str] = os.environ
 ) -> subprocess.CompletedProcess[str]:
     """Run a command away from the source tree: nothing of this process's Python comes with it."""
-    clean = {key: value for key, value in environment.items() if not key.startswith(("PYTHON", "VIRTUAL_ENV"))}
+    clean = {
+        key: value
+        for key, value in environment.items()
+        if not key.startswith(("PYTHON", "VIRTUAL_ENV"))
+    }
     return subprocess.run(
         [str(part) for part in command],
         cwd=folder,
@@ -48,7 +52,11 @@ def run(
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The wheel of this source tree."""
     folder = tmp_path_factory.mktemp("dist")
-    done = run([sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", folder, ROOT], folder, FOR_PIP)
+    done = run(
+        [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", folder, ROOT],
+        folder,
+        FOR_PIP,
+    )
     assert done.returncode == 0, done.stderr
     (built,) = folder.glob("*.whl")
     return built
@@ -76,7 +84,9 @@ def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def checked(scripts: Path, elsewhere: Path) -> subprocess.CompletedProcess[str]:
     """The check of that inspection, with its report."""
-    return run([scripts / "mlg", "check", "inspection.csv", "--json", "--report", "report"], elsewhere)
+    return run(
+        [scripts / "mlg", "check", "inspection.csv", "--json", "--report", "report"], elsewhere
+    )
 
 
 def test_the_wheel_carries_templates_fonts_gears_schemas_and_its_types(wheel: Path) -> None:
@@ -97,18 +107,24 @@ def test_the_wheel_carries_no_tests_and_no_example_data(wheel: Path) -> None:
 
 
 def test_the_installed_package_is_not_the_source_tree(scripts: Path, elsewhere: Path) -> None:
-    where = run([scripts / "python", "-c", "import mlg_troubleshoot as m; print(m.__file__)"], elsewhere).stdout
+    where = run(
+        [scripts / "python", "-c", "import mlg_troubleshoot as m; print(m.__file__)"], elsewhere
+    ).stdout
     assert Path(where.strip()).is_relative_to(scripts.parent)
 
 
-def test_the_installed_command_gives_the_failure_case(checked: subprocess.CompletedProcess[str]) -> None:
+def test_the_installed_command_gives_the_failure_case(
+    checked: subprocess.CompletedProcess[str],
+) -> None:
     assert checked.returncode == 1, checked.stderr
     (found,) = json.loads(checked.stdout)["inspections"]
     assert found["verdict"] == "OUTSIDE_MARGIN"
     assert found["predicted_displacement_in"] == pytest.approx(0.0472, abs=2e-4)
 
 
-def test_the_installed_command_writes_html_and_pdf(checked: subprocess.CompletedProcess[str], elsewhere: Path) -> None:
+def test_the_installed_command_writes_html_and_pdf(
+    checked: subprocess.CompletedProcess[str], elsewhere: Path
+) -> None:
     assert sorted(path.suffix for path in (elsewhere / "report").iterdir()) == [".html", ".pdf"]
 
 
@@ -119,7 +135,11 @@ def test_the_pdf_of_the_installed_command_has_its_fonts_embedded(
     for page in pypdf.PdfReader(path).pages:
         for font in page["/Resources"]["/Font"].values():
             entry = font.get_object()
-            described = (entry.get("/DescendantFonts") or [entry])[0].get_object()["/FontDescriptor"].get_object()
+            described = (
+                (entry.get("/DescendantFonts") or [entry])[0]
+                .get_object()["/FontDescriptor"]
+                .get_object()
+            )
             assert {"/FontFile", "/FontFile2", "/FontFile3"} & set(described)
 
 
@@ -140,4 +160,6 @@ def test_the_installed_command_verifies_its_gear(scripts: Path, elsewhere: Path)
 
 def test_the_installed_package_gives_its_schemas(scripts: Path, elsewhere: Path) -> None:
     code = "import mlg_troubleshoot as m; print(m.schema('check')['$id'])"
-    assert run([scripts / "python", "-c", code], elsewhere).stdout == "urn:mlg-troubleshoot:check:1\n"
+    assert (
+        run([scripts / "python", "-c", code], elsewhere).stdout == "urn:mlg-troubleshoot:check:1\n"
+    )

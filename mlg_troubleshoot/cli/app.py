@@ -36,7 +36,9 @@ class Program(TyperGroup):
             raise SystemExit(code if given else USAGE)
 
     def invoke(self, ctx: Any) -> Any:
-        """Also run the command behind the boundary: on its way out typer says nothing of an interrupt."""
+        """Also run the command behind the boundary: on its way out typer says nothing of an
+        interrupt.
+        """
         with Boundary():
             return super().invoke(ctx)
 
@@ -45,9 +47,9 @@ app = typer.Typer(
     name="mlg",
     cls=Program,
     help=(
-        "Do worn joints push the reversing-valve plunger of a main landing gear outside its margin? "
-        "Which joint next? Where is the model wrong?\n\n"
-        "Troubleshooting aid, not maintenance data: it does not replace the maintenance manual."
+        "Do worn joints push the reversing-valve plunger of a main landing gear outside its margin?"
+        " Which joint next? Where is the model wrong?\n\nTroubleshooting aid, not maintenance data:"
+        " it does not replace the maintenance manual."
     ),
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
@@ -55,7 +57,9 @@ app = typer.Typer(
 )
 gear_app = typer.Typer(
     name="gear",
-    help="Which model is in use: joints, coordinates, provenance; [b]mlg gear verify[/b] checks it.",
+    help=(
+        "Which model is in use: joints, coordinates, provenance; [b]mlg gear verify[/b] checks it."
+    ),
     invoke_without_command=True,
 )
 

@@ -15,22 +15,27 @@ from mlg_troubleshoot.errors import InconclusiveDataError, OutputError, Troubles
 
 USAGE, NOTHING_JUDGED, OUTPUT, INTERNAL, INTERRUPTED = 2, 3, 5, 70, 130
 _CANNOT_WRITE = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
-# Some releases of typer carry their own click: what it says about usage is found through a name that typer exports.
+# Some releases of typer carry their own click: what it says about usage is found through a name
+# that typer exports.
 _UsageMessage: type[typer.BadParameter] = typer.BadParameter.__mro__[2]
 
 
 class Boundary:
-    """A context that turns what goes wrong inside into a message on stderr and the exit code of the contract.
+    """A context that turns what goes wrong inside into a message on stderr and the exit code of the
+    contract.
 
-    Usage 2 · nothing could be judged or concluded 3 · output could not be written 5 · internal error 70 ·
-    interrupted 130.
+    Usage 2 · nothing could be judged or concluded 3 · output could not be written 5 · internal
+    error 70 · interrupted 130.
     """
 
     def __enter__(self) -> Boundary:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         if error is None or isinstance(error, SystemExit):
             return
@@ -42,7 +47,8 @@ class Boundary:
                 say("\nInterrupted.")
             raise SystemExit(INTERRUPTED) from None
         if isinstance(error, BrokenPipeError):
-            # Results survive a closed pipe (see output.py); what else was cut short was not finished.
+            # Results survive a closed pipe (see output.py); what else was cut short was not
+            # finished.
             abandon_stdout()
             raise SystemExit(OUTPUT) from None
         if isinstance(error, Exception):
@@ -65,14 +71,15 @@ def _explain(error: Exception) -> int:
         say(f"Error: {error.filename or 'the output'} cannot be written: {error.strerror}")
         say("What to do: Make room, or write to another place.")
         try:
-            # What is still to be written to stdout is written now or dropped: the interpreter must not fail on it.
+            # What is still to be written to stdout is written now or dropped: the interpreter must
+            # not fail on it.
             sys.stdout.flush()
         except OSError:
             abandon_stdout()
         return OUTPUT
     say(
-        f"Internal error: {type(error).__name__}: {error}\n"
-        "What to do: this is a defect of the program, not of your input. Run again with MLG_DEBUG=1 and "
-        "send the output to the maintainers."
+        f"Internal error: {type(error).__name__}: {error}\nWhat to do: this is a defect of the"
+        " program, not of your input. Run again with MLG_DEBUG=1 and send the output to the"
+        " maintainers."
     )
     return INTERNAL

@@ -35,16 +35,22 @@ def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
     if missing or flags.side is None:
         raise UsageError(
             f"--set needs {', '.join(missing)}",
-            "Say which gear (--tail N123 --side LH) and what a clearance reading is (--convention RADIAL, DIAMETRAL "
-            "or TOTAL_PLAY): there is no default.",
+            "Say which gear (--tail N123 --side LH) and what a clearance reading is (--convention"
+            " RADIAL, DIAMETRAL or TOTAL_PLAY): there is no default.",
         )
-    values: dict[str, object] = {"record_id": flags.record_id or "-", "tail_no": flags.tail, "side": flags.side}
+    values: dict[str, object] = {
+        "record_id": flags.record_id or "-",
+        "tail_no": flags.tail,
+        "side": flags.side,
+    }
     labels: dict[str, str] = {}
     for text in flags.values or ():
         name, sign, written = text.partition("=")
         number = name.strip().lstrip("#")
         if not sign or not number.isdecimal() or not written.strip():
-            raise UsageError(f"--set {text!r} is not JOINT=VALUE", "Write for example --set 3=0.013in.")
+            raise UsageError(
+                f"--set {text!r} is not JOINT=VALUE", "Write for example --set 3=0.013in."
+            )
         column = f"clearance_{int(number)}"
         if column in values:
             raise UsageError(f"--set gives joint {int(number)} twice", "Give each joint once.")
@@ -55,15 +61,25 @@ def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
 
 
 def _judged(
-    values: Mapping[str, object], labels: Mapping[str, str], flags: Flags, declared: task.CheckOptions
+    values: Mapping[str, object],
+    labels: Mapping[str, str],
+    flags: Flags,
+    declared: task.CheckOptions,
 ) -> Inspection:
     """Let the judge of table rows judge the flags; a refusal names the flag."""
     from mlg_troubleshoot.records import ReadOptions, admit
 
-    more = {"outcome": flags.outcome, "plunger_displacement": flags.measured, "margin": flags.margin}
+    more = {
+        "outcome": flags.outcome,
+        "plunger_displacement": flags.measured,
+        "margin": flags.margin,
+    }
     typed = {"record_id": flags.record_id, "tail_no": flags.tail, "side": flags.side, **more}
     names = {"tail_no": "tail", "plunger_displacement": "measured"}
-    named = {column: f"--{names.get(column, column).replace('_', '-')} {text!r}" for column, text in typed.items()}
+    named = {
+        column: f"--{names.get(column, column).replace('_', '-')} {text!r}"
+        for column, text in typed.items()
+    }
     options = ReadOptions.of(load_gear(declared.gear), declared)
     return admit({**values, **more}, options, {**named, **labels})
 
@@ -84,7 +100,12 @@ def ask(
     saved = store.latest() if resume else None
     if resume and saved is None:
         raise UsageError("there is no unfinished entry to resume", "Start a new one: mlg check")
-    nobody = {"record_id": "-", "tail_no": "-", "side": flags.side or "LH", "clearance_convention": "RADIAL"}
+    nobody = {
+        "record_id": "-",
+        "tail_no": "-",
+        "side": flags.side or "LH",
+        "clearance_convention": "RADIAL",
+    }
     judged = _judged(nobody, {}, flags, declared)
     unit = declared.unit or LengthUnit.INCH
     lengths = {"plunger_displacement": flags.measured, "margin": flags.margin}
@@ -96,7 +117,10 @@ def ask(
         record_id=flags.record_id,
     ).with_more(
         outcome=judged.outcome,
-        **{name: text if text is None or text[-1:].isalpha() else f"{text} {unit}" for name, text in lengths.items()},
+        **{
+            name: text if text is None or text[-1:].isalpha() else f"{text} {unit}"
+            for name, text in lengths.items()
+        },
     )
     entry = ask_inspection(gear, terminal, store, given, saved=saved, advice=_advice(gear))
     while True:
@@ -115,14 +139,20 @@ def ask(
 def _what_now(terminal: RichTerminal) -> str:
     try:
         while True:
-            typed = terminal.ask(" r = write the report, c = correct an answer, Enter = done > ").strip().lower()
+            typed = (
+                terminal.ask(" r = write the report, c = correct an answer, Enter = done > ")
+                .strip()
+                .lower()
+            )
             if typed in ("", "r", "c"):
                 return typed
     except EOFError:
         return ""
 
 
-def _advice(gear: Gear) -> Callable[[Mapping[int, float], Sequence[int]], tuple[str, int | None] | None]:
+def _advice(
+    gear: Gear,
+) -> Callable[[Mapping[int, float], Sequence[int]], tuple[str, int | None] | None]:
     """Say after each critical joint which reading is most useful next, or that one may stop."""
 
     def advise(measured: Mapping[int, float], left: Sequence[int]) -> tuple[str, int | None] | None:

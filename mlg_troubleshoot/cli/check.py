@@ -10,8 +10,9 @@ from mlg_troubleshoot.cli import options
 from mlg_troubleshoot.cli.flags import Flags, Wanted
 
 EPILOG = (
-    "Example: [b]mlg check inspections.xlsx --report out[/b] · one gear by hand: [b]mlg check[/b] · "
-    "scripted: [b]mlg check --tail N123 --side LH --convention RADIAL --set 3=0.013in --set 5=0.007in[/b]"
+    "Example: [b]mlg check inspections.xlsx --report out[/b] · one gear by hand: [b]mlg check[/b] ·"
+    " scripted: [b]mlg check --tail N123 --side LH --convention RADIAL --set 3=0.013in --set"
+    " 5=0.007in[/b]"
 )
 
 
@@ -20,7 +21,10 @@ def check(
     *,
     files: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[FILE|-]...", help="Inspection tables (CSV, xlsx, xls, ods), folders, or - for stdin."),
+        typer.Argument(
+            metavar="[FILE|-]...",
+            help="Inspection tables (CSV, xlsx, xls, ods), folders, or - for stdin.",
+        ),
     ] = None,
     flags: Flags,
     tables: options.Tables,
@@ -30,8 +34,8 @@ def check(
 ) -> None:
     """Check gears: clearances in, verdict and ranked joints out.
 
-    Without FILE on a terminal it asks, joint by joint. Exit codes: 0 every gear within margin · 1 something needs
-    attention · 3 no row could be judged · 2 usage.
+    Without FILE on a terminal it asks, joint by joint. Exit codes: 0 every gear within margin · 1
+    something needs attention · 3 no row could be judged · 2 usage.
     """
     from mlg_troubleshoot.cli.check_run import Run
 

@@ -1,4 +1,6 @@
-"""``mlg check``: judges tables or a gear entered by hand; shows, writes and keeps what was found."""
+"""``mlg check``: judges tables or a gear entered by hand; shows, writes and keeps what was
+found.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ _ASKED_FOR = Path("report")
 class Run:
     """One run of the command: what was asked for, read once."""
 
-    def __init__(self, files: Sequence[str], flags: Flags, tables: options.Tables, wanted: Wanted) -> None:
+    def __init__(
+        self, files: Sequence[str], flags: Flags, tables: options.Tables, wanted: Wanted
+    ) -> None:
         if wanted.annotate is not None and (len(files) != 1 or files[0] == "-"):
             raise UsageError("--annotate needs exactly one workbook", "Give one .xlsx FILE.")
         if wanted.formats and wanted.report is None:
@@ -48,14 +52,18 @@ class Run:
             store=wanted.store,
             force=wanted.force,
         )
-        self._shown = settings(tables.gear, wanted.show, wanted.page, tables.columns, keep=wanted.remember)
+        self._shown = settings(
+            tables.gear, wanted.show, wanted.page, tables.columns, keep=wanted.remember
+        )
         self._asked = task.CheckOptions(
             **tables.declared(self._shown.headers),
             remembered=self._shown.note or None,
             seed=wanted.seed,
             extension=load_model_extension(extensions, tables.gear, causes),
         )
-        self._place = history.kept_in(wanted.store, tables.gear) if wanted.keep or self._asks else None
+        self._place = (
+            history.kept_in(wanted.store, tables.gear) if wanted.keep or self._asks else None
+        )
 
     def run(self) -> int:
         """Judge, show and keep; the exit code is returned."""
@@ -72,8 +80,8 @@ class Run:
     def _judged(self) -> task.CheckResult:
         if self._files and any(astuple(self._flags)):
             raise UsageError(
-                "--set, --tail, --side, --record-id, --outcome, --measured and --margin describe one gear entered by "
-                "hand, and a FILE was given as well",
+                "--set, --tail, --side, --record-id, --outcome, --measured and --margin describe"
+                " one gear entered by hand, and a FILE was given as well",
                 "Give either a FILE or the values of one gear.",
             )
         if not self._files:
@@ -81,14 +89,18 @@ class Run:
         with stages(quiet=self._wanted.quiet) as bar:
             files = [Path(name) for name in self._files]
             return task.check_files(
-                files, self._asked, on_read=partial(bar, "Reading"), on_judged=partial(bar, "Judging")
+                files,
+                self._asked,
+                on_read=partial(bar, "Reading"),
+                on_judged=partial(bar, "Judging"),
             )
 
     def _ask(self) -> task.CheckResult:
         if not output.can_ask():
             raise UsageError(
                 "nothing to check: no FILE was given, and this is not a terminal to ask on",
-                "Pass a FILE, - for standard input, or --set JOINT=VALUE with --tail, --side and --convention.",
+                "Pass a FILE, - for standard input, or --set JOINT=VALUE with --tail, --side and"
+                " --convention.",
             )
 
         def publish(inspection: Inspection, entered_in: LengthUnit) -> by_hand.Ending:
@@ -96,13 +108,19 @@ class Run:
             self._publish(result, entered_in)
             if self._wanted.report is not None or self._wanted.as_json:
                 return by_hand.Ending(result, None)
-            return by_hand.Ending(result, partial(self._write_reports, result, _ASKED_FOR, self._seen(entered_in)))
+            return by_hand.Ending(
+                result, partial(self._write_reports, result, _ASKED_FOR, self._seen(entered_in))
+            )
 
         wanted = self._wanted
-        return by_hand.ask(self._flags, self._asked, publish, self._keep, resume=wanted.resume, place=wanted.store)
+        return by_hand.ask(
+            self._flags, self._asked, publish, self._keep, resume=wanted.resume, place=wanted.store
+        )
 
     def _seen(self, entered_in: LengthUnit) -> Settings:
-        """Lengths are shown in the unit that a flag or the memory says, or else in that of the entry."""
+        """Lengths are shown in the unit that a flag or the memory says, or else in that of the
+        entry.
+        """
         said = self._wanted.show or self._shown.show is not LengthUnit.INCH
         return self._shown if said else replace(self._shown, show=entered_in)
 
@@ -113,7 +131,9 @@ class Run:
 
             warnings = (*filter(None, [self._asked.remembered]), *result.notes)
             found = (result.gear, result.judgements, result.problems, warnings, result.seed)
-            output.write_json(check_json_pieces(*found) if len(result.judgements) > 1 else check_as_json(*found))
+            output.write_json(
+                check_json_pieces(*found) if len(result.judgements) > 1 else check_as_json(*found)
+            )
         else:
             self._show(result, seen.show)
         if wanted.csv is not None:
@@ -151,11 +171,21 @@ class Run:
             from mlg_troubleshoot.workflows.history import seen_before
 
             before = seen_before(result.judgements, self._place)
-        formats = tuple(str(f) for f in self._wanted.formats or (options.ReportFormat.HTML, options.ReportFormat.PDF))
+        formats = tuple(
+            str(f)
+            for f in self._wanted.formats or (options.ReportFormat.HTML, options.ReportFormat.PDF)
+        )
         with stages(quiet=self._wanted.quiet) as bar:
             told = partial(bar, "Writing reports")
             written = task.write_reports(
-                result, self._asked, directory, formats, str(seen.page), on_written=told, unit=seen.show, before=before
+                result,
+                self._asked,
+                directory,
+                formats,
+                str(seen.page),
+                on_written=told,
+                unit=seen.show,
+                before=before,
             )
         output.say_written(written, quiet=self._wanted.quiet)
 
@@ -166,10 +196,21 @@ class Run:
 
         tails = self._wanted.tails
         if tails not in (None, "same", "apart"):
-            raise UsageError(f"--tails {tails!r} is not same or apart", "Give same (one aircraft) or apart (two).")
+            raise UsageError(
+                f"--tails {tails!r} is not same or apart",
+                "Give same (one aircraft) or apart (two).",
+            )
         asked = history.ask_tail if output.can_ask() else None
-        added = keep(result, self._asked, self._place, asked if tails is None else lambda _new, _kept: tails == "same")
+        added = keep(
+            result,
+            self._asked,
+            self._place,
+            asked if tails is None else lambda _new, _kept: tails == "same",
+        )
         if not self._wanted.quiet:
-            output.say(f"Kept in {self._place.place}: {added.new} new records, {added.known} known already.")
+            output.say(
+                f"Kept in {self._place.place}: {added.new} new records, {added.known} known"
+                " already."
+            )
         for warning in added.warnings:
             output.say(f"Warning: {warning}")

@@ -26,8 +26,8 @@ def claim(
 ) -> None:
     """Refuse, before anything is read, an output that would replace what it must not.
 
-    Inputs of every command are the store, `mlg.toml`, the gear file and what it names. A report is a
-    file of its own name: of the files in its folder only those that a report could replace count.
+    Inputs of every command are the store, `mlg.toml`, the gear file and what it names. A report is
+    a file of its own name: of the files in its folder only those that a report could replace count.
     """
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.outputs import claim_outputs

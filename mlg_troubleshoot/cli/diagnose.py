@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 NOTHING_FOUND, SOMETHING_FOUND = 0, 1
 EPILOG = (
-    "Example: [b]mlg diagnose fleet.csv --write-extension EXT.toml[/b], then [b]mlg check FILE --extension EXT.toml[/b]"
+    "Example: [b]mlg diagnose fleet.csv --write-extension EXT.toml[/b], then [b]mlg check FILE"
+    " --extension EXT.toml[/b]"
 )
 
 
@@ -26,11 +27,13 @@ def diagnose(
     files: Annotated[
         list[str],
         typer.Argument(
-            metavar="FILE...", help="Tables with the plunger measured at mid-position or along the stroke, or -."
+            metavar="FILE...",
+            help="Tables with the plunger measured at mid-position or along the stroke, or -.",
         ),
     ],
     write_extension: Annotated[
-        Path | None, typer.Option("--write-extension", metavar="EXT.toml", help="Keep the extended model.")
+        Path | None,
+        typer.Option("--write-extension", metavar="EXT.toml", help="Keep the extended model."),
     ] = None,
     report: options.Report = None,
     page: options.Paper = None,
@@ -49,7 +52,8 @@ def diagnose(
 ) -> None:
     """Compare measured with predicted: what is wrong, the cause by name, the extension, the gain.
 
-    Exit codes: 0 nothing found · 1 something found · 3 cannot be concluded from this table · 2 usage.
+    Exit codes: 0 nothing found · 1 something found · 3 cannot be concluded from this table · 2
+    usage.
     """
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.progress import stages
@@ -75,7 +79,9 @@ def diagnose(
     try:
         with stages(quiet=quiet) as bar:
             result = task.diagnose_files(
-                [Path(name) for name in files], asked, progress=lambda share: bar("Diagnosing", int(100 * share), 100)
+                [Path(name) for name in files],
+                asked,
+                progress=lambda share: bar("Diagnosing", int(100 * share), 100),
             )
     except InconclusiveDataError as error:
         if as_json:
@@ -92,11 +98,14 @@ def diagnose(
         _show(result.diagnosis, shown.show)
     if write_extension is not None and result.extension is None:
         output.say(
-            f"No extension written: the verdict is {result.diagnosis.verdict}, no cause of the model is named alone."
+            f"No extension written: the verdict is {result.diagnosis.verdict}, no cause of the"
+            " model is named alone."
         )
     elif write_extension is not None and result.extension is not None:
         keep_extension(result.extension, write_extension)
-        output.say(f"Extension: {write_extension}. Use it: mlg check FILE --extension {write_extension}")
+        output.say(
+            f"Extension: {write_extension}. Use it: mlg check FILE --extension {write_extension}"
+        )
     if report is not None:
         made = task.write_diagnosis_report(result, asked, report, str(shown.page), unit=shown.show)
         output.say_written([made], quiet=quiet)

@@ -11,14 +11,20 @@ from mlg_troubleshoot.schemas import SCHEMA_VERSION
 
 
 def doctor(
-    gear: options.Gear = options.DEFAULT_GEAR, as_json: options.Json = False, _version: options.Version = False
+    gear: options.Gear = options.DEFAULT_GEAR,
+    as_json: options.Json = False,
+    _version: options.Version = False,
 ) -> None:
-    """Check whether this installation can do everything; exit 1 if something that should work does not."""
+    """Check whether this installation can do everything; exit 1 if something that should work does
+    not.
+    """
     from mlg_troubleshoot.workflows import doctor as task
 
     findings = task.examine_installation(gear)
     if as_json:
-        output.write_json({"schema_version": SCHEMA_VERSION, "abilities": [asdict(f) for f in findings]})
+        output.write_json(
+            {"schema_version": SCHEMA_VERSION, "abilities": [asdict(f) for f in findings]}
+        )
     else:
         console = output.console()
         for finding in findings:

@@ -17,22 +17,30 @@ class Flags:
     """What the flags say of one gear, as it was typed."""
 
     values: Annotated[
-        list[str] | None, typer.Option("--set", metavar="JOINT=VALUE", help="One clearance, e.g. 3=0.013in.")
+        list[str] | None,
+        typer.Option("--set", metavar="JOINT=VALUE", help="One clearance, e.g. 3=0.013in."),
     ] = None
-    tail: Annotated[str | None, typer.Option("--tail", help="Tail number, with --set or the prompts.")] = None
+    tail: Annotated[
+        str | None, typer.Option("--tail", help="Tail number, with --set or the prompts.")
+    ] = None
     side: Annotated[str | None, typer.Option("--side", metavar="LH|RH", help="Which gear.")] = None
-    record_id: Annotated[str | None, typer.Option("--record-id", help="Identity of the record.")] = None
-    outcome: Annotated[str | None, typer.Option("--outcome", metavar="RETRACTED|FAILED", help="What the gear did.")] = (
-        None
-    )
+    record_id: Annotated[
+        str | None, typer.Option("--record-id", help="Identity of the record.")
+    ] = None
+    outcome: Annotated[
+        str | None, typer.Option("--outcome", metavar="RETRACTED|FAILED", help="What the gear did.")
+    ] = None
     measured: Annotated[
         str | None,
         typer.Option(
-            "--measured", metavar="VALUE", help="Measured plunger displacement at mid-position, e.g. 0.041in."
+            "--measured",
+            metavar="VALUE",
+            help="Measured plunger displacement at mid-position, e.g. 0.041in.",
         ),
     ] = None
     margin: Annotated[
-        str | None, typer.Option("--margin", metavar="VALUE", help="This gear's own margin, e.g. 0.028in.")
+        str | None,
+        typer.Option("--margin", metavar="VALUE", help="This gear's own margin, e.g. 0.028in."),
     ] = None
 
 
@@ -53,38 +61,55 @@ class Wanted:
     page: options.Paper = None
     extension: Annotated[
         list[Path] | None,
-        typer.Option("--extension", metavar="TOML", help="Predict with an extension of the model; may repeat."),
+        typer.Option(
+            "--extension",
+            metavar="TOML",
+            help="Predict with an extension of the model; may repeat.",
+        ),
     ] = None
     causes: options.Causes = None
     annotate: Annotated[
         Path | None,
-        typer.Option("--annotate", metavar="OUT.xlsx", help="Your workbook with bad cells marked and verdicts added."),
+        typer.Option(
+            "--annotate",
+            metavar="OUT.xlsx",
+            help="Your workbook with bad cells marked and verdicts added.",
+        ),
     ] = None
     csv: Annotated[
-        Path | None, typer.Option("--csv", metavar="OUT.csv", help="Verdicts as a CSV, one line per gear.")
+        Path | None,
+        typer.Option("--csv", metavar="OUT.csv", help="Verdicts as a CSV, one line per gear."),
     ] = None
-    resume: Annotated[bool, typer.Option("--resume", help="Continue the last unfinished entry.")] = False
-    keep: Annotated[bool, typer.Option("--keep", help="Add the inspections to the store; the prompts always do.")] = (
-        False
-    )
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue the last unfinished entry.")
+    ] = False
+    keep: Annotated[
+        bool,
+        typer.Option("--keep", help="Add the inspections to the store; the prompts always do."),
+    ] = False
     store: history.Place = None
     tails: Annotated[
         str | None,
         typer.Option(
-            "--tails", metavar="same|apart", help="Spellings of a tail that differ in case, blanks or dashes."
+            "--tails",
+            metavar="same|apart",
+            help="Spellings of a tail that differ in case, blanks or dashes.",
         ),
     ] = None
-    detail: Annotated[bool, typer.Option("--detail", help="All joints, repairs, re-rigging and the uncertainty.")] = (
-        False
-    )
-    every: Annotated[bool, typer.Option("--all", help="A batch: every inspection, not the latest of each gear.")] = (
-        False
-    )
+    detail: Annotated[
+        bool, typer.Option("--detail", help="All joints, repairs, re-rigging and the uncertainty.")
+    ] = False
+    every: Annotated[
+        bool, typer.Option("--all", help="A batch: every inspection, not the latest of each gear.")
+    ] = False
     force: options.Force = False
     show: options.Show = None
     remember: options.Remember = False
     seed: Annotated[
-        int, typer.Option("--seed", min=0, help="Seed of the Monte Carlo draws of a gear looked at alone.")
+        int,
+        typer.Option(
+            "--seed", min=0, help="Seed of the Monte Carlo draws of a gear looked at alone."
+        ),
     ] = 1
     as_json: options.Json = False
     quiet: options.Quiet = False
@@ -100,61 +125,112 @@ class StudyFlags:
         typer.Option(
             "--design",
             metavar="fast|sampled|tensor|lhs|lhs+ccd|ccd",
-            help="fast = polynomial chaos that checks itself; sampled = Sobol points; tensor = exact reference; "
-            "the others are the paper's.",
+            help=(
+                "fast = polynomial chaos that checks itself; sampled = Sobol points; tensor = exact"
+                " reference; the others are the paper's."
+            ),
         ),
     ] = "fast"
-    accuracy: Annotated[float, typer.Option("--accuracy", help="Maximum error of every index.")] = 1e-3
+    accuracy: Annotated[float, typer.Option("--accuracy", help="Maximum error of every index.")] = (
+        1e-3
+    )
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")] = 0
     directions: Annotated[
-        str, typer.Option("--directions", metavar="worst|over|under|random", help="Direction of the clearances.")
+        str,
+        typer.Option(
+            "--directions", metavar="worst|over|under|random", help="Direction of the clearances."
+        ),
     ] = "worst"
     fixed: Annotated[
-        str | None, typer.Option("--fixed", metavar="DEG,DEG,…", help="Directions set by a load, one for each joint.")
+        str | None,
+        typer.Option(
+            "--fixed", metavar="DEG,DEG,…", help="Directions set by a load, one for each joint."
+        ),
     ] = None
     distribution: Annotated[
         str,
         typer.Option(
-            "--distribution", metavar="uniform|falling|rising|half-normal", help="Distribution of the clearances."
+            "--distribution",
+            metavar="uniform|falling|rising|half-normal",
+            help="Distribution of the clearances.",
         ),
     ] = "uniform"
     limit: Annotated[
-        float | None, typer.Option("--limit", metavar="IN", help="One limit for all joints, in, instead of the gear's.")
+        float | None,
+        typer.Option(
+            "--limit", metavar="IN", help="One limit for all joints, in, instead of the gear's."
+        ),
     ] = None
     beyond_margin: Annotated[
-        bool, typer.Option("--beyond-margin", help="Indices of exceeding the margin, not of the displacement.")
+        bool,
+        typer.Option(
+            "--beyond-margin", help="Indices of exceeding the margin, not of the displacement."
+        ),
     ] = False
     statements: Annotated[
-        bool, typer.Option("--statements", help="Which statements of section 4.3 hold, with the numbers.")
+        bool,
+        typer.Option(
+            "--statements", help="Which statements of section 4.3 hold, with the numbers."
+        ),
     ] = False
     bound: Annotated[
         bool,
-        typer.Option("--bound", help="Worst displacement at the limits: sequential rule, global search, proved bound."),
+        typer.Option(
+            "--bound",
+            help="Worst displacement at the limits: sequential rule, global search, proved bound.",
+        ),
     ] = False
-    most: Annotated[int, typer.Option("--most", min=1, help="Maximum number of evaluations.")] = 1 << 24
-    n1: Annotated[int | None, typer.Option("--n1", help="Repetitions of a paper design, 100.")] = None
-    n2: Annotated[int | None, typer.Option("--n2", help="Levels of a paper design, 1000 or 862.")] = None
-    iterations: Annotated[int | None, typer.Option("--iterations", help="Iterations of a paper design, 10.")] = None
-    workers: Annotated[int, typer.Option("--workers", min=1, help="Cores for the total order of lhs.")] = 2
+    most: Annotated[int, typer.Option("--most", min=1, help="Maximum number of evaluations.")] = (
+        1 << 24
+    )
+    n1: Annotated[int | None, typer.Option("--n1", help="Repetitions of a paper design, 100.")] = (
+        None
+    )
+    n2: Annotated[
+        int | None, typer.Option("--n2", help="Levels of a paper design, 1000 or 862.")
+    ] = None
+    iterations: Annotated[
+        int | None, typer.Option("--iterations", help="Iterations of a paper design, 10.")
+    ] = None
+    workers: Annotated[
+        int, typer.Option("--workers", min=1, help="Cores for the total order of lhs.")
+    ] = 2
     state: Annotated[
-        Path | None, typer.Option("--state", metavar="FILE", help="Keep finished blocks here and resume from them.")
+        Path | None,
+        typer.Option(
+            "--state", metavar="FILE", help="Keep finished blocks here and resume from them."
+        ),
     ] = None
     scheduler: Annotated[
-        str | None, typer.Option("--scheduler", metavar="ADDRESS", help="Dask cluster for the total order of lhs.")
+        str | None,
+        typer.Option(
+            "--scheduler", metavar="ADDRESS", help="Dask cluster for the total order of lhs."
+        ),
     ] = None
-    csv: Annotated[Path | None, typer.Option("--csv", metavar="OUT.csv", help="One line per joint.")] = None
+    csv: Annotated[
+        Path | None, typer.Option("--csv", metavar="OUT.csv", help="One line per joint.")
+    ] = None
     write_table: Annotated[
-        bool, typer.Option("--write-table", help="Write the table that mlg check uses, next to the gear file.")
+        bool,
+        typer.Option(
+            "--write-table", help="Write the table that mlg check uses, next to the gear file."
+        ),
     ] = False
     given: Annotated[
         Path | None,
         typer.Option(
-            "--given", metavar="FILE", help="Also estimate indices from measured inspections, without a model."
+            "--given",
+            metavar="FILE",
+            help="Also estimate indices from measured inspections, without a model.",
         ),
     ] = None
     report: Annotated[
         Path | None,
-        typer.Option("--report", metavar="DIR", help="Write a printable report with figures, statements and bound."),
+        typer.Option(
+            "--report",
+            metavar="DIR",
+            help="Write a printable report with figures, statements and bound.",
+        ),
     ] = None
     page: options.Paper = None
     force: options.Force = False

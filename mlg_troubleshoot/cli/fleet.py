@@ -66,7 +66,16 @@ def _show(told: dict[str, Any], gear: Gear) -> None:
     from mlg_troubleshoot.workflows.history import landings_shown
 
     console, gears = output.console(), told["gears"]
-    headings = ("tail", "side", "last seen", "verdict", "look at", "to limit", "to margin", "next due")
+    headings = (
+        "tail",
+        "side",
+        "last seen",
+        "verdict",
+        "look at",
+        "to limit",
+        "to margin",
+        "next due",
+    )
     table = output.plain_table(console, *headings, right=("to limit", "to margin", "next due"))
     for line in gears[:_LINES]:
         due = line["next_inspection_landings"]
@@ -82,9 +91,9 @@ def _show(told: dict[str, Any], gear: Gear) -> None:
             "-" if due is None else landings_shown(due, gear),
         )
     console.print(
-        f"{len(gears)} gears; landings left are those from the last inspection, median (5 %): to the limit of any "
-        "joint, with the one that most likely reaches its limit first; to the margin by the worst-case bound. "
-        "'look at' is the joint to look at first today."
+        f"{len(gears)} gears; landings left are those from the last inspection, median (5 %): to"
+        " the limit of any joint, with the one that most likely reaches its limit first; to the"
+        " margin by the worst-case bound. 'look at' is the joint to look at first today."
     )
     history.show_warnings(console, told["warnings"])
     console.print(table)

@@ -35,13 +35,17 @@ def show(
 def _show(gear: Gear) -> None:
     console = output.console()
     console.print(f"{gear.name} ({gear.id})", style="bold")
-    console.print(f"Geometry: {gear.provenance}. File {gear.path.name}, hash {gear.geometry_sha256[:12]}.")
+    console.print(
+        f"Geometry: {gear.provenance}. File {gear.path.name}, hash {gear.geometry_sha256[:12]}."
+    )
     kinds = Counter(str(number.kind) for number in gear.numbers)
     listed = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
-    console.print(f"Numbers behind a prediction: {listed}. Linkages in the ensemble: {len(gear.ensemble)}.")
     console.print(
-        f"Margin {gear.margin.value:g} in ({gear.margin.kind}) · release stroke {gear.reference.stroke[1]:g} in · "
-        f"calibration rate {gear.model.rate:.5f}"
+        f"Numbers behind a prediction: {listed}. Linkages in the ensemble: {len(gear.ensemble)}."
+    )
+    console.print(
+        f"Margin {gear.margin.value:g} in ({gear.margin.kind}) · release stroke"
+        f" {gear.reference.stroke[1]:g} in · calibration rate {gear.model.rate:.5f}"
     )
     headings = ("#", "joint", "where", "limit in", "acts like", "mid-position x, y in")
     joints = output.plain_table(None, *headings, right=("#", "limit in"))
@@ -58,7 +62,9 @@ def _show(gear: Gear) -> None:
         )
     console.print(joints)
     if gear.cycle is not None:
-        cycle = output.plain_table(None, "plunger", "oil flow", "stage", "what follows", title="Reversing valve")
+        cycle = output.plain_table(
+            None, "plunger", "oil flow", "stage", "what follows", title="Reversing valve"
+        )
         for state in gear.cycle.valve:
             cycle.add_row(state.plunger, state.flow, state.stage, state.result)
         console.print(cycle)
@@ -76,7 +82,11 @@ def _as_json(gear: Gear) -> dict[str, object]:
         "margin": plain(gear.margin),
         "release_stroke_in": gear.reference.stroke[1],
         "joints": [
-            {"joint": joint.number, **chosen(joint, *told), "acts_like": list(gear.alike[joint.number])}
+            {
+                "joint": joint.number,
+                **chosen(joint, *told),
+                "acts_like": list(gear.alike[joint.number]),
+            }
             for joint in gear.joints
         ],
         "points": {
@@ -87,8 +97,12 @@ def _as_json(gear: Gear) -> dict[str, object]:
     }
 
 
-def verify(context: typer.Context, as_json: options.Json = False, _version: options.Version = False) -> None:
-    """Print every number of the paper with the value of the model; exit 1 if a required value does not hold."""
+def verify(
+    context: typer.Context, as_json: options.Json = False, _version: options.Version = False
+) -> None:
+    """Print every number of the paper with the value of the model; exit 1 if a required value does
+    not hold.
+    """
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.paper import verification
 
@@ -115,7 +129,11 @@ def verify(context: typer.Context, as_json: options.Json = False, _version: opti
             style="bold red" if n in failed else "",
         )
     console.print(table)
-    verdict = "all required values hold" if not failed else f"required values that do not hold: {len(failed)}"
+    verdict = (
+        "all required values hold"
+        if not failed
+        else f"required values that do not hold: {len(failed)}"
+    )
     console.print(f"{len(numbers)} numbers: {verdict}.")
     raise typer.Exit(1 if failed else 0)
 

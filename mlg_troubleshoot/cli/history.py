@@ -20,24 +20,34 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.workflows.history import Forecast, GearLife, Verified
 
 EPILOG = (
-    "Example: [b]mlg history N123 LH[/b] · [b]mlg history repair N123 LH --joint 3 --date 2026-05-04[/b] · "
-    "[b]mlg history verify[/b]"
+    "Example: [b]mlg history N123 LH[/b] · [b]mlg history repair N123 LH --joint 3 --date"
+    " 2026-05-04[/b] · [b]mlg history verify[/b]"
 )
 _SHOW = "show"
 BROKEN = 1
 
 Place = Annotated[
     str | None,
-    typer.Option("--store", metavar="PATH|URL", help="Where it is kept; else MLG_STORE, else a file of your own."),
+    typer.Option(
+        "--store",
+        metavar="PATH|URL",
+        help="Where it is kept; else MLG_STORE, else a file of your own.",
+    ),
 ]
 Tail = Annotated[str, typer.Argument(metavar="TAIL", help="Tail number.")]
 Side = Annotated[str, typer.Argument(metavar="LH|RH", help="Which gear.")]
-RecordId = Annotated[str, typer.Argument(metavar="RECORD", help="Record id, or the start of its hash.")]
+RecordId = Annotated[
+    str, typer.Argument(metavar="RECORD", help="Record id, or the start of its hash.")
+]
 Day = Annotated[str, typer.Option("--date", metavar="YYYY-MM-DD", help="Day of the repair.")]
-Landings = Annotated[str | None, typer.Option("--landings", metavar="N", help="Landings at the repair.")]
+Landings = Annotated[
+    str | None, typer.Option("--landings", metavar="N", help="Landings at the repair.")
+]
 WorkOrder = Annotated[str | None, typer.Option("--work-order", help="Work order.")]
 Chain = Annotated[Path, typer.Argument(metavar="FILE", help="JSON Lines, one record per line.")]
-NoForecast = Annotated[bool, typer.Option("--no-forecast", help="Records only, without a forecast: faster.")]
+NoForecast = Annotated[
+    bool, typer.Option("--no-forecast", help="Records only, without a forecast: faster.")
+]
 
 
 class HistoryGroup(TyperGroup):
@@ -59,8 +69,12 @@ def kept_in(place: str | None, gear: str) -> Store:
 
 
 def show(
-    tail: Annotated[str | None, typer.Argument(metavar="[TAIL]", help="Tail number; without it all gears.")] = None,
-    side: Annotated[str | None, typer.Argument(metavar="[LH|RH]", help="Which gear; without it both.")] = None,
+    tail: Annotated[
+        str | None, typer.Argument(metavar="[TAIL]", help="Tail number; without it all gears.")
+    ] = None,
+    side: Annotated[
+        str | None, typer.Argument(metavar="[LH|RH]", help="Which gear; without it both.")
+    ] = None,
     store: Place = None,
     gear: options.Gear = options.DEFAULT_GEAR,
     no_forecast: NoForecast = False,
@@ -70,7 +84,9 @@ def show(
     show_in: options.Show = None,
     as_json: options.Json = False,
 ) -> None:
-    """Show the records: the gears and their latest state, or one gear's life with the forecast of each joint."""
+    """Show the records: the gears and their latest state, or one gear's life with the forecast of
+    each joint.
+    """
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.gear.gear_file import load_gear
@@ -80,7 +96,10 @@ def show(
     claim(gear, (), (), report, store=store, force=force)
     shown = settings(gear, show_in, page)
     if tail is None and report is not None:
-        raise UsageError("--report needs a gear", "Give TAIL, or write the page of all gears: mlg fleet --report DIR")
+        raise UsageError(
+            "--report needs a gear",
+            "Give TAIL, or write the page of all gears: mlg fleet --report DIR",
+        )
     if tail is None:
         found = task.lives(place)
         if as_json:
@@ -99,7 +118,10 @@ def show(
     ahead = task.forecast([everything[key] for key in wanted], model, known)
     if as_json:
         if len(wanted) != 1:
-            raise UsageError(f"{tail} has two gears here, and JSON shows one", f"Run: mlg history {tail} LH --json")
+            raise UsageError(
+                f"{tail} has two gears here, and JSON shows one",
+                f"Run: mlg history {tail} LH --json",
+            )
         output.write_json(task.life_as_json(everything[wanted[0]], ahead[wanted[0]], known))
     else:
         for key in wanted:
@@ -126,7 +148,16 @@ def _show_gears(found: Sequence[GearLife], place: str) -> None:
     if not found:
         console.print(f"No records in {place}. Keep inspections with: mlg check FILE --keep")
         return
-    headings = ("tail", "side", "last seen", "landings", "verdict", "look at", "inspections", "repairs")
+    headings = (
+        "tail",
+        "side",
+        "last seen",
+        "landings",
+        "verdict",
+        "look at",
+        "inspections",
+        "repairs",
+    )
     table = output.plain_table(console, *headings, right=("landings", "inspections", "repairs"))
     for life in found:
         seen = life.latest
@@ -168,7 +199,9 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
     console = output.console(unit=unit)
     told = task.life_as_json(life, ahead, gear)
     console.print(output.text(" ".join(life.key), "bold"))
-    table = output.plain_table(console, "date", "landings", "what", "record", "hash", right=("landings",))
+    table = output.plain_table(
+        console, "date", "landings", "what", "record", "hash", right=("landings",)
+    )
     for event in told["events"]:
         landings = event["gear_landings"]
         table.add_row(
@@ -182,14 +215,22 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
     show_warnings(console, life.warnings)
     if outlook := task.outlook_words(life, ahead, gear):
         console.print(outlook)
-    headings = ("joint", f"limit {unit}", f"readings since restored (landings: {unit})", "landings to its limit")
+    headings = (
+        "joint",
+        f"limit {unit}",
+        f"readings since restored (landings: {unit})",
+        "landings to its limit",
+    )
     joints = output.plain_table(console, *headings)
     unread = [f"#{joint['joint']}" for joint in told["joints"] if not joint["readings"]]
     for joint in told["joints"]:
         if not joint["readings"] and joint["joint"] not in ahead.joints:
             continue
         shown = joint["readings"][-4:]
-        read = ", ".join(f"{landings:g}: {console.length(clearance)}" for landings, clearance in shown) or "none"
+        read = (
+            ", ".join(f"{landings:g}: {console.length(clearance)}" for landings, clearance in shown)
+            or "none"
+        )
         joints.add_row(
             f"#{joint['joint']}",
             console.length(joint["limit_in"]),
@@ -198,7 +239,9 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
         )
     console.print(joints)
     if unread:
-        console.print(f"Not read since new or restored: {', '.join(unread)}; never read counts as 0 above.")
+        console.print(
+            f"Not read since new or restored: {', '.join(unread)}; never read counts as 0 above."
+        )
     advice = task.advice([life])
     if advice.asked:
         console.print(advice.words)
@@ -215,16 +258,27 @@ def _what(event: dict[str, Any], unit: LengthUnit) -> str:
         case "void":
             return f"void: {event['why']}"
         case "outcome":
-            return f"found: {event['found']}" + ("" if event["joint"] is None else f" (#{event['joint']})")
+            return f"found: {event['found']}" + (
+                "" if event["joint"] is None else f" (#{event['joint']})"
+            )
         case kind:
             corrected = kind == "inspection" and not event["counts"]
-            return f"{kind} (corrected or void)" if corrected else "re-rigged" if kind == "rerig" else str(kind)
+            return (
+                f"{kind} (corrected or void)"
+                if corrected
+                else "re-rigged"
+                if kind == "rerig"
+                else str(kind)
+            )
 
 
 def repair(
     tail: Tail,
     side: Side,
-    joints: Annotated[list[int], typer.Option("--joint", metavar="N", help="A joint that was restored; may repeat.")],
+    joints: Annotated[
+        list[int],
+        typer.Option("--joint", metavar="N", help="A joint that was restored; may repeat."),
+    ],
     day: Day,
     landings: Landings = None,
     work_order: WorkOrder = None,
@@ -241,7 +295,9 @@ def repair(
     restored = sorted(set(joints))
     place = kept_in(store, gear)
     record = task.work(place, Kind.REPAIR, (tail, side), day, work_order, landings, restored)
-    output.say(f"Kept: repair of {record.tail_no} {record.side}, {', '.join(f'#{j}' for j in restored)}.")
+    output.say(
+        f"Kept: repair of {record.tail_no} {record.side}, {', '.join(f'#{j}' for j in restored)}."
+    )
     say_warnings(place, [(record.tail_no, record.side)])
 
 
@@ -275,7 +331,9 @@ def _refuse_unknown(joints: Sequence[int], gear: Gear) -> None:
 
 def correct(
     record: RecordId,
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A table with the one right inspection.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A table with the one right inspection.")
+    ],
     store: Place = None,
     gear: options.Gear = options.DEFAULT_GEAR,
     unit: options.Unit = None,
@@ -298,7 +356,9 @@ def correct(
 
 def void(
     record: RecordId,
-    why: Annotated[str, typer.Option("--why", metavar="TEXT", help="Why the record does not count.")],
+    why: Annotated[
+        str, typer.Option("--why", metavar="TEXT", help="Why the record does not count.")
+    ],
     store: Place = None,
     gear: options.Gear = options.DEFAULT_GEAR,
 ) -> None:
@@ -312,7 +372,9 @@ def void(
 def outcome(
     record: RecordId,
     found: Annotated[str, typer.Option("--found", metavar="TEXT", help="What was found.")],
-    joint: Annotated[int | None, typer.Option("--joint", metavar="N", help="The joint that it was.")] = None,
+    joint: Annotated[
+        int | None, typer.Option("--joint", metavar="N", help="The joint that it was.")
+    ] = None,
     store: Place = None,
     gear: options.Gear = options.DEFAULT_GEAR,
 ) -> None:
@@ -330,27 +392,36 @@ def verify(
     store: Place = None,
     expect: Annotated[
         str | None,
-        typer.Option("--expect", metavar="HASH", help="A last hash noted earlier; it must still be in the chain."),
+        typer.Option(
+            "--expect",
+            metavar="HASH",
+            help="A last hash noted earlier; it must still be in the chain.",
+        ),
     ] = None,
     gear: options.Gear = options.DEFAULT_GEAR,
 ) -> None:
-    """Walk the chain; the first record that does not fit is named (exit code 1). It does not prove who wrote a record.
+    """Walk the chain; the first record that does not fit is named (exit code 1). It does not prove
+    who wrote a record.
 
-    The last hash is printed: noted elsewhere and given to --expect, it shows that no record was taken away since.
+    The last hash is printed: noted elsewhere and given to --expect, it shows that no record was
+    taken away since.
     """
     from mlg_troubleshoot.workflows import history as task
 
     noted = None if expect is None else expect.strip().lower()
     if noted is not None and not re.fullmatch(r"[0-9a-f]{64}", noted):
-        raise UsageError(f"--expect {expect!r} is not a hash", "Give the 64 letters and digits that verify printed.")
+        raise UsageError(
+            f"--expect {expect!r} is not a hash",
+            "Give the 64 letters and digits that verify printed.",
+        )
     found = task.verify(kept_in(store, gear), noted)
     if found.broken is None:
         output.write(f"{found.count} records fit the chain.")
     else:
         broken = found.broken
         output.write(
-            f"Record {broken.seq} ({broken.kind} {broken.record_id!r}) does not fit the chain: {broken.why}. "
-            f"{found.count} records before it fit."
+            f"Record {broken.seq} ({broken.kind} {broken.record_id!r}) does not fit the chain:"
+            f" {broken.why}. {found.count} records before it fit."
         )
     if found.last:
         output.write(f"The last hash is {found.last}")
@@ -360,8 +431,8 @@ def verify(
         output.write(f"Not as expected: {each}.")
     if found.wrong:
         output.write(
-            "What to do: void a record that cannot be read (mlg history void HASH --why TEXT). Otherwise export "
-            "the chain, and import it into a new store."
+            "What to do: void a record that cannot be read (mlg history void HASH --why TEXT)."
+            " Otherwise export the chain, and import it into a new store."
         )
     if found.broken is not None or found.wrong or (noted is not None and found.expected is None):
         raise typer.Exit(BROKEN)
@@ -370,8 +441,8 @@ def verify(
 def _expected(found: Verified) -> str:
     if found.expected is None:
         return (
-            "The expected hash is not in the chain: records were taken away or changed, or this is another store or an "
-            "older copy."
+            "The expected hash is not in the chain: records were taken away or changed, or this is"
+            " another store or an older copy."
         )
     since = found.count - found.expected
     return (
@@ -382,7 +453,10 @@ def _expected(found: Verified) -> str:
 
 
 def export(
-    file: Chain, store: Place = None, gear: options.Gear = options.DEFAULT_GEAR, force: options.Force = False
+    file: Chain,
+    store: Place = None,
+    gear: options.Gear = options.DEFAULT_GEAR,
+    force: options.Force = False,
 ) -> None:
     """Write the whole chain as JSON Lines."""
     from mlg_troubleshoot.cli.claims import claim
@@ -396,8 +470,12 @@ def export(
     output.say(f"Written: {file}, {len(lines)} records.")
 
 
-def import_chain(file: Chain, store: Place = None, gear: options.Gear = options.DEFAULT_GEAR) -> None:
-    """Read an exported chain into an empty store, or the rest of it into a store that holds its beginning."""
+def import_chain(
+    file: Chain, store: Place = None, gear: options.Gear = options.DEFAULT_GEAR
+) -> None:
+    """Read an exported chain into an empty store, or the rest of it into a store that holds its
+    beginning.
+    """
     from mlg_troubleshoot.workflows import history as task
 
     added = task.import_file(kept_in(store, gear), file)
@@ -405,14 +483,19 @@ def import_chain(file: Chain, store: Place = None, gear: options.Gear = options.
 
 
 def ask_tail(tail: str, kept: str) -> bool:
-    return typer.confirm(f"Tail {tail!r} differs from {kept!r} only in spelling. Is it the same aircraft?", err=True)
+    return typer.confirm(
+        f"Tail {tail!r} differs from {kept!r} only in spelling. Is it the same aircraft?", err=True
+    )
 
 
 def history_app() -> typer.Typer:
     app = typer.Typer(
         name="history",
         cls=HistoryGroup,
-        help="Records of each gear: [b]mlg history[/b] · [b]mlg history TAIL LH[/b], and what is added later.",
+        help=(
+            "Records of each gear: [b]mlg history[/b] · [b]mlg history TAIL LH[/b], and what is"
+            " added later."
+        ),
         epilog=EPILOG,
     )
     app.command(_SHOW, hidden=True)(show)

@@ -46,12 +46,22 @@ def _show_version(wanted: bool) -> None:
 
 
 Version = Annotated[
-    bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and stop.")
+    bool,
+    typer.Option(
+        "--version", callback=_show_version, is_eager=True, help="Show the version and stop."
+    ),
 ]
-Gear = Annotated[str, typer.Option("--gear", metavar="NAME|TOML", help="Shipped gear or a gear file.")]
+Gear = Annotated[
+    str, typer.Option("--gear", metavar="NAME|TOML", help="Shipped gear or a gear file.")
+]
 Unit = Annotated[
     LengthUnit | None,
-    typer.Option("--unit", parser=LengthUnit.parse, metavar="in|thou|mm", help="Unit of lengths that do not say one."),
+    typer.Option(
+        "--unit",
+        parser=LengthUnit.parse,
+        metavar="in|thou|mm",
+        help="Unit of lengths that do not say one.",
+    ),
 ]
 Convention = Annotated[
     ClearanceConvention | None,
@@ -59,37 +69,69 @@ Convention = Annotated[
         "--convention",
         parser=ClearanceConvention.parse,
         metavar="RADIAL|DIAMETRAL|TOTAL_PLAY",
-        help="What a clearance reading is, for rows that do not say it. No default: the factor 2 flips verdicts.",
+        help=(
+            "What a clearance reading is, for rows that do not say it. No default: the factor 2"
+            " flips verdicts."
+        ),
     ),
 ]
-Sheet = Annotated[str | None, typer.Option("--sheet", help="Worksheet; '*' reads every sheet with inspections.")]
+Sheet = Annotated[
+    str | None, typer.Option("--sheet", help="Worksheet; '*' reads every sheet with inspections.")
+]
 ColumnMap = Annotated[
     list[str] | None,
-    typer.Option("--map", metavar="HEADER=COLUMN", help="How to read a header, e.g. 'Spiel 3=clearance_3_mm'."),
+    typer.Option(
+        "--map",
+        metavar="HEADER=COLUMN",
+        help="How to read a header, e.g. 'Spiel 3=clearance_3_mm'.",
+    ),
 ]
 DecimalComma = Annotated[bool, typer.Option("--decimal-comma", help="0,013 means 0.013.")]
 SmallReadingsTrue = Annotated[
     bool,
-    typer.Option("--small-readings-true", help="Readings below the play of new parts were checked: the unit is right."),
+    typer.Option(
+        "--small-readings-true",
+        help="Readings below the play of new parts were checked: the unit is right.",
+    ),
 ]
 Dates = Annotated[
     str | None,
-    typer.Option("--dates", metavar="dmy|mdy|ymd", help="Order of dates that are written as numbers."),
+    typer.Option(
+        "--dates", metavar="dmy|mdy|ymd", help="Order of dates that are written as numbers."
+    ),
 ]
 Causes = Annotated[
     list[Path] | None,
-    typer.Option("--causes", metavar="FILE.py", help="Your own causes. Runs this file: give only one that you trust."),
+    typer.Option(
+        "--causes",
+        metavar="FILE.py",
+        help="Your own causes. Runs this file: give only one that you trust.",
+    ),
 ]
-Report = Annotated[Path | None, typer.Option("--report", metavar="DIR", help="Write printable reports to this folder.")]
-Paper = Annotated[Page | None, typer.Option("--page", help="Paper of the report; A4 unless remembered.")]
+Report = Annotated[
+    Path | None,
+    typer.Option("--report", metavar="DIR", help="Write printable reports to this folder."),
+]
+Paper = Annotated[
+    Page | None, typer.Option("--page", help="Paper of the report; A4 unless remembered.")
+]
 Show = Annotated[
-    str | None, typer.Option("--show", metavar="in|thou|mm", help="Unit to show lengths in; inches unless remembered.")
+    str | None,
+    typer.Option(
+        "--show", metavar="in|thou|mm", help="Unit to show lengths in; inches unless remembered."
+    ),
 ]
 Remember = Annotated[
-    bool, typer.Option("--remember", help="Keep --show, --page and --map in mlg.toml here, for later runs.")
+    bool,
+    typer.Option(
+        "--remember", help="Keep --show, --page and --map in mlg.toml here, for later runs."
+    ),
 ]
 Force = Annotated[
-    bool, typer.Option("--force", help="Replace a file that is not of an earlier run; never an input or a store.")
+    bool,
+    typer.Option(
+        "--force", help="Replace a file that is not of an earlier run; never an input or a store."
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Write the result as JSON to stdout.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no notes.")]
@@ -124,14 +166,17 @@ class Tables:
             header, sign, column = pair.rpartition("=")
             if not sign or not header.strip() or not column.strip():
                 raise UsageError(
-                    f"--map {pair!r} is not HEADER=COLUMN", "Write for example --map 'Spiel 3=clearance_3_mm'."
+                    f"--map {pair!r} is not HEADER=COLUMN",
+                    "Write for example --map 'Spiel 3=clearance_3_mm'.",
                 )
             mapped[header.strip()] = column.strip()
         return mapped
 
 
 def flat(command: Callable[..., None]) -> Callable[..., None]:
-    """Let a command take options as dataclasses: on the command line each field of one is an option."""
+    """Let a command take options as dataclasses: on the command line each field of one is an
+    option.
+    """
     hints = get_type_hints(command, include_extras=True)
     groups: dict[str, Any] = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
     shown: list[Parameter] = []
@@ -139,7 +184,10 @@ def flat(command: Callable[..., None]) -> Callable[..., None]:
         if name in groups:
             own, named = get_type_hints(groups[name], include_extras=True), Parameter.KEYWORD_ONLY
             options = [(each.name, each.default) for each in fields(groups[name])]
-            shown += [Parameter(name, named, default=default, annotation=own[name]) for name, default in options]
+            shown += [
+                Parameter(name, named, default=default, annotation=own[name])
+                for name, default in options
+            ]
         else:
             shown.append(parameter.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[name]))
 

@@ -1,4 +1,6 @@
-"""Where results and messages go: stdout, stderr, what they can show, and what a reader that went away means."""
+"""Where results and messages go: stdout, stderr, what they can show, and what a reader that went
+away means.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,10 @@ _WIDTH_ELSEWHERE = 80
 WIDE, WIDEST = 100, 120
 _PLAIN = "mlg.plain"
 # A sign and what stands for it, one for one, so that drawings and tables keep their columns.
-_SIGNS = "═=─-━-│|┃|╭+╮+╰+╯+┌+┐+└+┘+├+┤+▲^△A▶>◀<○o■#□.█#▏|✓*✗!·-•*—-–-−-→>←<….’'‘'“\"”\"‹<›>×x±~≤<≥>≈~²2³3μuµu\u00a0 "
+_SIGNS = (
+    "═=─-━-│|┃|╭+╮+╰+╯+┌+┐+└+┘+├+┤+▲^△A▶>"
+    "◀<○o■#□.█#▏|✓*✗!·-•*—-–-−-→>←<….’'‘'“\"”\"‹<›>×x±~≤<≥>≈~²2³3μuµu\u00a0 "
+)
 _IN_ASCII = str.maketrans(_SIGNS[::2], _SIGNS[1::2])
 
 
@@ -71,7 +76,9 @@ def can_ask() -> bool:
 
 
 def abandon_stdout() -> None:
-    """Drop what is still to be written to stdout: the reader of the pipe went away, the work goes on."""
+    """Drop what is still to be written to stdout: the reader of the pipe went away, the work goes
+    on.
+    """
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -98,8 +105,12 @@ class DataConsole(Console):
         self.quiet = True
         abandon_stdout()
 
-    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Render; what a cell holds is made visible before it is measured where it is text, and in any case here."""
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterable[Segment]:
+        """Render; what a cell holds is made visible before it is measured where it is text, and in
+        any case here.
+        """
         for text, style, control in super().render(renderable, options):
             yield Segment(text if control else visible(text), style, control)
 
@@ -129,12 +140,22 @@ def console(
 
 
 def plain_table(
-    console: Console | None, *headings: str, right: Sequence[str] = (), title: str | Text | None = None
+    console: Console | None,
+    *headings: str,
+    right: Sequence[str] = (),
+    title: str | Text | None = None,
 ) -> Table:
-    """Return a table without rules, set closer where a console has little room; numbers stand to the right."""
+    """Return a table without rules, set closer where a console has little room; numbers stand to
+    the right.
+    """
     gap = 2 if console is None or console.width >= WIDE else 1
     table = Table(
-        box=None, pad_edge=False, padding=(0, gap, 0, 0), header_style="bold", title=title, title_justify="left"
+        box=None,
+        pad_edge=False,
+        padding=(0, gap, 0, 0),
+        header_style="bold",
+        title=title,
+        title_justify="left",
     )
     for heading in headings:
         table.add_column(heading, justify="right" if heading in right else "left")
@@ -147,7 +168,9 @@ def text(data: str, style: str = "") -> Text:
 
 
 def word(data: str | None, style: str = "") -> Text:
-    """Return an identity for a heading or a cell: on one line, a question mark where there is none."""
+    """Return an identity for a heading or a cell: on one line, a question mark where there is
+    none.
+    """
     return Text("?" if data is None else visible(data, one_line=True), style=style)
 
 
@@ -177,7 +200,10 @@ def write(result: str) -> None:
 def write_json(result: dict[str, Any] | Iterator[str]) -> None:
     """Write a result as JSON to stdout, or the pieces of it if it is an iterator."""
     if isinstance(result, dict):
-        pieces: Iterable[str] = (json.dumps(result, allow_nan=False, ensure_ascii=False, indent=1), "\n")
+        pieces: Iterable[str] = (
+            json.dumps(result, allow_nan=False, ensure_ascii=False, indent=1),
+            "\n",
+        )
     else:
         pieces = result
     utf8 = codecs.lookup(sys.stdout.encoding or "ascii").name == "utf-8"

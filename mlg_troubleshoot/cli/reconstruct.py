@@ -1,4 +1,6 @@
-"""``mlg gear reconstruct``: what a linkage meets and what stays unknown. Nothing heavy is imported before it runs."""
+"""``mlg gear reconstruct``: what a linkage meets and what stays unknown. Nothing heavy is imported
+before it runs.
+"""
 
 from __future__ import annotations
 
@@ -21,17 +23,29 @@ EPILOG = (
 def reconstruct(
     context: typer.Context,
     targets: Annotated[
-        Path | None, typer.Option("--targets", metavar="TOML", help="Numbers to meet, else those printed in the paper.")
+        Path | None,
+        typer.Option(
+            "--targets", metavar="TOML", help="Numbers to meet, else those printed in the paper."
+        ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random linkages.")] = 0,
     start: Annotated[
         str | None,
-        typer.Option("--start", metavar="NAME", help="Polish this linkage of the gear (A, B, …), else from scratch."),
+        typer.Option(
+            "--start",
+            metavar="NAME",
+            help="Polish this linkage of the gear (A, B, …), else from scratch.",
+        ),
     ] = None,
     name: Annotated[str, typer.Option("--name", help="Name of the new linkage.")] = "N",
-    minutes: Annotated[float, typer.Option("--minutes", min=0.01, help="Time to give up after.")] = 15.0,
+    minutes: Annotated[
+        float, typer.Option("--minutes", min=0.01, help="Time to give up after.")
+    ] = 15.0,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="OUT.toml", help="Write the linkage as a member of an ensemble.")
+        Path | None,
+        typer.Option(
+            "--out", metavar="OUT.toml", help="Write the linkage as a member of an ensemble."
+        ),
     ] = None,
     force: options.Force = False,
     as_json: options.Json = False,
@@ -51,7 +65,14 @@ def reconstruct(
     claim(gear, [targets], [OutputFile("--out", out, task.LINKAGE)], force=force)
     with stages(quiet=quiet) as advance:
         found, text = task.reconstruct_linkage(
-            gear, targets=targets, seed=seed, start=start, name=name, minutes=minutes, out=out, progress=advance
+            gear,
+            targets=targets,
+            seed=seed,
+            start=start,
+            name=name,
+            minutes=minutes,
+            out=out,
+            progress=advance,
         )
     if as_json:
         output.write_json(task.reconstruction_values(found, text))
@@ -64,7 +85,9 @@ def reconstruct(
 
 def _show(found: Reconstruction, text: str, *, show_member: bool) -> None:
     console = output.console(elsewhere=output.WIDEST)
-    table = output.plain_table(None, "target", "printed", "linkage", "accepted", "", "", right=("linkage",))
+    table = output.plain_table(
+        None, "target", "printed", "linkage", "accepted", "", "", right=("linkage",)
+    )
     for each in found.met:
         table.add_row(
             each.target.quantity,
@@ -78,10 +101,12 @@ def _show(found: Reconstruction, text: str, *, show_member: bool) -> None:
     free = found.numbers - found.determined
     loosest = ", ".join(name for name, _ in found.loosest)
     console.print(
-        f"{found.numbers} numbers describe the linkage; the binding targets determine {found.determined} "
-        f"directions among them, {free} stay free. Least determined: {loosest}. "
-        f"{found.evaluations} linkages tried, seed {found.seed}."
+        f"{found.numbers} numbers describe the linkage; the binding targets determine"
+        f" {found.determined} directions among them, {free} stay free. Least determined: {loosest}."
+        f" {found.evaluations} linkages tried, seed {found.seed}."
     )
-    console.print("This linkage is chosen to meet numbers; it is not measured and not drawing data.")
+    console.print(
+        "This linkage is chosen to meet numbers; it is not measured and not drawing data."
+    )
     if show_member:
         output.write("\n" + text)

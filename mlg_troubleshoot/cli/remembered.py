@@ -1,7 +1,8 @@
-"""What is remembered from run to run in ``mlg.toml``: the unit to show, the paper, how headers are read.
+"""What is remembered from run to run in ``mlg.toml``: the unit to show, the paper, how headers are
+read.
 
-Never what could turn a verdict: unit of entry, convention, side or margin, nor another meaning for a
-header that is understood by itself. The file is data: it is checked strictly.
+Never what could turn a verdict: unit of entry, convention, side or margin, nor another meaning for
+a header that is understood by itself. The file is data: it is checked strictly.
 """
 
 from __future__ import annotations
@@ -50,7 +51,8 @@ def settings(
         say(f"Remembered: {_remember(gear, show, page, headers)}")
     found = _recall(gear, show, page)
     if found.note:
-        # Said even where notes are not wanted: a file that happens to lie here shapes what is shown.
+        # Said even where notes are not wanted: a file that happens to lie here shapes what is
+        # shown.
         say(f"Note: {found.note}")
     return found
 
@@ -99,42 +101,64 @@ def _remember(gear: str, show: str | None, page: Page | None, headers: Mapping[s
 
 def _read(file: Path, gear: str) -> Settings:
     if not file.is_file() or file.stat().st_size > _MOST_BYTES:
-        raise UsageError(f"{file} is not a file of at most {_MOST_BYTES} bytes", "Delete it, or write it anew.")
+        raise UsageError(
+            f"{file} is not a file of at most {_MOST_BYTES} bytes", "Delete it, or write it anew."
+        )
     try:
         raw = tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise UsageError(f"{file} cannot be read as TOML: {str(error)[:200]}", "Correct or delete it.") from error
+        raise UsageError(
+            f"{file} cannot be read as TOML: {str(error)[:200]}", "Correct or delete it."
+        ) from error
     return _judged(file, raw, gear)
 
 
 def _judged(file: Path, raw: Mapping[str, object], gear: str) -> Settings:
-    """Check every key and value: what is remembered is data, and nothing in it may turn a verdict."""
+    """Check every key and value: what is remembered is data, and nothing in it may turn a
+    verdict.
+    """
     unknown = [key for key in raw if key not in _KEYS]
     if unknown:
         raise UsageError(
-            f"{file}: {unknown[0]!r} is never remembered", f"Only {', '.join(_KEYS)} are; give the rest with each run."
+            f"{file}: {unknown[0]!r} is never remembered",
+            f"Only {', '.join(_KEYS)} are; give the rest with each run.",
         )
     headers = raw.get("headers", {})
     if not isinstance(headers, dict) or len(headers) > _MOST_HEADERS:
-        raise UsageError(f"{file}: headers is not a table of at most {_MOST_HEADERS} entries", "Correct or delete it.")
+        raise UsageError(
+            f"{file}: headers is not a table of at most {_MOST_HEADERS} entries",
+            "Correct or delete it.",
+        )
     for header, column in headers.items():
         texts = (header, column)
-        if not all(isinstance(t, str) and len(t) <= _MOST_CHARACTERS and t.isprintable() for t in texts):
-            raise UsageError(f"{file}: headers: {header!r} = {column!r} is not a text", "Correct or delete it.")
+        if not all(
+            isinstance(t, str) and len(t) <= _MOST_CHARACTERS and t.isprintable() for t in texts
+        ):
+            raise UsageError(
+                f"{file}: headers: {header!r} = {column!r} is not a text", "Correct or delete it."
+            )
         if _TURNS_A_VERDICT.search(column):
             raise UsageError(
-                f"{file}: headers: {header!r} = {column!r} states a unit, convention, side or margin: never remembered",
-                "Remember the column without its unit, as clearance_3, and give --unit with each run.",
+                f"{file}: headers: {header!r} = {column!r} states a unit, convention, side or"
+                " margin: never remembered",
+                "Remember the column without its unit, as clearance_3, and give --unit with each"
+                " run.",
             )
     _refuse_understood(file, headers, gear)
     try:
-        return Settings(LengthUnit(str(raw.get("show", "in"))), Page(str(raw.get("page", "A4"))), dict(headers))
+        return Settings(
+            LengthUnit(str(raw.get("show", "in"))), Page(str(raw.get("page", "A4"))), dict(headers)
+        )
     except ValueError as error:
-        raise UsageError(f"{file}: {error}", "show is in, thou or mm; page is A4 or Letter.") from None
+        raise UsageError(
+            f"{file}: {error}", "show is in, thou or mm; page is A4 or Letter."
+        ) from None
 
 
 def _refuse_understood(file: Path, headers: Mapping[str, str], gear: str) -> None:
-    """Refuse to remember another meaning for a header that is understood, or to drop a doubtful one."""
+    """Refuse to remember another meaning for a header that is understood, or to drop a doubtful
+    one.
+    """
     if not headers:
         return
     from mlg_troubleshoot.gear.gear_file import load_gear
@@ -145,7 +169,8 @@ def _refuse_understood(file: Path, headers: Mapping[str, str], gear: str) -> Non
         why = why_not_remembered(header, column, options)
         if why:
             raise UsageError(
-                f"{file}: headers: {header!r} = {column!r} is never remembered: by itself {header!r} "
-                f"{why}, and another meaning could turn a verdict",
-                f'Delete the line from {file}; give --map "{header}={column}" with each run that needs it.',
+                f"{file}: headers: {header!r} = {column!r} is never remembered: by itself"
+                f" {header!r} {why}, and another meaning could turn a verdict",
+                f'Delete the line from {file}; give --map "{header}={column}" with each run that'
+                " needs it.",
             )

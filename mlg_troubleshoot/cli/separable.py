@@ -10,35 +10,56 @@ import typer
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.schemas import SCHEMA_VERSION
 
-EPILOG = "Example: [b]mlg gear separable --columns tail_no,side,gear_landings,clearance_3_in,clearance_5_in[/b]"
+EPILOG = (
+    "Example: [b]mlg gear separable --columns"
+    " tail_no,side,gear_landings,clearance_3_in,clearance_5_in[/b]"
+)
 
 
 def separable(
     context: typer.Context,
     columns: Annotated[
         str | None,
-        typer.Option("--columns", metavar="A,B,…", help="Columns that will be recorded, as in a table; else all."),
+        typer.Option(
+            "--columns",
+            metavar="A,B,…",
+            help="Columns that will be recorded, as in a table; else all.",
+        ),
     ] = None,
     as_json: options.Json = False,
     _version: options.Version = False,
 ) -> None:
-    """Say which causes the planned columns could distinguish, and at which size, before anything is measured."""
+    """Say which causes the planned columns could distinguish, and at which size, before anything is
+    measured.
+    """
     from mlg_troubleshoot.workflows.separable import separable as planned
 
-    names = None if columns is None else [name.strip() for name in columns.split(",") if name.strip()]
+    names = (
+        None if columns is None else [name.strip() for name in columns.split(",") if name.strip()]
+    )
     gear = context.obj or options.DEFAULT_GEAR
     causes = planned(gear, names)
     if as_json:
         output.write_json(
-            {"schema_version": SCHEMA_VERSION, "columns": names, "causes": [asdict(cause) for cause in causes]}
+            {
+                "schema_version": SCHEMA_VERSION,
+                "columns": names,
+                "causes": [asdict(cause) for cause in causes],
+            }
         )
         return
     console = output.console()
     console.print(
-        "Smallest effects, rms in thou over 200 rows of 20 aircraft, that are detected, and distinguished from the "
-        "nearest alternative, with 80 % power:"
+        "Smallest effects, rms in thou over 200 rows of 20 aircraft, that are detected, and"
+        " distinguished from the nearest alternative, with 80 % power:"
     )
-    headings = ("cause", "detected", "looks most like", "distinguished", "cheapest column that splits them")
+    headings = (
+        "cause",
+        "detected",
+        "looks most like",
+        "distinguished",
+        "cheapest column that splits them",
+    )
     table = output.plain_table(None, *headings, right=("detected", "distinguished"))
     for cause in (c for c in causes if c.missing_column is None):
         table.add_row(

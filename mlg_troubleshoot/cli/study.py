@@ -6,8 +6,9 @@ from mlg_troubleshoot.cli import options
 from mlg_troubleshoot.cli.flags import StudyFlags
 
 EPILOG = (
-    "Example: [b]mlg study[/b] · the paper's design: [b]mlg study --design lhs[/b] · its statements: "
-    "[b]mlg study --statements[/b] · the table that mlg check uses: [b]mlg study --design tensor --write-table[/b]"
+    "Example: [b]mlg study[/b] · the paper's design: [b]mlg study --design lhs[/b] · its"
+    " statements: [b]mlg study --statements[/b] · the table that mlg check uses: [b]mlg study"
+    " --design tensor --write-table[/b]"
 )
 
 
@@ -22,7 +23,10 @@ def study(flags: StudyFlags, _version: options.Version = False) -> None:
     from mlg_troubleshoot.outputs import CONTINUED, OutputFile
     from mlg_troubleshoot.workflows.study import STUDY_CSV
 
-    outputs = [OutputFile("--csv", flags.csv, STUDY_CSV), OutputFile("--state", flags.state, CONTINUED)]
+    outputs = [
+        OutputFile("--csv", flags.csv, STUDY_CSV),
+        OutputFile("--state", flags.state, CONTINUED),
+    ]
     if flags.write_table:
         outputs.append(OutputFile(WRITE_TABLE, load_gear(flags.gear).indices_file, INDEX_TABLE))
     claim(flags.gear, [flags.given], outputs, flags.report, force=flags.force)

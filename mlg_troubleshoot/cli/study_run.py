@@ -21,7 +21,13 @@ from mlg_troubleshoot.cli.remembered import Settings
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.paper.study import Design, Directions, StudyFindings, StudyOptions, StudyResult
+from mlg_troubleshoot.paper.study import (
+    Design,
+    Directions,
+    StudyFindings,
+    StudyOptions,
+    StudyResult,
+)
 from mlg_troubleshoot.paper.targets import targets_file
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import study as task
@@ -40,12 +46,21 @@ def asked(flags: StudyFlags) -> Iterator[tuple[Gear, StudyOptions]]:
             fixed = np.radians([float(part) for part in flags.fixed.split(",")])
         except ValueError:
             raise UsageError(
-                f"directions {flags.fixed!r}", "Give degrees with commas between, one for each joint."
+                f"directions {flags.fixed!r}",
+                "Give degrees with commas between, one for each joint.",
             ) from None
-    plain = {each.name: getattr(flags, each.name) for each in fields(StudyOptions) if hasattr(flags, each.name)}
+    plain = {
+        each.name: getattr(flags, each.name)
+        for each in fields(StudyOptions)
+        if hasattr(flags, each.name)
+    }
     read = {
         "design": _choice(Design, flags.design, "design"),
-        "directions": _choice(Directions, flags.directions, "directions") if fixed is None else Directions.FIXED,
+        "directions": (
+            _choice(Directions, flags.directions, "directions")
+            if fixed is None
+            else Directions.FIXED
+        ),
         "fixed_rad": fixed,
         "limits_in": None if flags.limit is None else np.full(len(known.joints), flags.limit),
     }
@@ -68,7 +83,10 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
             designs=wants_report,
             progress=progress,
         )
-    said, searched = findings.statements if flags.statements else (), findings.searches if flags.bound else ()
+    said, searched = (
+        findings.statements if flags.statements else (),
+        findings.searches if flags.bound else (),
+    )
     shown = replace(findings, statements=said, searches=searched)
     if flags.as_json:
         output.write_json(task.study_values(shown, given))
@@ -98,7 +116,9 @@ def _choice(kind: type[_Choice], text: str, what: str) -> _Choice:
     try:
         return kind(text.lower())
     except ValueError:
-        raise UsageError(f"{what} {text!r} is not known", f"Give one of {', '.join(kind)}.") from None
+        raise UsageError(
+            f"{what} {text!r} is not known", f"Give one of {', '.join(kind)}."
+        ) from None
 
 
 def _client(address: str) -> Any:
@@ -106,45 +126,62 @@ def _client(address: str) -> Any:
         distributed: Any = import_module("distributed")
     except ImportError:
         raise UsageError(
-            "--scheduler needs dask.distributed", "Install the extra: pip install 'mlg-troubleshoot[cluster]'"
+            "--scheduler needs dask.distributed",
+            "Install the extra: pip install 'mlg-troubleshoot[cluster]'",
         ) from None
     try:
         return distributed.Client(address, timeout="10s")
     except (OSError, ValueError) as error:
-        raise UsageError(f"no Dask scheduler at {address}: {error}", "Start one, or leave out --scheduler.") from error
+        raise UsageError(
+            f"no Dask scheduler at {address}: {error}", "Start one, or leave out --scheduler."
+        ) from error
 
 
 def _show(findings: StudyFindings, unit: LengthUnit) -> None:
     console = output.console(unit=unit, elsewhere=output.WIDEST)
     gear, result = findings.gear, findings.result
     table = result.table
-    what = "exceeding the margin" if findings.options.beyond_margin else "plunger displacement at mid-position"
+    what = (
+        "exceeding the margin"
+        if findings.options.beyond_margin
+        else "plunger displacement at mid-position"
+    )
     console.print(f"{gear.name}: sensitivity of {what}", style="bold")
     console.print(f"Geometry: {gear.provenance}. Design: {table.design}, seed {table.seed}.")
     failed = f"{table.failed} did not close" if table.failed else "none failed"
-    console.print(f"{table.evaluations} solutions of the linkage over {len(gear.ensemble)} linkages, {failed}.")
+    console.print(
+        f"{table.evaluations} solutions of the linkage over {len(gear.ensemble)} linkages,"
+        f" {failed}."
+    )
     if result.indices.note:
         console.print(f"Note: {result.indices.note.rstrip('.')}.")
     console.print(_joints(gear, result))
     if result.plain is not None:
-        plain = ", ".join(f"#{n} {v:.4f}" for n, v in zip(gear.joint_numbers, result.plain, strict=True))
+        plain = ", ".join(
+            f"#{n} {v:.4f}" for n, v in zip(gear.joint_numbers, result.plain, strict=True)
+        )
         console.print(f"First order before its bias is removed: {plain}.")
     ends = [group for group in result.groups if len(group.joints) > 1]
     if ends:
         together = ", ".join(f"{'+'.join(f'#{j}' for j in g.joints)} {g.closed:.4f}" for g in ends)
         console.print(f"Both ends of one link together: {together}.")
     console.print(
-        "first, total: fractions of the variance, not normalised · linkages: range of the first order over all "
-        "that fit the printed numbers · A_iP: plunger movement per clearance · max A: largest stage-wise index"
+        "first, total: fractions of the variance, not normalised · linkages: range of the first"
+        " order over all that fit the printed numbers · A_iP: plunger movement per clearance · max"
+        " A: largest stage-wise index"
     )
     for found in findings.searches:
         sense = "over-travel" if found.sense > 0 else "under-travel"
         proved = found.proved
-        gap = "could not be proved" if math.isinf(proved.bound_in) else f"proved ≤ {proved.bound_in:.6f} in"
+        gap = (
+            "could not be proved"
+            if math.isinf(proved.bound_in)
+            else f"proved ≤ {proved.bound_in:.6f} in"
+        )
         console.sentence(
-            f"Worst {sense} with every clearance at its limit: {proved.found_in:.6f} in, {gap} over all directions "
-            f"and the whole stroke (sequential rule {found.sequential_in:.6f} in, "
-            f"global search {found.searched_in:.6f} in)."
+            f"Worst {sense} with every clearance at its limit: {proved.found_in:.6f} in, {gap} over"
+            f" all directions and the whole stroke (sequential rule {found.sequential_in:.6f} in,"
+            f" global search {found.searched_in:.6f} in)."
         )
     for statement in findings.statements:
         console.print()
@@ -155,11 +192,19 @@ def _joints(gear: Gear, result: StudyResult) -> Table:
     table = result.table
     shown = output.plain_table(None)
     for heading in ("joint", "first", "±", "", "total", "linkages", "rank", "A_iP", "max A"):
-        shown.add_column(heading, justify="left" if heading in {"joint", ""} else "right", no_wrap=True)
-    largest = max((j.first_order for j in table.joints if math.isfinite(j.first_order)), default=1.0)
+        shown.add_column(
+            heading, justify="left" if heading in {"joint", ""} else "right", no_wrap=True
+        )
+    largest = max(
+        (j.first_order for j in table.joints if math.isfinite(j.first_order)), default=1.0
+    )
     for joint, entry in zip(gear.joints, table.joints, strict=True):
         low, high = entry.first_order_interval
-        length = _BAR * max(entry.first_order, 0.0) / max(largest, 1e-9) if math.isfinite(entry.first_order) else 0
+        length = (
+            _BAR * max(entry.first_order, 0.0) / max(largest, 1e-9)
+            if math.isfinite(entry.first_order)
+            else 0
+        )
         first, last = entry.rank_range
         shown.add_row(
             joint.label,
@@ -184,9 +229,9 @@ def _show_given(gear: Gear, given: task.GivenDataResult) -> None:
         )
     )
     output.console().print(
-        f"Without a model, from {given.rows_used} measured of {given.rows_read} inspections in {given.file}, "
-        f"first order with 95 % intervals: {each}. Where joints wear together each also explains what the others "
-        "do, and these add to more than 1."
+        f"Without a model, from {given.rows_used} measured of {given.rows_read} inspections in"
+        f" {given.file}, first order with 95 % intervals: {each}. Where joints wear together each"
+        " also explains what the others do, and these add to more than 1."
     )
 
 

@@ -25,18 +25,31 @@ EPILOG = (
 def survey(
     context: typer.Context,
     file: Annotated[
-        str, typer.Argument(metavar="FILE|template|ask", help="Filled-in survey, or the word template or ask.")
+        str,
+        typer.Argument(
+            metavar="FILE|template|ask", help="Filled-in survey, or the word template or ask."
+        ),
     ],
     template: Annotated[
         Path | None,
-        typer.Argument(metavar="[FILE.csv|FILE.xlsx]", help="Template to write; after ask: where answers are kept."),
+        typer.Argument(
+            metavar="[FILE.csv|FILE.xlsx]",
+            help="Template to write; after ask: where answers are kept.",
+        ),
     ] = None,
     write: Annotated[
-        Path | None, typer.Option("--write", metavar="GEAR.toml", help="Write the surveyed gear, ensemble and table.")
+        Path | None,
+        typer.Option(
+            "--write", metavar="GEAR.toml", help="Write the surveyed gear, ensemble and table."
+        ),
     ] = None,
     inspections: Annotated[
         Path | None,
-        typer.Option("--for", metavar="INSPECTIONS", help="Narrow the displacement of these, not the indices."),
+        typer.Option(
+            "--for",
+            metavar="INSPECTIONS",
+            help="Narrow the displacement of these, not the indices.",
+        ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the starts and draws.")] = 0,
     force: options.Force = False,
@@ -60,23 +73,35 @@ def survey(
     gear = context.obj or options.DEFAULT_GEAR
     shown = settings(gear, show, page)
     if file in ("template", "ask") and template is None and not Path(file).exists():
-        raise UsageError(f"{file} needs the name of a file", f"Give for example: mlg gear survey {file} survey.csv")
+        raise UsageError(
+            f"{file} needs the name of a file",
+            f"Give for example: mlg gear survey {file} survey.csv",
+        )
     if file == "template" and template is not None:
         claim(gear, (), [OutputFile("the template", template, TO_FILL_IN)], force=force)
         task.write_survey_template(template, gear, shown.show)
         output.write(
-            f"Written: {template}. Fill in what you read, then: mlg gear survey {template} --write my-gear.toml"
+            f"Written: {template}. Fill in what you read, then: mlg gear survey {template} --write"
+            " my-gear.toml"
         )
         return
     if file == "ask" and template is not None:
         file = _asked(template, gear, shown.show)
     elif template is not None:
-        raise UsageError(f"unexpected {str(template)!r}", "Give one survey, or: mlg gear survey template FILE.csv")
+        raise UsageError(
+            f"unexpected {str(template)!r}",
+            "Give one survey, or: mlg gear survey template FILE.csv",
+        )
     outputs = () if write is None else task.written_with(write)
     claim(gear, [file, inspections], outputs, report, force=force)
     with stages(quiet=quiet) as bar:
         result = task.survey_gear(
-            file, gear, write=write, inspections=inspections, seed=seed, told=partial(bar, "Fitting")
+            file,
+            gear,
+            write=write,
+            inspections=inspections,
+            seed=seed,
+            told=partial(bar, "Fitting"),
         )
     if as_json:
         output.write_json(task.survey_values(result))
@@ -93,7 +118,9 @@ def survey(
 
 
 def _asked(file: Path, gear: str, unit: LengthUnit) -> str:
-    """Ask for the readings on the terminal; the file keeps them, so that a later run goes on where this one stopped."""
+    """Ask for the readings on the terminal; the file keeps them, so that a later run goes on where
+    this one stopped.
+    """
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.prompts import RichTerminal
     from mlg_troubleshoot.cli.survey_prompts import ask_survey
@@ -102,7 +129,10 @@ def _asked(file: Path, gear: str, unit: LengthUnit) -> str:
     from mlg_troubleshoot.workflows.survey import write_survey_template
 
     if not output.can_ask():
-        raise UsageError("this is not a terminal to ask on", "Fill in a template: mlg gear survey template FILE.csv")
+        raise UsageError(
+            "this is not a terminal to ask on",
+            "Fill in a template: mlg gear survey template FILE.csv",
+        )
     claim(gear, (), [OutputFile("the survey", file, CONTINUED)])
     if not file.exists():
         write_survey_template(file, gear, unit)
@@ -119,7 +149,9 @@ def _asked(file: Path, gear: str, unit: LengthUnit) -> str:
 
 def _show(result: SurveyResult, console: output.DataConsole) -> None:
     for problem in result.problems:
-        output.say(f"{problem.place()}: {problem.value}: expected {problem.expected}. {problem.remedy}")
+        output.say(
+            f"{problem.place()}: {problem.value}: expected {problem.expected}. {problem.remedy}"
+        )
     found = result.survey
     if found is None:
         console.print("This table contains no usable reading.")
@@ -127,18 +159,23 @@ def _show(result: SurveyResult, console: output.DataConsole) -> None:
         console.print(f"{result.gear.name}: {found.words}", style="bold")
         numbers = ("index", "90 % interval", "before")
         table = output.plain_table(None, "joint", *numbers, right=numbers)
-        rows = zip(result.gear.joints, result.amplification, result.interval, result.before, strict=True)
+        rows = zip(
+            result.gear.joints, result.amplification, result.interval, result.before, strict=True
+        )
         for joint, a, after, before in rows:
             ends = (f"{low:.3f} to {high:.3f}" for low, high in (after, before))
             table.add_row(output.word(joint.label), f"{a:.3f}", *ends)
         console.print(table)
         mode = found.modes[0]
         console.print(
-            f"Index: movement of the plunger per clearance of the joint. The readings determine "
-            f"{mode.parameters:.1f} of {len(mode.vector)} numbers of the linkage; the rest is as it was before."
+            "Index: movement of the plunger per clearance of the joint. The readings determine"
+            f" {mode.parameters:.1f} of {len(mode.vector)} numbers of the linkage; the rest is as"
+            " it was before."
         )
         for misfit in found.misfits:
-            console.sentence(f"Row {misfit.reading.row}, {misfit.reading.words}: {misfit.words}.", "bold")
+            console.sentence(
+                f"Row {misfit.reading.row}, {misfit.reading.words}: {misfit.words}.", "bold"
+            )
     for each in result.inspections:
         console.sentence(f"{each.record_id}: {each.words}.")
     for warning in result.warnings:
@@ -147,6 +184,10 @@ def _show(result: SurveyResult, console: output.DataConsole) -> None:
         console.print("No further reading would narrow this by 1 %: you can stop.")
     else:
         share = 100 * result.suggestion.narrowing
-        console.sentence(f"Next: {result.suggestion.reading.words}; narrows this by about {share:.0f} %.")
+        console.sentence(
+            f"Next: {result.suggestion.reading.words}; narrows this by about {share:.0f} %."
+        )
     if result.gear_file is not None:
-        console.print(f"Written: {result.gear_file}. Use it: mlg check FILE --gear {result.gear_file}")
+        console.print(
+            f"Written: {result.gear_file}. Use it: mlg check FILE --gear {result.gear_file}"
+        )

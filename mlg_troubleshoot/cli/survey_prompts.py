@@ -1,4 +1,6 @@
-"""The readings of a survey asked for on a terminal, one row of the template after the other, each kept at once."""
+"""The readings of a survey asked for on a terminal, one row of the template after the other, each
+kept at once.
+"""
 
 from __future__ import annotations
 
@@ -15,20 +17,31 @@ from mlg_troubleshoot.records.survey_table import COLUMNS, read_survey
 from mlg_troubleshoot.surveying.readings import SurveyedLinkage
 from mlg_troubleshoot.units import THOU_PER_IN
 
-_KEYS = keys(("Enter", "not read"), ("b", "back"), ("done", "no more"), ("q", "stop; what was read is kept"))
-_TYPED = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+))\s*(?P<unit>in|thou|mm|deg|°)?", re.IGNORECASE)
+_KEYS = keys(
+    ("Enter", "not read"), ("b", "back"), ("done", "no more"), ("q", "stop; what was read is kept")
+)
+_TYPED = re.compile(
+    r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+))\s*(?P<unit>in|thou|mm|deg|°)?", re.IGNORECASE
+)
 _SIGNED = re.compile(r"[-+]\d*\.?\d+(e-\d+)?")
 
 
 def ask_survey(file: Path, gear: Gear, terminal: RichTerminal) -> bool:
-    """Ask for the readings that a template still lacks and keep each in it; False if the user stopped."""
+    """Ask for the readings that a template still lacks and keep each in it; False if the user
+    stopped.
+    """
     if file.suffix.lower() != ".csv":
-        raise UsageError(f"{file.name!r} does not end in .csv", "Answers are kept as CSV: give such a name.")
+        raise UsageError(
+            f"{file.name!r} does not end in .csv", "Answers are kept as CSV: give such a name."
+        )
     linkage = SurveyedLinkage(gear)
     with file.open(newline="", encoding="utf-8-sig", errors="replace") as text:
         header, *rows = [*csv.reader(text)] or [[]]
     if not set(COLUMNS) <= set(header):
-        raise UsageError(f"{file} is not a survey template", "Give a new name, or one that mlg gear survey wrote.")
+        raise UsageError(
+            f"{file} is not a survey template",
+            "Give a new name, or one that mlg gear survey wrote.",
+        )
     rows = [[*row, *[""] * (len(header) - len(row))] for row in rows]
     values = [i for i, name in enumerate(header) if name.startswith("value_")]
     terminal.say([_KEYS, BLANK])
@@ -36,8 +49,20 @@ def ask_survey(file: Path, gear: Gear, terminal: RichTerminal) -> bool:
     while at < len(rows):
         row = dict(zip(header, rows[at], strict=False))
         unit = "deg" if row.get("u_deg") else "mm" if row.get("u_mm") else "in"
-        terminal.say([line((f"{at + 1} of {len(rows)}: {_words(row)}", Tone.STRONG)), line(row.get("how", ""))])
-        known = next((row[header[i]] + " " + header[i].removeprefix("value_") for i in values if rows[at][i]), "")
+        terminal.say(
+            [
+                line((f"{at + 1} of {len(rows)}: {_words(row)}", Tone.STRONG)),
+                line(row.get("how", "")),
+            ]
+        )
+        known = next(
+            (
+                row[header[i]] + " " + header[i].removeprefix("value_")
+                for i in values
+                if rows[at][i]
+            ),
+            "",
+        )
         typed = terminal.ask(f" {known or unit} > ").strip()
         if typed in ("q", "done"):
             return typed == "done"
@@ -48,13 +73,22 @@ def ask_survey(file: Path, gear: Gear, terminal: RichTerminal) -> bool:
         found = _TYPED.fullmatch(typed)
         if found is not None:
             rows[at] = [*before]
-            _put(rows[at], header, float(found["number"]), (found["unit"] or unit).lower().replace("°", "deg"))
+            _put(
+                rows[at],
+                header,
+                float(found["number"]),
+                (found["unit"] or unit).lower().replace("°", "deg"),
+            )
             _keep(file, header, rows)
         wrong = [p for p in read_survey(file, linkage)[1] if p.row == at + 2]
         if found is None or wrong:
             rows[at] = before
             _keep(file, header, rows)
-            expected = wrong[0].expected if wrong else f"a number, as 7.15 or 181.6 mm, in {unit} where it has no unit"
+            expected = (
+                wrong[0].expected
+                if wrong
+                else f"a number, as 7.15 or 181.6 mm, in {unit} where it has no unit"
+            )
             terminal.say([line((f"{typed!r}: expected {expected}.", Tone.BAD))])
         else:
             at += 1
@@ -62,8 +96,13 @@ def ask_survey(file: Path, gear: Gear, terminal: RichTerminal) -> bool:
 
 
 def _words(row: dict[str, str]) -> str:
-    ends = " ".join(part for part in (row["from"], "to" if row["kind"] == "DISTANCE" else "", row["to"]) if part)
-    at = next((f"at extension {row[c]} {c[10:]}" for c in ("extension_in", "extension_mm") if row.get(c)), "")
+    ends = " ".join(
+        part for part in (row["from"], "to" if row["kind"] == "DISTANCE" else "", row["to"]) if part
+    )
+    at = next(
+        (f"at extension {row[c]} {c[10:]}" for c in ("extension_in", "extension_mm") if row.get(c)),
+        "",
+    )
     return " ".join(part for part in (row["kind"].lower(), ends, at) if part)
 
 
@@ -78,6 +117,8 @@ def _put(row: list[str], header: list[str], number: float, unit: str) -> None:
 
 
 def _keep(file: Path, header: list[str], rows: list[list[str]]) -> None:
-    """Write the table; numbers as numbers, since a text that begins with a sign would be taken for a formula."""
+    """Write the table; numbers as numbers, since a text that begins with a sign would be taken for
+    a formula.
+    """
     plain = [[float(cell) if _SIGNED.fullmatch(cell) else cell for cell in row] for row in rows]
     write_csv(file, header, plain)

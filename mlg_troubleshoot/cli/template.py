@@ -13,7 +13,10 @@ from mlg_troubleshoot.errors import UsageError
 
 def template(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE.xlsx|FILE.pdf", help="Where to write it: a workbook, or a form to print.")
+        Path,
+        typer.Argument(
+            metavar="FILE.xlsx|FILE.pdf", help="Where to write it: a workbook, or a form to print."
+        ),
     ],
     gear: options.Gear = options.DEFAULT_GEAR,
     force: options.Force = False,
@@ -21,7 +24,9 @@ def template(
     show: options.Show = None,
     _version: options.Version = False,
 ) -> None:
-    """Write an empty inspection workbook for mlg check, or a one-page form (.pdf, .html) to fill in by hand."""
+    """Write an empty inspection workbook for mlg check, or a one-page form (.pdf, .html) to fill in
+    by hand.
+    """
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.outputs import TO_FILL_IN, OutputFile
@@ -29,7 +34,8 @@ def template(
 
     if file.suffix.lower() not in (".xlsx", ".pdf", ".html"):
         raise UsageError(
-            f"{file.name!r} is not the name of a workbook or a form", "Give a name that ends in .xlsx, .pdf or .html."
+            f"{file.name!r} is not the name of a workbook or a form",
+            "Give a name that ends in .xlsx, .pdf or .html.",
         )
     claim(gear, (), [OutputFile("the template", file, TO_FILL_IN)], force=force)
     shown = settings(gear, show, page)

@@ -38,10 +38,11 @@ class JointFinding:
 
     contribution_in: plunger amplification × radial clearance; both None if not measured. [in]
     first_order, total_order: sensitivity indices of the precomputed table (Eqs. 1 and 2). [1]
-    plunger_amplification: A_iP at mid-position in the limit of small clearance (Eq. 8). [1]
-    rank, rank_range: order in which to inspect, from 1, and how it varies over the ensemble of geometries.
-    alike: joints at the other end of the same link: plunger data alone cannot distinguish them.
-    allowance_in: how much further this joint alone may wear until the worst case reaches the margin; None if it is
+    plunger_amplification: A_iP at mid-position in the limit of small clearance (Eq. 8). [1] rank,
+    rank_range: order in which to inspect, from 1, and how it varies over the ensemble of
+    geometries. alike: joints at the other end of the same link: plunger data alone cannot
+    distinguish them. allowance_in: how much further this joint alone may wear until the worst case
+    reaches the margin; None if it is
         not measured or the worst case is beyond the margin already. [in]
     """
 
@@ -62,7 +63,8 @@ class JointFinding:
 
 @dataclass(frozen=True, slots=True)
 class RepairSet:
-    """A set of joints which, restored, brings the worst case within the margin; both numbers are those afterwards.
+    """A set of joints which, restored, brings the worst case within the margin; both numbers are
+    those afterwards.
 
     access_minutes, minutes: time to reach them; to open their areas and restore them. [min]
     """
@@ -76,7 +78,9 @@ class RepairSet:
 
 @dataclass(frozen=True, slots=True)
 class Rigging:
-    """What re-rigging alone would do: half of the range between both worst cases is left, clearances as they are."""
+    """What re-rigging alone would do: half of the range between both worst cases is left,
+    clearances as they are.
+    """
 
     shift_in: float
     predicted_displacement_in: float
@@ -89,9 +93,9 @@ class ReadingWorth:
     """What measuring one joint is worth.
 
     minutes: from the state of the inspection, areas that are open already being free. [min]
-    risk_drop: expected drop of the decision risk; 0 where this reading alone cannot change the decision. [1]
-    variance_in2: share of the variance of the worst case that the reading removes. [in²]
-    critical: true if no gear can be cleared without it.
+    risk_drop: expected drop of the decision risk; 0 where this reading alone cannot change the
+    decision. [1] variance_in2: share of the variance of the worst case that the reading removes.
+    [in²] critical: true if no gear can be cleared without it.
     """
 
     joint: int
@@ -103,12 +107,14 @@ class ReadingWorth:
 
 @dataclass(frozen=True, slots=True)
 class MeasuringAdvice:
-    """Which joint to measure next, the best one first, and whether one may stop: no reading will change the verdict.
+    """Which joint to measure next, the best one first, and whether one may stop: no reading will
+    change the verdict.
 
-    verdict: the verdict that stands if one may stop, else the verdict so far.
-    expected_within: chance that the gear is within its margin, unmeasured joints taken by their distribution. For
+    verdict: the verdict that stands if one may stop, else the verdict so far. expected_within:
+    chance that the gear is within its margin, unmeasured joints taken by their distribution. For
         the advice only: a verdict takes them at their bounds. [1]
-    expected: WITHIN_MARGIN or OUTSIDE_MARGIN where that chance is enough to go on troubleshooting, INCONCLUSIVE
+    expected: WITHIN_MARGIN or OUTSIDE_MARGIN where that chance is enough to go on troubleshooting,
+    INCONCLUSIVE
         where measuring the other joints would hardly settle it, else None.
     """
 
@@ -127,7 +133,9 @@ class MeasuringAdvice:
 
 @dataclass(frozen=True, slots=True)
 class Confidence:
-    """The probability of being within the margin with a linear response, and with its curvature by Monte Carlo. [1]"""
+    """The probability of being within the margin with a linear response, and with its curvature by
+    Monte Carlo. [1]
+    """
 
     analytic: float
     monte_carlo: float
@@ -137,7 +145,9 @@ class Confidence:
 
 @dataclass(frozen=True, slots=True)
 class UncertaintyBudget:
-    """Standard uncertainties behind the probability, at the prediction with unmeasured joints at 0. [in]"""
+    """Standard uncertainties behind the probability, at the prediction with unmeasured joints at 0.
+    [in]
+    """
 
     readings_in: Mapping[int, float]
     geometry_in: float
@@ -157,7 +167,9 @@ class UncertaintyBudget:
 
     @property
     def lines(self) -> tuple[tuple[str, float, float], ...]:
-        """Name, standard uncertainty and share of the combined variance of each part, largest reading first. [in, 1]"""
+        """Name, standard uncertainty and share of the combined variance of each part, largest
+        reading first. [in, 1]
+        """
         readings = sorted(self.readings_in.items(), key=lambda reading: -reading[1])
         parts = {
             **{f"reading of #{joint}": u for joint, u in readings},
@@ -171,7 +183,9 @@ class UncertaintyBudget:
 
 @dataclass(frozen=True, slots=True)
 class GroupChance:
-    """Chance that a joint, or one of two that the plunger cannot distinguish, is worn beyond its limit. [1]"""
+    """Chance that a joint, or one of two that the plunger cannot distinguish, is worn beyond its
+    limit. [1]
+    """
 
     joints: tuple[int, ...]
     probability: float
@@ -179,7 +193,9 @@ class GroupChance:
 
 @dataclass(frozen=True, slots=True)
 class ClearanceInterval:
-    """Median and central 90 % interval of one radial clearance, and the chance that it is beyond its limit. [in, 1]"""
+    """Median and central 90 % interval of one radial clearance, and the chance that it is beyond
+    its limit. [in, 1]
+    """
 
     joint: int
     low_in: float
@@ -235,7 +251,8 @@ class Assessment(_Planned):
     verdict : Verdict
         The verdict.
     predicted_displacement_in : float or None
-        Worst case, the larger of the two senses in magnitude; None where the linkage does not close. [in]
+        Worst case, the larger of the two senses in magnitude; None where the linkage does not
+        close. [in]
     over_travel_in, under_travel_in : float or None
         Signed worst case of each sense. [in]
     predicted_upper_in : float or None
@@ -245,9 +262,11 @@ class Assessment(_Planned):
     remaining_in : float or None
         Margin less prediction. [in]
     standard_uncertainty_in : float or None
-        Of the prediction against the margin; None where a linkage of the ensemble does not close. [in]
+        Of the prediction against the margin; None where a linkage of the ensemble does not close.
+        [in]
     probability_within_margin : float or None
-        Probability that the worst-case bound is within the margin, unmeasured joints taken as 0. [1]
+        Probability that the worst-case bound is within the margin, unmeasured joints taken as 0.
+        [1]
     probability_exceed_random_directions : float or None
         Chance with uniformly random directions. [1]
     geometry_spread_in : tuple of float or None
@@ -255,7 +274,8 @@ class Assessment(_Planned):
     budget : UncertaintyBudget or None
         What the standard uncertainty is made of.
     over_directions_rad, under_directions_rad : tuple of float
-        Worst directions, one per joint, for the curve and the schematic; empty where nothing closes. [rad]
+        Worst directions, one per joint, for the curve and the schematic; empty where nothing
+        closes. [rad]
     joints : tuple of JointFinding
         Ranked table, in the order of the joints' numbers.
     plan : Plan
@@ -265,12 +285,13 @@ class Assessment(_Planned):
     bound_in : float or None
         Worst case over all directions, whatever an extension predicts. [in]
     explained_at_most_in, unexplained_in : float or None
-        What of a measured displacement the joints can explain at most, unmeasured ones at their limit, and what they
-        cannot; None without a reading. [in]
+        What of a measured displacement the joints can explain at most, unmeasured ones at their
+        limit, and what they cannot; None without a reading. [in]
     headline : str
         The verdict in one or two plain sentences, what was measured first.
     measured_statement : str or None
-        What a displacement measured within the margin says; None if none was, or if the headline says it.
+        What a displacement measured within the margin says; None if none was, or if the headline
+        says it.
     repair_sets : tuple of RepairSet or None
         Repair sets; None if they were not asked for.
     warnings : tuple of str
@@ -280,9 +301,11 @@ class Assessment(_Planned):
     rigging : Rigging or None
         What re-rigging alone would do; None if it was not asked for or is not needed.
     confidence : Confidence or None
-        Monte Carlo check of the probability; None if it was not asked for or there is no uncertainty.
+        Monte Carlo check of the probability; None if it was not asked for or there is no
+        uncertainty.
     posterior : Posterior or None
-        Which joints explain the measured displacement; None if none was measured or it was not asked for.
+        Which joints explain the measured displacement; None if none was measured or it was not
+        asked for.
     """
 
     inspection: Inspection
@@ -322,19 +345,25 @@ class Assessment(_Planned):
 
     @property
     def as_loaded(self) -> bool:
-        """True where the prediction is the displacement as loaded: an expectation, with the bound also given."""
+        """True where the prediction is the displacement as loaded: an expectation, with the bound
+        also given.
+        """
         return self.predicted_displacement_in != self.bound_in
 
     @property
     def chance_wrong(self) -> float | None:
-        """Chance that the predicted worst case is on the other side of the margin than a verdict of this gear says.
+        """Chance that the predicted worst case is on the other side of the margin than a verdict of
+        this gear says.
 
-        Specific consumer's and producer's risk in the words of JCGM 106; None where no prediction decides. [1]
+        Specific consumer's and producer's risk in the words of JCGM 106; None where no prediction
+        decides. [1]
         """
         within = self.probability_within_margin
         if self.basis is Basis.MEASURED or self.standard_uncertainty_in is None or within is None:
             return None
-        return {Verdict.WITHIN_MARGIN: 1.0 - within, Verdict.OUTSIDE_MARGIN: within}.get(self.verdict)
+        return {Verdict.WITHIN_MARGIN: 1.0 - within, Verdict.OUTSIDE_MARGIN: within}.get(
+            self.verdict
+        )
 
     @property
     def ranked(self) -> tuple[JointFinding, ...]:

@@ -1,4 +1,6 @@
-"""A batch of gears under judgement as one object of arrays: what is known of each, held once and handed on."""
+"""A batch of gears under judgement as one object of arrays: what is known of each, held once and
+handed on.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ from mlg_troubleshoot.gear.gear import Gear
 
 @dataclass(frozen=True, slots=True)
 class Cases:
-    """n gears under judgement, NaN where nothing was measured; `own_gauge`: joints that were measured again. [in]"""
+    """n gears under judgement, NaN where nothing was measured; `own_gauge`: joints that were
+    measured again. [in]
+    """
 
     gear: Gear
     inspections: tuple[Inspection, ...]
@@ -43,17 +47,25 @@ class Cases:
     retracted: Mask
 
     @classmethod
-    def of(cls, gear: Gear, inspections: Sequence[Inspection], extension: Extension | None = None) -> Cases:
+    def of(
+        cls, gear: Gear, inspections: Sequence[Inspection], extension: Extension | None = None
+    ) -> Cases:
         numbers, rows = gear.joint_numbers, tuple(inspections)
         means = [i.measured_displacement_in for i in rows]
         return cls(
             gear=gear,
             inspections=rows,
             extension=extension,
-            clearance_in=np.array([[i.clearance_in.get(n, math.nan) for n in numbers] for i in rows], float),
+            clearance_in=np.array(
+                [[i.clearance_in.get(n, math.nan) for n in numbers] for i in rows], float
+            ),
             gauge_u_in=np.array([[i.gauge_u_of(number) for number in numbers] for i in rows]),
-            own_gauge=np.array([[number in i.gauge_u_by_joint_in for number in numbers] for i in rows]),
-            margin_in=np.array([gear.margin.value if i.margin_in is None else i.margin_in for i in rows]),
+            own_gauge=np.array(
+                [[number in i.gauge_u_by_joint_in for number in numbers] for i in rows]
+            ),
+            margin_in=np.array(
+                [gear.margin.value if i.margin_in is None else i.margin_in for i in rows]
+            ),
             margin_u_in=np.array([i.margin_u_in for i in rows]),
             mean_in=np.array([math.nan if mean is None else mean for mean in means]),
             mean_u_in=np.array([plunger_u(i) for i in rows]),
@@ -89,7 +101,9 @@ class Cases:
 
     @property
     def questions(self) -> tuple[str, ...]:
-        """What must be answered about the entry of each gear before it can be cleared; empty if nothing."""
+        """What must be answered about the entry of each gear before it can be cleared; empty if
+        nothing.
+        """
         return tuple(
             inspection.unit_question or _disagreement(inspection, float(margin_in))
             for inspection, margin_in in zip(self.inspections, self.margin_in, strict=True)
@@ -102,7 +116,9 @@ class Cases:
     def predict(self, clearance_in: Array, measured: Mask | None = None) -> Prediction:
         """Predict these gears with other clearances than those read. [in]"""
         known = self.measured if measured is None else measured
-        return predict(self.gear, self.inspections, clearance_in, known, self.gauge_u_in, self.extension)
+        return predict(
+            self.gear, self.inspections, clearance_in, known, self.gauge_u_in, self.extension
+        )
 
     def take(self, rows: Places) -> Cases:
         arrays = {
@@ -121,19 +137,25 @@ def _disagreement(inspection: Inspection, margin_in: float) -> str:
     if mean is None or not far or abs(mean) > margin_in:
         return ""
     return (
-        f"the plunger readings disagree: {far[0]:.4f} in is outside the margin of {margin_in:.4f} in, their mean of "
-        f"{mean:.4f} in is not. Read the plunger again."
+        f"the plunger readings disagree: {far[0]:.4f} in is outside the margin of {margin_in:.4f}"
+        f" in, their mean of {mean:.4f} in is not. Read the plunger again."
     )
 
 
 def plunger_u(inspection: Inspection) -> float:
     """Standard uncertainty of the mean plunger reading. [in]"""
-    one = DEFAULT_PLUNGER_U_IN if inspection.plunger_gauge_u_in is None else inspection.plunger_gauge_u_in
+    one = (
+        DEFAULT_PLUNGER_U_IN
+        if inspection.plunger_gauge_u_in is None
+        else inspection.plunger_gauge_u_in
+    )
     return one / math.sqrt(max(len(inspection.readings_in), 1))
 
 
 def predict_batch(cases: Cases) -> BatchPrediction:
-    """Predict with unmeasured joints at 0 and at their limit, and the chance with random directions."""
+    """Predict with unmeasured joints at 0 and at their limit, and the chance with random
+    directions.
+    """
     at_zero = cases.filled(0.0)
     lower = upper = cases.predict(at_zero)
     open_rows = np.flatnonzero(~cases.measured.all(axis=1))
@@ -144,10 +166,14 @@ def predict_batch(cases: Cases) -> BatchPrediction:
 
 
 def _chance(cases: Cases, clearance_in: Array) -> Array:
-    """Chance of exceeding the margin with random directions: by the expansion where clearances are small."""
+    """Chance of exceeding the margin with random directions: by the expansion where clearances are
+    small.
+    """
     gear, chance = cases.gear, np.empty(len(cases))
     small = np.all(clearance_in <= gear.confirm_above.value, axis=1) & (cases.extension is None)
-    chance[small] = responses(gear)[0].chance_beyond(clearance_in[small], cases.margin_in[small], DIRECTION_SETS)
+    chance[small] = responses(gear)[0].chance_beyond(
+        clearance_in[small], cases.margin_in[small], DIRECTION_SETS
+    )
     rows = np.flatnonzero(~small)
     if len(rows):
         chance[rows] = exact_chance(cases.take(rows), clearance_in[rows])
@@ -157,7 +183,18 @@ def _chance(cases: Cases, clearance_in: Array) -> Array:
 def exact_chance(cases: Cases, clearance_in: Array, shift_in: float = 0.0) -> Array:
     """Chance of exceeding the margin with random directions, the plunger shifted. [1]"""
     model, extension = cases.gear.model, cases.extension
-    found = Adjustment(clearance_in) if extension is None else extension.adjust(cases.inspections, clearance_in)
+    found = (
+        Adjustment(clearance_in)
+        if extension is None
+        else extension.adjust(cases.inspections, clearance_in)
+    )
     offset = shift_in + (np.zeros(len(cases)) if found.offset_in is None else found.offset_in)
-    acts = found.clearance_in, cases.margin_in, DIRECTION_SETS, found.numbers(model), offset, found.rate_factor
+    acts = (
+        found.clearance_in,
+        cases.margin_in,
+        DIRECTION_SETS,
+        found.numbers(model),
+        offset,
+        found.rate_factor,
+    )
     return chance_beyond(model, *acts)

@@ -36,14 +36,17 @@ def in_order(moments: Sequence[Moment]) -> list[int]:
     before: dict[str, float] = {}
     at = []
     for moment in moments:
-        before[moment.day] = before.get(moment.day, -inf) if moment.landings is None else moment.landings
+        before[moment.day] = (
+            before.get(moment.day, -inf) if moment.landings is None else moment.landings
+        )
         at.append(before[moment.day])
     by_time = sorted(range(len(moments)), key=lambda place: (moments[place].day, at[place]))
     dated = [place for place in by_time if moments[place].day]
     for earlier, place in pairwise(dated):
         if moments[place].landings is None:
             at[place] = at[earlier]
-    # An undated record follows every dated one with as many landings or fewer, and what is dated before that one.
+    # An undated record follows every dated one with as many landings or fewer, and what is dated
+    # before that one.
     for later, place in pairwise(reversed(dated)):
         at[place] = min(at[place], at[later])
     undated = [place for place in by_time if not moments[place].day]
@@ -51,10 +54,12 @@ def in_order(moments: Sequence[Moment]) -> list[int]:
 
 
 def contradictions(moments: Sequence[Moment], name: Callable[[int], str]) -> dict[int, str]:
-    """Say of each record that may be wrong how its date and its landings disagree with those of the others.
+    """Say of each record that may be wrong how its date and its landings disagree with those of the
+    others.
 
-    Suspect is what has to go so that the landings of the others never fall as time goes on: the fewest records that do.
-    Where several choices are as few, every record of any of them is a suspect, and they share one sentence.
+    Suspect is what has to go so that the landings of the others never fall as time goes on: the
+    fewest records that do. Where several choices are as few, every record of any of them is a
+    suspect, and they share one sentence.
     """
     placed = [i for i, moment in enumerate(moments) if moment.day and moment.landings is not None]
     placed.sort(key=lambda i: (moments[i].day, moments[i].landings))
@@ -74,12 +79,20 @@ def contradictions(moments: Sequence[Moment], name: Callable[[int], str]) -> dic
         return f"{moment.landings:g} landings on {moment.day} ({name(placed[n])})"
 
     if len(trusted) < longest:
-        listed = ", ".join(map(said, suspects[:_MOST_NAMED])) + (" …" if len(suspects) > _MOST_NAMED else "")
-        return dict.fromkeys((placed[n] for n in suspects), f"{listed} cannot all be right: landings never fall")
+        listed = ", ".join(map(said, suspects[:_MOST_NAMED])) + (
+            " …" if len(suspects) > _MOST_NAMED else ""
+        )
+        return dict.fromkeys(
+            (placed[n] for n in suspects), f"{listed} cannot all be right: landings never fall"
+        )
     found = {}
     for n in suspects:
         earlier = [m for m in trusted if m < n and landings[m] > landings[n]]
-        other = earlier[-1] if earlier else next(m for m in trusted if m > n and landings[m] < landings[n])
+        other = (
+            earlier[-1]
+            if earlier
+            else next(m for m in trusted if m > n and landings[m] < landings[n])
+        )
         found[placed[n]] = f"{said(n)} disagree with {said(other)}: landings never fall"
     return found
 

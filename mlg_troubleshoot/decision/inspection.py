@@ -1,4 +1,6 @@
-"""One inspection of one gear, as the decision and the diagnosis need it: radial clearances in inches."""
+"""One inspection of one gear, as the decision and the diagnosis need it: radial clearances in
+inches.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ class Side(StrEnum):
 
     @classmethod
     def spelt(cls, text: str) -> Side | None:
-        """Read a side as people write it: ``LH``, ``left``, ``L/H side``, ``port``; None if it is not one."""
+        """Read a side as people write it: ``LH``, ``left``, ``L/H side``, ``port``; None if it is
+        not one.
+        """
         bare = text.lower().removesuffix("side").removesuffix("gear")
         return _SIDES.get(re.sub(r"[^a-z]", "", bare))
 
@@ -35,10 +39,15 @@ class Side(StrEnum):
         return found
 
 
-# The one table of how sides are written, in lower case and letters only: for cells, prompts, flags and arguments.
+# The one table of how sides are written, in lower case and letters only: for cells, prompts, flags
+# and arguments.
 _SIDES = {
-    **dict.fromkeys(("l", "lh", "lhs", "left", "lefthand", "port", "lhmlg", "leftmlg", "mlgl", "mlglh"), Side.LH),
-    **dict.fromkeys(("r", "rh", "rhs", "right", "righthand", "starboard", "stbd", "rhmlg", "rightmlg"), Side.RH),
+    **dict.fromkeys(
+        ("l", "lh", "lhs", "left", "lefthand", "port", "lhmlg", "leftmlg", "mlgl", "mlglh"), Side.LH
+    ),
+    **dict.fromkeys(
+        ("r", "rh", "rhs", "right", "righthand", "starboard", "stbd", "rhmlg", "rightmlg"), Side.RH
+    ),
     **dict.fromkeys(("mlgr", "mlgrh"), Side.RH),
 }
 
@@ -67,7 +76,9 @@ class EnteredClearance:
 
 @dataclass(frozen=True, slots=True)
 class RowSource:
-    """Where an inspection came from; `row` counts from 1 with the header, no file stands for prompts and flags."""
+    """Where an inspection came from; `row` counts from 1 with the header, no file stands for
+    prompts and flags.
+    """
 
     file: str | None = None
     sheet: str | None = None
@@ -87,8 +98,9 @@ class Inspection:
     convention : ClearanceConvention
         How the clearances were taken.
     clearance_in : mapping of int to float
-        Clearance by joint number; a joint that is not a key was not measured. Radial, unless it is still to be
-        judged by `check`, which takes clearances without `entered` as readings in the convention. [in]
+        Clearance by joint number; a joint that is not a key was not measured. Radial, unless it is
+        still to be judged by `check`, which takes clearances without `entered` as readings in the
+        convention. [in]
     entered : mapping of int to EnteredClearance
         The readings as entered.
     gauge_u_in : float
@@ -104,7 +116,8 @@ class Inspection:
     plunger_down_lock_in : float or None
         Measured plunger position at Down Lock. [in]
     actuator_extension_in, plunger_position_in : float or None
-        A reading along the stroke: plunger position, zero as at Down Lock, at an extension from Down Lock. [in]
+        A reading along the stroke: plunger position, zero as at Down Lock, at an extension from
+        Down Lock. [in]
     margin_in : float or None
         This gear's margin as found at rigging. [in]
     margin_u_in : float
@@ -122,11 +135,14 @@ class Inspection:
     axial_float_in : mapping of int to float
         End float of a joint along its pin. [in]
     small_readings_true : bool
-        True if somebody confirmed that readings below the play of new parts were read in the stated unit.
+        True if somebody confirmed that readings below the play of new parts were read in the stated
+        unit.
     unit_question : str
-        What must be confirmed about the unit of the readings before this gear can be cleared; empty if nothing.
+        What must be confirmed about the unit of the readings before this gear can be cleared; empty
+        if nothing.
     carried : mapping of str to str
-        Columns that only travel to the report: work order, manual reference, remarks, unknown columns.
+        Columns that only travel to the report: work order, manual reference, remarks, unknown
+        columns.
     warnings : tuple of str
         What the reader noticed about this row, in plain words.
     source : RowSource
@@ -176,7 +192,9 @@ class Inspection:
 
 @dataclass(frozen=True, slots=True)
 class InvalidRow:
-    """A data row that cannot be judged, with the columns to correct; its problems stand in the list of problems."""
+    """A data row that cannot be judged, with the columns to correct; its problems stand in the list
+    of problems.
+    """
 
     record_id: str | None
     tail_no: str | None

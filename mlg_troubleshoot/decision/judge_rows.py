@@ -52,15 +52,24 @@ def assess(
     extension: Extension | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[Judgement, ...]:
-    """Judge rows: verdict, plan, repair sets and allowances; with `advice` what is worth it for one gear alone."""
+    """Judge rows: verdict, plan, repair sets and allowances; with `advice` what is worth it for one
+    gear alone.
+    """
     judged: list[Judgement] = []
     for start in range(0, len(rows), _CHUNK):
         part = rows[start : start + _CHUNK]
         valid = [row for row in part if isinstance(row, Inspection)]
         drawn = seed if advice else None
-        assessed = iter(_assess_valid(Cases.of(gear, valid, extension), table, drawn) if valid else ())
+        assessed = iter(
+            _assess_valid(Cases.of(gear, valid, extension), table, drawn) if valid else ()
+        )
         judged += [
-            next(assessed) if isinstance(row, Inspection) else Rejected(row, correct(row), row.warnings) for row in part
+            (
+                next(assessed)
+                if isinstance(row, Inspection)
+                else Rejected(row, correct(row), row.warnings)
+            )
+            for row in part
         ]
         if progress is not None:
             progress(len(judged), len(rows))
@@ -75,18 +84,34 @@ def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Ass
     # A gear whose entry leaves a question cannot be cleared either.
     absent = cases.critical_missing | np.array([bool(question) for question in cases.questions])
     verdicts = [
-        Verdict.OUTSIDE_MARGIN if beyond else verdict(float(low), float(high), critical_missing=bool(missing))
+        (
+            Verdict.OUTSIDE_MARGIN
+            if beyond
+            else verdict(float(low), float(high), critical_missing=bool(missing))
+        )
         for beyond, low, high, missing in zip(plunger.beyond, p_lower, p_upper, absent, strict=True)
     ]
     closes = np.isfinite(batch.lower.displacement_in)
-    found = calibrated(cases, search(cases, batch.upper.displacement_in, batch.upper.u_clearances_in))
+    found = calibrated(
+        cases, search(cases, batch.upper.displacement_in, batch.upper.u_clearances_in)
+    )
     wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in verdicts]) & closes
     sets = repair_sets(cases, found, wanted)
     findings = rank_joints(cases.gear, table, cases.clearance_in, allowances(cases, batch.lower))
     order = np.array([[f.rank for f in row] for row in findings]).argsort(axis=1)
-    judged = Judged(verdicts, batch, plunger, order, p_lower, batch.lower.standard_uncertainty(cases.margin_u_in))
+    judged = Judged(
+        verdicts,
+        batch,
+        plunger,
+        order,
+        p_lower,
+        batch.lower.standard_uncertainty(cases.margin_u_in),
+    )
     courses = plans(cases, judged, found, sets)
-    return [_assessment(cases, judged, i, findings[i], courses[i], sets[i], seed) for i in range(len(cases))]
+    return [
+        _assessment(cases, judged, i, findings[i], courses[i], sets[i], seed)
+        for i in range(len(cases))
+    ]
 
 
 def _assessment(
@@ -98,10 +123,16 @@ def _assessment(
     sets: tuple[RepairSet, ...],
     seed: int | None,
 ) -> Assessment:
-    inspection, found, lower, plunger = cases.inspections[i], judged.verdicts[i], judged.batch.lower, judged.plunger
+    inspection, found, lower, plunger = (
+        cases.inspections[i],
+        judged.verdicts[i],
+        judged.batch.lower,
+        judged.plunger,
+    )
     margin = float(cases.margin_in[i])
     closes = bool(np.isfinite(lower.displacement_in[i]))
-    # A linkage of the ensemble may not close where the reference does: the uncertainty is then unknown.
+    # A linkage of the ensemble may not close where the reference does: the uncertainty is then
+    # unknown.
     known = closes and bool(np.isfinite(judged.u_in[i]))
 
     def told(value: Any, when: bool = closes) -> float | None:
@@ -124,9 +155,14 @@ def _assessment(
         standard_uncertainty_in=told(judged.u_in[i]),
         probability_within_margin=float(judged.p_within[i]),
         probability_exceed_random_directions=told(judged.batch.chance_random[i]),
-        geometry_spread_in=(float(lower.spread_low_in[i]) + 0.0, float(lower.spread_high_in[i]) + 0.0)
-        if known
-        else None,
+        geometry_spread_in=(
+            (
+                float(lower.spread_low_in[i]) + 0.0,
+                float(lower.spread_high_in[i]) + 0.0,
+            )
+            if known
+            else None
+        ),
         budget=budget,
         over_directions_rad=tuple(lower.worst.over_directions[i].tolist()) if closes else (),
         under_directions_rad=tuple(lower.worst.under_directions[i].tolist()) if closes else (),
@@ -137,24 +173,32 @@ def _assessment(
         explained_at_most_in=told(plunger.explained_at_most_in[i]),
         unexplained_in=told(plunger.unexplained_in[i]),
         headline=_headline(cases, judged, i),
-        measured_statement=None
-        if beyond or not inspection.readings_in
-        else sentences.measured(float(cases.mean_in[i]), margin, "within"),
+        measured_statement=(
+            None
+            if beyond or not inspection.readings_in
+            else sentences.measured(float(cases.mean_in[i]), margin, "within")
+        ),
         repair_sets=sets if closes else None,
-        warnings=_warnings(inspection, cases.gear, findings, worst, float(judged.u_in[i]), cases.extension),
+        warnings=_warnings(
+            inspection, cases.gear, findings, worst, float(judged.u_in[i]), cases.extension
+        ),
         **detail,
     )
 
 
 _PROVISIONAL = (
-    f"provisional: the larger of {PROVISIONAL_U_IN:g} in and {100 * PROVISIONAL_U_SHARE:.0f} % of the prediction, "
-    "because one published failure gives none"
+    f"provisional: the larger of {PROVISIONAL_U_IN:g} in and {100 * PROVISIONAL_U_SHARE:.0f} % of"
+    " the prediction, because one published failure gives none"
 )
 
 
 def _budget(batch: BatchPrediction, cases: Cases, i: int) -> UncertaintyBudget:
     extension = cases.extension
-    source = _PROVISIONAL if extension is None else f"residual scatter of the diagnosis ({extension.describe()})"
+    source = (
+        _PROVISIONAL
+        if extension is None
+        else f"residual scatter of the diagnosis ({extension.describe()})"
+    )
     lower = batch.lower
     by_joint = dict(zip(cases.gear.joint_numbers, lower.u_readings_in[i].tolist(), strict=True))
     return UncertaintyBudget(
@@ -167,7 +211,12 @@ def _budget(batch: BatchPrediction, cases: Cases, i: int) -> UncertaintyBudget:
 
 
 def _detail(
-    cases: Cases, i: int, found: Verdict, worst_in: tuple[float, float], budget: UncertaintyBudget | None, seed: int
+    cases: Cases,
+    i: int,
+    found: Verdict,
+    worst_in: tuple[float, float],
+    budget: UncertaintyBudget | None,
+    seed: int,
 ) -> dict[str, Any]:
     """What is worked out for a gear that is looked at alone."""
     one, rng = cases.take(np.array([i])), np.random.default_rng(seed)
@@ -182,20 +231,36 @@ def _detail(
 
 def _headline(cases: Cases, judged: Judged, i: int) -> str:
     margin, mean, plunger = float(cases.margin_in[i]), float(cases.mean_in[i]), judged.plunger
-    lower, found, chance = judged.batch.lower, judged.verdicts[i], float(judged.batch.chance_random[i])
+    lower, found, chance = (
+        judged.batch.lower,
+        judged.verdicts[i],
+        float(judged.batch.chance_random[i]),
+    )
     # Adding zero turns a minus zero into zero.
-    said = sentences.Predicted(float(lower.displacement_in[i]) + 0.0, float(lower.bound_in[i]) + 0.0, chance)
+    said = sentences.Predicted(
+        float(lower.displacement_in[i]) + 0.0, float(lower.bound_in[i]) + 0.0, chance
+    )
     closes = np.isfinite(said.displacement_in)
     if plunger.beyond[i]:
-        explained = sentences.explained(float(plunger.explained_at_most_in[i]), float(plunger.unexplained_in[i]))
+        explained = sentences.explained(
+            float(plunger.explained_at_most_in[i]), float(plunger.unexplained_in[i])
+        )
         then = f"{explained} Predicted: {said}." if closes else sentences.NO_CLOSURE
         return f"{sentences.measured(mean, margin, 'outside')} {then}"
     if not closes:
         return sentences.NO_CLOSURE
     if found is Verdict.INCOMPLETE:
-        open_joints = [n for n, read in zip(cases.gear.joint_numbers, cases.measured[i], strict=True) if not read]
+        open_joints = [
+            n
+            for n, read in zip(cases.gear.joint_numbers, cases.measured[i], strict=True)
+            if not read
+        ]
         (question,) = cases.take(np.array([i])).questions
-        return sentences.entry_in_question(question, said) if question else sentences.incomplete(open_joints, said)
+        return (
+            sentences.entry_in_question(question, said)
+            if question
+            else sentences.incomplete(open_joints, said)
+        )
     if found is Verdict.OUTSIDE_MARGIN:
         return sentences.outside(margin, said)
     if found is Verdict.WITHIN_MARGIN:
@@ -216,11 +281,13 @@ def _warnings(
     lacking = () if extension is None else extension.lacks(inspection)
     if lacking:
         warnings.append(
-            f"The extension of the model needs {', '.join(lacking)}, which this inspection lacks: predicted without."
+            f"The extension of the model needs {', '.join(lacking)}, which this inspection lacks:"
+            " predicted without."
         )
     warnings += [
-        f"Joint #{finding.joint} {finding.name}: {finding.clearance_in:.4f} in radial is above its limit of "
-        f"{finding.limit_in:.4f} in ({gear.joint(finding.joint).limit.kind}): reject to the manual."
+        f"Joint #{finding.joint} {finding.name}: {finding.clearance_in:.4f} in radial is above its"
+        f" limit of {finding.limit_in:.4f} in ({gear.joint(finding.joint).limit.kind}): reject to"
+        " the manual."
         for finding in findings
         if finding.over_limit and finding.clearance_in is not None
     ]
@@ -228,30 +295,42 @@ def _warnings(
     low, high = gear.down_lock_range
     if down_lock is not None and not low <= down_lock <= high:
         warnings.append(
-            f"Plunger at Down Lock {down_lock:.4f} in is outside {low:.2f} to {high:.2f} in: check the rigging first."
+            f"Plunger at Down Lock {down_lock:.4f} in is outside {low:.2f} to {high:.2f} in: check"
+            " the rigging first."
         )
     if not np.all(np.isfinite(worst_in)):
-        warnings.append("With these clearances the linkage does not close in every direction: check the entries.")
+        warnings.append(
+            "With these clearances the linkage does not close in every direction: check the"
+            " entries."
+        )
     elif not np.isfinite(u):
-        warnings.append("With these clearances some linkages of the ensemble do not close: the uncertainty is unknown.")
+        warnings.append(
+            "With these clearances some linkages of the ensemble do not close: the uncertainty is"
+            " unknown."
+        )
     else:
         differs = plunger_reading.disagreement(inspection, *worst_in, u)
         if differs is not None:
             warnings.append(differs)
     if inspection.gauge_u_is_default:
         warnings.append(
-            f"Standard uncertainty of the gauge not stated: {inspection.gauge_u_in:.5f} in radial taken as the default."
+            f"Standard uncertainty of the gauge not stated: {inspection.gauge_u_in:.5f} in radial"
+            " taken as the default."
         )
     if inspection.outcome is Outcome.FAILED and inspection.measured_displacement_in is None:
-        warnings.append("The gear failed and no plunger displacement was measured: measure it at mid-position.")
+        warnings.append(
+            "The gear failed and no plunger displacement was measured: measure it at mid-position."
+        )
     return tuple(warnings)
 
 
 def allowances(cases: Cases, lower: Prediction) -> Array:
-    """How much further each measured joint may wear, alone, until the worst case reaches the margin or it its limit.
+    """How much further each measured joint may wear, alone, until the worst case reaches the margin
+    or it its limit.
 
-    NaN for a joint that was not measured, and for a gear that is beyond its margin already. The second-order expansion,
-    anchored at the exact worst case, gives the wear; one exact worst case along its directions corrects it. [in]
+    NaN for a joint that was not measured, and for a gear that is beyond its margin already. The
+    second-order expansion, anchored at the exact worst case, gives the wear; one exact worst case
+    along its directions corrects it. [in]
     """
     gear, reference = cases.gear, responses(cases.gear)[0]
     start, worst = cases.filled(0.0), lower.displacement_in
@@ -267,5 +346,7 @@ def allowances(cases: Cases, lower: Prediction) -> Array:
         senses = np.repeat(sense[:, 0], start.shape[1])
         links = reference.worst_links(worn.reshape(-1, start.shape[1]), senses)
         exact = (senses * gear.model.displacement(list(links.T))).reshape(wear.shape)
-        wear = np.clip(wear + (cases.margin_in[:, None] - exact) / np.maximum(slopes, 1e-9), 0.0, room)
+        wear = np.clip(
+            wear + (cases.margin_in[:, None] - exact) / np.maximum(slopes, 1e-9), 0.0, room
+        )
     return np.where(cases.measured & (left >= 0.0), wear, np.nan)

@@ -1,9 +1,11 @@
-"""Which joints explain a measured plunger displacement: importance sampling over wear, clearances and directions.
+"""Which joints explain a measured plunger displacement: importance sampling over wear, clearances
+and directions.
 
-Before the plunger is read each joint is worn beyond its limit with a small chance; a joint that is not worn has a
-clearance that grows rarer towards its limit, a worn one any clearance up to twice its limit. Measured joints have
-their reading with its uncertainty. Every clearance takes a uniformly random direction, and with a small chance
-something other than clearance moves the plunger as well. All of this is assumed: no fleet of this gear is public.
+Before the plunger is read each joint is worn beyond its limit with a small chance; a joint that is
+not worn has a clearance that grows rarer towards its limit, a worn one any clearance up to twice
+its limit. Measured joints have their reading with its uncertainty. Every clearance takes a
+uniformly random direction, and with a small chance something other than clearance moves the plunger
+as well. All of this is assumed: no fleet of this gear is public.
 """
 
 from __future__ import annotations
@@ -23,13 +25,13 @@ from mlg_troubleshoot.gear.gear import Gear
 _QUANTILES = (0.05, 0.5, 0.95)
 # Below this chance no joint is named as likely worn. [1]
 _WORTH_SAYING = 0.05
-# Assumed before the plunger is read: chance that one link or pivot is worn beyond its limit, either end of a link being
-# as likely. [1]
+# Assumed before the plunger is read: chance that one link or pivot is worn beyond its limit, either
+# end of a link being as likely. [1]
 _WORN = 0.05
 # Largest clearance of a worn joint in units of its limit. [1]
 _MOST_WORN = 2.0
-# Chance that something other than clearance moves the plunger, and the standard deviation of what it adds, in units of
-# the gear's margin. [1]
+# Chance that something other than clearance moves the plunger, and the standard deviation of what
+# it adds, in units of the gear's margin. [1]
 _OTHER_CAUSE, _OTHER_CAUSE_U = 0.05, 2.0
 
 
@@ -56,7 +58,9 @@ def explain(one: Cases, rng: np.random.Generator, draws: int = 32768) -> Posteri
 
 
 def _draw_clearances(one: Cases, rng: np.random.Generator, n: int) -> tuple[Array, Array]:
-    """Clearances, and the log of prior over proposal: worn joints are drawn more often than they occur. [in, 1]"""
+    """Clearances, and the log of prior over proposal: worn joints are drawn more often than they
+    occur. [in, 1]
+    """
     gear, found, limits = one.gear, one.clearance_in[0], one.gear.limits_in
     drawn = np.empty((n, len(found)))
     log_weight = np.zeros(n)
@@ -64,12 +68,16 @@ def _draw_clearances(one: Cases, rng: np.random.Generator, n: int) -> tuple[Arra
         for number in group:
             j = gear.joint_numbers.index(number)
             if np.isfinite(found[j]):
-                drawn[:, j] = _reading_with_error(float(found[j]), float(one.gauge_u_in[0, j]), rng, n)
+                drawn[:, j] = _reading_with_error(
+                    float(found[j]), float(one.gauge_u_in[0, j]), rng, n
+                )
                 continue
             chance = _WORN / len(group)
             often = 0.2 / len(group)
             is_worn = rng.random(n) < often
-            log_weight += np.where(is_worn, np.log(chance / often), np.log((1.0 - chance) / (1.0 - often)))
+            log_weight += np.where(
+                is_worn, np.log(chance / often), np.log((1.0 - chance) / (1.0 - often))
+            )
             within = 1.0 - np.sqrt(1.0 - rng.random(n))
             beyond = 1.0 + (_MOST_WORN - 1.0) * rng.random(n)
             drawn[:, j] = limits[j] * np.where(is_worn, beyond, within)
@@ -87,17 +95,23 @@ def _reading_with_error(found: float, u: float, rng: np.random.Generator, n: int
     return np.maximum(drawn, 0.0)
 
 
-def _summary(gear: Gear, drawn: Array, worn: Mask, weight: Array, not_clearance: float) -> Posterior:
+def _summary(
+    gear: Gear, drawn: Array, worn: Mask, weight: Array, not_clearance: float
+) -> Posterior:
     index = {number: j for j, number in enumerate(gear.joint_numbers)}
     chances = [
-        GroupChance(group, min(float(weight[worn[:, [index[n] for n in group]].any(axis=1)].sum()), 1.0))
+        GroupChance(
+            group, min(float(weight[worn[:, [index[n] for n in group]].any(axis=1)].sum()), 1.0)
+        )
         for group in gear.link_groups
     ]
     chances.sort(key=lambda chance: -chance.probability)
     intervals = []
     for number, j in index.items():
         low, median, high = _weighted_quantiles(drawn[:, j], weight)
-        intervals.append(ClearanceInterval(number, low, median, high, min(float(weight[worn[:, j]].sum()), 1.0)))
+        intervals.append(
+            ClearanceInterval(number, low, median, high, min(float(weight[worn[:, j]].sum()), 1.0))
+        )
     called = tuple(chance.joints for chance in chances if chance.probability > 0.5)
     # A sum of weights may pass 1 by rounding.
     none = min(float(weight[~worn.any(axis=1)].sum()), 1.0)
@@ -121,20 +135,29 @@ def _weighted_quantiles(values: Array, weight: Array) -> tuple[float, float, flo
     return low, median, high
 
 
-def _text(chances: Sequence[GroupChance], called: Sequence[tuple[int, ...]], none: float, not_clearance: float) -> str:
+def _text(
+    chances: Sequence[GroupChance],
+    called: Sequence[tuple[int, ...]],
+    none: float,
+    not_clearance: float,
+) -> str:
     likely = [chance for chance in chances[:2] if chance.probability >= _WORTH_SAYING]
     ranked = ", then ".join(
-        f"{' or '.join(f'#{n}' for n in chance.joints)} ({percent(chance.probability)})" for chance in likely
+        f"{' or '.join(f'#{n}' for n in chance.joints)} ({percent(chance.probability)})"
+        for chance in likely
     )
     # Another chance than those of the joints: both can be so at once.
     also = f" Chance that something else moved the plunger as well: {percent(not_clearance)}."
     if not_clearance > 0.8:
-        return f"Something other than joint clearance likely moved the plunger ({percent(not_clearance)})."
+        return (
+            "Something other than joint clearance likely moved the plunger"
+            f" ({percent(not_clearance)})."
+        )
     if called:
         return f"The measured displacement points to wear: most likely worn {ranked}.{also}"
     if not likely:
         return f"Probably no joint is beyond its limit ({percent(none)}).{also}"
     return (
-        f"The measured displacement does not show which joint is worn: no joint beyond its limit {percent(none)}; "
-        f"most likely worn {ranked}.{also}"
+        "The measured displacement does not show which joint is worn: no joint beyond its limit"
+        f" {percent(none)}; most likely worn {ranked}.{also}"
     )

@@ -1,9 +1,11 @@
-"""How good the number of the probability is: the linear rule against Monte Carlo with the curved response.
+"""How good the number of the probability is: the linear rule against Monte Carlo with the curved
+response.
 
-The decision rule propagates the errors of the readings linearly. The worst case is convex in the clearances and the
-larger of two senses, so the exact probability differs. Its Monte Carlo value averages, over errors of the readings,
-the normal probability of the other uncertainties; the same draws with the linear response serve as a control whose
-mean is known, so that only the difference carries an error.
+The decision rule propagates the errors of the readings linearly. The worst case is convex in the
+clearances and the larger of two senses, so the exact probability differs. Its Monte Carlo value
+averages, over errors of the readings, the normal probability of the other uncertainties; the same
+draws with the linear response serve as a control whose mean is known, so that only the difference
+carries an error.
 """
 
 from __future__ import annotations

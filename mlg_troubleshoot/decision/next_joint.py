@@ -29,9 +29,11 @@ COST_OF_WRONG_WITHIN = CONFORMANCE / (1.0 - CONFORMANCE)
 # A drop in risk below this is rounding: the reading has no value of its own.
 _NO_VALUE = 1e-6
 _QUANTILES = 12
-# An expectation is enough where being wrong costs at most this share of what a just conforming OUTSIDE does. [1]
+# An expectation is enough where being wrong costs at most this share of what a just conforming
+# OUTSIDE does. [1]
 _ENOUGH_SHARE = 0.5
-# Chance from which a gear counts as too close to its margin for any reading of a joint to settle it. [1]
+# Chance from which a gear counts as too close to its margin for any reading of a joint to settle
+# it. [1]
 _TOO_CLOSE = 0.9
 # Places and weights of a normal distribution, for the worst case once everything is measured.
 _SPOTS = np.linspace(-3.2, 3.2, 65)
@@ -53,7 +55,9 @@ def enough(within: float, too_close: float = 0.0) -> Verdict | None:
 
 @dataclass(frozen=True, slots=True)
 class Outlook:
-    """Chances that one gear is within its margin, and that it is INCONCLUSIVE once every joint is measured. [1]"""
+    """Chances that one gear is within its margin, and that it is INCONCLUSIVE once every joint is
+    measured. [1]
+    """
 
     worth: tuple[ReadingWorth, ...]
     within: float
@@ -65,15 +69,19 @@ class Outlook:
 
 
 def outlook(one: Cases, anchor: tuple[float, float] | None = None) -> Outlook:
-    """Find what each reading is worth, and the chances that the gear is within its margin or too close to it.
+    """Find what each reading is worth, and the chances that the gear is within its margin or too
+    close to it.
 
-    The unmeasured joints are taken by their distribution (`wear_levels`). For each joint the probability of being
-    within the margin, once its clearance is known, follows for a range of clearances; what the risk falls by on average
-    is the value of the reading. Where no single reading has a value, the share of the variance of the worst case takes
-    its place. Distribution and expansion serve the ranking only.
+    The unmeasured joints are taken by their distribution (`wear_levels`). For each joint the
+    probability of being within the margin, once its clearance is known, follows for a range of
+    clearances; what the risk falls by on average is the value of the reading. Where no single
+    reading has a value, the share of the variance of the worst case takes its place. Distribution
+    and expansion serve the ranking only.
     """
     gear, missing = one.gear, np.flatnonzero(~one.measured[0]).tolist()
-    opened = frozenset(joint.area for joint, read in zip(gear.joints, one.measured[0], strict=True) if read)
+    opened = frozenset(
+        joint.area for joint, read in zip(gear.joints, one.measured[0], strict=True) if read
+    )
     linkages = responses(gear)
     if anchor is not None:
         linkages = (linkages[0].anchored(one.filled(0.0)[0], *anchor), *linkages[1:])
@@ -91,7 +99,13 @@ def outlook(one: Cases, anchor: tuple[float, float] | None = None) -> Outlook:
     first = [w for w in worth if w.critical] or worth
     valued = any(w.risk_drop > _NO_VALUE for w in first)
     ordered = tuple(
-        sorted(worth, key=lambda w: (not w.critical, -(w.risk_drop if valued else w.variance_in2) / w.minutes))
+        sorted(
+            worth,
+            key=lambda w: (
+                not w.critical,
+                -(w.risk_drop if valued else w.variance_in2) / w.minutes,
+            ),
+        )
     )
     return Outlook(ordered, belief.within(), belief.too_close())
 
@@ -99,8 +113,8 @@ def outlook(one: Cases, anchor: tuple[float, float] | None = None) -> Outlook:
 class _Belief:
     """One gear with its unmeasured joints distributed, level of wear by level of wear.
 
-    At each level the worst case is taken as normal: a sum over several joints, of which none dominates. The unmeasured
-    joints are at their mean there, and the worst case is linearised.
+    At each level the worst case is taken as normal: a sum over several joints, of which none
+    dominates. The unmeasured joints are at their mean there, and the worst case is linearised.
     """
 
     def __init__(self, one: Cases, linkages: Sequence[Response]) -> None:
@@ -114,14 +128,18 @@ class _Belief:
         self.weight = level_weights((found / self.limits)[known])
 
     def _chance(self, worst: Array, variance: Array, u_rest: Array | None = None) -> Array:
-        """Chance of being within the margin, from the worst case expected and the variance of what is open."""
+        """Chance of being within the margin, from the worst case expected and the variance of what
+        is open.
+        """
         u_rest = self.u_rest if u_rest is None else u_rest
         u = np.sqrt(variance + u_rest**2 + model_uncertainty(worst, self.residual_u_in) ** 2)
         return tabled_normal_cdf((self.margin_in - worst) / u)
 
     def within(self) -> float:
         """Chance of being within the margin with what is measured so far."""
-        return float(self.weight @ self._chance(self.worst, np.sum(self.slopes**2 * self.spread, axis=1)))
+        return float(
+            self.weight @ self._chance(self.worst, np.sum(self.slopes**2 * self.spread, axis=1))
+        )
 
     def too_close(self) -> float:
         """Chance that neither verdict conforms once every joint is measured."""
@@ -153,9 +171,9 @@ class _Belief:
 def advise(one: Cases) -> MeasuringAdvice:
     """Say of one gear which joint to measure next and whether one may stop.
 
-    One may stop where the verdict is the same with every unmeasured joint measured as 0 and measured at its limit:
-    the worst case grows with every clearance, so nothing between can differ. A joint beyond its limit is found only
-    by measuring it.
+    One may stop where the verdict is the same with every unmeasured joint measured as 0 and
+    measured at its limit: the worst case grows with every clearance, so nothing between can differ.
+    A joint beyond its limit is found only by measuring it.
     """
     ends = np.vstack([one.filled(0.0), one.filled(one.gear.limits_in)])
     four = one.take(np.zeros(4, np.intp))
@@ -169,7 +187,9 @@ def advise(one: Cases) -> MeasuringAdvice:
     if one.measured.all():
         precise = _can_precision_settle(one, now)
         certain = None if now is Verdict.INCONCLUSIVE else now
-        return MeasuringAdvice((), not precise, now, float(p[0]), certain, _all_measured(now, precise))
+        return MeasuringAdvice(
+            (), not precise, now, float(p[0]), certain, _all_measured(now, precise)
+        )
     anchor = float(prediction.worst.over_in[0]), float(prediction.worst.under_in[0])
     ahead = outlook(one, anchor if np.isfinite(anchor).all() else None)
     return MeasuringAdvice(
@@ -184,8 +204,8 @@ def advise(one: Cases) -> MeasuringAdvice:
 
 def _settled(verdict_then: Verdict) -> str:
     return (
-        f"More measuring does not change the verdict ({verdict_then.words}): you may stop. A joint over its limit is "
-        "found only by measuring it."
+        f"More measuring does not change the verdict ({verdict_then.words}): you may stop. A joint"
+        " over its limit is found only by measuring it."
     )
 
 
@@ -194,22 +214,30 @@ def _text(one: Cases, ahead: Outlook) -> str:
     name = one.gear.joint(best.joint).label
     minutes = f"about {best.minutes:.0f} min access"
     if ahead.enough is Verdict.INCONCLUSIVE:
-        plunger = "" if np.isfinite(one.mean_in[0]) else " Measure the plunger displacement at mid-position."
+        plunger = (
+            ""
+            if np.isfinite(one.mean_in[0])
+            else " Measure the plunger displacement at mid-position."
+        )
         return (
-            "If the unmeasured joints are worn like the measured ones, measuring them will hardly settle it: too close "
-            f"to the margin (chance {percent(ahead.too_close)}).{plunger} The joint that tells most is {name} "
-            f"({minutes})."
+            "If the unmeasured joints are worn like the measured ones, measuring them will hardly"
+            f" settle it: too close to the margin (chance {percent(ahead.too_close)}).{plunger} The"
+            f" joint that tells most is {name} ({minutes})."
         )
     if ahead.enough is None:
         if best.risk_drop > 0.0:
             return f"Most useful next reading: {name} ({minutes})."
-        return f"Next: {name} ({minutes}); no single reading decides, it removes most of the uncertainty per minute."
+        return (
+            f"Next: {name} ({minutes}); no single reading decides, it removes most of the"
+            " uncertainty per minute."
+        )
     likely = within > 0.5
     chance = percent(within if likely else 1.0 - within)
     where = "inside the margin" if likely else "outside the margin"
     return (
-        f"If the unmeasured joints are worn like the measured ones, the worst case is {where} (chance {chance}): "
-        f"enough to go on troubleshooting. To be certain, measure {name} next ({minutes})."
+        f"If the unmeasured joints are worn like the measured ones, the worst case is {where}"
+        f" (chance {chance}): enough to go on troubleshooting. To be certain, measure {name} next"
+        f" ({minutes})."
     )
 
 
@@ -219,18 +247,28 @@ def _all_measured(now: Verdict, precise: bool) -> str:
     if precise:
         return "All joints are measured. More precise readings may still settle it."
     return (
-        "All joints are measured, and more precise readings do not settle it: the uncertainty of the geometry and of "
-        "the model is larger than that of the readings. Measure the plunger displacement at mid-position."
+        "All joints are measured, and more precise readings do not settle it: the uncertainty of"
+        " the geometry and of the model is larger than that of the readings. Measure the plunger"
+        " displacement at mid-position."
     )
 
 
 def _can_precision_settle(one: Cases, now: Verdict) -> bool:
-    """True if exact readings, within two standard uncertainties of these ones, could leave INCONCLUSIVE."""
+    """True if exact readings, within two standard uncertainties of these ones, could leave
+    INCONCLUSIVE.
+    """
     if now is not Verdict.INCONCLUSIVE:
         return False
     found, gauge_u_in, two = one.clearance_in[0], one.gauge_u_in[0], one.take(np.zeros(2, np.intp))
     slopes = responses(one.gear)[0].slopes(found)
-    step = 2.0 * gauge_u_in**2 * slopes / np.maximum(np.sqrt(np.sum((gauge_u_in * slopes) ** 2)), 1e-12)
+    step = (
+        2.0
+        * gauge_u_in**2
+        * slopes
+        / np.maximum(np.sqrt(np.sum((gauge_u_in * slopes) ** 2)), 1e-12)
+    )
     rows = np.maximum(np.array([found - step, found + step]), 0.0)
-    p = two.predict(rows, np.zeros(rows.shape, bool)).probability_within(two.margin_in, two.margin_u_in)
+    p = two.predict(rows, np.zeros(rows.shape, bool)).probability_within(
+        two.margin_in, two.margin_u_in
+    )
     return any(zone(float(value)) is not Verdict.INCONCLUSIVE for value in p)

@@ -26,11 +26,15 @@ def latest_of_each_gear(judgements: Sequence[Judgement]) -> tuple[list[int], lis
         if key not in last or (day or date.min) >= last[key][0]:
             last[key] = day or date.min, place
     latest = {place for _, place in last.values()}
-    return worst_first(judgements, latest), worst_first(judgements, set(range(len(judgements))) - latest)
+    return worst_first(judgements, latest), worst_first(
+        judgements, set(range(len(judgements))) - latest
+    )
 
 
 def worst_first(judgements: Sequence[Judgement], places: Iterable[int]) -> list[int]:
-    """Measured beyond the margin first, then by verdict, then by the displacement against the margin."""
+    """Measured beyond the margin first, then by verdict, then by the displacement against the
+    margin.
+    """
     return sorted(places, key=lambda place: (_severity(judgements[place]), place))
 
 
@@ -39,5 +43,13 @@ def _severity(judgement: Judgement) -> tuple[int, int, float]:
     if not isinstance(judgement, Assessment):
         return 1, rank, 0.0
     measured = judgement.basis is Basis.MEASURED
-    size = judgement.inspection.measured_displacement_in if measured else judgement.predicted_displacement_in
-    return 0 if measured else 1, rank, float("-inf") if size is None else -abs(size) / judgement.margin_in
+    size = (
+        judgement.inspection.measured_displacement_in
+        if measured
+        else judgement.predicted_displacement_in
+    )
+    return (
+        0 if measured else 1,
+        rank,
+        float("-inf") if size is None else -abs(size) / judgement.margin_in,
+    )

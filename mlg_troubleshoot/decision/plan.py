@@ -43,8 +43,9 @@ class Basis(StrEnum):
 class Step:
     """One step of a plan.
 
-    minutes: how long it takes: an area counts at its first step and again after a repair closed it. [min]
-    gauge_u_needed_in: largest standard uncertainty of one radial reading that serves; for `MEASURE_AGAIN` only. [in]
+    minutes: how long it takes: an area counts at its first step and again after a repair closed it.
+    [min] gauge_u_needed_in: largest standard uncertainty of one radial reading that serves; for
+    `MEASURE_AGAIN` only. [in]
     """
 
     action: Action
@@ -62,18 +63,24 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The expected course from what is known now to an end; never empty, and only its first step binds."""
+    """The expected course from what is known now to an end; never empty, and only its first step
+    binds.
+    """
 
     steps: tuple[Step, ...]
     end: End
 
 
-def minutes_to_measure(gear: Gear, joints: Sequence[int], opened: frozenset[str] = frozenset()) -> float:
+def minutes_to_measure(
+    gear: Gear, joints: Sequence[int], opened: frozenset[str] = frozenset()
+) -> float:
     """Minutes to read joints, opening an area once where it is not open."""
     return _opening(gear, joints, opened) + sum(gear.joint(n).access.value for n in joints)
 
 
-def minutes_to_restore(gear: Gear, joints: Sequence[int], opened: frozenset[str] = frozenset()) -> float:
+def minutes_to_restore(
+    gear: Gear, joints: Sequence[int], opened: frozenset[str] = frozenset()
+) -> float:
     """Minutes to restore joints, opening an area once where it is not open."""
     return _opening(gear, joints, opened) + sum(gear.joint(n).restore.value for n in joints)
 

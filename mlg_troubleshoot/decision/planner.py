@@ -1,8 +1,9 @@
 """The plan of each gear: the quickest way in expected minutes from what is known now to an end.
 
-The first step follows from the verdict by the rule of the design ("The advice, and where it ends"); where it leaves a
-choice, expected minutes decide. What comes after the first step is the expected course: joints that are not measured
-yet are taken at what is expected of them (`wear_levels`), levels of wear by what was measured on the same gear.
+The first step follows from the verdict by the rule of the design ("The advice, and where it ends");
+where it leaves a choice, expected minutes decide. What comes after the first step is the expected
+course: joints that are not measured yet are taken at what is expected of them (`wear_levels`),
+levels of wear by what was measured on the same gear.
 """
 
 from __future__ import annotations
@@ -17,7 +18,14 @@ from mlg_troubleshoot.decision import sentences
 from mlg_troubleshoot.decision.assessment import RepairSet, Verdict
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import InvalidRow
-from mlg_troubleshoot.decision.plan import Action, End, Plan, Step, minutes_to_measure, minutes_to_restore
+from mlg_troubleshoot.decision.plan import (
+    Action,
+    End,
+    Plan,
+    Step,
+    minutes_to_measure,
+    minutes_to_restore,
+)
 from mlg_troubleshoot.decision.plunger_reading import Compared
 from mlg_troubleshoot.decision.prediction import BatchPrediction, model_uncertainty
 from mlg_troubleshoot.decision.repair import SCORE, Search, search, subsets_of
@@ -30,7 +38,8 @@ from mlg_troubleshoot.gear.gear import Gear
 BETTER_GAUGES_IN = (0.0004, 0.0003)
 # Readings of one round are read together until the verdict is settled with this chance. [1]
 _SETTLED = 0.35
-# Chance with random directions from which a failure is expected to be one of clearance: what else may fail is as rare.
+# Chance with random directions from which a failure is expected to be one of clearance: what else
+# may fail is as rare.
 _OTHER_CAUSE = 0.05
 _POINTS = np.array([-1.2816, -0.6745, -0.3186, 0.0, 0.3186, 0.6745, 1.2816])
 
@@ -47,8 +56,8 @@ NOT_CLOSING = Plan((Step(Action.CORRECT, (), 0.0, None, sentences.CHECK_ENTRIES)
 class Judged:
     """What the verdict found about n gears.
 
-    order: places of the joints in the order of their rank.
-    p_within, u_in: chance that the worst case is within the margin, its uncertainty against the margin. [1, in]
+    order: places of the joints in the order of their rank. p_within, u_in: chance that the worst
+    case is within the margin, its uncertainty against the margin. [1, in]
     """
 
     verdicts: Sequence[Verdict]
@@ -59,7 +68,9 @@ class Judged:
     u_in: Array
 
 
-def plans(cases: Cases, judged: Judged, found: Search, sets: Sequence[tuple[RepairSet, ...]]) -> list[Plan]:
+def plans(
+    cases: Cases, judged: Judged, found: Search, sets: Sequence[tuple[RepairSet, ...]]
+) -> list[Plan]:
     facts = _Facts(cases, judged, found)
     return [_Course(facts, i, sets[i]).plan() for i in range(len(cases))]
 
@@ -129,10 +140,16 @@ class _Course:
         expected = self._joints(f.expected_set[i])
         if expected:
             self._restore(expected, None, unread)
-        return self.end(End.WITHIN if expected or f.expected_end[i] is Verdict.WITHIN_MARGIN else End.CANNOT_CLEAR)
+        return self.end(
+            End.WITHIN
+            if expected or f.expected_end[i] is Verdict.WITHIN_MARGIN
+            else End.CANNOT_CLEAR
+        )
 
     def _to_verdict(self) -> Plan:
-        """A gear without a complaint: read until there is a verdict, restore what is over its limit, end."""
+        """A gear without a complaint: read until there is a verdict, restore what is over its
+        limit, end.
+        """
         f, i = self.facts, self.row
         found = f.after_limits[i]
         if found is Verdict.INCOMPLETE:
@@ -145,7 +162,13 @@ class _Course:
             needed = float(f.again_u_in[i])
             minutes = self._open(minutes_to_measure(self.gear, joints, self.opened), joints)
             self.steps.append(
-                Step(Action.MEASURE_AGAIN, joints, minutes, needed, sentences.measure_again(joints, needed))
+                Step(
+                    Action.MEASURE_AGAIN,
+                    joints,
+                    minutes,
+                    needed,
+                    sentences.measure_again(joints, needed),
+                )
             )
             inside = self.judged.batch.lower.displacement_in[i] <= self.cases.margin_in[i]
             found = Verdict.WITHIN_MARGIN if inside else Verdict.OUTSIDE_MARGIN
@@ -161,7 +184,9 @@ class _Course:
 
     def _measure(self, joints: tuple[int, ...]) -> None:
         minutes = self._open(minutes_to_measure(self.gear, joints, self.opened), joints)
-        self.steps.append(Step(Action.MEASURE, joints, minutes, None, sentences.measure(self.gear, joints)))
+        self.steps.append(
+            Step(Action.MEASURE, joints, minutes, None, sentences.measure(self.gear, joints))
+        )
 
     def _restore(self, joints: tuple[int, ...], worst_in: float | None, unread: bool) -> _Course:
         minutes = minutes_to_restore(self.gear, joints, self.opened)
@@ -183,7 +208,9 @@ class _Course:
 
 
 class _Ahead:
-    """What to expect of the joints that are not measured, gear by gear and level of wear by level of wear."""
+    """What to expect of the joints that are not measured, gear by gear and level of wear by level
+    of wear.
+    """
 
     def __init__(self, cases: Cases, judged: Judged) -> None:
         self.gear, self.measured = cases.gear, cases.measured
@@ -194,11 +221,15 @@ class _Ahead:
         self.slopes = responses(self.gear)[0].slopes(cases.filled(0.5 * limits))
         readings = np.sqrt(np.sum((self.slopes * cases.gauge_u_in) ** 2, axis=1))
         model = model_uncertainty(cases.margin_in, cases.residual_u_in)
-        u = np.sqrt(readings**2 + np.nan_to_num(lower.u_geometry_in) ** 2 + cases.margin_u_in**2 + model**2)
+        u = np.sqrt(
+            readings**2 + np.nan_to_num(lower.u_geometry_in) ** 2 + cases.margin_u_in**2 + model**2
+        )
         self.within_in, self.outside_in = cases.margin_in - SCORE * u, cases.margin_in + SCORE * u
 
     def total(self, joints: Mask) -> tuple[Array, Array]:
-        """Mean and standard deviation, at each level, of what some joints add to the worst case. [in]"""
+        """Mean and standard deviation, at each level, of what some joints add to the worst case.
+        [in]
+        """
         mean, variance = moments()
         each = np.where(joints, self.slopes * self.gear.limits_in, 0.0)
         return each.sum(axis=1)[:, None] * mean, np.sqrt((each**2).sum(axis=1)[:, None] * variance)
@@ -218,7 +249,9 @@ class _Ahead:
         return outside + np.where((rest & self.gear.critical).any(axis=1), 0.0, within + between)
 
     def group(self, candidates: Mask) -> Mask:
-        """The joints to read in one round: the fewest, most telling a minute first, that likely settle the verdict."""
+        """The joints to read in one round: the fewest, most telling a minute first, that likely
+        settle the verdict.
+        """
         reach = self.slopes * self.gear.limits_in / self.gear.access_minutes
         # Rounded: both ends of one link tell alike, and rounding noise must not order them.
         order = np.argsort(np.where(candidates, -np.round(reach, 9), np.inf), axis=1, kind="stable")
@@ -228,29 +261,41 @@ class _Ahead:
             joint = order[:, place]
             chosen[rows, joint] |= ~done & candidates[rows, joint]
             if place > 0:
-                # Two at least: joints read one by one would not come to an end within twelve rounds.
+                # Two at least: joints read one by one would not come to an end within twelve
+                # rounds.
                 done = done | (self.settled(chosen, ~self.measured & ~chosen) >= _SETTLED)
         return chosen
 
 
 def _reading_is_quicker(gear: Gear, found: Search, ahead: _Ahead, unread: Mask) -> Mask:
-    """Whether reading all that is unread and then restoring is expected to be quicker than restoring now."""
+    """Whether reading all that is unread and then restoring is expected to be quicker than
+    restoring now.
+    """
     table = subsets_of(gear)
     minutes = np.append(table.minutes, table.minutes[-1])
     now = found.quickest()
     mean, spread = ahead.total(unread)
     at_limit = np.sum(np.where(unread, ahead.slopes * gear.limits_in, 0.0), axis=1)
-    # Mean and scatter over the levels together, taken as one normal distribution at seven equally likely points.
+    # Mean and scatter over the levels together, taken as one normal distribution at seven equally
+    # likely points.
     centre = np.sum(ahead.weight * mean, axis=1)
     scatter = np.sqrt(np.sum(ahead.weight * (spread**2 + (mean - centre[:, None]) ** 2), axis=1))
     after = np.mean(
-        [minutes[found.quickest(at_limit - np.clip(centre + z * scatter, 0.0, at_limit))] for z in _POINTS], axis=0
+        [
+            minutes[found.quickest(at_limit - np.clip(centre + z * scatter, 0.0, at_limit))]
+            for z in _POINTS
+        ],
+        axis=0,
     )
-    areas = [(area, np.array([joint.area == area.name for joint in gear.joints])) for area in gear.areas]
+    areas = [
+        (area, np.array([joint.area == area.name for joint in gear.joints])) for area in gear.areas
+    ]
     to_read = unread @ gear.access_minutes
     for area, inside in areas:
         shared = np.where(now >= 0, (table.members[now] & inside).any(axis=1), False)
-        to_read = to_read + np.where((unread & inside).any(axis=1) & ~shared, area.access.value, 0.0)
+        to_read = to_read + np.where(
+            (unread & inside).any(axis=1) & ~shared, area.access.value, 0.0
+        )
     return np.asarray(unread.any(axis=1) & ((now < 0) | (to_read + after < minutes[now])))
 
 
@@ -263,16 +308,21 @@ def _verdicts_after_limits(cases: Cases, judged: Judged) -> list[Verdict]:
     some = cases.take(rows)
     p = []
     for unread in (0.0, cases.gear.limits_in):
-        found = some.predict(np.where(some.over_limit, cases.gear.new_parts_in, some.filled(unread)))
+        found = some.predict(
+            np.where(some.over_limit, cases.gear.new_parts_in, some.filled(unread))
+        )
         p.append(found.probability_within(some.margin_in, some.margin_u_in))
     missing = some.critical_missing
     for k, row in enumerate(rows):
-        verdicts[int(row)] = verdict(float(p[0][k]), float(p[1][k]), critical_missing=bool(missing[k]))
+        verdicts[int(row)] = verdict(
+            float(p[0][k]), float(p[1][k]), critical_missing=bool(missing[k])
+        )
     return verdicts
 
 
 def _measure_again(cases: Cases, judged: Judged) -> tuple[Mask, Array]:
-    """Joints to measure again, and how well: the least work that settles the verdict more likely than not.
+    """Joints to measure again, and how well: the least work that settles the verdict more likely
+    than not.
 
     A new reading differs from the old one by the errors of both.
     """
@@ -300,18 +350,24 @@ def _measure_again(cases: Cases, judged: Judged) -> tuple[Mask, Array]:
             moves = np.sqrt(np.sum(np.where(again, own + (slopes * better) ** 2, 0.0), axis=1))
             off = part.displacement_in[rows] - margin
             moves = np.maximum(moves, 1e-12)
-            settles = tabled_normal_cdf((off - guard) / moves) + tabled_normal_cdf((-off - guard) / moves)
+            settles = tabled_normal_cdf((off - guard) / moves) + tabled_normal_cdf(
+                (-off - guard) / moves
+            )
             now = ~done & again.any(axis=1) & (settles > 0.5)
             chosen[rows[now]], needed[rows[now]] = again[now], better
             done |= now
     return chosen, needed
 
 
-def _expected(cases: Cases, judged: Judged, ahead: _Ahead, complaint: Mask) -> tuple[Mask, list[Verdict]]:
+def _expected(
+    cases: Cases, judged: Judged, ahead: _Ahead, complaint: Mask
+) -> tuple[Mask, list[Verdict]]:
     """What will be restored, and the verdict, if every unmeasured joint is as worn as expected."""
     full = cases.filled((ahead.weight @ moments()[0])[:, None] * cases.gear.limits_in)
     sets, ends = np.zeros_like(cases.measured), list(judged.verdicts)
-    rows = np.flatnonzero(~cases.measured.all(axis=1) & np.isfinite(judged.batch.upper.displacement_in))
+    rows = np.flatnonzero(
+        ~cases.measured.all(axis=1) & np.isfinite(judged.batch.upper.displacement_in)
+    )
     if not len(rows):
         return sets, ends
     some = cases.take(rows)
@@ -325,10 +381,18 @@ def _expected(cases: Cases, judged: Judged, ahead: _Ahead, complaint: Mask) -> t
     for k, row in enumerate(rows):
         within = worst[k] <= ahead.within_in[row]
         between = worst[k] < ahead.outside_in[row]
-        ends[row] = Verdict.WITHIN_MARGIN if within else Verdict.INCONCLUSIVE if between else Verdict.OUTSIDE_MARGIN
+        ends[row] = (
+            Verdict.WITHIN_MARGIN
+            if within
+            else Verdict.INCONCLUSIVE
+            if between
+            else Verdict.OUTSIDE_MARGIN
+        )
     needed = np.flatnonzero(complaint[rows])
     if len(needed):
         u_readings = judged.batch.upper.u_clearances_in[rows[needed]]
         best = search(read.take(needed), worst[needed], u_readings).quickest()
-        sets[rows[needed]] = np.where((best >= 0)[:, None], subsets_of(cases.gear).members[best], False)
+        sets[rows[needed]] = np.where(
+            (best >= 0)[:, None], subsets_of(cases.gear).members[best], False
+        )
     return sets, ends

@@ -16,11 +16,13 @@ from mlg_troubleshoot.units import SLIPS, ClearanceConvention, LengthUnit
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compared:
-    """Measured displacements of n gears compared with what the joints can explain, unmeasured joints at their limit.
+    """Measured displacements of n gears compared with what the joints can explain, unmeasured
+    joints at their limit.
 
-    beyond, clears: measured beyond the margin; within it by two standard uncertainties.
-    explained: false where the displacement is beyond what the joints can explain by two standard uncertainties.
-    explained_at_most_in, unexplained_in: what of it they explain at most, and what they cannot; NaN without a
+    beyond, clears: measured beyond the margin; within it by two standard uncertainties. explained:
+    false where the displacement is beyond what the joints can explain by two standard
+    uncertainties. explained_at_most_in, unexplained_in: what of it they explain at most, and what
+    they cannot; NaN without a
         reading. [in]
     """
 
@@ -34,7 +36,9 @@ class Compared:
 def compare(cases: Cases, upper: Prediction) -> Compared:
     """Split each measured displacement into what the joints can explain at most and the rest."""
     size = np.abs(cases.mean_in)
-    bound = np.maximum(np.where(cases.mean_in > 0.0, upper.worst.over_in, -upper.worst.under_in), 0.0)
+    bound = np.maximum(
+        np.where(cases.mean_in > 0.0, upper.worst.over_in, -upper.worst.under_in), 0.0
+    )
     at_most = np.where(np.isfinite(bound), np.minimum(size, bound), size)
     u = np.hypot(cases.mean_u_in, upper.standard_uncertainty(np.zeros(len(cases))))
     return Compared(
@@ -46,8 +50,12 @@ def compare(cases: Cases, upper: Prediction) -> Compared:
     )
 
 
-def disagreement(inspection: Inspection, over_in: float, under_in: float, standard_uncertainty_in: float) -> str | None:
-    """Flag a measured displacement that differs from the prediction by more than two standard uncertainties."""
+def disagreement(
+    inspection: Inspection, over_in: float, under_in: float, standard_uncertainty_in: float
+) -> str | None:
+    """Flag a measured displacement that differs from the prediction by more than two standard
+    uncertainties.
+    """
     measured = inspection.measured_displacement_in
     if measured is None:
         return None
@@ -55,30 +63,42 @@ def disagreement(inspection: Inspection, over_in: float, under_in: float, standa
     if abs(measured - over_in) <= 2.0 * u:
         return None
     differs = (
-        f"Measured {measured:+.4f} in differs from the predicted over-travel {over_in:+.4f} in by more than two "
-        f"combined standard uncertainties ({2 * u:.4f} in)."
+        f"Measured {measured:+.4f} in differs from the predicted over-travel {over_in:+.4f} in by"
+        f" more than two combined standard uncertainties ({2 * u:.4f} in)."
     )
     if under_in - 2.0 * u <= measured < over_in:
         return (
-            f"{differs} It lies inside the worst-case bounds, so it is possible: the clearances need not be taken "
-            "up in the worst direction."
+            f"{differs} It lies inside the worst-case bounds, so it is possible: the clearances"
+            " need not be taken up in the worst direction."
         )
     return (
-        f"{differs} It is beyond what the entered clearances can do in any direction. Look for: a clearance read "
-        f"smaller than it is or entered with the wrong unit or convention, an unmeasured joint, a part outside "
-        f"the listed joints, a changed rigging, the plunger gauge."
+        f"{differs} It is beyond what the entered clearances can do in any direction. Look for: a"
+        " clearance read "
+        "smaller than it is or entered with the wrong unit or convention, an unmeasured joint, a"
+        " part outside "
+        "the listed joints, a changed rigging, the plunger gauge."
         f"{_entry_error(inspection, abs(measured), over_in if measured > 0.0 else -under_in, u)}"
     )
 
 
 def _entry_error(inspection: Inspection, measured: float, bound: float, u: float) -> str:
-    """Name an error of entry that made the clearances, and so the bound, too small: suggested, never applied."""
+    """Name an error of entry that made the clearances, and so the bound, too small: suggested,
+    never applied.
+    """
     possible = {
-        "unit": any(reading.unit is LengthUnit.MILLIMETRE for reading in inspection.entered.values()),
+        "unit": any(
+            reading.unit is LengthUnit.MILLIMETRE for reading in inspection.entered.values()
+        ),
         "point": True,
         "convention": inspection.convention is not ClearanceConvention.RADIAL,
     }
     for name, slip in SLIPS.items():
-        if possible[name] and bound > 0.0 and abs(measured - bound * slip.factor) <= max(u, 0.05 * measured):
-            return f" An entry error that would explain it: {slip.too_small} (factor {slip.factor:g})."
+        if (
+            possible[name]
+            and bound > 0.0
+            and abs(measured - bound * slip.factor) <= max(u, 0.05 * measured)
+        ):
+            return (
+                f" An entry error that would explain it: {slip.too_small} (factor {slip.factor:g})."
+            )
     return ""

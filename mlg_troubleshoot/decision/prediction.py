@@ -19,7 +19,8 @@ from mlg_troubleshoot.gear.model import LinkageModel, links_from
 
 DIRECTION_SETS = 4096
 DEFAULT_PLUNGER_U_IN = 0.0005
-# The model's standard uncertainty until a diagnosis gives it: the larger of a length and a share of the prediction.
+# The model's standard uncertainty until a diagnosis gives it: the larger of a length and a share of
+# the prediction.
 PROVISIONAL_U_IN, PROVISIONAL_U_SHARE = 0.003, 0.10
 _STEP_IN = 1e-5
 
@@ -55,9 +56,9 @@ def model_uncertainty(displacement_in: Array, residual_u_in: float | None) -> Ar
 class Prediction:
     """Predictions for n gears with one assumption about their unmeasured joints.
 
-    worst: worst displacements and directions of the reference linkage. [in, rad]
-    spread_low_in, spread_high_in: least and largest prediction over the ensemble. [in]
-    u_readings_in: what the uncertainty of each joint's reading adds, (n, joints); 0 where it was not measured. [in]
+    worst: worst displacements and directions of the reference linkage. [in, rad] spread_low_in,
+    spread_high_in: least and largest prediction over the ensemble. [in] u_readings_in: what the
+    uncertainty of each joint's reading adds, (n, joints); 0 where it was not measured. [in]
     bound_in: worst case over all directions, where `worst` may be the displacement as loaded. [in]
     """
 
@@ -100,25 +101,40 @@ def predict(
     extension: Extension | None = None,
 ) -> Prediction:
     """Predict the worst displacement of each gear with its uncertainty. [in]"""
-    adjustment = Adjustment(clearance_in) if extension is None else extension.adjust(inspections, clearance_in)
+    adjustment = (
+        Adjustment(clearance_in)
+        if extension is None
+        else extension.adjust(inspections, clearance_in)
+    )
     worst = adjusted_worst_case(gear.model, adjustment)
     spread = np.array([worst.magnitude_in, *_members(gear, adjustment, extension)])
     # Added along contiguous rows: a gear alone and in a batch must give the same bits.
-    u_geometry = np.ascontiguousarray(spread.T).std(axis=1, ddof=1) if len(spread) > 1 else np.zeros(len(clearance_in))
+    u_geometry = (
+        np.ascontiguousarray(spread.T).std(axis=1, ddof=1)
+        if len(spread) > 1
+        else np.zeros(len(clearance_in))
+    )
     slopes = _slopes(gear.model, adjustment, worst)
     each_u = gauge_u_in if gauge_u_in.ndim == 2 else gauge_u_in[:, None]
     u_readings = np.abs(slopes * measured * each_u)
-    u_model = model_uncertainty(worst.magnitude_in, None if extension is None else extension.residual_u_in)
+    u_model = model_uncertainty(
+        worst.magnitude_in, None if extension is None else extension.residual_u_in
+    )
     bound = worst.magnitude_in
     if adjustment.direction_factors is not None:
-        bound = adjusted_worst_case(gear.model, replace(adjustment, direction_factors=None)).magnitude_in
-    return Prediction(worst, spread.min(axis=0), spread.max(axis=0), u_readings, u_geometry, u_model, bound)
+        bound = adjusted_worst_case(
+            gear.model, replace(adjustment, direction_factors=None)
+        ).magnitude_in
+    return Prediction(
+        worst, spread.min(axis=0), spread.max(axis=0), u_readings, u_geometry, u_model, bound
+    )
 
 
 def _members(gear: Gear, adjustment: Adjustment, extension: Extension | None) -> list[Array]:
     """Worst case of the other linkages of the ensemble. [in]
 
-    Where clearances are small the expansion gives the directions at once; the displacement in them is exact.
+    Where clearances are small the expansion gives the directions at once; the displacement in them
+    is exact.
     """
     clearance, others = adjustment.clearance_in, gear.ensemble_models[1:]
     small = np.all(clearance <= gear.confirm_above.value, axis=1) & (extension is None)
@@ -126,7 +142,10 @@ def _members(gear: Gear, adjustment: Adjustment, extension: Extension | None) ->
     for model, response in zip(others, responses(gear)[1:], strict=True):
         member = np.empty(len(clearance))
         part = clearance[small]
-        sides = [sense * model.displacement(list(response.worst_links(part, sense).T)) for sense in (1.0, -1.0)]
+        sides = [
+            sense * model.displacement(list(response.worst_links(part, sense).T))
+            for sense in (1.0, -1.0)
+        ]
         member[small] = np.maximum(*sides)
         if len(rows):
             member[rows] = adjusted_worst_case(model, adjustment.take(rows)).magnitude_in
@@ -135,7 +154,9 @@ def _members(gear: Gear, adjustment: Adjustment, extension: Extension | None) ->
 
 
 def _slopes(model: LinkageModel, adjustment: Adjustment, worst: WorstCase) -> Array:
-    """Amplification of each clearance to the plunger at the clearances that act, directions held. [1]"""
+    """Amplification of each clearance to the plunger at the clearances that act, directions held.
+    [1]
+    """
     directions, changed = worst.governing_directions, adjustment.numbers(model)
     factor = 1.0 if adjustment.rate_factor is None else adjustment.rate_factor
     slopes = np.empty_like(adjustment.clearance_in)
@@ -152,7 +173,9 @@ def _slopes(model: LinkageModel, adjustment: Adjustment, worst: WorstCase) -> Ar
 
 @dataclass(frozen=True, slots=True)
 class BatchPrediction:
-    """n gears with unmeasured joints at 0 and at their limit, and the chance of exceeding the margin at random. [1]"""
+    """n gears with unmeasured joints at 0 and at their limit, and the chance of exceeding the
+    margin at random. [1]
+    """
 
     lower: Prediction
     upper: Prediction
@@ -162,7 +185,9 @@ class BatchPrediction:
 def with_rows(whole: Prediction, part: Prediction, rows: Places) -> Prediction:
     def merged(a: Any, b: Any) -> Any:
         if not isinstance(a, np.ndarray):
-            return replace(a, **{f.name: merged(getattr(a, f.name), getattr(b, f.name)) for f in fields(a)})
+            return replace(
+                a, **{f.name: merged(getattr(a, f.name), getattr(b, f.name)) for f in fields(a)}
+            )
         both = a.copy()
         both[rows] = b
         return both

@@ -14,15 +14,18 @@ from mlg_troubleshoot.indices.index_table import IndexTable
 def rank_joints(
     gear: Gear, table: IndexTable, clearance_in: Array, allowance_in: Array | None = None
 ) -> list[tuple[JointFinding, ...]]:
-    """Rank the joints of each gear in the order in which to inspect them; NaN where nothing was measured or found.
+    """Rank the joints of each gear in the order in which to inspect them; NaN where nothing was
+    measured or found.
 
-    Joints over their limit come first, then by contribution; an unmeasured joint counts with half its limit,
-    ties go to the larger total-order index.
+    Joints over their limit come first, then by contribution; an unmeasured joint counts with half
+    its limit, ties go to the larger total-order index.
     """
     measured = np.isfinite(clearance_in)
     over = gear.over_limit(clearance_in)
     assumed = np.where(measured, clearance_in, 0.5 * gear.limits_in)
-    contribution = np.array([linkage.amplification for linkage in responses(gear)]) * assumed[:, None, :]
+    contribution = (
+        np.array([linkage.amplification for linkage in responses(gear)]) * assumed[:, None, :]
+    )
     places = _places(over[:, None, :], contribution, table.total_order)
     best, worst = places.min(axis=1).tolist(), places.max(axis=1).tolist()
     # There are few ranges: a large batch holds each of them once.
@@ -40,7 +43,9 @@ def rank_joints(
             clearance_in=clearance,
             limit_in=joint.limit.value,
             over_limit=above[i][j],
-            contribution_in=None if clearance is None else indices.plunger_amplification * clearance,
+            contribution_in=(
+                None if clearance is None else indices.plunger_amplification * clearance
+            ),
             first_order=indices.first_order,
             total_order=indices.total_order,
             plunger_amplification=indices.plunger_amplification,

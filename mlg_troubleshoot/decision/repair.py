@@ -1,4 +1,6 @@
-"""What to restore: all subsets of all gears as one array, the best checked exactly; and what re-rigging would do."""
+"""What to restore: all subsets of all gears as one array, the best checked exactly; and what
+re-rigging would do.
+"""
 
 from __future__ import annotations
 
@@ -23,9 +25,11 @@ _SHOWN = 5
 _ROWS = 256
 # Standard score of the conformance probability. [1]
 SCORE = NormalDist().inv_cdf(CONFORMANCE)
-# Within this of the conformance limit a subset counts as about sufficient: how far the expansion may be off. [in]
+# Within this of the conformance limit a subset counts as about sufficient: how far the expansion
+# may be off. [in]
 _ABOUT_IN = 5e-4
-# A reading this far above a new part is one of a part to restore; below, restoring gains nothing. [in]
+# A reading this far above a new part is one of a part to restore; below, restoring gains nothing.
+# [in]
 _AS_NEW_IN = 1e-4
 
 
@@ -77,7 +81,8 @@ def subsets_of(gear: Gear) -> Subsets:
 class Search:
     """How far each subset, restored, stays inside the conformance limit, for some gears.
 
-    slack_in: margin less worst case less its guard band, unmeasured joints at their limit; −inf for a subset that
+    slack_in: margin less worst case less its guard band, unmeasured joints at their limit; −inf for
+    a subset that
         restores what is new or unmeasured, or leaves a joint over its limit. [in]
     """
 
@@ -85,16 +90,21 @@ class Search:
     slack_in: Array
 
     def quickest(self, relief_in: Array | float = 0.0) -> Places:
-        """Place of the quickest sufficient subset if the worst case is less by `relief_in`; −1 if none is."""
+        """Place of the quickest sufficient subset if the worst case is less by `relief_in`; −1 if
+        none is.
+        """
         enough = self.slack_in >= -np.broadcast_to(relief_in, len(self.slack_in))[:, None]
         return _surest(self.table, self.slack_in, enough)
 
 
 def _surest(table: Subsets, slack_in: Array, among: Mask) -> Places:
-    """The quickest of some subsets; of equally many joints in equal minutes the one with most slack; −1 if none."""
+    """The quickest of some subsets; of equally many joints in equal minutes the one with most
+    slack; −1 if none.
+    """
     first, rows = np.argmax(among, axis=1), np.arange(len(among))
     alike = among & (table.alike[first][:, None] == table.alike)
-    # Rounded: both ends of one link leave the same, and rounding noise must not choose between them.
+    # Rounded: both ends of one link leave the same, and rounding noise must not choose between
+    # them.
     found = np.argmax(np.where(alike, np.round(slack_in, 7), -np.inf), axis=1)
     return np.where(among[rows, first], found, -1)
 
@@ -105,20 +115,26 @@ def removable(cases: Cases) -> Mask:
 
 
 def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
-    """Judge all subsets of all gears by the second-order expansion, anchored at the exact worst case `worst_in`."""
+    """Judge all subsets of all gears by the second-order expansion, anchored at the exact worst
+    case `worst_in`.
+    """
     table, linkages = subsets_of(cases.gear), responses(cases.gear)
     worn, now = removable(cases), cases.filled(cases.gear.limits_in)
     less = np.where(worn, now - cases.gear.new_parts_in, 0.0)
     over = cases.over_limit
     # A subset may hold no joint that gains nothing and must hold every joint over its limit.
-    barred = (~worn).astype(float) @ table.weights.T + over.astype(float) @ (1.0 - table.weights.T) > 0.0
-    # Slopes fall with the clearances that are restored, and with them what the errors of the readings do.
+    barred = (~worn).astype(float) @ table.weights.T + over.astype(float) @ (
+        1.0 - table.weights.T
+    ) > 0.0
+    # Slopes fall with the clearances that are restored, and with them what the errors of the
+    # readings do.
     readings = (cases.gauge_u_in * cases.measured) ** 2
     slack = np.empty(barred.shape)
     for start in range(0, len(cases), _ROWS):
         part = slice(start, start + _ROWS)
         some, gone = now[part], less[part]
-        # What bends the ensemble is found with everything restored, and goes with the square of the fall.
+        # What bends the ensemble is found with everything restored, and goes with the square of the
+        # fall.
         falls = [(gone * linkage.slopes(some)) @ table.weights.T for linkage in linkages]
         after = worst_in[part, None] - falls[0] + _bend(linkages[0], table, some, gone)
         square = (falls[0] / np.maximum(falls[0][:, -1:], 1e-12)) ** 2
@@ -129,8 +145,12 @@ def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
             members.append(whole[:, None] - fall + (least - whole + fall[:, -1])[:, None] * square)
         geometry = _variance(members)
         model = model_uncertainty(after, cases.residual_u_in)
-        gauges = u_clearances_in[part, None] ** 2 - _calmer(linkages[0], table, some, gone, readings[part])
-        u = np.sqrt(np.maximum(gauges, 0.0) + cases.margin_u_in[part, None] ** 2 + geometry + model**2)
+        gauges = u_clearances_in[part, None] ** 2 - _calmer(
+            linkages[0], table, some, gone, readings[part]
+        )
+        u = np.sqrt(
+            np.maximum(gauges, 0.0) + cases.margin_u_in[part, None] ** 2 + geometry + model**2
+        )
         slack[part] = cases.margin_in[part, None] - after - SCORE * u
     return Search(table, np.where(barred | ~np.isfinite(slack), -np.inf, slack))
 
@@ -139,7 +159,9 @@ def _bend(linkage: Response, table: Subsets, clearance_in: Array, less_in: Array
     """What the curvature adds to the worst case with each subset restored. [in]"""
     first, second = np.triu_indices(less_in.shape[1])
     curved = linkage.worst_curvature[first, second] * np.where(first == second, 0.5, 1.0)
-    return linkage.sense(clearance_in)[:, None] * ((less_in[:, first] * less_in[:, second] * curved) @ table.pairs.T)
+    return linkage.sense(clearance_in)[:, None] * (
+        (less_in[:, first] * less_in[:, second] * curved) @ table.pairs.T
+    )
 
 
 def _third_order(cases: Cases, least_in: Array, expanded_in: Array) -> Array:
@@ -153,8 +175,12 @@ def _third_order(cases: Cases, least_in: Array, expanded_in: Array) -> Array:
     return np.where(np.isfinite(missed), missed, 0.0)
 
 
-def _calmer(linkage: Response, table: Subsets, clearance_in: Array, less_in: Array, variance_in2: Array) -> Array:
-    """What restoring each subset takes from the variance that the readings cause, to first order. [in²]"""
+def _calmer(
+    linkage: Response, table: Subsets, clearance_in: Array, less_in: Array, variance_in2: Array
+) -> Array:
+    """What restoring each subset takes from the variance that the readings cause, to first order.
+    [in²]
+    """
     turned = (variance_in2 * linkage.slopes(clearance_in)) @ linkage.worst_curvature
     return 2.0 * linkage.sense(clearance_in)[:, None] * ((less_in * turned) @ table.weights.T)
 
@@ -170,7 +196,9 @@ def _variance(members: Sequence[Array]) -> Array:
 
 
 def calibrated(cases: Cases, found: Search) -> Search:
-    """The search, shifted so that it is exact for the quickest subset of each gear that is about sufficient."""
+    """The search, shifted so that it is exact for the quickest subset of each gear that is about
+    sufficient.
+    """
     near = found.quickest(_ABOUT_IN)
     rows = np.flatnonzero(near > 0)
     if not len(rows):
@@ -187,7 +215,9 @@ def _restored(cases: Cases, rows: Places, places: Places) -> tuple[Prediction, A
     """The exact prediction of some gears, each with one subset restored, and its probability."""
     some = cases.take(rows)
     now = some.filled(cases.gear.limits_in)
-    after = np.where(subsets_of(cases.gear).members[places], np.minimum(now, cases.gear.new_parts_in), now)
+    after = np.where(
+        subsets_of(cases.gear).members[places], np.minimum(now, cases.gear.new_parts_in), now
+    )
     found = some.predict(after)
     return found, found.probability_within(some.margin_in, some.margin_u_in)
 
@@ -195,12 +225,16 @@ def _restored(cases: Cases, rows: Places, places: Places) -> tuple[Prediction, A
 def repair_sets(cases: Cases, found: Search, wanted: Mask) -> list[tuple[RepairSet, ...]]:
     """Find the sets of joints which, restored, bring the worst case within the margin.
 
-    Unmeasured joints count with their limit: what holds with them at 0 sends every fifth gear back. Only sets that
-    contain no smaller sufficient set are returned, the quickest first, each checked by the exact worst case.
+    Unmeasured joints count with their limit: what holds with them at 0 sends every fifth gear back.
+    Only sets that contain no smaller sufficient set are returned, the quickest first, each checked
+    by the exact worst case.
     """
     table = subsets_of(cases.gear)
     chosen = _least(table, found.slack_in[wanted])
-    rows, sets = np.repeat(np.flatnonzero(wanted), [len(c) for c in chosen]), np.concatenate([*chosen, [0]])[:-1]
+    rows, sets = (
+        np.repeat(np.flatnonzero(wanted), [len(c) for c in chosen]),
+        np.concatenate([*chosen, [0]])[:-1],
+    )
     result: list[list[RepairSet]] = [[] for _ in range(len(cases))]
     if not len(rows):
         return [tuple(sets) for sets in result]
@@ -210,12 +244,16 @@ def repair_sets(cases: Cases, found: Search, wanted: Mask) -> list[tuple[RepairS
     for k in np.flatnonzero(p >= CONFORMANCE):
         which = sets[k]
         minutes = table.to_measure[which], float(table.minutes[which])
-        result[rows[k]].append(RepairSet(table.joints[which], float(moved[k]), float(p[k]), *minutes))
+        result[rows[k]].append(
+            RepairSet(table.joints[which], float(moved[k]), float(p[k]), *minutes)
+        )
     return [tuple(sets) for sets in result]
 
 
 def _least(table: Subsets, slack_in: Array) -> Sequence[Places]:
-    """Places of the quickest sufficient subsets of each gear, none within another; none where none is needed."""
+    """Places of the quickest sufficient subsets of each gear, none within another; none where none
+    is needed.
+    """
     open_sets = slack_in >= 0.0
     members = table.weights
     chosen: list[list[int]] = [[] for _ in range(len(slack_in))]
@@ -228,11 +266,13 @@ def _least(table: Subsets, slack_in: Array) -> Sequence[Places]:
     return [np.array(places, dtype=np.intp) for places in chosen]
 
 
-def rigging_alternative(one: Cases, worst_in: tuple[float, float], budget: UncertaintyBudget) -> Rigging:
+def rigging_alternative(
+    one: Cases, worst_in: tuple[float, float], budget: UncertaintyBudget
+) -> Rigging:
     """Shift the plunger so that the worst cases of both senses are equally far.
 
-    Re-rigging moves the range of the plunger and cannot narrow it: what remains is half the distance between both
-    worst cases. The uncertainties of the decision rule stay as they are.
+    Re-rigging moves the range of the plunger and cannot narrow it: what remains is half the
+    distance between both worst cases. The uncertainties of the decision rule stay as they are.
     """
     over, under = worst_in
     shift, left = -0.5 * (over + under), 0.5 * (over - under)

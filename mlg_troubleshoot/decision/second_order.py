@@ -1,8 +1,9 @@
 """The displacement to second order in the clearances: fast enough for thousands of imagined gears.
 
-To second order the plunger moves by g·x + ½ xᵀHx, x being the components of all virtual links. Along the worst
-directions of small clearances, dᵢ = ±gᵢ/|gᵢ|, this gives the worst case as a quadratic form of the clearances; that
-the directions themselves turn as clearances grow enters only at third order (envelope theorem).
+To second order the plunger moves by g·x + ½ xᵀHx, x being the components of all virtual links.
+Along the worst directions of small clearances, dᵢ = ±gᵢ/|gᵢ|, this gives the worst case as a
+quadratic form of the clearances; that the directions themselves turn as clearances grow enters only
+at third order (envelope theorem).
 """
 
 from __future__ import annotations
@@ -40,7 +41,9 @@ class Response:
 
     def displacement(self, links: Array) -> Array:
         """Displacement by the components of the virtual links. [in]"""
-        return np.asarray(links @ self.gradient + 0.5 * np.sum((links @ self.curvature) * links, axis=-1))
+        return np.asarray(
+            links @ self.gradient + 0.5 * np.sum((links @ self.curvature) * links, axis=-1)
+        )
 
     def worst(self, clearance_in: Array) -> tuple[Array, Array]:
         """Worst displacement of both senses. [in]"""
@@ -55,7 +58,9 @@ class Response:
 
     def slopes(self, clearance_in: Array) -> Array:
         """Slope of the worst displacement by each clearance, in the governing sense. [1]"""
-        return self.amplification + self.sense(clearance_in)[..., None] * (clearance_in @ self.worst_curvature)
+        return self.amplification + self.sense(clearance_in)[..., None] * (
+            clearance_in @ self.worst_curvature
+        )
 
     def sense(self, clearance_in: Array) -> Array:
         """Which sense governs: +1 for over-travel, −1 for under-travel. [1]"""
@@ -63,7 +68,9 @@ class Response:
         return np.where(over >= -under, 1.0, -1.0)
 
     def worst_links(self, clearance_in: Array, sense: Array | float) -> Array:
-        """Virtual links in the worst directions of one sense, each along the gradient where the others lead. [in]"""
+        """Virtual links in the worst directions of one sense, each along the gradient where the
+        others lead. [in]
+        """
         n, joints = clearance_in.shape
         links, towards = np.zeros((n, 2 * joints)), np.reshape(sense, (-1, 1, 1))
         for _ in range(5):

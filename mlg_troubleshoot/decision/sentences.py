@@ -1,4 +1,6 @@
-"""Every sentence that a verdict, a step or an end can say: one place for screen, batch, files and paper."""
+"""Every sentence that a verdict, a step or an end can say: one place for screen, batch, files and
+paper.
+"""
 
 from __future__ import annotations
 
@@ -10,25 +12,39 @@ from mlg_troubleshoot.decision.plan import End
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.gear.gear import Gear
 
-NO_CLOSURE = "With these clearances the linkage does not close in its worst position: outside any margin."
-CHECK_ENTRIES = "Do not use. Correct: the linkage does not close with these clearances; check the entries."
+NO_CLOSURE = (
+    "With these clearances the linkage does not close in its worst position: outside any margin."
+)
+CHECK_ENTRIES = (
+    "Do not use. Correct: the linkage does not close with these clearances; check the entries."
+)
 _SET_THAT_HOLDS = (
-    f"set of joints, restored to new, brings the worst case within the margin with {100.0 * CONFORMANCE:.0f} % "
-    "probability."
+    "set of joints, restored to new, brings the worst case within the margin with"
+    f" {100.0 * CONFORMANCE:.0f} % probability."
 )
 GO_ON = {
     End.WITHIN: "Go on with fault isolation: within margin is not a release to service.",
-    End.NOT_EXPLAINED: "Joint clearances do not explain it: check rigging, lock roller, reversing valve, hydraulics, "
-    "doors.",
-    End.TOO_CLOSE: "Go on: too close to the margin for the model to decide. Look again at the next inspection; record "
-    "its date or landings.",
-    End.OUTSIDE_NO_COMPLAINT: "Go on: clearances could contribute, but no failure is recorded. Engineering decides.",
+    End.NOT_EXPLAINED: (
+        "Joint clearances do not explain it: check rigging, lock roller, reversing valve,"
+        " hydraulics, doors."
+    ),
+    End.TOO_CLOSE: (
+        "Go on: too close to the margin for the model to decide. Look again at the next inspection;"
+        " record its date or landings."
+    ),
+    End.OUTSIDE_NO_COMPLAINT: (
+        "Go on: clearances could contribute, but no failure is recorded. Engineering decides."
+    ),
     End.CANNOT_CLEAR: f"Go on to engineering: no {_SET_THAT_HOLDS}",
 }
 
 
-JOINTS_DONE = "Joints are within limits. No further action on the joints; this is not a release to service."
-FAILED_BUT_WITHIN = "Joint clearances do not explain this failure: check hydraulics, reversing valve, doors."
+JOINTS_DONE = (
+    "Joints are within limits. No further action on the joints; this is not a release to service."
+)
+FAILED_BUT_WITHIN = (
+    "Joint clearances do not explain this failure: check hydraulics, reversing valve, doors."
+)
 
 
 def percent(share: float) -> str:
@@ -50,7 +66,9 @@ def go_on(end: End, *, failed: bool, joints_done: bool) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Predicted:
-    """The numbers that stand together everywhere: as predicted, over all directions, and in random ones. [in, 1]"""
+    """The numbers that stand together everywhere: as predicted, over all directions, and in random
+    ones. [in, 1]
+    """
 
     displacement_in: float
     bound_in: float
@@ -64,7 +82,10 @@ class Predicted:
     def __str__(self) -> str:
         chance = f"chance with random directions {percent(self.chance)}"
         if self.loaded:
-            return f"as loaded {self.displacement_in:.4f} in, worst case {self.bound_in:.4f} in, {chance}"
+            return (
+                f"as loaded {self.displacement_in:.4f} in, worst case {self.bound_in:.4f} in,"
+                f" {chance}"
+            )
         return f"worst case {self.displacement_in:.4f} in, {chance}"
 
 
@@ -75,8 +96,13 @@ def outside(margin_in: float, said: Predicted) -> str:
 
 
 def measured(measured_in: float, margin_in: float, where: str) -> str:
-    """Where the plunger was measured: ``outside`` or ``within`` its margin; outside is said first and loudest."""
-    sense, word = "beyond" if measured_in > 0 else "short of", "MEASURED" if where == "outside" else "Measured"
+    """Where the plunger was measured: ``outside`` or ``within`` its margin; outside is said first
+    and loudest.
+    """
+    sense, word = (
+        "beyond" if measured_in > 0 else "short of",
+        "MEASURED" if where == "outside" else "Measured",
+    )
     stands = f"the plunger stands {abs(measured_in):.4f} in {sense} mid-position"
     return f"{word}: {stands}, {where} its margin of {margin_in:.4f} in."
 
@@ -84,7 +110,10 @@ def measured(measured_in: float, margin_in: float, where: str) -> str:
 def explained(explained_in: float, unexplained_in: float) -> str:
     if unexplained_in <= 0.0:
         return "Joint clearances can explain all of it."
-    return f"Joint clearances explain at most {explained_in:.4f} in of it; {unexplained_in:.4f} in has another cause."
+    return (
+        f"Joint clearances explain at most {explained_in:.4f} in of it; {unexplained_in:.4f} in has"
+        " another cause."
+    )
 
 
 def within(margin_in: float, said: Predicted, *, failed: bool, joints_done: bool) -> str:
@@ -94,12 +123,18 @@ def within(margin_in: float, said: Predicted, *, failed: bool, joints_done: bool
     if not said.loaded:
         return f"Even the worst case stays within the margin of {margin_in:.4f} in ({said}). {then}"
     loads = f"Other loads than this fleet's could push it to {said.bound_in:.4f} in."
-    return f"Within its margin of {margin_in:.4f} in as loaded ({said.displacement_in:.4f} in). {loads} {then}"
+    return (
+        f"Within its margin of {margin_in:.4f} in as loaded ({said.displacement_in:.4f} in)."
+        f" {loads} {then}"
+    )
 
 
 def incomplete(open_joints: Sequence[int], said: Predicted) -> str:
     """Headline of INCOMPLETE."""
-    return f"Cannot clear: not measured {joint_list(open_joints)} ({said} from the measured joints alone)."
+    return (
+        f"Cannot clear: not measured {joint_list(open_joints)} ({said} from the measured joints"
+        " alone)."
+    )
 
 
 def entry_in_question(question: str, said: Predicted) -> str:
@@ -114,8 +149,8 @@ def inconclusive(margin_in: float, said: Predicted, p_within: float) -> str:
     """Headline of INCONCLUSIVE."""
     what = "the plunger" if said.loaded else "the bound"
     return (
-        f"Too close to the margin of {margin_in:.4f} in to say ({said}; probability that {what} is within the margin "
-        f"{percent(p_within)})."
+        f"Too close to the margin of {margin_in:.4f} in to say ({said}; probability that {what} is"
+        f" within the margin {percent(p_within)})."
     )
 
 
@@ -129,22 +164,37 @@ def measure(gear: Gear, joints: Sequence[int]) -> str:
 def measure_again(joints: Sequence[int], gauge_u_needed_in: float) -> str:
     """Step MEASURE_AGAIN."""
     return (
-        f"Measure {joint_list(joints)} again, with a standard uncertainty of {gauge_u_needed_in:.5f} in radial or less."
+        f"Measure {joint_list(joints)} again, with a standard uncertainty of"
+        f" {gauge_u_needed_in:.5f} in radial or less."
     )
 
 
 READ_PLUNGER = "Read the plunger displacement at mid-position."
 
 
-def restore(joints: Sequence[int], over: Sequence[int], worst_in: float | None, *, unread: bool, expected: bool) -> str:
+def restore(
+    joints: Sequence[int],
+    over: Sequence[int],
+    worst_in: float | None,
+    *,
+    unread: bool,
+    expected: bool,
+) -> str:
     """Step RESTORE; `expected`: what is measured before decides."""
     if expected:
         return f"Restore what the readings call for: expected {joint_list(joints)}."
-    said = f"Restore, in this order: {joint_list(joints)}." if len(joints) > 1 else f"Restore {joint_list(joints)}."
+    said = (
+        f"Restore, in this order: {joint_list(joints)}."
+        if len(joints) > 1
+        else f"Restore {joint_list(joints)}."
+    )
     if over:
         said += f" Above its limit, reject to the manual: {joint_list(over)}."
     if worst_in is not None:
-        said += f" The worst case is then {worst_in:.4f} in{', unmeasured joints at their limit' if unread else ''}."
+        said += (
+            f" The worst case is then {worst_in:.4f}"
+            f" in{', unmeasured joints at their limit' if unread else ''}."
+        )
     return said
 
 
@@ -171,10 +221,14 @@ def chance_wrong_sentence(a: Assessment) -> str | None:
     if a.chance_wrong is None:
         return None
     what = "displacement as loaded" if a.as_loaded else "worst case"
-    unread = "; joints that were not measured count as 0" if any(f.clearance_in is None for f in a.joints) else ""
+    unread = (
+        "; joints that were not measured count as 0"
+        if any(f.clearance_in is None for f in a.joints)
+        else ""
+    )
     return (
-        f"Called {a.verdict.words.lower()}, the {what} of this gear lies on the other side of the margin with a chance "
-        f"of {percent(a.chance_wrong)}{unread}."
+        f"Called {a.verdict.words.lower()}, the {what} of this gear lies on the other side of the"
+        f" margin with a chance of {percent(a.chance_wrong)}{unread}."
     )
 
 
@@ -186,14 +240,18 @@ def no_repair_set(a: Assessment) -> str:
         return f"None needed: the worst case{of_which} is within the margin already."
     if unread:
         are = "is" if len(unread) == 1 else "are"
-        return f"No set is sure to hold while {joint_list(unread)} {are} not measured: they count at their limit here."
+        return (
+            f"No set is sure to hold while {joint_list(unread)} {are} not measured: they count at"
+            " their limit here."
+        )
     return f"No {_SET_THAT_HOLDS}"
 
 
 def rigging_sentence(rigging: Rigging) -> str:
     return (
-        f"Re-rigging alone (plunger shifted by {rigging.shift_in:+.4f} in) would leave a worst case of "
-        f"{rigging.predicted_displacement_in:.4f} in: probability within the margin "
-        f"{percent(rigging.probability_within_margin)}, chance of leaving it with random directions "
-        f"{percent(rigging.probability_exceed_random_directions)}; the joints stay worn."
+        f"Re-rigging alone (plunger shifted by {rigging.shift_in:+.4f} in) would leave a worst case"
+        f" of {rigging.predicted_displacement_in:.4f} in: probability within the margin"
+        f" {percent(rigging.probability_within_margin)}, chance of leaving it with random"
+        f" directions {percent(rigging.probability_exceed_random_directions)}; the joints stay"
+        " worn."
     )

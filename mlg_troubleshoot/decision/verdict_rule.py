@@ -1,4 +1,6 @@
-"""The verdict under measurement uncertainty (after JCGM 106 and ISO 14253-1, conformance probability 95 %)."""
+"""The verdict under measurement uncertainty (after JCGM 106 and ISO 14253-1, conformance
+probability 95 %).
+"""
 
 from __future__ import annotations
 

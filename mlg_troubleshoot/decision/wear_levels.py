@@ -1,8 +1,9 @@
 """How worn the unmeasured joints may be, for ranking only: the verdict takes them at their bounds.
 
-No wear rate of this gear is public, so the distribution knows no fleet: a joint's wear, as a share of its limit, is
-exponential and cut off at the limit, and one gear's joints share a level of wear that is itself unknown. What was
-measured on a gear tells its level, and through it what to expect of the joints not yet measured.
+No wear rate of this gear is public, so the distribution knows no fleet: a joint's wear, as a share
+of its limit, is exponential and cut off at the limit, and one gear's joints share a level of wear
+that is itself unknown. What was measured on a gear tells its level, and through it what to expect
+of the joints not yet measured.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ def level_weights(measured_share: Array) -> Array:
 
 
 def level_chances(total_share: Array, count: Places) -> Array:
-    """The same for many gears, from the sum of the shares of each and their number: shape (n, n_levels)."""
+    """The same for many gears, from the sum of the shares of each and their number: shape (n,
+    n_levels).
+    """
     log_norm = np.log(_LEVELS) + np.log1p(-np.exp(-1.0 / _LEVELS))
     log_weight = -total_share[:, None] / _LEVELS - count[:, None] * log_norm
     weight = np.exp(log_weight - log_weight.max(axis=1, keepdims=True))
@@ -71,7 +74,9 @@ _TABLE = normal_cdf(_SCORES)
 def uncertainty_parts(
     linkages: Sequence[Response], clearance_in: Array, gauge_u_in: Array | float, margin_u_in: float
 ) -> tuple[Array, Array, Array]:
-    """Worst case by the second-order expansion, its slopes, and its uncertainty without that of the model. [in]"""
+    """Worst case by the second-order expansion, its slopes, and its uncertainty without that of the
+    model. [in]
+    """
     members = np.array([linkage.magnitude(clearance_in) for linkage in linkages])
     u_geometry = members.std(axis=0, ddof=1) if len(members) > 1 else np.zeros(len(clearance_in))
     slopes = linkages[0].slopes(clearance_in)

@@ -1,8 +1,16 @@
-"""Measured against predicted: what the model gets wrong, the cause by name, the extension and its gain."""
+"""Measured against predicted: what the model gets wrong, the cause by name, the extension and its
+gain.
+"""
 
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate, Cause, Scene, load_causes
 from mlg_troubleshoot.diagnosis.diagnose import Diagnosis, NamedCause, diagnose
-from mlg_troubleshoot.diagnosis.extension import EXTENSION, ModelExtension, Term, load_extension, write_extension
+from mlg_troubleshoot.diagnosis.extension import (
+    EXTENSION,
+    ModelExtension,
+    Term,
+    load_extension,
+    write_extension,
+)
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
 from mlg_troubleshoot.misfit import (
     HeldOutGain,

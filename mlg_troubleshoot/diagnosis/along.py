@@ -1,7 +1,7 @@
 """Predictions at the extension of each row: at mid-position, or along the stroke.
 
-Along the stroke pins rest as they do at mid-position; how far they may turn with the worst direction, and where the rod
-of each gear was rigged, is not known.
+Along the stroke pins rest as they do at mid-position; how far they may turn with the worst
+direction, and where the rod of each gear was rigged, is not known.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 
-# Standard deviation of the plunger at Down Lock where 0.01 to 0.05 in are allowed, each as likely. [in]
+# Standard deviation of the plunger at Down Lock where 0.01 to 0.05 in are allowed, each as likely.
+# [in]
 RIGGED_IN = 0.04 / np.sqrt(12.0)
 # Gears from which their own readings say how far rods were rigged apart.
 _MANY_GEARS = 6
@@ -29,14 +30,21 @@ def stroke_of(model: LinkageModel, table: DiagnosisTable) -> Array | None:
 
 
 def displaced(
-    model: LinkageModel, table: DiagnosisTable, links: list[Any], changed: Mapping[str, Any] | None = None
+    model: LinkageModel,
+    table: DiagnosisTable,
+    links: list[Any],
+    changed: Mapping[str, Any] | None = None,
 ) -> Array:
     """Displacement of each row at its own extension. [in]"""
     return model.displacement(links, changed, stroke_of(model, table))
 
 
-def predicted(model: LinkageModel, table: DiagnosisTable, clearance_in: Array) -> tuple[Array, Array]:
-    """Over-travel at each row's extension, in the directions that are worst at mid-position; these. [in, rad]"""
+def predicted(
+    model: LinkageModel, table: DiagnosisTable, clearance_in: Array
+) -> tuple[Array, Array]:
+    """Over-travel at each row's extension, in the directions that are worst at mid-position; these.
+    [in, rad]
+    """
     over, directions = worst_of_sense(model, clearance_in)
     if table.along.any():
         over = displaced(model, table, links_from(clearance_in, directions))
@@ -44,17 +52,23 @@ def predicted(model: LinkageModel, table: DiagnosisTable, clearance_in: Array) -
 
 
 def travel(model: LinkageModel, table: DiagnosisTable) -> Array:
-    """Travel of the plunger from Down Lock without clearances where a position is compared, else 0. [in]"""
+    """Travel of the plunger from Down Lock without clearances where a position is compared, else 0.
+    [in]
+    """
     stroke = stroke_of(model, table)
     if stroke is None:
         return np.zeros(len(table))
     return np.where(table.along, model.plunger(stroke) - model.calibration.down_lock_in, 0.0)
 
 
-def unknown_along(model: LinkageModel, table: DiagnosisTable, clearance_in: Array, over: Array, turn: Array) -> Array:
-    """What is not known of rows along the stroke, each column at one standard deviation: (n, k). [in]
+def unknown_along(
+    model: LinkageModel, table: DiagnosisTable, clearance_in: Array, over: Array, turn: Array
+) -> Array:
+    """What is not known of rows along the stroke, each column at one standard deviation: (n, k).
+    [in]
 
-    How far pins turn with the worst direction, where the dial's zero is, and how apart the rods were rigged.
+    How far pins turn with the worst direction, where the dial's zero is, and how apart the rods
+    were rigged.
     """
     along = table.along
     if not along.any():

@@ -1,4 +1,6 @@
-"""A bank of shapes that do not belong to a listed cause: does the residual vary with a variable, and which?"""
+"""A bank of shapes that do not belong to a listed cause: does the residual vary with a variable,
+and which?
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,9 @@ def build_bank(scene: Scene, catalogue: Array) -> Bank:
         for value in levels(texts)
     }
     shapes: list[tuple[Array, tuple[str, ...]]] = []
-    main = {name: z for name, z in smooth.items() if not name.startswith(("clearance_", "axial_float_"))}
+    main = {
+        name: z for name, z in smooth.items() if not name.startswith(("clearance_", "axial_float_"))
+    }
     for name, z in smooth.items():
         shapes += [(z, (name,)), (z**2, (name,)), (z**3, (name,))]
         bends = (0.15, 0.3, 0.5, 0.7, 0.85) if name in main else (0.5,)
@@ -49,7 +53,10 @@ def build_bank(scene: Scene, catalogue: Array) -> Bank:
         day = np.nan_to_num(scene.table.quantities["day"])
         for period in _PERIODS_DAYS:
             phase = 2.0 * np.pi * day / period
-            shapes += [(np.cos(phase - turn), ("day",)) for turn in (0.0, np.pi / 4, np.pi / 2, 3 * np.pi / 4)]
+            shapes += [
+                (np.cos(phase - turn), ("day",))
+                for turn in (0.0, np.pi / 4, np.pi / 2, 3 * np.pi / 4)
+            ]
     names = list(main)
     for i, a in enumerate(names):
         shapes += [(main[a] * main[b], (a, b)) for b in names[i + 1 :]]
@@ -59,10 +66,18 @@ def build_bank(scene: Scene, catalogue: Array) -> Bank:
     keys = list(classes)
     for i, key in enumerate(keys):
         shapes += [(classes[key] * main[b], (key[0], b)) for b in names]
-        shapes += [(classes[key] * classes[other], (key[0], other[0])) for other in keys[i + 1 :] if other[0] != key[0]]
+        shapes += [
+            (classes[key] * classes[other], (key[0], other[0]))
+            for other in keys[i + 1 :]
+            if other[0] != key[0]
+        ]
     for tail in levels(scene.table.tails, _LEAST_OF_TAIL):
         one = scene.table.tails == tail
-        alone = [(one * (smooth[n] - np.mean(smooth[n][one])), ("tail_no", n)) for n in WITHIN if n in smooth]
+        alone = [
+            (one * (smooth[n] - np.mean(smooth[n][one])), ("tail_no", n))
+            for n in WITHIN
+            if n in smooth
+        ]
         shapes += [(shape, v) for shape, v in alone if np.any(shape)]
     return _distinct(shapes, catalogue, smooth)
 
@@ -79,14 +94,18 @@ def _quantities(scene: Scene) -> dict[str, Array]:
     smooth = {}
     for name, values in raw.items():
         known = np.isfinite(values)
-        if known.sum() < 3 or np.std(values[known]) <= 1e-12 * max(1.0, float(np.max(np.abs(values[known])))):
+        if known.sum() < 3 or np.std(values[known]) <= 1e-12 * max(
+            1.0, float(np.max(np.abs(values[known])))
+        ):
             continue
         z = (values - np.mean(values[known])) / np.std(values[known])
         smooth[name] = np.clip(np.where(known, z, 0.0), -4.0, 4.0)
     return smooth
 
 
-def _distinct(shapes: list[tuple[Array, tuple[str, ...]]], catalogue: Array, smooth: Mapping[str, Array]) -> Bank:
+def _distinct(
+    shapes: list[tuple[Array, tuple[str, ...]]], catalogue: Array, smooth: Mapping[str, Array]
+) -> Bank:
     """Drop shapes that are constant, or that a candidate of the catalogue has already."""
     kept = [(s / np.sqrt(np.mean(s**2)), v) for s, v in shapes if np.std(s) > 1e-9]
     n = len(catalogue)

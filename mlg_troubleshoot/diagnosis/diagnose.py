@@ -44,20 +44,24 @@ LEAST_ROWS = 20
 _MANY_FAULTS = 0.15
 # Measured over predicted displacement: further from 1 than this, or negative, is not a misfit. [1]
 _MOST_RATIO = 4.0
-# Mean square left by all-joint effects, over that left by one scale or by a constant, from which they explain; rows
-# further off than so many standard deviations are slips and do not count. Ten factors take 5 % off by chance. [1]
+# Mean square left by all-joint effects, over that left by one scale or by a constant, from which
+# they explain; rows further off than so many standard deviations are slips and do not count. Ten
+# factors take 5 % off by chance. [1]
 _CLEARLY_LESS, _SLIP = 0.7, 4.0
-# Above this ratio readings against the prediction are not an error of the sign, which gives -0.9 to -1.1 (20 simulated
-# tables with one cause or none), nor of a unit: that the clearances tell of them beyond chance is enough. [1]
+# Above this ratio readings against the prediction are not an error of the sign, which gives -0.9 to
+# -1.1 (20 simulated tables with one cause or none), nor of a unit: that the clearances tell of them
+# beyond chance is enough. [1]
 _SIGN_SLIP, _BY_CHANCE = -0.75, 0.05
-# And where one scale leaves more than this of the variance, which a slip of the unit does not (of 60 tables with one
-# cause, S = 10 and 25, seeds 8,700,000 and on, at most 0.25 in 57): that they tell beyond this chance. [1]
+# And where one scale leaves more than this of the variance, which a slip of the unit does not (of
+# 60 tables with one cause, S = 10 and 25, seeds 8,700,000 and on, at most 0.25 in 57): that they
+# tell beyond this chance. [1]
 _NO_SCALE, _SURELY = 0.3, 0.001
 
 
 @dataclass(frozen=True)
 class NamedCause(Term):
-    """A cause that the data name, or cannot rule out: a term of the extension with what speaks for it.
+    """A cause that the data name, or cannot rule out: a term of the extension with what speaks for
+    it.
 
     Parameters
     ----------
@@ -68,7 +72,8 @@ class NamedCause(Term):
     p_value : float or None
         p-value. [1]
     aliases : tuple of Candidate
-        What these rows cannot tell from it, one cause or two together: the class is named by its likeliest member.
+        What these rows cannot tell from it, one cause or two together: the class is named by its
+        likeliest member.
     """
 
     effect_in: Array
@@ -82,24 +87,33 @@ class NamedCause(Term):
 
     @property
     def predicts(self) -> bool:
-        """True if the model can be extended by it: it is about the gear, and some joint's share of it is known."""
+        """True if the model can be extended by it: it is about the gear, and some joint's share of
+        it is known.
+        """
         return self.candidate.cause.extends and bool(self.candidate.setting.get("factors", True))
 
     @property
     def parameters(self) -> dict[str, float | str]:
-        """The parameters as a person reads them, with the date of a change or the exponent of wear."""
+        """The parameters as a person reads them, with the date of a change or the exponent of
+        wear.
+        """
         fixed = self.candidate.setting
         if "factors" in fixed:
             return {f"factor_{joint}": value for joint, value in fixed["factors"].items()}
         shown: dict[str, float | str] = dict(self.candidate.cause.shown(self.value))
-        return shown | {name: fixed[name] for name in ("since", "wear_exponent") if fixed.get(name) is not None}
+        return shown | {
+            name: fixed[name] for name in ("since", "wear_exponent") if fixed.get(name) is not None
+        }
 
     @property
     def interval_shown(self) -> dict[str, tuple[float, float]]:
         """Intervals of the parameters as a person reads them."""
         fixed = self.candidate.setting
         if "factors" in fixed:
-            return {f"factor_{joint}": (fixed["low"][joint], fixed["high"][joint]) for joint in fixed["factors"]}
+            return {
+                f"factor_{joint}": (fixed["low"][joint], fixed["high"][joint])
+                for joint in fixed["factors"]
+            }
         low, high = (self.candidate.cause.shown(v) for v in self.interval)
         return {name: (min(low[name], high[name]), max(low[name], high[name])) for name in low}
 
@@ -131,7 +145,8 @@ class Diagnosis:
     rows_read, rows_used : int
         Rows of the table, and rows behind the verdict.
     unread : tuple of int
-        Joints that no row has a clearance of: they count as worn with landings like the others of their gear.
+        Joints that no row has a clearance of: they count as worn with landings like the others of
+        their gear.
     unread_in, unread_u_in : float
         What they add to the prediction on average, and how far the fleet may lie off that. [in]
     mean_in, rms_in : float
@@ -250,7 +265,9 @@ def diagnose(
         catalogue = (*CATALOGUE, *own_causes)
         # What never varies cannot be distinguished from a linkage of other dimensions.
         same = {
-            name for name, values in scene.table.quantities.items() if len(np.unique(values[np.isfinite(values)])) < 2
+            name
+            for name, values in scene.table.quantities.items()
+            if len(np.unique(values[np.isfinite(values)])) < 2
         }
         told = set(scene.table.columns) - same
         testable = [cause for cause in catalogue if set(cause.needs) <= told]
@@ -264,7 +281,9 @@ def diagnose(
             if more:
                 faults = (*faults, *more)
                 case = _infer(*again, (testable, blind), ensemble, permutations, rng, progress)
-        return _report(model, case.scene.table, read, faults, not_testable, case, seed, permutations, rng)
+        return _report(
+            model, case.scene.table, read, faults, not_testable, case, seed, permutations, rng
+        )
 
 
 @dataclass(frozen=True)
@@ -291,7 +310,9 @@ class _Case:
 def _without_faults(
     model: LinkageModel, table: DiagnosisTable, where: Discrepancies, explained: Array | None
 ) -> tuple[tuple[Scene, Rows], tuple[DataFault, ...]]:
-    """Predict the rows, those with data faults repaired or set aside, without rows whose linkage does not close."""
+    """Predict the rows, those with data faults repaired or set aside, without rows whose linkage
+    does not close.
+    """
     read = len(table)
     table, faults, usable = screen_faults(model, table, explained)
     _single_slips(faults, read)
@@ -323,7 +344,12 @@ def _infer(
     moving = np.isfinite(columns).all(axis=0) & (np.abs(columns).max(axis=0) > 0.0)
     candidates = [c for c, keep in zip(candidates, moving, strict=True) if keep]
     columns = columns[:, moving]
-    blocks = [b for cause in testable if isinstance(cause, JointFactors) for b in cause.blocks(scene, ensemble)]
+    blocks = [
+        b
+        for cause in testable
+        if isinstance(cause, JointFactors)
+        for b in cause.blocks(scene, ensemble)
+    ]
     _comparable(table.measured_in, scene.over_in, scene.contribution_in, ~table.along)
     misfit = table.measured_in - scene.over_in
     bank = build_bank(scene, columns)
@@ -332,7 +358,9 @@ def _infer(
         changed = scene_at(other, table, scene.where, scene.clearance_in, scene.drawn_share)
         return np.nan_to_num(effect_columns(changed, candidates))
 
-    whole = Inference(misfit, rows, candidates, columns, bank, permutations, rng, progress, columns_in=columns_in)
+    whole = Inference(
+        misfit, rows, candidates, columns, bank, permutations, rng, progress, columns_in=columns_in
+    )
     finding = infer(whole, blocks)
     values, covariance = np.empty(0), np.empty((0, 0))
     if finding.fit is not None:
@@ -340,18 +368,23 @@ def _infer(
         if finding.block is not None:
             held, block = columns[:, list(finding.chosen)], finding.block
             expected = misfit - EXPECTED_SLOPE * scene.over_in
-            values, covariance = shrunk(finding.noise, held, block.columns, block.covariance, expected)
+            values, covariance = shrunk(
+                finding.noise, held, block.columns, block.covariance, expected
+            )
     return _Case(candidates, columns, misfit, finding, scene, rows, values, covariance)
 
 
 def _answerable(table: DiagnosisTable) -> DiagnosisTable:
-    """Keep the rows with a reading and, at mid-position, at least one clearance; refuse a table without them."""
+    """Keep the rows with a reading and, at mid-position, at least one clearance; refuse a table
+    without them.
+    """
     measured = np.isfinite(table.measured_in)
     if not measured.any():
         raise InconclusiveDataError(
-            "no row has a measured plunger displacement, so there is nothing to compare the prediction with",
-            "Record plunger_displacement_in at mid-position, twice or three times, with every inspection, or "
-            "plunger_position_in along the stroke with actuator_extension_in.",
+            "no row has a measured plunger displacement, so there is nothing to compare the"
+            " prediction with",
+            "Record plunger_displacement_in at mid-position, twice or three times, with every"
+            " inspection, or plunger_position_in along the stroke with actuator_extension_in.",
         )
     some = np.isfinite(table.clearance_in).any(axis=1) | table.along
     if not (measured & some).any():
@@ -363,19 +396,31 @@ def _answerable(table: DiagnosisTable) -> DiagnosisTable:
 
 
 def _single_slips(faults: tuple[DataFault, ...], read: int) -> None:
-    """Refuse a table in which so many rows look wrong that the whole table is wrong, not single cells."""
+    """Refuse a table in which so many rows look wrong that the whole table is wrong, not single
+    cells.
+    """
     wrong = len({fault.place for fault in faults})
     if wrong > max(_MANY_FAULTS * read, 5):
         column = Counter(fault.column for fault in faults).most_common(1)[0][0]
         raise InconclusiveDataError(
-            f"{wrong} of {read} rows look wrong, most often in {column}: these are not errors in single cells",
-            "Check the unit and the convention of the clearances, and the unit of the displacements, column by column.",
+            f"{wrong} of {read} rows look wrong, most often in {column}: these are not errors in"
+            " single cells",
+            "Check the unit and the convention of the clearances, and the unit of the"
+            " displacements, column by column.",
         )
 
 
-def _comparable(measured_in: Array, predicted_in: Array, contribution_in: Array, at_mid: Mask) -> None:
-    """Refuse measured displacements that cannot be what the prediction is of: sign, unit, or a gauge that is stuck."""
-    measured_in, predicted_in, contribution_in = measured_in[at_mid], predicted_in[at_mid], contribution_in[at_mid]
+def _comparable(
+    measured_in: Array, predicted_in: Array, contribution_in: Array, at_mid: Mask
+) -> None:
+    """Refuse measured displacements that cannot be what the prediction is of: sign, unit, or a
+    gauge that is stuck.
+    """
+    measured_in, predicted_in, contribution_in = (
+        measured_in[at_mid],
+        predicted_in[at_mid],
+        contribution_in[at_mid],
+    )
     if not len(measured_in):
         return
     if np.ptp(measured_in) == 0.0:
@@ -391,23 +436,29 @@ def _comparable(measured_in: Array, predicted_in: Array, contribution_in: Array,
         measured_in, predicted_in, contribution_in, _SIGN_SLIP < ratio < 0.0
     ):
         return
-    check = "Check the unit and the convention of the clearances, and that the gauge moves with the plunger."
+    check = (
+        "Check the unit and the convention of the clearances, and that the gauge moves with the"
+        " plunger."
+    )
     if ratio <= -1.0 / _MOST_RATIO:
         check = "Check the sign: over-travel is positive."
     elif ratio >= _MOST_RATIO:
         check = "Check the unit of the displacements."
     raise InconclusiveDataError(
-        f"the measured displacements are {ratio:.2g} times the predicted ones: no known cause does that", check
+        f"the measured displacements are {ratio:.2g} times the predicted ones: no known cause does"
+        " that",
+        check,
     )
 
 
 def _explained_by_clearances(
     measured_in: Array, predicted_in: Array, contribution_in: Array, no_sign_slip: bool
 ) -> bool:
-    """Tell whether factors of −1 to 1, joint by joint, explain readings that no one scale of the prediction does.
+    """Tell whether factors of −1 to 1, joint by joint, explain readings that no one scale of the
+    prediction does.
 
-    Nor one scale with one joint that was written in millimetres. What is not an entry error is reported only beyond
-    chance.
+    Nor one scale with one joint that was written in millimetres. What is not an entry error is
+    reported only beyond chance.
     """
     near = np.ones(len(measured_in), bool)
     for _ in range(4):
@@ -419,9 +470,14 @@ def _explained_by_clearances(
     one = measured[:, None] - simple * (measured @ simple / np.sum(simple**2, axis=0))
     unexplained, constant = np.mean(left[near] ** 2), np.var(measured)
     if no_sign_slip:
-        return bool(len(measured) * np.log(constant / unexplained) > chi2.isf(_BY_CHANCE, contribution_in.shape[1]))
+        return bool(
+            len(measured) * np.log(constant / unexplained)
+            > chi2.isf(_BY_CHANCE, contribution_in.shape[1])
+        )
     alone = min(np.mean(one**2, axis=0).min(), constant)
-    surely = len(measured) * np.log(alone / unexplained) > chi2.isf(_SURELY, contribution_in.shape[1])
+    surely = len(measured) * np.log(alone / unexplained) > chi2.isf(
+        _SURELY, contribution_in.shape[1]
+    )
     return bool(unexplained < _CLEARLY_LESS * alone or (surely and alone > _NO_SCALE * constant))
 
 
@@ -430,16 +486,20 @@ def _unsaid(table: DiagnosisTable) -> tuple[str, ...]:
     found = []
     if len(np.unique(table.tails)) < LEAST_TAILS:
         found.append(
-            f"With fewer than {LEAST_TAILS} aircraft it cannot be said whether other gears do the same, nor where this "
-            "plunger rod should be rigged; the gain is measured on rows of the same gears."
+            f"With fewer than {LEAST_TAILS} aircraft it cannot be said whether other gears do the"
+            " same, nor where this plunger rod should be rigged; the gain is measured on rows of"
+            " the same gears."
         )
     if not np.isfinite(table.clearance_in).any() and len(np.unique(table.gears)) > 1:
         found.append(
-            "Without clearances the wear of each gear is only supposed: what is found in several gears may be wear. "
-            "Read clearances, at least of #2 to #5, before acting on it."
+            "Without clearances the wear of each gear is only supposed: what is found in several"
+            " gears may be wear. Read clearances, at least of #2 to #5, before acting on it."
         )
     if len(table) < LEAST_ROWS:
-        found.append(f"With fewer than {LEAST_ROWS} rows small effects stay unseen, and scatter is a rough guess.")
+        found.append(
+            f"With fewer than {LEAST_ROWS} rows small effects stay unseen, and scatter is a rough"
+            " guess."
+        )
     return tuple(found)
 
 
@@ -449,12 +509,14 @@ def _enough(table: DiagnosisTable) -> None:
     if len(table) < LEAST_ROWS:
         raise InconclusiveDataError(
             f"{len(table)} usable rows are too few: a cause would be a guess",
-            f"Record at least {LEAST_ROWS} inspections with measured displacements; 100 and more are better.",
+            f"Record at least {LEAST_ROWS} inspections with measured displacements; 100 and more"
+            " are better.",
         )
     tails = len(np.unique(table.tails))
     if "tail_no" in table.factors and tails < LEAST_TAILS:
         raise InconclusiveDataError(
-            f"all rows are of {tails} aircraft: model errors cannot be distinguished from effects of single aircraft",
+            f"all rows are of {tails} aircraft: model errors cannot be distinguished from effects"
+            " of single aircraft",
             f"Record inspections of at least {LEAST_TAILS} aircraft.",
         )
     if not np.nan_to_num(table.clearance_in).any():
@@ -513,7 +575,8 @@ def _report(  # noqa: PLR0913 - everything that a diagnosis says
         expected_scatter_in=_expected_scatter(model, table, repeatability),
         remainder_p=finding.remainder_p,
         # Where nothing stands out beyond chance, the residual is noise by the same test.
-        remainder_is_noise=verdict is Verdict.NONE or (finding.verdict is Verdict.NAMED and finding.remainder_p > 0.05),
+        remainder_is_noise=verdict is Verdict.NONE
+        or (finding.verdict is Verdict.NAMED and finding.remainder_p > 0.05),
         used=table,
         predicted_in=case.scene.over_in,
         misfit_in=misfit,
@@ -533,11 +596,17 @@ def _gain(case: _Case, rng: np.random.Generator) -> Gain:
         others = [place for place, k in enumerate(finding.chosen) if k not in finding.sure]
         noise = noise.beside(columns[:, list(finding.chosen)][:, others] * case.values[others])
         noise, block = noise if block is None else noise.beside(block.effects_in), None
-    return measure_gain(noise, columns[:, firm], case.misfit, case.scene.over_in, case.scene.table, rng, block)
+    return measure_gain(
+        noise, columns[:, firm], case.misfit, case.scene.over_in, case.scene.table, rng, block
+    )
 
 
-def _corrected(model: LinkageModel, table: DiagnosisTable, named: Sequence[NamedCause]) -> tuple[DataFault, ...]:
-    """Each clearance that a named slip of convention concerns: what was entered, and what it is in the analysis."""
+def _corrected(
+    model: LinkageModel, table: DiagnosisTable, named: Sequence[NamedCause]
+) -> tuple[DataFault, ...]:
+    """Each clearance that a named slip of convention concerns: what was entered, and what it is in
+    the analysis.
+    """
     cells: list[DataFault] = []
     for candidate in (c.candidate for c in named if isinstance(c.candidate.cause, ConventionSlip)):
         meant = as_meant(table, candidate.setting).clearance_in
@@ -556,11 +625,16 @@ def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
     for place, k in enumerate(finding.chosen if finding.fit is not None else ()):
         value, error = float(case.values[place]), float(np.sqrt(case.covariance[place, place]))
         effect = case.columns[:, k] * value
-        found = NamedCause(case.candidates[k], value, _interval(value, error), effect, p_values[place])
+        found = NamedCause(
+            case.candidates[k], value, _interval(value, error), effect, p_values[place]
+        )
         fitted.append((found, k in finding.firm))
     if block is not None:
         k = len(finding.chosen)
-        change, candidate = case.values[k:], block.candidate(case.values[k:], case.covariance[k:, k:])
+        change, candidate = (
+            case.values[k:],
+            block.candidate(case.values[k:], case.covariance[k:, k:]),
+        )
         effect = block.columns @ change
         found = NamedCause(candidate, 1.0, (1.0, 1.0), effect, finding.block_p, finding.aliases)
         fitted.append((found, finding.verdict is Verdict.NAMED))
@@ -569,14 +643,19 @@ def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
     rivals += [] if finding.rival is None else [Candidate(finding.rival.cause)]
     none = np.zeros(len(case.misfit))
     possible = [NamedCause(candidate, 0.0, (0.0, 0.0), none, None) for candidate in rivals]
-    return tuple(c for c, firm in fitted if firm), (*(c for c, firm in fitted if not firm), *possible)
+    return tuple(c for c, firm in fitted if firm), (
+        *(c for c, firm in fitted if not firm),
+        *possible,
+    )
 
 
 def _interval(value: float, error: float) -> tuple[float, float]:
     return value - 1.96 * error, value + 1.96 * error
 
 
-def _expected_scatter(model: LinkageModel, table: DiagnosisTable, repeatability: float) -> float | None:
+def _expected_scatter(
+    model: LinkageModel, table: DiagnosisTable, repeatability: float
+) -> float | None:
     """Scatter that the gauges alone cause: readings, and clearances through the mechanism. [in]"""
     if not np.isfinite(repeatability):
         return None

@@ -1,4 +1,6 @@
-"""An extension of the model: named causes with fitted parameters, kept in a file that a check can use."""
+"""An extension of the model: named causes with fitted parameters, kept in a file that a check can
+use.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,12 @@ from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.scene import scene_at
-from mlg_troubleshoot.diagnosis.table import FACTORS, QUANTITIES, DiagnosisTable, table_from_inspections
+from mlg_troubleshoot.diagnosis.table import (
+    FACTORS,
+    QUANTITIES,
+    DiagnosisTable,
+    table_from_inspections,
+)
 from mlg_troubleshoot.errors import GearFileError, TroubleshootError
 from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
 from mlg_troubleshoot.gear.gear import Discrepancies, Gear
@@ -64,7 +71,8 @@ class ModelExtension:
     terms : tuple of Term
         The terms; their changes add up.
     residual_u_in : float
-        Scatter of what the extended model leaves, the model's standard uncertainty from now on. [in]
+        Scatter of what the extended model leaves, the model's standard uncertainty from now on.
+        [in]
     data_sha256 : tuple of str
         Hashes of the data that the terms were fitted to.
     rows : int
@@ -86,26 +94,40 @@ class ModelExtension:
         clearance_in, shape (n, n_joints): radial clearances, unmeasured joints filled. [in]
         """
         table = table_from_inspections(inspections, self.gear)
-        return adjustment_of(self.terms, self.gear.model, table, clearance_in, self.gear.discrepancies)
+        return adjustment_of(
+            self.terms, self.gear.model, table, clearance_in, self.gear.discrepancies
+        )
 
     def describe(self) -> str:
         """Return the extension in one sentence."""
         terms = "; ".join(term.words() for term in self.terms)
         listed = ", ".join(f"#{joint}" for joint in self.unread)
-        unread = f", in which nobody had read {listed}: what was fitted rests on their usual wear" if listed else ""
+        unread = (
+            f", in which nobody had read {listed}: what was fitted rests on their usual wear"
+            if listed
+            else ""
+        )
         return f"{terms}; fitted to {self.rows} measured rows{unread}"
 
     def lacks(self, inspection: Inspection) -> tuple[str, ...]:
-        """Return the columns that the terms need and an inspection lacks: a term does nothing where one is missing."""
+        """Return the columns that the terms need and an inspection lacks: a term does nothing where
+        one is missing.
+        """
         known = table_from_inspections([inspection], self.gear).columns
         needed = dict.fromkeys(name for term in self.terms for name in term.candidate.cause.needs)
         return tuple(name for name in needed if name not in known)
 
 
 def adjustment_of(
-    terms: Sequence[Term], model: LinkageModel, table: DiagnosisTable, clearance_in: Array, where: Discrepancies
+    terms: Sequence[Term],
+    model: LinkageModel,
+    table: DiagnosisTable,
+    clearance_in: Array,
+    where: Discrepancies,
 ) -> Adjustment:
-    """Combine the changes of several terms; a term whose columns a table lacks does nothing there."""
+    """Combine the changes of several terms; a term whose columns a table lacks does nothing
+    there.
+    """
     clearance = np.asarray(clearance_in, float)
     changed: dict[str, Array] = {}
     scaled: dict[str, Array] = {}
@@ -203,8 +225,8 @@ def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ())
             raise raw.fail("schema", f"{SCHEMA}, as mlg diagnose writes it")
         if raw.text("geometry_sha256") != gear.geometry_sha256:
             raise GearFileError(
-                f"{file}: this extension was made on another geometry ({raw.text('geometry_sha256')[:12]} "
-                f"instead of {gear.geometry_sha256[:12]})",
+                f"{file}: this extension was made on another geometry"
+                f" ({raw.text('geometry_sha256')[:12]} instead of {gear.geometry_sha256[:12]})",
                 "Diagnose again with this gear, or name the gear that it was made on with --gear.",
             )
         rows, residual = raw.whole("rows", least=1), raw.positive("residual_u_in", most=MOST_IN)
@@ -219,7 +241,9 @@ def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ())
 
 
 def _tried_out(term: Term, gear: Gear) -> float:
-    """Predict one gear with a term, so that a setting that it lacks is found when it is read. [in]"""
+    """Predict one gear with a term, so that a setting that it lacks is found when it is read.
+    [in]
+    """
     one = np.zeros(1)
     table = DiagnosisTable(
         clearance_in=np.full((1, len(gear.joint_numbers)), 0.001),
@@ -241,22 +265,30 @@ def _term(entry: DataTable, known: Mapping[str, Cause], gear: Gear) -> Term:
     entry.skip("words", "parameter")
     name = entry.text("cause")
     if name not in known:
-        raise entry.fail("cause", "the name of a cause; give the file of your own causes with --causes")
+        raise entry.fail(
+            "cause", "the name of a cause; give the file of your own causes with --causes"
+        )
     setting = _setting(entry.table("setting")) if entry.has("setting") else {}
     target = entry.text("target") if entry.has("target") else None
-    term = Term(Candidate(known[name], target, setting), entry.number("value"), entry.rising("interval_95"))
+    term = Term(
+        Candidate(known[name], target, setting), entry.number("value"), entry.rising("interval_95")
+    )
     entry.finish()
     try:
         moved = _tried_out(term, gear)
     except (KeyError, TypeError, ValueError, TroubleshootError) as error:
         raise entry.fail("setting", f"what {name} needs of this gear ({error})") from error
     if not moved <= MOST_IN:
-        raise entry.fail("value", f"a number that leaves the plunger within {MOST_IN:g} in of its place")
+        raise entry.fail(
+            "value", f"a number that leaves the plunger within {MOST_IN:g} in of its place"
+        )
     return term
 
 
 def _setting(setting: DataTable) -> dict[str, Any]:
-    """What a cause fixes in addition to its parameter: texts, numbers, lists of joints, numbers by name."""
+    """What a cause fixes in addition to its parameter: texts, numbers, lists of joints, numbers by
+    name.
+    """
     read: dict[str, Any] = {}
     for key in setting.names:
         value = setting.get(key)
@@ -268,6 +300,8 @@ def _setting(setting: DataTable) -> dict[str, Any]:
         else:
             whole = isinstance(value, int)
             read[key] = (
-                setting.text(key) if isinstance(value, str) else (setting.whole if whole else setting.number)(key)
+                setting.text(key)
+                if isinstance(value, str)
+                else (setting.whole if whole else setting.number)(key)
             )
     return read

@@ -21,11 +21,11 @@ LEAST_TAILS = 4
 class Gain:
     """Held-out misfit and decisions before and after.
 
-    rms_before_in, rms_after_in: root mean square misfit of held-out rows. [in]
-    share_interval: 95 % interval of the share of the mean square misfit that is removed, over tails. [1]
-    false_within_before, false_within_after: rows predicted within whose measured displacement is outside.
-    false_outside_before, false_outside_after: rows predicted outside whose measured displacement is within.
-    verdicts_changed: records whose predicted side of the margin changes.
+    rms_before_in, rms_after_in: root mean square misfit of held-out rows. [in] share_interval: 95 %
+    interval of the share of the mean square misfit that is removed, over tails. [1]
+    false_within_before, false_within_after: rows predicted within whose measured displacement is
+    outside. false_outside_before, false_outside_after: rows predicted outside whose measured
+    displacement is within. verdicts_changed: records whose predicted side of the margin changes.
     held_out_by: what was held out together: ``tail`` or ``row``.
     """
 
@@ -41,7 +41,9 @@ class Gain:
 
 
 def folds(noise: NoiseModel, columns: Array, shuffled: Wholes) -> tuple[Wholes, str]:
-    """Number the fold in which each row is held out, with its tail where there are enough and others teach the rest."""
+    """Number the fold in which each row is held out, with its tail where there are enough and
+    others teach the rest.
+    """
     group = noise.tails if noise.tails.max() + 1 >= LEAST_TAILS else None
     return folds_of(np.arange(len(shuffled)), group, columns, shuffled)
 
@@ -55,7 +57,9 @@ def measure_gain(
     rng: np.random.Generator,
     block: Block | None = None,
 ) -> Gain:
-    """Cross-validate an extension; rows of one tail are never on both sides, unless the others cannot teach it."""
+    """Cross-validate an extension; rows of one tail are never on both sides, unless the others
+    cannot teach it.
+    """
     fold, held_out_by = folds(noise, columns, rng.permutation(len(misfit)))
     expected = misfit - EXPECTED_SLOPE * predicted
     known = None if block is None else (block.columns, block.covariance)
@@ -74,16 +78,22 @@ def measure_gain(
         false_within_after=int(np.sum(said_after & outside)),
         false_outside_before=int(np.sum(~said_before & ~outside)),
         false_outside_after=int(np.sum(~said_after & ~outside)),
-        verdicts_changed=tuple(table.record_id[int(i)] for i in np.flatnonzero(said_before != said_after)),
+        verdicts_changed=tuple(
+            table.record_id[int(i)] for i in np.flatnonzero(said_before != said_after)
+        ),
         held_out_by="tail" if held_out_by == "group" else "row",
     )
 
 
-def _interval(before: Array, after: Array, groups: Wholes, rng: np.random.Generator) -> tuple[float, float]:
+def _interval(
+    before: Array, after: Array, groups: Wholes, rng: np.random.Generator
+) -> tuple[float, float]:
     """Bootstrap over tails of the share of mean square misfit removed."""
     square_before = np.bincount(groups, before**2)
     square_after = np.bincount(groups, after**2)
     drawn = rng.integers(0, len(square_before), size=(999, len(square_before)))
-    share = 1.0 - square_after[drawn].sum(axis=1) / np.maximum(square_before[drawn].sum(axis=1), 1e-30)
+    share = 1.0 - square_after[drawn].sum(axis=1) / np.maximum(
+        square_before[drawn].sum(axis=1), 1e-30
+    )
     low, high = np.quantile(share, [0.025, 0.975])
     return float(low), float(high)

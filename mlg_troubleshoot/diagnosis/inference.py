@@ -1,7 +1,8 @@
-"""Which cause explains the misfit beyond chance, which rivals are ruled out, and whether anything is left.
+"""Which cause explains the misfit beyond chance, which rivals are ruled out, and whether anything
+is left.
 
-The alarm is a maximum over all candidates against null simulations, which controls the
-family-wise error. A name is unique only if every rival explains clearly less; otherwise the whole set is
+The alarm is a maximum over all candidates against null simulations, which controls the family-wise
+error. A name is unique only if every rival explains clearly less; otherwise the whole set is
 reported. Candidates of one cause share its prior, so a cause with many targets must explain more.
 """
 
@@ -31,15 +32,16 @@ from mlg_troubleshoot.misfit.verdict import ALARM, NAME, REMAINS, Verdict, refut
 
 Key = tuple[str, str | None]
 
-# Thresholds: set in 2026 on the tuning seeds of the study of hidden effects (200 and 500 rows, S 5 to 25, one cause,
-# two, none, off the list); not re-tuned.
+# Thresholds: set in 2026 on the tuning seeds of the study of hidden effects (200 and 500 rows, S 5
+# to 25, one cause, two, none, off the list); not re-tuned.
 
 # Log-likelihood by which a rival must fall behind to be ruled out.
 RULED_OUT = 2.5
 RULED_OUT_FAINT = 4.0
 # Cosine from which two effects count as the same effect under two names.
 ALIKE = 0.985
-# A second cause below this share of the first one's effect is taken for a slip of the first one's form.
+# A second cause below this share of the first one's effect is taken for a slip of the first one's
+# form.
 SECOND_SHARE = 1.0 / 3.0
 # Where something must be left all the same, a weaker listed cause is accepted down to this share.
 WEAK_SHARE = 0.12
@@ -47,10 +49,11 @@ WEAK_SHARE = 0.12
 CONSTANT = 1.5
 # A remainder in the named cause's own variable refutes its form from this share of the effect on.
 OWN_SHARE = 0.2
-# By how many standard errors, and by how much at the least, a value may lie off the only one that it can have.
+# By how many standard errors, and by how much at the least, a value may lie off the only one that
+# it can have.
 _OFF, _OFF_SHARE = 3.5, 0.15
-# Likeliest causes of which a pair has one at least; causes that are sought together: of 30 fleets with four (seeds
-# 7,500,000) none had a fifth named.
+# Likeliest causes of which a pair has one at least; causes that are sought together: of 30 fleets
+# with four (seeds 7,500,000) none had a fifth named.
 _PAIR_POOL, _MOST_CAUSES = 24, 5
 
 
@@ -58,20 +61,17 @@ _PAIR_POOL, _MOST_CAUSES = 24, 5
 class Finding:
     """What the inference found.
 
-    verdict: NONE, NAMED, AMBIGUOUS or UNLISTED.
-    chosen: candidates that are named, or the leading one of an ambiguous set.
-    rivals: the best candidate of each further cause and target that the data cannot rule out.
-    sure: of an ambiguous set, those of `chosen` that are there whatever the rest is.
-    p_values: p-value of each of `chosen`. [1]
-    variables: variables of an unlisted effect.
-    remainder_p: chance of as much left if only noise is left. [1]
-    noise: the noise with what is named removed.
-    fit: fit of the chosen columns.
-    smallest_rms_in: root mean square of the smallest effect that is detected with 80 % power. [in]
-    ruled_out: causes and targets that explain clearly less, best first.
-    block, aliases, rival: all-joint effects that are part of the model; what these data cannot tell from them, the
-        other cause that changes all joints, or two causes together; and all-joint effects that explain as much as
-        what is chosen.
+    verdict: NONE, NAMED, AMBIGUOUS or UNLISTED. chosen: candidates that are named, or the leading
+    one of an ambiguous set. rivals: the best candidate of each further cause and target that the
+    data cannot rule out. sure: of an ambiguous set, those of `chosen` that are there whatever the
+    rest is. p_values: p-value of each of `chosen`. [1] variables: variables of an unlisted effect.
+    remainder_p: chance of as much left if only noise is left. [1] noise: the noise with what is
+    named removed. fit: fit of the chosen columns. smallest_rms_in: root mean square of the smallest
+    effect that is detected with 80 % power. [in] ruled_out: causes and targets that explain clearly
+    less, best first. block, aliases, rival: all-joint effects that are part of the model; what
+    these data cannot tell from them, the
+        other cause that changes all joints, or two causes together; and all-joint effects that
+        explain as much as what is chosen.
     block_p: p-value of all-joint effects. [1]
     """
 
@@ -93,19 +93,20 @@ class Finding:
 
     @property
     def firm(self) -> tuple[int, ...]:
-        """Single causes that are named: all that are chosen, or those of an ambiguous set that are sure."""
+        """Single causes that are named: all that are chosen, or those of an ambiguous set that are
+        sure.
+        """
         return self.chosen if self.verdict is Verdict.NAMED else self.sure
 
 
 class Inference:
     """The data of one table against the catalogue and the bank.
 
-    misfit, shape (n,): measured less predicted. [in]
-    columns, shape (n, n_candidates): effects of the candidates. [in / unit]
-    permutations: number of null simulations.
-    progress: called with the share that is done.
-    block: all-joint effects that are part of the model, shrunk by what is known of them.
-    columns_in: effects of the candidates in another linkage, each asked for once; the same if not given. [in / unit]
+    misfit, shape (n,): measured less predicted. [in] columns, shape (n, n_candidates): effects of
+    the candidates. [in / unit] permutations: number of null simulations. progress: called with the
+    share that is done. block: all-joint effects that are part of the model, shrunk by what is known
+    of them. columns_in: effects of the candidates in another linkage, each asked for once; the same
+    if not given. [in / unit]
     """
 
     def __init__(  # noqa: PLR0913 - all that a search for causes looks at
@@ -133,7 +134,9 @@ class Inference:
         self.columns_in = cache(columns_in) if columns_in is not None else lambda _model: columns
         self._refitted: dict[tuple[int, ...], tuple[NoiseModel, Fit]] = {}
         self.signs = np.array([c.cause.sign for c in candidates])
-        self.exact = np.array([np.nan if c.cause.exact is None else c.cause.exact for c in candidates])
+        self.exact = np.array(
+            [np.nan if c.cause.exact is None else c.cause.exact for c in candidates]
+        )
         counts = Counter(c.cause.name for c in candidates)
         scales = [k for k, c in enumerate(candidates) if c.cause.one_scale]
         self.one_scale = columns[:, scales[0]] if scales else rows.predicted_in
@@ -147,8 +150,21 @@ class Inference:
 
     def beside(self, block: Block, kept: Sequence[int], rng: np.random.Generator) -> Inference:
         """The same data with some of the candidates, all-joint effects being part of the model."""
-        candidates, columns = [self.candidates[k] for k in kept], self.columns_beside(block)[:, list(kept)]
-        return Inference(self.observed, self.rows, candidates, columns, self.bank, self.permutations, rng, None, block)
+        candidates, columns = (
+            [self.candidates[k] for k in kept],
+            self.columns_beside(block)[:, list(kept)],
+        )
+        return Inference(
+            self.observed,
+            self.rows,
+            candidates,
+            columns,
+            self.bank,
+            self.permutations,
+            rng,
+            None,
+            block,
+        )
 
     def run(self) -> Finding:
         """Run the inference."""
@@ -177,17 +193,25 @@ class Inference:
         return self._noise()
 
     def _noise(self, explained: Array | None = None) -> NoiseModel:
-        return build_noise(self.misfit, self.rows, explained, None if self.block is None else self.block.effects_in)
+        return build_noise(
+            self.misfit, self.rows, explained, None if self.block is None else self.block.effects_in
+        )
 
-    def _strongest(self, screen: Screen, null: Array, barred: Array | None = None) -> tuple[int, float]:
-        """Place of the shape that stands out most, of those that are not barred, and its p-value."""
+    def _strongest(
+        self, screen: Screen, null: Array, barred: Array | None = None
+    ) -> tuple[int, float]:
+        """Place of the shape that stands out most, of those that are not barred, and its
+        p-value.
+        """
         barred = np.zeros(screen.columns.shape[1]) if barred is None else barred
         gain = screen.run(self.misfit[:, None])[0][:, 0] - barred
         top = int(np.argmax(gain))
         return top, Chance(screen.largest(null, barred)).of(float(gain[top]))
 
     def null(self, noise: NoiseModel, screen: Screen, aside: bool = False) -> Array:
-        """Draw null simulations; aside from the stream that the rest of the diagnosis draws from."""
+        """Draw null simulations; aside from the stream that the rest of the diagnosis draws
+        from.
+        """
         ratio, scale = screen.tail_ratio(self.misfit)
         rng = self.rng.spawn(1)[0] if aside else self.rng
         normal = rng.standard_normal(4096)
@@ -207,10 +231,13 @@ class Inference:
         constant = self._constant(lead)
         if constant is not None and self._shifted(several.chosen):
             p, variables = constant
-            return Finding(Verdict.UNLISTED, p, self.bare, smallest, p_values=(p_alarm,), variables=variables)
+            return Finding(
+                Verdict.UNLISTED, p, self.bare, smallest, p_values=(p_alarm,), variables=variables
+            )
         finding = self._with(several, smallest)
         if finding.verdict is Verdict.UNLISTED:
-            # The residual may hold a weaker cause of the catalogue: a listed cause goes before an unlisted one.
+            # The residual may hold a weaker cause of the catalogue: a listed cause goes before an
+            # unlisted one.
             weaker = one_by_one(replace(alone, least_share=WEAK_SHARE), _MOST_CAUSES)
             if len(weaker.chosen) > 1:
                 again = self._with(weaker, smallest)
@@ -236,36 +263,52 @@ class Inference:
         possible = {self.candidates[k].key for k in (*chosen, *rivals)}
         ruled_out = tuple(sorted(behind.keys() - possible, key=lambda key: (behind[key], str(key))))
         verdict = verdict_of(p_values[0], bool(rivals), refuted)
-        found = Finding(verdict, remainder_p, noise, smallest, p_values=p_values, ruled_out=ruled_out)
+        found = Finding(
+            verdict, remainder_p, noise, smallest, p_values=p_values, ruled_out=ruled_out
+        )
         if refuted:
             return replace(found, variables=variables)
         sure = self._sure(chosen, instead) if clear else ()
         return replace(found, chosen=tuple(chosen), rivals=tuple(rivals), sure=sure, fit=fitted)
 
     def _sure(self, chosen: Sequence[int], instead: Sequence[Sequence[int]]) -> tuple[int, ...]:
-        """Those of several causes that stand alone in their place, whatever stands in the places of the others."""
+        """Those of several causes that stand alone in their place, whatever stands in the places of
+        the others.
+        """
         if not any(instead):
             return ()
-        sets = [[*chosen[:place], k, *chosen[place + 1 :]] for place, near in enumerate(instead) for k in near]
+        sets = [
+            [*chosen[:place], k, *chosen[place + 1 :]]
+            for place, near in enumerate(instead)
+            for k in near
+        ]
 
         def alone(place: int) -> bool:
             k, held = chosen[place], [other for other in sets if other[place] == chosen[place]]
             found = [self.rivals(k, [c for c in other if c != k], clear=True) for other in held]
-            return all(self.candidates[best].key == self.candidates[k].key and not near for best, near, _far in found)
+            return all(
+                self.candidates[best].key == self.candidates[k].key and not near
+                for best, near, _far in found
+            )
 
         chances = _Together(self, tuple(chosen), (), 0.0).chances()
         return tuple(
-            k for place, k in enumerate(chosen) if not instead[place] and chances[place] <= NAME and alone(place)
+            k
+            for place, k in enumerate(chosen)
+            if not instead[place] and chances[place] <= NAME and alone(place)
         )
 
     def _constant(self, lead: int) -> tuple[float, tuple[str, ...]] | None:
-        """Tell whether a shift of all rows alike explains clearly more than any cause; no listed cause does that.
+        """Tell whether a shift of all rows alike explains clearly more than any cause; no listed
+        cause does that.
 
         What moves besides is looked for with the shift taken out.
         """
         noise = self.bare
         everywhere = np.ones((len(self.misfit), 1))
-        both = Screen(noise, np.hstack([everywhere, self.columns[:, [lead]]]), np.array([0, self.signs[lead]]))
+        both = Screen(
+            noise, np.hstack([everywhere, self.columns[:, [lead]]]), np.array([0, self.signs[lead]])
+        )
         gain = both.run(self.misfit[:, None])[0][:, 0]
         if gain[0] < gain[1] - self.penalty[lead] + CONSTANT:
             return None
@@ -275,13 +318,17 @@ class Inference:
         return min(p, ALARM), variables
 
     def _shifted(self, chosen: Sequence[int]) -> bool:
-        """Tell whether a shift of all rows alike still stands out given causes; given a single one it did."""
+        """Tell whether a shift of all rows alike still stands out given causes; given a single one
+        it did.
+        """
         noise, _fitted = self.refit(chosen)
         screen = _of_shapes(noise, np.ones((len(self.misfit), 1)), self.columns[:, list(chosen)])
         return len(chosen) < 2 or float(screen.run(self.misfit[:, None])[0][0, 0]) > CONSTANT
 
     def refit(self, chosen: Sequence[int]) -> tuple[NoiseModel, Fit]:
-        """Noise with the chosen causes taken out, and their fit under it; kept, since rivals and pairs ask again."""
+        """Noise with the chosen causes taken out, and their fit under it; kept, since rivals and
+        pairs ask again.
+        """
         key = tuple(chosen)
         if key not in self._refitted:
             columns = self.columns[:, list(chosen)]
@@ -289,10 +336,20 @@ class Inference:
             self._refitted[key] = noise, fit(noise, columns, self.misfit)
         return self._refitted[key]
 
-    def rivals(self, lead: int, others: Sequence[int], clear: bool) -> tuple[int, list[int], dict[Key, float]]:
-        """Best candidate in the lead's place, the rivals that are near it, and how far the rest is behind."""
+    def rivals(
+        self, lead: int, others: Sequence[int], clear: bool
+    ) -> tuple[int, list[int], dict[Key, float]]:
+        """Best candidate in the lead's place, the rivals that are near it, and how far the rest is
+        behind.
+        """
         noise, _fitted = self.refit([lead, *others])
-        screen = Screen(noise, self.columns, self.signs, self.columns[:, list(others)] if others else None, self.exact)
+        screen = Screen(
+            noise,
+            self.columns,
+            self.signs,
+            self.columns[:, list(others)] if others else None,
+            self.exact,
+        )
         gain = screen.run(self.misfit[:, None])[0][:, 0]
         score = gain - self.prior
         keys = [c.key for c in self.candidates]
@@ -304,12 +361,16 @@ class Inference:
 
     def _alike(self, a: int, b: int) -> bool:
         first, second = self.columns[:, a], self.columns[:, b]
-        return abs(float(first @ second)) > ALIKE * float(np.linalg.norm(first) * np.linalg.norm(second))
+        return abs(float(first @ second)) > ALIKE * float(
+            np.linalg.norm(first) * np.linalg.norm(second)
+        )
 
     def remainder(self, chosen: Sequence[int]) -> tuple[float, tuple[str, ...], bool]:
-        """p-value of the strongest shape in the residual, its variables, and whether it refutes what is named.
+        """p-value of the strongest shape in the residual, its variables, and whether it refutes
+        what is named.
 
-        A large remainder of any shape does; a smaller one does if it moves with the named cause's own variable.
+        A large remainder of any shape does; a smaller one does if it moves with the named cause's
+        own variable.
         """
         held, (noise, fitted) = self.columns[:, list(chosen)], self.refit(chosen)
         screen = _of_shapes(noise, self.bank.columns, held)
@@ -328,14 +389,18 @@ class Inference:
         others = np.array([0.0 if set(names) <= needs else np.inf for names in self.bank.variables])
         if not others.all():
             strongest, p_own = self._strongest(screen, null, others)
-            if refutes(p_own, self._size(noise, held, self.bank.columns[:, strongest]), OWN_SHARE * named):
+            if refutes(
+                p_own, self._size(noise, held, self.bank.columns[:, strongest]), OWN_SHARE * named
+            ):
                 return min(p, p_own), self.bank.variables[strongest], True
         return p, self.bank.variables[top], False
 
     def _where_it_acts(
         self, noise: NoiseModel, chosen: Sequence[int], fitted: Fit
     ) -> tuple[float, tuple[str, ...]] | None:
-        """Tell whether the rows of a named group still move with a variable, or a value is not what it can only be."""
+        """Tell whether the rows of a named group still move with a variable, or a value is not what
+        it can only be.
+        """
         held, found = self.columns[:, list(chosen)], None
         for place, k in enumerate(chosen):
             cause, column = self.candidates[k].cause, self.columns[:, k]
@@ -359,8 +424,14 @@ class Inference:
         return found
 
     def _explained(self, noise: NoiseModel, known: Array) -> float:
-        """Root mean square of what single causes explain, and all-joint effects that are part of the model. [in]"""
-        block = 0.0 if self.block is None else noise.share_of(self.block.effects_in, self.misfit - known)
+        """Root mean square of what single causes explain, and all-joint effects that are part of
+        the model. [in]
+        """
+        block = (
+            0.0
+            if self.block is None
+            else noise.share_of(self.block.effects_in, self.misfit - known)
+        )
         return float(np.sqrt(np.mean((known + block) ** 2)))
 
     def _size(self, noise: NoiseModel, held: Array, shape: Array) -> float:
@@ -371,8 +442,9 @@ class Inference:
 
 @dataclass(frozen=True)
 class _Together:
-    """Single causes that explain the misfit together, the p-value of each, and how small one may be compared with
-    the largest."""
+    """Single causes that explain the misfit together, the p-value of each, and how small one may be
+    compared with the largest.
+    """
 
     whole: Inference
     chosen: tuple[int, ...]
@@ -380,7 +452,9 @@ class _Together:
     least_share: float
 
     def further(self) -> _Together | None:
-        """The same with the next cause; after one the best pair of all, since two may hide each other."""
+        """The same with the next cause; after one the best pair of all, since two may hide each
+        other.
+        """
         if len(self.chosen) == 1:
             return self._added(self._pair)
         polished = self._polished()
@@ -390,27 +464,45 @@ class _Together:
         """The same, each in the form that explains most given the others."""
         chosen = list(self.chosen)
         for place, k in enumerate(chosen):
-            chosen[place] = self.whole.rivals(k, [*chosen[:place], *chosen[place + 1 :]], clear=True)[0]
+            chosen[place] = self.whole.rivals(
+                k, [*chosen[:place], *chosen[place + 1 :]], clear=True
+            )[0]
         return replace(self, chosen=tuple(chosen))
 
-    def _added(self, found_by: Callable[[NoiseModel], tuple[list[int], float] | None]) -> _Together | None:
-        """The same with what was found, if it earns its place; tails are held out from the third cause on."""
+    def _added(
+        self, found_by: Callable[[NoiseModel], tuple[list[int], float] | None]
+    ) -> _Together | None:
+        """The same with what was found, if it earns its place; tails are held out from the third
+        cause on.
+        """
         whole, further = self.whole, len(self.chosen) > 1
         noise, _fitted = whole.refit(self.chosen)
         found = found_by(noise)
-        if found is None or not self._sound(found[0]) or (further and not self._helps(noise, found[0])):
+        if (
+            found is None
+            or not self._sound(found[0])
+            or (further and not self._helps(noise, found[0]))
+        ):
             return None
         p = self._chance(noise, whole.columns[:, found[0][:-1]], found[1], aside=further)
-        return replace(self, chosen=tuple(found[0]), p_values=(*self.p_values, p)) if p <= NAME else None
+        return (
+            replace(self, chosen=tuple(found[0]), p_values=(*self.p_values, p))
+            if p <= NAME
+            else None
+        )
 
     def without_idle(self) -> _Together | None:
-        """The same without the one that stands out least, if no more than by chance; two stood out as a pair."""
+        """The same without the one that stands out least, if no more than by chance; two stood out
+        as a pair.
+        """
         if len(self.chosen) < 3:
             return None
         p, place = max((p, place) for place, p in enumerate(self.chances()))
         if p <= NAME:
             return None
-        chosen, p_values = ((*values[:place], *values[place + 1 :]) for values in (self.chosen, self.p_values))
+        chosen, p_values = (
+            (*values[:place], *values[place + 1 :]) for values in (self.chosen, self.p_values)
+        )
         return replace(self, chosen=chosen, p_values=p_values)
 
     def chances(self) -> list[float]:
@@ -419,7 +511,9 @@ class _Together:
         noise, _fitted = whole.refit(self.chosen)
         for k in self.chosen:
             others = whole.columns[:, [c for c in self.chosen if c != k]]
-            screen = Screen(noise, whole.columns[:, [k]], whole.signs[[k]], others, whole.exact[[k]])
+            screen = Screen(
+                noise, whole.columns[:, [k]], whole.signs[[k]], others, whole.exact[[k]]
+            )
             gain = float(screen.run(whole.misfit[:, None])[0][0, 0] - whole.penalty[k])
             found.append(self._chance(noise, others, gain, aside=True))
         return found
@@ -431,14 +525,20 @@ class _Together:
         return Chance(screen.largest(whole.null(noise, screen, aside), whole.penalty)).of(gain)
 
     def _helps(self, noise: NoiseModel, chosen: Sequence[int]) -> bool:
-        """Tell whether the last one makes tails that are held out likelier, a shift common to them being noise."""
+        """Tell whether the last one makes tails that are held out likelier, a shift common to them
+        being noise.
+        """
         columns, misfit = self.whole.columns[:, list(chosen)], self.whole.misfit
         fold, _by = folds(noise, columns, np.arange(len(misfit)))
-        before, after = (misfit - held_out_part(noise, held, misfit, fold) for held in (columns[:, :-1], columns))
+        before, after = (
+            misfit - held_out_part(noise, held, misfit, fold) for held in (columns[:, :-1], columns)
+        )
         return likelier(noise, before, after, fold)
 
     def _sound(self, chosen: list[int]) -> bool:
-        """Tell whether each has the sign that it can have, and is not an error in the form of the largest."""
+        """Tell whether each has the sign that it can have, and is not an error in the form of the
+        largest.
+        """
         whole = self.whole
         values = whole.refit(chosen)[1].values
         if np.any((whole.signs[chosen] != 0) & (np.sign(values) != whole.signs[chosen])):

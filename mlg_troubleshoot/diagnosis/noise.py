@@ -1,8 +1,9 @@
-"""What rows do when nothing is wrong: scatter of readings, scatter between tails, small bias and slope.
+"""What rows do when nothing is wrong: scatter of readings, scatter between tails, small bias and
+slope.
 
-Rows of one aircraft are not exchangeable, noise may grow with the displacement and have heavy tails, and
-rounding and scatter of the clearances bias the mean and the slope a little. All of that is part of the
-covariance; what stands out against it is an effect.
+Rows of one aircraft are not exchangeable, noise may grow with the displacement and have heavy
+tails, and rounding and scatter of the clearances bias the mean and the slope a little. All of that
+is part of the covariance; what stands out against it is an effect.
 """
 
 from __future__ import annotations
@@ -18,32 +19,37 @@ from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 
-# What is not a cause yet: set in 2026 on healthy fleets of the study's tuning seeds (iid, heavy tails, scatter between
-# tails, confounded, growing noise) so that at most 2 % alarm; more of it costs power at S below 10. Not re-tuned.
+# What is not a cause yet: set in 2026 on healthy fleets of the study's tuning seeds (iid, heavy
+# tails, scatter between tails, confounded, growing noise) so that at most 2 % alarm; more of it
+# costs power at S below 10. Not re-tuned.
 
-# Pins scatter by up to some 6° about the worst direction, so a healthy fleet reads less than the bound by this
-# share. [1]
+# Pins scatter by up to some 6° about the worst direction, so a healthy fleet reads less than the
+# bound by this share. [1]
 EXPECTED_SLOPE = -0.0045
-# Bias that the null model allows beyond that, one standard deviation: of the mean [in], and of the slope [1]; and
-# what comes on top where clearances are read no better than the plunger.
+# Bias that the null model allows beyond that, one standard deviation: of the mean [in], and of the
+# slope [1]; and what comes on top where clearances are read no better than the plunger.
 BIAS_IN, READ_BIAS_IN = 0.0001, 0.0001
 SLOPE, READ_SLOPE = 0.003, 0.003
-# Doubt about how well clearances were really read: share of the drawing that may be too much or too little. [1]
+# Doubt about how well clearances were really read: share of the drawing that may be too much or too
+# little. [1]
 DRAWN = 0.3
-# Scatter of a row is at least this share of the predictions' size: nothing is known better than that. [1]
+# Scatter of a row is at least this share of the predictions' size: nothing is known better than
+# that. [1]
 LEAST_SCATTER = 0.01
-# Scatter between the gears of one tail, in units of the scatter of a row, and what the errors of reading leave in
-# the level of wear of each.
+# Scatter between the gears of one tail, in units of the scatter of a row, and what the errors of
+# reading leave in the level of wear of each.
 GEAR_RATIO, READ_GEAR_RATIO = 0.08, 0.28
-# Trends over a quantity, and habits of a side or an approach, that are not a cause yet, in the same units.
+# Trends over a quantity, and habits of a side or an approach, that are not a cause yet, in the same
+# units.
 TREND, READ_TREND = 0.03, 0.03
 HABIT, READ_HABIT = 0.04, 0.04
-# Scatter between gauges, and between technicians, over that of a row, before the data are looked at: median, and
-# spread of its logarithm; the spread for gears; and the ratios that are tried.
+# Scatter between gauges, and between technicians, over that of a row, before the data are looked
+# at: median, and spread of its logarithm; the spread for gears; and the ratios that are tried.
 HABIT_OF_ONE, HABIT_SPREAD = 0.1, 0.7
 GEAR_SPREAD = 0.5
 _RATIOS = np.geomspace(0.02, 1.0, 24)
-# Common error of a gear's rows, over the scatter of a row, from which it is distinguished from that of single rows. [1]
+# Common error of a gear's rows, over the scatter of a row, from which it is distinguished from that
+# of single rows. [1]
 _SHARED = 0.2
 # With fewer levels nothing can be told.
 _LEAST_LEVELS = 4
@@ -59,19 +65,21 @@ _LEAST_TAILS = 6
 class Rows:
     """What is known of the rows before their misfit is looked at.
 
-    predicted_in, shape (n,): prediction. [in]
-    tails, gears, shape (n,): tail and single gear of each row.
-    u_filled_in, u_shared_in, shape (n,): further standard deviation of a row by clearances that were not read: its own,
+    predicted_in, shape (n,): prediction. [in] tails, gears, shape (n,): tail and single gear of
+    each row. u_filled_in, u_shared_in, shape (n,): further standard deviation of a row by
+    clearances that were not read: its own,
         and common to its gear's rows. [in]
-    unread_in, shape (n, k): what joints that nobody read may add or lack in all rows together, each at one standard
+    unread_in, shape (n, k): what joints that nobody read may add or lack in all rows together, each
+    at one standard
         deviation. [in]
-    along_in, shape (n, k): what is not known of rows along the stroke, each at one standard deviation. [in]
-    u_read_in: standard deviation by the reading of clearances. [in]
-    u_measured_in: standard deviation of a row's measured displacement by the plunger gauge alone, 0 if unknown. [in]
-    drawn_in, shape (n,): by how much the prediction from the readings as they are lies above the one with all of them
+    along_in, shape (n, k): what is not known of rows along the stroke, each at one standard
+    deviation. [in] u_read_in: standard deviation by the reading of clearances. [in] u_measured_in:
+    standard deviation of a row's measured displacement by the plunger gauge alone, 0 if unknown.
+    [in] drawn_in, shape (n,): by how much the prediction from the readings as they are lies above
+    the one with all of them
         drawn to their expectation. [in]
-    trends, habits, shape (n, k): shapes of trends and habits that are always there in some small measure. [1]
-    readers, shape (n, k): rows of each gauge, and of each technician. [1]
+    trends, habits, shape (n, k): shapes of trends and habits that are always there in some small
+    measure. [1] readers, shape (n, k): rows of each gauge, and of each technician. [1]
     """
 
     predicted_in: Array
@@ -123,7 +131,9 @@ def tail_numbers(tails: Sequence[str] | NDArray[np.str_]) -> Wholes:
 
 
 def small_trends(table: DiagnosisTable) -> tuple[Array, Array, tuple[Array, ...]]:
-    """Trends and habits that are always there in some small measure: people, gauges, seasons, wear."""
+    """Trends and habits that are always there in some small measure: people, gauges, seasons,
+    wear.
+    """
     trends = []
     for values in table.quantities.values():
         known = np.isfinite(values)
@@ -133,7 +143,11 @@ def small_trends(table: DiagnosisTable) -> tuple[Array, Array, tuple[Array, ...]
             trends.append(np.where(known, z * z - 1.0, 0.0) / np.sqrt(2.0))
     empty = np.empty((len(table), 0))
     habits = np.hstack([empty, *(_levels(table, name) for name in ("side", "approach"))])
-    readers = tuple(levels for name in ("gauge_id", "technician_id") if (levels := _levels(table, name)).shape[1] > 1)
+    readers = tuple(
+        levels
+        for name in ("gauge_id", "technician_id")
+        if (levels := _levels(table, name)).shape[1] > 1
+    )
     return np.column_stack(trends) if trends else empty, habits, readers
 
 
@@ -149,12 +163,19 @@ def _levels(table: DiagnosisTable, name: str) -> Array:
 def build_noise(
     misfit: Array, rows: Rows, explained: Array | None = None, effects_in: Array | None = None
 ) -> NoiseModel:
-    """Estimate the noise from the misfit; effects of unknown size, and of the curve, are not scatter but its doubt."""
+    """Estimate the noise from the misfit; effects of unknown size, and of the curve, are not
+    scatter but its doubt.
+    """
     rest = misfit if explained is None else misfit - explained
     wide = rows.along_in if effects_in is None else np.hstack([rows.along_in, effects_in])
     noise, unread = _scatter(rest, rest, rows), np.empty((len(rest), 0))
     if rows.unread_in.any():
-        unread = np.hstack([rows.unread_in, rows.u_shared_in[:, None] * (rows.gears[:, None] == np.unique(rows.gears))])
+        unread = np.hstack(
+            [
+                rows.unread_in,
+                rows.u_shared_in[:, None] * (rows.gears[:, None] == np.unique(rows.gears)),
+            ]
+        )
     for _ in range(_ROUNDS if wide.size + unread.size else 0):
         known = noise.beside(wide)
         left = rest - known.share_of(wide, rest)
@@ -163,7 +184,9 @@ def build_noise(
 
 
 def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
-    """Noise of the rows; `alone` is the residual without what unread joints most likely add to gears. [in]"""
+    """Noise of the rows; `alone` is the residual without what unread joints most likely add to
+    gears. [in]
+    """
     predicted = rows.predicted_in
     numbers = tail_numbers(rows.tails)
     centred = alone.copy()
@@ -201,14 +224,20 @@ def _scatter(rest: Array, alone: Array, rows: Rows) -> NoiseModel:
         others = [HABIT_OF_ONE * other for k, other in enumerate(rows.readers) if k != place]
         beside = replace(noise, loadings=np.hstack([loadings, *others]))
         each_own[place] = _ratio(beside, levels, standard, HABIT_OF_ONE, HABIT_SPREAD)
-    loadings = np.hstack([loadings, *(ratio * levels for ratio, levels in zip(each_own, rows.readers, strict=True))])
+    loadings = np.hstack(
+        [loadings, *(ratio * levels for ratio, levels in zip(each_own, rows.readers, strict=True))]
+    )
     alike = replace(noise, loadings=loadings, gear_ratio=0.0)
     each = (gears[:, None] == np.arange(gears.max() + 1)).astype(float)
-    return replace(noise, loadings=loadings, gear_ratio=_ratio(alike, each, standard, gear_ratio, GEAR_SPREAD))
+    return replace(
+        noise, loadings=loadings, gear_ratio=_ratio(alike, each, standard, gear_ratio, GEAR_SPREAD)
+    )
 
 
 def _shared(relative: Array, gears: Wholes) -> tuple[Array, Array]:
-    """Loadings of gears whose unread joints make all their rows wrong alike, and the residual of single rows. [1]"""
+    """Loadings of gears whose unread joints make all their rows wrong alike, and the residual of
+    single rows. [1]
+    """
     largest = np.zeros(gears.max() + 1)
     np.maximum.at(largest, gears, relative)
     large = np.flatnonzero(largest > _SHARED)
@@ -219,9 +248,10 @@ def _shared(relative: Array, gears: Wholes) -> tuple[Array, Array]:
 def _ratio(noise: NoiseModel, levels: Array, rest: Array, expected: float, spread: float) -> float:
     """Scatter between the levels of a factor over that of a row. [1]
 
-    Restricted likelihood with the fleet's level and the one that stands out most left free, because that may be an
-    effect; weighed with what is expected before the data are looked at (median, and spread of the logarithm), and
-    enlarged by what the one that stands out most among as many carries on average.
+    Restricted likelihood with the fleet's level and the one that stands out most left free, because
+    that may be an effect; weighed with what is expected before the data are looked at (median, and
+    spread of the logarithm), and enlarged by what the one that stands out most among as many
+    carries on average.
     """
     count = levels.shape[1]
     if count < _LEAST_LEVELS:
@@ -243,17 +273,22 @@ def _ratio(noise: NoiseModel, levels: Array, rest: Array, expected: float, sprea
 
 
 def _apart(inner: Array, along: Array, free: int) -> tuple[Array, Array]:
-    """Products of columns with each other and with the data, one of the columns left free and taken out."""
+    """Products of columns with each other and with the data, one of the columns left free and taken
+    out.
+    """
     kept = np.delete(np.arange(len(along)), free)
     share = inner[kept, free] / max(float(inner[free, free]), 1e-9)
-    return inner[np.ix_(kept, kept)] - np.outer(share, inner[free, kept]), along[kept] - share * along[free]
+    return (
+        inner[np.ix_(kept, kept)] - np.outer(share, inner[free, kept]),
+        along[kept] - share * along[free],
+    )
 
 
 def _tail_ratios(standard: Array, tails: Wholes, gear_ratio: float) -> tuple[float, ...]:
     """Scatter between tails that is likely, over that of a row: from none to its estimate. [1]
 
-    By moments, about the fleet's level, without the tail that stands out most, which may be an effect, and
-    enlarged by what the largest of as many normal tails carries on average.
+    By moments, about the fleet's level, without the tail that stands out most, which may be an
+    effect, and enlarged by what the largest of as many normal tails carries on average.
     """
     count = np.bincount(tails).astype(float)
     if len(count) < _LEAST_TAILS:
@@ -271,7 +306,9 @@ def _tail_ratios(standard: Array, tails: Wholes, gear_ratio: float) -> tuple[flo
 
 
 def _companion(values: Array, tails: Wholes) -> Array:
-    """Distance of each row to the nearest other row of its tail: rows that stand out together are not outliers. [in]"""
+    """Distance of each row to the nearest other row of its tail: rows that stand out together are
+    not outliers. [in]
+    """
     nearest = np.full(len(values), np.inf)
     for tail in range(tails.max() + 1):
         rows = np.flatnonzero(tails == tail)

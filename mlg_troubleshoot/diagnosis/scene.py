@@ -11,26 +11,39 @@ from mlg_troubleshoot.diagnosis.along import displaced, predicted, travel, unkno
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Scene
 from mlg_troubleshoot.diagnosis.noise import Rows, build_noise, measured_uncertainty, small_trends
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
-from mlg_troubleshoot.diagnosis.wear import HEAVY_LEAD, UNREAD_IN, LikelyClearances, likely_clearances, wear_of_gears
+from mlg_troubleshoot.diagnosis.wear import (
+    HEAVY_LEAD,
+    UNREAD_IN,
+    LikelyClearances,
+    likely_clearances,
+    wear_of_gears,
+)
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 from mlg_troubleshoot.misfit.screen import fit
 
-# Doubt whether clearances were read as well as declared: standard deviation of the share of the declared error. [1]
+# Doubt whether clearances were read as well as declared: standard deviation of the share of the
+# declared error. [1]
 _SHARE_DOUBT = 0.35
 
 
-def build_scene(model: LinkageModel, table: DiagnosisTable, where: Discrepancies) -> tuple[Scene, Rows]:
-    """Predict every row with the plain model; what is known of the rows before their misfit is looked at.
+def build_scene(
+    model: LinkageModel, table: DiagnosisTable, where: Discrepancies
+) -> tuple[Scene, Rows]:
+    """Predict every row with the plain model; what is known of the rows before their misfit is
+    looked at.
 
-    Readings of clearances are drawn to their expectation as far as the measured displacements say that they
-    scatter as declared: a gauge that reads better than declared is believed more. Where no wear was read at all,
-    moderate wear is supposed, or heavy wear where that is clearly likelier.
+    Readings of clearances are drawn to their expectation as far as the measured displacements say
+    that they scatter as declared: a gauge that reads better than declared is believed more. Where
+    no wear was read at all, moderate wear is supposed, or heavy wear where that is clearly
+    likelier.
     """
     if np.nan_to_num(table.clearance_in).any():
         return _scene(model, table, where, likely_clearances(table))
-    supposed = [_scene(model, table, where, likely_clearances(table, unread_in)) for unread_in in UNREAD_IN]
+    supposed = [
+        _scene(model, table, where, likely_clearances(table, unread_in)) for unread_in in UNREAD_IN
+    ]
     moderate, heavy = (_likelihood(*found) for found in supposed)
     return supposed[heavy > moderate + HEAVY_LEAD]
 
@@ -57,15 +70,21 @@ def _scene(
     for j in range(clearance.shape[1]):
         moved = clearance.copy()
         moved[:, j] += 1e-5
-        slopes[:, j] = (displaced(model, table, links_from(moved, scene.directions)) - scene.over_in) / 1e-5
+        slopes[:, j] = (
+            displaced(model, table, links_from(moved, scene.directions)) - scene.over_in
+        ) / 1e-5
     filled_in, shared_in, read_in = (
-        np.sqrt(np.sum((slopes * u) ** 2, axis=1)) for u in (worn.u_row_in, worn.u_gear_in, worn.u_read_in)
+        np.sqrt(np.sum((slopes * u) ** 2, axis=1))
+        for u in (worn.u_row_in, worn.u_gear_in, worn.u_read_in)
     )
     fleet_in = slopes * worn.u_fleet_in
     u_read = share * float(np.sqrt(np.nanmean(read_in**2)))
     along = unknown_along(model, table, clearance, scene.over_in, scene.directions)
     if not np.nan_to_num(table.clearance_in).any():
-        along, shared_in = np.hstack([along, wear_of_gears(table, slopes * worn.u_gear_in)]), np.zeros(len(table))
+        along, shared_in = (
+            np.hstack([along, wear_of_gears(table, slopes * worn.u_gear_in)]),
+            np.zeros(len(table)),
+        )
     return scene, Rows(
         scene.over_in,
         table.tails,
@@ -82,23 +101,40 @@ def _scene(
 
 
 def scene_at(
-    model: LinkageModel, table: DiagnosisTable, where: Discrepancies, clearance_in: Array, share: float = 1.0
+    model: LinkageModel,
+    table: DiagnosisTable,
+    where: Discrepancies,
+    clearance_in: Array,
+    share: float = 1.0,
 ) -> Scene:
-    """The rows with the clearances that act: worst directions, displacement, and what each joint adds to it."""
+    """The rows with the clearances that act: worst directions, displacement, and what each joint
+    adds to it.
+    """
     over, directions = predicted(model, table, clearance_in)
     contribution = np.empty_like(clearance_in)
     for j in range(clearance_in.shape[1]):
         without = clearance_in.copy()
         without[:, j] = 0.0
         contribution[:, j] = over - displaced(model, table, links_from(without, directions))
-    return Scene(model, table, clearance_in, model.joint_numbers, where, over, directions, contribution, share)
+    return Scene(
+        model,
+        table,
+        clearance_in,
+        model.joint_numbers,
+        where,
+        over,
+        directions,
+        contribution,
+        share,
+    )
 
 
 def _share_of_declared(misfit: Array, drawn: Array) -> float:
     """Share of the declared error of clearances that the misfit shows, 0 to 1. [1]
 
-    What the error of a reading adds to the prediction, drawing takes off in part; so the misfit against the
-    readings as they are follows the drawing, all of it if they scatter as declared, nothing if they do not.
+    What the error of a reading adds to the prediction, drawing takes off in part; so the misfit
+    against the readings as they are follows the drawing, all of it if they scatter as declared,
+    nothing if they do not.
     """
     known = np.isfinite(misfit) & np.isfinite(drawn)
     y, d = misfit[known], drawn[known]
@@ -118,7 +154,9 @@ def _share_of_declared(misfit: Array, drawn: Array) -> float:
 
 
 def effect(scene: Scene, adjustment: Adjustment) -> Array:
-    """What an adjustment adds to the plain prediction, the worst directions held: exact to first order."""
+    """What an adjustment adds to the plain prediction, the worst directions held: exact to first
+    order.
+    """
     moved = scene.over_in
     if adjustment.changed or adjustment.scaled or adjustment.acting_in is not scene.clearance_in:
         links = links_from(adjustment.acting_in, scene.directions)

@@ -1,7 +1,9 @@
-"""Rows written to the wrong side: a left-hand gear's inspection that is a right-hand one's, or the other way round.
+"""Rows written to the wrong side: a left-hand gear's inspection that is a right-hand one's, or the
+other way round.
 
-Landings and wear go on from one inspection of a gear to the next; a row that does not lie on its own gear's line but
-on the line of the aircraft's other gear was most likely written to the wrong side.
+Landings and wear go on from one inspection of a gear to the next; a row that does not lie on its
+own gear's line but on the line of the aircraft's other gear was most likely written to the wrong
+side.
 """
 
 from __future__ import annotations
@@ -16,8 +18,9 @@ from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 
 # Spread of the logarithm of a clearance about its gear's median. [1]
 _LOG_SPREAD = 0.55
-# Set in 2026 on sides exchanged in fleets of the study's tuning seeds: nearer ones are found more often, and falsely.
-# By how much a row must be nearer to the other side, and nearer than its twin, where few days tell of pairs.
+# Set in 2026 on sides exchanged in fleets of the study's tuning seeds: nearer ones are found more
+# often, and falsely. By how much a row must be nearer to the other side, and nearer than its twin,
+# where few days tell of pairs.
 _SIDE_ALONE = 4.0
 _SIDE_APART = 8.0
 # Two rows no further apart than this are the same inspection twice.
@@ -25,7 +28,9 @@ _SIDE_DIFFER = 2.0
 
 
 def swapped_sides(table: DiagnosisTable) -> list[tuple[int, str, str]]:
-    """Find rows whose landings do not lie on their own gear's line over time but on the other side's."""
+    """Find rows whose landings do not lie on their own gear's line over time but on the other
+    side's.
+    """
     side, tail = table.factors.get("side"), table.factors.get("tail_no")
     landings, day = table.quantities.get("gear_landings"), table.quantities.get("day")
     if side is None or tail is None or landings is None or day is None:
@@ -49,14 +54,17 @@ def swapped_sides(table: DiagnosisTable) -> list[tuple[int, str, str]]:
             for row in rows[own]
             if _on_the_other_line(day, landings, int(row), rows[own], rows[other])
         ]
-        # Two lines that fit this badly are not evidence; one row off its line and on the other one is.
+        # Two lines that fit this badly are not evidence; one row off its line and on the other one
+        # is.
         if len(off) == 1:
             swapped += off
     return [(row, str(side[row]), "RH" if side[row] == "LH" else "LH") for row in swapped]
 
 
 def _landings_a_day(table: DiagnosisTable) -> float:
-    """Landings a day between inspections of one gear, median over the fleet; 0 if none was inspected twice."""
+    """Landings a day between inspections of one gear, median over the fleet; 0 if none was
+    inspected twice.
+    """
     day, landings, gears = table.quantities["day"], table.quantities["gear_landings"], table.gears
     known = np.flatnonzero(np.isfinite(day) & np.isfinite(landings))
     order = known[np.lexsort((day[known], gears[known]))]
@@ -64,11 +72,15 @@ def _landings_a_day(table: DiagnosisTable) -> float:
     again = (gears[later] == gears[earlier]) & (day[later] > day[earlier])
     if not again.any():
         return 0.0
-    return float(np.median((landings[later] - landings[earlier])[again] / (day[later] - day[earlier])[again]))
+    return float(
+        np.median((landings[later] - landings[earlier])[again] / (day[later] - day[earlier])[again])
+    )
 
 
 def _pairs(table: DiagnosisTable, rows: Places, rate: float) -> tuple[int, int | None]:
-    """Days on which a tail was inspected on both sides, and the row that was most likely written to the wrong side."""
+    """Days on which a tail was inspected on both sides, and the row that was most likely written to
+    the wrong side.
+    """
     side, day = table.factors["side"], table.quantities["day"]
     days = [float(d) for d in np.unique(day[rows][np.isfinite(day[rows])])]
     pairs = 0
@@ -85,7 +97,8 @@ def _pairs(table: DiagnosisTable, rows: Places, rate: float) -> tuple[int, int |
     two = suspects[0]
     others = np.setdiff1d(rows, two)
     near = [_nearness_to_other_side(table, others, int(row), rate) for row in two]
-    # A gear may be inspected twice a day: then neither row lies with the other side, or both do alike.
+    # A gear may be inspected twice a day: then neither row lies with the other side, or both do
+    # alike.
     apart, likely = abs(near[0] - near[1]), max(near)
     clear = apart >= _SIDE_APART and likely >= (_SIDE_ALONE if pairs == 1 else -_SIDE_ALONE)
     if not (clear or (pairs > 1 and likely > 0.0 and apart >= _SIDE_DIFFER)):
@@ -104,7 +117,9 @@ def _nearness_to_other_side(table: DiagnosisTable, others: Places, row: int, rat
         if len(timed) and np.isfinite(landings[row]):
             at, scatter = _line(day[timed], landings[timed], float(day[row]), rate)
             total += sign * min(abs(float(landings[row]) - at) / (3.0 * scatter + 20.0), 50.0)
-        known = np.isfinite(table.clearance_in[row]) & np.isfinite(table.clearance_in[group]).any(axis=0)
+        known = np.isfinite(table.clearance_in[row]) & np.isfinite(table.clearance_in[group]).any(
+            axis=0
+        )
         if len(group) and known.any():
             usual = np.nanmedian(table.clearance_in[group][:, known], axis=0)
             total += sign * _surprise(table.clearance_in[row][known].tolist(), usual.tolist())
@@ -124,17 +139,25 @@ def _on_the_other_line(day: Array, landings: Array, row: int, own: Places, other
 
 
 def _line(x: Array, y: Array, at: float, usual_slope: float = 0.0) -> tuple[float, float]:
-    """Median line through points, read at one place, with a robust scatter; one point alone has the usual slope."""
+    """Median line through points, read at one place, with a robust scatter; one point alone has the
+    usual slope.
+    """
     i, j = np.triu_indices(len(x), 1)
     apart = np.abs(x[j] - x[i]) > 1e-9
-    slope = float(np.median((y[j] - y[i])[apart] / (x[j] - x[i])[apart])) if apart.any() else usual_slope
+    slope = (
+        float(np.median((y[j] - y[i])[apart] / (x[j] - x[i])[apart]))
+        if apart.any()
+        else usual_slope
+    )
     level = float(np.median(y - slope * x))
     scatter = max(robust_scale(y - level - slope * x), 8.0)
     return level + slope * at, scatter
 
 
 def _surprise(values: Sequence[float], typical: Sequence[float]) -> float:
-    """How unlikely clearances are given the typical ones of their gear, as minus a log-likelihood. [1]"""
+    """How unlikely clearances are given the typical ones of their gear, as minus a log-likelihood.
+    [1]
+    """
     total = 0.0
     for value, usual in zip(values, typical, strict=True):
         ratio = np.log((value + 0.0005) / (usual + 0.0005)) / _LOG_SPREAD

@@ -32,8 +32,8 @@ class DiagnosisTable:
     clearance_in : ndarray, shape (n, n_joints)
         Radial clearances, NaN where not measured. [in]
     readings_in : ndarray, shape (n, n_readings)
-        Repeat readings of the output, NaN where missing; of a row along the stroke the plunger's position less that
-        without clearances. [in or rad]
+        Repeat readings of the output, NaN where missing; of a row along the stroke the plunger's
+        position less that without clearances. [in or rad]
     record_id : sequence of str
         Identity of each row.
     row : ndarray of int, shape (n,)
@@ -43,10 +43,12 @@ class DiagnosisTable:
     gauge_u_in : ndarray, shape (n,)
         Standard uncertainty of one radial clearance. [in]
     quantities : mapping of str to ndarray of shape (n,)
-        Numbers by name: ``temperature_c`` [°C], ``hydraulic_pressure_psi`` [psi], ``gear_landings``,
-        ``day`` (days since the earliest date), ``actuator_extension_in`` (of rows along the stroke), or a user's own.
+        Numbers by name: ``temperature_c`` [°C], ``hydraulic_pressure_psi`` [psi],
+        ``gear_landings``, ``day`` (days since the earliest date), ``actuator_extension_in`` (of
+        rows along the stroke), or a user's own.
     factors : mapping of str to ndarray of str of shape (n,)
-        Texts by name: ``tail_no``, ``side``, ``gauge_id``, ``technician_id``, ``approach``, or a user's own.
+        Texts by name: ``tail_no``, ``side``, ``gauge_id``, ``technician_id``, ``approach``, or a
+        user's own.
     axial_float_in : ndarray, shape (n, n_joints), or None
         End floats, NaN where not measured. [in]
     first_day : str or None
@@ -79,7 +81,9 @@ class DiagnosisTable:
 
     @property
     def extension_in(self) -> Array:
-        """Actuator extension from Down Lock of each row along the stroke, shape (n,); NaN at mid-position. [in]"""
+        """Actuator extension from Down Lock of each row along the stroke, shape (n,); NaN at
+        mid-position. [in]
+        """
         return np.asarray(self.quantities.get(ALONG, np.full(len(self), np.nan)))
 
     @property
@@ -124,15 +128,21 @@ class DiagnosisTable:
             quantities={name: values[places] for name, values in self.quantities.items()},
             factors={name: values[places] for name, values in self.factors.items()},
             axial_float_in=None if self.axial_float_in is None else self.axial_float_in[places],
-            plunger_gauge_u_in=None if self.plunger_gauge_u_in is None else self.plunger_gauge_u_in[places],
+            plunger_gauge_u_in=(
+                None if self.plunger_gauge_u_in is None else self.plunger_gauge_u_in[places]
+            ),
         )
 
 
 def _read_along(inspection: Inspection) -> bool:
-    return inspection.actuator_extension_in is not None and inspection.plunger_position_in is not None
+    return (
+        inspection.actuator_extension_in is not None and inspection.plunger_position_in is not None
+    )
 
 
-def table_from_inspections(inspections: Sequence[Inspection], gear: Gear, *, along: bool = False) -> DiagnosisTable:
+def table_from_inspections(
+    inspections: Sequence[Inspection], gear: Gear, *, along: bool = False
+) -> DiagnosisTable:
     """Put inspections into columns.
 
     Parameters
@@ -150,8 +160,12 @@ def table_from_inspections(inspections: Sequence[Inspection], gear: Gear, *, alo
         The columns; a covariate that no inspection has is absent.
     """
     positions = [i for i in inspections if _read_along(i)] if along else []
-    at_mid = [i for i in inspections if i.readings_in or not _read_along(i)] if along else inspections
-    stroke = np.array([*[np.nan] * len(at_mid), *(i.actuator_extension_in for i in positions)], float)
+    at_mid = (
+        [i for i in inspections if i.readings_in or not _read_along(i)] if along else inspections
+    )
+    stroke = np.array(
+        [*[np.nan] * len(at_mid), *(i.actuator_extension_in for i in positions)], float
+    )
     inspections = [*at_mid, *positions]
     n, numbers = len(inspections), gear.joint_numbers
     clearance = np.full((n, len(numbers)), np.nan)
@@ -166,7 +180,9 @@ def table_from_inspections(inspections: Sequence[Inspection], gear: Gear, *, alo
             readings[row, : len(inspection.readings_in)] = inspection.readings_in
     readings[len(at_mid) :, 0] = [i.plunger_position_in for i in positions]
     readings[len(at_mid) :, 0] -= np.nan_to_num(gear.model.plunger(stroke[len(at_mid) :]))
-    days = [None if i.inspection_date is None else i.inspection_date.toordinal() for i in inspections]
+    days = [
+        None if i.inspection_date is None else i.inspection_date.toordinal() for i in inspections
+    ]
     known = [day for day in days if day is not None]
     first = min(known) if known else None
     quantities: dict[str, list[float | None]] = {
@@ -183,14 +199,18 @@ def table_from_inspections(inspections: Sequence[Inspection], gear: Gear, *, alo
         "technician_id": [i.technician_id or "" for i in inspections],
         "approach": ["" if i.approach is None else str(i.approach) for i in inspections],
     }
-    declared = [np.nan if i.plunger_gauge_u_in is None else i.plunger_gauge_u_in for i in inspections]
+    declared = [
+        np.nan if i.plunger_gauge_u_in is None else i.plunger_gauge_u_in for i in inspections
+    ]
     return DiagnosisTable(
         clearance_in=clearance,
         readings_in=readings,
         record_id=tuple(i.record_id for i in inspections),
         row=np.array([i.source.row or k + 1 for k, i in enumerate(inspections)], np.int64),
         margin_in=np.where(
-            np.isnan(stroke), [gear.margin.value if i.margin_in is None else i.margin_in for i in inspections], np.inf
+            np.isnan(stroke),
+            [gear.margin.value if i.margin_in is None else i.margin_in for i in inspections],
+            np.inf,
         ),
         gauge_u_in=np.array([i.gauge_u_in for i in inspections]),
         quantities={

@@ -1,8 +1,10 @@
-"""How each joint of each gear wore: the clearance to expect at every inspection, from all that was read of that gear.
+"""How each joint of each gear wore: the clearance to expect at every inspection, from all that was
+read of that gear.
 
-A joint's clearance grows in proportion to landings, from a level and at a rate that differ from gear to gear about
-those of the fleet (a linear mixed model). On top it scatters in proportion to its size, and readings have errors,
-perhaps smaller than declared. All of these are estimated together by expectation maximisation (Laird and Ware 1982).
+A joint's clearance grows in proportion to landings, from a level and at a rate that differ from
+gear to gear about those of the fleet (a linear mixed model). On top it scatters in proportion to
+its size, and readings have errors, perhaps smaller than declared. All of these are estimated
+together by expectation maximisation (Laird and Ware 1982).
 """
 
 from __future__ import annotations
@@ -14,9 +16,11 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 
-# Set in 2026 on simulated wear (tests/diagnosis/test_wear.py and the study's tuning seeds); not re-tuned.
+# Set in 2026 on simulated wear (tests/diagnosis/test_wear.py and the study's tuning seeds); not
+# re-tuned.
 _ROUNDS = 25
-# The split between errors of reading and scatter of wear is left alone until the lines have settled.
+# The split between errors of reading and scatter of wear is left alone until the lines have
+# settled.
 _SETTLED = 3
 # A gear's joint scatters as if it were worn at least this share of the fleet's mean. [1]
 _LEAST_LEVEL = 0.25
@@ -24,7 +28,8 @@ _LEAST_LEVEL = 0.25
 _TIGHT_IN = 1e-5
 # Scatter of wear about its line at the start, as a share of the level. [1]
 _SCATTER = 0.15
-# Rows of gears with three readings or more that are needed to distinguish errors of reading from scatter of wear.
+# Rows of gears with three readings or more that are needed to distinguish errors of reading from
+# scatter of wear.
 _LEAST_ROWS = 20
 # No reading is exact. [in²]
 _LEAST_READING_IN2 = 1e-12
@@ -33,29 +38,36 @@ _FAR = 3.0
 
 # A reading is overruled by at most this many standard deviations of its error.
 _MOST_SIGMAS = 2.0
-# Single gears wear further off the fleet than a normal distribution has it: of ten fleets with 30 or
-# 50 % of the clearances blank (seeds 2,001,555 and on) three had a worn gear named as re-rigged at 1, none at this. [1]
+# Single gears wear further off the fleet than a normal distribution has it: of ten fleets with 30
+# or 50 % of the clearances blank (seeds 2,001,555 and on) three had a worn gear named as re-rigged
+# at 1, none at this. [1]
 _HEAVY_TAILS = 1.5
-# Wear of a joint that nobody read over the mean of the read ones: standard deviation between joints of the fleet,
-# between gears, and between inspections of one gear. Supposed, from the read joints of simulated fleets. [1]
+# Wear of a joint that nobody read over the mean of the read ones: standard deviation between joints
+# of the fleet, between gears, and between inspections of one gear. Supposed, from the read joints
+# of simulated fleets. [1]
 JOINTS_APART, GEARS_APART, ROWS_APART = 0.35, 0.5, 0.4
-# Mean radial wear of joints where none was read, moderate and heavy [in]; log-likelihood by which the heavy one must be
-# ahead to be supposed: another linkage makes it no more than half a unit likelier, fleets twice as worn by ten.
+# Mean radial wear of joints where none was read, moderate and heavy [in]; log-likelihood by which
+# the heavy one must be ahead to be supposed: another linkage makes it no more than half a unit
+# likelier, fleets twice as worn by ten.
 UNREAD_IN, HEAVY_LEAD = (0.003, 0.006), 3.0
-# How far all joints of such a fleet, and of one of its gears, may be worn more or less together, over that. Of 100
-# sound simulated fleets (seeds 20,000 and on) two alarmed, seven where wear was half as much again. [1]
+# How far all joints of such a fleet, and of one of its gears, may be worn more or less together,
+# over that. Of 100 sound simulated fleets (seeds 20,000 and on) two alarmed, seven where wear was
+# half as much again. [1]
 FLEET_TOGETHER, GEARS_TOGETHER = 0.5, 0.25
 # Share of the largest variance below which one is but rounding. [1]
 _NEGLIGIBLE = 1e-9
-# How much of what a gear's only read joint is worn beyond the fleet's is to be expected of the others, supposed. [1]
+# How much of what a gear's only read joint is worn beyond the fleet's is to be expected of the
+# others, supposed. [1]
 OWN_GEAR = 0.5
-# Standard deviations, supposed: how much further that may follow one read joint, and of exponents of wear. [1]
+# Standard deviations, supposed: how much further that may follow one read joint, and of exponents
+# of wear. [1]
 FOLLOWS, BENT = 0.2, 0.1
 
 
 @dataclass(frozen=True)
 class WearHistory:
-    """Expected clearance of joints in each row, and the variances about it; 0 where a joint was never read.
+    """Expected clearance of joints in each row, and the variances about it; 0 where a joint was
+    never read.
 
     expected_in, shape (n, ...): expected clearance. [in]
     unsure_in2, shape (n, ...): variance of the expectation. [in²]
@@ -71,11 +83,13 @@ class WearHistory:
 
 @dataclass(frozen=True)
 class LikelyClearances:
-    """Clearances behind the readings, those that were not read filled, and what is not known of them.
+    """Clearances behind the readings, those that were not read filled, and what is not known of
+    them.
 
-    likely_in, shape (n, n_joints): most likely radial clearances. [in]
-    u_row_in, u_gear_in, u_fleet_in, shape (n, n_joints): standard uncertainty of what was not read: of each row, common
-        to a gear's rows, common to all rows; where no wear was read, that of the gear is all that is supposed. [in]
+    likely_in, shape (n, n_joints): most likely radial clearances. [in] u_row_in, u_gear_in,
+    u_fleet_in, shape (n, n_joints): standard uncertainty of what was not read: of each row, common
+        to a gear's rows, common to all rows; where no wear was read, that of the gear is all that
+        is supposed. [in]
     u_read_in, shape (n, n_joints): standard uncertainty of what was read. [in]
     together, shape (n, k): further changes of u_fleet_in, of all joints that nobody read alike. [1]
     """
@@ -91,22 +105,28 @@ class LikelyClearances:
 def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) -> LikelyClearances:
     """Estimate the clearances behind the readings, and those that were not read.
 
-    A gear's joint wears along its own history (`wear`). A reading is drawn towards what that makes expect as far as
-    its uncertainty deserves it, judged by how much the readings really scatter (regression calibration). Otherwise
-    the scatter of the readings alone looks like a cause, because a reading that is too large by chance
-    predicts too much. A joint that nobody read is latent: it wears with landings as the read joints do on average,
-    in part as those of its own gear, and how far it lies off that is unknown for the fleet, each gear and each row.
-    Where no wear was read at all, joints are supposed to be worn by `unread_in` [in] on average.
+    A gear's joint wears along its own history (`wear`). A reading is drawn towards what that makes
+    expect as far as its uncertainty deserves it, judged by how much the readings really scatter
+    (regression calibration). Otherwise the scatter of the readings alone looks like a cause,
+    because a reading that is too large by chance predicts too much. A joint that nobody read is
+    latent: it wears with landings as the read joints do on average, in part as those of its own
+    gear, and how far it lies off that is unknown for the fleet, each gear and each row. Where no
+    wear was read at all, joints are supposed to be worn by `unread_in` [in] on average.
     """
     readings = table.clearance_in
     if not np.nan_to_num(readings).any():
         none, unread = np.zeros_like(readings), np.where(np.isfinite(readings), 0.0, unread_in)
-        return LikelyClearances(landed_share(table)[:, None] * unread, none, unread, none, none, none[:, :0])
+        return LikelyClearances(
+            landed_share(table)[:, None] * unread, none, unread, none, none, none[:, :0]
+        )
     history, kilo, landed = fleet_history(table)
     known, noise = np.isfinite(readings), history.reading_in2
-    # What wear is to be expected of an inspection without its landings is not known: its readings stand.
+    # What wear is to be expected of an inspection without its landings is not known: its readings
+    # stand.
     both = history.scatter_in2 + noise
-    trust = np.where(landed[:, None] & (both > 0.0), history.scatter_in2 / np.where(both > 0.0, both, 1.0), 1.0)
+    trust = np.where(
+        landed[:, None] & (both > 0.0), history.scatter_in2 / np.where(both > 0.0, both, 1.0), 1.0
+    )
     read = np.where(known, readings, history.expected_in)
     drawn = history.expected_in + trust * (read - history.expected_in)
     # A reading is never overruled by more than its own uncertainty makes likely.
@@ -126,11 +146,16 @@ def likely_clearances(table: DiagnosisTable, unread_in: float = UNREAD_IN[0]) ->
         alike = OWN_GEAR if n == 1 else np.clip((n - apart) / (n - 1), 0.0, 1.0)
         line = np.mean(lines, axis=1, keepdims=True)
         worn = np.maximum(line + alike * line * np.mean(further, axis=1, keepdims=True), 0.0)
-        rows_apart = np.sqrt(np.mean(history.scatter_in2[:, seen] / np.maximum(own, _TIGHT_IN) ** 2))
+        rows_apart = np.sqrt(
+            np.mean(history.scatter_in2[:, seen] / np.maximum(own, _TIGHT_IN) ** 2)
+        )
         likely[:, ~seen], common[:, ~seen] = worn, JOINTS_APART * worn
         shared[:, ~seen], spread[:, ~seen] = GEARS_APART * worn, rows_apart * worn
         bent = BENT * np.log(np.maximum(kilo, 0.1 * np.mean(kilo)) + _TIGHT_IN)[:, None]
-        together = np.hstack([FOLLOWS * further, bent - np.mean(bent), BENT * np.mean(worn) / line]) / JOINTS_APART
+        together = (
+            np.hstack([FOLLOWS * further, bent - np.mean(bent), BENT * np.mean(worn) / line])
+            / JOINTS_APART
+        )
     return LikelyClearances(np.maximum(likely, 0.0), spread, shared, common, left, together)
 
 
@@ -157,10 +182,12 @@ def landed_share(table: DiagnosisTable) -> Array:
 
 
 def wear_of_gears(table: DiagnosisTable, unread_in: Array) -> Array:
-    """What wear may add or lack where none was read, each column at one standard deviation: (n, k). [in]
+    """What wear may add or lack where none was read, each column at one standard deviation: (n, k).
+    [in]
 
-    The joints of the fleet, of each gear, and at each inspection of it lie off what is supposed, on their own and
-    together. The rows of one inspection, at one number of landings or on one day, share their wear.
+    The joints of the fleet, of each gear, and at each inspection of it lie off what is supposed, on
+    their own and together. The rows of one inspection, at one number of landings or on one day,
+    share their wear.
     """
     gears, worn = gears_of(table), landed_share(table)
     own = gears[:, None] == gears
@@ -178,11 +205,16 @@ def wear_of_gears(table: DiagnosisTable, unread_in: Array) -> Array:
 
 
 def fleet_history(table: DiagnosisTable) -> tuple[WearHistory, Array, Mask]:
-    """Expect every joint in each row, readings rounded to the steps they show; the landings, and which are known."""
+    """Expect every joint in each row, readings rounded to the steps they show; the landings, and
+    which are known.
+    """
     readings, gears = table.clearance_in, gears_of(table)
     kilo, landed = landings_of(table.quantities.get("gear_landings"), gears)
     worn = np.flatnonzero(np.nan_to_num(readings).max(axis=0) > 0.0)
-    rounded = np.array([_resolution(column[np.isfinite(column)]) for column in readings[:, worn].T]) ** 2 / 12.0
+    rounded = (
+        np.array([_resolution(column[np.isfinite(column)]) for column in readings[:, worn].T]) ** 2
+        / 12.0
+    )
     told = np.where(landed[:, None], readings, np.nan)[:, worn]
     told = np.where(np.isfinite(told).any(axis=0), told, readings[:, worn])
     own = wear_history(told, gears, kilo, table.gauge_u_in[:, None] ** 2 + rounded)
@@ -203,7 +235,8 @@ def _resolution(values: Array) -> float:
 
 
 def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Array) -> WearHistory:
-    """Expect joints in each row from what was read of them, of its gear and of the fleet; each joint on its own.
+    """Expect joints in each row from what was read of them, of its gear and of the fleet; each
+    joint on its own.
 
     reading_in, shape (n,) or (n, n_joints): readings, NaN where there is none. [in]
     gears, kilo, shape (n,): gear of each row, and its landings in thousands.
@@ -240,7 +273,10 @@ def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Arr
         worn, error = scatter * level**2, share * declared
         part, size = worn / (worn + error), np.maximum(many.sum(axis=0), 1)
         larger = np.sum(many * (part**2 * square + part * error) / level**2, axis=0) / size
-        better = np.sum(many * ((1.0 - part) ** 2 * square + (1.0 - part) * worn) / declared, axis=0) / size
+        better = (
+            np.sum(many * ((1.0 - part) ** 2 * square + (1.0 - part) * worn) / declared, axis=0)
+            / size
+        )
         scatter = np.where(told, larger, scatter)
         if step >= _SETTLED:
             share = np.where(told, np.minimum(better, 1.0), share)
@@ -256,7 +292,9 @@ def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Arr
 
 
 def _fleet(x: Array, y: Array, here: Array) -> tuple[Array, Array]:
-    """Line through all readings, (2, n_joints), and how widely levels and rates of single gears may lie about it."""
+    """Line through all readings, (2, n_joints), and how widely levels and rates of single gears may
+    lie about it.
+    """
     size = here.sum(axis=0)
     mean_x, mean_y = (here * x).sum(axis=0) / size, (here * y).sum(axis=0) / size
     off = here * (x - mean_x)
@@ -269,8 +307,12 @@ def _fleet(x: Array, y: Array, here: Array) -> tuple[Array, Array]:
     return np.array([mean_y - rate * mean_x, rate]), np.array([rest, np.zeros_like(rest), rates])
 
 
-def _lines(by_gear: Array, x: Array, y: Array, weight: Array, fleet: Array, spread: Array) -> tuple[Array, Array]:
-    """Level and rate of each gear drawn to the fleet's, (2, n_gears, n_joints), and their covariances (aa, ab, bb)."""
+def _lines(
+    by_gear: Array, x: Array, y: Array, weight: Array, fleet: Array, spread: Array
+) -> tuple[Array, Array]:
+    """Level and rate of each gear drawn to the fleet's, (2, n_gears, n_joints), and their
+    covariances (aa, ab, bb).
+    """
     p = np.array([spread[2], -spread[1], spread[0]]) / (spread[0] * spread[2] - spread[1] ** 2)
     j = weight.shape[1]
     sums = by_gear @ np.hstack([weight, weight * x, weight * x * x, weight * y, weight * x * y])
@@ -280,7 +322,9 @@ def _lines(by_gear: Array, x: Array, y: Array, weight: Array, fleet: Array, spre
     # Rounding must not make level and rate of a gear exactly one.
     det = np.maximum(aa * bb - ab * ab, 1e-12 * aa * bb)
     unsure = np.array([bb, -ab, aa]) / det
-    lines = np.array([unsure[0] * right[0] + unsure[1] * right[1], unsure[1] * right[0] + unsure[2] * right[1]])
+    lines = np.array(
+        [unsure[0] * right[0] + unsure[1] * right[1], unsure[1] * right[0] + unsure[2] * right[1]]
+    )
     return lines, unsure
 
 

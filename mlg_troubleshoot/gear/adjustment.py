@@ -16,13 +16,14 @@ from mlg_troubleshoot.gear.model import LinkageModel, links_from
 class Adjustment:
     """What differs from the plain model for each of n gears.
 
-    clearance_in, shape (n, n_joints): radial clearances that act. [in]
-    changed, shape (n,): change of numbers of the linkage, added to the nominal ones, by name. [in, rad or 1]
-    scaled, shape (n,): factors on numbers of the linkage, by name. [1]
-    rate_factor, shape (n,): factor on the calibration rate. [1]
-    offset_in, shape (n,): displacement that comes on top, whatever the clearances. [in]
-    direction_factors, shape (n_joints,): share of each clearance that acts along its worst direction where loads rest
-        the pin elsewhere, −1 to 1: the prediction is then the displacement as loaded, an expectation, not a bound. [1]
+    clearance_in, shape (n, n_joints): radial clearances that act. [in] changed, shape (n,): change
+    of numbers of the linkage, added to the nominal ones, by name. [in, rad or 1] scaled, shape
+    (n,): factors on numbers of the linkage, by name. [1] rate_factor, shape (n,): factor on the
+    calibration rate. [1] offset_in, shape (n,): displacement that comes on top, whatever the
+    clearances. [in] direction_factors, shape (n_joints,): share of each clearance that acts along
+    its worst direction where loads rest
+        the pin elsewhere, −1 to 1: the prediction is then the displacement as loaded, an
+        expectation, not a bound. [1]
     """
 
     clearance_in: Array
@@ -34,14 +35,25 @@ class Adjustment:
 
     @property
     def acting_in(self) -> Array:
-        """Clearances along their worst directions, negative where a pin rests on the other side. [in]"""
-        return self.clearance_in if self.direction_factors is None else self.clearance_in * self.direction_factors
+        """Clearances along their worst directions, negative where a pin rests on the other side.
+        [in]
+        """
+        return (
+            self.clearance_in
+            if self.direction_factors is None
+            else self.clearance_in * self.direction_factors
+        )
 
     def numbers(self, model: LinkageModel) -> dict[str, Array]:
         """New values of the changed numbers of one linkage, by name, shape (n,). [in, rad or 1]"""
-        nominal = dict(zip(model.kernel.parameter_names, model.kernel.parameters.tolist(), strict=True))
+        nominal = dict(
+            zip(model.kernel.parameter_names, model.kernel.parameters.tolist(), strict=True)
+        )
         return {
-            name: nominal[name] * np.asarray(self.scaled.get(name, 1.0)) + np.asarray(self.changed.get(name, 0.0))
+            name: (
+                nominal[name] * np.asarray(self.scaled.get(name, 1.0))
+                + np.asarray(self.changed.get(name, 0.0))
+            )
             for name in dict.fromkeys((*self.changed, *self.scaled))
         }
 
@@ -57,7 +69,9 @@ class Adjustment:
 
 
 def adjusted_worst_case(model: LinkageModel, adjustment: Adjustment) -> WorstCase:
-    """Worst displacement of each gear with its adjustment; with direction factors the one as loaded, twice."""
+    """Worst displacement of each gear with its adjustment; with direction factors the one as
+    loaded, twice.
+    """
     plain = worst_case(model, adjustment.clearance_in, adjustment.numbers(model))
     over, under = plain.over_in, plain.under_in
     if adjustment.direction_factors is not None:

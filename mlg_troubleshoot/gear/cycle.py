@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """One of the four stages of the cycle, with the position of the plunger in it: in, mid or out."""
+    """One of the four stages of the cycle, with the position of the plunger in it: in, mid or
+    out.
+    """
 
     name: str
     meaning: str
@@ -16,7 +18,9 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class ValveState:
-    """What follows from a position of the plunger and a direction of the oil flow; it may be "not stated"."""
+    """What follows from a position of the plunger and a direction of the oil flow; it may be "not
+    stated".
+    """
 
     plunger: str
     flow: str
@@ -26,7 +30,9 @@ class ValveState:
 
 @dataclass(frozen=True, slots=True)
 class RetractionCycle:
-    """Steps of the release, order of doors and gear, valve combinations, and what a misplaced plunger means."""
+    """Steps of the release, order of doors and gear, valve combinations, and what a misplaced
+    plunger means.
+    """
 
     stages: tuple[Stage, ...]
     release: tuple[str, ...]

@@ -13,10 +13,12 @@ from mlg_troubleshoot.geometry.mechanism import Dyad, Mechanism, Point, Slider, 
 
 
 class DesignSpace:
-    """The design variables of a linkage's topology: coordinates, angles of planes, slider axes, the extension.
+    """The design variables of a linkage's topology: coordinates, angles of planes, slider axes, the
+    extension.
 
-    Moving and turning everything together changes nothing, so one pivot of the base plane is held, and with it the
-    direction to another of its points. The extension is the input from Down Lock to the reference position.
+    Moving and turning everything together changes nothing, so one pivot of the base plane is held,
+    and with it the direction to another of its points. The extension is the input from Down Lock to
+    the reference position.
 
     given: the linkage whose topology, held pivot and other end of the stroke are kept.
     """
@@ -27,9 +29,15 @@ class DesignSpace:
         base = [p for p in m.points if p.plane == m.planes[0].name]
         self.held = next((p for p in base if p.fixed and p.virtual_link is not None), base[0])
         others = [p for p in base if p is not self.held and _apart(p, self.held) > 0.0]
-        level = [p for p in others if p.y == self.held.y and not p.fixed] or [p for p in others if p.fixed] or others
+        level = (
+            [p for p in others if p.y == self.held.y and not p.fixed]
+            or [p for p in others if p.fixed]
+            or others
+        )
         self.guide = level[0]
-        self.points = tuple(p.name for p in m.points if p.name not in (self.held.name, self.guide.name))
+        self.points = tuple(
+            p.name for p in m.points if p.name not in (self.held.name, self.guide.name)
+        )
         self.planes = tuple(p.name for p in m.planes if p.parent is not None)
         self.sliders = tuple(s.joint for s in m.steps if isinstance(s, Slider))
         self.moves_reference = m.reference_input != given.stroke[0]
@@ -42,7 +50,9 @@ class DesignSpace:
         )
 
     def vector(self, linkage: Linkage) -> Array:
-        """The variables of a linkage of this topology, as it would stand with the held pivot in its place."""
+        """The variables of a linkage of this topology, as it would stand with the held pivot in its
+        place.
+        """
         m = linkage.mechanism
         held, guide = m.point(self.held.name), m.point(self.guide.name)
         base = m.planes[0].name
@@ -52,19 +62,29 @@ class DesignSpace:
         for point in map(m.point, self.points):
             x, y = point.x, point.y
             if point.plane == base and (back or (held.x, held.y) != (self.held.x, self.held.y)):
-                moved = complex(x - held.x, y - held.y) * np.exp(1j * back) + complex(self.held.x, self.held.y)
+                moved = complex(x - held.x, y - held.y) * np.exp(1j * back) + complex(
+                    self.held.x, self.held.y
+                )
                 x, y = moved.real, moved.imag
             values += [x, y]
         for plane in m.planes:
             if plane.parent is not None:
-                values += [plane.hinge_direction + (back if plane.parent == base else 0.0), plane.dihedral]
-        values += [s.axis + (back if m.point(s.joint).plane == base else 0.0) for s in m.steps if isinstance(s, Slider)]
+                values += [
+                    plane.hinge_direction + (back if plane.parent == base else 0.0),
+                    plane.dihedral,
+                ]
+        values += [
+            s.axis + (back if m.point(s.joint).plane == base else 0.0)
+            for s in m.steps
+            if isinstance(s, Slider)
+        ]
         if self.moves_reference:
             values.append(m.reference_input - linkage.stroke[0])
         return np.array(values)
 
     def assembled(self, vectors: Any) -> Mechanism:
-        """The mechanism of a vector, or of a batch, shape (..., n_variables): its coordinates are then arrays.
+        """The mechanism of a vector, or of a batch, shape (..., n_variables): its coordinates are
+        then arrays.
 
         Every branch sign is as the coordinates have it.
         """
@@ -72,21 +92,36 @@ class DesignSpace:
         turn = np.arctan2(self.guide.y - self.held.y, self.guide.x - self.held.x)
         reach = x[f"{self.guide.name}.r"]
         places = {p: (x[f"{p}.x"], x[f"{p}.y"]) for p in self.points}
-        places[self.guide.name] = (self.held.x + reach * np.cos(turn), self.held.y + reach * np.sin(turn))
+        places[self.guide.name] = (
+            self.held.x + reach * np.cos(turn),
+            self.held.y + reach * np.sin(turn),
+        )
         m = self.mechanism
         mechanism = replace(
             m,
             points=tuple(
-                replace(p, x=places[p.name][0], y=places[p.name][1]) if p.name in places else p for p in m.points
+                replace(p, x=places[p.name][0], y=places[p.name][1]) if p.name in places else p
+                for p in m.points
             ),
             planes=tuple(
-                replace(p, hinge_direction=x[f"{p.name}.direction"], dihedral=x[f"{p.name}.dihedral"])
-                if p.name in self.planes
-                else p
+                (
+                    replace(
+                        p,
+                        hinge_direction=x[f"{p.name}.direction"],
+                        dihedral=x[f"{p.name}.dihedral"],
+                    )
+                    if p.name in self.planes
+                    else p
+                )
                 for p in m.planes
             ),
-            steps=tuple(replace(s, axis=x[f"{s.joint}.axis"]) if isinstance(s, Slider) else s for s in m.steps),
-            reference_input=self.given.stroke[0] + x["extension"] if self.moves_reference else m.reference_input,
+            steps=tuple(
+                replace(s, axis=x[f"{s.joint}.axis"]) if isinstance(s, Slider) else s
+                for s in m.steps
+            ),
+            reference_input=(
+                self.given.stroke[0] + x["extension"] if self.moves_reference else m.reference_input
+            ),
         )
         steps: list[Step] = []
         for step in mechanism.steps:
@@ -100,16 +135,25 @@ class DesignSpace:
     def linkage(self, vector: Array, name: str = "N") -> Linkage:
         """The linkage of one vector, in plain numbers."""
         m = self.assembled(vector)
-        points, planes, steps = (tuple(map(_plain, parts)) for parts in (m.points, m.planes, m.steps))
-        plain = replace(m, points=points, planes=planes, steps=steps, reference_input=float(m.reference_input))
+        points, planes, steps = (
+            tuple(map(_plain, parts)) for parts in (m.points, m.planes, m.steps)
+        )
+        plain = replace(
+            m, points=points, planes=planes, steps=steps, reference_input=float(m.reference_input)
+        )
         low, high = self.given.stroke
-        return Linkage(name, plain, (low, high + plain.reference_input - self.mechanism.reference_input))
+        return Linkage(
+            name, plain, (low, high + plain.reference_input - self.mechanism.reference_input)
+        )
 
 
 def _plain(part: Any) -> Any:
     """A part of a mechanism with a number in place of each array of one."""
     values = {field.name: getattr(part, field.name) for field in fields(part)}
-    return replace(part, **{name: v.item() for name, v in values.items() if isinstance(v, np.ndarray | np.generic)})
+    return replace(
+        part,
+        **{name: v.item() for name, v in values.items() if isinstance(v, np.ndarray | np.generic)},
+    )
 
 
 def _apart(a: Point, b: Point) -> float:

@@ -1,9 +1,9 @@
 """Directions of the virtual links: worst for over-travel, worst for under-travel, or random.
 
-The paper selects "the circumferential direction to maximize the probability of failure … sequentially from
-the most remotely located joint to the nearest joint" (section 1).
-Differs from the paper: over-travel and under-travel are run separately, because choosing the larger of the
-two joint by joint can end on the wrong side.
+The paper selects "the circumferential direction to maximize the probability of failure …
+sequentially from the most remotely located joint to the nearest joint" (section 1). Differs from
+the paper: over-travel and under-travel are run separately, because choosing the larger of the two
+joint by joint can end on the wrong side.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ _ROOT_HALF = np.sqrt(0.5)
 # A joint without clearance still has a direction in which it would act: found with this length.
 _PROBE_IN = 1e-5
 _ROWS = 512
-# Positions solved at once: twice as many no longer stay in the cache and take half as long again, each.
+# Positions solved at once: twice as many no longer stay in the cache and take half as long again,
+# each.
 _IN_CACHE = 4096
 
 
@@ -30,7 +31,8 @@ _IN_CACHE = 4096
 class WorstCase:
     """Worst displacement of each gear in both senses, with the directions that give it.
 
-    over_in, under_in, shape (n,): signed displacement in the worst directions for over-travel and under-travel; NaN
+    over_in, under_in, shape (n,): signed displacement in the worst directions for over-travel and
+    under-travel; NaN
       where the linkage does not close. [in]
     over_directions, under_directions, shape (n, n_joints): directions of the virtual links. [rad]
     """
@@ -52,11 +54,14 @@ class WorstCase:
         return np.where(over, self.over_directions, self.under_directions)
 
 
-def worst_case(model: LinkageModel, clearance_in: Array, changed: Mapping[str, Array] | None = None) -> WorstCase:
-    """Find the worst directions for each gear's own clearances, joint by joint from the most remote one.
+def worst_case(
+    model: LinkageModel, clearance_in: Array, changed: Mapping[str, Array] | None = None
+) -> WorstCase:
+    """Find the worst directions for each gear's own clearances, joint by joint from the most remote
+    one.
 
-    Along one joint's circle the displacement is a smooth periodic function: it is sampled at eight angles,
-    and the maximum of the trigonometric polynomial through them is taken.
+    Along one joint's circle the displacement is a smooth periodic function: it is sampled at eight
+    angles, and the maximum of the trigonometric polynomial through them is taken.
 
     clearance_in, shape (n, n_joints): radial clearances. [in]
     changed, shape (n,): numbers of the linkage that differ from the nominal ones, row by row.
@@ -67,9 +72,14 @@ def worst_case(model: LinkageModel, clearance_in: Array, changed: Mapping[str, A
 
 
 def worst_of_sense(
-    model: LinkageModel, clearance_in: Array, sense: float = 1.0, changed: Mapping[str, Array] | None = None
+    model: LinkageModel,
+    clearance_in: Array,
+    sense: float = 1.0,
+    changed: Mapping[str, Array] | None = None,
 ) -> tuple[Array, Array]:
-    """Find the worst displacement of one sense, over-travel if 1 and under-travel if −1, and its directions."""
+    """Find the worst displacement of one sense, over-travel if 1 and under-travel if −1, and its
+    directions.
+    """
     clearance = np.atleast_2d(np.asarray(clearance_in, float))
     n, joints = clearance.shape
     moved, angles = np.empty(n), np.empty((n, joints))
@@ -90,7 +100,10 @@ def _sequential(
     for j in reversed(range(joints)):
         length = np.ascontiguousarray(clearance[:, j])
         probe = np.where(length > 0.0, length, _PROBE_IN)
-        links[2 * j], links[2 * j + 1] = np.cos(_ANGLES)[:, None] * probe, np.sin(_ANGLES)[:, None] * probe
+        links[2 * j], links[2 * j + 1] = (
+            np.cos(_ANGLES)[:, None] * probe,
+            np.sin(_ANGLES)[:, None] * probe,
+        )
         angle = _argmax_on_circle(sense * model.displacement(links, changed))
         chosen[j] = angle
         links[2 * j], links[2 * j + 1] = length * np.cos(angle), length * np.sin(angle)
@@ -119,15 +132,24 @@ def _argmax_on_circle(sampled: Array) -> Array:
 
 
 def _harmonics(sampled: Array) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-    """Real and imaginary parts of the first three terms of the discrete Fourier transform of eight samples."""
+    """Real and imaginary parts of the first three terms of the discrete Fourier transform of eight
+    samples.
+    """
     even, odd = sampled[:4] + sampled[4:], sampled[:4] - sampled[4:]
     near, far = (odd[1] - odd[3]) * _ROOT_HALF, (odd[1] + odd[3]) * _ROOT_HALF
-    return (odd[0] + near, even[0] - even[2], odd[0] - near), (-odd[2] - far, even[3] - even[1], odd[2] - far)
+    return (odd[0] + near, even[0] - even[2], odd[0] - near), (
+        -odd[2] - far,
+        even[3] - even[1],
+        odd[2] - far,
+    )
 
 
 def random_directions(n_joints: int, n: int) -> Array:
-    """Uniform directions, shape (n, n_joints), even by a rank-1 lattice: the same set at every call. [rad]"""
-    # Powers of the generalised golden ratio of the dimension: badly approximable together, hence even.
+    """Uniform directions, shape (n, n_joints), even by a rank-1 lattice: the same set at every
+    call. [rad]
+    """
+    # Powers of the generalised golden ratio of the dimension: badly approximable together, hence
+    # even.
     root = 1.5
     for _ in range(60):
         root = (1.0 + root) ** (1.0 / (n_joints + 1))
@@ -144,15 +166,15 @@ def chance_beyond(
     offset_in: Array | None = None,
     rate_factor: Array | None = None,
 ) -> Array:
-    """Chance that the plunger leaves its margin when every clearance takes a uniformly random direction.
+    """Chance that the plunger leaves its margin when every clearance takes a uniformly random
+    direction.
 
-    clearance_in, shape (n_gears, n_joints): radial clearances. [in]
-    margin_in, shape (n_gears,): margin of each gear. [in]
-    n: sets of directions to try.
-    changed, shape (n_gears,): numbers of the linkage that differ from the nominal ones, row by row.
-    offset_in, shape (n_gears,): displacement that comes on top, whatever the directions. [in]
-    rate_factor, shape (n_gears,): factor on the calibration rate. [1]
-    Returns, shape (n_gears,): share of the sets of directions that exceed the margin, a position that does not
+    clearance_in, shape (n_gears, n_joints): radial clearances. [in] margin_in, shape (n_gears,):
+    margin of each gear. [in] n: sets of directions to try. changed, shape (n_gears,): numbers of
+    the linkage that differ from the nominal ones, row by row. offset_in, shape (n_gears,):
+    displacement that comes on top, whatever the directions. [in] rate_factor, shape (n_gears,):
+    factor on the calibration rate. [1] Returns, shape (n_gears,): share of the sets of directions
+    that exceed the margin, a position that does not
       close counted as exceeding it. [1]
     """
     clearance = np.atleast_2d(np.asarray(clearance_in, float))
@@ -167,7 +189,11 @@ def chance_beyond(
         wide = {name: np.asarray(value)[part, None] for name, value in (changed or {}).items()}
         links: list[Any] = []
         for j in range(c.shape[1]):
-            links += [c[:, j, None] * cosines[j], c[:, j, None] * sines[j]] if np.any(c[:, j]) else [0.0, 0.0]
+            links += (
+                [c[:, j, None] * cosines[j], c[:, j, None] * sines[j]]
+                if np.any(c[:, j])
+                else [0.0, 0.0]
+            )
         moved = np.atleast_2d(model.displacement(links, wide))
         if rate_factor is not None:
             moved = rate_factor[part, None] * moved

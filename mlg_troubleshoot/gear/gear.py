@@ -1,4 +1,6 @@
-"""One gear type: its linkage, joints, margin and limits, and the ensemble of linkages that fit as well."""
+"""One gear type: its linkage, joints, margin and limits, and the ensemble of linkages that fit as
+well.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ from mlg_troubleshoot.geometry.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True)
 class Linkage:
-    """One set of numbers for the linkage, ``A`` being the reference; the stroke ends at mid-position. [in]"""
+    """One set of numbers for the linkage, ``A`` being the reference; the stroke ends at
+    mid-position. [in]
+    """
 
     name: str
     mechanism: Mechanism
@@ -36,7 +40,9 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class TiltedLink:
-    """A link whose projected length shrinks when end float of its joints (of a lever: of its pivot) lets it tilt."""
+    """A link whose projected length shrinks when end float of its joints (of a lever: of its pivot)
+    lets it tilt.
+    """
 
     length: str
     floats: tuple[int, ...]
@@ -79,8 +85,8 @@ class Gear:
     plunger_reading : Sourced
         Time to read the plunger displacement at mid-position. [min]
     horizon, accepted_chance : Sourced
-        How far forecasts look ahead, and the chance of being over a limit or outside the margin at which the next
-        inspection is due. [landings, 1]
+        How far forecasts look ahead, and the chance of being over a limit or outside the margin at
+        which the next inspection is due. [landings, 1]
     margin : Sourced
         Allowed displacement of the plunger from mid-position. [in]
     bearing_span : Sourced
@@ -92,7 +98,8 @@ class Gear:
     discrepancies : Discrepancies
         Where a diagnosis may change the model.
     cycle : RetractionCycle or None
-        What the plunger's position means in the retraction sequence, as far as the source states it.
+        What the plunger's position means in the retraction sequence, as far as the source states
+        it.
     numbers : tuple of Sourced
         Every number behind a prediction, with its source.
     geometry_sha256, ensemble_sha256 : str
@@ -159,7 +166,9 @@ class Gear:
         return np.array([joint.limit.value for joint in self.joints])
 
     def over_limit(self, clearance_in: Array) -> Mask:
-        """Which clearances are above their limits, shape (…, n_joints): as `JointSpec.is_over_limit`. [in]"""
+        """Which clearances are above their limits, shape (…, n_joints): as
+        `JointSpec.is_over_limit`. [in]
+        """
         return np.asarray(clearance_in > self.limits_in + ROUNDING_IN)
 
     @property
@@ -179,13 +188,19 @@ class Gear:
 
     @property
     def link_groups(self) -> tuple[tuple[int, ...], ...]:
-        """Joints at both ends of one link together, which the plunger cannot distinguish, the others each alone."""
+        """Joints at both ends of one link together, which the plunger cannot distinguish, the
+        others each alone.
+        """
         return self.reference.mechanism.alike
 
     @cached_property
     def alike(self) -> dict[int, tuple[int, ...]]:
         """Joints that act alike with each joint: the other end of the same link, by structure."""
-        return {n: tuple(other for other in group if other != n) for group in self.link_groups for n in group}
+        return {
+            n: tuple(other for other in group if other != n)
+            for group in self.link_groups
+            for n in group
+        }
 
     def joint(self, number: int) -> JointSpec:
         """Return the joint of that number; `KeyError` if the gear has none."""

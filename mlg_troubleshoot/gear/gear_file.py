@@ -1,4 +1,6 @@
-"""Gear files: a gear type as TOML, with a source for every number. A gear file is data: nothing in it is run."""
+"""Gear files: a gear type as TOML, with a source for every number. A gear file is data: nothing in
+it is run.
+"""
 
 from __future__ import annotations
 
@@ -19,16 +21,33 @@ from mlg_troubleshoot.gear.gear import Area, Discrepancies, Gear, Linkage, Tilte
 from mlg_troubleshoot.gear.joints import JointSpec
 from mlg_troubleshoot.gear.model import Calibration
 from mlg_troubleshoot.gear.sources import Source, Sourced, SourceKind
-from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Output, Plane, Point, Slider, Slot, Step
+from mlg_troubleshoot.geometry.mechanism import (
+    Crank,
+    Dyad,
+    Lever,
+    Mechanism,
+    Output,
+    Plane,
+    Point,
+    Slider,
+    Slot,
+    Step,
+)
 from mlg_troubleshoot.geometry.program import write_program
 
 DEFAULT_GEAR = "hawker-800xp"
 _DATA = Path(str(files("mlg_troubleshoot.gear"))) / "data"
-# Nothing of a landing gear is longer, and no angle needs more than two turns; far beyond, formulas overflow.
+# Nothing of a landing gear is longer, and no angle needs more than two turns; far beyond, formulas
+# overflow.
 _LENGTH, _ANGLE = {"least": -1e4, "most": 1e4}, {"least": -720.0, "most": 720.0}
 _LARGEST = {"in": 1e4, "min": 1e5, "landings": 1e6, "1": 0.5}
 # What a gear file need not state, and what stands for it.
-_UNSTATED = {"restore_min": 120.0, "read_min": 12.0, "horizon_landings": 20_000.0, "accepted_chance": 0.05}
+_UNSTATED = {
+    "restore_min": 120.0,
+    "read_min": 12.0,
+    "horizon_landings": 20_000.0,
+    "accepted_chance": 0.05,
+}
 _GEOMETRY_KEYS = ("input", "planes", "points", "steps", "output", "calibration")
 
 
@@ -66,7 +85,8 @@ def load_gear(name_or_path: str | Path = DEFAULT_GEAR) -> Gear:
     path = Path(text)
     if not path.exists():
         raise UsageError(
-            f"there is no gear {text!r}", f"Give one of {', '.join(shipped_gears())}, or the path of a gear file."
+            f"there is no gear {text!r}",
+            f"Give one of {', '.join(shipped_gears())}, or the path of a gear file.",
         )
     return _read(path)
 
@@ -92,14 +112,19 @@ def _read(path: Path) -> Gear:
     entry = table.table("entry")
     table.skip(*_GEOMETRY_KEYS)
     (plunger_reading,) = _not_needed(table, "plunger", numbers, read_min="min")
-    horizon, accepted = _not_needed(table, "forecast", numbers, horizon_landings="landings", accepted_chance="1")
+    horizon, accepted = _not_needed(
+        table, "forecast", numbers, horizon_landings="landings", accepted_chance="1"
+    )
     indices_file = table.sibling("indices", f"{path.stem}-indices.json")
     gear = Gear(
         id=table.name("id"),
         name=table.name("name"),
         provenance=table.text("provenance"),
         reference=reference,
-        ensemble=(reference, *(_linkage(DataTable(m, ensemble_path), n, None) for n, m in members.items())),
+        ensemble=(
+            reference,
+            *(_linkage(DataTable(m, ensemble_path), n, None) for n, m in members.items()),
+        ),
         joints=tuple(_joint(t, numbers) for t in table.tables("joints")),
         areas=tuple(_area(t, numbers) for t in table.tables("areas")),
         plunger_reading=plunger_reading,
@@ -115,10 +140,16 @@ def _read(path: Path) -> Gear:
         cycle=_cycle(table.table("cycle")) if table.has("cycle") else None,
         numbers=tuple(numbers.found),
         geometry_sha256=_sha256({k: table.values.get(k) for k in _GEOMETRY_KEYS}),
-        ensemble_sha256=_sha256({n: {k: m.get(k) for k in _GEOMETRY_KEYS} for n, m in members.items()}),
+        ensemble_sha256=_sha256(
+            {n: {k: m.get(k) for k in _GEOMETRY_KEYS} for n, m in members.items()}
+        ),
         path=path,
         indices_file=indices_file,
-        files=tuple(dict.fromkeys((path, ensemble_path, indices_file, path.with_name(f"{path.stem}-targets.toml")))),
+        files=tuple(
+            dict.fromkeys(
+                (path, ensemble_path, indices_file, path.with_name(f"{path.stem}-targets.toml"))
+            )
+        ),
     )
     entry.finish()
     table.finish()
@@ -149,13 +180,21 @@ class _Numbers:
         return number
 
     def read(
-        self, table: DataTable, key: str, unit: str, source_key: str = "source", *, or_zero: bool = False
+        self,
+        table: DataTable,
+        key: str,
+        unit: str,
+        source_key: str = "source",
+        *,
+        or_zero: bool = False,
     ) -> Sourced:
         """Read a number that cannot be negative."""
         number = table.positive(key, or_zero=or_zero, most=_LARGEST[unit])
         return self.add(number, unit, self.source(table, source_key))
 
-    def or_assumed(self, table: DataTable, key: str, unit: str = "min", source_key: str = "source") -> Sourced:
+    def or_assumed(
+        self, table: DataTable, key: str, unit: str = "min", source_key: str = "source"
+    ) -> Sourced:
         """Read a number that a gear file need not state: it is then assumed, and says so."""
         if table.has(key):
             return self.read(table, key, unit, source_key)
@@ -201,7 +240,10 @@ def _linkage(table: DataTable, name: str, numbers: _Numbers | None) -> Linkage:
     planes = []
     for entry in table.tables("planes"):
         if entry.has("parent"):
-            direction, dihedral = entry.number("hinge_direction_deg", **_ANGLE), entry.number("dihedral_deg", **_ANGLE)
+            direction, dihedral = (
+                entry.number("hinge_direction_deg", **_ANGLE),
+                entry.number("dihedral_deg", **_ANGLE),
+            )
             names = entry.name("name"), entry.name("parent"), entry.name("hinge_point")
             planes.append(Plane(*names, float(np.radians(direction)), float(np.radians(dihedral))))
             sourced(entry, (direction, "deg"), (dihedral, "deg"))
@@ -212,7 +254,9 @@ def _linkage(table: DataTable, name: str, numbers: _Numbers | None) -> Linkage:
     for entry in table.tables("points"):
         x, y = entry.pair("at", **_LENGTH)
         link = entry.whole("virtual_link", least=1, most=999) if entry.has("virtual_link") else None
-        points.append(Point(entry.name("name"), entry.name("plane"), x, y, entry.flag("fixed"), link))
+        points.append(
+            Point(entry.name("name"), entry.name("plane"), x, y, entry.flag("fixed"), link)
+        )
         sourced(entry, (x, "in"), (y, "in"))
         entry.finish()
     steps = []
@@ -240,13 +284,21 @@ def _step(t: DataTable) -> Step:
         case "crank":
             return Crank(joint, t.name("pivot"), links)
         case "dyad":
-            return Dyad(joint, t.name("upstream"), t.name("downstream"), _sign(t), links, t.flag("driven"))
+            return Dyad(
+                joint, t.name("upstream"), t.name("downstream"), _sign(t), links, t.flag("driven")
+            )
         case "lever":
             return Lever(joint, t.name("pivot"), t.name("follows"), links)
         case "slot":
             return Slot(joint, t.name("pivot"), t.name("pin"), links)
         case "slider":
-            return Slider(joint, t.name("upstream"), float(np.radians(t.number("axis_deg", **_ANGLE))), _sign(t), links)
+            return Slider(
+                joint,
+                t.name("upstream"),
+                float(np.radians(t.number("axis_deg", **_ANGLE))),
+                _sign(t),
+                links,
+            )
         case _:
             raise t.fail("type", "crank, dyad, lever, slot or slider")
 
@@ -259,7 +311,9 @@ def _sign(table: DataTable) -> float:
 
 
 def _members(raw: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:
-    """Each member of the ensemble as a full description: the reference with its own numbers in place."""
+    """Each member of the ensemble as a full description: the reference with its own numbers in
+    place.
+    """
     table = read_toml(path)
     table.text("source")
     members = table.table("members")
@@ -272,10 +326,14 @@ def _members(raw: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:
         for point in points.names:
             _entry(new["points"], "name", point, points)["at"] = list(points.pair(point))
         for part, key in (("planes", "name"), ("steps", "joint")):
-            changes = member.table(part) if member.has(part) or part == "steps" else DataTable({}, path)
+            changes = (
+                member.table(part) if member.has(part) or part == "steps" else DataTable({}, path)
+            )
             for name_of in changes.names:
                 change = changes.table(name_of)
-                _entry(new[part], key, name_of, changes).update({k: change.number(k) for k in change.names})
+                _entry(new[part], key, name_of, changes).update(
+                    {k: change.number(k) for k in change.names}
+                )
         member.finish()
         full[name] = new
     table.finish()
@@ -328,7 +386,9 @@ def _not_needed(table: DataTable, name: str, numbers: _Numbers, **units: str) ->
 
 
 def _area(t: DataTable, numbers: _Numbers) -> Area:
-    area = Area(t.name("name"), t.text("description"), numbers.read(t, "access_min", "min", or_zero=True))
+    area = Area(
+        t.name("name"), t.text("description"), numbers.read(t, "access_min", "min", or_zero=True)
+    )
     t.finish()
     return area
 
@@ -345,22 +405,31 @@ def _discrepancies(table: DataTable, mechanism: Mechanism, numbers: _Numbers) ->
         contact=entry.pairs("contact"),
         tilt=tuple(TiltedLink(t.text("length"), t.wholes("floats")) for t in entry.tables("tilt")),
     )
-    used = (*found.elastic, *(t.length for t in found.tilt), *((found.wear_shift,) if found.wear_shift else ()))
+    used = (
+        *found.elastic,
+        *(t.length for t in found.tilt),
+        *((found.wear_shift,) if found.wear_shift else ()),
+    )
     for name in used:
         if name not in known:
-            raise entry.fail("elastic, tilt or wear_shift", f"a number of the linkage instead of {name!r}")
+            raise entry.fail(
+                "elastic, tilt or wear_shift", f"a number of the linkage instead of {name!r}"
+            )
     entry.finish()
     return found
 
 
 def _cycle(t: DataTable) -> RetractionCycle:
     cycle = RetractionCycle(
-        stages=tuple(Stage(s.text("name"), s.text("meaning"), s.text("plunger")) for s in t.tables("stages")),
+        stages=tuple(
+            Stage(s.text("name"), s.text("meaning"), s.text("plunger")) for s in t.tables("stages")
+        ),
         release=t.texts("release"),
         retraction_order=t.texts("retraction_order"),
         extension_order=t.texts("extension_order"),
         valve=tuple(
-            ValveState(v.text("plunger"), v.text("flow"), v.text("stage"), v.text("result")) for v in t.tables("valve")
+            ValveState(v.text("plunger"), v.text("flow"), v.text("stage"), v.text("result"))
+            for v in t.tables("valve")
         ),
         beyond=t.text("beyond"),
         short=t.text("short"),
@@ -375,7 +444,8 @@ def _check_joints(gear: Gear, path: Path) -> None:
     links = gear.reference.mechanism.virtual_links
     if tuple(sorted(gear.joint_numbers)) != links or gear.joint_numbers != links:
         raise GearFileError(
-            f"{path.name}: joints {list(gear.joint_numbers)} and virtual links {list(links)} differ",
+            f"{path.name}: joints {list(gear.joint_numbers)} and virtual links {list(links)}"
+            " differ",
             "Describe each virtual link of the steps as one joint, in ascending order.",
         )
     areas = {area.name for area in gear.areas}
@@ -383,11 +453,13 @@ def _check_joints(gear: Gear, path: Path) -> None:
     for joint in gear.joints:
         if joint.point not in points:
             raise GearFileError(
-                f"{path.name}: joint {joint.number} is at point {joint.point!r}, which has no coordinates",
+                f"{path.name}: joint {joint.number} is at point {joint.point!r}, which has no"
+                " coordinates",
                 "Name one of the points of the linkage.",
             )
         if joint.area not in areas:
             raise GearFileError(
-                f"{path.name}: joint {joint.number} lies in area {joint.area!r}, which is not described",
+                f"{path.name}: joint {joint.number} lies in area {joint.area!r}, which is not"
+                " described",
                 f"Use one of {', '.join(sorted(areas))}, or add the area.",
             )

@@ -14,9 +14,10 @@ ROUNDING_IN = 1e-9
 class JointSpec:
     """A joint as the gear file describes it; its number is also that of its virtual link.
 
-    limit, new_part: radial clearance that the manual allows at most, and that a restored joint has. [in]
-    access, restore: time to measure it, and to restore it, once its area is open. [min]
-    critical: true for a joint without whose measurement nothing can be cleared (joints 1 to 5 of the paper).
+    limit, new_part: radial clearance that the manual allows at most, and that a restored joint has.
+    [in] access, restore: time to measure it, and to restore it, once its area is open. [min]
+    critical: true for a joint without whose measurement nothing can be cleared (joints 1 to 5 of
+    the paper).
     """
 
     number: int
@@ -31,7 +32,9 @@ class JointSpec:
     critical: bool
 
     def is_over_limit(self, clearance_in: float) -> bool:
-        """Tell whether a clearance is above the limit, beyond the rounding of a conversion from another unit."""
+        """Tell whether a clearance is above the limit, beyond the rounding of a conversion from
+        another unit.
+        """
         return clearance_in > self.limit.value + ROUNDING_IN
 
     @property

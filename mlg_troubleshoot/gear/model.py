@@ -32,15 +32,16 @@ class Calibration:
 class LinkageModel:
     """One calibrated linkage, ready to be solved for batches of clearances.
 
-    mechanism: the linkage, given at mid-position.
-    stroke: input at Down Lock and at mid-position, the release stroke. [in]
-    calibration: what the plunger does without clearance.
-    mid: output of the mechanism at mid-position without clearance. [in]
-    rate: calibration rate k of P(s) = P(0) + k (p(s) − p(0)); its sign makes over-travel positive. [1]
-    Raises `MechanismError` if the linkage does not close over the whole stroke without clearance.
+    mechanism: the linkage, given at mid-position. stroke: input at Down Lock and at mid-position,
+    the release stroke. [in] calibration: what the plunger does without clearance. mid: output of
+    the mechanism at mid-position without clearance. [in] rate: calibration rate k of P(s) = P(0) +
+    k (p(s) − p(0)); its sign makes over-travel positive. [1] Raises `MechanismError` if the linkage
+    does not close over the whole stroke without clearance.
     """
 
-    def __init__(self, mechanism: Mechanism, stroke: tuple[float, float], calibration: Calibration) -> None:
+    def __init__(
+        self, mechanism: Mechanism, stroke: tuple[float, float], calibration: Calibration
+    ) -> None:
         self.kernel = Kernel(mechanism)
         self.mechanism = mechanism
         self.stroke = stroke
@@ -52,7 +53,9 @@ class LinkageModel:
         curve = self.kernel.output(np.linspace(*stroke, 201), self.kernel.no_clearance())
         if not np.all(np.isfinite(curve)):
             closed = 100.0 * float(np.mean(np.isfinite(curve)))
-            raise MechanismError(f"Without clearance the linkage closes over only {closed:.0f} % of its stroke.")
+            raise MechanismError(
+                f"Without clearance the linkage closes over only {closed:.0f} % of its stroke."
+            )
         self.rate = 1.0
         if calibration.travel_in is not None:
             self.rate = self._calibrated_rate(calibration.travel_in)
@@ -62,10 +65,14 @@ class LinkageModel:
         return LinkageModel, (self.mechanism, self.stroke, self.calibration)
 
     def _calibrated_rate(self, travel_in: float) -> float:
-        """Rate k that makes the travel from the least displacement to mid-position as prescribed."""
+        """Rate k that makes the travel from the least displacement to mid-position as
+        prescribed.
+        """
         direction = np.sign(self.mid - self._down_lock)
         if direction == 0:
-            raise MechanismError("The plunger is at the same place at Down Lock and at mid-position.")
+            raise MechanismError(
+                "The plunger is at the same place at Down Lock and at mid-position."
+            )
         low, high = self.stroke
         for _ in range(4):
             strokes = np.linspace(low, high, 101)
@@ -75,7 +82,9 @@ class LinkageModel:
         return float(direction * travel_in / (direction * self.mid - along[least]))
 
     def numbers(self, changed: Mapping[str, Any] | None) -> Sequence[Any] | None:
-        """The linkage's numbers with some changed by name, for the kernel; arrays broadcast with the virtual links."""
+        """The linkage's numbers with some changed by name, for the kernel; arrays broadcast with
+        the virtual links.
+        """
         if not changed:
             return None
         values: list[Any] = self.kernel.parameters.tolist()
@@ -83,7 +92,9 @@ class LinkageModel:
             values[self.kernel.parameter_index(name)] = value
         return values
 
-    def displacement(self, links: Sequence[Any], changed: Mapping[str, Any] | None = None, stroke: Any = None) -> Array:
+    def displacement(
+        self, links: Sequence[Any], changed: Mapping[str, Any] | None = None, stroke: Any = None
+    ) -> Array:
         """Displacement of the plunger by clearances, measured from the same linkage without them.
 
         links: components of each virtual link. [in]
@@ -96,13 +107,17 @@ class LinkageModel:
         return np.asarray(self.rate * (self.kernel.output(at, links, self.numbers(changed)) - zero))
 
     def plunger(self, stroke: Any, links: Sequence[Any] | None = None) -> Array:
-        """Plunger position (Fig. 12), P(s) = P(0) + k (p(s) − p(0)), by extension and links; NaN if not closed. [in]"""
+        """Plunger position (Fig. 12), P(s) = P(0) + k (p(s) − p(0)), by extension and links; NaN if
+        not closed. [in]
+        """
         links = self.kernel.no_clearance() if links is None else links
         moved = self.kernel.output(stroke, links) - self._down_lock
         return np.asarray(self.calibration.down_lock_in + self.rate * moved)
 
     def plunger_amplification(self) -> Array:
-        """Amplification index A_iP of each joint to the plunger at mid-position (Eq. 8), for small clearances. [1]"""
+        """Amplification index A_iP of each joint to the plunger at mid-position (Eq. 8), for small
+        clearances. [1]
+        """
         n = 2 * len(self.joint_numbers)
         steps = np.vstack([np.eye(n), -np.eye(n)]) * _STEP_IN
         moved = self.displacement([steps[:, i] for i in range(n)])

@@ -18,7 +18,9 @@ class SourceKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A source in words, which numbers of a gear file refer to by name: document, section, how it was obtained."""
+    """A source in words, which numbers of a gear file refer to by name: document, section, how it
+    was obtained.
+    """
 
     name: str
     kind: SourceKind

@@ -1,10 +1,12 @@
-"""Intervals with two derivatives: the formulas of a mechanism, run on whole ranges at once with safe rounding.
+"""Intervals with two derivatives: the formulas of a mechanism, run on whole ranges at once with
+safe rounding.
 
-Every quantity carries enclosures of its value, gradient and second derivatives over a box of the variables, and
-of its value and gradient in the middle of the box. After every operation the value is narrowed by the gradient
-(mean value theorem) and the gradient by the second derivatives: plain interval arithmetic would be hundreds of
-times too wide where a link lies almost in line with its neighbour. Bounds are rounded outward after every
-operation, so that the true value of the formulas lies inside.
+Every quantity carries enclosures of its value, gradient and second derivatives over a box of the
+variables, and of its value and gradient in the middle of the box. After every operation the value
+is narrowed by the gradient (mean value theorem) and the gradient by the second derivatives: plain
+interval arithmetic would be hundreds of times too wide where a link lies almost in line with its
+neighbour. Bounds are rounded outward after every operation, so that the true value of the formulas
+lies inside.
 """
 
 from __future__ import annotations
@@ -98,12 +100,13 @@ class Box:
 class Range:
     """Enclosures of a quantity and of its derivatives over boxes of the variables.
 
-    value, shape (n_boxes,): bounds of the value. [unit of the quantity]
-    slope, shape (n_variables, n_boxes): bounds of the gradient. [unit of the quantity / in]
-    bend, shape (n_variables, n_variables, n_boxes): bounds of the second derivatives. [unit of the quantity / in²]
-    at_middle, shape (n_boxes,): bounds of the value in the middle of the box. [unit of the quantity]
-    slope_at_middle, shape (n_variables, n_boxes): bounds of the gradient there. [unit of the quantity / in]
-    offsets, shape (n_variables, n_boxes): ranges of the variables about the middle. [in]
+    value, shape (n_boxes,): bounds of the value. [unit of the quantity] slope, shape (n_variables,
+    n_boxes): bounds of the gradient. [unit of the quantity / in] bend, shape (n_variables,
+    n_variables, n_boxes): bounds of the second derivatives. [unit of the quantity / in²] at_middle,
+    shape (n_boxes,): bounds of the value in the middle of the box. [unit of the quantity]
+    slope_at_middle, shape (n_variables, n_boxes): bounds of the gradient there. [unit of the
+    quantity / in] offsets, shape (n_variables, n_boxes): ranges of the variables about the middle.
+    [in]
     """
 
     value: Pair
@@ -115,7 +118,9 @@ class Range:
 
     def _each(self, function: Callable[..., Pair], *others: Range) -> Range:
         parts = (self, *others)
-        return replace(self, **{name: function(*(getattr(part, name) for part in parts)) for name in _ENCLOSED})
+        return replace(
+            self, **{name: function(*(getattr(part, name) for part in parts)) for name in _ENCLOSED}
+        )
 
     def _narrowed(self) -> Range:
         slope = _common(self.slope, _plus(self.slope_at_middle, _along(self.bend, self.offsets)))
@@ -126,7 +131,9 @@ class Range:
         if isinstance(other, Range):
             return self._each(_plus, other)._narrowed()
         number = (other, other)
-        return replace(self, value=_plus(self.value, number), at_middle=_plus(self.at_middle, number))
+        return replace(
+            self, value=_plus(self.value, number), at_middle=_plus(self.at_middle, number)
+        )
 
     __add__ = __radd__ = _plus
 
@@ -146,13 +153,19 @@ class Range:
         if isinstance(other, Range):
             crossed = _outer(self.slope, other.slope)
             turned = crossed[0].swapaxes(0, 1), crossed[1].swapaxes(0, 1)
-            bend = _plus(_plus(_times(self.bend, other.value), _times(other.bend, self.value)), _plus(crossed, turned))
+            bend = _plus(
+                _plus(_times(self.bend, other.value), _times(other.bend, self.value)),
+                _plus(crossed, turned),
+            )
             return Range(
                 _times(self.value, other.value),
                 _plus(_times(self.slope, other.value), _times(other.slope, self.value)),
                 bend,
                 _times(self.at_middle, other.at_middle),
-                _plus(_times(self.slope_at_middle, other.at_middle), _times(other.slope_at_middle, self.at_middle)),
+                _plus(
+                    _times(self.slope_at_middle, other.at_middle),
+                    _times(other.slope_at_middle, self.at_middle),
+                ),
                 self.offsets,
             )._narrowed()
         number = (np.asarray(other), np.asarray(other))
@@ -175,7 +188,12 @@ class Range:
         middle, middle_rate, _ = function(self.at_middle)
         bend = _plus(_times(self.bend, rate), _times(_outer(self.slope, self.slope), curvature))
         return Range(
-            value, _times(self.slope, rate), bend, middle, _times(self.slope_at_middle, middle_rate), self.offsets
+            value,
+            _times(self.slope, rate),
+            bend,
+            middle,
+            _times(self.slope_at_middle, middle_rate),
+            self.offsets,
         )._narrowed()
 
     def sqrt(self) -> Range:
@@ -196,8 +214,8 @@ Joint = tuple[Any, Any]
 def narrowed_by_links(joint: Joint, start: Joint, end: Joint, square: Any, area: Any) -> Joint:
     """Narrow the enclosures of a joint on two links by the links' own equations.
 
-    The derivatives of the explicit formulas are enclosed far too widely where terms cancel; those of the two
-    equations of length, |C − A|² = square and |C − B|² constant, are not.
+    The derivatives of the explicit formulas are enclosed far too widely where terms cancel; those
+    of the two equations of length, |C − A|² = square and |C − B|² constant, are not.
     """
     ranges = [part for part in joint if isinstance(part, Range)]
     if len(ranges) < 2:
@@ -212,13 +230,18 @@ def narrowed_by_links(joint: Joint, start: Joint, end: Joint, square: Any, area:
         u, v = (c[0] - a[0], c[1] - a[1]), (c[0] - b[0], c[1] - b[1])
         inverse = _inverse_or_nothing(_common(cross, (u[0] * v[1] - u[1] * v[0]).value))
         slopes = _implicit_slopes(u, v, inverse, a, b, grown)
-        c = tuple(replace(p, slope=_common(p.slope, slope)) for p, slope in zip(c, slopes, strict=True))
+        c = tuple(
+            replace(p, slope=_common(p.slope, slope)) for p, slope in zip(c, slopes, strict=True)
+        )
         turned = [[_minus(p.slope, q.slope) for p, q in zip(c, far, strict=True)] for far in (a, b)]
         bent = [_plus(_outer(x, x), _outer(y, y)) for x, y in turned]
         first = _minus(_plus(_dot(u, (a[0].bend, a[1].bend)), grown.bend), bent[0])
         second = _minus(_dot(v, (b[0].bend, b[1].bend)), bent[1])
         bends = _solved(u, v, inverse, first, second)
-        c = tuple(replace(p, bend=_common(p.bend, bend))._narrowed() for p, bend in zip(c, bends, strict=True))
+        c = tuple(
+            replace(p, bend=_common(p.bend, bend))._narrowed()
+            for p, bend in zip(c, bends, strict=True)
+        )
     return c[0], c[1]
 
 
@@ -227,15 +250,18 @@ def _first_guess(
 ) -> tuple[Range, ...]:
     """Enclose the joint from its middle alone, where its formulas give next to nothing.
 
-    A box around the middle is guessed. If the gradients over it carry the joint nowhere out of it, the joint
-    cannot leave it: it moves continuously, and the links stay apart from being in line.
+    A box around the middle is guessed. If the gradients over it carry the joint nowhere out of it,
+    the joint cannot leave it: it moves continuously, and the links stay apart from being in line.
     """
     swing = [np.maximum(*(np.abs(end) for end in _along(p.slope_at_middle, p.offsets))) for p in c]
     # A joint on a circle also moves across its tangent.
     widest = _BULGE * np.maximum(*swing)
     for factor in _GUESSES:
         guess = [
-            (p.at_middle[0] - factor * (w + widest) - 1e-12, p.at_middle[1] + factor * (w + widest) + 1e-12)
+            (
+                p.at_middle[0] - factor * (w + widest) - 1e-12,
+                p.at_middle[1] + factor * (w + widest) + 1e-12,
+            )
             for p, w in zip(c, swing, strict=True)
         ]
         u = [_minus(g, p.value) for g, p in zip(guess, a, strict=True)]
@@ -246,9 +272,14 @@ def _first_guess(
         for part, slope, bound in zip(c, slopes, guess, strict=True):
             reached = _plus(part.at_middle, _along(slope, part.offsets))
             inside &= (reached[0] > bound[0]) & (reached[1] < bound[1])
-        found = ((_where(inside, bound), _where(inside, slope)) for bound, slope in zip(guess, slopes, strict=True))
+        found = (
+            (_where(inside, bound), _where(inside, slope))
+            for bound, slope in zip(guess, slopes, strict=True)
+        )
         c = tuple(
-            replace(part, value=_common(part.value, value), slope=_common(part.slope, slope))._narrowed()
+            replace(
+                part, value=_common(part.value, value), slope=_common(part.slope, slope)
+            )._narrowed()
             for part, (value, slope) in zip(c, found, strict=True)
         )
     return c
@@ -264,9 +295,16 @@ def _inverse_or_nothing(x: Pair) -> Pair:
 
 
 def _implicit_slopes(
-    u: Sequence[Any], v: Sequence[Any], inverse: Pair, a: tuple[Range, ...], b: tuple[Range, ...], grown: Range
+    u: Sequence[Any],
+    v: Sequence[Any],
+    inverse: Pair,
+    a: tuple[Range, ...],
+    b: tuple[Range, ...],
+    grown: Range,
 ) -> tuple[Pair, Pair]:
-    """Gradients of the joint from the equations of length; u and v are the links as bounds or ranges."""
+    """Gradients of the joint from the equations of length; u and v are the links as bounds or
+    ranges.
+    """
     first = _plus(_dot(u, (a[0].slope, a[1].slope)), grown.slope)
     return _solved(u, v, inverse, first, _dot(v, (b[0].slope, b[1].slope)))
 
@@ -280,14 +318,18 @@ def _as_range(part: Any, like: Range) -> Range:
         return part
     flat, level = np.zeros_like(like.slope[0]), np.full_like(like.value[0], float(part))
     bend = np.zeros_like(like.bend[0])
-    return Range((level, level), (flat, flat), (bend, bend), (level, level), (flat, flat), like.offsets)
+    return Range(
+        (level, level), (flat, flat), (bend, bend), (level, level), (flat, flat), like.offsets
+    )
 
 
 def _dot(u: Sequence[Any], slopes: tuple[Pair, Pair]) -> Pair:
     return _plus(_times(_bounds(u[0]), slopes[0]), _times(_bounds(u[1]), slopes[1]))
 
 
-def _solved(u: Sequence[Any], v: Sequence[Any], inverse: Pair, first: Pair, second: Pair) -> tuple[Pair, Pair]:
+def _solved(
+    u: Sequence[Any], v: Sequence[Any], inverse: Pair, first: Pair, second: Pair
+) -> tuple[Pair, Pair]:
     """Solve u · x = first, v · x = second."""
     x = _minus(_times(first, _bounds(v[1])), _times(second, _bounds(u[1])))
     y = _minus(_times(second, _bounds(u[0])), _times(first, _bounds(v[0])))

@@ -1,7 +1,7 @@
 """Runs a mechanism's program on arrays: numpy always, numba where it is installed.
 
-Both run the same formulas of :mod:`~mlg_troubleshoot.geometry.program`. A position that does not close is
-NaN; nobody drops it.
+Both run the same formulas of :mod:`~mlg_troubleshoot.geometry.program`. A position that does not
+close is NaN; nobody drops it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,13 @@ from mlg_troubleshoot.geometry.mechanism import Mechanism
 from mlg_troubleshoot.geometry.program import Program, write_program
 
 Array = NDArray[Any]
-_NUMPY = {"sqrt": np.sqrt, "cos": np.cos, "sin": np.sin, "arctan2": np.arctan2, "narrowed_by_links": narrowed_by_links}
+_NUMPY = {
+    "sqrt": np.sqrt,
+    "cos": np.cos,
+    "sin": np.sin,
+    "arctan2": np.arctan2,
+    "narrowed_by_links": narrowed_by_links,
+}
 CHUNK = 4096
 
 
@@ -32,8 +38,8 @@ def numba_is_installed() -> bool:
 class Kernel:
     """A mechanism that can be solved for many virtual links at once.
 
-    parameters, shape (n_parameters,): its numbers, in the order of `parameter_names`. [in, rad or 1]
-    parameter_names: their names: ``length.3-5``, ``point.E.x`` …
+    parameters, shape (n_parameters,): its numbers, in the order of `parameter_names`. [in, rad or
+    1] parameter_names: their names: ``length.3-5``, ``point.E.x`` …
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -53,13 +59,16 @@ class Kernel:
             raise KeyError(f"{name!r} is not a number of this mechanism") from None
 
     def output(
-        self, position: Array | float, links: Sequence[Array | float], parameters: Sequence[Any] | None = None
+        self,
+        position: Array | float,
+        links: Sequence[Array | float],
+        parameters: Sequence[Any] | None = None,
     ) -> Array:
         """Solve the mechanism and read its output.
 
-        position: input of the mechanism. [in or rad]
-        links: components x, y of each virtual link in turn; all must broadcast with each other. [in]
-        parameters: numbers of the mechanism in place of its own, each a number or an array that broadcasts. [in,
+        position: input of the mechanism. [in or rad] links: components x, y of each virtual link in
+        turn; all must broadcast with each other. [in] parameters: numbers of the mechanism in place
+        of its own, each a number or an array that broadcasts. [in,
           rad or 1]
         Returns: output; NaN where the mechanism does not close. [in or rad]
         """
@@ -68,13 +77,20 @@ class Kernel:
             return np.asarray(self._output(position, links, numbers)[0])
 
     def enclose(self, position: Any, links: Sequence[Any]) -> Any:
-        """Run the formulas on ranges; every joint on two links is narrowed by what the links allow."""
+        """Run the formulas on ranges; every joint on two links is narrowed by what the links
+        allow.
+        """
         return _enclosing(self._program)(position, links, self.parameters.tolist())[0]
 
     def positions(
-        self, position: Array | float, links: Sequence[Array | float], parameters: Sequence[Any] | None = None
+        self,
+        position: Array | float,
+        links: Sequence[Array | float],
+        parameters: Sequence[Any] | None = None,
     ) -> dict[str, tuple[Array, Array]]:
-        """x and y of every point in its own plane, of one with a virtual link at its downstream link. [in]"""
+        """x and y of every point in its own plane, of one with a virtual link at its downstream
+        link. [in]
+        """
         names = self._program.joints
         wanted = tuple(dict.fromkeys(n for pair in names.values() for n in pair))
         if self._joints is None:
@@ -82,16 +98,21 @@ class Kernel:
         with np.errstate(invalid="ignore", divide="ignore"):
             numbers = self.parameters.tolist() if parameters is None else parameters
             values = dict(zip(wanted, self._joints(position, links, numbers), strict=True))
-        return {joint: (np.asarray(values[x]), np.asarray(values[y])) for joint, (x, y) in names.items()}
+        return {
+            joint: (np.asarray(values[x]), np.asarray(values[y])) for joint, (x, y) in names.items()
+        }
 
     def no_clearance(self) -> list[float]:
         return [0.0] * (2 * len(self.mechanism.virtual_links))
 
-    def batch(self, position: float, clearance_in: Array, directions: Array, *, compiled: bool = False) -> Array:
-        """Output for a large batch of clearances in fixed directions, as fast as this machine allows.
+    def batch(
+        self, position: float, clearance_in: Array, directions: Array, *, compiled: bool = False
+    ) -> Array:
+        """Output for a large batch of clearances in fixed directions, as fast as this machine
+        allows.
 
-        clearance_in, shape (n_virtual_links, n): lengths of the virtual links, one row per joint. [in]
-        Returns, shape (n,): output; NaN where the mechanism does not close. [in or rad]
+        clearance_in, shape (n_virtual_links, n): lengths of the virtual links, one row per joint.
+        [in] Returns, shape (n,): output; NaN where the mechanism does not close. [in or rad]
         """
         clearance = np.ascontiguousarray(clearance_in, float)
         result = np.empty(clearance.shape[1])
@@ -119,9 +140,13 @@ def _function(program: Program, results: tuple[str, ...]) -> Callable[..., tuple
 def _enclosing(program: Program) -> Callable[..., tuple[Any, ...]]:
     """Formulas with a line after every joint on two links that narrows it."""
     hooks = {
-        closure.joint[1]: f"    {', '.join(closure.joint)} = narrowed_by_links("
-        + ", ".join(f"({', '.join(pair)})" for pair in (closure.joint, closure.start, closure.end))
-        + f", {closure.square}, {closure.area})"
+        closure.joint[1]: (
+            f"    {', '.join(closure.joint)} = narrowed_by_links("
+            + ", ".join(
+                f"({', '.join(pair)})" for pair in (closure.joint, closure.start, closure.end)
+            )
+            + f", {closure.square}, {closure.area})"
+        )
         for closure in program.closures
     }
     lines = []
@@ -134,7 +159,9 @@ def _enclosing(program: Program) -> Callable[..., tuple[Any, ...]]:
 
 
 @lru_cache(maxsize=64)
-def _build(body: str, inputs: tuple[str, ...], results: tuple[str, ...]) -> Callable[..., tuple[Any, ...]]:
+def _build(
+    body: str, inputs: tuple[str, ...], results: tuple[str, ...]
+) -> Callable[..., tuple[Any, ...]]:
     n_links = sum(name.startswith("v") for name in inputs)
     unpack = ""
     if n_links:
@@ -154,7 +181,9 @@ def _compiled_loop(body: str, layout: tuple[int, int, str]) -> Callable[..., Non
     n_parameters, links, result = layout
     lines = ["def loop(s, clearance, unit, numbers, out):"]
     lines += [f"    p{i} = numbers[{i}]" for i in range(n_parameters)]
-    lines += [f"    u{axis}{j} = unit[{j}, {i}]" for j in range(links) for i, axis in enumerate("xy")]
+    lines += [
+        f"    u{axis}{j} = unit[{j}, {i}]" for j in range(links) for i, axis in enumerate("xy")
+    ]
     lines.append("    for i in range(out.shape[0]):")
     for j in range(links):
         lines += [f"        c{j} = clearance[{j}, i]"]

@@ -1,8 +1,9 @@
 """A mechanism as data: planes, points, and the order in which its joints are located.
 
 A mechanism is given at one *reference* position of its input. Link lengths, lever ratios and the
-transfers between planes follow from the coordinates there, so a user writes coordinates and nothing else.
-This module knows no aircraft; a joint's clearance is a *virtual link* with a number (section 3.2).
+transfers between planes follow from the coordinates there, so a user writes coordinates and nothing
+else. This module knows no aircraft; a joint's clearance is a *virtual link* with a number (section
+3.2).
 """
 
 from __future__ import annotations
@@ -66,10 +67,11 @@ class Crank:
 class Dyad:
     """Two links that meet in a joint: the triangle A, B, C of section 3.1.
 
-    upstream, downstream: the joints at the other ends; the downstream one is a fixed pivot or located before.
-    sign: +1 if the joint lies to the left of the line from upstream to downstream, else −1. [1]
-    virtual_links: virtual links at the two ends of the upstream link: both displace it in parallel (A**, Fig. 8b).
-    driven: true if the upstream link is the actuator whose length is the input.
+    upstream, downstream: the joints at the other ends; the downstream one is a fixed pivot or
+    located before. sign: +1 if the joint lies to the left of the line from upstream to downstream,
+    else −1. [1] virtual_links: virtual links at the two ends of the upstream link: both displace it
+    in parallel (A**, Fig. 8b). driven: true if the upstream link is the actuator whose length is
+    the input.
     """
 
     joint: str
@@ -82,7 +84,9 @@ class Dyad:
 
 @dataclass(frozen=True, slots=True)
 class Lever:
-    """A rigid link of three joints, the middle one fixed (Fig. 9c): `joint` follows one that is already located."""
+    """A rigid link of three joints, the middle one fixed (Fig. 9c): `joint` follows one that is
+    already located.
+    """
 
     joint: str
     pivot: str
@@ -92,7 +96,9 @@ class Lever:
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """A lever that a pin turns in a radial slot: the pin sets the direction of its other arm, to `joint`, only."""
+    """A lever that a pin turns in a radial slot: the pin sets the direction of its other arm, to
+    `joint`, only.
+    """
 
     joint: str
     pivot: str
@@ -104,8 +110,9 @@ class Slot:
 class Slider:
     """A link whose far end slides on an axis.
 
-    axis: direction of the axis in the joint's plane; the axis passes through the joint's reference position. [rad]
-    sign: +1 if the joint lies ahead, along the axis, of the foot of the upstream joint, else −1. [1]
+    axis: direction of the axis in the joint's plane; the axis passes through the joint's reference
+    position. [rad] sign: +1 if the joint lies ahead, along the axis, of the foot of the upstream
+    joint, else −1. [1]
     """
 
     joint: str
@@ -122,8 +129,8 @@ Step = Crank | Dyad | Lever | Slot | Slider
 class Output:
     """What the mechanism is for.
 
-    kind: position of a slider along its axis from its reference [in], or direction of a joint from a pivot [rad].
-    pivot: the pivot, for an angle.
+    kind: position of a slider along its axis from its reference [in], or direction of a joint from
+    a pivot [rad]. pivot: the pivot, for an angle.
     """
 
     kind: Literal["position", "angle"]
@@ -135,11 +142,10 @@ class Output:
 class Mechanism:
     """Planes, points and steps of one mechanism at its reference position.
 
-    planes: planes, parents first.
-    steps: steps in the order of the mechanism, from the input to the output.
-    reference_input: input at which the points are given. [in or rad]
-    virtual_links: numbers of all virtual links, in order.
-    Raises `MechanismError` if a plane, point, step or the output refers to what is not there, a point is located
+    planes: planes, parents first. steps: steps in the order of the mechanism, from the input to the
+    output. reference_input: input at which the points are given. [in or rad] virtual_links: numbers
+    of all virtual links, in order. Raises `MechanismError` if a plane, point, step or the output
+    refers to what is not there, a point is located
       never or twice, or a virtual link is used twice.
     """
 
@@ -149,7 +155,9 @@ class Mechanism:
     output: Output
     reference_input: float
     virtual_links: tuple[int, ...] = field(init=False)
-    _frames: dict[str, tuple[Array, Array]] = field(init=False, repr=False, compare=False, default_factory=dict)
+    _frames: dict[str, tuple[Array, Array]] = field(
+        init=False, repr=False, compare=False, default_factory=dict
+    )
     _places: dict[str, Array] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -173,7 +181,10 @@ class Mechanism:
             if plane.parent is not None and plane.parent not in planes:
                 yield f"Plane {plane.name!r} is hinged to {plane.parent!r}, not defined before it."
             if plane.parent is not None and plane.hinge_point not in names:
-                yield f"Plane {plane.name!r} is hinged at {plane.hinge_point!r}, which has no coordinates."
+                yield (
+                    f"Plane {plane.name!r} is hinged at {plane.hinge_point!r}, which has no"
+                    " coordinates."
+                )
             planes.add(plane.name)
         for name in names:
             if names.count(name) > 1:
@@ -188,7 +199,10 @@ class Mechanism:
         for step in self.steps:
             for needed in needs(step):
                 if needed not in known:
-                    yield f"Step {step.joint!r} needs {needed!r}, which is neither fixed nor located before it."
+                    yield (
+                        f"Step {step.joint!r} needs {needed!r}, which is neither fixed nor located"
+                        " before it."
+                    )
             if step.joint not in names:
                 yield f"Step {step.joint!r} locates a point that has no coordinates."
             if step.joint in known:
@@ -210,16 +224,22 @@ class Mechanism:
 
     @property
     def alike(self) -> tuple[tuple[int, ...], ...]:
-        """Virtual links that displace the same link, together, and the others each alone, in order."""
-        ends = {number: tuple(sorted(step.virtual_links)) for step in self.steps for number in step.virtual_links}
+        """Virtual links that displace the same link, together, and the others each alone, in
+        order.
+        """
+        ends = {
+            number: tuple(sorted(step.virtual_links))
+            for step in self.steps
+            for number in step.virtual_links
+        }
         return tuple(dict.fromkeys(ends.get(number, (number,)) for number in self.virtual_links))
 
     def frame(self, plane: str) -> tuple[Array, Array]:
         """Origin and axes of a plane in space.
 
-        A plane is turned about its hinge line, which lies in its parent: Rodrigues' bracket of Eq. 6 maps what is
-        normal to the axis to cos δ of itself and sin δ of the third direction. Coordinates and angles may be arrays,
-        for a batch of linkages; their axes then come first.
+        A plane is turned about its hinge line, which lies in its parent: Rodrigues' bracket of Eq.
+        6 maps what is normal to the axis to cos δ of itself and sin δ of the third direction.
+        Coordinates and angles may be arrays, for a batch of linkages; their axes then come first.
 
         Returns origin, shape (..., 3): origin. [in]
         Returns axes, shape (..., 3, 3): rows are the two axes in the plane and its normal. [1]
@@ -235,12 +255,19 @@ class Mechanism:
         origin, axes = self.frame(found.parent)
         hinge = self.point(found.hinge_point)
         if hinge.plane != found.parent:
-            raise MechanismError(f"Plane {plane!r} is hinged at {hinge.name!r}, which is not in {found.parent!r}.")
+            raise MechanismError(
+                f"Plane {plane!r} is hinged at {hinge.name!r}, which is not in {found.parent!r}."
+            )
         x, y, normal = axes[..., 0, :], axes[..., 1, :], axes[..., 2, :]
-        cosine, sine = _column(np.cos(found.hinge_direction)), _column(np.sin(found.hinge_direction))
+        cosine, sine = (
+            _column(np.cos(found.hinge_direction)),
+            _column(np.sin(found.hinge_direction)),
+        )
         turned, tilted = _column(np.cos(found.dihedral)), _column(np.sin(found.dihedral))
         first, flat = cosine * x + sine * y, cosine * y - sine * x
-        new = np.broadcast_arrays(first, turned * flat + tilted * normal, turned * normal - tilted * flat)
+        new = np.broadcast_arrays(
+            first, turned * flat + tilted * normal, turned * normal - tilted * flat
+        )
         return origin + _column(hinge.x) * x + _column(hinge.y) * y, np.stack(new, axis=-2)
 
     def reference_in_space(self, name: str) -> Array:
@@ -248,7 +275,9 @@ class Mechanism:
         if name not in self._places:
             point = self.point(name)
             origin, axes = self.frame(point.plane)
-            self._places[name] = origin + _column(point.x) * axes[..., 0, :] + _column(point.y) * axes[..., 1, :]
+            self._places[name] = (
+                origin + _column(point.x) * axes[..., 0, :] + _column(point.y) * axes[..., 1, :]
+            )
         return self._places[name]
 
     def seen_in_plane(self, plane: str, start: str, end: str) -> tuple[Any, Any]:
@@ -258,7 +287,9 @@ class Mechanism:
         return (across * axes[..., 0, :]).sum(axis=-1), (across * axes[..., 1, :]).sum(axis=-1)
 
     def side(self, step: Dyad | Slider) -> Any:
-        """How far the coordinates put a joint to the side that its branch sign names: the sign is that of this."""
+        """How far the coordinates put a joint to the side that its branch sign names: the sign is
+        that of this.
+        """
         plane = self.point(step.joint).plane
         arm = self.seen_in_plane(plane, step.upstream, step.joint)
         if isinstance(step, Slider):

@@ -1,8 +1,9 @@
 """From a mechanism to one straight-line program: every step becomes a few scalar formulas.
 
-The same formulas run on numpy arrays (:mod:`~mlg_troubleshoot.geometry.kernel`), on complex numbers for
-derivatives, and compiled in a loop. In a plane, Eq. 6 needs no matrix: with ω normal to AB the bracket
-``I + [ω] sin θ + [ω]² (1 − cos θ)`` maps AB to ``cos θ · AB + sin θ · ω × AB``, and Eq. 3 gives cos θ.
+The same formulas run on numpy arrays (:mod:`~mlg_troubleshoot.geometry.kernel`), on complex numbers
+for derivatives, and compiled in a loop. In a plane, Eq. 6 needs no matrix: with ω normal to AB the
+bracket ``I + [ω] sin θ + [ω]² (1 − cos θ)`` maps AB to ``cos θ · AB + sin θ · ω × AB``, and Eq. 3
+gives cos θ.
 """
 
 from __future__ import annotations
@@ -37,11 +38,13 @@ class Closure:
 class Program:
     """Formulas that locate every joint of a mechanism, in order, and its numbers by name.
 
-    parameters: every number of the mechanism by name: ``point.E.x``, ``length.3-5``, ``sign.5`` … [in, rad or 1]
-      Names of a mechanism stand here and nowhere in the formulas: whatever they are, they are never run.
-    lines: assignments (name, expression); each name is assigned once.
-    joints: names of the two coordinates of each point, in its plane.
-    virtual_links: how many virtual links there are, each the two inputs ``vx{i}`` and ``vy{i}`` by its place. [in]
+    parameters: every number of the mechanism by name: ``point.E.x``, ``length.3-5``, ``sign.5`` …
+    [in, rad or 1]
+      Names of a mechanism stand here and nowhere in the formulas: whatever they are, they are never
+      run.
+    lines: assignments (name, expression); each name is assigned once. joints: names of the two
+    coordinates of each point, in its plane. virtual_links: how many virtual links there are, each
+    the two inputs ``vx{i}`` and ``vy{i}`` by its place. [in]
     """
 
     parameters: dict[str, Any]
@@ -57,7 +60,9 @@ class Program:
         links = [f"v{axis}{i}" for i in range(self.virtual_links) for axis in "xy"]
         return (*links, *(f"p{i}" for i in range(len(self.parameters))))
 
-    def source(self, results: tuple[str, ...], indent: str = "    ", *, release: bool = True) -> str:
+    def source(
+        self, results: tuple[str, ...], indent: str = "    ", *, release: bool = True
+    ) -> str:
         """Write the formulas that the given results need, as Python source."""
         needed = set(results)
         kept: list[tuple[str, str, set[str]]] = []
@@ -94,7 +99,9 @@ class _Writer:
 
     def parameter(self, name: str, value: Any) -> str:
         if not np.array_equal(self.parameters.setdefault(name, value), value, equal_nan=True):
-            raise MechanismError(f"Two numbers of the mechanism are called {name!r}.", "Give its points other names.")
+            raise MechanismError(
+                f"Two numbers of the mechanism are called {name!r}.", "Give its points other names."
+            )
         return f"p{list(self.parameters).index(name)}"
 
     def let(self, expression: str) -> str:
@@ -126,7 +133,9 @@ class _Writer:
         for i, axis in enumerate("uvh"):
             c0, cx, cy = (
                 self.parameter(f"transfer.{point.plane}.{plane}.{axis}{part}", value)
-                for part, value in zip("0xy", (constant[..., i], slopes[..., i, 0], slopes[..., i, 1]), strict=True)
+                for part, value in zip(
+                    "0xy", (constant[..., i], slopes[..., i, 0], slopes[..., i, 1]), strict=True
+                )
             )
             seen.append(self.let(f"{c0} + {cx} * {x} + {cy} * {y}"))
         return (seen[0], seen[1]), seen[2]
@@ -135,7 +144,9 @@ class _Writer:
         plane = self.mechanism.point(step.joint).plane
         for name in names:
             if self.mechanism.point(name).plane != plane:
-                raise MechanismError(f"Step {step.joint!r}: {name!r} is not in the plane {plane!r}.")
+                raise MechanismError(
+                    f"Step {step.joint!r}: {name!r} is not in the plane {plane!r}."
+                )
 
     def distance(self, a: str, b: str) -> Any:
         between = self.mechanism.reference_in_space(a) - self.mechanism.reference_in_space(b)
@@ -151,7 +162,8 @@ class _Writer:
         """Refuse a branch sign that would put the joint elsewhere than its coordinates do."""
         if np.any(self.mechanism.side(step) * step.sign < 0.0):
             raise MechanismError(
-                f"Step {step.joint!r} has the sign {step.sign:+.0f}, but its coordinates lie on the other side."
+                f"Step {step.joint!r} has the sign {step.sign:+.0f}, but its coordinates lie on the"
+                " other side."
             )
 
 
@@ -159,7 +171,10 @@ def write_program(mechanism: Mechanism) -> Program:
     w = _Writer(mechanism)
     for point in mechanism.points:
         if point.fixed:
-            place = (w.parameter(f"point.{point.name}.x", point.x), w.parameter(f"point.{point.name}.y", point.y))
+            place = (
+                w.parameter(f"point.{point.name}.x", point.x),
+                w.parameter(f"point.{point.name}.y", point.y),
+            )
             links = () if point.virtual_link is None else (point.virtual_link,)
             w.joints[point.name] = w.shifted(place, links)
     for step in mechanism.steps:
@@ -175,7 +190,14 @@ def write_program(mechanism: Mechanism) -> Program:
             case Slider():
                 _slider(w, step)
     output = _output(w)
-    return Program(w.parameters, tuple(w.lines), w.joints, output, len(mechanism.virtual_links), tuple(w.closures))
+    return Program(
+        w.parameters,
+        tuple(w.lines),
+        w.joints,
+        output,
+        len(mechanism.virtual_links),
+        tuple(w.closures),
+    )
 
 
 def _travel(w: _Writer) -> str:
@@ -186,7 +208,9 @@ def _crank(w: _Writer, step: Crank) -> None:
     w.same_plane(step, step.pivot)
     joint, pivot = w.mechanism.point(step.joint), w.mechanism.point(step.pivot)
     length = w.length(step.pivot, step.joint)
-    start = w.parameter(f"crank.{step.joint}.angle", np.arctan2(joint.y - pivot.y, joint.x - pivot.x))
+    start = w.parameter(
+        f"crank.{step.joint}.angle", np.arctan2(joint.y - pivot.y, joint.x - pivot.x)
+    )
     angle = w.let(f"{start} + {_travel(w)}")
     x, y = w.joints[step.pivot]
     place = (w.let(f"{x} + {length} * cos({angle})"), w.let(f"{y} + {length} * sin({angle})"))
@@ -231,12 +255,17 @@ def _lever(w: _Writer, step: Lever) -> None:
     w.same_plane(step, step.pivot, step.follows)
     joint, pivot, led = (w.mechanism.point(n) for n in (step.joint, step.pivot, step.follows))
     w.distance(step.pivot, step.follows)
-    ratio = ((joint.x - pivot.x) + 1j * (joint.y - pivot.y)) / ((led.x - pivot.x) + 1j * (led.y - pivot.y))
+    ratio = ((joint.x - pivot.x) + 1j * (joint.y - pivot.y)) / (
+        (led.x - pivot.x) + 1j * (led.y - pivot.y)
+    )
     along = w.parameter(f"lever.{step.joint}.along", ratio.real)
     across = w.parameter(f"lever.{step.joint}.across", ratio.imag)
     (px, py), (fx, fy) = w.joints[step.pivot], w.joints[step.follows]
     dx, dy = w.let(f"{fx} - {px}"), w.let(f"{fy} - {py}")
-    place = (w.let(f"{px} + {along} * {dx} - {across} * {dy}"), w.let(f"{py} + {along} * {dy} + {across} * {dx}"))
+    place = (
+        w.let(f"{px} + {along} * {dx} - {across} * {dy}"),
+        w.let(f"{py} + {along} * {dy} + {across} * {dx}"),
+    )
     w.joints[step.joint] = w.shifted(place, step.virtual_links)
 
 
@@ -281,7 +310,9 @@ def _output(w: _Writer) -> str:
     output = w.mechanism.output
     if output.kind == "position":
         if not isinstance(w.mechanism.step(output.joint), Slider):
-            raise MechanismError(f"The output is the position of {output.joint!r}, which is not a slider.")
+            raise MechanismError(
+                f"The output is the position of {output.joint!r}, which is not a slider."
+            )
         return w.positions[output.joint]
     (jx, jy), (px, py) = w.joints[output.joint], w.joints[output.pivot]
     return w.let(f"arctan2({jy} - {py}, {jx} - {px})")

@@ -1,14 +1,15 @@
-"""Amplification index method: how a small clearance grows from joint to joint (section 3.3, Eqs. 7 to 10).
+"""Amplification index method: how a small clearance grows from joint to joint (section 3.3, Eqs. 7
+to 10).
 
-Every step of the mechanism is one of the three cases of Eq. 10. A clearance enters at the step whose link it
-displaces (*current clearance*, ``csc θ``), is handed on by the next links (*previous clearance*,
-``cos φ csc θ``) and by levers and slots (*rigid body*, ``sin φ · L2/L1``).
+Every step of the mechanism is one of the three cases of Eq. 10. A clearance enters at the step
+whose link it displaces (*current clearance*, ``csc θ``), is handed on by the next links (*previous
+clearance*, ``cos φ csc θ``) and by levers and slots (*rigid body*, ``sin φ · L2/L1``).
 
-The stage of a clearance runs from its joint to the first joint of a higher number that moves: A_i,i+1 of
-Eq. 9. The two ends of one link act alike (Fig. 10), so both have the stage of the upstream end.
-Differs from the paper: a fixed pivot that has a clearance is not a case of Eq. 10; its stage is the exact
-derivative. In a slider the guide stands for an infinitely long second link, so that its csc θ is the secant
-of the angle between link and axis.
+The stage of a clearance runs from its joint to the first joint of a higher number that moves:
+A_i,i+1 of Eq. 9. The two ends of one link act alike (Fig. 10), so both have the stage of the
+upstream end. Differs from the paper: a fixed pivot that has a clearance is not a case of Eq. 10;
+its stage is the exact derivative. In a slider the guide stands for an infinitely long second link,
+so that its csc θ is the secant of the angle between link and axis.
 """
 
 from __future__ import annotations
@@ -20,7 +21,16 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, frozen
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
-from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot, Step, needs
+from mlg_troubleshoot.geometry.mechanism import (
+    Crank,
+    Dyad,
+    Lever,
+    Mechanism,
+    Slider,
+    Slot,
+    Step,
+    needs,
+)
 
 STROKES = 2001
 _STEP_IN = 1e-5
@@ -30,13 +40,14 @@ _STEP_IN = 1e-5
 class Amplification:
     """Stage-wise and plunger amplification indices of one linkage.
 
-    stroke, shape (n_strokes,): actuator extension from Down Lock to mid-position. [in]
-    stage, shape (n_joints, n_strokes): stage-wise index A_i,i+1 over the release. [1]
-    handed_on, shape (n_joints, n_strokes): product of the indices of all later stages, as the chain from the
+    stroke, shape (n_strokes,): actuator extension from Down Lock to mid-position. [in] stage, shape
+    (n_joints, n_strokes): stage-wise index A_i,i+1 over the release. [1] handed_on, shape
+    (n_joints, n_strokes): product of the indices of all later stages, as the chain from the
       stage's end to the output. [1]
-    onward_of_maxima, shape (n_joints,): the same product, each factor at its own maximum over the release. [1]
-    beta: β of Eq. 9: what follows the last joint, here the calibration rate k. [1]
-    exact, shape (n_joints,): plunger amplification index at mid-position from the exact gradient. [1]
+    onward_of_maxima, shape (n_joints,): the same product, each factor at its own maximum over the
+    release. [1] beta: β of Eq. 9: what follows the last joint, here the calibration rate k. [1]
+    exact, shape (n_joints,): plunger amplification index at mid-position from the exact gradient.
+    [1]
     """
 
     joints: tuple[int, ...]
@@ -71,14 +82,16 @@ class Amplification:
         """Share of each joint in the variance of the linearised displacement: Fig. 13b's index.
 
         plunger, shape (n_joints,): plunger amplification indices: local, of maxima, or exact. [1]
-        limits_in, shape (n_joints,): largest clearance of each joint, each uniformly distributed from 0. [in]
-        Returns, shape (n_joints,): shares, 1 in total. [1]
+        limits_in, shape (n_joints,): largest clearance of each joint, each uniformly distributed
+        from 0. [in] Returns, shape (n_joints,): shares, 1 in total. [1]
         """
         squares = (plunger * limits_in) ** 2
         return np.asarray(squares / squares.sum())
 
 
-def amplification(gear: Gear, model: LinkageModel | None = None, n_strokes: int = STROKES) -> Amplification:
+def amplification(
+    gear: Gear, model: LinkageModel | None = None, n_strokes: int = STROKES
+) -> Amplification:
     """Compute the amplification indices of a linkage over its release stroke.
 
     model: another linkage of the same gear, else the reference.
@@ -127,15 +140,22 @@ class _Chain:
                 self.place[point.name] = origin + x * axes[0] + y * axes[1]
 
     def stage_and_later(self, number: int) -> tuple[Array, list[Array]]:
-        """Index of the stage of a joint, and the index of every later stage, each over the release."""
+        """Index of the stage of a joint, and the index of every later stage, each over the
+        release.
+        """
         first = next(group[0] for group in self.mechanism.alike if number in group)
         entry = self._entry(first)
         path = self._path(entry)
-        end = next((i for i, step in enumerate(path) if self.numbers.get(step.joint, 0) > first), len(path) - 1)
+        end = next(
+            (i for i, step in enumerate(path) if self.numbers.get(step.joint, 0) > first),
+            len(path) - 1,
+        )
         if self.mechanism.point(self.points[first]).fixed:
             own = self._derivative(first, path[end].joint)
         else:
-            own = self._current(entry) * np.prod([self._previous(step) for step in path[1 : end + 1]], axis=0)
+            own = self._current(entry) * np.prod(
+                [self._previous(step) for step in path[1 : end + 1]], axis=0
+            )
         return own, [self._previous(step) for step in path[end + 1 :]]
 
     def output_factor(self) -> float:
@@ -150,7 +170,11 @@ class _Chain:
         return next(
             step
             for step in self.mechanism.steps
-            if number in (*step.virtual_links, *(self.mechanism.point(name).virtual_link for name in needs(step)))
+            if number
+            in (
+                *step.virtual_links,
+                *(self.mechanism.point(name).virtual_link for name in needs(step)),
+            )
         )
 
     def _path(self, entry: Step) -> list[Step]:
@@ -170,7 +194,9 @@ class _Chain:
         """Unit vector along which a step's joint moves when only the mechanism's input changes."""
         axes, place = self._axes(step), self.place[step.joint]
         if isinstance(step, Slider):
-            return np.broadcast_to(np.cos(step.axis) * axes[0] + np.sin(step.axis) * axes[1], place.shape)
+            return np.broadcast_to(
+                np.cos(step.axis) * axes[0] + np.sin(step.axis) * axes[1], place.shape
+            )
         return _unit(np.cross(axes[2], place - self.place[needs(step)[-1]]))
 
     def _axes(self, step: Step) -> Array:
@@ -180,13 +206,16 @@ class _Chain:
         return self.place[step.joint] - self.place[step.upstream]
 
     def _current(self, step: Step) -> Array:
-        """Current clearance: csc θ; on a slot's pin, which is a rigid body, L2/L1 (Eq. 10 with sin φ = 1)."""
+        """Current clearance: csc θ; on a slot's pin, which is a rigid body, L2/L1 (Eq. 10 with sin
+        φ = 1).
+        """
         match step:
             case Dyad() | Slider():
                 axes = self._axes(step)
                 in_plane = self._link(step) @ axes[:2].T
                 tangent = self._tangent(step) @ axes[:2].T
-                # The joint moves across its second link: the sine of θ is the cosine between link and path.
+                # The joint moves across its second link: the sine of θ is the cosine between link
+                # and path.
                 return csc(in_plane, np.stack([-tangent[:, 1], tangent[:, 0]], axis=-1))
             case Slot():
                 return self._arms(step, step.pin)
@@ -229,7 +258,9 @@ class _Chain:
             links[at + axis] = step
             return np.stack(self.model.kernel.positions(self.stroke, links)[joint], axis=-1)
 
-        moved = [(place(axis, _STEP_IN) - place(axis, -_STEP_IN)) / (2 * _STEP_IN) for axis in (0, 1)]
+        moved = [
+            (place(axis, _STEP_IN) - place(axis, -_STEP_IN)) / (2 * _STEP_IN) for axis in (0, 1)
+        ]
         return np.linalg.svd(np.stack(moved, axis=-1), compute_uv=False)[..., 0]
 
 

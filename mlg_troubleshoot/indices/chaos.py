@@ -1,8 +1,10 @@
-"""Polynomial chaos by least squares: the fast route for a smooth response, with a check that it is smooth.
+"""Polynomial chaos by least squares: the fast route for a smooth response, with a check that it is
+smooth.
 
-The response is fitted by orthonormal Legendre polynomials of the unit cube; Eqs. 1 and 2 are then sums of
-squared coefficients. Points that took no part in the fit, and corners of the range, say whether to trust it:
-a clipped or otherwise kinked response is handed to :mod:`~mlg_troubleshoot.indices.saltelli`.
+The response is fitted by orthonormal Legendre polynomials of the unit cube; Eqs. 1 and 2 are then
+sums of squared coefficients. Points that took no part in the fit, and corners of the range, say
+whether to trust it: a clipped or otherwise kinked response is handed to
+:mod:`~mlg_troubleshoot.indices.saltelli`.
 """
 
 from __future__ import annotations
@@ -22,8 +24,8 @@ _HELD_OUT = 48
 _CORNERS = 16
 _MOST_TERMS = 500
 _PER_TERM = 1.3
-# A fit that follows the inside of the range but misses a corner by more than this share of the standard
-# deviation has met a kink.
+# A fit that follows the inside of the range but misses a corner by more than this share of the
+# standard deviation has met a kink.
 _CORNER_MISS = 0.1
 
 
@@ -55,7 +57,8 @@ class ChaosFit:
     def index_error(self, accuracy_of: Array) -> Array:
         """Error of indices from what the polynomial leaves out.
 
-        Returns, shape (n,): bound of the omitted share, and twice the effect of its aliasing on the coefficients.
+        Returns, shape (n,): bound of the omitted share, and twice the effect of its aliasing on the
+        coefficients.
           [1]
         """
         level = np.clip(accuracy_of, self.residual, 1.0)
@@ -67,20 +70,32 @@ def chaos_indices(
     response: Response, n: int, rng: Generator, seed: int, accuracy: float = 1e-3, most: int = 2048
 ) -> tuple[Indices, ChaosFit | None]:
     """Compute indices by polynomial chaos, with as few evaluations as the accuracy needs."""
-    corners = np.concatenate([np.zeros((1, n)), np.ones((1, n)), rng.integers(0, 2, (_CORNERS - 2, n))])
+    corners = np.concatenate(
+        [np.zeros((1, n)), np.ones((1, n)), rng.integers(0, 2, (_CORNERS - 2, n))]
+    )
     held = _latin(rng, _HELD_OUT, n)
     checks = np.concatenate([held, corners])
-    # Points of the first fit: enough for the second degree, or for a good one where variables are few.
+    # Points of the first fit: enough for the second degree, or for a good one where variables are
+    # few.
     points = _latin(rng, max(128, 2 * len(total_degree(n, 2))), n)
     values = response(np.concatenate([checks, points]))
     check_values, values = values[: len(checks)], values[len(checks) :]
     best: ChaosFit | None = None
     while True:
         used = len(check_values) + len(values)
-        failed = int(np.count_nonzero(~np.isfinite(check_values)) + np.count_nonzero(~np.isfinite(values)))
-        design = f"polynomial chaos, {len(values)} points for the fit and {len(checks)} for its check"
+        failed = int(
+            np.count_nonzero(~np.isfinite(check_values)) + np.count_nonzero(~np.isfinite(values))
+        )
+        design = (
+            f"polynomial chaos, {len(values)} points for the fit and {len(checks)} for its check"
+        )
         if failed:
-            return without_numbers(design, seed, n, used, failed, failed_note(failed, used), (np.nan, np.nan)), None
+            return (
+                without_numbers(
+                    design, seed, n, used, failed, failed_note(failed, used), (np.nan, np.nan)
+                ),
+                None,
+            )
         before = np.inf if best is None else best.residual
         best = _best_fit(points, values, checks, check_values, best)
         if best is not None:
@@ -91,7 +106,10 @@ def chaos_indices(
         if not gains or used + len(values) > most:
             residual = "undefined" if best is None else f"{best.residual:.2g} of the variance"
             note = f"not smooth: a polynomial leaves {residual} unexplained"
-            return without_numbers(design, seed, n, used, 0, note, (float(values.mean()), np.nan)), None
+            return (
+                without_numbers(design, seed, n, used, 0, note, (float(values.mean()), np.nan)),
+                None,
+            )
         more = _latin(rng, len(values), n)
         points, values = np.concatenate([points, more]), np.concatenate([values, response(more)])
 
@@ -124,7 +142,9 @@ def _best_fit(
         residual = float(np.mean(misses[:_HELD_OUT] ** 2)) / spread
         if residual < last:
             corner = float(np.abs(misses[_HELD_OUT:]).max()) / np.sqrt(spread)
-            found = ChaosFit(exponents, np.asarray(coefficients, float), residual, corner, len(points))
+            found = ChaosFit(
+                exponents, np.asarray(coefficients, float), residual, corner, len(points)
+            )
             last = residual
             if residual < 1e-10:
                 break
@@ -149,18 +169,28 @@ def _indices(fit: ChaosFit, design: str, seed: int, used: int, mean: float) -> I
 
 @lru_cache(maxsize=64)
 def total_degree(n: int, degree: int) -> Wholes:
-    """Exponents of all polynomials up to a total degree, shape (n_terms, n), the constant first. [1]"""
-    chosen = (c for total in range(degree + 1) for c in combinations_with_replacement(range(n), total))
-    exponents = np.array([np.bincount(np.array(c, int), minlength=n) for c in chosen], dtype=np.int64)
+    """Exponents of all polynomials up to a total degree, shape (n_terms, n), the constant first.
+    [1]
+    """
+    chosen = (
+        c for total in range(degree + 1) for c in combinations_with_replacement(range(n), total)
+    )
+    exponents = np.array(
+        [np.bincount(np.array(c, int), minlength=n) for c in chosen], dtype=np.int64
+    )
     exponents.flags.writeable = False
     return exponents
 
 
 def legendre_terms(unit: Array, exponents: Wholes) -> Array:
-    """Orthonormal Legendre polynomials at points of the unit cube, shape (n_points, n_terms). [1]"""
+    """Orthonormal Legendre polynomials at points of the unit cube, shape (n_points, n_terms).
+    [1]
+    """
     degree = int(exponents.max(initial=0))
     values = np.moveaxis(np.polynomial.legendre.legvander(2.0 * unit.T - 1.0, degree), -1, 0)
-    flat = (values * np.sqrt(2.0 * np.arange(degree + 1) + 1.0)[:, None, None]).reshape(-1, len(unit))
+    flat = (values * np.sqrt(2.0 * np.arange(degree + 1) + 1.0)[:, None, None]).reshape(
+        -1, len(unit)
+    )
     places = _factors(exponents.tobytes(), exponents.shape)
     matrix = flat[places[0]]
     for factor in places[1:]:
@@ -170,7 +200,9 @@ def legendre_terms(unit: Array, exponents: Wholes) -> Array:
 
 @lru_cache(maxsize=64)
 def _factors(raw: bytes, shape: tuple[int, int]) -> list[Wholes]:
-    """Rows of the table of one-variable polynomials that each term multiplies; absent ones are constant."""
+    """Rows of the table of one-variable polynomials that each term multiplies; absent ones are
+    constant.
+    """
     exponents = np.frombuffer(raw, dtype=np.int64).reshape(shape)
     most = max(1, int((exponents > 0).sum(axis=1).max(initial=0)))
     present = np.argsort(exponents == 0, axis=1, kind="stable")[:, :most]

@@ -40,18 +40,21 @@ class HeldDirections:
         Returns, shape (n,): displacement in this sense; NaN where the linkage does not close. [in]
         """
         model = self.model
-        moved = model.kernel.batch(model.stroke[1], clearance_in, self.directions, compiled=self.compiled)
+        moved = model.kernel.batch(
+            model.stroke[1], clearance_in, self.directions, compiled=self.compiled
+        )
         moved -= model.mid
         moved *= self.sense * model.rate
         return moved
 
 
 def worst_directions(model: LinkageModel, limits_in: Array) -> HeldDirections:
-    """Worst directions found with every clearance at its limit, then held for all samples (section 4.3).
+    """Worst directions found with every clearance at its limit, then held for all samples (section
+    4.3).
 
-    "We set the direction of the clearances so that the plunger would have the maximum number of failures."
-    Differs from the paper: both senses are tried and the governing one is kept. Finding the directions anew
-    for every sample changes no index of the shipped linkages by more than 5e-4.
+    "We set the direction of the clearances so that the plunger would have the maximum number of
+    failures." Differs from the paper: both senses are tried and the governing one is kept. Finding
+    the directions anew for every sample changes no index of the shipped linkages by more than 5e-4.
     """
     worst = worst_case(model, limits_in[None, :])
     over, under = worst.over_in[0], -worst.under_in[0]

@@ -18,12 +18,12 @@ Estimate = tuple[Array, Array]
 class Indices:
     """First- and total-order indices with 95 % intervals, as fractions of the variance.
 
-    first_order, total_order, shape (n,): indices of Eqs. 1 and 2. [1]
-    first_order_interval, total_order_interval, shape (n, 2): their 95 % intervals. [1]
-    mean, variance: moments of the response. [its unit, its unit squared]
-    evaluations, failed: evaluations of the response, and those that gave no number: one makes the indices NaN.
-    note: what the user should know about the route taken; empty if nothing.
-    second_order, shape (n, n): share of each pair beyond its two first orders, where the route gives it. [1]
+    first_order, total_order, shape (n,): indices of Eqs. 1 and 2. [1] first_order_interval,
+    total_order_interval, shape (n, 2): their 95 % intervals. [1] mean, variance: moments of the
+    response. [its unit, its unit squared] evaluations, failed: evaluations of the response, and
+    those that gave no number: one makes the indices NaN. note: what the user should know about the
+    route taken; empty if nothing. second_order, shape (n, n): share of each pair beyond its two
+    first orders, where the route gives it. [1]
     """
 
     design: str
@@ -40,14 +40,18 @@ class Indices:
     second_order: Array | None = None
 
     @classmethod
-    def around(cls, design: str, seed: int, first: Estimate, total: Estimate, *rest: Any) -> Indices:
+    def around(
+        cls, design: str, seed: int, first: Estimate, total: Estimate, *rest: Any
+    ) -> Indices:
         """Indices from values with the half widths of their intervals, both of shape (n,). [1]"""
         return cls(design, seed, first[0], _interval(*first), total[0], _interval(*total), *rest)
 
     @property
     def half_width(self) -> float:
         """Largest half width of all intervals; NaN if there are none. [1]"""
-        widths = [np.diff(i, axis=1) for i in (self.first_order_interval, self.total_order_interval)]
+        widths = [
+            np.diff(i, axis=1) for i in (self.first_order_interval, self.total_order_interval)
+        ]
         return float(np.max(np.abs(np.concatenate(widths)))) / 2.0
 
 
@@ -64,13 +68,19 @@ class GroupIndices:
     total: float
 
 
-def group_indices(gear: Gear, closed: Callable[[tuple[int, ...]], float]) -> tuple[GroupIndices, ...]:
-    """Indices of every link, from the share of the variance that joints at some places explain alone."""
+def group_indices(
+    gear: Gear, closed: Callable[[tuple[int, ...]], float]
+) -> tuple[GroupIndices, ...]:
+    """Indices of every link, from the share of the variance that joints at some places explain
+    alone.
+    """
     places = {number: i for i, number in enumerate(gear.joint_numbers)}
     found = []
     for group in gear.link_groups:
         others = tuple(i for number, i in places.items() if number not in group)
-        found.append(GroupIndices(group, closed(tuple(places[n] for n in group)), 1.0 - closed(others)))
+        found.append(
+            GroupIndices(group, closed(tuple(places[n] for n in group)), 1.0 - closed(others))
+        )
     return tuple(found)
 
 
@@ -92,15 +102,34 @@ def student_half(scatter: Array, count: int) -> Array:
 
 
 def without_numbers(
-    design: str, seed: int, n: int, evaluations: int, failed: int, note: str, moments: tuple[float, float]
+    design: str,
+    seed: int,
+    n: int,
+    evaluations: int,
+    failed: int,
+    note: str,
+    moments: tuple[float, float],
 ) -> Indices:
     """Return indices that are not defined, because samples failed or nothing varies."""
     none, pairs = np.full(n, np.nan), np.full((n, 2), np.nan)
-    return Indices(design, seed, none, pairs, none, pairs, moments[0], moments[1], evaluations, failed, note, None)
+    return Indices(
+        design,
+        seed,
+        none,
+        pairs,
+        none,
+        pairs,
+        moments[0],
+        moments[1],
+        evaluations,
+        failed,
+        note,
+        None,
+    )
 
 
 def failed_note(failed: int, evaluations: int) -> str:
     return (
-        f"{failed} of {evaluations} samples do not close, so the variance over the whole range is not defined: "
-        "use smaller limits."
+        f"{failed} of {evaluations} samples do not close, so the variance over the whole range is"
+        " not defined: use smaller limits."
     )

@@ -1,8 +1,8 @@
 """First-order indices from measured inspections: no design, only what was found.
 
-A joint's clearances are cut into classes of equal count; the variance of the class means is Eq. 1's numerator.
-Differs from the paper: the share that class means vary by chance is subtracted, else a few dozen inspections
-would give every joint a large index.
+A joint's clearances are cut into classes of equal count; the variance of the class means is Eq. 1's
+numerator. Differs from the paper: the share that class means vary by chance is subtracted, else a
+few dozen inspections would give every joint a large index.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ _FEWEST = 20
 class GivenDataIndices:
     """First-order indices of observed data.
 
-    first_order, shape (n_joints,): indices; NaN for a joint with fewer than 20 rows or no variation. [1]
-    interval, shape (n_joints, 2): 95 % intervals by resampling rows. [1]
+    first_order, shape (n_joints,): indices; NaN for a joint with fewer than 20 rows or no
+    variation. [1] interval, shape (n_joints, 2): 95 % intervals by resampling rows. [1]
     """
 
     first_order: Array
@@ -59,7 +59,8 @@ def given_data_indices(
         first[j] = _share(x, y, classes)
         chosen = rng.integers(0, len(x), (resamples, len(x)))
         spread = np.array([_share(x[pick], y[pick], classes) for pick in chosen])
-        # The resampled indices are centred on the estimate: repeated rows make class means too different.
+        # The resampled indices are centred on the estimate: repeated rows make class means too
+        # different.
         deviation = np.percentile(spread - np.mean(spread), [2.5, 97.5])
         bounds[j] = first[j] + deviation
     return GivenDataIndices(first, bounds, rows)

@@ -28,14 +28,13 @@ _SAME_RANK = 1e-4
 class JointIndices:
     """Indices of one joint, as fractions of the variance and not normalised to 1.
 
-    limit_in: upper end of its clearance's distribution. [in]
-    first_order, total_order: indices of Eqs. 1 and 2. [1]
-    first_order_interval, total_order_interval: their 95 % intervals. [1]
+    limit_in: upper end of its clearance's distribution. [in] first_order, total_order: indices of
+    Eqs. 1 and 2. [1] first_order_interval, total_order_interval: their 95 % intervals. [1]
     plunger_amplification: A_iP of Eq. 8 at mid-position, in the limit of small clearance. [1]
-    max_amplification_index: largest stage-wise index over the release (section 4.3). [1]
-    rank: place by first order, 1 the largest; joints that differ by less than 1e-4 share a place. [1]
-    rank_range: least and greatest place over the ensemble of linkages. [1]
-    first_order_spread, total_order_spread: least and greatest index over the ensemble. [1]
+    max_amplification_index: largest stage-wise index over the release (section 4.3). [1] rank:
+    place by first order, 1 the largest; joints that differ by less than 1e-4 share a place. [1]
+    rank_range: least and greatest place over the ensemble of linkages. [1] first_order_spread,
+    total_order_spread: least and greatest index over the ensemble. [1]
     """
 
     joint: int
@@ -82,21 +81,31 @@ class IndexTable:
     def as_dict(self) -> dict[str, Any]:
         """Return the table as plain values, in the order of the JSON contract of ``mlg study``."""
         told = asdict(self)
-        names = {"gear_id": "id", **{n: n for n in ("geometry_sha256", "ensemble_sha256", "provenance")}}
+        names = {
+            "gear_id": "id",
+            **{n: n for n in ("geometry_sha256", "ensemble_sha256", "provenance")},
+        }
         gear = {shown: told.pop(name) for name, shown in names.items()}
         return {"schema_version": SCHEMA_VERSION, "gear": gear, **told}
 
 
 def ranks(first_order: Array) -> Wholes:
-    """Place of each joint by first-order index, 1 the largest; joints closer than 1e-4 share a place."""
+    """Place of each joint by first-order index, 1 the largest; joints closer than 1e-4 share a
+    place.
+    """
     above = first_order[None, :] > first_order[:, None] + _SAME_RANK
     return np.asarray(1 + above.sum(axis=1), dtype=np.int64)
 
 
 def rank_ranges(ensemble_first_order: Array) -> list[tuple[int, int]]:
-    """Least and greatest place of each joint over several linkages, from indices of shape (n_linkages, n_joints)."""
+    """Least and greatest place of each joint over several linkages, from indices of shape
+    (n_linkages, n_joints).
+    """
     places = np.array([ranks(row) for row in ensemble_first_order])
-    return [(int(low), int(high)) for low, high in zip(places.min(axis=0), places.max(axis=0), strict=True)]
+    return [
+        (int(low), int(high))
+        for low, high in zip(places.min(axis=0), places.max(axis=0), strict=True)
+    ]
 
 
 def load_index_table(gear: Gear) -> IndexTable:
@@ -115,7 +124,8 @@ def load_index_table(gear: Gear) -> IndexTable:
     Raises
     ------
     GearFileError
-        If the table is missing, unreadable, or was computed for another geometry, ensemble or limit.
+        If the table is missing, unreadable, or was computed for another geometry, ensemble or
+        limit.
     """
     path = gear.indices_file
     if not path.exists():
@@ -131,14 +141,17 @@ def load_index_table(gear: Gear) -> IndexTable:
     ):
         if found != wanted:
             raise GearFileError(
-                f"{path.name}: was computed for another {what}: {found[:16]}, not {wanted[:16]}", _remedy(gear)
+                f"{path.name}: was computed for another {what}: {found[:16]}, not {wanted[:16]}",
+                _remedy(gear),
             )
     limits = tuple((entry.joint, entry.limit_in) for entry in table.joints)
     wanted_limits = tuple((joint.number, joint.limit.value) for joint in gear.joints)
     if limits != wanted_limits:
         gone = sorted(set(limits) ^ set(wanted_limits))
         named = ", ".join(f"joint {number} at {limit:g} in" for number, limit in gone)
-        raise GearFileError(f"{path.name}: was computed for other joints or limits: {named}", _remedy(gear))
+        raise GearFileError(
+            f"{path.name}: was computed for other joints or limits: {named}", _remedy(gear)
+        )
     return table
 
 
@@ -148,7 +161,8 @@ def _text(values: Mapping[str, Any]) -> str:
 
 # How every table begins, up to the name of its gear.
 INDEX_TABLE = OutputKind.marked(
-    "is not a table of indices", _text({"schema_version": SCHEMA_VERSION, "gear": {"id": ""}}).partition('""')[0]
+    "is not a table of indices",
+    _text({"schema_version": SCHEMA_VERSION, "gear": {"id": ""}}).partition('""')[0],
 )
 
 

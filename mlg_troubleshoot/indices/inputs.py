@@ -34,8 +34,8 @@ DISTRIBUTIONS = tuple(_QUANTILES)
 class Inputs:
     """Independent clearances on [0, limit], all of one kind of distribution.
 
-    limits_in, shape (n_joints,): upper ends. [in]
-    distribution: uniform (the paper's), falling or rising (triangular, most likely at 0 or at the limit), half-
+    limits_in, shape (n_joints,): upper ends. [in] distribution: uniform (the paper's), falling or
+    rising (triangular, most likely at 0 or at the limit), half-
       normal.
     Raises `UsageError` if the distribution is unknown or a limit is not a positive number.
     """
@@ -46,7 +46,8 @@ class Inputs:
     def __post_init__(self) -> None:
         if self.distribution not in DISTRIBUTIONS:
             raise UsageError(
-                f"distribution {self.distribution!r} is not known", f"Give one of {', '.join(DISTRIBUTIONS)}."
+                f"distribution {self.distribution!r} is not known",
+                f"Give one of {', '.join(DISTRIBUTIONS)}.",
             )
         limits = np.array(self.limits_in, float)
         if limits.ndim != 1 or not np.all(np.isfinite(limits) & (limits > 0.0)):
@@ -64,7 +65,9 @@ class Inputs:
 def with_random_directions(model: LinkageModel, inputs: Inputs) -> Response:
     """Displacement when every clearance takes a uniformly random direction (as Zhu and Ting do)."""
     n = len(inputs.limits_in)
-    return lambda unit: model.displacement(links_from(inputs.at(unit[:, :n]), 2.0 * np.pi * unit[:, n:]))
+    return lambda unit: model.displacement(
+        links_from(inputs.at(unit[:, :n]), 2.0 * np.pi * unit[:, n:])
+    )
 
 
 def joint_groups(n_joints: int) -> tuple[tuple[int, ...], ...]:
@@ -73,5 +76,7 @@ def joint_groups(n_joints: int) -> tuple[tuple[int, ...], ...]:
 
 
 def beyond_margin(response: Response, margin_in: float) -> Response:
-    """Turn a displacement into 1 where it exceeds the margin or the linkage does not close, else 0."""
+    """Turn a displacement into 1 where it exceeds the margin or the linkage does not close, else
+    0.
+    """
     return lambda variables: np.asarray(~(np.abs(response(variables)) <= margin_in), dtype=float)

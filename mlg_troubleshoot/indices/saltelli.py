@@ -1,7 +1,8 @@
-"""Indices of any response by sampling: Saltelli's and Jansen's estimators on scrambled Sobol points.
+"""Indices of any response by sampling: Saltelli's and Jansen's estimators on scrambled Sobol
+points.
 
-The intervals come from independent scrambles of the points, because neighbouring Sobol points are not
-independent and a bootstrap over them is many times too wide.
+The intervals come from independent scrambles of the points, because neighbouring Sobol points are
+not independent and a bootstrap over them is many times too wide.
 """
 
 from __future__ import annotations
@@ -57,7 +58,9 @@ def saltelli_indices(  # noqa: PLR0913 - what is asked, where it stops, what a f
         failed = sum(total.failed for total in sums)
         design = f"Saltelli and Jansen on {SCRAMBLES} scrambles of 2^{power} Sobol points"
         if failed:
-            return without_numbers(design, seed, len(sets), used, failed, failed_note(failed, used), (np.nan, np.nan))
+            return without_numbers(
+                design, seed, len(sets), used, failed, failed_note(failed, used), (np.nan, np.nan)
+            )
         found = _pooled(sums, design, seed, used, note)
         if progress is not None:
             progress(used, found.half_width)
@@ -72,7 +75,9 @@ def saltelli_indices(  # noqa: PLR0913 - what is asked, where it stops, what a f
 def _continued(stream: Any, power: int) -> Iterator[tuple[Array, Array]]:
     """Further Sobol points of a scramble, in both halves of the variables."""
     while stream.num_generated < 1 << power:
-        first, second = np.split(stream.random(min(_ROWS, (1 << power) - stream.num_generated)), 2, axis=1)
+        first, second = np.split(
+            stream.random(min(_ROWS, (1 << power) - stream.num_generated)), 2, axis=1
+        )
         yield first, second
 
 
@@ -86,7 +91,9 @@ class _Sums:
         self.partial = np.zeros(n)
         self.total_partial = np.zeros(n)
 
-    def add(self, response: Response, a: Array, b: Array, groups: tuple[tuple[int, ...], ...]) -> int:
+    def add(
+        self, response: Response, a: Array, b: Array, groups: tuple[tuple[int, ...], ...]
+    ) -> int:
         count = len(a)
         ya, yb = response(a), response(b)
         self.failed += int(np.count_nonzero(~np.isfinite(ya)) + np.count_nonzero(~np.isfinite(yb)))
@@ -117,13 +124,27 @@ def _pooled(sums: list[_Sums], design: str, seed: int, used: int, note: str) -> 
     variance = moments[:, 1]
     if np.any(variance <= 0.0):
         return without_numbers(
-            design, seed, len(sums[0].partial), used, 0, "the response does not vary", (moments[0, 0], 0.0)
+            design,
+            seed,
+            len(sums[0].partial),
+            used,
+            0,
+            "the response does not vary",
+            (moments[0, 0], 0.0),
         )
-    first = np.array([each.partial / each.count / v for each, v in zip(sums, variance, strict=True)])
-    total = np.array([each.total_partial / each.count / v for each, v in zip(sums, variance, strict=True)])
-    estimates = [(x.mean(axis=0), student_half(x.std(axis=0, ddof=1), len(sums))) for x in (first, total)]
+    first = np.array(
+        [each.partial / each.count / v for each, v in zip(sums, variance, strict=True)]
+    )
+    total = np.array(
+        [each.total_partial / each.count / v for each, v in zip(sums, variance, strict=True)]
+    )
+    estimates = [
+        (x.mean(axis=0), student_half(x.std(axis=0, ddof=1), len(sums))) for x in (first, total)
+    ]
     mean = float(moments[:, 0].mean())
-    return Indices.around(design, seed, estimates[0], estimates[1], mean, float(variance.mean()), used, 0, note)
+    return Indices.around(
+        design, seed, estimates[0], estimates[1], mean, float(variance.mean()), used, 0, note
+    )
 
 
 def fast_indices(
@@ -135,8 +156,12 @@ def fast_indices(
     most: int = 1 << 24,
     progress: Callable[[int, float], None] | None = None,
 ) -> tuple[Indices, ChaosFit | None]:
-    """Compute indices by polynomial chaos, or by sampling where the response is not smooth: there is then no fit."""
+    """Compute indices by polynomial chaos, or by sampling where the response is not smooth: there
+    is then no fit.
+    """
     found, fit = chaos_indices(response, n, rng, seed, accuracy, most=min(2048, most))
     if fit is None and not found.failed:
-        found = saltelli_indices(response, n, rng, seed, accuracy, most, None, progress, found.note, found.evaluations)
+        found = saltelli_indices(
+            response, n, rng, seed, accuracy, most, None, progress, found.note, found.evaluations
+        )
     return found, fit

@@ -1,7 +1,7 @@
 """Indices by an exact tensor of Gauss points: the reference that faster routes are held against.
 
-With m Gauss points a variable, every conditional mean of Eqs. 1 and 2 is exact for polynomials of degree
-2m − 1 in each variable: no sampling, no seed, no interval.
+With m Gauss points a variable, every conditional mean of Eqs. 1 and 2 is exact for polynomials of
+degree 2m − 1 in each variable: no sampling, no seed, no interval.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ _ROWS = 1 << 16
 class TensorIndices:
     """First- and total-order indices from a tensor of points.
 
-    evaluations, failed: number of points, and of those that gave no number; one failure makes all indices NaN.
+    evaluations, failed: number of points, and of those that gave no number; one failure makes all
+    indices NaN.
     """
 
     first_order: Array
@@ -35,7 +36,9 @@ class TensorIndices:
     weights: Array
 
     def closed(self, group: tuple[int, ...]) -> float:
-        """Share of the variance that a group of variables explains alone, interactions within it included."""
+        """Share of the variance that a group of variables explains alone, interactions within it
+        included.
+        """
         partial = _averaged(self.values, self.weights, set(group))
         return float(_variance(partial, self.weights) / self.variance)
 
@@ -71,9 +74,19 @@ def tensor_indices(
     tensor = tensor - mean
     variance = float(_variance(tensor, weights))
     first = [_variance(_averaged(tensor, weights, {i}), weights) / variance for i in range(n)]
-    others = [_variance(_averaged(tensor, weights, set(range(n)) - {i}), weights) / variance for i in range(n)]
+    others = [
+        _variance(_averaged(tensor, weights, set(range(n)) - {i}), weights) / variance
+        for i in range(n)
+    ]
     return TensorIndices(
-        np.array(first), 1.0 - np.array(others), mean, variance, m**n, failed, tensor, np.asarray(weights)
+        np.array(first),
+        1.0 - np.array(others),
+        mean,
+        variance,
+        m**n,
+        failed,
+        tensor,
+        np.asarray(weights),
     )
 
 

@@ -1,7 +1,21 @@
-"""How likely each explanation of a misfit is, for any simulation: noise, evidence, held-out rows. Knows no gear."""
+"""How likely each explanation of a misfit is, for any simulation: noise, evidence, held-out rows.
+Knows no gear.
+"""
 
 from mlg_troubleshoot.misfit.search import diagnose_simulation
-from mlg_troubleshoot.misfit.simulation_result import HeldOutGain, SimulationDiagnosis, Suspect, SuspectFound
+from mlg_troubleshoot.misfit.simulation_result import (
+    HeldOutGain,
+    SimulationDiagnosis,
+    Suspect,
+    SuspectFound,
+)
 from mlg_troubleshoot.misfit.verdict import Verdict
 
-__all__ = ["HeldOutGain", "SimulationDiagnosis", "Suspect", "SuspectFound", "Verdict", "diagnose_simulation"]
+__all__ = [
+    "HeldOutGain",
+    "SimulationDiagnosis",
+    "Suspect",
+    "SuspectFound",
+    "Verdict",
+    "diagnose_simulation",
+]

@@ -1,4 +1,6 @@
-"""How likely a statistic is if nothing is wrong, from the largest of all candidates in data sets drawn so."""
+"""How likely a statistic is if nothing is wrong, from the largest of all candidates in data sets
+drawn so.
+"""
 
 from __future__ import annotations
 
@@ -17,12 +19,16 @@ _SHORT = 0.84
 
 @dataclass(frozen=True)
 class Chance:
-    """Largest statistic of each of many null simulations: the error rate holds for all that is tried."""
+    """Largest statistic of each of many null simulations: the error rate holds for all that is
+    tried.
+    """
 
     largest: Array
 
     def surprise(self, observed: ArrayLike) -> Array:
-        """Minus the logarithm of the chance of as much; beyond the draws by the exponential tail of the largest."""
+        """Minus the logarithm of the chance of as much; beyond the draws by the exponential tail of
+        the largest.
+        """
         seen = np.asarray(observed, float)
         count = np.sum(self.largest >= seen[..., None], axis=-1)
         counted = np.log1p(len(self.largest)) - np.log1p(count)
@@ -50,5 +56,7 @@ class Chance:
 
 
 def smallest_rms(bar: float, scatter: float, n: int) -> float:
-    """Root mean square over n rows of an effect whose squared t clears a bar with 80 % power. [unit of scatter]"""
+    """Root mean square over n rows of an effect whose squared t clears a bar with 80 % power. [unit
+    of scatter]
+    """
     return float(scatter * (np.sqrt(max(bar, 0.0)) + _SHORT) / np.sqrt(n))

@@ -14,14 +14,13 @@ from mlg_troubleshoot.arrays import Array, Mask, Wholes
 class NoiseModel:
     """Covariance of the rows: diagonal scatter, common scatter of each tail, bias and slope.
 
-    relative, shape (n,): standard deviation of each row in units of the common one. [1]
-    tails, shape (n,): number of the tail of each row.
-    gears, shape (n,): number of the single gear of each row.
-    loadings, shape (n, k): bias, slope and small trends, each at one standard deviation in units of the common one. [1]
-    floor_in: scatter that every row has at least. [in]
-    gear_ratio: scatter between the gears of one tail over the scatter of a row. [1]
-    tail_ratios: ratios of the scatter between tails to the scatter of a row that are tried. [1]
-    scale_in: the common standard deviation as it was estimated. [in]
+    relative, shape (n,): standard deviation of each row in units of the common one. [1] tails,
+    shape (n,): number of the tail of each row. gears, shape (n,): number of the single gear of each
+    row. loadings, shape (n, k): bias, slope and small trends, each at one standard deviation in
+    units of the common one. [1] floor_in: scatter that every row has at least. [in] gear_ratio:
+    scatter between the gears of one tail over the scatter of a row. [1] tail_ratios: ratios of the
+    scatter between tails to the scatter of a row that are tried. [1] scale_in: the common standard
+    deviation as it was estimated. [in]
     """
 
     relative: Array
@@ -32,7 +31,9 @@ class NoiseModel:
     gear_ratio: float
     tail_ratios: tuple[float, ...]
     scale_in: float
-    _roots: dict[float, tuple[Array, float]] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _roots: dict[float, tuple[Array, float]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     @classmethod
     def white(cls, n: int) -> NoiseModel:
@@ -59,7 +60,9 @@ class NoiseModel:
         return replace(self, loadings=np.hstack([self.loadings, effects_in / self.scale_in]))
 
     def share_of(self, effects_in: Array, data: Array) -> Array:
-        """What effects of unknown size that are part of this covariance most likely explain of data (BLUP). [in]"""
+        """What effects of unknown size that are part of this covariance most likely explain of data
+        (BLUP). [in]
+        """
         product, _log = self.precision_times(data[:, None], self.tail_ratios[-1])
         return np.asarray(effects_in @ (effects_in.T @ product[:, 0]) / self.scale_in**2)
 
@@ -91,12 +94,16 @@ class NoiseModel:
             low = self.factors(0.0)
             scaled = low / self.relative[:, None] ** 2
             lower = np.linalg.cholesky(np.eye(low.shape[1]) + low.T @ scaled)
-            log_determinant = 2.0 * float(np.sum(np.log(np.diag(lower))) + np.sum(np.log(self.relative)))
+            log_determinant = 2.0 * float(
+                np.sum(np.log(np.diag(lower))) + np.sum(np.log(self.relative))
+            )
             self._roots[tail_ratio] = solve_triangular(lower, scaled.T, lower=True), log_determinant
         return self._roots[tail_ratio]
 
     def tail_root(self, tail_ratio: float) -> tuple[Array, float]:
-        """E with V⁻¹ = V₀⁻¹ − Eᵀ E, V₀ without scatter between tails, and the logarithm of V's determinant."""
+        """E with V⁻¹ = V₀⁻¹ − Eᵀ E, V₀ without scatter between tails, and the logarithm of V's
+        determinant.
+        """
         log_determinant = self._root(0.0)[1]
         if tail_ratio == 0.0:
             return np.empty((0, len(self.relative))), log_determinant
@@ -106,7 +113,9 @@ class NoiseModel:
         log_determinant += 2.0 * float(np.sum(np.log(np.diag(lower))))
         return solve_triangular(lower, scaled.T, lower=True), log_determinant
 
-    def draw(self, residuals: Array, tail_ratio: float, scale: float, n: int, rng: np.random.Generator) -> Array:
+    def draw(
+        self, residuals: Array, tail_ratio: float, scale: float, n: int, rng: np.random.Generator
+    ) -> Array:
         """Draw data sets in which nothing is wrong."""
         rows = len(self.relative)
         drawn = rng.choice(residuals, size=(rows, n)) * rng.choice([-1.0, 1.0], size=(rows, n))

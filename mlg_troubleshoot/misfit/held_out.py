@@ -13,8 +13,12 @@ _FOLDS = 10
 _LEARNED = 0.1
 
 
-def folds_of(row: Wholes, group: Wholes | None, columns: Array, shuffled: Wholes) -> tuple[Wholes, str]:
-    """Number the fold in which each reading is held out: whole groups, or rows where a cause acts in one group only."""
+def folds_of(
+    row: Wholes, group: Wholes | None, columns: Array, shuffled: Wholes
+) -> tuple[Wholes, str]:
+    """Number the fold in which each reading is held out: whole groups, or rows where a cause acts
+    in one group only.
+    """
     if group is not None and group.max() > 0:
         numbers = np.argsort(np.argsort(shuffled[: group.max() + 1]))
         part = np.asarray(numbers % _FOLDS)[group[row]]
@@ -25,24 +29,34 @@ def folds_of(row: Wholes, group: Wholes | None, columns: Array, shuffled: Wholes
     return shuffled[row] % min(_FOLDS, len(shuffled)), "row"
 
 
-def likelier(noise: NoiseModel, before: Array, after: Array, fold: Wholes, allowed: float = 1.0) -> bool:
-    """Tell whether the residual of held-out rows is likelier after than before, what a fold has in common being noise.
+def likelier(
+    noise: NoiseModel, before: Array, after: Array, fold: Wholes, allowed: float = 1.0
+) -> bool:
+    """Tell whether the residual of held-out rows is likelier after than before, what a fold has in
+    common being noise.
 
     allowed: squared residual after over that before, from which it is not. [1]
 
     Far readings decide no more than others: where noise is estimated they scatter more.
     """
     left, ratio = np.column_stack([before, after]), noise.tail_ratios[-1]
-    square = np.sum([noise.take(fold == k).square(left[fold == k], ratio) for k in np.unique(fold)], axis=0)
+    square = np.sum(
+        [noise.take(fold == k).square(left[fold == k], ratio) for k in np.unique(fold)], axis=0
+    )
     return bool(square[1] < allowed * square[0])
 
 
 def held_out_part(
-    noise: NoiseModel, columns: Array, data: Array, fold: Wholes, known: tuple[Array, Array] | None = None
+    noise: NoiseModel,
+    columns: Array,
+    data: Array,
+    fold: Wholes,
+    known: tuple[Array, Array] | None = None,
 ) -> Array:
     """What a model explains of each row that was fitted to the rows of the other folds alone. [in]
 
-    known: further effects, shape (n, k), and the covariance of their sizes that is known beforehand.
+    known: further effects, shape (n, k), and the covariance of their sizes that is known
+    beforehand.
     """
     explained = np.zeros(len(data))
     for k in np.unique(fold):

@@ -1,4 +1,6 @@
-"""Several causes at once: added stepwise while each earns its place, left out again where others make it idle."""
+"""Several causes at once: added stepwise while each earns its place, left out again where others
+make it idle.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +15,14 @@ class Explanation(Protocol):
         """The causes."""
 
     def further(self) -> Self | None:
-        """The same with one more, if one earns its place: it stands out beyond chance given the others, and helps."""
+        """The same with one more, if one earns its place: it stands out beyond chance given the
+        others, and helps.
+        """
 
     def without_idle(self) -> Self | None:
-        """The same without the one that stands out least, if it does so no more than by chance given the others."""
+        """The same without the one that stands out least, if it does so no more than by chance
+        given the others.
+        """
 
 
 E = TypeVar("E", bound=Explanation)

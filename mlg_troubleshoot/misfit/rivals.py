@@ -13,14 +13,22 @@ Alike = Callable[[int, int], bool]
 
 
 def near_and_behind(
-    gain: Array, score: Array, causes: Sequence[Hashable], winner: int, ruled_out: float, clear: bool, alike: Alike = eq
+    gain: Array,
+    score: Array,
+    causes: Sequence[Hashable],
+    winner: int,
+    ruled_out: float,
+    clear: bool,
+    alike: Alike = eq,
 ) -> tuple[list[int], dict[int, float]]:
-    """The likeliest candidate of each other cause that is near the winner, and how far the rest of them is behind.
+    """The likeliest candidate of each other cause that is near the winner, and how far the rest of
+    them is behind.
 
-    gain, score, shape (n,): log-likelihood of each candidate in the winner's place, and that less what its cause pays
+    gain, score, shape (n,): log-likelihood of each candidate in the winner's place, and that less
+    what its cause pays
         for being one of many; -inf where it is not asked. [1]
-    causes: cause of each candidate.
-    ruled_out: log-likelihood by which a rival must fall behind to be ruled out; clear: whether the evidence is enough
+    causes: cause of each candidate. ruled_out: log-likelihood by which a rival must fall behind to
+    be ruled out; clear: whether the evidence is enough
         for a name; alike: whether the data hardly distinguish two candidates.
     """
     others: dict[Hashable, list[int]] = {}

@@ -1,4 +1,6 @@
-"""A simulation that is called with parameters: predictions, sensitivities, fit and what that leaves, all checked."""
+"""A simulation that is called with parameters: predictions, sensitivities, fit and what that
+leaves, all checked.
+"""
 
 from __future__ import annotations
 
@@ -15,23 +17,28 @@ Predict = Callable[[Mapping[str, float]], Any]
 
 # Share of the trial by which a derivative is taken; all of it where so little does nothing.
 _STEP = 0.1
-# Central difference over forward one below which the effect is even about the nominal value, as of a play: then the
-# forward difference stands for it.
+# Central difference over forward one below which the effect is even about the nominal value, as of
+# a play: then the forward difference stands for it.
 _EVEN = 1e-3
 _ITERATIONS = 30
 # Expected fall of the sum of squares, in variances of a reading, below which parameters stand.
 _STANDS = 1e-3
-# Singular value, in units of the largest, below which rows say nothing about a combination of nuisance parameters.
+# Singular value, in units of the largest, below which rows say nothing about a combination of
+# nuisance parameters.
 _KNOWN = 1e-5
 
 
 class Runner:
-    """The simulation, asked only for the readings that there are; suspects first, then nuisance parameters."""
+    """The simulation, asked only for the readings that there are; suspects first, then nuisance
+    parameters.
+    """
 
     def __init__(self, predict: Predict, measured: Array, suspects: Sequence[Suspect]) -> None:
         self.predict = predict
         self.shape = measured.shape
-        self.row, self.output = (places.astype(np.int64) for places in np.nonzero(np.isfinite(measured)))
+        self.row, self.output = (
+            places.astype(np.int64) for places in np.nonzero(np.isfinite(measured))
+        )
         self.reading = measured[self.row, self.output]
         self.suspects = suspects
         self.names = [s.name for s in suspects]
@@ -42,12 +49,15 @@ class Runner:
     def everything(self, values: Array) -> Array:
         """Predict all rows and outputs, shape (n, m)."""
         self.calls += 1
-        predicted = np.asarray(self.predict(dict(zip(self.names, values.tolist(), strict=True))), float)
+        predicted = np.asarray(
+            self.predict(dict(zip(self.names, values.tolist(), strict=True))), float
+        )
         if predicted.ndim == 1 and self.shape == (len(predicted), 1):
             predicted = predicted[:, None]
         if predicted.shape != self.shape:
             raise UsageError(
-                f"The simulation returned an array of shape {predicted.shape}, the readings have shape {self.shape}",
+                f"The simulation returned an array of shape {predicted.shape}, the readings have"
+                f" shape {self.shape}",
                 "predict must return one row for each row read and one column for each output",
             )
         return predicted
@@ -57,20 +67,24 @@ class Runner:
         return self.everything(values)[self.row, self.output]
 
     def nominal_prediction(self) -> Array:
-        """Predict all rows at the nominal values, and refuse what is not a number where a reading is."""
+        """Predict all rows at the nominal values, and refuse what is not a number where a reading
+        is.
+        """
         predicted = self.everything(self.nominal)
         bad = np.flatnonzero(~np.isfinite(predicted[self.row, self.output]))
         if len(bad):
             place = f"row {self.row[bad[0]]}, output {self.output[bad[0]]}"
             raise UsageError(
-                f"The simulation gives no number for {len(bad)} of {len(self.row)} readings at the nominal values, "
-                f"the first at {place} (counted from 0)",
+                f"The simulation gives no number for {len(bad)} of {len(self.row)} readings at the"
+                f" nominal values, the first at {place} (counted from 0)",
                 "set these readings to NaN or correct the simulation",
             )
         return predicted
 
     def sensitivities(self, values: Array, base: Array, which: Sequence[int]) -> Array:
-        """Change of the readings for a change of some parameters by their trials, shape (N, len(which))."""
+        """Change of the readings for a change of some parameters by their trials, shape (N,
+        len(which)).
+        """
         none = np.empty((len(self.row), 0))
         return np.column_stack([none, *(self._column(values, base, k) for k in which)])
 
@@ -80,14 +94,19 @@ class Runner:
             forward, backward = bool(np.isfinite(up).all()), bool(np.isfinite(down).all())
             if not (forward or backward):
                 continue
-            even = forward and backward and np.linalg.norm(up - down) < 2.0 * _EVEN * np.linalg.norm(up)
+            even = (
+                forward
+                and backward
+                and np.linalg.norm(up - down) < 2.0 * _EVEN * np.linalg.norm(up)
+            )
             both = forward and backward and not even
             change = (up - down) / 2.0 if both else up if forward else -down
             if np.any(change) or step == 1.0:
                 return np.asarray(change / step)
         s = self.suspects[k]
         raise UsageError(
-            f"The simulation gives no number for all readings at {values[k]:g} ± {abs(s.trial):g} of {s.name}",
+            f"The simulation gives no number for all readings at {values[k]:g} ± {abs(s.trial):g}"
+            f" of {s.name}",
             f"give {s.name} a smaller trial, or correct the simulation",
         )
 
@@ -97,12 +116,17 @@ class Runner:
         return self.at(moved)
 
     def fit(
-        self, values: Array, active: Sequence[int], white: Callable[[Array], Array], columns: Array | None = None
+        self,
+        values: Array,
+        active: Sequence[int],
+        white: Callable[[Array], Array],
+        columns: Array | None = None,
     ) -> tuple[Array, Array, float]:
-        """Fit some parameters by least squares of the whitened misfit (Gauss–Newton), from the values given.
+        """Fit some parameters by least squares of the whitened misfit (Gauss–Newton), from the
+        values given.
 
-        The sensitivities are computed again only where the sum of squares does not fall as they say. Returned are all
-        values, the prediction, and the sum of squares.
+        The sensitivities are computed again only where the sum of squares does not fall as they
+        say. Returned are all values, the prediction, and the sum of squares.
         """
         base = self.at(values)
         rest = white(self.reading - base)
@@ -128,7 +152,12 @@ class Runner:
         return values, base, cost
 
     def _shorter(
-        self, values: Array, active: Sequence[int], step: Array, white: Callable[[Array], Array], cost: float
+        self,
+        values: Array,
+        active: Sequence[int],
+        step: Array,
+        white: Callable[[Array], Array],
+        cost: float,
     ) -> tuple[Array, Array, Array, float] | None:
         """Go along a step, or a part of it, if that makes the sum of squares smaller."""
         for share in (1.0, 0.5, 0.25, 0.1, 0.02):
@@ -149,10 +178,13 @@ def least_squares(columns: Array, data: Array) -> Array:
     return np.asarray((found.T / size).T)
 
 
-def held_out(columns: Array, rest: Array, causes: Sequence[int], nuisance: Sequence[int], part: Wholes) -> Array:
+def held_out(
+    columns: Array, rest: Array, causes: Sequence[int], nuisance: Sequence[int], part: Wholes
+) -> Array:
     """Misfit of each reading, fitted on the other folds.
 
-    What only the held-out readings know of the nuisance parameters (the place of their own socket) is fitted there.
+    What only the held-out readings know of the nuisance parameters (the place of their own socket)
+    is fitted there.
     """
     left = rest.copy()
     chosen, free = columns[:, list(causes)], columns[:, list(nuisance)]

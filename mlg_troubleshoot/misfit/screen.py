@@ -1,4 +1,6 @@
-"""How much better each candidate explains the misfit than nothing does, and how much of that is chance."""
+"""How much better each candidate explains the misfit than nothing does, and how much of that is
+chance.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +14,22 @@ from mlg_troubleshoot.misfit.covariance import NoiseModel
 
 
 class Screen:
-    """Candidates against data under one noise model; the products are computed once for all data sets.
+    """Candidates against data under one noise model; the products are computed once for all data
+    sets.
 
-    noise: the noise.
-    columns, shape (n, n_candidates): effect of each candidate per unit of its parameter. [in / unit]
-    signs, shape (n_candidates,): sign that the parameter may have: +1, −1, or 0 for both.
-    fixed, shape (n, k): columns that are always fitted: causes named already.
-    exact, shape (n_candidates,): the only value that a parameter can have, NaN where it is free.
+    noise: the noise. columns, shape (n, n_candidates): effect of each candidate per unit of its
+    parameter. [in / unit] signs, shape (n_candidates,): sign that the parameter may have: +1, −1,
+    or 0 for both. fixed, shape (n, k): columns that are always fitted: causes named already. exact,
+    shape (n_candidates,): the only value that a parameter can have, NaN where it is free.
     """
 
     def __init__(
-        self, noise: NoiseModel, columns: Array, signs: Array, fixed: Array | None = None, exact: Array | None = None
+        self,
+        noise: NoiseModel,
+        columns: Array,
+        signs: Array,
+        fixed: Array | None = None,
+        exact: Array | None = None,
     ) -> None:
         self.noise = noise
         self.columns = columns
@@ -33,9 +40,11 @@ class Screen:
         self._parts = [self._part(ratio, fixed) for ratio in noise.tail_ratios]
 
     def _part(self, ratio: float, fixed: Array | None) -> tuple[Array, Array, Array, float]:
-        """A with V⁻¹ − V⁻¹ F (Fᵀ V⁻¹ F)⁻¹ Fᵀ V⁻¹ = V₀⁻¹ − Aᵀ A, A X, squared length of each column, and log |V|.
+        """A with V⁻¹ − V⁻¹ F (Fᵀ V⁻¹ F)⁻¹ Fᵀ V⁻¹ = V₀⁻¹ − Aᵀ A, A X, squared length of each column,
+        and log |V|.
 
-        V₀ has no scatter between tails; F are the fixed columns. A has few rows, so that a further ratio costs little.
+        V₀ has no scatter between tails; F are the fixed columns. A has few rows, so that a further
+        ratio costs little.
         """
         root, log_determinant = self.noise.tail_root(ratio)
         if fixed is not None and fixed.shape[1]:
@@ -45,33 +54,44 @@ class Screen:
             kept = values > 1e-14 * values[-1]
             root = np.vstack([root, (held @ (vectors[:, kept] / np.sqrt(values[kept]))).T])
         along = root @ self.columns
-        square = np.einsum("ij,ij->j", self.columns, self._weighted) - np.einsum("ij,ij->j", along, along)
+        square = np.einsum("ij,ij->j", self.columns, self._weighted) - np.einsum(
+            "ij,ij->j", along, along
+        )
         return root, along, square, log_determinant
 
     def _levels(
         self, data: Array, which: Places | slice = slice(None)
     ) -> Iterator[tuple[Array, Array, Array, Callable[..., Array]]]:
-        """For each tail ratio: residual sums of squares without candidates, the products and squared lengths of the
-        candidates, and the log-likelihood when something is taken off those sums."""
+        """For each tail ratio: residual sums of squares without candidates, the products and
+        squared lengths of the candidates, and the log-likelihood when something is taken off those
+        sums.
+        """
         n = len(data)
         plain, products = self.noise.square(data, 0.0), self._weighted[:, which].T @ data
         for root, along, square, log_determinant in self._parts:
             common = root @ data
             rest = self.noise.floored(plain - np.einsum("ij,ij->j", common, common))
 
-            def likelihood(drop: Array | float = 0.0, rest: Array = rest, log: float = log_determinant) -> Array:
-                return np.asarray(-0.5 * n * np.log(np.maximum(rest - drop, 1e-12 * rest) / n) - 0.5 * log)
+            def likelihood(
+                drop: Array | float = 0.0, rest: Array = rest, log: float = log_determinant
+            ) -> Array:
+                return np.asarray(
+                    -0.5 * n * np.log(np.maximum(rest - drop, 1e-12 * rest) / n) - 0.5 * log
+                )
 
             yield rest, products - along[:, which].T @ common, square[which], likelihood
 
     def explained(self, data: Array) -> tuple[Array, Array]:
-        """What each candidate takes off the residual sum of squares of each data set, and that sum without any, where
-        nothing scatters between tails."""
+        """What each candidate takes off the residual sum of squares of each data set, and that sum
+        without any, where nothing scatters between tails.
+        """
         rest, along, square, _likelihood = next(self._levels(data))
         return self._drop(along, square), rest
 
     def run(self, data: Array) -> tuple[Array, Array]:
-        """Gain in log-likelihood of candidates over the null, shape (n_candidates, n_sets), and the null's. [1]"""
+        """Gain in log-likelihood of candidates over the null, shape (n_candidates, n_sets), and the
+        null's. [1]
+        """
         best = np.full((self.columns.shape[1], data.shape[1]), -np.inf)
         null = np.full(data.shape[1], -np.inf)
         for _rest, along, square, likelihood in self._levels(data):
@@ -80,7 +100,9 @@ class Screen:
         return best - null, null
 
     def largest(self, data: Array, penalty: Array) -> Array:
-        """Largest gain less its penalty over all candidates, for each of many data sets: what chance makes of it."""
+        """Largest gain less its penalty over all candidates, for each of many data sets: what
+        chance makes of it.
+        """
         kept = np.flatnonzero(np.isfinite(penalty))
         kept = kept[np.argsort(penalty[kept], kind="stable")]
         null = np.full(data.shape[1], -np.inf)
@@ -96,7 +118,9 @@ class Screen:
         return np.asarray(best.max(axis=0) - null)
 
     def _drop(self, along: Array, square: Array, which: Places | slice = slice(None)) -> Array:
-        """What each candidate takes off the residual sum of squares, from its products with the data."""
+        """What each candidate takes off the residual sum of squares, from its products with the
+        data.
+        """
         signs, only = self.signs[which], self.exact[which]
         usable = square > 1e-9 * self.length[which]
         one = np.flatnonzero(signs)
@@ -118,7 +142,8 @@ class Screen:
             own = np.maximum(square, 1e-300)
             apart = square[:, None] * own[pool] - cross**2
             clear = apart > 1e-3 * own[:, None] * own[pool]
-            # Least squares for both at once; a pair is refused if one of them would have the wrong sign.
+            # Least squares for both at once; a pair is refused if one of them would have the wrong
+            # sign.
             apart = np.where(clear, apart, 1.0)
             value = (along * own[pool] - cross * along[pool, 0]) / apart
             partner = (along[pool, 0] * own[:, None] - cross * along) / apart
@@ -129,8 +154,13 @@ class Screen:
         return np.asarray(best - null)
 
     def tail_ratio(self, data: Array) -> tuple[float, float]:
-        """Most likely scatter between tails and common scale of one data set, candidates left out."""
-        found = [(float(likelihood()[0]), float(rest[0])) for rest, _a, _s, likelihood in self._levels(data[:, None])]
+        """Most likely scatter between tails and common scale of one data set, candidates left
+        out.
+        """
+        found = [
+            (float(likelihood()[0]), float(rest[0]))
+            for rest, _a, _s, likelihood in self._levels(data[:, None])
+        ]
         most = max(range(len(found)), key=lambda k: found[k][0])
         return self.noise.tail_ratios[most], float(np.sqrt(found[most][1] / len(data)))
 
@@ -139,10 +169,9 @@ class Screen:
 class Fit:
     """Least-squares fit of some columns under the noise model.
 
-    values, shape (k,): parameters.
-    errors, shape (k,): their standard errors.
-    log_likelihood: profiled over scale and tail scatter. [1]
-    tail_ratio, scale: scatter between tails over scatter of a row [1], common standard deviation [in].
+    values, shape (k,): parameters. errors, shape (k,): their standard errors. log_likelihood:
+    profiled over scale and tail scatter. [1] tail_ratio, scale: scatter between tails over scatter
+    of a row [1], common standard deviation [in].
     """
 
     values: Array
@@ -152,8 +181,12 @@ class Fit:
     scale: float
 
 
-def shrunk(noise: NoiseModel, free: Array, columns: Array, covariance: Array, data: Array) -> tuple[Array, Array]:
-    """Fit free columns, and columns whose values are known beforehand to a covariance: values, and their covariance."""
+def shrunk(
+    noise: NoiseModel, free: Array, columns: Array, covariance: Array, data: Array
+) -> tuple[Array, Array]:
+    """Fit free columns, and columns whose values are known beforehand to a covariance: values, and
+    their covariance.
+    """
     both = np.hstack([free, columns])
     scale = noise.scale_in
     product, _log = noise.precision_times(np.column_stack([both, data]), noise.tail_ratios[-1])

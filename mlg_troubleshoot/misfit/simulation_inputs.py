@@ -28,10 +28,13 @@ def checked(
     data = data[:, None] if data.ndim == 1 else data
     if data.ndim != 2 or not data.size:
         raise UsageError(
-            f"measured has shape {data.shape}", "give one row for each row read, one column for each output"
+            f"measured has shape {data.shape}",
+            "give one row for each row read, one column for each output",
         )
     if np.isinf(data).any():
-        raise UsageError(f"measured holds {int(np.isinf(data).sum())} infinite readings", "set them to NaN")
+        raise UsageError(
+            f"measured holds {int(np.isinf(data).sum())} infinite readings", "set them to NaN"
+        )
     _suspects(suspects, nuisance)
     readings = int(np.isfinite(data).sum())
     if readings < len(nuisance) + 3:
@@ -40,7 +43,9 @@ def checked(
             f"measure {len(nuisance) + 3 - readings} more at least",
         )
     if permutations < _LEAST_PERMUTATIONS:
-        raise UsageError(f"permutations is {permutations}", f"at least {_LEAST_PERMUTATIONS} are needed")
+        raise UsageError(
+            f"permutations is {permutations}", f"at least {_LEAST_PERMUTATIONS} are needed"
+        )
     return data, _declared(reading_u, data), _groups(groups, len(data))
 
 
@@ -48,15 +53,22 @@ def _numbers(values: ArrayLike, name: str) -> Array:
     try:
         return np.array(values, float)
     except (TypeError, ValueError) as error:
-        raise UsageError(f"{name} is not an array of numbers: {error}", "give numbers, NaN where not read") from error
+        raise UsageError(
+            f"{name} is not an array of numbers: {error}", "give numbers, NaN where not read"
+        ) from error
 
 
 def _suspects(suspects: Sequence[Suspect], nuisance: Sequence[Suspect]) -> None:
     if not suspects:
         raise UsageError("No suspects were given", "name at least one parameter that may be wrong")
-    twice = [name for name, count in Counter(s.name for s in [*suspects, *nuisance]).items() if count > 1]
+    twice = [
+        name for name, count in Counter(s.name for s in [*suspects, *nuisance]).items() if count > 1
+    ]
     if twice:
-        raise UsageError(f"{', '.join(twice)} is named twice among suspects and nuisance parameters", "name each once")
+        raise UsageError(
+            f"{', '.join(twice)} is named twice among suspects and nuisance parameters",
+            "name each once",
+        )
     for s in [*suspects, *nuisance]:
         if not (np.isfinite(s.nominal) and np.isfinite(s.trial)) or s.trial == 0.0:
             raise UsageError(
@@ -77,7 +89,10 @@ def _declared(reading_u: ArrayLike | None, data: Array) -> Array | None:
     declared = np.broadcast_to(declared, data.shape)
     read = declared[np.isfinite(data)]
     if not np.all(np.isfinite(read) & (read > 0.0)):
-        raise UsageError("reading_u holds a value that is not above 0", "a standard uncertainty is a positive number")
+        raise UsageError(
+            "reading_u holds a value that is not above 0",
+            "a standard uncertainty is a positive number",
+        )
     return np.array(declared)
 
 
@@ -86,6 +101,8 @@ def _groups(groups: ArrayLike | None, n: int) -> Wholes | None:
         return None
     labels = np.asarray(groups)
     if labels.shape != (n,):
-        raise UsageError(f"groups has shape {labels.shape}, there are {n} rows", "give one label for each row")
+        raise UsageError(
+            f"groups has shape {labels.shape}, there are {n} rows", "give one label for each row"
+        )
     numbers = np.unique(labels.astype(str), return_inverse=True)[1].astype(np.int64)
     return numbers if numbers.max() > 0 else None

@@ -52,12 +52,13 @@ class SuspectFound:
     interval : tuple of float
         95 % interval of `value`, what looks like it taken to be right. [unit of the suspect]
     effect_rms : float
-        Root mean square over the readings of what the change does to the prediction, less what the nuisance
-        parameters absorb of it. [unit of the readings]
+        Root mean square over the readings of what the change does to the prediction, less what the
+        nuisance parameters absorb of it. [unit of the readings]
     p_value : float
         Chance of as much for any suspect if nothing more is wrong. [1]
     aliases : tuple of str
-        Suspects that these rows cannot tell from it, whatever is measured: the class is named, not this member.
+        Suspects that these rows cannot tell from it, whatever is measured: the class is named, not
+        this member.
     """
 
     suspect: Suspect
@@ -85,7 +86,8 @@ class HeldOutGain:
     Parameters
     ----------
     rms_before : float
-        Root mean square with the suspects at their nominal values, nuisance parameters fitted. [unit of the readings]
+        Root mean square with the suspects at their nominal values, nuisance parameters fitted.
+        [unit of the readings]
     rms_after : float
         The same with the causes fitted. [unit of the readings]
     held_out_by : str
@@ -104,13 +106,16 @@ class SimulationDiagnosis:
     Parameters
     ----------
     verdict : Verdict
-        NONE, NAMED, AMBIGUOUS (the data leave rivals) or UNLISTED (more is left than the suspects explain).
+        NONE, NAMED, AMBIGUOUS (the data leave rivals) or UNLISTED (more is left than the suspects
+        explain).
     causes : tuple of SuspectFound
         All that earned their place, whatever the verdict, by effect.
     also_possible : tuple of SuspectFound
-        The whole set that the data leave possible, where there are rivals that no alias class says; else empty.
+        The whole set that the data leave possible, where there are rivals that no alias class says;
+        else empty.
     aliases : tuple of tuple of str
-        Classes of suspects that these rows cannot distinguish, known before a measured value is looked at.
+        Classes of suspects that these rows cannot distinguish, known before a measured value is
+        looked at.
     untestable : tuple of str
         Suspects that do nothing in these rows which the nuisance parameters do not absorb.
     gain : HeldOutGain
@@ -120,7 +125,8 @@ class SimulationDiagnosis:
     remainder_p : float
         p-value of the pattern in the residual. [1]
     smallest_detectable_rms : float
-        Root mean square of the smallest effect that is detected with 80 % power. [unit of the readings]
+        Root mean square of the smallest effect that is detected with 80 % power. [unit of the
+        readings]
     noise : tuple of float
         Standard deviation of a reading of each output, as it is estimated with all suspects fitted.
         [unit of the readings]

@@ -16,15 +16,17 @@ class Verdict(StrEnum):
     UNLISTED = "UNLISTED"
 
 
-# p-value below which something is wrong (alarm), below which a cause is named, and below which the residual
-# is not noise: set in 2026 on the tuning seeds of the study of hidden effects (at most 2 % of healthy fleets alarm)
-# and on five simulated rigs. A lower bar names more at S = 5 to 7 and names more wrongly; a higher one leaves more sets
-# undecided.
+# p-value below which something is wrong (alarm), below which a cause is named, and below which the
+# residual is not noise: set in 2026 on the tuning seeds of the study of hidden effects (at most 2 %
+# of healthy fleets alarm) and on five simulated rigs. A lower bar names more at S = 5 to 7 and
+# names more wrongly; a higher one leaves more sets undecided.
 ALARM, NAME, REMAINS = 0.012, 0.002, 0.002
 
 
 def refutes(p: float, size: float = np.inf, slip: float = 0.0) -> bool:
-    """Tell whether the residual refutes what is named: it is not noise, and larger than an error in a cause's form."""
+    """Tell whether the residual refutes what is named: it is not noise, and larger than an error in
+    a cause's form.
+    """
     return p <= REMAINS and size >= slip
 
 

@@ -1,1 +1,3 @@
-"""What the paper prints, reproduced: its designs, statements and numbers, the reconstruction, the proved bound."""
+"""What the paper prints, reproduced: its designs, statements and numbers, the reconstruction, the
+proved bound.
+"""

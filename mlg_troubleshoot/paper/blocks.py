@@ -1,9 +1,10 @@
-"""The paper-size total-order study (Fig. 5b) in blocks: resumable, on several cores or a Dask cluster.
+"""The paper-size total-order study (Fig. 5b) in blocks: resumable, on several cores or a Dask
+cluster.
 
-Each of the n1 · n2 samples of a modified Latin hypercube keeps all joints but one while that joint takes the
-n1 clearances of its level: n1² · n2 solutions per joint. A block is a range of levels of one iteration. It
-depends on nothing but the study and its number, so that blocks computed anywhere and in any order add up to
-the same bits.
+Each of the n1 · n2 samples of a modified Latin hypercube keeps all joints but one while that joint
+takes the n1 clearances of its level: n1² · n2 solutions per joint. A block is a range of levels of
+one iteration. It depends on nothing but the study and its number, so that blocks computed anywhere
+and in any order add up to the same bits.
 """
 
 from __future__ import annotations
@@ -72,7 +73,8 @@ class BlockStudy:
     def __post_init__(self) -> None:
         if self.n1 < 2 or self.n2 < 1 or self.iterations < 1:
             raise UsageError(
-                f"a total-order study of {self.n1} repetitions, {self.n2} levels, {self.iterations} iterations",
+                f"a total-order study of {self.n1} repetitions, {self.n2} levels, {self.iterations}"
+                " iterations",
                 "It has at least 2 repetitions, 1 level and 1 iteration.",
             )
 
@@ -89,17 +91,24 @@ class BlockStudy:
     def blocks(self) -> tuple[Block, ...]:
         starts = range(0, self.n2, LEVELS_PER_BLOCK)
         return tuple(
-            Block(i, start, min(start + LEVELS_PER_BLOCK, self.n2)) for i in range(self.iterations) for start in starts
+            Block(i, start, min(start + LEVELS_PER_BLOCK, self.n2))
+            for i in range(self.iterations)
+            for start in starts
         )
 
     def key(self) -> dict[str, Any]:
-        """What must agree for blocks to be of one study; the hash stands for the linkage and its calibration."""
+        """What must agree for blocks to be of one study; the hash stands for the linkage and its
+        calibration.
+        """
         return {
             "directions": self.response.directions.tolist(),
             "sense": self.response.sense,
             "limits_in": self.inputs.limits_in.tolist(),
             "distribution": self.inputs.distribution,
-            **{name: getattr(self, name) for name in ("n1", "n2", "iterations", "seed", "geometry_sha256")},
+            **{
+                name: getattr(self, name)
+                for name in ("n1", "n2", "iterations", "seed", "geometry_sha256")
+            },
             "levels_per_block": LEVELS_PER_BLOCK,
             "compiled": numba_is_installed(),
         }
@@ -172,9 +181,13 @@ def total_order_study(
     missing = [block for block in blocks if block not in done]
     runner: Iterator[tuple[Block, BlockSums]]
     if scheduler is not None:
-        waiting = {scheduler.submit(compute_block, study, block, pure=False): block for block in missing}
+        waiting = {
+            scheduler.submit(compute_block, study, block, pure=False): block for block in missing
+        }
         distributed: Any = import_module("distributed")
-        runner = ((waiting[future], future.result()) for future in distributed.as_completed(list(waiting)))
+        runner = (
+            (waiting[future], future.result()) for future in distributed.as_completed(list(waiting))
+        )
     elif workers > 1 and len(missing) > 1:
         runner = _on_this_machine(study, missing, workers)
     else:
@@ -191,9 +204,11 @@ def total_order_study(
     return _summed(study, done)
 
 
-def _on_this_machine(study: BlockStudy, blocks: list[Block], workers: int) -> Iterator[tuple[Block, BlockSums]]:
-    # The compiled loop runs without the interpreter's lock: threads share its memory. Forking a process that has
-    # threads of its own can hang; a fresh interpreter cannot.
+def _on_this_machine(
+    study: BlockStudy, blocks: list[Block], workers: int
+) -> Iterator[tuple[Block, BlockSums]]:
+    # The compiled loop runs without the interpreter's lock: threads share its memory. Forking a
+    # process that has threads of its own can hang; a fresh interpreter cannot.
     fresh = partial(ProcessPoolExecutor, mp_context=get_context("spawn"))
     pool: Executor = (ThreadPoolExecutor if numba_is_installed() else fresh)(workers)
     try:
@@ -235,19 +250,28 @@ def _append(path: Path, entry: Any) -> None:
 
 
 def _resumed(study: BlockStudy, path: Path) -> dict[Block, BlockSums]:
-    """Read finished blocks; a last line that was cut off by an interruption is dropped with its block."""
+    """Read finished blocks; a last line that was cut off by an interruption is dropped with its
+    block.
+    """
     if not path.exists() or path.stat().st_size == 0:
         _append(path, study.key())
         return {}
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)
     if lines[0] != json.dumps(study.key()) + "\n":
-        raise UsageError(f"{path}: belongs to another study", "Give another file, or delete this one.")
+        raise UsageError(
+            f"{path}: belongs to another study", "Give another file, or delete this one."
+        )
     if not lines[-1].endswith("\n"):
         path.write_text("".join(lines[:-1]), encoding="utf-8")
         lines = lines[:-1]
     known = set(study.blocks)
     try:
-        found = [(Block(*block), BlockSums(tuple(sums[0]), *sums[1:])) for block, sums in map(json.loads, lines[1:])]
+        found = [
+            (Block(*block), BlockSums(tuple(sums[0]), *sums[1:]))
+            for block, sums in map(json.loads, lines[1:])
+        ]
     except (ValueError, TypeError, LookupError, RecursionError) as error:
-        raise UsageError(f"{path}: damaged ({error})", "Give another file, or delete this one.") from error
+        raise UsageError(
+            f"{path}: damaged ({error})", "Give another file, or delete this one."
+        ) from error
     return {block: sums for block, sums in found if block in known}

@@ -1,12 +1,13 @@
-"""A bound of the plunger displacement over all directions and the whole stroke, proved by interval arithmetic.
+"""A bound of the plunger displacement over all directions and the whole stroke, proved by interval
+arithmetic.
 
-Each virtual link may be any vector in a disc, each position any of the stroke. Where the displacement is
-greatest, a virtual link whose gradient is not zero has its full length and points along that gradient. An
-enclosure of the gradients over a box of links therefore narrows the box; the gradients over the narrower box
-are narrower still, and so on until it is a point. The stroke shrinks to its end where the displacement grows
-along it. A box that cannot hold the greatest displacement is dropped, one that does not shrink is split.
-The result holds for every combination of directions and every clearance up to the given ones: nothing is
-sampled.
+Each virtual link may be any vector in a disc, each position any of the stroke. Where the
+displacement is greatest, a virtual link whose gradient is not zero has its full length and points
+along that gradient. An enclosure of the gradients over a box of links therefore narrows the box;
+the gradients over the narrower box are narrower still, and so on until it is a point. The stroke
+shrinks to its end where the displacement grows along it. A box that cannot hold the greatest
+displacement is dropped, one that does not shrink is split. The result holds for every combination
+of directions and every clearance up to the given ones: nothing is sampled.
 """
 
 from __future__ import annotations
@@ -65,7 +66,8 @@ def certified_bound(
             halves = _halves(kept, smear[:, ~within])
             # The most promising box comes last and is taken next.
             waiting = Box(
-                np.concatenate([waiting.low, halves.low], axis=1), np.concatenate([waiting.high, halves.high], axis=1)
+                np.concatenate([waiting.low, halves.low], axis=1),
+                np.concatenate([waiting.high, halves.high], axis=1),
             )
     bound = np.inf if waiting.low.size else max(settled, search.best)
     return CertifiedBound(sense, search.best, bound, search.directions, search.stroke, examined)
@@ -85,14 +87,17 @@ def _halves(boxes: Box, smear: Array) -> Box:
 
 
 class _Search:
-    """Contracts boxes of the links that have a clearance, and of the stroke; remembers the best it reached."""
+    """Contracts boxes of the links that have a clearance, and of the stroke; remembers the best it
+    reached.
+    """
 
     def __init__(self, model: LinkageModel, clearance: Array, sense: float) -> None:
         self.model = model
         self.clearance = clearance
         self.sense = sense
         worn = {number: j for j, number in enumerate(model.joint_numbers) if clearance[j] > 0.0}
-        # Links at both ends of one rigid link displace it by their sum: one disc of the summed length.
+        # Links at both ends of one rigid link displace it by their sum: one disc of the summed
+        # length.
         groups = (tuple(worn[n] for n in group if n in worn) for group in model.mechanism.alike)
         self.groups = tuple(group for group in groups if group)
         self.reach = np.array([clearance[list(group)].sum() for group in self.groups])
@@ -113,8 +118,8 @@ class _Search:
     def contract(self, boxes: Box) -> tuple[Box, Array, Array]:
         """Narrow boxes until they no longer shrink.
 
-        Returns the boxes that may hold the greatest displacement, a bound of each, and how much each
-        variable widens it.
+        Returns the boxes that may hold the greatest displacement, a bound of each, and how much
+        each variable widens it.
         """
         bounds = np.full(boxes.low.shape[1], np.inf)
         while True:
@@ -148,7 +153,9 @@ class _Search:
         top[-1] = np.where(high[-1] < 0.0, boxes.low[-1], top[-1])
         # A part of the stroke that is not its end hands its own end to the next part.
         first, last = sorted(self.model.stroke)
-        inner = ((low[-1] > 0.0) & (boxes.high[-1] < last)) | ((high[-1] < 0.0) & (boxes.low[-1] > first))
+        inner = ((low[-1] > 0.0) & (boxes.high[-1] < last)) | (
+            (high[-1] < 0.0) & (boxes.low[-1] > first)
+        )
         bottom[0] = np.where(inner, np.inf, bottom[0])
         return Box(bottom, top)
 
@@ -167,7 +174,9 @@ class _Search:
         return result
 
     def _try(self, boxes: Box) -> None:
-        """Solve the linkage with full-length links towards the middle of each box and keep the best."""
+        """Solve the linkage with full-length links towards the middle of each box and keep the
+        best.
+        """
         if not boxes.low.shape[1]:
             return
         middle = boxes.middle
@@ -185,7 +194,9 @@ class _Search:
 
 
 def _arc(low: Array, high: Array, length: float) -> tuple[Array, Array]:
-    """Smallest box around the vectors of a length that point along a gradient, −∞ to ∞ if it may be zero."""
+    """Smallest box around the vectors of a length that point along a gradient, −∞ to ∞ if it may be
+    zero.
+    """
     (left, bottom), (right, top) = low, high
     usable = (left > 0.0) | (right < 0.0) | (bottom > 0.0) | (top < 0.0)
     centre = np.arctan2(bottom + top, left + right)
@@ -195,7 +206,10 @@ def _arc(low: Array, high: Array, length: float) -> tuple[Array, Array]:
             off = np.arctan2(y, x) - centre
             half = np.maximum(half, np.abs(np.remainder(off + np.pi, 2 * np.pi) - np.pi))
     usable &= np.isfinite(half)
-    centre, half = np.where(usable, centre, 0.0), np.where(usable, half, np.pi) * (1.0 + 1e-12) + 1e-14
+    centre, half = (
+        np.where(usable, centre, 0.0),
+        np.where(usable, half, np.pi) * (1.0 + 1e-12) + 1e-14,
+    )
     across = cosine_range(centre - half, centre + half)
     up = cosine_range(centre - half - np.pi / 2, centre + half - np.pi / 2)
     return (

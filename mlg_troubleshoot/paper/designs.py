@@ -1,8 +1,9 @@
-"""The paper's designs: modified Latin hypercube samples and central composite points (section 2.2, Fig. 5).
+"""The paper's designs: modified Latin hypercube samples and central composite points (section 2.2,
+Fig. 5).
 
-A modified Latin hypercube has n1 replicates of n2 levels. Sorted by the level of one joint, the n1 samples of
-a level share that joint's clearance while the others vary (Fig. 5a); exchanging one joint's clearance among
-them lets that joint vary while the others are fixed (Fig. 5b).
+A modified Latin hypercube has n1 replicates of n2 levels. Sorted by the level of one joint, the n1
+samples of a level share that joint's clearance while the others vary (Fig. 5a); exchanging one
+joint's clearance among them lets that joint vary while the others are fixed (Fig. 5b).
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from numpy.random import Generator
 from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.errors import UsageError
 
-# Resolution V fractions of the two-level factorial: the columns whose product each further column is. No
-# word of their defining relations is shorter than five letters.
+# Resolution V fractions of the two-level factorial: the columns whose product each further column
+# is. No word of their defining relations is shorter than five letters.
 _FRACTIONS: dict[int, tuple[int, tuple[tuple[int, ...], ...]]] = {
     8: (6, ((0, 1, 2, 3), (0, 1, 4, 5))),
     9: (7, ((0, 2, 3, 5, 6), (1, 2, 4, 5, 6))),
@@ -30,8 +31,9 @@ _FULL = 7
 class Replicated:
     """Levels and points of a replicated design.
 
-    points, shape (n1, n_rows, n): points of the unit cube, replicate by replicate. [1]
-    places, shape (n1, n_rows, n): group of each row for each variable: rows of one group share the variable's value
+    points, shape (n1, n_rows, n): points of the unit cube, replicate by replicate. [1] places,
+    shape (n1, n_rows, n): group of each row for each variable: rows of one group share the
+    variable's value
       (Fig. 5a). [1]
     """
 
@@ -42,17 +44,19 @@ class Replicated:
 def central_composite(n: int) -> Array:
     """Corners and axial points of the range.
 
-    The paper has 138 points in ten joints and does not say how they are made up. 128 corners are the
-    resolution V fraction 2^(10−3) of the two-level factorial; the ten points that remain are taken as one
-    axial point per joint, all others in mid-range: the first joint at its limit, the second at zero, and so
-    on. (With all ten at their limits a joint in mid-range would go with high values of the others, which
-    adds 0.004 to every first-order index.)
+    The paper has 138 points in ten joints and does not say how they are made up. 128 corners are
+    the resolution V fraction 2^(10−3) of the two-level factorial; the ten points that remain are
+    taken as one axial point per joint, all others in mid-range: the first joint at its limit, the
+    second at zero, and so on. (With all ten at their limits a joint in mid-range would go with high
+    values of the others, which adds 0.004 to every first-order index.)
 
     Returns, shape (n_corners + n, n): points of the unit cube. [1]
     Raises `UsageError` if there is no such design.
     """
     if not 2 <= n <= max(_FRACTIONS):
-        raise UsageError(f"a central composite design in {n} variables", f"It has 2 to {max(_FRACTIONS)}.")
+        raise UsageError(
+            f"a central composite design in {n} variables", f"It has 2 to {max(_FRACTIONS)}."
+        )
     base, words = (n, ()) if n <= _FULL else _FRACTIONS[n]
     signs = np.array(list(product((-1, 1), repeat=base)))
     columns = [signs, *(np.prod(signs[:, list(word)], axis=1)[:, None] for word in words)]
@@ -75,10 +79,11 @@ def middle_of_level(levels: Wholes, n2: int) -> Array:
 
 
 def first_order_design(n: int, n1: int, n2: int, ccd: Array | None, rng: Generator) -> Replicated:
-    """Samples for the first-order index (Fig. 5a): Latin hypercube levels, composite points, or both.
+    """Samples for the first-order index (Fig. 5a): Latin hypercube levels, composite points, or
+    both.
 
-    Every replicate holds all composite points. Points that share a joint's clearance are put in its groups
-    in an order of their own in every replicate, so that the others vary within a group.
+    Every replicate holds all composite points. Points that share a joint's clearance are put in its
+    groups in an order of their own in every replicate, so that the others vary within a group.
 
     ccd, shape (n_ccd, n): composite points added to every replicate. [1]
     """

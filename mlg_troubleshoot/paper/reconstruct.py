@@ -1,9 +1,10 @@
 """Where the coordinates come from: a search for linkages that meet printed numbers.
 
-The coordinates at mid-position, the planes, the plunger's axis and the release stroke are free; link lengths
-and branch signs follow. Every target with ``search = true`` becomes a residual in units of its tolerance. A
-start is polished by least squares; without a start, random linkages are drawn, the best are polished, and
-the first that meets everything is taken. What the targets leave free is reported: it is not known.
+The coordinates at mid-position, the planes, the plunger's axis and the release stroke are free;
+link lengths and branch signs follow. Every target with ``search = true`` becomes a residual in
+units of its tolerance. A start is polished by least squares; without a start, random linkages are
+drawn, the best are polished, and the first that meets everything is taken. What the targets leave
+free is reported: it is not known.
 """
 
 from __future__ import annotations
@@ -37,10 +38,10 @@ _SMALL_LENGTH_IN, _LARGE_IN = 0.4, 22.0
 class Reconstruction:
     """A linkage that was searched for.
 
-    linkage: the linkage, its coordinates rounded to 1e-4 in.
-    numbers: free numbers of the linkage: coordinates, angles, stroke.
-    determined: directions in the space of these numbers that the binding targets determine.
-    loosest: numbers that can change most while every target stays met to first order, with their part. [1]
+    linkage: the linkage, its coordinates rounded to 1e-4 in. numbers: free numbers of the linkage:
+    coordinates, angles, stroke. determined: directions in the space of these numbers that the
+    binding targets determine. loosest: numbers that can change most while every target stays met to
+    first order, with their part. [1]
     """
 
     linkage: Linkage
@@ -68,7 +69,9 @@ def reconstruct(
     """Search a linkage of the gear's topology that meets targets."""
     wanted = tuple(target for target in targets if target.search)
     if not wanted:
-        raise UsageError("no target has search = true", "Mark the numbers that a linkage must meet.")
+        raise UsageError(
+            "no target has search = true", "Mark the numbers that a linkage must meet."
+        )
     search = _Search(gear, wanted, monotonic() + 60.0 * minutes, told)
     if start is not None:
         return search.report(search.polished(search.space.vector(start), 60), seed)
@@ -84,13 +87,17 @@ def reconstruct(
             if monotonic() > search.until:
                 break
     raise InconclusiveDataError(
-        f"no linkage met the {len(wanted)} targets in {minutes:g} minutes ({search.tried} were tried)",
-        "Give more --minutes, another --seed, or wider tolerances; targets may contradict each other.",
+        f"no linkage met the {len(wanted)} targets in {minutes:g} minutes ({search.tried} were"
+        " tried)",
+        "Give more --minutes, another --seed, or wider tolerances; targets may contradict each"
+        " other.",
     )
 
 
 def random_vector(space: DesignSpace, rng: Generator) -> Array:
-    """A linkage as nobody would build it, to start a search from: its driven link's far end is remote."""
+    """A linkage as nobody would build it, to start a search from: its driven link's far end is
+    remote.
+    """
     vector = rng.uniform(-7.0, 7.0, len(space.names))
     for i, name in enumerate(space.names):
         if name.endswith((".direction", ".axis")):
@@ -110,7 +117,9 @@ def random_vector(space: DesignSpace, rng: Generator) -> Array:
 class _Search:
     """Residuals of candidate linkages, with a count and a deadline."""
 
-    def __init__(self, gear: Gear, targets: tuple[Target, ...], until: float, told: Told | None) -> None:
+    def __init__(
+        self, gear: Gear, targets: tuple[Target, ...], until: float, told: Told | None
+    ) -> None:
         self.gear = gear
         self.targets = targets
         self.space = DesignSpace(gear.reference)
@@ -131,7 +140,9 @@ class _Search:
                 misses = [_miss(target, facts.measure(target)) for target in self.targets]
         except (MechanismError, ValueError, np.linalg.LinAlgError):
             misses = [_FAR] * len(self.targets)
-        return np.concatenate([np.nan_to_num(np.array(misses), nan=_FAR, posinf=_FAR, neginf=-_FAR), sense])
+        return np.concatenate(
+            [np.nan_to_num(np.array(misses), nan=_FAR, posinf=_FAR, neginf=-_FAR), sense]
+        )
 
     def loss(self, vector: Array) -> float:
         return float(np.sum(np.log1p(self.residuals(vector) ** 2)))
@@ -143,7 +154,10 @@ class _Search:
         for step in mechanism.steps:
             for other in (getattr(step, name, "") for name in ("upstream", "downstream", "pivot")):
                 if other:
-                    ends = mechanism.reference_in_space(step.joint), mechanism.reference_in_space(other)
+                    ends = (
+                        mechanism.reference_in_space(step.joint),
+                        mechanism.reference_in_space(other),
+                    )
                     lengths.append(float(np.linalg.norm(ends[0] - ends[1])))
         spans = np.array(lengths)
         dihedral = np.array([p.dihedral for p in mechanism.planes if p.parent is not None])
@@ -181,7 +195,9 @@ class _Search:
         return vector
 
     def _slopes(self, vector: Array, value: Array, step: float = 1e-5) -> Array:
-        columns = [(self.residuals(vector + moved) - value) / step for moved in step * np.eye(len(vector))]
+        columns = [
+            (self.residuals(vector + moved) - value) / step for moved in step * np.eye(len(vector))
+        ]
         return np.clip(np.array(columns).T, -1e6, 1e6)
 
     def report(self, vector: Array, seed: int) -> Reconstruction:
@@ -200,7 +216,9 @@ class _Search:
         return Reconstruction(linkage, met, len(vector), determined, loosest, self.tried, seed)
 
     def _binding_slopes(self, vector: Array, met: tuple[Computed, ...]) -> Array:
-        """Slopes of what binds; a target that moves with nothing, or has no value nearby, determines nothing."""
+        """Slopes of what binds; a target that moves with nothing, or has no value nearby,
+        determines nothing.
+        """
         binding = [each.target for each in met if each.binds]
 
         def measured(place: Array) -> Array:

@@ -1,8 +1,9 @@
 """First-order indices as the paper estimates them: replicated designs, averages of ten iterations.
 
-A group mean over n1 samples still carries 1/n1 of the variance within the group, so that the variance of the
-group means is too large: the plain index exceeds the true one by (1 − S)/n1 on average. Both columns are
-given. The total-order study of Fig. 5b is in :mod:`~mlg_troubleshoot.paper.blocks`.
+A group mean over n1 samples still carries 1/n1 of the variance within the group, so that the
+variance of the group means is too large: the plain index exceeds the true one by (1 − S)/n1 on
+average. Both columns are given. The total-order study of Fig. 5b is in
+:mod:`~mlg_troubleshoot.paper.blocks`.
 """
 
 from __future__ import annotations
@@ -45,9 +46,9 @@ ITERATIONS = 10
 class ReplicatedIndices:
     """First-order indices of a replicated design, averaged over iterations.
 
-    plain, corrected, shape (n,): mean index over the iterations, as the paper has it and freed of its bias. [1]
-    scatter, shape (n,): standard deviation of one iteration's index. [1]
-    evaluations, failed: solutions of the linkage, and those that did not close: one makes its iteration NaN.
+    plain, corrected, shape (n,): mean index over the iterations, as the paper has it and freed of
+    its bias. [1] scatter, shape (n,): standard deviation of one iteration's index. [1] evaluations,
+    failed: solutions of the linkage, and those that did not close: one makes its iteration NaN.
     """
 
     design: PaperDesign
@@ -83,8 +84,8 @@ def replicated_first_order(
 ) -> ReplicatedIndices:
     """Estimate first-order indices (Eq. 1) with a replicated design.
 
-    response: unit cube, shape (n_points, n), to values, shape (n_points,).
-    progress: called with the iterations done and their number; a KeyboardInterrupt in it ends the study with what
+    response: unit cube, shape (n_points, n), to values, shape (n_points,). progress: called with
+    the iterations done and their number; a KeyboardInterrupt in it ends the study with what
       is done.
     Raises `UsageError` if the design has fewer than two repetitions or no points.
     """

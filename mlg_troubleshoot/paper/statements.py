@@ -48,15 +48,17 @@ class Statement:
 
     @property
     def numbers(self) -> str:
-        """What the linkages say, in sentences: each number, where it is accepted and why it is so."""
+        """What the linkages say, in sentences: each number, where it is accepted and why it is
+        so.
+        """
         parts = []
         for each in self.evidence:
             low, high = min(each.values), max(each.values)
             unit = f" {each.unit}" if each.unit else ""
             parts.append(
-                f"{each.quantity[0].upper()}{each.quantity[1:]}: {each.values[0]:.4g}{unit} on {self.linkages[0]}, "
-                f"{low:.4g} to {high:.4g} over {len(each.values)} linkages; {each.accepted} on {sum(each.holds)}. "
-                f"{each.why}"
+                f"{each.quantity[0].upper()}{each.quantity[1:]}: {each.values[0]:.4g}{unit} on"
+                f" {self.linkages[0]}, {low:.4g} to {high:.4g} over {len(each.values)} linkages;"
+                f" {each.accepted} on {sum(each.holds)}. {each.why}"
             )
         return " ".join(parts)
 
@@ -65,7 +67,9 @@ class Statement:
         return f"{self.claim} (section {self.section}): {self.outcome}. {self.numbers}"
 
 
-def check_statements(gear: Gear, progress: Callable[[int, int], None] | None = None) -> tuple[Statement, ...]:
+def check_statements(
+    gear: Gear, progress: Callable[[int, int], None] | None = None
+) -> tuple[Statement, ...]:
     """Check every statement of the targets of a gear on the reference and the whole ensemble."""
     entries = load_targets(targets_file(gear))
     columns: list[list[float]] = []
@@ -81,7 +85,9 @@ def check_statements(gear: Gear, progress: Callable[[int, int], None] | None = N
     names = tuple(linkage.name for linkage in gear.ensemble)
     found = []
     for claim, places in by_claim.items():
-        evidence = tuple(_evidence(entries[i], tuple(column[i] for column in columns)) for i in places)
+        evidence = tuple(
+            _evidence(entries[i], tuple(column[i] for column in columns)) for i in places
+        )
         outcome = _outcome(evidence, by_reading=len({entries[i].reading for i in places}) > 1)
         found.append(Statement(claim, entries[places[0]].section, outcome, names, evidence))
     return tuple(found)

@@ -1,4 +1,6 @@
-"""The study of one gear: a design, indices of every joint, their spread over the ensemble, what goes with them."""
+"""The study of one gear: a design, indices of every joint, their spread over the ensemble, what
+goes with them.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +17,20 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.indices.amplification import Amplification, amplification
-from mlg_troubleshoot.indices.displacement import HeldDirections, Response, worst_directions, worst_sense
+from mlg_troubleshoot.indices.displacement import (
+    HeldDirections,
+    Response,
+    worst_directions,
+    worst_sense,
+)
 from mlg_troubleshoot.indices.estimators import GroupIndices, Indices, group_indices, student_half
 from mlg_troubleshoot.indices.index_table import IndexTable, JointIndices, rank_ranges, ranks
-from mlg_troubleshoot.indices.inputs import Inputs, beyond_margin, joint_groups, with_random_directions
+from mlg_troubleshoot.indices.inputs import (
+    Inputs,
+    beyond_margin,
+    joint_groups,
+    with_random_directions,
+)
 from mlg_troubleshoot.indices.saltelli import fast_indices, saltelli_indices
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
 
@@ -171,10 +183,15 @@ class _Run:
 def run_study(gear: Gear, options: StudyOptions, progress: Progress | None = None) -> StudyResult:
     """Run a study of a gear: its reference by the chosen design, its ensemble by the fast route."""
     if not options.accuracy > 0.0:
-        raise UsageError(f"accuracy {options.accuracy}", "Give a positive number, for example 0.001.")
+        raise UsageError(
+            f"accuracy {options.accuracy}", "Give a positive number, for example 0.001."
+        )
     inputs = _inputs(gear, options)
     if len(inputs.limits_in) != len(gear.joints):
-        raise UsageError(f"{len(inputs.limits_in)} limits for {len(gear.joints)} joints", "Give one for each joint.")
+        raise UsageError(
+            f"{len(inputs.limits_in)} limits for {len(gear.joints)} joints",
+            "Give one for each joint.",
+        )
 
     def told(name: str) -> Callable[[int, int | None], None]:
         return lambda done, total: None if progress is None else progress(name, done, total)
@@ -198,10 +215,14 @@ def run_study(gear: Gear, options: StudyOptions, progress: Progress | None = Non
 
 
 def _inputs(gear: Gear, options: StudyOptions) -> Inputs:
-    return Inputs(gear.limits_in if options.limits_in is None else options.limits_in, options.distribution)
+    return Inputs(
+        gear.limits_in if options.limits_in is None else options.limits_in, options.distribution
+    )
 
 
-def _response(gear: Gear, model: LinkageModel, inputs: Inputs, options: StudyOptions) -> tuple[Response, int]:
+def _response(
+    gear: Gear, model: LinkageModel, inputs: Inputs, options: StudyOptions
+) -> tuple[Response, int]:
     """Response on the unit cube and its number of variables."""
     n = len(inputs.limits_in)
     cube: Response
@@ -221,13 +242,21 @@ def _held(model: LinkageModel, inputs: Inputs, options: StudyOptions) -> HeldDir
         return HeldDirections(model, np.asarray(options.fixed_rad, float))
     if options.directions is Directions.WORST:
         return worst_directions(model, inputs.limits_in)
-    return worst_sense(model, inputs.limits_in, 1.0 if options.directions is Directions.OVER else -1.0)
+    return worst_sense(
+        model, inputs.limits_in, 1.0 if options.directions is Directions.OVER else -1.0
+    )
 
 
 def _on_linkage(
-    gear: Gear, inputs: Inputs, options: StudyOptions, k: int, told: Callable[[int, int | None], None] | None = None
+    gear: Gear,
+    inputs: Inputs,
+    options: StudyOptions,
+    k: int,
+    told: Callable[[int, int | None], None] | None = None,
 ) -> _Run:
-    """Indices of linkage k of the ensemble; of the reference, which is the first, by the design that was asked for."""
+    """Indices of linkage k of the ensemble; of the reference, which is the first, by the design
+    that was asked for.
+    """
     cube, n = _response(gear, gear.ensemble_models[k], inputs, options)
     stream = np.random.default_rng(np.random.SeedSequence(options.seed, spawn_key=(k,)))
     accuracy, most = options.accuracy, options.most
@@ -240,7 +269,9 @@ def _on_linkage(
     if options.design is Design.TENSOR:
         tensor = tensor_indices(cube, np.ones(n))
         coarse = None if k else tensor_indices(cube, np.ones(n), order=2)
-        return _Run(_of_tensor(tensor, coarse, options.seed), groups=group_indices(gear, tensor.closed))
+        return _Run(
+            _of_tensor(tensor, coarse, options.seed), groups=group_indices(gear, tensor.closed)
+        )
     if options.design is Design.SAMPLED and not k:
         return _Run(saltelli_indices(cube, n, stream, options.seed, accuracy, most, None, advance))
     if k and options.beyond_margin:
@@ -256,8 +287,13 @@ def _of_tensor(tensor: TensorIndices, coarse: TensorIndices | None, seed: int) -
         half = np.abs([first - coarse.first_order, total - coarse.total_order])
         evaluations += coarse.evaluations
         note = "intervals are the difference to two Gauss points per joint"
-    design, estimates = f"tensor of {len(tensor.weights)} Gauss points per joint", ((first, half[0]), (total, half[1]))
-    return Indices.around(design, seed, *estimates, tensor.mean, tensor.variance, evaluations, tensor.failed, note)
+    design, estimates = (
+        f"tensor of {len(tensor.weights)} Gauss points per joint",
+        ((first, half[0]), (total, half[1])),
+    )
+    return Indices.around(
+        design, seed, *estimates, tensor.mean, tensor.variance, evaluations, tensor.failed, note
+    )
 
 
 def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _Run:
@@ -267,7 +303,8 @@ def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _
 
     if options.directions is Directions.RANDOM:
         raise UsageError(
-            f"design {options.design} with random directions", "The paper's designs hold directions; use sampled."
+            f"design {options.design} with random directions",
+            "The paper's designs hold directions; use sampled.",
         )
     cube, n = _response(gear, gear.model, inputs, options)
     design = _sized(PAPER_DESIGNS[str(options.design)], n, options)
@@ -281,7 +318,9 @@ def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _
     if options.design is Design.LHS and finished and not options.beyond_margin:
         response = _held(gear.model, inputs, options)
         study = BlockStudy(response, inputs, gear.geometry_sha256, options.seed, n1, n2, iterations)
-        totals = total_order_study(study, options.workers, options.state, options.scheduler, told("total order"))
+        totals = total_order_study(
+            study, options.workers, options.state, options.scheduler, told("total order")
+        )
         total, spread = totals.total_order, student_half(totals.scatter, totals.iterations)
         evaluations, failed = evaluations + totals.evaluations, failed + totals.failed
         finished = totals.iterations == iterations
@@ -289,14 +328,21 @@ def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _
             note += f"; {totals.note}"
     if not finished:
         note += "; interrupted, averages of the finished part"
-    name = f"{design.name}: n1 = {n1}, n2 = {n2}, nCCD = {design.n_ccd}, mean of {found.iterations} iterations"
+    name = (
+        f"{design.name}: n1 = {n1}, n2 = {n2}, nCCD = {design.n_ccd}, mean of {found.iterations}"
+        " iterations"
+    )
     estimates = (found.corrected, half), (total, spread)
-    indices = Indices.around(name, options.seed, *estimates, np.nan, np.nan, evaluations, failed, note)
+    indices = Indices.around(
+        name, options.seed, *estimates, np.nan, np.nan, evaluations, failed, note
+    )
     return _Run(indices, plain=found.plain, finished=finished)
 
 
 def _sized(paper: PaperDesign, n: int, options: StudyOptions) -> PaperDesign:
-    """Return a paper design in the size asked for, with the composite points of this number of variables."""
+    """Return a paper design in the size asked for, with the composite points of this number of
+    variables.
+    """
     from mlg_troubleshoot.paper.designs import central_composite
 
     return replace(
@@ -310,7 +356,9 @@ def _sized(paper: PaperDesign, n: int, options: StudyOptions) -> PaperDesign:
 def compare_designs(
     gear: Gear, options: StudyOptions, progress: Progress | None = None
 ) -> tuple[ReplicatedIndices, ...]:
-    """Estimate the first-order indices of the reference with each design of the paper (Fig. 13c)."""
+    """Estimate the first-order indices of the reference with each design of the paper (Fig.
+    13c).
+    """
     from mlg_troubleshoot.paper.replicated import ITERATIONS, PAPER_DESIGNS, replicated_first_order
 
     if options.directions is Directions.RANDOM:
@@ -319,14 +367,20 @@ def compare_designs(
     iterations = ITERATIONS if options.iterations is None else options.iterations
     found = []
     for k, paper in enumerate(PAPER_DESIGNS.values(), start=1):
-        found.append(replicated_first_order(cube, n, _sized(paper, n, options), options.seed, iterations))
+        found.append(
+            replicated_first_order(cube, n, _sized(paper, n, options), options.seed, iterations)
+        )
         if progress is not None:
             progress("designs", k, len(PAPER_DESIGNS))
     return tuple(found)
 
 
 def _table(
-    gear: Gear, inputs: Inputs, options: StudyOptions, found: Sequence[Indices], growth: Amplification
+    gear: Gear,
+    inputs: Inputs,
+    options: StudyOptions,
+    found: Sequence[Indices],
+    growth: Amplification,
 ) -> IndexTable:
     """The table of the reference, the first that was found, with the spread over all."""
     reference = found[0]

@@ -1,4 +1,6 @@
-"""Printed numbers as data: what a source says about a gear, and how far the model may be from it."""
+"""Printed numbers as data: what a source says about a gear, and how far the model may be from
+it.
+"""
 
 from __future__ import annotations
 
@@ -72,7 +74,9 @@ class Computed:
 
     @property
     def binds(self) -> bool:
-        """True if it determines the linkage: a printed value, or a limit that the linkage lies at."""
+        """True if it determines the linkage: a printed value, or a limit that the linkage lies
+        at.
+        """
         low, high = self.target.low, self.target.high
         if np.isfinite(low) and np.isfinite(high):
             return True
@@ -106,7 +110,9 @@ def _target(entry: DataTable) -> Target:
         value, width = entry.number("value"), entry.number("tolerance")
         low, high, tolerance = value - width, value + width, f"± {width:g}"
         if not low < high:
-            raise entry.fail("tolerance", "a number above 0 that the value can be distinguished from")
+            raise entry.fail(
+                "tolerance", "a number above 0 that the value can be distinguished from"
+            )
     elif entry.has("at_least"):
         low = entry.number("at_least")
         tolerance = f"≥ {low:g}"

@@ -68,7 +68,9 @@ class Facts:
 
     @cached_property
     def corner_indices(self) -> TensorIndices:
-        """Indices with every clearance at an end of its range: the limit of a central composite design."""
+        """Indices with every clearance at an end of its range: the limit of a central composite
+        design.
+        """
         return tensor_indices(self.response, self.limits, nodes=_CORNERS)
 
     @cached_property
@@ -119,13 +121,17 @@ def _end_rate(facts: Facts, _: Target) -> float:
 
 
 def _least(stroke: Array, position: Array) -> tuple[float, float]:
-    """Stroke and position of the least displacement, by a parabola through the lowest three points."""
+    """Stroke and position of the least displacement, by a parabola through the lowest three
+    points.
+    """
     i = int(np.argmin(position))
     if i in (0, len(position) - 1):
         return float(stroke[i]), float(position[i])
     before, at, after = position[i - 1 : i + 2]
     offset = 0.5 * (before - after) / (before - 2.0 * at + after)
-    return float(stroke[i] + offset * (stroke[1] - stroke[0])), float(at - 0.25 * (before - after) * offset)
+    return float(stroke[i] + offset * (stroke[1] - stroke[0])), float(
+        at - 0.25 * (before - after) * offset
+    )
 
 
 def _sharpening(facts: Facts, target: Target) -> float:
@@ -148,7 +154,9 @@ def _interaction(facts: Facts) -> Array:
 
 def _interaction_order(facts: Facts, target: Target) -> float:
     near, far = target.joints, facts.others(target.joints)
-    return float(facts.of(_interaction(facts), near).min() - facts.of(_interaction(facts), far).max())
+    return float(
+        facts.of(_interaction(facts), near).min() - facts.of(_interaction(facts), far).max()
+    )
 
 
 _MEASURES: dict[str, Callable[[Facts, Target], float]] = {

@@ -1,7 +1,8 @@
-"""The worst directions by three routes: the paper's sequential rule, a global search, a proved bound.
+"""The worst directions by three routes: the paper's sequential rule, a global search, a proved
+bound.
 
-The paper's conclusion leaves "more advanced algorithms such as a genetic algorithm" as future work. Differential
-evolution searches all directions and the whole stroke at once; the proof of
+The paper's conclusion leaves "more advanced algorithms such as a genetic algorithm" as future work.
+Differential evolution searches all directions and the whole stroke at once; the proof of
 :mod:`~mlg_troubleshoot.paper.certified` says how much any search can have missed.
 """
 
@@ -37,13 +38,22 @@ class WorstSearch:
 
 
 def search_worst(
-    model: LinkageModel, clearance_in: Array, sense: float, rng: Generator, seed: int, generations: int = 300
+    model: LinkageModel,
+    clearance_in: Array,
+    sense: float,
+    rng: Generator,
+    seed: int,
+    generations: int = 300,
 ) -> WorstSearch:
-    """Find the worst displacement by the sequential rule, by differential evolution and by proof."""
+    """Find the worst displacement by the sequential rule, by differential evolution and by
+    proof.
+    """
     clearance = np.asarray(clearance_in, float)
     sequential = sense * float(worst_of_sense(model, clearance[None], sense)[0][0])
     searched, evaluations = _evolved(model, clearance, sense, rng, generations)
-    return WorstSearch(sense, seed, sequential, searched, evaluations, certified_bound(model, clearance, sense))
+    return WorstSearch(
+        sense, seed, sequential, searched, evaluations, certified_bound(model, clearance, sense)
+    )
 
 
 def _evolved(
@@ -66,7 +76,15 @@ def _evolved(
 
     # The population moves as one: a generation is a batch.
     found = differential_evolution(
-        lost, bounds, popsize=12, maxiter=generations, tol=1e-10, atol=1e-12, polish=False, vectorized=True,
-        updating="deferred", rng=rng,
-    )  # fmt: skip
+        lost,
+        bounds,
+        popsize=12,
+        maxiter=generations,
+        tol=1e-10,
+        atol=1e-12,
+        polish=False,
+        vectorized=True,
+        updating="deferred",
+        rng=rng,
+    )
     return -float(found.fun), count

@@ -1,10 +1,18 @@
-"""Inspection tables: read and checked; `annotate` and `template`, which need openpyxl, write workbooks."""
+"""Inspection tables: read and checked; `annotate` and `template`, which need openpyxl, write
+workbooks.
+"""
 
 from __future__ import annotations
 
 from mlg_troubleshoot.records.gate import admit, judge_again, judge_length, made_record_id
 from mlg_troubleshoot.records.layout import why_not_remembered
-from mlg_troubleshoot.records.model import ColumnReading, FileRead, ReadOptions, ReadResult, SheetLayout
+from mlg_troubleshoot.records.model import (
+    ColumnReading,
+    FileRead,
+    ReadOptions,
+    ReadResult,
+    SheetLayout,
+)
 from mlg_troubleshoot.records.read import expand, read_many
 
 __all__ = [

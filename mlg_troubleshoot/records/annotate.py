@@ -8,6 +8,7 @@ import warnings
 import zlib
 from collections import Counter
 from collections.abc import Mapping
+from functools import partial
 from html import escape
 from pathlib import Path
 from types import MappingProxyType
@@ -39,7 +40,8 @@ _OVER_FILL = "FFFFD08A"
 _VERDICT_FILLS = {"WITHIN_MARGIN": "FFC9E7CB", "OUTSIDE_MARGIN": "FFF4A3A0", "INVALID": "FFF4A3A0"}
 _UNDECIDED_FILL = "FFFFEB9C"
 _AUTHOR = "mlg check"
-# Widths of columns, and what fits on a line of the widest: its letters are narrower than digits. [characters]
+# Widths of columns, and what fits on a line of the widest: its letters are narrower than digits.
+# [characters]
 _TEXT_WIDTH, _NUMBER_WIDTH, _LONG_WIDTH, _ON_A_LINE = 17, 11, 52, 58
 # At which the verdicts fit on the width of a landscape page. [%]
 _LANDSCAPE_SCALE = 55
@@ -57,7 +59,15 @@ def _is_annotated(file: BinaryIO) -> bool:
     try:
         with ZipFile(file) as package, package.open(_PROPERTIES) as properties:
             return _SAVED in properties.read(_MOST_BYTES)
-    except (BadZipFile, KeyError, ValueError, RuntimeError, NotImplementedError, EOFError, zlib.error):
+    except (
+        BadZipFile,
+        KeyError,
+        ValueError,
+        RuntimeError,
+        NotImplementedError,
+        EOFError,
+        zlib.error,
+    ):
         return False
 
 
@@ -71,7 +81,8 @@ def annotate_workbook(
     verdicts: VerdictColumns,
     over_limit: OverLimit = MappingProxyType({}),
 ) -> tuple[str, ...]:
-    """Write a copy of a workbook with bad cells and joints over their limit marked, and verdict columns.
+    """Write a copy of a workbook with bad cells and joints over their limit marked, and verdict
+    columns.
 
     ``over_limit`` gives for a row its joints over their limit, each with that limit. [in]
     """
@@ -87,7 +98,16 @@ def annotate_workbook(
             _annotate(book, label, result, verdicts, over_limit)
             book.properties.lastModifiedBy = _SAVED_BY
             ExcelWriter(book, package).save()
-    except (BadZipFile, KeyError, ValueError, TypeError, AttributeError, IndexError, SyntaxError, OSError) as error:
+    except (
+        BadZipFile,
+        KeyError,
+        ValueError,
+        TypeError,
+        AttributeError,
+        IndexError,
+        SyntaxError,
+        OSError,
+    ) as error:
         raise OutputError(
             f"{source} cannot be copied ({type(error).__name__}): a part of it is not understood",
             "Open it in a spreadsheet program, save it again as .xlsx, and annotate the copy.",
@@ -97,7 +117,9 @@ def annotate_workbook(
     return _not_taken_over(data, written)
 
 
-def _annotate(book: Workbook, label: str, result: ReadResult, verdicts: VerdictColumns, over_limit: OverLimit) -> None:
+def _annotate(
+    book: Workbook, label: str, result: ReadResult, verdicts: VerdictColumns, over_limit: OverLimit
+) -> None:
     for layout in result.layouts:
         if layout.file != label or layout.sheet not in book.sheetnames:
             continue
@@ -131,15 +153,22 @@ _SHAPES = (b"<xdr:sp ", b"<xdr:sp>", b"<xdr:cxnSp", b"<xdr:grpSp")
 
 def _not_taken_over(before: bytes, after: bytes) -> tuple[str, ...]:
     lost = _beside_cells(before) - _beside_cells(after)
-    return tuple(f"the annotated copy lacks {count} of the {what} of the workbook" for what, count in lost.items())
+    return tuple(
+        f"the annotated copy lacks {count} of the {what} of the workbook"
+        for what, count in lost.items()
+    )
 
 
 def _beside_cells(package: bytes) -> Counter[str]:
     """Count what a package holds in addition to its cells, by what a user calls it."""
     with ZipFile(io.BytesIO(package)) as archive:
         names = [name for name in archive.namelist() if "_rels" not in name]
-        held = Counter(what for folder, what in _DROPPABLE for name in names if name.lower().startswith(folder))
-        drawings = [archive.read(name) for name in names if name.lower().startswith("xl/drawings/drawing")]
+        held = Counter(
+            what for folder, what in _DROPPABLE for name in names if name.lower().startswith(folder)
+        )
+        drawings = [
+            archive.read(name) for name in names if name.lower().startswith("xl/drawings/drawing")
+        ]
     held["drawn shapes"] = sum(drawing.count(mark) for drawing in drawings for mark in _SHAPES)
     return held
 
@@ -147,7 +176,9 @@ def _beside_cells(package: bytes) -> Counter[str]:
 def _load(source: str | Path, out: str | Path) -> bytes:
     path = Path(source)
     if Path(out).resolve() == path.resolve():
-        raise UsageError(f"{out} is the workbook itself", "Name another file for the annotated copy.")
+        raise UsageError(
+            f"{out} is the workbook itself", "Name another file for the annotated copy."
+        )
     try:
         data = path.read_bytes()
         if not data.startswith(b"PK") or b"opendocument" in data[:200]:
@@ -160,13 +191,18 @@ def _load(source: str | Path, out: str | Path) -> bytes:
     except FileRefusedError as refusal:
         raise UsageError(f"{source}: {refusal}", refusal.problem.remedy) from None
     except OSError as error:
-        raise UsageError(f"{source} cannot be opened: {error.strerror}", "Check the path.") from None
+        raise UsageError(
+            f"{source} cannot be opened: {error.strerror}", "Check the path."
+        ) from None
     return data
 
 
 def _free_column(sheet: Worksheet, layout: SheetLayout) -> int:
     """Return the first column, counted from 1, with nothing in it or to the right of it."""
-    used = max((cell.column for row in sheet.iter_rows() for cell in row if cell.value is not None), default=0)
+    used = max(
+        (cell.column for row in sheet.iter_rows() for cell in row if cell.value is not None),
+        default=0,
+    )
     return int(max(used, layout.width)) + 1
 
 
@@ -201,7 +237,9 @@ def _mark_over_limit(sheet: Worksheet, layout: SheetLayout, over_limit: OverLimi
                 continue
             cell = sheet.cell(row, read.index + 1)
             if isinstance(cell, Cell):
-                _fill(cell, _OVER_FILL, f"over the limit of joint {joint}, {limit_in:.4f} in radial.")
+                _fill(
+                    cell, _OVER_FILL, f"over the limit of joint {joint}, {limit_in:.4f} in radial."
+                )
 
 
 def _put(cell: Cell | MergedCell, value: str | float | None) -> None:
@@ -224,9 +262,19 @@ def _behind_table(sheet: Worksheet, layout: SheetLayout, free: int, own: Verdict
         cell.font = Font(name=FONT, bold=True)
         _fill(cell, HEADER_FILL)
         cell.alignment = Alignment(wrap_text=True, vertical="center")
-        found = {s.row: v[header] for s, v in own.items() if s.row is not None and v.get(header) is not None}
+        found = {
+            s.row: v[header]
+            for s, v in own.items()
+            if s.row is not None and v.get(header) is not None
+        }
         longest = max((len(v) for v in found.values() if isinstance(v, str)), default=0)
-        width = _NUMBER_WIDTH if not longest else _TEXT_WIDTH if longest < 2 * _TEXT_WIDTH else _LONG_WIDTH
+        width = (
+            _NUMBER_WIDTH
+            if not longest
+            else _TEXT_WIDTH
+            if longest < 2 * _TEXT_WIDTH
+            else _LONG_WIDTH
+        )
         sheet.column_dimensions[column_letters(column - 1)].width = width
         for row, value in found.items():
             written = sheet.cell(row, column)
@@ -242,9 +290,16 @@ def _behind_table(sheet: Worksheet, layout: SheetLayout, free: int, own: Verdict
 
 
 def _print_well(sheet: Worksheet, layout: SheetLayout, free: int) -> None:
-    """Put the verdicts on pages of their own behind the readings, where the user has not set up his pages himself."""
+    """Put the verdicts on pages of their own behind the readings, where the user has not set up his
+    pages himself.
+    """
     pages = sheet.sheet_properties.pageSetUpPr
-    if sheet.print_area or sheet.print_title_rows or sheet.col_breaks.brk or (pages is not None and pages.fitToPage):
+    if (
+        sheet.print_area
+        or sheet.print_title_rows
+        or sheet.col_breaks.brk
+        or (pages is not None and pages.fitToPage)
+    ):
         return
     sheet.page_setup.orientation, sheet.page_setup.scale = "landscape", _LANDSCAPE_SCALE
     sheet.print_title_rows = f"{layout.header_row}:{layout.header_row}"
@@ -264,12 +319,15 @@ def _beside_form(sheet: Worksheet, layout: SheetLayout, free: int, own: VerdictC
 
 
 _FORMULA = re.compile(
-    r'<c r="([A-Z]{1,3}\d{1,7})"((?: s="\d+")?)(?: t="\w+")?>(<f\b[^>]*(?:/>|>[^<]*</f>))<v ?(?:/>|></v>)</c>'
+    r'<c r="([A-Z]{1,3}\d{1,7})"((?: s="\d+")?)(?: t="\w+")?>(<f\b[^>]*(?:/>|>[^<]*</f>))<v'
+    r" ?(?:/>|></v>)</c>"
 )
 
 
 def _restore_results(original: bytes, written: bytes) -> bytes:
-    """Put the last results of formulas back into a copy: openpyxl keeps either them or the formulas."""
+    """Put the last results of formulas back into a copy: openpyxl keeps either them or the
+    formulas.
+    """
     before = {sheet.name: sheet for sheet in XlsxFile(original).sheets}
     after = {sheet.part.lower(): sheet.name for sheet in XlsxFile(written).sheets}
     out = io.BytesIO()
@@ -279,7 +337,8 @@ def _restore_results(original: bytes, written: bytes) -> bytes:
             sheet = before.get(after.get(member.filename.lower()))
             if sheet is not None and b"<f" in content:
                 results = _results(sheet)
-                content = _FORMULA.sub(lambda m, r=results: _with_result(m, r), content.decode()).encode()  # type: ignore[misc]
+                with_results = partial(_with_result, results=results)
+                content = _FORMULA.sub(with_results, content.decode()).encode()
             new.writestr(member, content)
     return out.getvalue()
 

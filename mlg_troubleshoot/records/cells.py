@@ -67,7 +67,9 @@ def show(cell: Cell) -> str:
 
 
 def quote(cell: Cell, limit: int = 300) -> str:
-    """Return a cell as text for a message: not endless, and without characters that steer a terminal."""
+    """Return a cell as text for a message: not endless, and without characters that steer a
+    terminal.
+    """
     text = show(cell)
     if len(text) > limit:
         text = text[:limit] + "…"

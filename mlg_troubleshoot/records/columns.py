@@ -64,8 +64,22 @@ IDENTITY = (Kind.RECORD_ID, *REQUIRED)
 # A mistake in one of these changes a verdict, so the whole row is not judged.
 VERDICT_BEARING = frozenset(
     (
-        *(*IDENTITY, Kind.CONVENTION, Kind.UNIT, Kind.JOINT, Kind.CLEARANCE, Kind.SMALL_READINGS_TRUE),
-        *(Kind.OUTCOME, Kind.PLUNGER_DISPLACEMENT, Kind.MARGIN, Kind.MARGIN_U, Kind.GAUGE_U, Kind.PLUNGER_GAUGE_U),
+        *(
+            *IDENTITY,
+            Kind.CONVENTION,
+            Kind.UNIT,
+            Kind.JOINT,
+            Kind.CLEARANCE,
+            Kind.SMALL_READINGS_TRUE,
+        ),
+        *(
+            Kind.OUTCOME,
+            Kind.PLUNGER_DISPLACEMENT,
+            Kind.MARGIN,
+            Kind.MARGIN_U,
+            Kind.GAUGE_U,
+            Kind.PLUNGER_GAUGE_U,
+        ),
     )
 )
 CARRIED = (Kind.WORK_ORDER, Kind.MANUAL_REF, Kind.MANUAL_REV, Kind.REMARKS)
@@ -81,7 +95,9 @@ class Field:
     def name(self) -> str:
         """Canonical name, for example ``clearance_3_mm``."""
         parts = [self.kind.value]
-        if self.number is not None and not (self.kind is Kind.PLUNGER_DISPLACEMENT and self.number == 1):
+        if self.number is not None and not (
+            self.kind is Kind.PLUNGER_DISPLACEMENT and self.number == 1
+        ):
             parts.append(str(self.number))
         if self.unit is not None:
             parts.append(self.unit.value)
@@ -89,7 +105,9 @@ class Field:
 
     @property
     def label(self) -> str:
-        """The label of its line in the template's form, for example ``Clearance #3`` or ``Tail no``."""
+        """The label of its line in the template's form, for example ``Clearance #3`` or ``Tail
+        no``.
+        """
         words = self.kind.value.replace("_", " ")
         if self.kind is Kind.PLUNGER_DISPLACEMENT and self.number not in (None, 1):
             words += f" {self.number}"
@@ -99,5 +117,7 @@ class Field:
 
     @property
     def quantity(self) -> tuple[Kind, int | None]:
-        """What it is a reading of, whatever the unit: two columns of one quantity are duplicates."""
+        """What it is a reading of, whatever the unit: two columns of one quantity are
+        duplicates.
+        """
         return (self.kind, self.number)

@@ -23,7 +23,8 @@ _MAX_BYTES = 25_000_000
 _MAX_LINES = 500_000
 _MAX_LINE_CHARACTERS = 1_000_000
 _MAX_FIELDS = 20_000
-# How many characters may be joined in the search for the ends of quoted fields before every open quote is a stray one.
+# How many characters may be joined in the search for the ends of quoted fields before every open
+# quote is a stray one.
 _QUOTE_BUDGET = 20_000_000
 
 
@@ -37,9 +38,13 @@ def decode(data: bytes) -> tuple[str, list[str]]:
         head = data[:4096]
         even, odd = head[0::2].count(0), head[1::2].count(0)
         if odd > len(head) * 0.3 and even < len(head) * 0.05:
-            return _strictly(data, "utf-16-le"), ["read as UTF-16 text (little-endian, without a byte order mark)"]
+            return _strictly(data, "utf-16-le"), [
+                "read as UTF-16 text (little-endian, without a byte order mark)"
+            ]
         if even > len(head) * 0.3 and odd < len(head) * 0.05:
-            return _strictly(data, "utf-16-be"), ["read as UTF-16 text (big-endian, without a byte order mark)"]
+            return _strictly(data, "utf-16-be"), [
+                "read as UTF-16 text (big-endian, without a byte order mark)"
+            ]
     try:
         return data.decode("utf-8"), []
     except UnicodeDecodeError:
@@ -54,7 +59,10 @@ def _strictly(data: bytes, encoding: str) -> str:
 
 
 def _too_large(what: str, row: int | None = None) -> FileRefusedError:
-    limits = f"at most {MAX_ROWS} rows, {MAX_COLUMNS} columns and {_MAX_LINE_CHARACTERS} characters per line"
+    limits = (
+        f"at most {MAX_ROWS} rows, {MAX_COLUMNS} columns and {_MAX_LINE_CHARACTERS} characters per"
+        " line"
+    )
     return FileRefusedError("file_too_large", what, limits, row=row)
 
 
@@ -71,7 +79,9 @@ class _CsvSheet(Sheet):
 
     def _read(self) -> Iterator[NumberedRow]:
         for number, fields in enumerate(self._records(), 1):
-            cells: list[Cell] = [field if field and not field.isspace() else None for field in fields]
+            cells: list[Cell] = [
+                field if field and not field.isspace() else None for field in fields
+            ]
             if not any(cells):
                 continue
             if number > MAX_ROWS or (len(cells) > MAX_COLUMNS and any(cells[MAX_COLUMNS:])):
@@ -81,7 +91,9 @@ class _CsvSheet(Sheet):
     def _records(self) -> Iterator[list[str]]:
         """Split the lines into fields; a quoted field may go on over several lines."""
         text = self._text
-        lines = deque((text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text).split("\n"))
+        lines = deque(
+            (text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text).split("\n")
+        )
         delimiter = self._delimiter
         usual = 0
         number = 0
@@ -89,7 +101,10 @@ class _CsvSheet(Sheet):
             line = lines.popleft()
             number += 1
             if len(line) > _MAX_LINE_CHARACTERS or line.count(delimiter) > _MAX_FIELDS:
-                raise _too_large(f"line {number} has {len(line)} characters and {line.count(delimiter)} separators")
+                raise _too_large(
+                    f"line {number} has {len(line)} characters and {line.count(delimiter)}"
+                    " separators"
+                )
             if '"' not in line:
                 fields = line.split(delimiter) if line else []
             else:
@@ -110,7 +125,8 @@ class _CsvSheet(Sheet):
             self._budget -= len(record)
             if self._budget < 0 or len(record) > _MAX_LINE_CHARACTERS:
                 break
-            # A line inside the quotation marks with as many separators as a row is a row that they would swallow.
+            # A line inside the quotation marks with as many separators as a row is a row that they
+            # would swallow.
             if usual > 2 and lines[more].partition('"')[0].count(self._delimiter) >= usual - 1:
                 break
             fields = self._parse(record) if '"' in lines[more] else None
@@ -118,14 +134,17 @@ class _CsvSheet(Sheet):
                 for _ in range(more + 1):
                     lines.popleft()
                 return fields
-        # The quotation mark is a stray one: the row is named as faulty and the next line is a row again.
+        # The quotation mark is a stray one: the row is named as faulty and the next line is a row
+        # again.
         what = "a quotation mark that is not closed, or stands in the middle of a field"
         self.facts.faulty[number] = FileRefusedError("csv_quote", what, row=number)
         return line.split(self._delimiter)
 
     def _parse(self, record: str) -> list[str] | None:
         try:
-            parsed = list(csv.reader(io.StringIO(record, newline=""), delimiter=self._delimiter, strict=True))
+            parsed = list(
+                csv.reader(io.StringIO(record, newline=""), delimiter=self._delimiter, strict=True)
+            )
         except csv.Error:
             return None
         return parsed[0] if len(parsed) == 1 else None
@@ -147,7 +166,9 @@ def csv_book(data: bytes, header_score: Callable[[Sequence[Cell]], int]) -> Work
         delimiter = _find_delimiter(head, header_score)
     else:
         delimiter, text = match[1], text[match.end() :]
-        notes.append(f"the first line names the separator {delimiter!r} and is not counted as a row")
+        notes.append(
+            f"the first line names the separator {delimiter!r} and is not counted as a row"
+        )
     return Workbook("csv", (_CsvSheet(text, delimiter),), notes, delimiter)
 
 
@@ -156,7 +177,11 @@ def _find_delimiter(head: str, header_score: Callable[[Sequence[Cell]], int]) ->
     lines = head.splitlines()[:20]
 
     def best_score(delimiter: str) -> int:
-        rows = (next(csv.reader([line], delimiter=delimiter), []) for line in lines if delimiter in line)
-        return max((header_score([f or None for f in fields[:MAX_COLUMNS]]) for fields in rows), default=0)
+        rows = (
+            next(csv.reader([line], delimiter=delimiter), []) for line in lines if delimiter in line
+        )
+        return max(
+            (header_score([f or None for f in fields[:MAX_COLUMNS]]) for fields in rows), default=0
+        )
 
     return max(_DELIMITERS, key=best_score)

@@ -28,7 +28,9 @@ class DateOrder(StrEnum):
         try:
             return cls(text.strip().lower())
         except ValueError:
-            raise UsageError(f"--dates {text!r} is not an order of dates", "Give dmy, mdy or ymd.") from None
+            raise UsageError(
+                f"--dates {text!r} is not an order of dates", "Give dmy, mdy or ymd."
+            ) from None
 
 
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
@@ -47,7 +49,9 @@ _NUMBERS = re.compile(rf"(\d{{1,4}})([./\-])(\d{{1,2}})\2(\d{{1,4}}){_CLOCK}", r
 
 
 def written_day(text: str) -> date | None:
-    """Return a day whose text says which number is which; None for another text, ValueError for no such day."""
+    """Return a day whose text says which number is which; None for another text, ValueError for no
+    such day.
+    """
     iso = _ISO_DAY.fullmatch(text)
     if iso is not None:
         return date.fromisoformat(iso[1])

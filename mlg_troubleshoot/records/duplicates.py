@@ -13,9 +13,13 @@ from mlg_troubleshoot.records.model import SheetLayout
 
 
 def settle_duplicates(
-    rows: list[Inspection | InvalidRow], layouts: Sequence[SheetLayout], invalid_content: Mapping[RowSource, int]
+    rows: list[Inspection | InvalidRow],
+    layouts: Sequence[SheetLayout],
+    invalid_content: Mapping[RowSource, int],
 ) -> list[Problem]:
-    """Warn of rows that are the same inspection again, and refuse rows that share an id and differ."""
+    """Warn of rows that are the same inspection again, and refuse rows that share an id and
+    differ.
+    """
     named: dict[tuple[str | None, str], list[int]] = {}
     for place, row in enumerate(rows):
         if row.record_id is not None:
@@ -38,11 +42,15 @@ def settle_duplicates(
             problems.append(_problem(record_id, row.source, others, header, cell))
             correct = row.correct if isinstance(row, InvalidRow) else ()
             columns = tuple(dict.fromkeys((header, *correct)))
-            rows[place] = InvalidRow(row.record_id, row.tail_no, row.side, columns, row.warnings, row.source)
+            rows[place] = InvalidRow(
+                row.record_id, row.tail_no, row.side, columns, row.warnings, row.source
+            )
     return problems
 
 
-def _content(row: Inspection | InvalidRow, invalid_content: Mapping[RowSource, int]) -> Inspection | int | None:
+def _content(
+    row: Inspection | InvalidRow, invalid_content: Mapping[RowSource, int]
+) -> Inspection | int | None:
     if isinstance(row, InvalidRow):
         return invalid_content.get(row.source)
     return replace(row, source=RowSource(), warnings=(), entered={})
@@ -53,17 +61,26 @@ def where(source: RowSource) -> str:
     return f"row {source.row}{sheet} of {source.file or 'the input'}"
 
 
-def cell_of(source: RowSource, layouts: Sequence[SheetLayout], kind: Kind) -> tuple[str, str | None]:
-    """Header of a column as it was written, and its cell in a row or a form; no cell if the table does not have it."""
+def cell_of(
+    source: RowSource, layouts: Sequence[SheetLayout], kind: Kind
+) -> tuple[str, str | None]:
+    """Header of a column as it was written, and its cell in a row or a form; no cell if the table
+    does not have it.
+    """
     for layout in layouts:
         if (layout.file, layout.sheet) == (source.file, source.sheet):
             for column in layout.columns:
                 if column.read_as == kind:
-                    return column.header, f"{column_letters(column.index)}{column.row or source.row}"
+                    return (
+                        column.header,
+                        f"{column_letters(column.index)}{column.row or source.row}",
+                    )
     return kind.value, None
 
 
-def _problem(record_id: str, source: RowSource, others: list[str], header: str, cell: str | None) -> Problem:
+def _problem(
+    record_id: str, source: RowSource, others: list[str], header: str, cell: str | None
+) -> Problem:
     shown = ", ".join(others[:3]) + (f" and {len(others) - 3} more" if len(others) > 3 else "")
     expected = f"a record id that no other inspection of the file has; {shown} also has it"
     remedy = "Keep the right row, or give each inspection its own record id."

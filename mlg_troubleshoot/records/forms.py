@@ -28,7 +28,9 @@ class Form:
 
     def is_untouched(self, options: ReadOptions) -> bool:
         filled = [label for _, label, value in self.lines if value is not None]
-        fields = (recognise(label, options.joint_numbers, options.joint_names).field for label in filled)
+        fields = (
+            recognise(label, options.joint_numbers, options.joint_names).field for label in filled
+        )
         return all(field is not None and field.kind in _DECLARATIONS for field in fields)
 
 
@@ -48,8 +50,12 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
     ours = any(cell == FORM_TITLE for _, cells in rows[:2] for cell in cells[:1])
     value_column = column + 1
     if not ours:
-        labelled = [cells for _, cells in rows if column < len(cells) and isinstance(cells[column], str)]
-        filled = Counter(i for cells in labelled for i in range(column + 1, len(cells)) if cells[i] is not None)
+        labelled = [
+            cells for _, cells in rows if column < len(cells) and isinstance(cells[column], str)
+        ]
+        filled = Counter(
+            i for cells in labelled for i in range(column + 1, len(cells)) if cells[i] is not None
+        )
         # Merged labels push the values further to the right.
         if filled and column + 1 not in filled:
             value_column = min(filled)
@@ -57,7 +63,9 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
     for number, cells in rows:
         label = cells[column] if column < len(cells) else None
         if isinstance(label, str) and _is_line(label, options):
-            lines.append((number, label, cells[value_column] if value_column < len(cells) else None))
+            lines.append(
+                (number, label, cells[value_column] if value_column < len(cells) else None)
+            )
     return Form(lines, column, value_column)
 
 
@@ -67,7 +75,9 @@ def _is_line(label: str, options: ReadOptions) -> bool:
     return found is not UNKNOWN or label in options.column_map or label.rstrip().endswith(":")
 
 
-def read_form(form: Form, options: ReadOptions, *, file: str | None, sheet: str | None) -> Collected:
+def read_form(
+    form: Form, options: ReadOptions, *, file: str | None, sheet: str | None
+) -> Collected:
     out = Collected()
     letters, values = column_letters(form.label_column), column_letters(form.value_column)
     labels = [label for _, label, _ in form.lines]
@@ -84,5 +94,7 @@ def read_form(form: Form, options: ReadOptions, *, file: str | None, sheet: str 
     out.notes += filter(None, [reader.settle_dates(out.rows)])
     out.invalid_content[out.rows[0].source] = hash(tuple(value for _, _, value in form.lines))
     read = tuple(ColumnReading(form.value_column, p.header, p.read_as, row) for row, p in named)
-    out.layouts.append(SheetLayout(file, sheet, "form", form.lines[0][0], form.value_column + 1, read))
+    out.layouts.append(
+        SheetLayout(file, sheet, "form", form.lines[0][0], form.value_column + 1, read)
+    )
     return out

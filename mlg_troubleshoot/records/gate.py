@@ -1,4 +1,6 @@
-"""The gate for values that stand in no file: flags, prompts and Python fill a row for the judge of rows."""
+"""The gate for values that stand in no file: flags, prompts and Python fill a row for the judge of
+rows.
+"""
 
 from __future__ import annotations
 
@@ -19,24 +21,62 @@ from mlg_troubleshoot.records.values import CellFaultError, read_text
 
 # Fields of an inspection that a column of the same name holds, and the convention.
 _AS_IN_A_TABLE = (
-    *("record_id", "tail_no", "side", "convention", "outcome", "inspection_date", "gear_landings", "temperature_c"),
-    *("hydraulic_pressure_psi", "approach", "gauge_id", "technician_id", "plunger_gauge_u_in", "plunger_down_lock_in"),
-    *("actuator_extension_in", "plunger_position_in", "margin_in", "margin_u_in", "small_readings_true"),
+    *(
+        "record_id",
+        "tail_no",
+        "side",
+        "convention",
+        "outcome",
+        "inspection_date",
+        "gear_landings",
+        "temperature_c",
+    ),
+    *(
+        "hydraulic_pressure_psi",
+        "approach",
+        "gauge_id",
+        "technician_id",
+        "plunger_gauge_u_in",
+        "plunger_down_lock_in",
+    ),
+    *(
+        "actuator_extension_in",
+        "plunger_position_in",
+        "margin_in",
+        "margin_u_in",
+        "small_readings_true",
+    ),
 )
 _NOBODY = {Kind.RECORD_ID.value: "-", Kind.TAIL_NO.value: "-", Kind.SIDE.value: "LH"}
 
 
-def judge_row(values: Mapping[str, object], options: ReadOptions) -> tuple[Inspection | InvalidRow, list[Problem]]:
+def judge_row(
+    values: Mapping[str, object], options: ReadOptions
+) -> tuple[Inspection | InvalidRow, list[Problem]]:
     """Judge values by column name as a table with these headers and one row would be."""
     if not any(name.startswith("clearance_") and name != Kind.CONVENTION for name in values):
         values = {**values, f"clearance_{options.joint_numbers[0]}": None}
     problems: list[Problem] = []
     table = TableInHand(
-        options, None, None, lambda p: problems.append(replace(p, row=None, cell=None)), options.decimal_comma
+        options,
+        None,
+        None,
+        lambda p: problems.append(replace(p, row=None, cell=None)),
+        options.decimal_comma,
     )
     columns = ColumnReader(table, by_hand=True).place(list(values), 1)
     problems += [
-        Problem("column_unknown", None, None, None, p.header, None, p.header, "a column of the inspection table", "")
+        Problem(
+            "column_unknown",
+            None,
+            None,
+            None,
+            p.header,
+            None,
+            p.header,
+            "a column of the inspection table",
+            "",
+        )
         for p in columns.placed
         if p.field is None and not p.refused
     ]
@@ -46,17 +86,23 @@ def judge_row(values: Mapping[str, object], options: ReadOptions) -> tuple[Inspe
     return replace(rows[0], source=RowSource()), problems
 
 
-def admit(values: Mapping[str, object], options: ReadOptions, labels: Mapping[str, str] | None = None) -> Inspection:
+def admit(
+    values: Mapping[str, object], options: ReadOptions, labels: Mapping[str, str] | None = None
+) -> Inspection:
     """Return the inspection that the values make, or raise what a table would call a problem."""
     read, problems = judge_row(values, options)
     if problems or isinstance(read, InvalidRow):
         said = [f"{_label(p, labels or {})}: expected {p.expected}" for p in problems]
         remedies = dict.fromkeys(p.remedy for p in problems if p.remedy)
-        raise UsageError("; ".join(said) or "the values do not form an inspection", " ".join(remedies))
+        raise UsageError(
+            "; ".join(said) or "the values do not form an inspection", " ".join(remedies)
+        )
     return read
 
 
-def judge_length(column: str, text: str, options: ReadOptions) -> tuple[Inspection | InvalidRow, list[Problem]]:
+def judge_length(
+    column: str, text: str, options: ReadOptions
+) -> tuple[Inspection | InvalidRow, list[Problem]]:
     """Judge one length alone, before it is known whose it is."""
     return judge_row({**_NOBODY, column: text}, options)
 
@@ -79,12 +125,15 @@ def made_record_id(tail_no: str | None, side: Side | None, at: datetime) -> str:
 def judge_again(inspection: Inspection, options: ReadOptions) -> Inspection:
     """Judge an inspection made in Python.
 
-    Without `entered` its clearances and their uncertainties are readings in its convention, as in a table; with it
-    they were read before and are radial. Numbers are inches.
+    Without `entered` its clearances and their uncertainties are readings in its convention, as in a
+    table; with it they were read before and are radial. Numbers are inches.
     """
     given = inspection
     factor = given.convention.per_radial if given.entered and given.convention is not None else 1.0
-    values = {"clearance_convention" if name == "convention" else name: getattr(given, name) for name in _AS_IN_A_TABLE}
+    values = {
+        "clearance_convention" if name == "convention" else name: getattr(given, name)
+        for name in _AS_IN_A_TABLE
+    }
     for kind, by_joint, scale in (
         ("clearance", given.clearance_in, factor),
         ("gauge_u", given.gauge_u_by_joint_in, factor),
@@ -94,19 +143,30 @@ def judge_again(inspection: Inspection, options: ReadOptions) -> Inspection:
             if isinstance(joint, bool) or joint not in options.joint_numbers:
                 low, high = min(options.joint_numbers), max(options.joint_numbers)
                 said = no_joint(joint, options.joint_numbers)
-                raise UsageError(f"{kind}_{joint}_in: expected a joint from {low} to {high}", f"T{said[1:]}.")
+                raise UsageError(
+                    f"{kind}_{joint}_in: expected a joint from {low} to {high}", f"T{said[1:]}."
+                )
             values[f"{kind}_{joint}_in"] = _times(value, scale)
-    stated = not given.gauge_u_is_default or given.gauge_u_in != Inspection.__dataclass_fields__["gauge_u_in"].default
+    stated = (
+        not given.gauge_u_is_default
+        or given.gauge_u_in != Inspection.__dataclass_fields__["gauge_u_in"].default
+    )
     if stated:
         values["gauge_u_in"] = _times(given.gauge_u_in, factor)
     for place, value in enumerate(given.readings_in, 1):
         values[f"plunger_displacement_{place}_in"] = value
-    read = admit({name: value for name, value in values.items() if value is not None or name in _NOBODY}, options)
+    read = admit(
+        {name: value for name, value in values.items() if value is not None or name in _NOBODY},
+        options,
+    )
     return replace(
         read,
         entered=given.entered or read.entered,
-        # Numbers are inches here: what was asked about the unit of the entry stands until it is confirmed.
-        unit_question="" if given.small_readings_true else given.unit_question or read.unit_question,
+        # Numbers are inches here: what was asked about the unit of the entry stands until it is
+        # confirmed.
+        unit_question=(
+            "" if given.small_readings_true else given.unit_question or read.unit_question
+        ),
         carried=given.carried,
         warnings=tuple(dict.fromkeys((*given.warnings, *read.warnings))),
         source=given.source,
@@ -129,4 +189,6 @@ def _cell(value: object) -> Cell:
 
 def _label(problem: Problem, labels: Mapping[str, str]) -> str:
     column = problem.column or "the values"
-    return labels.get(column) or (column if problem.value in (None, column) else f"{column}: {problem.value!r}")
+    return labels.get(column) or (
+        column if problem.value in (None, column) else f"{column}: {problem.value!r}"
+    )

@@ -10,7 +10,14 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.records.columns import LENGTHS, NUMBERED, PER_JOINT, VERDICT_BEARING, Field, Kind
+from mlg_troubleshoot.records.columns import (
+    LENGTHS,
+    NUMBERED,
+    PER_JOINT,
+    VERDICT_BEARING,
+    Field,
+    Kind,
+)
 from mlg_troubleshoot.units import UNIT_SPELLINGS, LengthUnit
 
 
@@ -27,9 +34,27 @@ class Recognition:
 UNKNOWN = Recognition()
 
 _FOREIGN_UNITS = frozenset(
-    ("cm", "um", "μm", "µm", "micron", "microns", "m", "ft", "foot", "feet", "dm", "nm", "cms", "metre", "meter")
+    (
+        "cm",
+        "um",
+        "μm",
+        "µm",
+        "micron",
+        "microns",
+        "m",
+        "ft",
+        "foot",
+        "feet",
+        "dm",
+        "nm",
+        "cms",
+        "metre",
+        "meter",
+    )
 )
-_CONVENTION_WORDS = frozenset(("radial", "diametral", "diametrical", "diameter", "diam", "dia", "play"))
+_CONVENTION_WORDS = frozenset(
+    ("radial", "diametral", "diametrical", "diameter", "diam", "dia", "play")
+)
 _CLEARANCE_WORDS = frozenset(("clearance", "clearances", "clr"))
 _JOINT_WORDS = frozenset(("joint", "jt", "j", "no", "nr", "number", "#"))
 _FLOAT_WORDS = frozenset(("axial", "float", "end", "endfloat"))
@@ -37,8 +62,32 @@ _FILLERS = frozenset(("of", "at", "the", "for", "in"))
 # A joint's column with one of these words holds something other than a measurement.
 _OTHER_MATTER = frozenset(
     (
-        *("remark", "remarks", "comment", "comments", "note", "notes", "photo", "photos", "picture", "date", "by"),
-        *("initials", "sign", "signature", "stamp", "part", "serial", "sn", "pn", "status", "ok", "condition"),
+        *(
+            "remark",
+            "remarks",
+            "comment",
+            "comments",
+            "note",
+            "notes",
+            "photo",
+            "photos",
+            "picture",
+            "date",
+            "by",
+        ),
+        *(
+            "initials",
+            "sign",
+            "signature",
+            "stamp",
+            "part",
+            "serial",
+            "sn",
+            "pn",
+            "status",
+            "ok",
+            "condition",
+        ),
         *("technician", "inspector", "gauge", "name", "description", "location", "access"),
     )
 )
@@ -48,32 +97,49 @@ _ALIASES: dict[str, Kind] = {
     for kind, aliases in (
         (
             Kind.RECORD_ID,
-            "id|insp no|insp id|record|record no|record nr|record number|inspection id|inspection no|inspection number",
+            (
+                "id|insp no|insp id|record|record no|record nr|record number|inspection"
+                " id|inspection no|inspection number"
+            ),
         ),
         (
             Kind.TAIL_NO,
-            "aircraft|aircraft no|aircraft number|aircraft reg|reg|reg no|registration no|"
-            "tail|tail number|tail nr|tail #|a c reg|a c registration|a c tail no|aircraft tail|aircraft tail no|"
-            "aircraft registration|registration",
+            (
+                "aircraft|aircraft no|aircraft number|aircraft reg|reg|reg no|registration"
+                " no|tail|tail number|tail nr|tail #|a c reg|a c registration|a c tail no|aircraft"
+                " tail|aircraft tail no|aircraft registration|registration"
+            ),
         ),
-        (Kind.SIDE, "posn|position|gear position|gear posn|l r|gear side|lh rh|side lh rh|gear side lh rh"),
+        (
+            Kind.SIDE,
+            "posn|position|gear position|gear posn|l r|gear side|lh rh|side lh rh|gear side lh rh",
+        ),
         (Kind.CONVENTION, "convention|clearance type convention|convention of the clearances"),
         (Kind.UNIT, "units|length unit|clearance unit|unit of the clearances|unit of the lengths"),
         (Kind.JOINT, "joint no|joint nr|joint number|jt|jt no|joint #"),
         (Kind.DATE, "insp date|inspected on|date inspected|date measured|date|date of inspection"),
-        (Kind.LANDINGS, "ldgs|landings since o h|landings|landings since overhaul|gear landings since overhaul"),
+        (
+            Kind.LANDINGS,
+            "ldgs|landings since o h|landings|landings since overhaul|gear landings since overhaul",
+        ),
         (Kind.APPROACH, "approach direction"),
         (
             Kind.OUTCOME,
-            "result|test result|retraction result|retraction|retracted|gear retracted|failed|gear failed|"
-            "failed to retract|did it retract|did the gear retract|retracted y n|gear retracted y n|failed y n|"
-            "gear failed y n|failure|retraction failed|not retracted|retraction ok|retraction outcome|retraction test|"
-            "gear result|ergebnis",
+            (
+                "result|test result|retraction result|retraction|retracted|gear"
+                " retracted|failed|gear failed|failed to retract|did it retract|did the gear"
+                " retract|retracted y n|gear retracted y n|failed y n|gear failed y"
+                " n|failure|retraction failed|not retracted|retraction ok|retraction"
+                " outcome|retraction test|gear result|ergebnis"
+            ),
         ),
         (Kind.GAUGE_ID, "gauge id no|gauge s n|gauge|gauge no|gauge number|gauge set"),
         (
             Kind.TECHNICIAN_ID,
-            "tech|mechanic|inspector|inspected by|technician|technician no|technician number|measured by",
+            (
+                "tech|mechanic|inspector|inspected by|technician|technician no|technician"
+                " number|measured by"
+            ),
         ),
         (Kind.WORK_ORDER, "wo|work order no|work order number|w o"),
         (Kind.MANUAL_REF, "manual reference"),
@@ -84,14 +150,21 @@ _ALIASES: dict[str, Kind] = {
         (Kind.PLUNGER_DOWN_LOCK, "plunger at down lock|plunger position at down lock"),
         (
             Kind.PLUNGER_DISPLACEMENT,
-            "plunger displacement at mid position|measured plunger displacement|plunger|"
-            "plunger reading|measured plunger|plunger measured|plunger travel|plunger offset|plunger disp",
+            (
+                "plunger displacement at mid position|measured plunger displacement|plunger|plunger"
+                " reading|measured plunger|plunger measured|plunger travel|plunger offset|plunger"
+                " disp"
+            ),
         ),
         (Kind.MARGIN, "plunger margin|margin found at rigging|margin as found at rigging"),
         (Kind.MARGIN_U, "margin uncertainty|standard uncertainty of the margin"),
     )
     for alias in aliases.split("|")
-} | {kind.value.replace("_", " "): kind for kind in Kind if kind not in (Kind.TEMPERATURE, Kind.PRESSURE)}
+} | {
+    kind.value.replace("_", " "): kind
+    for kind in Kind
+    if kind not in (Kind.TEMPERATURE, Kind.PRESSURE)
+}
 _WITH_OTHER_UNIT: dict[str, Kind] = {
     "temperature c": Kind.TEMPERATURE,
     "temp c": Kind.TEMPERATURE,
@@ -99,7 +172,9 @@ _WITH_OTHER_UNIT: dict[str, Kind] = {
     "pressure psi": Kind.PRESSURE,
 }
 
-_CANONICAL = re.compile(r"(?P<kind>[a-z]+(?:_[a-z]+)*?)(?:_(?P<number>[1-9]\d?))?(?:_(?P<unit>in|thou|mm))?", re.ASCII)
+_CANONICAL = re.compile(
+    r"(?P<kind>[a-z]+(?:_[a-z]+)*?)(?:_(?P<number>[1-9]\d?))?(?:_(?P<unit>in|thou|mm))?", re.ASCII
+)
 _KINDS: dict[str, Kind] = {kind.value: kind for kind in Kind}
 _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
 _TOKEN = re.compile(r"""[a-zµμ]+\d*|\d+(?:[.,]\d+)?|["″]|''|\#""")
@@ -108,8 +183,12 @@ _DASHES = re.compile(r"[\u2010-\u2015\u2212]")
 
 
 def tidy(header: str) -> str:
-    """Return a header in one spelling: lower case, plain dashes and blanks, no colon or asterisk at the end."""
-    text = unicodedata.normalize("NFKC", header.replace("″", '"').replace("”", '"').replace("“", '"'))
+    """Return a header in one spelling: lower case, plain dashes and blanks, no colon or asterisk at
+    the end.
+    """
+    text = unicodedata.normalize(
+        "NFKC", header.replace("″", '"').replace("”", '"').replace("“", '"')
+    )
     text = _DASHES.sub("-", text).replace("\u200b", "").replace("\ufeff", "")
     return re.sub(r"\s+", " ", text).strip().rstrip(":*").strip().casefold()
 
@@ -131,7 +210,9 @@ def parse_canonical(name: str, joint_numbers: tuple[int, ...]) -> Field | None:
 
 
 @lru_cache(maxsize=4096)
-def _recognise(header: str, joint_numbers: tuple[int, ...], names: tuple[tuple[int, str], ...]) -> Recognition:
+def _recognise(
+    header: str, joint_numbers: tuple[int, ...], names: tuple[tuple[int, str], ...]
+) -> Recognition:
     text = tidy(header)
     if not text or len(text) > 120:
         return UNKNOWN
@@ -154,7 +235,11 @@ def _recognise(header: str, joint_numbers: tuple[int, ...], names: tuple[tuple[i
         found = _by_alias(plain, units, foreign, odd)
         if found is UNKNOWN:
             found = _resembles_plunger(words, bool(units))
-        return _resembles_clearance(words, bool(units), joint_numbers, names) if found is UNKNOWN else found
+        return (
+            _resembles_clearance(words, bool(units), joint_numbers, names)
+            if found is UNKNOWN
+            else found
+        )
     return numbered if numbered.field is None else _with_unit(numbered.field, units, foreign, odd)
 
 
@@ -185,7 +270,9 @@ def _trailing_unit(words: list[str]) -> tuple[list[str], LengthUnit | None]:
     return words, None
 
 
-def _by_alias(plain: str, units: set[LengthUnit], foreign: list[str], odd: list[str]) -> Recognition:
+def _by_alias(
+    plain: str, units: set[LengthUnit], foreign: list[str], odd: list[str]
+) -> Recognition:
     kind = _ALIASES.get(f"{plain} {' '.join(odd)}") if odd else None
     odd = [] if kind is not None else odd
     kind = kind or _ALIASES.get(plain)
@@ -203,7 +290,10 @@ def _resembles_plunger(words: list[str], has_unit: bool) -> Recognition:
 
 
 def _resembles_clearance(
-    words: list[str], has_unit: bool, joint_numbers: tuple[int, ...], names: tuple[tuple[int, str], ...]
+    words: list[str],
+    has_unit: bool,
+    joint_numbers: tuple[int, ...],
+    names: tuple[tuple[int, str], ...],
 ) -> Recognition:
     """Doubt a header that may be a joint's clearance, although it does not say so plainly."""
     said = set(words) - _FILLERS
@@ -212,18 +302,24 @@ def _resembles_clearance(
     if len(words) == 1:
         number = re.fullmatch(r"(?:c|cl)?0?(\d{1,2})", words[0], re.ASCII)
         if number is not None and int(number[1]) in joint_numbers:
-            return _doubt("a number alone does not say what was measured", f"clearance_{int(number[1])}")
+            return _doubt(
+                "a number alone does not say what was measured", f"clearance_{int(number[1])}"
+            )
     rest = said - _CLEARANCE_WORDS - _JOINT_WORDS
     speaks_of_joint = len(rest) < len(said)
     named = len(rest) > 1 and rest <= _vocabulary(names)
     if (speaks_of_joint and has_unit and rest) or (named and (speaks_of_joint or has_unit)):
         fitting = [number for number, name in names if rest and rest <= _name_words(name)]
         nearest = f"clearance_{fitting[0]}" if len(fitting) == 1 else None
-        return _doubt("it may be a joint's clearance, but does not give the joint's number", nearest)
+        return _doubt(
+            "it may be a joint's clearance, but does not give the joint's number", nearest
+        )
     return UNKNOWN
 
 
-def _with_unit(field: Field, units: set[LengthUnit], foreign: list[str], odd: list[str]) -> Recognition:
+def _with_unit(
+    field: Field, units: set[LengthUnit], foreign: list[str], odd: list[str]
+) -> Recognition:
     if foreign:
         return _doubt(f"the unit {foreign[0]!r} is not in, thou or mm", field.name)
     if len(units) > 1:
@@ -269,24 +365,35 @@ def _numbered(  # noqa: PLR0911 - each return is one reason to doubt
     kind = Kind.AXIAL_FLOAT if is_float else Kind.CLEARANCE
     nearest = f"{kind.value}_{number}"
     if number not in joint_numbers:
-        close = difflib.get_close_matches(nearest, [f"{kind.value}_{n}" for n in joint_numbers], 2, 0.0)
+        close = difflib.get_close_matches(
+            nearest, [f"{kind.value}_{n}" for n in joint_numbers], 2, 0.0
+        )
         return _doubt(no_joint(number, joint_numbers), " or ".join(close), "joint_unknown")
     if everything & _CONVENTION_WORDS:
         return _doubt("a convention in the header is not read; it has its own column", nearest)
-    allowed = _CLEARANCE_WORDS | _JOINT_WORDS | _FILLERS | (_FLOAT_WORDS if is_float else frozenset())
+    allowed = (
+        _CLEARANCE_WORDS | _JOINT_WORDS | _FILLERS | (_FLOAT_WORDS if is_float else frozenset())
+    )
     extra = said - allowed
     if extra:
-        return _doubt(f"{' '.join(sorted(extra))!r} may mean something other than the clearance", nearest)
+        return _doubt(
+            f"{' '.join(sorted(extra))!r} may mean something other than the clearance", nearest
+        )
     if after and not is_float and set(after) <= _CLEARANCE_WORDS:
         after = []
     return _check_name(kind, number, after, names)
 
 
 def no_joint(number: object, joint_numbers: tuple[int, ...]) -> str:
-    return f"this gear has no joint {number}: its joints are {min(joint_numbers)} to {max(joint_numbers)}"
+    return (
+        f"this gear has no joint {number}: its joints are {min(joint_numbers)} to"
+        f" {max(joint_numbers)}"
+    )
 
 
-def _check_name(kind: Kind, number: int, after: list[str], names: tuple[tuple[int, str], ...]) -> Recognition:
+def _check_name(
+    kind: Kind, number: int, after: list[str], names: tuple[tuple[int, str], ...]
+) -> Recognition:
     """Accept a joint's name behind its number only if it is this joint's, not another's."""
     nearest = f"{kind.value}_{number}"
     said = set(after) - _FILLERS
@@ -309,16 +416,21 @@ def _name_words(name: str) -> frozenset[str]:
     return frozenset(_TOKEN.findall(name.casefold()))
 
 
-# The ten joints of the Hawker 800XP in the order of the mechanism (Fig. 7). The paper's text names joints 2 to 5
-# (section 4.3); the other names follow from the order of the mechanism in section 3.2 and the reconstructed topology.
+# The ten joints of the Hawker 800XP in the order of the mechanism (Fig. 7). The paper's text names
+# joints 2 to 5 (section 4.3); the other names follow from the order of the mechanism in section 3.2
+# and the reconstructed topology.
 _NAMES = (
-    "actuator rod end|locking pin|short link inner|locking lever pivot|short link outer|extension lever end|"
-    "bellcrank input|bellcrank pivot|bellcrank output|plunger pin"
+    "actuator rod end|locking pin|short link inner|locking lever pivot|short link outer|extension"
+    " lever end|bellcrank input|bellcrank pivot|bellcrank output|plunger pin"
 )
-_REFERENCE_NAMES = {number: f"{name} bearing joint" for number, name in enumerate(_NAMES.split("|"), 1)}
+_REFERENCE_NAMES = {
+    number: f"{name} bearing joint" for number, name in enumerate(_NAMES.split("|"), 1)
+}
 
 
-def recognise(header: str, joint_numbers: tuple[int, ...], joint_names: Mapping[int, str]) -> Recognition:
+def recognise(
+    header: str, joint_numbers: tuple[int, ...], joint_names: Mapping[int, str]
+) -> Recognition:
     names = dict(_REFERENCE_NAMES)
     for number, name in joint_names.items():
         names[number] = f"{name} {names.get(number, '')}" if number in joint_numbers else name
@@ -329,8 +441,12 @@ def near_miss(header: str, joint_numbers: tuple[int, ...]) -> Recognition:
     """Look for the canonical column that an unknown header is one entry error away from."""
     snake = _snake(header)
     bare = re.sub(r"_(in|thou|mm)$", "", snake)
-    candidates = [k.value for k in Kind if k not in PER_JOINT and k not in (Kind.UNIT, Kind.SIDE, Kind.JOINT)]
-    candidates += [f"{k.value}_{n}" for k in (Kind.CLEARANCE, Kind.AXIAL_FLOAT) for n in joint_numbers]
+    candidates = [
+        k.value for k in Kind if k not in PER_JOINT and k not in (Kind.UNIT, Kind.SIDE, Kind.JOINT)
+    ]
+    candidates += [
+        f"{k.value}_{n}" for k in (Kind.CLEARANCE, Kind.AXIAL_FLOAT) for n in joint_numbers
+    ]
     close = difflib.get_close_matches(bare, candidates, 1, 0.87)
     if not close:
         return UNKNOWN
@@ -353,6 +469,7 @@ def parse_target(name: str, joint_numbers: tuple[int, ...]) -> Field | None:
     if field is None:
         raise UsageError(
             f"--map: {name!r} is not a column of the inspection table",
-            "Give a column such as clearance_3_mm, tail_no or margin_in, or carry to leave the column unread.",
+            "Give a column such as clearance_3_mm, tail_no or margin_in, or carry to leave the"
+            " column unread.",
         )
     return field

@@ -1,4 +1,6 @@
-"""Rows compared with the other inspections of the same gear: slips that would explain a jump, and the order of time."""
+"""Rows compared with the other inspections of the same gear: slips that would explain a jump, and
+the order of time.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ from mlg_troubleshoot.records.duplicates import cell_of, where
 from mlg_troubleshoot.records.model import SheetLayout
 from mlg_troubleshoot.units import SLIPS
 
-# Rows of a gear before and after that a row is compared with: enough for a median, few enough to follow the wear.
+# Rows of a gear before and after that a row is compared with: enough for a median, few enough to
+# follow the wear.
 _NEIGHBOURS = 3
 _FEWEST = 2
 _FIT_IN = 0.0008
@@ -39,24 +42,35 @@ def history_warnings(rows: Sequence[Inspection | InvalidRow]) -> dict[int, tuple
     for gear, places in gears.items():
         if len(places) <= _FEWEST:
             continue
-        clearances = [row.clearance_in for row in (rows[p] for p in places) if isinstance(row, Inspection)]
+        clearances = [
+            row.clearance_in for row in (rows[p] for p in places) if isinstance(row, Inspection)
+        ]
         for at, place in enumerate(places):
-            near = [*clearances[max(0, at - _NEIGHBOURS) : at], *clearances[at + 1 : at + 1 + _NEIGHBOURS]]
+            near = [
+                *clearances[max(0, at - _NEIGHBOURS) : at],
+                *clearances[at + 1 : at + 1 + _NEIGHBOURS],
+            ]
             if _fits(clearances[at], near):
                 continue
             expected = _medians(near)
             other = (gear[0], Side.RH if gear[1] is Side.LH else Side.LH)
             if other not in usual:
                 others = [rows[p] for p in gears.get(other, ())][: 2 * _NEIGHBOURS + 1]
-                usual[other] = _medians([r.clearance_in for r in others if isinstance(r, Inspection)])
+                usual[other] = _medians(
+                    [r.clearance_in for r in others if isinstance(r, Inspection)]
+                )
             slip = _slip(clearances[at], expected, usual[other], other[1])
             if slip:
                 found[place] = (slip,)
     return found
 
 
-def order_warnings(rows: Sequence[Inspection | InvalidRow], layouts: Sequence[SheetLayout]) -> dict[int, str]:
-    """Name the rows of one gear whose landings run backwards as its dates go on, each with its cell."""
+def order_warnings(
+    rows: Sequence[Inspection | InvalidRow], layouts: Sequence[SheetLayout]
+) -> dict[int, str]:
+    """Name the rows of one gear whose landings run backwards as its dates go on, each with its
+    cell.
+    """
     gears: dict[Gear, list[tuple[int, Inspection]]] = {}
     for place, row in enumerate(rows):
         if isinstance(row, Inspection):
@@ -66,7 +80,11 @@ def order_warnings(rows: Sequence[Inspection | InvalidRow], layouts: Sequence[Sh
 
         def name(n: int, seen: list[tuple[int, Inspection]] = seen) -> str:
             source = seen[n][1].source
-            cells = [cell for kind in (Kind.LANDINGS, Kind.DATE) if (cell := cell_of(source, layouts, kind)[1])]
+            cells = [
+                cell
+                for kind in (Kind.LANDINGS, Kind.DATE)
+                if (cell := cell_of(source, layouts, kind)[1])
+            ]
             return ", ".join([where(source), *cells])
 
         for n, said in contradictions([Moment.of(row) for _place, row in seen], name).items():
@@ -77,7 +95,10 @@ def order_warnings(rows: Sequence[Inspection | InvalidRow], layouts: Sequence[Sh
 def _fits(own: Clearances, near: Sequence[Clearances]) -> bool:
     """Tell quickly that a row is like one of its neighbours."""
     return any(
-        all(abs(value - them.get(joint, value)) <= _tolerance(value) for joint, value in own.items()) for them in near
+        all(
+            abs(value - them.get(joint, value)) <= _tolerance(value) for joint, value in own.items()
+        )
+        for them in near
     )
 
 
@@ -95,17 +116,30 @@ def _medians(near: Sequence[Clearances]) -> Clearances:
 
 def _slip(own: Clearances, usual: Clearances, other: Clearances, other_side: Side) -> str:
     common = [joint for joint in own if joint in usual]
-    off = [joint for joint in common if abs(own[joint] - usual[joint]) > _CLEARLY_OFF * _tolerance(usual[joint])]
+    off = [
+        joint
+        for joint in common
+        if abs(own[joint] - usual[joint]) > _CLEARLY_OFF * _tolerance(usual[joint])
+    ]
     if not off:
         return ""
     for first, second in pairwise(sorted(common)):
-        if off == [first, second] and _near(own[first], usual[second]) and _near(own[second], usual[first]):
+        if (
+            off == [first, second]
+            and _near(own[first], usual[second])
+            and _near(own[second], usual[first])
+        ):
             return (
-                f"joints {first} and {second} do not fit this gear's other inspections, but would if they were "
-                "swapped: were the two readings exchanged?"
+                f"joints {first} and {second} do not fit this gear's other inspections, but would"
+                " if they were swapped: were the two readings exchanged?"
             )
-    if len(common) >= 3 and all(joint in other and _near(own[joint], other[joint]) for joint in common):
-        return f"the clearances fit the {other_side} gear of this aircraft, not this one: is the side right?"
+    if len(common) >= 3 and all(
+        joint in other and _near(own[joint], other[joint]) for joint in common
+    ):
+        return (
+            f"the clearances fit the {other_side} gear of this aircraft, not this one: is the side"
+            " right?"
+        )
     return _scale(own, usual, common, off)
 
 

@@ -18,7 +18,14 @@ from mlg_troubleshoot.records.columns import (
     VERDICT_BEARING,
     Kind,
 )
-from mlg_troubleshoot.records.headers import UNKNOWN, Recognition, near_miss, parse_target, recognise, tidy
+from mlg_troubleshoot.records.headers import (
+    UNKNOWN,
+    Recognition,
+    near_miss,
+    parse_target,
+    recognise,
+    tidy,
+)
 from mlg_troubleshoot.records.model import ReadOptions, TableInHand
 from mlg_troubleshoot.records.refusals import HEADER_SEARCH_ROWS
 from mlg_troubleshoot.records.rows import PlacedField
@@ -30,10 +37,9 @@ from mlg_troubleshoot.units import UNIT_SPELLINGS, LengthUnit
 class Header:
     """A header as found.
 
-    row: its row (the lower one of two), counted from 1.
-    texts: one for each field, trailing blanks included.
-    rows_used: the rows that belong to it: one, or two where the header has two rows or a row of units below.
-    units: unit of each column from a row of units; empty if there is none.
+    row: its row (the lower one of two), counted from 1. texts: one for each field, trailing blanks
+    included. rows_used: the rows that belong to it: one, or two where the header has two rows or a
+    row of units below. units: unit of each column from a row of units; empty if there is none.
     """
 
     row: int
@@ -46,9 +52,9 @@ class Header:
 class Columns:
     """The columns of a table.
 
-    mapped, carried: headers that are not canonical with what they were read as; headers of what is only carried.
-    ids_made: True if there is no column of record ids.
-    is_long: True if one row is one joint's reading.
+    mapped, carried: headers that are not canonical with what they were read as; headers of what is
+    only carried. ids_made: True if there is no column of record ids. is_long: True if one row is
+    one joint's reading.
     """
 
     placed: list[PlacedField]
@@ -58,16 +64,23 @@ class Columns:
     is_long: bool = False
 
     def notes(self) -> tuple[str, str]:
-        """Say how the headers were read, all in one note, and what is only carried, in another; empty if nothing."""
+        """Say how the headers were read, all in one note, and what is only carried, in another;
+        empty if nothing.
+        """
         read = ["each header was read as: " + ", ".join(self.mapped)] * bool(self.mapped)
         if self.ids_made:
-            read.append("there is no record_id: each inspection is named after the file, its row and its content")
+            read.append(
+                "there is no record_id: each inspection is named after the file, its row and its"
+                " content"
+            )
         carried = "not used, only carried to the report: " + ", ".join(self.carried)
         return "; ".join(read), carried if self.carried else ""
 
 
 def _mapped(text: str, index: int, options: ReadOptions) -> bool:
-    return any(tidy(key) == tidy(text) or key == column_letters(index) for key in options.column_map)
+    return any(
+        tidy(key) == tidy(text) or key == column_letters(index) for key in options.column_map
+    )
 
 
 def header_score(cells: Sequence[Cell], options: ReadOptions) -> int:
@@ -76,7 +89,9 @@ def header_score(cells: Sequence[Cell], options: ReadOptions) -> int:
     for index, cell in enumerate(cells):
         if isinstance(cell, str):
             mapped = _mapped(cell, index, options)
-            found = UNKNOWN if mapped else recognise(cell, options.joint_numbers, options.joint_names)
+            found = (
+                UNKNOWN if mapped else recognise(cell, options.joint_numbers, options.joint_names)
+            )
             known |= set() if found.field is None else {found.field.quantity}
             doubtful += mapped or bool(found.reason)
     kinds = {kind for kind, _ in known}
@@ -112,7 +127,10 @@ def _text(cell: Cell) -> str:
 
 
 def _two_row_header(
-    near: Sequence[NumberedRow], options: ReadOptions, merged: Callable[[], Sequence[MergedRange]], single: int
+    near: Sequence[NumberedRow],
+    options: ReadOptions,
+    merged: Callable[[], Sequence[MergedRange]],
+    single: int,
 ) -> Header | None:
     """Join a header of two rows, where merged cells say which columns the upper one covers."""
     best: Header | None = None
@@ -132,12 +150,22 @@ def _two_row_header(
 
 def _may_be_upper(above: Sequence[Cell], below: Sequence[Cell]) -> bool:
     texts = [c for c in above if c is not None]
-    return bool(texts) and all(isinstance(c, str) for c in texts) and sum(c is not None for c in below) >= 2
+    return (
+        bool(texts)
+        and all(isinstance(c, str) for c in texts)
+        and sum(c is not None for c in below) >= 2
+    )
 
 
-def _joined(upper: int, above: Sequence[Cell], below: Sequence[Cell], ranges: Sequence[MergedRange]) -> list[str]:
+def _joined(
+    upper: int, above: Sequence[Cell], below: Sequence[Cell], ranges: Sequence[MergedRange]
+) -> list[str]:
     """Return each header of two rows; none if nothing is merged across columns."""
-    across = [(first, last) for top, first, bottom, last in ranges if top == bottom == upper and last > first]
+    across = [
+        (first, last)
+        for top, first, bottom, last in ranges
+        if top == bottom == upper and last > first
+    ]
     joined = [[_text(cell), _text(under)] for cell, under in zip_longest(above, below)]
     for first, last in across:
         for covered in joined[first + 1 : last + 1]:
@@ -145,13 +173,21 @@ def _joined(upper: int, above: Sequence[Cell], below: Sequence[Cell], ranges: Se
     return [" ".join(texts).strip() for texts in joined] if across else []
 
 
-def _unit_row(header: Header, cells: Sequence[Cell], options: ReadOptions) -> tuple[LengthUnit | None, ...] | None:
+def _unit_row(
+    header: Header, cells: Sequence[Cell], options: ReadOptions
+) -> tuple[LengthUnit | None, ...] | None:
     """Read a row of units below the header; None if it is something else."""
     words = [_text(c).strip("()[]").lower() for c in cells]
-    if not any(words) or any(w not in UNIT_SPELLINGS and w not in ("", "-", "psi", "°c", "c") for w in words):
+    if not any(words) or any(
+        w not in UNIT_SPELLINGS and w not in ("", "-", "psi", "°c", "c") for w in words
+    ):
         return None
     for text, word in zip(header.texts, words, strict=False):
-        known = recognise(text, options.joint_numbers, options.joint_names).field if word in UNIT_SPELLINGS else None
+        known = (
+            recognise(text, options.joint_numbers, options.joint_names).field
+            if word in UNIT_SPELLINGS
+            else None
+        )
         if known is not None and known.kind not in LENGTHS:
             return None
     units = [UNIT_SPELLINGS.get(word) for word in words[: len(header.texts)]]
@@ -207,7 +243,9 @@ class ColumnReader:
         columns = Columns([])
         readings: list[tuple[Recognition, bool]] = []
         for index, text in enumerate(headers):
-            header_row, cell = places[index] if places is not None else (row, f"{column_letters(index)}{row}")
+            header_row, cell = (
+                places[index] if places is not None else (row, f"{column_letters(index)}{row}")
+            )
             found, mapped = self._recognise(text, index)
             known = found.field
             if known is not None and index < len(units) and units[index] is not None:
@@ -226,17 +264,37 @@ class ColumnReader:
         self._unused_map(columns, row)
         return columns
 
-    def _note(self, columns: Columns, placed: PlacedField, found: Recognition, mapped: bool, *, in_form: bool) -> None:
+    def _note(
+        self,
+        columns: Columns,
+        placed: PlacedField,
+        found: Recognition,
+        mapped: bool,
+        *,
+        in_form: bool,
+    ) -> None:
         if placed.field is None:
             hint = ""
             if found.nearest and not mapped:
-                hint = f' (if it means {found.nearest}, pass --map "{placed.header}={found.nearest}")'
+                hint = (
+                    f' (if it means {found.nearest}, pass --map "{placed.header}={found.nearest}")'
+                )
             columns.carried.append(f'"{placed.header}"{hint}')
-        elif mapped or (placed.header != placed.field.label if in_form else placed.header != placed.field.name):
+        elif mapped or (
+            placed.header != placed.field.label if in_form else placed.header != placed.field.name
+        ):
             columns.mapped.append(f'"{placed.header}" {placed.field.name}')
 
     def _tell(self, code: str, placed: PlacedField, expected: str, remedy: str) -> None:
-        self._table.tell(code, placed.header, expected, remedy, placed.header_row, placed.header, placed.header_cell)
+        self._table.tell(
+            code,
+            placed.header,
+            expected,
+            remedy,
+            placed.header_row,
+            placed.header,
+            placed.header_cell,
+        )
 
     def _doubt(self, placed: PlacedField, found: Recognition) -> None:
         target = found.nearest or "clearance_3_in"
@@ -249,16 +307,23 @@ class ColumnReader:
         else:
             expected = "a header that can be understood, such as clearance_3_mm"
             remedy = (
-                f'The header is doubtful: {found.reason}. If {target} is meant, pass --map "{placed.header}={target}" '
-                f'(a length with its unit); to leave the column unread, pass --map "{placed.header}=carry".'
+                f"The header is doubtful: {found.reason}. If {target} is meant, pass --map"
+                f' "{placed.header}={target}" (a length with its unit); to leave the column unread,'
+                f' pass --map "{placed.header}=carry".'
             )
         self._tell(found.code, placed, expected, remedy)
 
     def _joint_columns(self, columns: Columns) -> None:
-        """Tell a long table from a wide one; a clearance without its joint is doubtful in a wide one."""
+        """Tell a long table from a wide one; a clearance without its joint is doubtful in a wide
+        one.
+        """
         fields = [p.field for p in columns.placed if p.field is not None and not p.refused]
         numbered = any(f.kind in PER_JOINT and f.number is not None for f in fields)
-        loose = [p for p in columns.placed if p.field and p.field.kind in PER_JOINT and p.field.number is None]
+        loose = [
+            p
+            for p in columns.placed
+            if p.field and p.field.kind in PER_JOINT and p.field.number is None
+        ]
         joint = next((p for p in columns.placed if p.field and p.field.kind is Kind.JOINT), None)
         if joint is not None and loose and not numbered:
             columns.is_long = True
@@ -268,12 +333,16 @@ class ColumnReader:
                 columns,
                 p,
                 "joint_missing",
-                "a joint's number in the header, such as clearance_3_in, or a column joint next to it",
+                "a joint's number in the header, such as clearance_3_in, or a column joint next"
+                " to it",
                 "The header does not say which joint. "
-                f'Correct it, or pass --map "{p.header}=COLUMN" with a column such as clearance_3_in.',
+                f'Correct it, or pass --map "{p.header}=COLUMN" with a column such as'
+                " clearance_3_in.",
             )
 
-    def _refuse(self, columns: Columns, placed: PlacedField, code: str, expected: str, remedy: str) -> None:
+    def _refuse(
+        self, columns: Columns, placed: PlacedField, code: str, expected: str, remedy: str
+    ) -> None:
         columns.placed[placed.index] = replace(placed, refused=True)
         self._tell(code, placed, expected, remedy)
 
@@ -285,9 +354,12 @@ class ColumnReader:
             first = seen.setdefault(placed.field.quantity, placed)
             if first is placed:
                 continue
-            plain = [p for p in (first, placed) if tidy(p.header).replace(" ", "_") == placed.field.name]
+            plain = [
+                p for p in (first, placed) if tidy(p.header).replace(" ", "_") == placed.field.name
+            ]
             if placed.field.kind not in LENGTHS and len(plain) == 1:
-                # The column that bears the name is meant; the other one is another matter, such as the aircraft's type.
+                # The column that bears the name is meant; the other one is another matter, such as
+                # the aircraft's type.
                 other = placed if plain[0] is first else first
                 columns.placed[other.index] = replace(other, field=None)
                 seen[placed.field.quantity] = plain[0]
@@ -301,31 +373,50 @@ class ColumnReader:
                 columns,
                 placed,
                 "header_duplicate",
-                f"one column for {placed.field.name}; {first.header_cell} {first.header!r} is one already",
-                f"Remove one of the two, or pass --map {column_letters(placed.index)}=carry to use the other.",
+                f"one column for {placed.field.name}; {first.header_cell} {first.header!r} is one"
+                " already",
+                f"Remove one of the two, or pass --map {column_letters(placed.index)}=carry to use"
+                " the other.",
             )
 
     def _missing(self, columns: Columns, row: int) -> None:
         fields = {p.field.kind for p in columns.placed if p.field is not None}
         unknown = [p.header for p in columns.placed if p.field is None and p.header]
-        missing = [(kind.value, f"a column {kind.value}") for kind in REQUIRED if kind not in fields]
+        missing = [
+            (kind.value, f"a column {kind.value}") for kind in REQUIRED if kind not in fields
+        ]
         if Kind.RECORD_ID not in fields and columns.is_long:
-            missing.insert(0, ("record_id", "a column record_id, by which the rows of one inspection are gathered"))
+            missing.insert(
+                0,
+                (
+                    "record_id",
+                    "a column record_id, by which the rows of one inspection are gathered",
+                ),
+            )
         elif Kind.RECORD_ID not in fields:
             columns.ids_made = True
         clearance_refused = any(p.refused for p in columns.placed)
         if Kind.CLEARANCE not in fields and not clearance_refused and not fields >= set(ALONG):
-            missing.append(("clearance_1_in", "at least one clearance column, such as clearance_3_in"))
+            missing.append(
+                ("clearance_1_in", "at least one clearance column, such as clearance_3_in")
+            )
         for name, expected in missing:
-            close = difflib.get_close_matches(name, [tidy(h).replace(" ", "_") for h in unknown], 1, 0.6)
-            hint = next((h for h in unknown if close and tidy(h).replace(" ", "_") == close[0]), None)
+            close = difflib.get_close_matches(
+                name, [tidy(h).replace(" ", "_") for h in unknown], 1, 0.6
+            )
+            hint = next(
+                (h for h in unknown if close and tidy(h).replace(" ", "_") == close[0]), None
+            )
             like = f' If "{hint}" is meant, pass --map "{hint}={name}".' if hint else ""
             remedy = f"Add the column, or name the one that is meant with --map.{like}"
             self._table.tell("column_missing", None, expected, remedy, row, name)
 
     def _unused_map(self, columns: Columns, row: int) -> None:
         for key in self._options.column_map:
-            if not any(tidy(key) == tidy(p.header) or key == column_letters(p.index) for p in columns.placed):
+            if not any(
+                tidy(key) == tidy(p.header) or key == column_letters(p.index)
+                for p in columns.placed
+            ):
                 headers = ", ".join(p.header for p in columns.placed if p.header)
                 expected = f"one of the headers of the table: {headers[:200]}"
                 remedy = "Correct the header named in --map."

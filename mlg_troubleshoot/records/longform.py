@@ -38,8 +38,11 @@ class LongReader:
         self._per_joint = [p for p in placed if p.field is not None and p.field.kind in PER_JOINT]
         # What is of one reading, not of the whole inspection.
         self._own = [*self._per_joint, *([] if self._joint is None else [self._joint])]
-        wide: list[PlacedField] = [replace(p, field=None, refused=True) if p in self._own else p for p in placed]
-        # The joint's own columns stay in place but empty; each joint's reading gets a column behind them.
+        wide: list[PlacedField] = [
+            replace(p, field=None, refused=True) if p in self._own else p for p in placed
+        ]
+        # The joint's own columns stay in place but empty; each joint's reading gets a column behind
+        # them.
         self._slots: dict[tuple[int, int], int] = {}
         for p in self._per_joint:
             for joint in options.joint_numbers:
@@ -52,7 +55,14 @@ class LongReader:
         self.reader = RowReader(wide, table)
 
     def _find(self, kind: Kind) -> PlacedField | None:
-        return next((p for p in self._placed if p.field is not None and p.field.kind is kind and not p.refused), None)
+        return next(
+            (
+                p
+                for p in self._placed
+                if p.field is not None and p.field.kind is kind and not p.refused
+            ),
+            None,
+        )
 
     def add(self, row: int, cells: Sequence[Cell]) -> None:
         width = len(self._placed)
@@ -97,7 +107,9 @@ class LongReader:
             joints = self._table.options.joint_numbers
             code = "joint_missing" if cell is None else "joint_unknown"
             expected = f"a joint number from {min(joints)} to {max(joints)}"
-            self._fault(group, (self._joint, row, cell), code, expected, "Enter the joint's number.")
+            self._fault(
+                group, (self._joint, row, cell), code, expected, "Enter the joint's number."
+            )
             return
         for p, reading in readings:
             slot = self._slots[p.index, joint]
@@ -107,9 +119,13 @@ class LongReader:
                 group.cells[slot] = reading
                 group.places[slot] = place
             elif first == reading:
-                group.warnings.append(f"joint {joint} is given twice with the same reading (row {row})")
+                group.warnings.append(
+                    f"joint {joint} is given twice with the same reading (row {row})"
+                )
             else:
-                expected = f"one reading of joint {joint}; cell {group.places[slot][1]} says {show(first)}"
+                expected = (
+                    f"one reading of joint {joint}; cell {group.places[slot][1]} says {show(first)}"
+                )
                 remedy = "Keep the right one, or correct the joint number."
                 self._fault(group, (p, row, reading), "joint_twice", expected, remedy)
 
@@ -125,13 +141,20 @@ class LongReader:
         return number if number in self._table.options.joint_numbers else None
 
     def _fault(
-        self, group: _Group, place: tuple[PlacedField, int, Cell], code: str, expected: str, remedy: str
+        self,
+        group: _Group,
+        place: tuple[PlacedField, int, Cell],
+        code: str,
+        expected: str,
+        remedy: str,
     ) -> None:
         p, row, cell = place
         if p.header not in group.bad:
             group.bad.append(p.header)
         found = None if cell is None else quote(cell)
-        self._table.tell(code, found, expected, remedy, row, p.header, f"{column_letters(p.index)}{row}")
+        self._table.tell(
+            code, found, expected, remedy, row, p.header, f"{column_letters(p.index)}{row}"
+        )
 
     def finish(self) -> list[Inspection | InvalidRow]:
         done: list[Inspection | InvalidRow] = []

@@ -29,16 +29,18 @@ class TableOptions:
     sheet : str or None
         Worksheet to read; ``*`` reads every sheet that holds inspections, None takes the only one.
     column_map : mapping of str to str
-        Column by header (or by letter), for headers that are not understood: ``{"Spiel 3": "clearance_3_mm"}``; the
-        target ``carry`` lets a column travel to the report unread.
+        Column by header (or by letter), for headers that are not understood: ``{"Spiel 3":
+        "clearance_3_mm"}``; the target ``carry`` lets a column travel to the report unread.
     remembered_map : mapping of str to str
         The same as remembered from another table: a header that is absent is not reported.
     decimal_comma : bool
         True if ``0,013`` means 0.013.
     small_readings_true : bool
-        True if readings below the play of new parts were checked: they were read in the unit that is stated.
+        True if readings below the play of new parts were checked: they were read in the unit that
+        is stated.
     dates : DateOrder or None
-        Order of day, month and year in dates that are written as numbers; None takes it from the column.
+        Order of day, month and year in dates that are written as numbers; None takes it from the
+        column.
     """
 
     unit: LengthUnit | None = None
@@ -77,11 +79,13 @@ class TableResult:
 class ReadOptions(TableOptions):
     """What is declared about tables, and what the gear says of the values in them.
 
-    joint_names: names of the gear's joints, by which a header's number is checked; empty takes the reference gear's.
-    clearance_hard_max_in, clearance_confirm_above_in: a radial clearance above the one is refused, above the other
+    joint_names: names of the gear's joints, by which a header's number is checked; empty takes the
+    reference gear's. clearance_hard_max_in, clearance_confirm_above_in: a radial clearance above
+    the one is refused, above the other
         accepted with a warning. [in]
     plunger_hard_max_in: a measured plunger displacement beyond this, either way, is refused. [in]
-    new_part_in, limit_in: radial clearance of a new part, and the largest one allowed, by joint; empty where no gear
+    new_part_in, limit_in: radial clearance of a new part, and the largest one allowed, by joint;
+    empty where no gear
         says them. [in]
     margin_in: largest displacement that the gear allows; infinite where no gear says it. [in]
     asks: a person is there to confirm what is unusual.
@@ -99,7 +103,11 @@ class ReadOptions(TableOptions):
 
     @classmethod
     def of(cls, gear: Gear, tables: TableOptions | None = None, **declared: Any) -> ReadOptions:
-        told = {} if tables is None else {each.name: getattr(tables, each.name) for each in fields(TableOptions)}
+        told = (
+            {}
+            if tables is None
+            else {each.name: getattr(tables, each.name) for each in fields(TableOptions)}
+        )
         return cls(
             **told,
             **declared,
@@ -115,7 +123,9 @@ class ReadOptions(TableOptions):
 
 @dataclass(frozen=True, slots=True)
 class TableInHand:
-    """The table or form that is being read: how, where it stands, and who is told of its problems."""
+    """The table or form that is being read: how, where it stands, and who is told of its
+    problems.
+    """
 
     options: ReadOptions
     file: str | None
@@ -136,7 +146,9 @@ class TableInHand:
         column: str | None = None,
         cell: str | None = None,
     ) -> None:
-        self.report(Problem(code, self.file, self.sheet, row, column, cell, value, expected, remedy))
+        self.report(
+            Problem(code, self.file, self.sheet, row, column, cell, value, expected, remedy)
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +181,9 @@ class SheetLayout:
     columns: tuple[ColumnReading, ...]
 
     def index_of(self, column: str) -> int | None:
-        """Return the index of a canonical column, counted from 0; None if the table does not have it."""
+        """Return the index of a canonical column, counted from 0; None if the table does not have
+        it.
+        """
         return next((c.index for c in self.columns if c.read_as == column), None)
 
 
@@ -183,7 +197,9 @@ class FileRead:
 
 @dataclass(frozen=True, slots=True)
 class ReadResult:
-    """Everything that came out of one or more files, in their order: no row is lost, each problem stands once."""
+    """Everything that came out of one or more files, in their order: no row is lost, each problem
+    stands once.
+    """
 
     rows: tuple[Inspection | InvalidRow, ...]
     problems: tuple[Problem, ...]

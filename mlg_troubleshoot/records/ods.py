@@ -10,15 +10,31 @@ import re
 from collections.abc import Iterator, Sequence
 from xml.etree.ElementTree import Element, iterparse
 
-from mlg_troubleshoot.records.cells import MAX_COLUMNS, MAX_ROWS, NO_VALUE_TEXT, Cell, OddCell, OddKind, iso_date_cell
+from mlg_troubleshoot.records.cells import (
+    MAX_COLUMNS,
+    MAX_ROWS,
+    NO_VALUE_TEXT,
+    Cell,
+    OddCell,
+    OddKind,
+    iso_date_cell,
+)
 from mlg_troubleshoot.records.source import MergedRange, NumberedRow, Sheet, Workbook
-from mlg_troubleshoot.records.zipguard import GuardedZip, Stream, damage, outside_limits, password_protected
+from mlg_troubleshoot.records.zipguard import (
+    GuardedZip,
+    Stream,
+    damage,
+    outside_limits,
+    password_protected,
+)
 
 _CONTENT = "content.xml"
 _PADDED = re.compile(r"0\d+", re.ASCII)
 _ERROR_TEXT = re.compile(r"#[A-Z/0-9!?]+|Err:\d+")
 _OASIS = "urn:oasis:names:tc:opendocument:xmlns:"
-_OFFICE, _STYLE, _TABLE, _TEXT = (f"{{{_OASIS}{name}:1.0}}" for name in ("office", "style", "table", "text"))
+_OFFICE, _STYLE, _TABLE, _TEXT = (
+    f"{{{_OASIS}{name}:1.0}}" for name in ("office", "style", "table", "text")
+)
 _EXTENDED = "{urn:org:documentfoundation:names:experimental:calc:xmlns:calcext:1.0}"
 _BREAKS = {f"{_TEXT}tab": "\t", f"{_TEXT}line-break": "\n"}
 
@@ -38,7 +54,10 @@ def ods_book(data: bytes) -> Workbook:
             shown = element.find(f"{_STYLE}table-properties")
             if shown is not None and shown.get(f"{_TABLE}display") == "false":
                 hidden.add(element.get(f"{_STYLE}name", ""))
-    sheets = [_OdsSheet(archive, index, name, style in hidden) for index, (name, style) in enumerate(found)]
+    sheets = [
+        _OdsSheet(archive, index, name, style in hidden)
+        for index, (name, style) in enumerate(found)
+    ]
     return Workbook("ods", sheets)
 
 
@@ -112,7 +131,9 @@ def _count(element: Element, name: str) -> int:
 
 
 def _written(element: Element) -> str:
-    """Return the text of a paragraph: what a file writes as elements are blanks, tabs and line breaks."""
+    """Return the text of a paragraph: what a file writes as elements are blanks, tabs and line
+    breaks.
+    """
     pieces = [element.text or ""]
     for part in element:
         if part.tag == f"{_TEXT}s":
@@ -127,7 +148,9 @@ def _value(element: Element) -> Cell:  # noqa: PLR0911 - one return for each kin
     shown = "\n".join(_written(paragraph) for paragraph in element.iterfind(f"{_TEXT}p"))
     kind = element.get(f"{_OFFICE}value-type")
     formula = f"{_TABLE}formula" in element.attrib
-    if element.get(f"{_EXTENDED}value-type") == "error" or (formula and _ERROR_TEXT.fullmatch(shown)):
+    if element.get(f"{_EXTENDED}value-type") == "error" or (
+        formula and _ERROR_TEXT.fullmatch(shown)
+    ):
         return OddCell(OddKind.ERROR, shown or "error")
     if kind in ("float", "percentage", "currency"):
         number = float(element.attrib[f"{_OFFICE}value"])

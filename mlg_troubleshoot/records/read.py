@@ -59,11 +59,15 @@ def _ticker(progress: Progress | None) -> Callable[[int], None]:
     return tick
 
 
-def read_many(sources: Iterable[Source], options: ReadOptions, *, progress: Progress | None = None) -> ReadResult:
+def read_many(
+    sources: Iterable[Source], options: ReadOptions, *, progress: Progress | None = None
+) -> ReadResult:
     """Read the inspections of several files, folders and patterns as one batch."""
     ticker = _ticker(progress)
     given = list(sources)
-    read = _finish([_read_file(item, options, ticker) for source in given for item in expand(source)])
+    read = _finish(
+        [_read_file(item, options, ticker) for source in given for item in expand(source)]
+    )
     passed_over = [note for source in given if (note := _subfolders_note(source))]
     return replace(read, notes=(*passed_over, *read.notes))
 
@@ -77,7 +81,9 @@ def _subfolders_note(source: Source) -> str:
         names = [f.name for f in folders if any(p.suffix.lower() in _SUFFIXES for p in f.iterdir())]
     except OSError:
         return ""
-    return f"{source}: folders in it were not read: {', '.join(map(writable, names))}" if names else ""
+    return (
+        f"{source}: folders in it were not read: {', '.join(map(writable, names))}" if names else ""
+    )
 
 
 def expand(source: Source) -> list[Source]:
@@ -86,13 +92,21 @@ def expand(source: Source) -> list[Source]:
     path = Path(source)
     try:
         if path.is_dir():
-            found = [p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES and not _is_scratch(p)]
+            found = [
+                p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES and not _is_scratch(p)
+            ]
             return [*sorted(found)] or [source]
         if any(c in str(source) for c in "*?[") and not path.exists():
             base = Path(path.anchor) if path.is_absolute() else Path()
             pattern = str(path.relative_to(path.anchor)) if path.is_absolute() else str(path)
-            return [*sorted(p for p in base.glob(pattern) if p.is_file() and not _is_scratch(p))] or [source]
-    except (OSError, ValueError, NotImplementedError):  # pathlib raises the last for patterns that it cannot follow
+            return [
+                *sorted(p for p in base.glob(pattern) if p.is_file() and not _is_scratch(p))
+            ] or [source]
+    except (
+        OSError,
+        ValueError,
+        NotImplementedError,
+    ):  # pathlib raises the last for patterns that it cannot follow
         return [source]
     return [source]
 
@@ -103,7 +117,9 @@ def _is_scratch(path: Path) -> bool:
 
 
 def _read_file(source: Source, options: ReadOptions, ticker: Callable[[int], None]) -> _Found:
-    label = writable(str(source if isinstance(source, str | Path) else getattr(source, "name", STDIN_NAME)))
+    label = writable(
+        str(source if isinstance(source, str | Path) else getattr(source, "name", STDIN_NAME))
+    )
     digest: str | None = None
     kind = "unreadable"
     found = Collected()
@@ -133,25 +149,34 @@ def load_bytes(source: Source) -> bytes:
         if isinstance(source, str | Path) and str(source) != STDIN_NAME:
             data = _regular_file(source)
         else:
-            data = (sys.stdin.buffer if isinstance(source, str | Path) else source).read(MAX_FILE_BYTES + 1)
+            data = (sys.stdin.buffer if isinstance(source, str | Path) else source).read(
+                MAX_FILE_BYTES + 1
+            )
     except FileNotFoundError:
         raise FileRefusedError("file_not_found", "there is no such file") from None
     except IsADirectoryError:
         raise FileRefusedError(
-            "file_not_found", "it is a folder without tables", "a CSV file or a workbook", "Name the file."
+            "file_not_found",
+            "it is a folder without tables",
+            "a CSV file or a workbook",
+            "Name the file.",
         ) from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise FileRefusedError("file_unreadable", f"it cannot be opened ({reason})") from None
     if len(data) > MAX_FILE_BYTES:
-        raise FileRefusedError("file_too_large", f"the file is larger than {MAX_FILE_BYTES // 1_000_000} MB")
+        raise FileRefusedError(
+            "file_too_large", f"the file is larger than {MAX_FILE_BYTES // 1_000_000} MB"
+        )
     return data
 
 
 def _regular_file(source: str | Path) -> bytes:
     """Read a file, never a pipe or a device that may not end."""
     # Opened without waiting: a pipe that nobody writes to would hang before it can be told.
-    handle = os.open(source, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    handle = os.open(
+        source, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    )
     with os.fdopen(handle, "rb") as file:
         if stat.S_ISDIR(os.fstat(handle).st_mode):
             raise IsADirectoryError
@@ -194,7 +219,11 @@ def _is_instructions(rows: Sequence[NumberedRow]) -> bool:
 
 
 def _read_book(
-    book: Workbook, options: ReadOptions, label: str, ticker: Callable[[int], None], found: Collected
+    book: Workbook,
+    options: ReadOptions,
+    label: str,
+    ticker: Callable[[int], None],
+    found: Collected,
 ) -> None:
     chosen = _choose(book, options, found)
     for candidate in chosen:
@@ -204,7 +233,13 @@ def _read_book(
             ticker(1)
         elif candidate.header is not None:
             part = read_table(
-                sheet, candidate.header, candidate.rows, options, file=label, delimiter=book.delimiter, tick=ticker
+                sheet,
+                candidate.header,
+                candidate.rows,
+                options,
+                file=label,
+                delimiter=book.delimiter,
+                tick=ticker,
             )
         else:
             raise _no_header(candidate)
@@ -233,9 +268,13 @@ def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Can
     hidden = ", ".join(repr(sheet.name) for sheet in book.sheets if sheet.hidden)
     if hidden:
         found.notes.append(f"hidden sheets were not read: {hidden}")
-    filled_otherwise = [c.sheet.name for c in candidates if c.header is None and c.form is None and c.has_cells]
+    filled_otherwise = [
+        c.sheet.name for c in candidates if c.header is None and c.form is None and c.has_cells
+    ]
     if filled_otherwise:
-        found.notes.append(f"no header of inspections, not read: sheet {', '.join(map(repr, filled_otherwise))}")
+        found.notes.append(
+            f"no header of inspections, not read: sheet {', '.join(map(repr, filled_otherwise))}"
+        )
     if options.sheet == "*":
         return chosen or tables
     if len(filled) > 1:
@@ -244,12 +283,15 @@ def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Can
             "sheet_several",
             f"several sheets hold inspections: {names}",
             "one table, or the sheet to read",
-            f'Name the sheet, for example --sheet "{filled[0].sheet.name}", or --sheet "*" for all of them.',
+            f'Name the sheet, for example --sheet "{filled[0].sheet.name}", or --sheet "*" for all'
+            " of them.",
         )
     if chosen:
         if len(visible) > 1:
             names = ", ".join(repr(c.sheet.name) for c in chosen)
-            found.notes.append(f"read from sheet {names}" if len(chosen) == 1 else f"read from sheets {names}")
+            found.notes.append(
+                f"read from sheet {names}" if len(chosen) == 1 else f"read from sheets {names}"
+            )
         return chosen
     if tables:
         return tables[:1]
@@ -260,7 +302,9 @@ def _choose(book: Workbook, options: ReadOptions, found: Collected) -> list[_Can
 
 def _named(book: Workbook, wanted: str, options: ReadOptions, found: Collected) -> _Candidate:
     by_name = [s for s in book.sheets if s.name == wanted]
-    by_name = by_name or [s for s in book.sheets if (s.name or "").strip().casefold() == wanted.strip().casefold()]
+    by_name = by_name or [
+        s for s in book.sheets if (s.name or "").strip().casefold() == wanted.strip().casefold()
+    ]
     if not by_name:
         names = ", ".join(repr(s.name) for s in book.sheets)
         known, remedy = f"one of its sheets: {names}", "Correct the name given with --sheet."
@@ -274,7 +318,9 @@ def _named(book: Workbook, wanted: str, options: ReadOptions, found: Collected) 
     return candidate
 
 
-def _nothing_found(book: Workbook, candidates: Sequence[_Candidate], options: ReadOptions) -> FileRefusedError:
+def _nothing_found(
+    book: Workbook, candidates: Sequence[_Candidate], options: ReadOptions
+) -> FileRefusedError:
     hidden = [_candidate(sheet, options) for sheet in book.sheets if sheet.hidden]
     name = next((c.sheet.name for c in hidden if c.header is not None or c.form is not None), None)
     if name is not None:
@@ -288,7 +334,9 @@ def _nothing_found(book: Workbook, candidates: Sequence[_Candidate], options: Re
     if len(candidates) == 1:
         return _no_header(candidates[0])
     names = ", ".join(repr(c.sheet.name) for c in candidates)
-    return FileRefusedError("header_missing", f"no sheet holds a table of inspections (sheets: {names})")
+    return FileRefusedError(
+        "header_missing", f"no sheet holds a table of inspections (sheets: {names})"
+    )
 
 
 def _no_header(candidate: _Candidate) -> FileRefusedError:
@@ -296,7 +344,11 @@ def _no_header(candidate: _Candidate) -> FileRefusedError:
     shown = "it holds nothing"
     if first is not None:
         texts = [str(cell) for cell in first[1] if isinstance(cell, str)][:8]
-        shown = f"row {first[0]} reads: {', '.join(texts)[:120]}" if texts else f"row {first[0]} holds no text"
+        shown = (
+            f"row {first[0]} reads: {', '.join(texts)[:120]}"
+            if texts
+            else f"row {first[0]} holds no text"
+        )
     found = f"no header of inspections was found ({shown})"
     return FileRefusedError("header_missing", found, sheet=candidate.sheet.name)
 
@@ -306,7 +358,9 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
     rows = [row for _, found in results for row in found.rows]
     layouts = tuple(layout for _, found in results for layout in found.layouts)
     problems = [p for _, found in results for p in found.problems]
-    contents = {source: content for _, found in results for source, content in found.invalid_content.items()}
+    contents = {
+        source: content for _, found in results for source, content in found.invalid_content.items()
+    }
     problems += settle_duplicates(rows, layouts, contents)
     for place, warnings in history_warnings(rows).items():
         rows[place] = replace(rows[place], warnings=(*rows[place].warnings, *warnings))
@@ -317,7 +371,10 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
     return ReadResult(
         tuple(rows),
         tuple(problems),
-        (*(note for _, found in results for note in found.notes), *dict.fromkeys(backwards.values())),
+        (
+            *(note for _, found in results for note in found.notes),
+            *dict.fromkeys(backwards.values()),
+        ),
         layouts,
         tuple(file for file, _ in results),
     )
@@ -326,5 +383,12 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
 def _places(results: Sequence[_Found]) -> Callable[[Problem], tuple[int, int, int]]:
     files = {file.name: i for i, (file, _) in reversed(list(enumerate(results)))}
     layouts = (layout for _, found in results for layout in found.layouts)
-    sheets = {sheet: i for i, sheet in enumerate(dict.fromkeys((layout.file, layout.sheet) for layout in layouts))}
-    return lambda p: (files.get(p.file or "", len(results)), sheets.get((p.file, p.sheet), -1), p.row or 0)
+    sheets = {
+        sheet: i
+        for i, sheet in enumerate(dict.fromkeys((layout.file, layout.sheet) for layout in layouts))
+    }
+    return lambda p: (
+        files.get(p.file or "", len(results)),
+        sheets.get((p.file, p.sheet), -1),
+        p.row or 0,
+    )

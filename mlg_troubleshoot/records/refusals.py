@@ -1,4 +1,6 @@
-"""Files and sheets that cannot be read as a table: what each kind of refusal expects, and what to do about it."""
+"""Files and sheets that cannot be read as a table: what each kind of refusal expects, and what to
+do about it.
+"""
 
 from __future__ import annotations
 
@@ -15,27 +17,47 @@ _USUAL = {
         "Correct the quotation marks of this row; write inches as 0.013 in.",
     ),
     "file_damaged": ("a whole workbook", _SAVE_AGAIN),
-    "file_empty": ("a table of inspections", "Check that the file was saved and copied completely."),
-    "file_kind": ("an .xlsx workbook or a CSV file", "Save the table as .xlsx or as CSV (UTF-8) and read that."),
+    "file_empty": (
+        "a table of inspections",
+        "Check that the file was saved and copied completely.",
+    ),
+    "file_kind": (
+        "an .xlsx workbook or a CSV file",
+        "Save the table as .xlsx or as CSV (UTF-8) and read that.",
+    ),
     "file_not_found": ("an existing file", "Check the path and the spelling."),
-    "file_too_large": ("a table of inspections", "Read the inspection table alone, or split the file."),
+    "file_too_large": (
+        "a table of inspections",
+        "Read the inspection table alone, or split the file.",
+    ),
     "file_unreadable": ("a readable file", "Check the path and the permissions."),
     "header_missing": (
-        f"a header with record_id, tail_no, side and clearances in the first {HEADER_SEARCH_ROWS} rows",
+        (
+            "a header with record_id, tail_no, side and clearances in the first"
+            f" {HEADER_SEARCH_ROWS} rows"
+        ),
         "Use the workbook that 'mlg template' writes, or name the columns with --map.",
     ),
-    "no_rows": ("at least one row below the header, or a filled-in form", "Enter the inspections and save the file."),
+    "no_rows": (
+        "at least one row below the header, or a filled-in form",
+        "Enter the inspections and save the file.",
+    ),
     "not_a_table": (
         "a CSV file in UTF-8, UTF-16 or Windows-1252, or an .xlsx workbook",
         "Save the table as .xlsx or as CSV (UTF-8) and read that.",
     ),
-    "password_protected": ("a workbook without a password", "Save a copy without the password and read the copy."),
+    "password_protected": (
+        "a workbook without a password",
+        "Save a copy without the password and read the copy.",
+    ),
     "xml_declaration": ("a workbook as a spreadsheet program writes it", _SAVE_AGAIN),
 }
 
 
 class FileRefusedError(Exception):
-    """A file or a sheet that cannot be read as a table; caught inside this package and made a `Problem`."""
+    """A file or a sheet that cannot be read as a table; caught inside this package and made a
+    `Problem`.
+    """
 
     def __init__(
         self,

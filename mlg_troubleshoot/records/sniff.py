@@ -25,7 +25,9 @@ _OTHERS: tuple[tuple[bytes, str], ...] = (
 
 def sniff(data: bytes, name: str) -> str:
     if not data.strip(b" \t\r\n\0\xef\xbb\xbf"):
-        raise FileRefusedError("file_empty", "the file holds nothing but blanks" if data else "the file is empty")
+        raise FileRefusedError(
+            "file_empty", "the file holds nothing but blanks" if data else "the file is empty"
+        )
     if data.startswith((b"PK\x03\x04", b"PK\x05\x06", b"PK\x07\x08")):
         return "zip"
     if data.startswith(OLE_MAGIC):
@@ -45,6 +47,7 @@ def sniff(data: bytes, name: str) -> str:
             "file_kind",
             f"a text file under a workbook's name ({suffix})",
             "a workbook",
-            "If it is a CSV file, rename it to .csv. Otherwise open it in a spreadsheet program and save it as .xlsx.",
+            "If it is a CSV file, rename it to .csv. Otherwise open it in a spreadsheet program and"
+            " save it as .xlsx.",
         )
     return "text"

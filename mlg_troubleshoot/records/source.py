@@ -18,7 +18,8 @@ MACROS = "the workbook holds macros: they are ignored, the values are read"
 
 @dataclass(slots=True)
 class SheetFacts:
-    """What was noticed in addition to the values while the rows were read; it fills up as they come.
+    """What was noticed in addition to the values while the rows were read; it fills up as they
+    come.
 
     hidden_rows: rows with something in them that are hidden or filtered out, counted from 1.
     hidden_columns: first and last column of each hidden block, counted from 0.
@@ -41,7 +42,9 @@ class Sheet(ABC):
         self.facts = SheetFacts()
 
     def rows(self) -> Iterator[NumberedRow]:
-        """Read the rows that are not blank, with their numbers counted from 1; the facts begin anew."""
+        """Read the rows that are not blank, with their numbers counted from 1; the facts begin
+        anew.
+        """
         self.facts = SheetFacts()
         yield from self._read()
 
@@ -50,7 +53,9 @@ class Sheet(ABC):
         """Read the rows as each kind of file holds them, and note the facts on the way."""
 
     def merged(self) -> Sequence[MergedRange]:
-        """Return merged ranges as first row, first column, last row, last column (rows from 1, columns from 0)."""
+        """Return merged ranges as first row, first column, last row, last column (rows from 1,
+        columns from 0).
+        """
         return ()
 
 

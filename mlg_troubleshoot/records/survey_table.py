@@ -1,4 +1,6 @@
-"""The table of a survey: written empty for a gear, read back as readings; a bad cell is a `Problem`."""
+"""The table of a survey: written empty for a gear, read back as readings; a bad cell is a
+`Problem`.
+"""
 
 from __future__ import annotations
 
@@ -41,22 +43,37 @@ _KINDS = {kind: kind for kind in Kind if kind not in (Kind.TRAVEL, Kind.ORDER)}
 # No linkage of a landing gear is longer than this; angles are read within one turn.
 _LONGEST_IN, _WIDEST_DEG = 500.0, 360.0
 _HOW = {
-    Kind.DISTANCE: "Pin centre to pin centre: over the outside of both pins, less half of each diameter.",
-    Kind.PLUNGER: "Dial on the plunger, zero at the reference extension; actuator at the extension given.",
+    Kind.DISTANCE: (
+        "Pin centre to pin centre: over the outside of both pins, less half of each diameter."
+    ),
+    Kind.PLUNGER: (
+        "Dial on the plunger, zero at the reference extension; actuator at the extension given."
+    ),
     Kind.EXTENSION: "Travel of the actuator from Down Lock to the reference position.",
-    Kind.ANGLE: "In the gear file's axes, with an inclinometer or from a photograph square to the plane.",
+    Kind.ANGLE: (
+        "In the gear file's axes, with an inclinometer or from a photograph square to the plane."
+    ),
 }
 
 
 def write_survey_template(
-    path: Path, linkage: SurveyedLinkage, planned: Iterable[tuple[Reading, bool]], unit: LengthUnit = LengthUnit.INCH
+    path: Path,
+    linkage: SurveyedLinkage,
+    planned: Iterable[tuple[Reading, bool]],
+    unit: LengthUnit = LengthUnit.INCH,
 ) -> None:
-    """Write the rows that are worth reading on this gear, as CSV or as a workbook with a sketch; in inches or mm."""
+    """Write the rows that are worth reading on this gear, as CSV or as a workbook with a sketch; in
+    inches or mm.
+    """
     rows = []
     metric = LengthUnit.MILLIMETRE if unit is LengthUnit.MILLIMETRE else LengthUnit.INCH
     drive = metric if linkage.driven_in == "in" else LengthUnit.INCH
     for reading, checked in planned:
-        by_others = "Checked by the other readings." if checked else "NOT checked by the others: read it twice."
+        by_others = (
+            "Checked by the other readings."
+            if checked
+            else "NOT checked by the others: read it twice."
+        )
         values: dict[str, str | float | None] = {
             "kind": reading.kind.value,
             "from": reading.start,
@@ -87,7 +104,9 @@ def write_survey_template(
 
 
 def _sketch(sheet: Worksheet, linkage: SurveyedLinkage) -> None:
-    """The pins of each plane at the reference position, with their names, and the parts between them."""
+    """The pins of each plane at the reference position, with their names, and the parts between
+    them.
+    """
     mechanism = linkage.space.mechanism
     sheet.append(["point", "plane", "x in", "y in", "", "part", "x in", "y in"])
     for point in mechanism.points:
@@ -106,7 +125,8 @@ def _sketch(sheet: Worksheet, linkage: SurveyedLinkage) -> None:
                     sheet.cell(line, 8, places[name][1])
                     line += 1
                 along, across = (
-                    Reference(sheet, min_col=column, min_row=line - 2, max_row=line - 1) for column in (7, 8)
+                    Reference(sheet, min_col=column, min_row=line - 2, max_row=line - 1)
+                    for column in (7, 8)
                 )
                 part = Series(across, along)
                 part.graphicalProperties.line.solidFill = "9AA5B1"
@@ -114,16 +134,22 @@ def _sketch(sheet: Worksheet, linkage: SurveyedLinkage) -> None:
         for row, point in enumerate(mechanism.points, start=2):
             if point.name in places:
                 spot = Series(
-                    Reference(sheet, min_col=4, min_row=row), Reference(sheet, min_col=3, min_row=row), title=point.name
+                    Reference(sheet, min_col=4, min_row=row),
+                    Reference(sheet, min_col=3, min_row=row),
+                    title=point.name,
                 )
                 spot.marker.symbol = "circle"
-                spot.dLbls = DataLabelList(showSerName=True, showVal=False, showLegendKey=False, showCatName=False)
+                spot.dLbls = DataLabelList(
+                    showSerName=True, showVal=False, showLegendKey=False, showCatName=False
+                )
                 chart.series.append(spot)
         chart.legend = None
         sheet.add_chart(chart, f"J{2 + 30 * k}")
 
 
-def read_survey(path: Path, linkage: SurveyedLinkage) -> tuple[tuple[Reading, ...], tuple[Problem, ...], str]:
+def read_survey(
+    path: Path, linkage: SurveyedLinkage
+) -> tuple[tuple[Reading, ...], tuple[Problem, ...], str]:
     """Read the rows that have a value, the cells that are wrong, and the file's SHA-256."""
     label = str(path)
     try:
@@ -132,9 +158,18 @@ def read_survey(path: Path, linkage: SurveyedLinkage) -> tuple[tuple[Reading, ..
         book = open_book(data, label, ReadOptions())
         for sheet in book.sheets:
             rows = list(sheet.rows())
-            header = next((i for i, (_, cells) in enumerate(rows[:_HEADER_WITHIN]) if "kind" in _names(cells)), None)
+            header = next(
+                (
+                    i
+                    for i, (_, cells) in enumerate(rows[:_HEADER_WITHIN])
+                    if "kind" in _names(cells)
+                ),
+                None,
+            )
             if header is not None:
-                reader = _Rows(label, sheet.name, _names(rows[header][1]), linkage, comma=book.delimiter == ";")
+                reader = _Rows(
+                    label, sheet.name, _names(rows[header][1]), linkage, comma=book.delimiter == ";"
+                )
                 found = [reader.read(row) for row in rows[header + 1 :]]
                 return tuple(r for r in found if r is not None), tuple(reader.problems), digest
         raise FileRefusedError(
@@ -155,19 +190,42 @@ class _Rows:
     """Reads the rows of one sheet and gathers what is wrong with them."""
 
     def __init__(
-        self, file: str, sheet: str | None, header: list[str], linkage: SurveyedLinkage, *, comma: bool
+        self,
+        file: str,
+        sheet: str | None,
+        header: list[str],
+        linkage: SurveyedLinkage,
+        *,
+        comma: bool,
     ) -> None:
-        self.file, self.sheet, self.header, self.linkage, self.comma = file, sheet, header, linkage, comma
+        self.file, self.sheet, self.header, self.linkage, self.comma = (
+            file,
+            sheet,
+            header,
+            linkage,
+            comma,
+        )
         self.points = [p.name for p in linkage.space.mechanism.points]
         self.problems: list[Problem] = []
         for i, name in enumerate(header):
             if name and header.index(name) != i:
-                self._fault(1, name, None, "header_duplicate", "each column once", "Remove one of the columns.")
+                self._fault(
+                    1,
+                    name,
+                    None,
+                    "header_duplicate",
+                    "each column once",
+                    "Remove one of the columns.",
+                )
 
     def read(self, numbered: NumberedRow) -> Reading | None:
         """Read one row; None if it has no value, or a cell that is wrong."""
         number, cells = numbered
-        row = {name: cell for name, cell in zip(self.header, cells, strict=False) if name and cell is not None}
+        row = {
+            name: cell
+            for name, cell in zip(self.header, cells, strict=False)
+            if name and cell is not None
+        }
         given = [f"value_{unit}" for unit in _UNITS if f"value_{unit}" in row]
         if not given:
             return None
@@ -176,23 +234,44 @@ class _Rows:
             kind = read_choice(row.get("kind", ""), Kind, "kind_unknown", {})
             turns = self.linkage.space.mechanism.output.kind == "angle"
             is_angle = kind is Kind.ANGLE or (kind is Kind.PLUNGER and turns)
-            self._require(kind in _KINDS, "kind", "one of " + ", ".join(_KINDS), "Correct the word.", "kind_unknown")
+            self._require(
+                kind in _KINDS,
+                "kind",
+                "one of " + ", ".join(_KINDS),
+                "Correct the word.",
+                "kind_unknown",
+            )
             wanted = ("value_deg",) if is_angle else ("value_in", "value_mm")
-            one, expected = given[1:] == [] and given[0] in wanted, f"one value, in {' or '.join(wanted)}"
-            self._require(one, given[-1], expected, "Leave the other columns blank.", "value_columns")
+            one, expected = (
+                given[1:] == [] and given[0] in wanted,
+                f"one value, in {' or '.join(wanted)}",
+            )
+            self._require(
+                one, given[-1], expected, "Leave the other columns blank.", "value_columns"
+            )
             value = self._quantity(row, given[0], signed=kind in (Kind.PLUNGER, Kind.ANGLE))
             u = default_u(kind, is_angle=is_angle)
             for unit in _UNITS:
                 column, expected = f"u_{unit}", "an uncertainty in the unit of the value"
                 if column in row:
-                    self._require((unit == "deg") == is_angle, column, expected, "Move the number.", "unit_of_u")
+                    self._require(
+                        (unit == "deg") == is_angle,
+                        column,
+                        expected,
+                        "Move the number.",
+                        "unit_of_u",
+                    )
                     u = self._quantity(row, column, signed=False)
             extension = self._extension(row)
             start, end = self._ends(kind, row)
         except CellFaultError as fault:
-            self._fault(number, self.column, row.get(self.column), fault.code, fault.expected, fault.remedy)
+            self._fault(
+                number, self.column, row.get(self.column), fault.code, fault.expected, fault.remedy
+            )
             return None
-        return Reading(kind, start, end, value, u, extension, number, is_angle, self.linkage.driven_in)
+        return Reading(
+            kind, start, end, value, u, extension, number, is_angle, self.linkage.driven_in
+        )
 
     def _quantity(self, row: Mapping[str, Cell], column: str, *, signed: bool) -> float:
         self.column, cell = column, row[column]
@@ -205,7 +284,9 @@ class _Rows:
             length = LengthUnit.parse(unit)
             most = length.from_inches(_LONGEST_IN)
             value = length.to_inches(
-                self._number(cell, -most if signed else 0.0, most, f"a length up to {most:g} {unit}")
+                self._number(
+                    cell, -most if signed else 0.0, most, f"a length up to {most:g} {unit}"
+                )
             )
         remedy = "Read it again, or leave it blank."
         self._require(value > 0.0 or signed, column, f"a {name} above 0", remedy, "out_of_range")
@@ -217,15 +298,21 @@ class _Rows:
         for unit in (LengthUnit.INCH, LengthUnit.MILLIMETRE):
             self.column, most = f"extension_{unit}", unit.from_inches(reach)
             if self.column in row:
-                one = extension is None and (unit is LengthUnit.INCH or self.linkage.driven_in == "in")
+                one = extension is None and (
+                    unit is LengthUnit.INCH or self.linkage.driven_in == "in"
+                )
                 expected = "one extension, in the unit of the input"
                 self._require(one, self.column, expected, "Leave one.", "extension_columns")
-                read = self._number(row[self.column], 0.0, most, f"an extension from 0 to {most:.4g}")
+                read = self._number(
+                    row[self.column], 0.0, most, f"an extension from 0 to {most:.4g}"
+                )
                 extension = unit.to_inches(read)
         return extension
 
     def _number(self, cell: Cell, low: float, most: float, expected: str) -> float:
-        return read_number("" if cell is None else cell, low, most, decimal_comma=self.comma, expected=expected)
+        return read_number(
+            "" if cell is None else cell, low, most, decimal_comma=self.comma, expected=expected
+        )
 
     def _ends(self, kind: Kind, row: Mapping[str, Cell]) -> tuple[str, str]:
         texts = []
@@ -233,7 +320,9 @@ class _Rows:
             cell = row.get(column)
             self.column = column
             # A spreadsheet takes the point 4 for a number.
-            texts.append(f"{cell:g}" if isinstance(cell, float) else read_text(cell or "", "a name").strip())
+            texts.append(
+                f"{cell:g}" if isinstance(cell, float) else read_text(cell or "", "a name").strip()
+            )
         start, end = texts
         space = self.linkage.space
         if kind is Kind.DISTANCE:
@@ -242,23 +331,43 @@ class _Rows:
                 self._require(name in self.points, column, points, "Correct the name.")
             self._require(start != end, "to", "another point than in from", "Name both pins.")
         elif kind is Kind.ANGLE:
-            known = {**dict.fromkeys(space.planes, ("hinge", "dihedral")), **dict.fromkeys(space.sliders, ("axis",))}
+            known = {
+                **dict.fromkeys(space.planes, ("hinge", "dihedral")),
+                **dict.fromkeys(space.sliders, ("axis",)),
+            }
             expected = f"one of {', '.join(known)}"
-            self._require(start in known, "from", expected, "Name a hinged plane or the slider's joint.")
-            self._require(end in known[start], "to", " or ".join(known[start]), "Say which angle it is.")
+            self._require(
+                start in known, "from", expected, "Name a hinged plane or the slider's joint."
+            )
+            self._require(
+                end in known[start], "to", " or ".join(known[start]), "Say which angle it is."
+            )
         else:
-            self._require(not (start or end), "from" if start else "to", "a blank cell", f"A {kind} needs no points.")
+            self._require(
+                not (start or end),
+                "from" if start else "to",
+                "a blank cell",
+                f"A {kind} needs no points.",
+            )
         expected = "DISTANCE, PLUNGER or ANGLE"
         remedy = "The reference position of this gear is its Down Lock."
         self._require(kind is not Kind.EXTENSION or space.moves_reference, "kind", expected, remedy)
         return start, end
 
-    def _require(self, holds: bool, column: str, expected: str, remedy: str, code: str = "point_unknown") -> None:
+    def _require(
+        self, holds: bool, column: str, expected: str, remedy: str, code: str = "point_unknown"
+    ) -> None:
         if not holds:
             self.column = column
             raise CellFaultError(code, expected, remedy)
 
-    def _fault(self, row: int, column: str, cell: Cell, code: str, expected: str, remedy: str) -> None:
-        place = f"{column_letters(self.header.index(column))}{row}" if column in self.header else None
+    def _fault(
+        self, row: int, column: str, cell: Cell, code: str, expected: str, remedy: str
+    ) -> None:
+        place = (
+            f"{column_letters(self.header.index(column))}{row}" if column in self.header else None
+        )
         shown = None if cell is None else quote(cell)
-        self.problems.append(Problem(code, self.file, self.sheet, row, column, place, shown, expected, remedy))
+        self.problems.append(
+            Problem(code, self.file, self.sheet, row, column, place, shown, expected, remedy)
+        )

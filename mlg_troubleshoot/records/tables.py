@@ -23,7 +23,8 @@ _PROGRESS_ROWS = 500
 class Collected:
     """What the sheets of one file gave.
 
-    invalid_content: a hash of the cells of each row that cannot be judged, to recognize a repeated row.
+    invalid_content: a hash of the cells of each row that cannot be judged, to recognize a repeated
+    row.
     """
 
     rows: list[Inspection | InvalidRow] = field(default_factory=list)
@@ -57,7 +58,11 @@ def read_table(
                 tick(_PROGRESS_ROWS)
     tick(taken % _PROGRESS_ROWS)
     table.finish()
-    placed = f"the header stands in row {' and '.join(map(str, header.rows_used))}" if header.row > 1 else ""
+    placed = (
+        f"the header stands in row {' and '.join(map(str, header.rows_used))}"
+        if header.row > 1
+        else ""
+    )
     read, carried = columns.notes()
     about = "; ".join([*table.notes(), *_hidden_notes(sheet, columns, header.row)])
     out.notes += filter(None, ("; ".join(filter(None, (placed, read))), carried, about))
@@ -81,7 +86,13 @@ class _Table:
     """The rows of one table: inspections, and what stands between them."""
 
     def __init__(
-        self, sheet: Sheet, header: Header, columns: Columns, table: TableInHand, delimiter: str | None, out: Collected
+        self,
+        sheet: Sheet,
+        header: Header,
+        columns: Columns,
+        table: TableInHand,
+        delimiter: str | None,
+        out: Collected,
     ) -> None:
         self._reader = RowReader(columns.placed, table)
         self._long = LongReader(columns.placed, table) if columns.is_long else None
@@ -118,15 +129,22 @@ class _Table:
                 self._out.invalid_content[read.source] = hash(tuple(cells))
 
     def _stands_aside(self, number: int, cells: Sequence[Cell]) -> bool:
-        """Tell a row of totals, signatures and the like: it says so first, and lacks what makes an inspection."""
+        """Tell a row of totals, signatures and the like: it says so first, and lacks what makes an
+        inspection.
+        """
         place = next((i for i, cell in enumerate(cells) if cell is not None), None)
         first = None if place is None else cells[place]
         if not isinstance(first, str):
             return False
-        ruled = all(cell is None or (isinstance(cell, str) and _RULE.fullmatch(cell)) for cell in cells)
+        ruled = all(
+            cell is None or (isinstance(cell, str) and _RULE.fullmatch(cell)) for cell in cells
+        )
         if not ruled and _NO_INSPECTION.match(first.strip()) is None:
             return False
-        filled = [any(i != place and i < len(cells) and cells[i] is not None for i in kind) for kind in self._telling]
+        filled = [
+            any(i != place and i < len(cells) and cells[i] is not None for i in kind)
+            for kind in self._telling
+        ]
         if sum(filled) > 1 and not ruled:
             return False
         self._aside.append(f"row {number} {quote(first, 40)!r}")
@@ -136,20 +154,31 @@ class _Table:
         """Read what could be read only with all rows at hand."""
         reader = self._reader
         if self._long is not None:
-            self._out.rows[:] = sorted([*self._out.rows, *self._long.finish()], key=lambda row: row.source.row or 0)
+            self._out.rows[:] = sorted(
+                [*self._out.rows, *self._long.finish()], key=lambda row: row.source.row or 0
+            )
             reader = self._long.reader
         self._dates = reader.settle_dates(self._out.rows)
 
     def notes(self) -> list[str]:
         notes = []
         if self._long is not None:
-            notes.append("long layout: one row is one joint's reading; rows with one record id are one inspection")
+            notes.append(
+                "long layout: one row is one joint's reading; rows with one record id are one"
+                " inspection"
+            )
         if self._repeated:
-            again = f"{self._repeated} repeated header rows were" if self._repeated > 1 else "a repeated header row was"
+            again = (
+                f"{self._repeated} repeated header rows were"
+                if self._repeated > 1
+                else "a repeated header row was"
+            )
             notes.append(f"{again} skipped")
         if self._aside:
             count = (
-                f"{len(self._aside)} rows are not inspections" if len(self._aside) > 1 else "1 row is not an inspection"
+                f"{len(self._aside)} rows are not inspections"
+                if len(self._aside) > 1
+                else "1 row is not an inspection"
             )
             shown = ", ".join(self._aside[:5]) + (", …" if len(self._aside) > 5 else "")
             notes.append(f"{count}, set aside: {shown}")
@@ -159,7 +188,9 @@ class _Table:
         if words:
             shown = ", ".join(repr(word) for word in list(words)[:4])
             cells = sum(words.values())
-            notes.append(f"{cells} {'cells' if cells > 1 else 'cell'} with {shown} read as not measured")
+            notes.append(
+                f"{cells} {'cells' if cells > 1 else 'cell'} with {shown} read as not measured"
+            )
         return notes
 
 
@@ -168,11 +199,19 @@ def _hidden_notes(sheet: Sheet, columns: Columns, header_row: int) -> list[str]:
     facts, width = sheet.facts, len(columns.placed)
     hidden = sum(1 for row in facts.hidden_rows if row > header_row)
     if hidden:
-        notes.append(f"{hidden} hidden or filtered {'rows were' if hidden > 1 else 'row was'} also read")
+        notes.append(
+            f"{hidden} hidden or filtered {'rows were' if hidden > 1 else 'row was'} also read"
+        )
     for first, last in facts.hidden_columns:
         ends = dict.fromkeys(column_letters(index) for index in (first, min(last, width - 1)))
         notes += [f"hidden column {' to '.join(ends)} was also read"] * (first < width)
-    counts = [f"{column_letters(index)} ({n})" for index, n in sorted(facts.formulas.items()) if index < width]
+    counts = [
+        f"{column_letters(index)} ({n})"
+        for index, n in sorted(facts.formulas.items())
+        if index < width
+    ]
     if counts:
-        notes.append(f"formulas were read by their last calculated values: column {', '.join(counts)}")
+        notes.append(
+            f"formulas were read by their last calculated values: column {', '.join(counts)}"
+        )
     return notes

@@ -46,22 +46,35 @@ _MEANING: dict[Kind, str] = {
     Kind.RECORD_ID: "Required. Your own unique name of this inspection.",
     Kind.TAIL_NO: "Required. Tail number, kept as text.",
     Kind.SIDE: "Required. LH or RH; there is no default.",
-    Kind.CONVENTION: "Required. " + " ".join(f"{c.value}: {c.meaning}." for c in ClearanceConvention),
+    Kind.CONVENTION: (
+        "Required. " + " ".join(f"{c.value}: {c.meaning}." for c in ClearanceConvention)
+    ),
     Kind.UNIT: "Unit of every length on this sheet: in, thou or mm.",
-    Kind.CLEARANCE: "Clearance. Leave blank if it was not measured; 0 means measured and found to be zero.",
+    Kind.CLEARANCE: (
+        "Clearance. Leave blank if it was not measured; 0 means measured and found to be zero."
+    ),
     Kind.DATE: "Optional. Year-month-day, for example 2026-03-04.",
     Kind.OUTCOME: "Optional. What the gear did: RETRACTED or FAILED.",
     Kind.LANDINGS: "Optional. Landings since overhaul, 0 or more.",
-    Kind.GAUGE_U: "Optional. Standard uncertainty of one reading, as read. Blank: {gauge_u} radial is assumed.",
-    Kind.PLUNGER_DISPLACEMENT: "Optional. Measured change of the plunger position at mid-position, over-travel "
-    "positive, under-travel negative. Repeat readings have their own columns.",
-    Kind.PLUNGER_DOWN_LOCK: "Optional. Measured plunger position at Down Lock; {down_lock} is allowed.",
+    Kind.GAUGE_U: (
+        "Optional. Standard uncertainty of one reading, as read. Blank: {gauge_u} radial is"
+        " assumed."
+    ),
+    Kind.PLUNGER_DISPLACEMENT: (
+        "Optional. Measured change of the plunger position at mid-position, over-travel "
+        "positive, under-travel negative. Repeat readings have their own columns."
+    ),
+    Kind.PLUNGER_DOWN_LOCK: (
+        "Optional. Measured plunger position at Down Lock; {down_lock} is allowed."
+    ),
     Kind.PLUNGER_GAUGE_U: "Optional. Repeatability of one plunger reading.",
     Kind.MARGIN: "Optional. This gear's margin as found at rigging. Blank: {margin}.",
     Kind.MARGIN_U: "Optional. Standard uncertainty of that margin. Blank: 0.",
     Kind.TEMPERATURE: "Optional. Temperature in degrees Celsius, -60 to 60.",
     Kind.PRESSURE: "Optional. Hydraulic pressure in psi, 0 to 4000.",
-    Kind.APPROACH: "Optional. How the position was approached before the reading: EXTENDING or RETRACTING.",
+    Kind.APPROACH: (
+        "Optional. How the position was approached before the reading: EXTENDING or RETRACTING."
+    ),
     Kind.GAUGE_ID: "Optional. The gauge set that was used.",
     Kind.TECHNICIAN_ID: "Optional. Who measured.",
     Kind.WORK_ORDER: "Optional. Goes to the report unchanged.",
@@ -75,19 +88,30 @@ _INSTRUCTIONS = (
     "",
     "Use either of the two sheets, or both:",
     "  Inspections: one row is one inspection of one gear.",
-    "  Form: one sheet is one inspection. Copy the sheet for each further inspection (right click on its tab).",
+    (
+        "  Form: one sheet is one inspection. Copy the sheet for each further inspection (right"
+        " click on its tab)."
+    ),
     "",
     "Yellow columns and lines must be filled in. Everything else may stay blank.",
-    "Blank means not measured. 0 means measured and found to be zero. Never enter 0 for a joint that was not measured.",
+    (
+        "Blank means not measured. 0 means measured and found to be zero. Never enter 0 for a joint"
+        " that was not measured."
+    ),
     "",
     "Clearance convention: say how the clearances were taken. A wrong convention is a factor of 2.",
     *(f"  {c.value}: {c.meaning}" for c in ClearanceConvention),
     "",
-    "Lengths: in the sheet Inspections the unit is the last word of the column's name (_in, _thou, _mm). "
-    "To enter another unit, change that word in the header of that column.",
+    (
+        "Lengths: in the sheet Inspections the unit is the last word of the column's name (_in,"
+        " _thou, _mm). To enter another unit, change that word in the header of that column."
+    ),
     "In the sheet Form choose the unit in the line Unit.",
     "Use a decimal point or your program's own decimal mark, and no fractions.",
-    "Dates: year-month-day. Columns of your own may be added; they are carried to the report unchanged.",
+    (
+        "Dates: year-month-day. Columns of your own may be added; they are carried to the report"
+        " unchanged."
+    ),
     "",
     "Each column is explained in the comment of its header.",
     "Troubleshooting aid, not maintenance data: the limits of the maintenance manual apply.",
@@ -114,11 +138,21 @@ def write_book(path: str | Path, book: Workbook) -> None:
 
 
 def _fields(gear: Gear, unit: LengthUnit | None) -> list[Field]:
-    """Return the columns in one unit, or the lines of the form: these say their unit on a line of its own."""
+    """Return the columns in one unit, or the lines of the form: these say their unit on a line of
+    its own.
+    """
     numbers = gear.joint_numbers
-    several = {Kind.CLEARANCE: numbers, Kind.PLUNGER_DISPLACEMENT: (1, 2, 3), Kind.AXIAL_FLOAT: numbers}
+    several = {
+        Kind.CLEARANCE: numbers,
+        Kind.PLUNGER_DISPLACEMENT: (1, 2, 3),
+        Kind.AXIAL_FLOAT: numbers,
+    }
     kinds = [kind for kind in _MEANING if kind is not Kind.UNIT or unit is None]
-    return [Field(kind, n, unit if kind in LENGTHS else None) for kind in kinds for n in several.get(kind, (None,))]
+    return [
+        Field(kind, n, unit if kind in LENGTHS else None)
+        for kind in kinds
+        for n in several.get(kind, (None,))
+    ]
 
 
 def _explain(field: Field, gear: Gear, unit: LengthUnit) -> str:
@@ -179,7 +213,9 @@ def _table(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
         letters = column_letters(index)
         cell = sheet.cell(1, index + 1, field.name)
         cell.font = Font(name=FONT, bold=True)
-        cell.fill = PatternFill("solid", fgColor=_REQUIRED_FILL if field.kind in _MUST else HEADER_FILL)
+        cell.fill = PatternFill(
+            "solid", fgColor=_REQUIRED_FILL if field.kind in _MUST else HEADER_FILL
+        )
         cell.alignment = Alignment(wrap_text=True, vertical="center", horizontal="center")
         cell.border = Border(bottom=_LINE, right=_LINE)
         cell.comment = Comment(_explain(field, gear, unit), "mlg", width=320, height=120)
@@ -191,19 +227,35 @@ def _table(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
     sheet.freeze_panes = "D2"
     # On paper: which gear on every page, and its clearances together on the first.
     sheet.print_title_rows, sheet.print_title_cols = "1:1", "A:C"
-    sheet.page_setup.paperSize, sheet.page_setup.orientation, sheet.page_setup.scale = 9, "landscape", 53
+    sheet.page_setup.paperSize, sheet.page_setup.orientation, sheet.page_setup.scale = (
+        9,
+        "landscape",
+        53,
+    )
     for after in (Kind.CLEARANCE, Kind.MARGIN_U, Kind.REMARKS):
-        sheet.col_breaks.append(Break(id=max(i for i, field in enumerate(fields, 1) if field.kind is after)))
+        sheet.col_breaks.append(
+            Break(id=max(i for i, field in enumerate(fields, 1) if field.kind is after))
+        )
 
 
 def _validate(sheet: Worksheet, kind: Kind, cells: str) -> None:
     if kind in _CHOICES:
-        rule = DataValidation("list", formula1='"' + ",".join(_CHOICES[kind]) + '"', allow_blank=True)
-        rule.errorTitle, rule.error = "Not in the list", "Choose one of: " + ", ".join(_CHOICES[kind])
+        rule = DataValidation(
+            "list", formula1='"' + ",".join(_CHOICES[kind]) + '"', allow_blank=True
+        )
+        rule.errorTitle, rule.error = (
+            "Not in the list",
+            "Choose one of: " + ", ".join(_CHOICES[kind]),
+        )
     elif kind in _NEVER_NEGATIVE:
-        rule = DataValidation("decimal", operator="greaterThanOrEqual", formula1="0", allow_blank=True)
+        rule = DataValidation(
+            "decimal", operator="greaterThanOrEqual", formula1="0", allow_blank=True
+        )
         if kind in LENGTHS:
-            rule.errorTitle, rule.error = "Not a length", "Enter a number, 0 or more, or leave the cell blank."
+            rule.errorTitle, rule.error = (
+                "Not a length",
+                "Enter a number, 0 or more, or leave the cell blank.",
+            )
             rule.errorStyle = "warning"
     else:
         return
@@ -216,7 +268,9 @@ def _form(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
     sheet = book.create_sheet("Form")
     sheet["A1"] = FORM_TITLE
     sheet["A1"].font = Font(name=FONT, bold=True, size=14)
-    sheet["A2"] = "One sheet is one inspection. Yellow lines must be filled in; blank means not measured."
+    sheet["A2"] = (
+        "One sheet is one inspection. Yellow lines must be filled in; blank means not measured."
+    )
     for letters, width in (("A", 28), ("B", 24), ("C", 66)):
         sheet.column_dimensions[letters].width = width
     for row, field in enumerate(_fields(gear, None), 4):

@@ -1,7 +1,7 @@
 """Readings whose size fits another unit better: a pin hardly has less play than in new parts.
 
-A row is compared with the play of new parts that the gear file states, by the mean ratio of its non-zero readings.
-What each number costs and catches: `python -m tests.records.unit_confusions`.
+A row is compared with the play of new parts that the gear file states, by the mean ratio of its
+non-zero readings. What each number costs and catches: `python -m tests.records.unit_confusions`.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from mlg_troubleshoot.decision.inspection import EnteredClearance
 from mlg_troubleshoot.records.model import ReadOptions
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
-# Below this ratio to new parts a reading is clearly too small. Inches taken for millimetres stay below it
-# unless the joints are worn beyond their limits on average (0.6 x 25.4 x 0.0005 in = 0.0076 in).
-# A row whose mean lies between this and new parts may be of a new gear, or of a gear with its joints worn out on
-# average that was read in another unit: it is asked about.
+# Below this ratio to new parts a reading is clearly too small. Inches taken for millimetres stay
+# below it unless the joints are worn beyond their limits on average (0.6 x 25.4 x 0.0005 in =
+# 0.0076 in). A row whose mean lies between this and new parts may be of a new gear, or of a gear
+# with its joints worn out on average that was read in another unit: it is asked about.
 _TOO_SMALL = 0.6
 # Fewer readings than this do not show what the others of the row were read in.
 _FEWEST = 3
@@ -25,7 +25,8 @@ _FEWEST = 3
 _PLUNGER_NEAR_ZERO_IN = 0.0025
 _ROUNDING = 1e-9
 CONFIRM_SMALL = (
-    "Correct the unit, or confirm the readings: --small-readings-true, or yes in a column small_readings_true."
+    "Correct the unit, or confirm the readings: --small-readings-true, or yes in a column"
+    " small_readings_true."
 )
 
 
@@ -40,7 +41,9 @@ class UnitFit(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class RowUnit:
-    """How the readings of a row fit their unit, the joints whose readings do not, and what to ask about them."""
+    """How the readings of a row fit their unit, the joints whose readings do not, and what to ask
+    about them.
+    """
 
     scale: UnitFit = UnitFit.FITS
     joints: tuple[int, ...] = ()
@@ -55,7 +58,9 @@ def judge_unit(
 ) -> RowUnit:
     """Judge whether the readings of a row can have been read in the unit that is stated. [in]"""
     read = {
-        joint: value for joint, value in radial_in.items() if value > 0.0 and options.new_part_in.get(joint, 0.0) > 0.0
+        joint: value
+        for joint, value in radial_in.items()
+        if value > 0.0 and options.new_part_in.get(joint, 0.0) > 0.0
     }
     if not read:
         return RowUnit()
@@ -66,7 +71,8 @@ def judge_unit(
     small = tuple(joint for joint, ratio in ratios.items() if ratio < _TOO_SMALL)
     scale = UnitFit.FITS
     if stated is LengthUnit.INCH:
-        # No unit is larger: single readings say nothing, a row of them may be of another convention.
+        # No unit is larger: single readings say nothing, a row of them may be of another
+        # convention.
         small = small if enough and mean < _TOO_SMALL else ()
     elif mean < _TOO_SMALL:
         scale = UnitFit.TOO_SMALL if enough else UnitFit.DOUBTFUL
@@ -83,7 +89,9 @@ def judge_unit(
 
 
 def plunger_question(displacement_in: float, stated: LengthUnit, options: ReadOptions) -> str:
-    """Ask about a plunger reading near zero that would be outside the margin in a larger unit. [in]"""
+    """Ask about a plunger reading near zero that would be outside the margin in a larger unit.
+    [in]
+    """
     if not 0.0 < abs(displacement_in) <= _PLUNGER_NEAR_ZERO_IN:
         return ""
     number = stated.from_inches(displacement_in)
@@ -97,7 +105,10 @@ def plunger_question(displacement_in: float, stated: LengthUnit, options: ReadOp
         return ""
     confirm = "" if options.asks else f" {CONFIRM_SMALL}"
     read = f"read in {' or '.join(others)}, not in {stated.words}"
-    return f"the plunger reading of {number:g} {stated} is {displacement_in:.4f} in: was it {read}?{confirm}"
+    return (
+        f"the plunger reading of {number:g} {stated} is {displacement_in:.4f} in: was it"
+        f" {read}?{confirm}"
+    )
 
 
 def _small_question(
@@ -118,27 +129,42 @@ def _small_question(
         names = " or ".join(unit.words for unit in others)
         confirm = "" if options.asks else f" {CONFIRM_SMALL}"
         return f"{said}: {_asked(joints)} read in {names}, not in {stated.words}?{confirm}"
-    factor = "" if convention is ClearanceConvention.RADIAL else ", or is it a radial clearance (factor 2)"
+    factor = (
+        ""
+        if convention is ClearanceConvention.RADIAL
+        else ", or is it a radial clearance (factor 2)"
+    )
     return f"{said}: has the decimal point slipped{factor}?"
 
 
 def _large_question(
-    joints: tuple[int, ...], read: Mapping[int, float], stated: LengthUnit, convention: ClearanceConvention
+    joints: tuple[int, ...],
+    read: Mapping[int, float],
+    stated: LengthUnit,
+    convention: ClearanceConvention,
 ) -> str:
     other = LengthUnit.MILLIMETRE if stated is LengthUnit.INCH else LengthUnit.THOU
     factor = " Or is it a diametral clearance or total play, not radial (factor 2)?"
     return (
-        f"{_readings(joints, read)} above the limit: {_asked(joints)} read in {other.words}, not in {stated.words}?"
-        f"{factor if convention is ClearanceConvention.RADIAL else ''}"
+        f"{_readings(joints, read)} above the limit: {_asked(joints)} read in {other.words}, not in"
+        f" {stated.words}?{factor if convention is ClearanceConvention.RADIAL else ''}"
     )
 
 
 def _plausible(
-    joints: tuple[int, ...], read: Mapping[int, float], stated: LengthUnit, other: LengthUnit, options: ReadOptions
+    joints: tuple[int, ...],
+    read: Mapping[int, float],
+    stated: LengthUnit,
+    other: LengthUnit,
+    options: ReadOptions,
 ) -> bool:
     """Whether the readings would be those of a gear, had they been read in the other unit."""
-    mean_in = other.to_inches(stated.from_inches(sum(read[joint] for joint in joints) / len(joints)))
-    return options.new_part_in[joints[0]] * _TOO_SMALL <= mean_in <= options.clearance_confirm_above_in
+    mean_in = other.to_inches(
+        stated.from_inches(sum(read[joint] for joint in joints) / len(joints))
+    )
+    return (
+        options.new_part_in[joints[0]] * _TOO_SMALL <= mean_in <= options.clearance_confirm_above_in
+    )
 
 
 def _readings(joints: tuple[int, ...], read: Mapping[int, float]) -> str:

@@ -1,4 +1,6 @@
-"""Cell values read as lengths, numbers, names and dates; what cannot be read is a fault with its remedy."""
+"""Cell values read as lengths, numbers, names and dates; what cannot be read is a fault with its
+remedy.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ from mlg_troubleshoot.units import MINUS, LengthUnit, parse_length
 
 
 class CellFaultError(Exception):
-    """A cell that does not hold what its column needs; caught by the row reader and made a `Problem`."""
+    """A cell that does not hold what its column needs; caught by the row reader and made a
+    `Problem`.
+    """
 
     def __init__(self, code: str, expected: str, remedy: str = "") -> None:
         super().__init__(code)
@@ -29,28 +33,42 @@ class CellFaultError(Exception):
 # The remedy by the code of a fault; a fault that knows better says so itself.
 _USUAL = {
     "cell_is_boolean": "The cell holds TRUE or FALSE. Enter the value.",
-    "cell_is_date": "The cell is formatted as a date or time; a fraction such as 1/8 is turned into one. Format the "
-    "cell as a number (or text) and enter the value again.",
-    "date_ambiguous": "Which number is the day and which the month is not guessed. Enter year-month-day, for example "
-    "2026-03-04, or say the order with --dates dmy, mdy or ymd.",
+    "cell_is_date": (
+        "The cell is formatted as a date or time; a fraction such as 1/8 is turned into one. Format"
+        " the cell as a number (or text) and enter the value again."
+    ),
+    "date_ambiguous": (
+        "Which number is the day and which the month is not guessed. Enter year-month-day, for"
+        " example 2026-03-04, or say the order with --dates dmy, mdy or ymd."
+    ),
     "date_in_the_future": "Check the year, and the clock of this computer.",
     "date_invalid": "Enter year-month-day, for example 2026-03-04.",
     "date_out_of_range": "Check the year.",
-    "date_serial": "The cell holds a bare number. Format it as a date, or enter year-month-day as text.",
-    "formula_without_value": "The formula has never been calculated. Open the file in a spreadsheet program, save it, "
-    "read it again.",
+    "date_serial": (
+        "The cell holds a bare number. Format it as a date, or enter year-month-day as text."
+    ),
+    "formula_without_value": (
+        "The formula has never been calculated. Open the file in a spreadsheet program, save it, "
+        "read it again."
+    ),
     "fraction": "Fractions are not read. Enter a decimal number, for example 0.125.",
-    "length_negative": "It cannot be less than zero. Enter the value as measured, or leave it blank if it was not "
-    "measured.",
+    "length_negative": (
+        "It cannot be less than zero. Enter the value as measured, or leave it blank if it was not "
+        "measured."
+    ),
     "not_a_number": "Enter a plain number, or leave it blank if it is not known.",
     "not_finite": "Enter a number, or leave it blank if it was not measured.",
-    "number_lost_digits": "A spreadsheet keeps 15 digits of a number. Format the cell as text and enter it again.",
+    "number_lost_digits": (
+        "A spreadsheet keeps 15 digits of a number. Format the cell as text and enter it again."
+    ),
     "outcome_unknown": "Enter RETRACTED or FAILED, or leave it blank if it is not known.",
     "out_of_range": "Check the number and the unit, or leave it blank if it is not known.",
     "text_control_character": "It holds a line break or an invisible character. Enter it again.",
     "text_unwritable": "It holds a character that no file can carry. Enter the text again.",
-    "unit_missing": "Nothing says the unit. Write it with the value (0.013 in, 13 thou, 0.33 mm) or in the header "
-    "(_in, _thou, _mm), or pass --unit.",
+    "unit_missing": (
+        "Nothing says the unit. Write it with the value (0.013 in, 13 thou, 0.33 mm) or in the"
+        " header (_in, _thou, _mm), or pass --unit."
+    ),
 }
 
 
@@ -64,8 +82,31 @@ _INVISIBLE = {ord(c): None for c in "\u200b\u200c\u200d\u2060\ufeff"}
 # What people write where nothing was measured; the error value #N/A is not one of them.
 NOT_MEASURED = frozenset(
     (
-        *("-", "--", "\u2010", "\u2011", "\u2012", "\u2013", "\u2014", "\u2212", "n/a", "na", "n.a.", "nm", "n/m"),
-        *("n.m.", "nil", "none", "not measured", "not taken", "not done", "not applicable", "not accessible"),
+        *(
+            "-",
+            "--",
+            "\u2010",
+            "\u2011",
+            "\u2012",
+            "\u2013",
+            "\u2014",
+            "\u2212",
+            "n/a",
+            "na",
+            "n.a.",
+            "nm",
+            "n/m",
+        ),
+        *(
+            "n.m.",
+            "nil",
+            "none",
+            "not measured",
+            "not taken",
+            "not done",
+            "not applicable",
+            "not accessible",
+        ),
     )
 )
 
@@ -76,11 +117,15 @@ _ODD_CELLS = {OddKind.NO_VALUE: "formula_without_value", OddKind.DATE: "cell_is_
 
 
 def odd_cell_fault(cell: OddCell, expected: str) -> CellFaultError:
-    """Return the fault of a cell that holds an error, a date, a truth value or nothing that was computed."""
+    """Return the fault of a cell that holds an error, a date, a truth value or nothing that was
+    computed.
+    """
     if cell.kind is OddKind.ERROR:
         said = f"The cell shows the error {cell.text}, which is not the same as not measured."
         return CellFaultError(
-            "cell_error", expected, f"{said} Enter the value, or empty the cell if it was not measured."
+            "cell_error",
+            expected,
+            f"{said} Enter the value, or empty the cell if it was not measured.",
         )
     return CellFaultError(_ODD_CELLS.get(cell.kind, "cell_is_boolean"), expected)
 
@@ -106,7 +151,9 @@ def read_length(
     decimal_comma: bool,
     expected: str,
 ) -> tuple[float, LengthUnit, str]:
-    """Read a length in its own unit or that of its column, which must agree, or else in the declared one."""
+    """Read a length in its own unit or that of its column, which must agree, or else in the
+    declared one.
+    """
     if isinstance(cell, str):
         text = plain_text(cell)
         value, written = _written_length(text, decimal_comma, expected, unit)
@@ -121,8 +168,9 @@ def read_length(
         raise CellFaultError(
             "unit_contradiction",
             f"{expected}, in the unit of the column ({unit.value})",
-            f"The cell says {written.value}, the column says {unit.value}. If the cell is right, enter {same} "
-            f"({unit.value}); if the column is right, enter the number without a unit.",
+            f"The cell says {written.value}, the column says {unit.value}. If the cell is right,"
+            f" enter {same} ({unit.value}); if the column is right, enter the number without a"
+            " unit.",
         )
     found = written or unit or declared
     if found is None:
@@ -151,7 +199,9 @@ _EXAMPLES = {LengthUnit.INCH: "0.013", LengthUnit.THOU: "13", LengthUnit.MILLIME
 
 
 def _comma_fault(text: str, expected: str) -> CellFaultError:
-    remedy = f"If the comma is the decimal mark, enter {text.replace(',', '.')} or pass --decimal-comma."
+    remedy = (
+        f"If the comma is the decimal mark, enter {text.replace(',', '.')} or pass --decimal-comma."
+    )
     return CellFaultError("decimal_comma", f"{expected}, with a decimal point", remedy)
 
 
@@ -160,14 +210,23 @@ def _length_fault(text: str, body: str, expected: str, unit: LengthUnit | None) 
         return _comma_fault(text, expected)
     if re.fullmatch(r"\d+\s*/\s*\d+.*", body):
         return CellFaultError("fraction", expected)
-    # A unit beside the number is refused where the header states another: the example is in the header's.
-    example = f"{_EXAMPLES[unit]} ({unit.value})" if unit is not None else "0.013 in, 13 thou or 0.33 mm"
+    # A unit beside the number is refused where the header states another: the example is in the
+    # header's.
+    example = (
+        f"{_EXAMPLES[unit]} ({unit.value})" if unit is not None else "0.013 in, 13 thou or 0.33 mm"
+    )
     remedy = f"Enter a number, for example {example}, or leave it blank if it was not measured."
     return CellFaultError("not_a_length", expected, remedy)
 
 
 def read_number(
-    cell: str | float | OddCell, low: float, high: float, *, decimal_comma: bool, expected: str, suffix: str = ""
+    cell: str | float | OddCell,
+    low: float,
+    high: float,
+    *,
+    decimal_comma: bool,
+    expected: str,
+    suffix: str = "",
 ) -> float:
     if isinstance(cell, str):
         value = _written_number(plain_text(cell), decimal_comma, expected, suffix)
@@ -188,7 +247,10 @@ def _written_number(text: str, decimal_comma: bool, expected: str, suffix: str) 
         text = ("" if sign[1] == "+" else "-") + text[sign.end() :]
     if "," in text or decimal_comma:
         if _UNCLEAR_GROUP.fullmatch(text):
-            remedy = f"{text!r} may be a thousand or a fraction. Enter it without a separator for thousands."
+            remedy = (
+                f"{text!r} may be a thousand or a fraction. Enter it without a separator for"
+                " thousands."
+            )
             raise CellFaultError("ambiguous_number", expected, remedy)
         if decimal_comma and _COMMA_NUMBER.fullmatch(text):
             text = text.replace(",", ".")
@@ -219,7 +281,9 @@ def read_text(cell: str | float | OddCell, expected: str, *, required: bool = Fa
     raise odd_cell_fault(cell, expected)
 
 
-def read_choice(cell: str | float | OddCell, choices: type[_E], code: str, hints: dict[str, str]) -> _E:
+def read_choice(
+    cell: str | float | OddCell, choices: type[_E], code: str, hints: dict[str, str]
+) -> _E:
     """Read one of a few words, in upper or lower case."""
     known = choices.__members__
     if isinstance(cell, str) and cell in known:
@@ -237,7 +301,10 @@ def read_choice(cell: str | float | OddCell, choices: type[_E], code: str, hints
     raise CellFaultError(code, expected, remedy)
 
 
-_YES_NO = {**dict.fromkeys(("yes", "y", "true", "1"), True), **dict.fromkeys(("no", "n", "false", "0"), False)}
+_YES_NO = {
+    **dict.fromkeys(("yes", "y", "true", "1"), True),
+    **dict.fromkeys(("no", "n", "false", "0"), False),
+}
 
 
 def _yes_no(cell: str | float | OddCell) -> bool | None:
@@ -255,16 +322,31 @@ def read_yes_no(cell: str | float | OddCell) -> bool:
 
 
 _OUTCOME_WORDS = {
-    **dict.fromkeys(("retracted", "retracts", "ok", "okay", "pass", "passed", "good", "normal"), Outcome.RETRACTED),
     **dict.fromkeys(
-        ("failed", "fail", "fails", "failure", "failed to retract", "did not retract", "not retracted", "ng", "not ok"),
+        ("retracted", "retracts", "ok", "okay", "pass", "passed", "good", "normal"),
+        Outcome.RETRACTED,
+    ),
+    **dict.fromkeys(
+        (
+            "failed",
+            "fail",
+            "fails",
+            "failure",
+            "failed to retract",
+            "did not retract",
+            "not retracted",
+            "ng",
+            "not ok",
+        ),
         Outcome.FAILED,
     ),
 }
 
 
 def _outcome_word(text: str) -> Outcome | None:
-    return _OUTCOME_WORDS.get(re.sub(r"[\s_\-]+", " ", plain_text(text).replace(".", "")).casefold())
+    return _OUTCOME_WORDS.get(
+        re.sub(r"[\s_\-]+", " ", plain_text(text).replace(".", "")).casefold()
+    )
 
 
 def says_failed(text: str) -> bool:
@@ -273,7 +355,9 @@ def says_failed(text: str) -> bool:
 
 
 def read_outcome(cell: str | float | OddCell, header: str) -> Outcome:
-    """Read what the gear did; yes and no count only where the header asks a question (`Retracted?`, `Failed?`)."""
+    """Read what the gear did; yes and no count only where the header asks a question (`Retracted?`,
+    `Failed?`).
+    """
     if isinstance(cell, str):
         found = _outcome_word(cell)
         if found is not None:
@@ -298,11 +382,14 @@ class AmbiguousDateError(CellFaultError):
         self.days = days
 
 
-def read_date(cell: str | float | OddCell, order: DateOrder | None = None, latest: date = date.max) -> date:
-    """Read a day: ISO 8601, a month as a word, numbers in one order, or a cell that is formatted as a date.
+def read_date(
+    cell: str | float | OddCell, order: DateOrder | None = None, latest: date = date.max
+) -> date:
+    """Read a day: ISO 8601, a month as a word, numbers in one order, or a cell that is formatted as
+    a date.
 
-    A day after `latest` is refused. Numbers of which only one order makes a day need no `order`; others raise
-    `AmbiguousDateError` without one.
+    A day after `latest` is refused. Numbers of which only one order makes a day need no `order`;
+    others raise `AmbiguousDateError` without one.
     """
     expected = "a date as 2026-03-04 (year-month-day) or 4 Mar 2026"
     if isinstance(cell, float):

@@ -35,7 +35,10 @@ def xls_book(data: bytes) -> Workbook:
     if "EncryptedPackage".encode(_UTF16) in data:
         raise password_protected()
     if len(data) > MAX_BYTES:
-        found, expected = f"an .xls workbook of {len(data) / 1e6:.0f} MB", f"at most {MAX_BYTES // 1_000_000} MB"
+        found, expected = (
+            f"an .xls workbook of {len(data) / 1e6:.0f} MB",
+            f"at most {MAX_BYTES // 1_000_000} MB",
+        )
         raise FileRefusedError("file_too_large", found, expected, COPY_THE_TABLE)
     return Workbook("xls", _sheets(data), [MACROS] if "_VBA_PROJECT".encode(_UTF16) in data else [])
 
@@ -49,7 +52,9 @@ def _sheets(data: bytes) -> list[_XlsSheet]:
         if "encrypted" in str(error).lower():
             raise password_protected() from None
         if "find workbook" in str(error).lower():
-            raise FileRefusedError("file_kind", "an old Office file that is not a workbook") from None
+            raise FileRefusedError(
+                "file_kind", "an old Office file that is not a workbook"
+            ) from None
         raise damaged("its records cannot be read") from None
     except xlrd.compdoc.CompDocError:
         raise damaged("its records are incomplete") from None
@@ -63,7 +68,10 @@ class _XlsSheet(Sheet):
         self._sheet = sheet
 
     def merged(self) -> Sequence[MergedRange]:
-        return [(top + 1, left, bottom, right - 1) for top, bottom, left, right in self._sheet.merged_cells]
+        return [
+            (top + 1, left, bottom, right - 1)
+            for top, bottom, left, right in self._sheet.merged_cells
+        ]
 
     def _read(self) -> Iterator[NumberedRow]:
         sheet = self._sheet

@@ -1,10 +1,11 @@
 """Workbooks of Excel and LibreOffice (.xlsx, .xlsm), read by openpyxl behind a guard.
 
-Openpyxl finds the sheets and walks over the rows. What stands in a cell is taken here, since it would hide a formula
-without a result (blank), a date outside the calendar (an error value) and the escaped characters of a text, refuse a
-whole sheet for ``NaN`` in a number, and tell neither hidden rows nor which results are of formulas. Texts and styles
-are also taken here: its model of the styles refuses workbooks of other programs for a colour it does not know, and a
-text with ``x005F_`` in it would lose that.
+Openpyxl finds the sheets and walks over the rows. What stands in a cell is taken here, since it
+would hide a formula without a result (blank), a date outside the calendar (an error value) and the
+escaped characters of a text, refuse a whole sheet for ``NaN`` in a number, and tell neither hidden
+rows nor which results are of formulas. Texts and styles are also taken here: its model of the
+styles refuses workbooks of other programs for a colour it does not know, and a text with ``x005F_``
+in it would lose that.
 """
 
 from __future__ import annotations
@@ -47,12 +48,23 @@ from mlg_troubleshoot.records.cells import (
 )
 from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.source import MACROS, MergedRange, NumberedRow, Sheet, Workbook
-from mlg_troubleshoot.records.zipguard import MAX_ITEMS, GuardedZip, Stream, damage, damaged, outside_limits, too_large
+from mlg_troubleshoot.records.zipguard import (
+    MAX_ITEMS,
+    GuardedZip,
+    Stream,
+    damage,
+    damaged,
+    outside_limits,
+    too_large,
+)
 
 _MERGE = re.compile(rb'<(?:\w+:)?mergeCell\s[^<>]*?ref="([A-Z]{1,3}\d{1,7}:[A-Z]{1,3}\d{1,7})"')
-_TEXT_TAG, _PHONETIC_TAG, _STRING_TAG = (f"{{{SHEET_MAIN_NS}}}{name}" for name in ("t", "rPh", "si"))
+_TEXT_TAG, _PHONETIC_TAG, _STRING_TAG = (
+    f"{{{SHEET_MAIN_NS}}}{name}" for name in ("t", "rPh", "si")
+)
 _TRUE = ("1", "true", "on")
-# "Strict Open XML", which Excel offers, differs from what openpyxl knows in the names of two vocabularies.
+# "Strict Open XML", which Excel offers, differs from what openpyxl knows in the names of two
+# vocabularies.
 _STRICT = (
     (b"http://purl.oclc.org/ooxml/spreadsheetml/main", SHEET_MAIN_NS.encode()),
     (
@@ -94,7 +106,8 @@ class XlsxFile(Workbook):
             reader.read_workbook()
             self.epoch_1904: bool = reader.wb.epoch == CALENDAR_MAC_1904
             self._parts = {
-                rel.Type.rpartition("/")[2]: rel.target for rel in cast(dict[str, Any], reader.parser.rels).values()
+                rel.Type.rpartition("/")[2]: rel.target
+                for rel in cast(dict[str, Any], reader.parser.rels).values()
             }
             self.sheets = tuple(
                 XlsxSheet(sheet.name, rel.target, sheet.state != "visible", self)
@@ -118,18 +131,25 @@ class XlsxFile(Workbook):
 
     @cached_property
     def odd_styles(self) -> dict[str, int]:
-        """Return the styles that show a number as a date (0) or with leading zeros (how many digits)."""
+        """Return the styles that show a number as a date (0) or with leading zeros (how many
+        digits).
+        """
         part = self._parts.get("styles", "")
         if part.lower() not in self.archive.names:
             return {}
         with damage(f"{part} is not well-formed"):
             root = fromstring(self.archive.read(part))
-        codes = {number.get("numFmtId"): number.get("formatCode", "") for number in root.iterfind(".//{*}numFmt")}
+        codes = {
+            number.get("numFmtId"): number.get("formatCode", "")
+            for number in root.iterfind(".//{*}numFmt")
+        }
         found: dict[str, int] = {}
         for index, style in enumerate(root.iterfind("{*}cellXfs/{*}xf")):
             format_id = style.get("numFmtId", "0")
             code = codes.get(format_id)
-            if is_date_format(int(format_id) if re.fullmatch(r"[0-9]{1,5}", format_id) else 0, code):
+            if is_date_format(
+                int(format_id) if re.fullmatch(r"[0-9]{1,5}", format_id) else 0, code
+            ):
                 found[str(index)] = 0
             elif padding_width(code):
                 found[str(index)] = padding_width(code)
@@ -149,7 +169,9 @@ def _refuse_other_kinds(kinds: str) -> None:
 
 def _text(element: Element) -> str | None:
     """Return the text of a cell, without its pronunciation; None if it is blank."""
-    pieces = (t.text or "" for run in element if run.tag != _PHONETIC_TAG for t in run.iter(_TEXT_TAG))
+    pieces = (
+        t.text or "" for run in element if run.tag != _PHONETIC_TAG for t in run.iter(_TEXT_TAG)
+    )
     return _shown("".join(pieces))
 
 
@@ -165,7 +187,9 @@ class XlsxSheet(Sheet):
         self.book = book
 
     def merged(self) -> Sequence[MergedRange]:
-        """Search the part: they stand behind the last row and are asked for before the first is judged."""
+        """Search the part: they stand behind the last row and are asked for before the first is
+        judged.
+        """
         found: list[MergedRange] = []
         tail = b""
         for chunk in self.book.archive.chunks(self.part):
@@ -202,7 +226,9 @@ class _Rows(WorkSheetParser):
         self._styles = sheet.book.odd_styles
 
     def parse(self) -> Generator[NumberedRow]:
-        """Read the rows only: what stands behind them, such as rules, can make openpyxl refuse the whole sheet."""
+        """Read the rows only: what stands behind them, such as rules, can make openpyxl refuse the
+        whole sheet.
+        """
         for element in self._sheet.elements():
             if element.tag == ROW_TAG:
                 yield self.parse_row(element)
@@ -246,7 +272,10 @@ class _Rows(WorkSheetParser):
         else:
             letters = reference.rstrip("0123456789")
             if reference[len(letters) :] != str(self.row_counter):
-                raise damaged(f"cell {reference!r} of sheet {self._sheet.name!r} stands in row {self.row_counter}")
+                raise damaged(
+                    f"cell {reference!r} of sheet {self._sheet.name!r} stands in row"
+                    f" {self.row_counter}"
+                )
             self.col_counter = column_index_from_string(letters)
         return self.col_counter - 1
 

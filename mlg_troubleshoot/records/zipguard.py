@@ -1,4 +1,6 @@
-"""What is refused before a packed workbook is parsed: bombs, declared entities, encrypted or broken archives."""
+"""What is refused before a packed workbook is parsed: bombs, declared entities, encrypted or broken
+archives.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +21,24 @@ MAX_RATIO = 100
 MAX_MEMBERS = 5_000
 _SMALL_MEMBER_BYTES = 1_000_000
 _CHUNK = 1 << 16
-_BEFORE_ROOT = re.compile(rb"(?:\xef\xbb\xbf|\xff\xfe|\xfe\xff)?(?:\s++|<\?.*?\?>|<!--.*?-->)*+", re.DOTALL)
-# A tree is kept until a row or a text is complete, and an empty shell of each until the end of its part.
+_BEFORE_ROOT = re.compile(
+    rb"(?:\xef\xbb\xbf|\xff\xfe|\xfe\xff)?(?:\s++|<\?.*?\?>|<!--.*?-->)*+", re.DOTALL
+)
+# A tree is kept until a row or a text is complete, and an empty shell of each until the end of its
+# part.
 MAX_OPEN_BYTES = 2_000_000
 MAX_ITEMS = 1 << 20
-# What zipfile raises: NotImplementedError for compression that it lacks, RuntimeError for encrypted members.
-_ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError, ValueError, RuntimeError)
+# What zipfile raises: NotImplementedError for compression that it lacks, RuntimeError for encrypted
+# members.
+_ZIP_ERRORS = (
+    zipfile.BadZipFile,
+    zlib.error,
+    EOFError,
+    OSError,
+    NotImplementedError,
+    ValueError,
+    RuntimeError,
+)
 # What openpyxl, xlrd and the parser of XML raise on damaged bytes: a part or an attribute that is
 # missing, a wrong kind of element or value, a place outside the texts or the bytes, XML that is not
 # well-formed, a text in no known encoding, arithmetic on wrong lengths, their own checks.
@@ -79,7 +93,8 @@ class GuardedZip:
         for member in members:
             if member.file_size > max(_SMALL_MEMBER_BYTES, MAX_RATIO * member.compress_size):
                 raise too_large(
-                    f"{member.filename} unpacks to {member.file_size / max(member.compress_size, 1):.0f} times its size"
+                    f"{member.filename} unpacks to"
+                    f" {member.file_size / max(member.compress_size, 1):.0f} times its size"
                 )
         self._refuse_declarations()
 
@@ -90,7 +105,10 @@ class GuardedZip:
             before = _BEFORE_ROOT.match(head)
             rest = head[before.end() if before is not None else 0 :]
             if rest.startswith((b"<!", b"<?")) or (not rest and len(head) >= _CHUNK // 2):
-                found = f"{name} declares a document type or entities, which no spreadsheet program writes"
+                found = (
+                    f"{name} declares a document type or entities, which no spreadsheet program"
+                    " writes"
+                )
                 raise FileRefusedError("xml_declaration", found)
 
     @property
@@ -125,7 +143,9 @@ class GuardedZip:
 
 
 class Stream:
-    """A part as a file, refused before the buffer up to the end of a row or a text becomes too large."""
+    """A part as a file, refused before the buffer up to the end of a row or a text becomes too
+    large.
+    """
 
     def __init__(self, archive: GuardedZip, part: str) -> None:
         self._part = part
@@ -136,7 +156,9 @@ class Stream:
         piece = next(self._chunks, b"")
         self._open += len(piece)
         if self._open > MAX_OPEN_BYTES:
-            raise too_large(f"one row or text of {self._part} is longer than {MAX_OPEN_BYTES // 1_000_000} MB")
+            raise too_large(
+                f"one row or text of {self._part} is longer than {MAX_OPEN_BYTES // 1_000_000} MB"
+            )
         return piece
 
     def end_item(self) -> None:
@@ -150,7 +172,8 @@ def too_large(what: str) -> FileRefusedError:
     return FileRefusedError(
         "file_too_large",
         f"the workbook is far too large or packed to look small: {what}",
-        f"at most {MAX_EXPANDED_BYTES // 1_000_000} MB unpacked and {MAX_RATIO} times the packed size",
+        f"at most {MAX_EXPANDED_BYTES // 1_000_000} MB unpacked and {MAX_RATIO} times the packed"
+        " size",
         COPY_THE_TABLE,
     )
 
@@ -160,7 +183,9 @@ def password_protected() -> FileRefusedError:
 
 
 def outside_limits(sheet: str | None, column: int, row: int) -> FileRefusedError:
-    """Return the refusal of a sheet with something in a cell (its column counted from 0) that no table reaches."""
+    """Return the refusal of a sheet with something in a cell (its column counted from 0) that no
+    table reaches.
+    """
     cell = f"{column_letters(column)}{row}"
     return FileRefusedError(
         "cell_outside_limits",

@@ -18,7 +18,9 @@ DISCLAIMER = (
 )
 
 
-def head(title: str, footer: str, gear: Gear, provenance: ReportProvenance, lengths: Lengths) -> dict[str, Any]:
+def head(
+    title: str, footer: str, gear: Gear, provenance: ReportProvenance, lengths: Lengths
+) -> dict[str, Any]:
     """Return what the base template shows; the caller adds its own and may replace any of it."""
     return {
         "title": title,
@@ -26,9 +28,13 @@ def head(title: str, footer: str, gear: Gear, provenance: ReportProvenance, leng
         "footer_left": footer,
         "footer_middle": _program_and_hashes(provenance),
         "disclaimer": DISCLAIMER,
-        "source_counts": [(sum(n.kind is kind for n in gear.numbers), kind.value) for kind in SourceKind],
+        "source_counts": [
+            (sum(n.kind is kind for n in gear.numbers), kind.value) for kind in SourceKind
+        ],
         "limits_of": sorted({(j.limit.value, j.limit.kind, j.limit.source) for j in gear.joints}),
-        "alike": [" = ".join(map("#{}".format, pair)) for pair in gear.link_groups if len(pair) > 1],
+        "alike": [
+            " = ".join(map("#{}".format, pair)) for pair in gear.link_groups if len(pair) > 1
+        ],
         "made": provenance,
         "made_on": provenance.created.date().isoformat(),
         "lengths": lengths,
@@ -41,5 +47,7 @@ def _program_and_hashes(p: ReportProvenance) -> str:
     hashes = list(p.input_sha256.values())
     parts = [f"mlg {p.program_version}", f"geometry {digest(p.geometry_sha256, 8)}"]
     if hashes:
-        parts.append(f"input {digest(hashes[0], 8)}" if len(hashes) == 1 else f"{len(hashes)} inputs")
+        parts.append(
+            f"input {digest(hashes[0], 8)}" if len(hashes) == 1 else f"{len(hashes)} inputs"
+        )
     return " · ".join(parts)

@@ -1,4 +1,6 @@
-"""Figures of the diagnosis report: its sign, residuals before and after, measured against predicted, tails."""
+"""Figures of the diagnosis report: its sign, residuals before and after, measured against
+predicted, tails.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ _UNITS = {"temperature_c": "°C", "hydraulic_pressure_psi": "psi", ALONG: "in"}
 
 @dataclass(frozen=True)
 class Residuals:
-    """The rows behind a diagnosis, before and after its extension, and the unit that they are drawn in."""
+    """The rows behind a diagnosis, before and after its extension, and the unit that they are drawn
+    in.
+    """
 
     diagnosis: Diagnosis
     joints: tuple[int, ...]
@@ -52,7 +56,9 @@ class Residuals:
     def effect_in(self) -> Array:
         """What the named causes add to the prediction, shape (n,); zero if none is named. [in]"""
         none = np.zeros(len(self.before_in))
-        return np.asarray(np.sum([none, *(cause.effect_in for cause in self.diagnosis.causes)], axis=0))
+        return np.asarray(
+            np.sum([none, *(cause.effect_in for cause in self.diagnosis.causes)], axis=0)
+        )
 
     @property
     def after_in(self) -> Array:
@@ -81,18 +87,27 @@ class Against:
 
 
 def against_cause(residuals: Residuals, candidate: Candidate, effect_in: Array) -> Against:
-    """Choose what to draw residuals against: the column that the cause lives on, else the prediction."""
+    """Choose what to draw residuals against: the column that the cause lives on, else the
+    prediction.
+    """
     table, setting = residuals.diagnosis.used, candidate.setting
     joints = [setting["joint"]] if "joint" in setting else list(setting.get("pair", ()))
     if joints:
         least = residuals.drawn(np.min([residuals.clearance(joint) for joint in joints], axis=0))
         named = " and ".join(f"#{joint}" for joint in joints)
-        return Against(f"{'smaller ' if len(joints) > 1 else ''}clearance of {named}, {residuals.unit}", least)
+        return Against(
+            f"{'smaller ' if len(joints) > 1 else ''}clearance of {named}, {residuals.unit}", least
+        )
     if "tail" in setting and "day" in table.quantities:
         rows = table.factors["tail_no"] == setting["tail"]
         if "side" in setting:
             rows = rows & (table.factors["side"] == setting["side"])
-        return Against(_day_label(residuals), table.quantities["day"], marked=rows, marked_label=candidate.target or "")
+        return Against(
+            _day_label(residuals),
+            table.quantities["day"],
+            marked=rows,
+            marked_label=candidate.target or "",
+        )
     for need in candidate.cause.needs:
         if need == "axial_float" and table.axial_float_in is not None:
             return _most_telling_float(residuals, table.axial_float_in, effect_in)
@@ -113,11 +128,15 @@ def against_column(residuals: Residuals, name: str) -> Against:
     kind, _, joint = name.rpartition("_")
     if joint.isdigit() and int(joint) in residuals.joints:
         if kind == "clearance":
-            return Against(f"{column_words(name)}, {unit}", residuals.drawn(residuals.clearance(int(joint))))
+            return Against(
+                f"{column_words(name)}, {unit}", residuals.drawn(residuals.clearance(int(joint)))
+            )
         if kind == "axial_float" and table.axial_float_in is not None:
             values = table.axial_float_in[:, residuals.joints.index(int(joint))]
             return Against(f"{column_words(name)}, {unit}", residuals.drawn(values))
-    return Against(f"predicted displacement, {unit}", residuals.drawn(residuals.diagnosis.predicted_in))
+    return Against(
+        f"predicted displacement, {unit}", residuals.drawn(residuals.diagnosis.predicted_in)
+    )
 
 
 def split_by(residuals: Residuals, name: str, other: Against) -> tuple[Mask, str, str] | None:
@@ -128,7 +147,11 @@ def split_by(residuals: Residuals, name: str, other: Against) -> tuple[Mask, str
         half = float(np.median(column.values[known])) if known.any() else np.nan
         words = column_words(name)
         shown = f"{half:.0f}" if abs(half) >= 100.0 else f"{half:.3g}"
-        return np.asarray(column.values >= half), f"{words} {shown} and more", f"{words} below {shown}"
+        return (
+            np.asarray(column.values >= half),
+            f"{words} {shown} and more",
+            f"{words} below {shown}",
+        )
     if column.groups is None:
         return None
     x = other.values
@@ -138,10 +161,14 @@ def split_by(residuals: Residuals, name: str, other: Against) -> tuple[Mask, str
     for level in np.unique(column.groups):
         rows = (column.groups == level) & np.isfinite(x)
         if level and rows.sum() > 3 and np.std(x[rows]) > 0.0:
-            slope = abs(float(np.polyfit(x[rows], residuals.before_in[rows], 1)[0])) * np.sqrt(rows.sum())
+            slope = abs(float(np.polyfit(x[rows], residuals.before_in[rows], 1)[0])) * np.sqrt(
+                rows.sum()
+            )
             if best is None or slope > best[0]:
                 best = (slope, str(level))
-    return None if best is None else (np.asarray(column.groups == best[1]), best[1], f"not {best[1]}")
+    return (
+        None if best is None else (np.asarray(column.groups == best[1]), best[1], f"not {best[1]}")
+    )
 
 
 def _most_telling_float(residuals: Residuals, floats_in: Array, effect_in: Array) -> Against:
@@ -163,9 +190,16 @@ def _day_label(residuals: Residuals) -> str:
 
 
 def residual_plot(
-    residuals: Residuals, against: Against, title: str, *, after: bool = False, only: Mask | None = None
+    residuals: Residuals,
+    against: Against,
+    title: str,
+    *,
+    after: bool = False,
+    only: Mask | None = None,
 ) -> Markup:
-    """Draw residuals against a column, with the mean of each stretch or group and twice its standard error."""
+    """Draw residuals against a column, with the mean of each stretch or group and twice its
+    standard error.
+    """
     y = residuals.drawn(residuals.after_in if after else residuals.before_in)
     if only is not None:
         y = np.where(only, y, np.nan)
@@ -176,11 +210,14 @@ def residual_plot(
     if against.groups is not None:
         x = np.array([groups.index(str(g)) if g else np.nan for g in against.groups], float)
         plot = Plot(canvas, Axis(against.label, -0.6, len(groups) - 0.4), axis, top=24)
-        # Points of one group stand side by side in the order of the rows, so that none hides another.
+        # Points of one group stand side by side in the order of the rows, so that none hides
+        # another.
         x = x + 0.5 * (np.arange(len(x)) * 0.618 % 1.0 - 0.5)
     else:
         x = np.full(len(y), np.nan) if against.values is None else against.values
-        plot = Plot(canvas, Axis.around(against.label, x[np.isfinite(x)].tolist(), 0.03), axis, top=24)
+        plot = Plot(
+            canvas, Axis.around(against.label, x[np.isfinite(x)].tolist(), 0.03), axis, top=24
+        )
     plot.draw_axes(names=groups)
     canvas.text(plot.area[0], 12, title, size=11, bold=True)
     _, zero = plot.at(plot.x.low, 0.0)
@@ -188,7 +225,12 @@ def residual_plot(
     marked = np.zeros(len(y), bool) if against.marked is None else against.marked
     known = np.isfinite(x) & np.isfinite(y)
     for place in (*np.flatnonzero(known & ~marked), *np.flatnonzero(known & marked)):
-        _point(canvas, *plot.at(float(x[place]), float(y[place])), after=after, marked=bool(marked[place]))
+        _point(
+            canvas,
+            *plot.at(float(x[place]), float(y[place])),
+            after=after,
+            marked=bool(marked[place]),
+        )
     rows = known & marked if against.marked is not None else known
     if against.groups is None:
         # The mean of each stretch of the column that holds as many rows as the others.
@@ -232,11 +274,15 @@ def tail_strips(residuals: Residuals) -> Markup:
     if residuals.diagnosis.causes:
         panels.append(("with the extension", residuals.drawn(residuals.after_in), True))
     before = panels[0][1]
-    names = sorted(np.unique(tails).tolist(), key=lambda name: -abs(float(np.mean(before[tails == name]))))
+    names = sorted(
+        np.unique(tails).tolist(), key=lambda name: -abs(float(np.mean(before[tails == name])))
+    )
     shown = sorted(names[:MOST_TAILS])
     width, row, top, left, gap = 690.0, 13.0, 22.0, 74.0, 16.0
     height = top + row * len(shown) + 34
-    description = "One line for each aircraft; every point is one inspection, the square is their mean"
+    description = (
+        "One line for each aircraft; every point is one inspection, the square is their mean"
+    )
     canvas = Canvas(width, height, "Measured less predicted, by tail", description)
     room = (width - left - 8 - gap * (len(panels) - 1)) / len(panels)
     for k, (name, values, is_after) in enumerate(panels):
@@ -261,14 +307,25 @@ def measured_against_predicted(residuals: Residuals) -> Markup:
     d, unit = residuals.diagnosis, residuals.unit
     predicted, measured = residuals.drawn(d.predicted_in), residuals.drawn(d.used.measured_in)
     extended = predicted + residuals.drawn(residuals.effect_in)
-    description = "Measured displacement of each inspection against the predicted one; on the line both are equal"
+    description = (
+        "Measured displacement of each inspection against the predicted one; on the line both are"
+        " equal"
+    )
     canvas = Canvas(*_PLOT, "Measured against predicted", description)
     values = np.concatenate([predicted, extended, measured]).tolist()
-    plot = Plot(canvas, Axis.around(f"predicted, {unit}", values), Axis.around(f"measured, {unit}", values), top=24)
+    plot = Plot(
+        canvas,
+        Axis.around(f"predicted, {unit}", values),
+        Axis.around(f"measured, {unit}", values),
+        top=24,
+    )
     plot.draw_axes(x_ticks=8)
     low, high = plot.x.low, plot.x.high
     canvas.line(*plot.at(low, low), *plot.at(high, high), colour=SOFT, dash="6 3")
-    shown = [("before", predicted, False), *([("with the extension", extended, True)] if d.causes else [])]
+    shown = [
+        ("before", predicted, False),
+        *([("with the extension", extended, True)] if d.causes else []),
+    ]
     for k, (label, x_values, is_after) in enumerate(shown):
         for x, y in zip(x_values, measured, strict=True):
             _point(canvas, *plot.at(float(x), float(y)), after=is_after)

@@ -74,14 +74,18 @@ def cause_words(cause: NamedCause) -> str:
         words += f" (these rows cannot distinguish it from {others})"
     if not candidate.stands_in:
         return words
-    return f"{words} (not testable without {' and '.join(map(column_words, candidate.cause.needs))})"
+    return (
+        f"{words} (not testable without {' and '.join(map(column_words, candidate.cause.needs))})"
+    )
 
 
 def seven_lines(d: Diagnosis, unit: LengthUnit = LengthUnit.THOU) -> tuple[Line, ...]:
     """Say what a diagnosis found: data, misfit, cause, model, gain, residual, what to do."""
     # Blanks of every kind break a line of the terminal, and long words where they must.
     texts = [" ".join(text.split()) for text in _said(d, unit, *_WORDS)]
-    return tuple(Line(k, word, text) for k, (word, text) in enumerate(zip(_WORDS, texts, strict=True), 1))
+    return tuple(
+        Line(k, word, text) for k, (word, text) in enumerate(zip(_WORDS, texts, strict=True), 1)
+    )
 
 
 def headline(d: Diagnosis, unit: LengthUnit) -> str:
@@ -90,8 +94,18 @@ def headline(d: Diagnosis, unit: LengthUnit) -> str:
 
 
 def _said(d: Diagnosis, unit: LengthUnit, *parts: str) -> Iterator[str]:
-    words = {"kind_words": kind_words, "chance_words": chance_words, "fitted_numbers": fitted_numbers}
-    context = {**words, "d": d, "by_slip": by_slip, "noise_above": NOISE_ABOVE, "lengths": Lengths(unit)}
+    words = {
+        "kind_words": kind_words,
+        "chance_words": chance_words,
+        "fitted_numbers": fitted_numbers,
+    }
+    context = {
+        **words,
+        "d": d,
+        "by_slip": by_slip,
+        "noise_above": NOISE_ABOVE,
+        "lengths": Lengths(unit),
+    }
     said = environment().get_template("diagnosis.txt.j2").make_module(context)
     return (str(getattr(said, part)).replace("\u200b", "") for part in parts)
 
@@ -105,7 +119,9 @@ def by_slip(faults: Sequence[DataFault]) -> list[list[DataFault]]:
 
 
 def fitted_numbers(d: Diagnosis, lengths: Lengths) -> tuple[str, ...]:
-    """Write the fitted parameters of the named causes with their intervals, lengths in the reader's unit."""
+    """Write the fitted parameters of the named causes with their intervals, lengths in the reader's
+    unit.
+    """
     parts = []
     for c in d.causes:
         for name, value in c.parameters.items():
@@ -117,9 +133,15 @@ def fitted_numbers(d: Diagnosis, lengths: Lengths) -> tuple[str, ...]:
 
             interval = c.interval_shown.get(name)
             band = "" if interval is None else f" (95 % {said(interval[0])} to {said(interval[1])})"
-            shown = value if isinstance(value, str) else said(value) + (f" {lengths.unit}" if is_length else "")
+            shown = (
+                value
+                if isinstance(value, str)
+                else said(value) + (f" {lengths.unit}" if is_length else "")
+            )
             parts.append(f"{name_words(words if is_length else name)} {shown}{band}")
     return tuple(parts)
 
 
-environment().filters.update(name_words=name_words, cause_words=cause_words, column_words=column_words)
+environment().filters.update(
+    name_words=name_words, cause_words=cause_words, column_words=column_words
+)

@@ -1,4 +1,6 @@
-"""What the report of a diagnosis is made from; its tables and most of its sentences stand in the template."""
+"""What the report of a diagnosis is made from; its tables and most of its sentences stand in the
+template.
+"""
 
 from __future__ import annotations
 
@@ -55,11 +57,19 @@ def diagnosis_document(
 ) -> Document:
     context = _context(d, gear, extension, provenance, Lengths(unit))
     stem = safe_stem("diagnosis", *(Path(name).stem for name in provenance.input_sha256))
-    return Document("diagnosis.html.j2", {**context, "problems": list(problems), "notes": [*d.unsaid, *notes]}, stem)
+    return Document(
+        "diagnosis.html.j2",
+        {**context, "problems": list(problems), "notes": [*d.unsaid, *notes]},
+        stem,
+    )
 
 
 def _context(
-    d: Diagnosis, gear: Gear, extension: ModelExtension | None, provenance: ReportProvenance, lengths: Lengths
+    d: Diagnosis,
+    gear: Gear,
+    extension: ModelExtension | None,
+    provenance: ReportProvenance,
+    lengths: Lengths,
 ) -> dict[str, Any]:
     source = ", ".join(Path(name).name for name in provenance.input_sha256) or "inspections"
     residuals = Residuals(d, gear.joint_numbers, lengths.unit)
@@ -67,7 +77,13 @@ def _context(
     found = d.causes or d.also_possible
     chance = found[0].p_value if found else d.remainder_p
     return {
-        **head(f"Measured against predicted – {source}", f"Diagnosis · {short(source, 40)}", gear, provenance, lengths),
+        **head(
+            f"Measured against predicted – {source}",
+            f"Diagnosis · {short(source, 40)}",
+            gear,
+            provenance,
+            lengths,
+        ),
         "source": source,
         "d": d,
         "days": _days(d),
@@ -86,10 +102,15 @@ def _context(
         "catalogue": {cause.name: cause for cause in CATALOGUE},
         "most_ruled_out": _MOST_RULED_OUT,
         "kind_words": kind_words,
-        "as_loaded": any("load_directions" in (o.cause.name for o in (c.candidate, *c.aliases)) for c in d.causes),
+        "as_loaded": any(
+            "load_directions" in (o.cause.name for o in (c.candidate, *c.aliases)) for c in d.causes
+        ),
         "changes": _changes(residuals),
         "more_changes": len(d.gain.verdicts_changed) - _MOST_CHANGES if d.gain else 0,
-        "do": [(cause_words(c), c.candidate.cause.inspect, c.candidate.separates) for c in (*found, *d.beside)],
+        "do": [
+            (cause_words(c), c.candidate.cause.inspect, c.candidate.separates)
+            for c in (*found, *d.beside)
+        ],
         "extension": extension,
         "approval": [("Proposed by", ""), ("Checked by", ""), ("Approved for use by", "")],
     }
@@ -103,7 +124,9 @@ def _days(d: Diagnosis) -> int | None:
 
 
 def _plots(residuals: Residuals) -> list[PlotPair]:
-    """Pairs of plots of residuals, each with what it shows: before and after, two rivals, or two columns."""
+    """Pairs of plots of residuals, each with what it shows: before and after, two rivals, or two
+    columns.
+    """
     d = residuals.diagnosis
     if d.causes:
         pairs = []
@@ -123,7 +146,13 @@ def _plots(residuals: Residuals) -> list[PlotPair]:
             )
             for c in d.also_possible[:_MOST_PANELS]
         ]
-        return [(panels[0], panels[1] if len(panels) > 1 else scatter, "What the data cannot distinguish")]
+        return [
+            (
+                panels[0],
+                panels[1] if len(panels) > 1 else scatter,
+                "What the data cannot distinguish",
+            )
+        ]
     if d.unlisted_variables:
         return [_unlisted_plots(residuals, d.unlisted_variables, scatter)]
     left = drawn.residual_plot(residuals, drawn.against_column(residuals, "predicted"), "")
@@ -131,12 +160,20 @@ def _plots(residuals: Residuals) -> list[PlotPair]:
 
 
 def _unlisted_plots(residuals: Residuals, variables: tuple[str, ...], scatter: Markup) -> PlotPair:
-    """Plots against the variables of an unlisted effect; of two, the rows split by the second one."""
+    """Plots against the variables of an unlisted effect; of two, the rows split by the second
+    one.
+    """
     columns = [drawn.against_column(residuals, name) for name in variables]
     caption = f"Moves with {' and '.join(column_words(name) for name in variables)}"
     # A number makes the better axis, a name the better way to split.
-    first = 1 if len(columns) > 1 and columns[0].values is None and columns[1].values is not None else 0
-    split = drawn.split_by(residuals, variables[1 - first], columns[first]) if len(columns) > 1 else None
+    first = (
+        1 if len(columns) > 1 and columns[0].values is None and columns[1].values is not None else 0
+    )
+    split = (
+        drawn.split_by(residuals, variables[1 - first], columns[first])
+        if len(columns) > 1
+        else None
+    )
     if split is None:
         return drawn.residual_plot(residuals, columns[0], ""), scatter, caption
     rows, these, others = split
@@ -148,7 +185,9 @@ def _unlisted_plots(residuals: Residuals, variables: tuple[str, ...], scatter: M
 
 
 def _changes(residuals: Residuals) -> list[dict[str, Any]]:
-    """Inspections whose predicted side of the margin changes, and whether it is then the measured one."""
+    """Inspections whose predicted side of the margin changes, and whether it is then the measured
+    one.
+    """
     d = residuals.diagnosis
     if d.gain is None:
         return []
@@ -157,7 +196,11 @@ def _changes(residuals: Residuals) -> list[dict[str, Any]]:
     for record in d.gain.verdicts_changed[:_MOST_CHANGES]:
         k = places[record]
         margin = float(d.used.margin_in[k])
-        values = [float(d.predicted_in[k]), float(d.predicted_in[k] + residuals.effect_in[k]), d.used.measured_in[k]]
+        values = [
+            float(d.predicted_in[k]),
+            float(d.predicted_in[k] + residuals.effect_in[k]),
+            d.used.measured_in[k],
+        ]
         before, after, truth = ("within" if abs(value) <= margin else "OUTSIDE" for value in values)
         rows.append(
             {
@@ -165,7 +208,13 @@ def _changes(residuals: Residuals) -> list[dict[str, Any]]:
                 "gear": str(d.used.gears[k]),
                 "margin_in": margin,
                 "shown": list(zip(values, (before, after, truth), strict=True)),
-                "right": "on the edge" if before == after else "now right" if after == truth else "now wrong",
+                "right": (
+                    "on the edge"
+                    if before == after
+                    else "now right"
+                    if after == truth
+                    else "now wrong"
+                ),
             }
         )
     return rows

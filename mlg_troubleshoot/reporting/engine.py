@@ -1,7 +1,8 @@
-"""Child process that turns HTML into PDF, and what it does to the PDF; it imports the two PDF libraries only.
+"""Child process that turns HTML into PDF, and what it does to the PDF; it imports the two PDF
+libraries only.
 
-It is started by its path (see :mod:`~mlg_troubleshoot.reporting.pdf`), reads jobs from standard input and
-answers each on standard output: a line of JSON, then the bytes it announces.
+It is started by its path (see :mod:`~mlg_troubleshoot.reporting.pdf`), reads jobs from standard
+input and answers each on standard output: a line of JSON, then the bytes it announces.
 """
 
 from __future__ import annotations
@@ -15,7 +16,15 @@ from urllib.parse import unquote
 
 from pypdf import PdfReader, PdfWriter
 from pypdf.errors import PyPdfError
-from pypdf.generic import ArrayObject, BooleanObject, DictionaryObject, Fit, NameObject, NumberObject, TextStringObject
+from pypdf.generic import (
+    ArrayObject,
+    BooleanObject,
+    DictionaryObject,
+    Fit,
+    NameObject,
+    NumberObject,
+    TextStringObject,
+)
 
 _HERE = "https://report.invalid/"
 
@@ -35,7 +44,8 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
         try:
             book = plutoprint.Book(getattr(plutoprint, f"PAGE_SIZE_{job['page'].upper()}"))
             book.custom_resource_fetcher = Refuse()
-            # Links within the document become named destinations only where the document has an address.
+            # Links within the document become named destinations only where the document has an
+            # address.
             book.load_html(html, base_url=_HERE)
             stream = io.BytesIO()
             book.write_to_pdf_stream(stream)
@@ -48,15 +58,19 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
         answers.flush()
 
 
-def finished(pdf: bytes, sections: Mapping[str, str], title: str, created: str) -> tuple[bytes, bool]:
+def finished(
+    pdf: bytes, sections: Mapping[str, str], title: str, created: str
+) -> tuple[bytes, bool]:
     """Give a PDF its title, language, dates and a bookmark for each section (anchor to heading).
 
-    Also tell whether it shows the box that stands for a character that no font has. The dates are those given, so
-    that the same document always has the same bytes.
+    Also tell whether it shows the box that stands for a character that no font has. The dates are
+    those given, so that the same document always has the same bytes.
     """
     writer = PdfWriter(clone_from=io.BytesIO(pdf))
     boxes = check_fonts(writer)
-    for annotation in (each.get_object() for page in writer.pages for each in page.get("/Annots", ())):
+    for annotation in (
+        each.get_object() for page in writer.pages for each in page.get("/Annots", ())
+    ):
         address = str(annotation.get("/A", {}).get("/URI", ""))
         if address.startswith(_HERE):
             # A link to a file beside this one, which a reader of the PDF opens there.
@@ -74,7 +88,9 @@ def finished(pdf: bytes, sections: Mapping[str, str], title: str, created: str) 
         writer.add_outline_item(title=heading, page_number=page, fit=Fit.xyz(left=0, top=place.top))
     root = writer.root_object
     root[NameObject("/Lang")] = TextStringObject("en")
-    root[NameObject("/ViewerPreferences")] = DictionaryObject({NameObject("/DisplayDocTitle"): BooleanObject(True)})
+    root[NameObject("/ViewerPreferences")] = DictionaryObject(
+        {NameObject("/DisplayDocTitle"): BooleanObject(True)}
+    )
     if sections:
         writer.page_mode = "/UseOutlines"
     writer.metadata = {
@@ -90,14 +106,18 @@ def finished(pdf: bytes, sections: Mapping[str, str], title: str, created: str) 
 
 
 def check_fonts(document: PdfReader | PdfWriter) -> bool:
-    """Refuse a PDF that does not carry its fonts: without any, the engine writes blank pages and reports success.
+    """Refuse a PDF that does not carry its fonts: without any, the engine writes blank pages and
+    reports success.
 
-    Return whether a font draws the box that stands for a missing character (U+FFFD in its map to text).
+    Return whether a font draws the box that stands for a missing character (U+FFFD in its map to
+    text).
     """
     fonts = {
         str(font.get("/BaseFont")): font
         for page in document.pages
-        for font in (each.get_object() for each in page.get("/Resources", {}).get("/Font", {}).values())
+        for font in (
+            each.get_object() for each in page.get("/Resources", {}).get("/Font", {}).values()
+        )
     }
     if not fonts:
         raise ValueError("it drew no text: no font is embedded")
@@ -106,7 +126,9 @@ def check_fonts(document: PdfReader | PdfWriter) -> bool:
         drawn = font["/DescendantFonts"][0].get_object() if "/DescendantFonts" in font else font
         if not {"/FontFile", "/FontFile2", "/FontFile3"} & set(drawn.get("/FontDescriptor", {})):
             raise ValueError(f"the font {name.lstrip('/')} is not embedded in the PDF")
-        boxes = boxes or ("/ToUnicode" in font and b"<fffd>" in font["/ToUnicode"].get_data().lower())
+        boxes = boxes or (
+            "/ToUnicode" in font and b"<fffd>" in font["/ToUnicode"].get_data().lower()
+        )
     return boxes
 
 

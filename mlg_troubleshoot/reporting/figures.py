@@ -1,8 +1,8 @@
 """Figures as inline SVG: flat colours, and text or shape wherever a colour says something.
 
-A :class:`Canvas` escapes what it is given and carries a title and a description for readers who cannot see it;
-a :class:`Plot` puts axes, series and a legend on it. A unit
-of a canvas is about 1 px on a screen and 0.25 mm on paper; its text is 11 units.
+A :class:`Canvas` escapes what it is given and carries a title and a description for readers who
+cannot see it; a :class:`Plot` puts axes, series and a legend on it. A unit of a canvas is about 1
+px on a screen and 0.25 mm on paper; its text is 11 units.
 """
 
 from __future__ import annotations
@@ -69,7 +69,9 @@ class Canvas:
         self._parts: list[str] = []
 
     def add(self, element: str, content: str = "", **attributes: str | float | None) -> None:
-        """Add an element; underscores in attribute names become hyphens, None leaves an attribute out."""
+        """Add an element; underscores in attribute names become hyphens, None leaves an attribute
+        out.
+        """
         written = []
         for name, value in attributes.items():
             if value is not None:
@@ -82,17 +84,37 @@ class Canvas:
         self.add("line", x1=x1, y1=y1, x2=x2, y2=y2, **_stroke(stroke))
 
     def rectangle(
-        self, x: float, y: float, across: float, down: float, *, fill: str = "none", **edge: Unpack[Stroke]
+        self,
+        x: float,
+        y: float,
+        across: float,
+        down: float,
+        *,
+        fill: str = "none",
+        **edge: Unpack[Stroke],
     ) -> None:
         outline = _stroke(edge) if edge else {}
-        self.add("rect", x=x, y=y, width=max(across, 0.0), height=max(down, 0.0), fill=fill, **outline)
+        self.add(
+            "rect", x=x, y=y, width=max(across, 0.0), height=max(down, 0.0), fill=fill, **outline
+        )
 
     def polyline(
-        self, points: Sequence[Place], *, fill: str = "none", closed: bool = False, **stroke: Unpack[Stroke]
+        self,
+        points: Sequence[Place],
+        *,
+        fill: str = "none",
+        closed: bool = False,
+        **stroke: Unpack[Stroke],
     ) -> None:
         through = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
         drawn = _stroke({"width": 1.5, **stroke})
-        self.add("polygon" if closed else "polyline", points=through, fill=fill, **drawn, stroke_linejoin="round")
+        self.add(
+            "polygon" if closed else "polyline",
+            points=through,
+            fill=fill,
+            **drawn,
+            stroke_linejoin="round",
+        )
 
     def text(
         self,
@@ -106,7 +128,9 @@ class Canvas:
         anchor: Anchor = "start",
         halo: bool = False,
     ) -> None:
-        """Write a text with its baseline at y; a halo keeps it readable across lines. [canvas units]"""
+        """Write a text with its baseline at y; a halo keeps it readable across lines. [canvas
+        units]
+        """
         if halo:
             width = text_width(text, size)
             left = {"start": x, "middle": x - width / 2, "end": x - width}[anchor]
@@ -122,7 +146,9 @@ class Canvas:
             text_anchor=None if anchor == "start" else anchor,
         )
 
-    def marker(self, shape: Marker, x: float, y: float, size: float = 5.0, *, colour: str = INK) -> None:
+    def marker(
+        self, shape: Marker, x: float, y: float, size: float = 5.0, *, colour: str = INK
+    ) -> None:
         """Draw a marker centred on a point; `size` is half its width. [canvas units]"""
         s = size
         match shape:
@@ -187,7 +213,9 @@ class Axis:
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """A line in a plot; a NaN in it is a gap. Its colour never stands alone: dashes and label say the same."""
+    """A line in a plot; a NaN in it is a gap. Its colour never stands alone: dashes and label say
+    the same.
+    """
 
     label: str
     x: tuple[float, ...]
@@ -222,13 +250,22 @@ class Plot:
         )
 
     def draw_axes(self, x_ticks: int = 6, names: Sequence[str] = ()) -> None:
-        """Draw grid, ticks, frame and labels; names take the place of numbers on the horizontal axis."""
+        """Draw grid, ticks, frame and labels; names take the place of numbers on the horizontal
+        axis.
+        """
         x0, y0, x1, y1 = self.area
         ticks = nice_ticks(self.y.low, self.y.high)
         for value in ticks:
             _, y = self.at(self.x.low, value)
             self.canvas.line(x0, y, x1, y, colour=PALE)
-            self.canvas.text(x0 - 5, y + 3.5, number(value, decimals_of(ticks)), size=9.5, anchor="end", colour=SOFT)
+            self.canvas.text(
+                x0 - 5,
+                y + 3.5,
+                number(value, decimals_of(ticks)),
+                size=9.5,
+                anchor="end",
+                colour=SOFT,
+            )
         ticks = nice_ticks(self.x.low, self.x.high, x_ticks)
         room = max(2, int((x1 - x0) / max(len(names), 1) / 6.5))
         marks = [(float(k), short(name, room)) for k, name in enumerate(names)]
@@ -254,20 +291,35 @@ class Plot:
         ticks = nice_ticks(self.x.low, self.x.high, 6)
         for value in ticks:
             x, _ = self.at(value, self.y.low)
-            self.canvas.line(x, y0, x, y1, colour=SOFT if value == 0.0 else RULE, width=1.0 if value == 0.0 else 0.5)
+            self.canvas.line(
+                x,
+                y0,
+                x,
+                y1,
+                colour=SOFT if value == 0.0 else RULE,
+                width=1.0 if value == 0.0 else 0.5,
+            )
             text = number(value, decimals_of(ticks))
             self.canvas.text(x, y1 + 13, text, size=9.5, anchor="middle", colour=SOFT)
         self.canvas.line(x0, y1, x1, y1, colour=SOFT)
         self.canvas.text((x0 + x1) / 2, y1 + 27, self.x.label, size=10, anchor="middle")
 
     def draw(self, series: Series) -> None:
-        for known, run in groupby(zip(series.x, series.y, strict=True), lambda at: all(map(math.isfinite, at))):
+        for known, run in groupby(
+            zip(series.x, series.y, strict=True), lambda at: all(map(math.isfinite, at))
+        ):
             if known:
                 places = [self.at(x, y) for x, y in run]
-                self.canvas.polyline(places, colour=series.colour, width=series.width, dash=series.dash)
+                self.canvas.polyline(
+                    places, colour=series.colour, width=series.width, dash=series.dash
+                )
 
     def draw_legend(
-        self, series: Sequence[Series], x: float, y: float, markers: Sequence[tuple[Marker, str]] = ()
+        self,
+        series: Sequence[Series],
+        x: float,
+        y: float,
+        markers: Sequence[tuple[Marker, str]] = (),
     ) -> None:
         """Draw the legend on one line, from its left end. [canvas units]"""
         for one in series:
@@ -282,7 +334,9 @@ class Plot:
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """A bar and the ends of its interval, in the data's unit; black, grey or outlined as its caption explains."""
+    """A bar and the ends of its interval, in the data's unit; black, grey or outlined as its
+    caption explains.
+    """
 
     value: float | None
     low: float | None = None
@@ -290,11 +344,17 @@ class Bar:
     style: Style = "mid"
 
 
-def draw_bar(canvas: Canvas, bar: Bar, x: float, y: float, height: float, per_value: float) -> float:
+def draw_bar(
+    canvas: Canvas, bar: Bar, x: float, y: float, height: float, per_value: float
+) -> float:
     if bar.value is None:
         return x
     length = max(bar.value * per_value, 0.8)
-    fill, edge, dash = {"solid": (INK, INK, None), "mid": (RULE, SOFT, None), "open": (PAPER, SOFT, "3 2")}[bar.style]
+    fill, edge, dash = {
+        "solid": (INK, INK, None),
+        "mid": (RULE, SOFT, None),
+        "open": (PAPER, SOFT, "3 2"),
+    }[bar.style]
     canvas.rectangle(x, y, length, height, fill=fill, colour=edge, dash=dash)
     end = x + length
     if bar.low is not None and bar.high is not None:

@@ -1,4 +1,6 @@
-"""The page of a fleet to hang up, and the page of one gear's life with before and after side by side."""
+"""The page of a fleet to hang up, and the page of one gear's life with before and after side by
+side.
+"""
 
 from __future__ import annotations
 
@@ -20,21 +22,29 @@ _BAR, _SPARK, _HIGH = 150.0, 90.0, 18.0
 
 
 def interval_bar(ends: Mapping[str, float | None] | None, horizon: float) -> Markup:
-    """Draw landings left: the 90 % interval as a bar, the median as a stroke, an arrow for beyond the horizon."""
+    """Draw landings left: the 90 % interval as a bar, the median as a stroke, an arrow for beyond
+    the horizon.
+    """
     if ends is None:
         return Markup(ABSENT)
     # A square root scale shows what is near.
-    low, middle, high = (_BAR * min((horizon if e is None else e) / horizon, 1.0) ** 0.5 for e in ends.values())
+    low, middle, high = (
+        _BAR * min((horizon if e is None else e) / horizon, 1.0) ** 0.5 for e in ends.values()
+    )
     canvas = Canvas(_BAR + 8, _HIGH, f"landings left, 5, 50 and 95 %: {landings(ends)}")
     canvas.line(0, 9, _BAR, 9, colour=SOFT)
     canvas.rectangle(low, 4, max(high - low, 1.0), 10, fill=ACCENT)
     canvas.rectangle(middle, 0, 2.5, 18, fill=INK)
     if ends["p95"] is None:
-        canvas.polyline([(_BAR, 2), (_BAR + 6, 9), (_BAR, 16)], fill=ACCENT, colour=None, closed=True)
+        canvas.polyline(
+            [(_BAR, 2), (_BAR + 6, 9), (_BAR, 16)], fill=ACCENT, colour=None, closed=True
+        )
     return canvas.svg()
 
 
-def sparkline(worst_in: Sequence[float | None], margin_in: float | None, lengths: Lengths) -> Markup:
+def sparkline(
+    worst_in: Sequence[float | None], margin_in: float | None, lengths: Lengths
+) -> Markup:
     """Draw the worst case of each inspection, and the margin as a dashed line."""
     known = [value for value in worst_in if value is not None]
     if not known:
@@ -45,7 +55,14 @@ def sparkline(worst_in: Sequence[float | None], margin_in: float | None, lengths
     said = ", ".join(map(lengths.bare, known))
     canvas = Canvas(_SPARK + 6, _HIGH, f"worst case of each inspection, {lengths.unit}: {said}")
     if margin_in is not None:
-        canvas.line(3, _high(margin_in, top), _SPARK + 3, _high(margin_in, top), colour="#a3131a", dash="4 3")
+        canvas.line(
+            3,
+            _high(margin_in, top),
+            _SPARK + 3,
+            _high(margin_in, top),
+            colour="#a3131a",
+            dash="4 3",
+        )
     canvas.polyline(at)
     canvas.marker("circle", *at[-1], 2.5)
     return canvas.svg()
@@ -63,7 +80,9 @@ def fleet_document(
     provenance: ReportProvenance,
     unit: LengthUnit = LengthUnit.INCH,
 ) -> Document:
-    """Make one page: one line per gear, worst first, with its landings left and the worst case over its inspections."""
+    """Make one page: one line per gear, worst first, with its landings left and the worst case over
+    its inspections.
+    """
     lengths = Lengths(unit)
     lines = [
         {
@@ -91,7 +110,9 @@ def life_document(
     provenance: ReportProvenance,
     unit: LengthUnit = LengthUnit.INCH,
 ) -> Document:
-    """Make one gear's life: its last inspections side by side, what was restored between, landings left."""
+    """Make one gear's life: its last inspections side by side, what was restored between, landings
+    left.
+    """
     name = f"{life['tail_no']} {life['side']}"
     shown = {"life": life, "outlook": outlook, "steps": steps}
     context = {**head(f"Life of {name}", name, gear, provenance, Lengths(unit)), **shown}

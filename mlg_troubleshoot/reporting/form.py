@@ -17,10 +17,18 @@ from mlg_troubleshoot.reporting.schematic import blank_schematic
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 
-def write_form(file: Path, gear: Gear, *, page: str = "A4", unit: LengthUnit = LengthUnit.INCH) -> None:
+def write_form(
+    file: Path, gear: Gear, *, page: str = "A4", unit: LengthUnit = LengthUnit.INCH
+) -> None:
     """Write the form as PDF or HTML, as the name ends; limits stand in `unit`."""
     context = {
-        **head(f"Joint clearances – {gear.name}", gear.name, gear, provenance_of(gear, {}), Lengths(unit)),
+        **head(
+            f"Joint clearances – {gear.name}",
+            gear.name,
+            gear,
+            provenance_of(gear, {}),
+            Lengths(unit),
+        ),
         "conventions": tuple(ClearanceConvention),
         "drawing": blank_schematic(gear),
     }
@@ -33,5 +41,7 @@ def write_form(file: Path, gear: Gear, *, page: str = "A4", unit: LengthUnit = L
             made, _ = engine.convert(render(document, page, for_pdf=True), page, document.created)
     except PdfError as error:
         instead = file.with_suffix(".html").name
-        raise OutputError(f"no PDF can be made: {error}", f"Write {instead} and print it from a browser.") from error
+        raise OutputError(
+            f"no PDF can be made: {error}", f"Write {instead} and print it from a browser."
+        ) from error
     write_bytes(file, made)

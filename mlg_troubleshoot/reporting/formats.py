@@ -1,4 +1,6 @@
-"""Numbers as a reader sees them: every figure, table and sentence of a report formats with these."""
+"""Numbers as a reader sees them: every figure, table and sentence of a report formats with
+these.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +47,9 @@ class Lengths:
 
 
 def percent(share: float | None) -> str:
-    """Write a probability: ``25 %``, ``< 0.1 %``, ``> 99.9 %``; never a rounded 0 or 100 that is neither."""
+    """Write a probability: ``25 %``, ``< 0.1 %``, ``> 99.9 %``; never a rounded 0 or 100 that is
+    neither.
+    """
     if share is None or math.isnan(share):
         return ABSENT
     return sentences.percent(share).replace(" ", "\u00a0")
@@ -82,7 +86,9 @@ def landings(ends: Mapping[str, float | None] | None) -> str:
     """Write the quantiles of a forecast, to two digits: it has no more."""
     if ends is None:
         return ABSENT
-    return ", ".join("beyond" if end is None else f"{float(f'{end:.2g}'):.0f}" for end in ends.values())
+    return ", ".join(
+        "beyond" if end is None else f"{float(f'{end:.2g}'):.0f}" for end in ends.values()
+    )
 
 
 def minutes(value: float) -> str:

@@ -17,7 +17,9 @@ _SOUNDS = re.compile(r"^(?:HANGUL SYLLABLE|HIRAGANA LETTER|KATAKANA LETTER) (?:S
 
 
 def breakable(text: str) -> str:
-    """Let a word that is wider than a page be broken: the PDF engine would shrink the whole page to fit it."""
+    """Let a word that is wider than a page be broken: the PDF engine would shrink the whole page to
+    fit it.
+    """
     if len(text) <= _LONGEST_WORD:
         return text
     return _LONG_WORD.sub(lambda word: "\u200b".join(re.findall(".{1,32}", word[0])), text)
@@ -31,15 +33,22 @@ def font_coverage() -> frozenset[int]:
 
 
 def _code_points(font: bytes) -> frozenset[int]:
-    """Code points of a TrueType font's character map, of which the bundled ones have the full one (format 12)."""
+    """Code points of a TrueType font's character map, of which the bundled ones have the full one
+    (format 12).
+    """
     found: set[int] = set()
-    tables = {tag: start for tag, _, start, _ in struct.iter_unpack(">4sIII", font[12 : 12 + 16 * font[5]])}
+    tables = {
+        tag: start
+        for tag, _, start, _ in struct.iter_unpack(">4sIII", font[12 : 12 + 16 * font[5]])
+    }
     cmap = tables[b"cmap"]
     for i in range(struct.unpack_from(">H", font, cmap + 2)[0]):
         start = cmap + struct.unpack_from(">I", font, cmap + 8 + 8 * i)[0]
         if struct.unpack_from(">H", font, start)[0] == 12:
             count = struct.unpack_from(">I", font, start + 12)[0]
-            for first, last, _ in struct.iter_unpack(">III", font[start + 16 : start + 16 + 12 * count]):
+            for first, last, _ in struct.iter_unpack(
+                ">III", font[start + 16 : start + 16 + 12 * count]
+            ):
                 found.update(range(first, last + 1))
     return frozenset(found)
 
@@ -49,7 +58,9 @@ def missing_characters(text: str) -> str:
     if text.isascii():
         return ""
     covered = font_coverage()
-    return "".join(dict.fromkeys(c for c in text if ord(c) not in covered and c not in _PLAIN_SPACE))
+    return "".join(
+        dict.fromkeys(c for c in text if ord(c) not in covered and c not in _PLAIN_SPACE)
+    )
 
 
 def spell_out(text: str, missing: str) -> str:

@@ -23,7 +23,9 @@ from mlg_troubleshoot.visible import visible
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A document of a template that extends ``base.html.j2``; its context holds at least what `common.head` says."""
+    """A document of a template that extends ``base.html.j2``; its context holds at least what
+    `common.head` says.
+    """
 
     template: str
     context: Mapping[str, Any]
@@ -53,7 +55,10 @@ def environment() -> Environment:
     made.filters.update(
         css_string=css_string,
         address=address,
-        **{name: _in_its_unit(how) for name, how in (("length", "full"), ("bare", "bare"), ("said", "said"))},
+        **{
+            name: _in_its_unit(how)
+            for name, how in (("length", "full"), ("bare", "bare"), ("said", "said"))
+        },
         number=formats.number,
         percent=formats.percent,
         joints=formats.joint_list,
@@ -77,17 +82,27 @@ def _in_its_unit(how: str) -> Callable[..., str]:
 
 def _readable(value: Any) -> Any:
     """Make a text fit to be shown; markup of this package is left as it is."""
-    return value if isinstance(value, Markup) or not isinstance(value, str) else breakable(visible(value))
+    return (
+        value
+        if isinstance(value, Markup) or not isinstance(value, str)
+        else breakable(visible(value))
+    )
 
 
 def address(file_name: str) -> Markup:
-    """Write the name of a file next to the document as a link's address, which nothing may be added to."""
+    """Write the name of a file next to the document as a link's address, which nothing may be added
+    to.
+    """
     return Markup(quote(file_name, safe=""))
 
 
 def css_string(text: str) -> Markup:
     """Write a text as a CSS string that can end neither itself nor the style element."""
-    coded = re.sub(r"[^0-9A-Za-z .,:·–…\u00a0-\U0010ffff]", lambda found: f"\\{ord(found[0]):x} ", visible(text))
+    coded = re.sub(
+        r"[^0-9A-Za-z .,:·–…\u00a0-\U0010ffff]",
+        lambda found: f"\\{ord(found[0]):x} ",
+        visible(text),
+    )
     return Markup(f'"{coded}"')
 
 

@@ -18,7 +18,9 @@ from mlg_troubleshoot.reporting.formats import Lengths, number
 
 
 def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
-    """Draw the worst cases of both senses against the margin, with the uncertainty and what was measured."""
+    """Draw the worst cases of both senses against the margin, with the uncertainty and what was
+    measured.
+    """
     a = assessment
     if a.predicted_displacement_in is None or a.over_travel_in is None or a.under_travel_in is None:
         return None
@@ -29,12 +31,14 @@ def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
     upper = a.predicted_upper_in
     if upper is not None and abs(upper - worst) <= 5e-5:
         upper = None
-    extent = max(margin, worst + u2, abs(measured or 0.0), upper or 0.0, spread[1] if spread else 0.0)
+    extent = max(
+        margin, worst + u2, abs(measured or 0.0), upper or 0.0, spread[1] if spread else 0.0
+    )
     lanes = 1 + (upper is not None) + (spread is not None) + (measured is not None)
     what = "As loaded" if a.as_loaded else "Worst case"
     description = (
-        f"{what} {lengths.full(over, True)} over-travel and {lengths.full(under, True)} under-travel against a "
-        f"margin of plus or minus {lengths.full(margin)}"
+        f"{what} {lengths.full(over, True)} over-travel and {lengths.full(under, True)}"
+        f" under-travel against a margin of plus or minus {lengths.full(margin)}"
     )
     if measured is not None:
         description += f"; measured {lengths.full(measured, True)}"
@@ -51,7 +55,9 @@ def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
         bold=True,
     )
     canvas.line(gauge.px(under), y, gauge.px(over), y, width=4)
-    canvas.rectangle(gauge.px(sense * worst - u2), y - 6, gauge.px(2 * u2) - gauge.px(0.0), 12, colour=INK)
+    canvas.rectangle(
+        gauge.px(sense * worst - u2), y - 6, gauge.px(2 * u2) - gauge.px(0.0), 12, colour=INK
+    )
     for value in (under, over):
         canvas.marker("diamond", gauge.px(value), y, 5.5)
     if upper is not None:
@@ -60,7 +66,10 @@ def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
         canvas.marker("ring", gauge.px(sense * upper), y, 4.5)
     if spread is not None:
         ends = [gauge.px(sense * value) for value in spread]
-        y = gauge.lane("other geometries", " … ".join(dict.fromkeys(lengths.bare(sense * v, True) for v in spread)))
+        y = gauge.lane(
+            "other geometries",
+            " … ".join(dict.fromkeys(lengths.bare(sense * v, True) for v in spread)),
+        )
         canvas.line(ends[0], y, ends[1], y, width=1.5)
         for end in ends:
             canvas.line(end, y - 5, end, y + 5, width=1.5)
@@ -70,22 +79,35 @@ def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
 class _Gauge:
     """The gauge without its lanes: axis, margin and allowed range; lanes are added from the top."""
 
-    def __init__(self, extent: float, margin: float, lanes: int, description: str, lengths: Lengths) -> None:
+    def __init__(
+        self, extent: float, margin: float, lanes: int, description: str, lengths: Lengths
+    ) -> None:
         self.left, self.right, self.top, self.row, self.width = 150.0, 556.0, 36.0, 21.0, 690.0
         self.bottom = self.top + self.row * lanes + 4
         self.centre = (self.left + self.right) / 2
         self.scale = (self.right - self.left) / 2 / (extent * 1.06)
         self.filled = 0
         self.canvas = canvas = Canvas(
-            self.width, self.bottom + 24, "Margin gauge: plunger displacement from mid-position", description
+            self.width,
+            self.bottom + 24,
+            "Margin gauge: plunger displacement from mid-position",
+            description,
         )
         top, bottom, header = self.top, self.bottom, self.top - 26
-        canvas.rectangle(self.px(-margin), top - 4, self.px(margin) - self.px(-margin), bottom - top + 4, fill=PALE)
+        canvas.rectangle(
+            self.px(-margin),
+            top - 4,
+            self.px(margin) - self.px(-margin),
+            bottom - top + 4,
+            fill=PALE,
+        )
         canvas.text(self.centre, header, "allowed", size=10, anchor="middle", colour=SOFT)
         for end in (-margin, margin):
             canvas.line(self.px(end), top - 8, self.px(end), bottom + 4, width=2.6)
             said = lengths.bare(end, True)
-            canvas.text(self.px(end), top - 11, said, size=10.5, bold=True, anchor="middle", halo=True)
+            canvas.text(
+                self.px(end), top - 11, said, size=10.5, bold=True, anchor="middle", halo=True
+            )
         canvas.line(self.centre, top - 4, self.centre, bottom, colour=SOFT, dash="3 3")
         canvas.text(self.left, header, "◀ short of mid-position", size=10, colour=SOFT)
         canvas.text(self.right, header, "beyond mid-position ▶", size=10, colour=SOFT, anchor="end")
@@ -112,7 +134,9 @@ class _Gauge:
         return y
 
 
-def contribution_bar(finding: JointFinding, longest_in: float, gauge_u_in: float, lengths: Lengths) -> Markup:
+def contribution_bar(
+    finding: JointFinding, longest_in: float, gauge_u_in: float, lengths: Lengths
+) -> Markup:
     name = f"Contribution of joint {finding.joint}"
     value = finding.contribution_in
     if value is None:
@@ -130,17 +154,24 @@ def contribution_bar(finding: JointFinding, longest_in: float, gauge_u_in: float
 
 
 def bar_stand_in(finding: JointFinding) -> float:
-    """Displacement with which an unmeasured joint is ranked: its amplification × half its limit. [in]"""
+    """Displacement with which an unmeasured joint is ranked: its amplification × half its limit.
+    [in]
+    """
     return finding.plunger_amplification * finding.limit_in / 2.0
 
 
 def plunger_curve(
-    gear: Gear, assessment: Assessment, lengths: Lengths | None = None, width: float = 440.0, height: float = 250.0
+    gear: Gear,
+    assessment: Assessment,
+    lengths: Lengths | None = None,
+    width: float = 440.0,
+    height: float = 250.0,
 ) -> Markup:
-    """Draw how far clearances move the plunger from where it would stand without them, over the release stroke.
+    """Draw how far clearances move the plunger from where it would stand without them, over the
+    release stroke.
 
-    Both worst cases, the margin at mid-position, and what was measured: at mid-position, at Down Lock and along the
-    stroke.
+    Both worst cases, the margin at mid-position, and what was measured: at mid-position, at Down
+    Lock and along the stroke.
     """
     a, model, shown = assessment, gear.model, lengths or Lengths()
     per_inch = shown.unit.per_inch
@@ -156,24 +187,32 @@ def plunger_curve(
     ):
         if directions:
             moved = model.plunger(strokes, links_from(clearance, np.array(directions))) - nominal
-            series.append(figures.Series(label, x, tuple((moved * per_inch).tolist()), dash=dash, width=2.2))
+            series.append(
+                figures.Series(label, x, tuple((moved * per_inch).tolist()), dash=dash, width=2.2)
+            )
     measured = _measured_along(gear, a, start, end)
     margin = a.margin_in * per_inch
     farthest = max([end + 0.3 * (end - start), *(place for place, _ in measured)])
-    values = [v for one in series for v in one.y] + [y * per_inch for _, y in measured] + [margin, -margin, 0.0]
+    values = (
+        [v for one in series for v in one.y]
+        + [y * per_inch for _, y in measured]
+        + [margin, -margin, 0.0]
+    )
     span = (end - start) * per_inch
     canvas = Canvas(
         width,
         height,
         "Plunger displacement over the release of the Down Lock",
-        "Displacement of the plunger from its nominal position against actuator extension, in the worst case of each "
-        "sense, with the margin at mid-position and what was measured",
+        "Displacement of the plunger from its nominal position against actuator extension, in the"
+        " worst case of each sense, with the margin at mid-position and what was measured",
     )
     plot = figures.Plot(
         canvas,
         # Room for the labels beyond mid-position.
         figures.Axis(
-            f"actuator extension from Down Lock, {shown.unit}", start * per_inch - 0.02 * span, farthest * per_inch
+            f"actuator extension from Down Lock, {shown.unit}",
+            start * per_inch - 0.02 * span,
+            farthest * per_inch,
         ),
         figures.Axis.around(f"displacement from nominal, {shown.unit}", values, 0.08),
         left=56,
@@ -187,17 +226,25 @@ def plunger_curve(
     _, low = plot.at(end * per_inch, -margin)
     canvas.rectangle(px, high, 7, low - high, fill=PALE, colour=INK, width=1.2)
     marks = [(0.0, f"margin ±{shown.bare(a.margin_in)}", False)]
-    marks += [(v, shown.bare(v, True), True) for v in (a.over_travel_in, a.under_travel_in) if v is not None]
+    marks += [
+        (v, shown.bare(v, True), True)
+        for v in (a.over_travel_in, a.under_travel_in)
+        if v is not None
+    ]
     heights = [plot.at(0.0, value * per_inch)[1] for value, _, _ in marks]
     for (_, text, bold), y in zip(marks, _apart(heights, 11.0), strict=True):
         canvas.text(px + 11, y + 3, text, size=9, bold=bold)
     for place, value in measured:
         canvas.marker("triangle", *plot.at(place * per_inch, value * per_inch), 5.0)
-    plot.draw_legend(series, plot.area[0], 10, markers=[("triangle", "measured")] if measured else ())
+    plot.draw_legend(
+        series, plot.area[0], 10, markers=[("triangle", "measured")] if measured else ()
+    )
     return canvas.svg()
 
 
-def _measured_along(gear: Gear, a: Assessment, start: float, end: float) -> list[tuple[float, float]]:
+def _measured_along(
+    gear: Gear, a: Assessment, start: float, end: float
+) -> list[tuple[float, float]]:
     """What was measured, as actuator extension and displacement from nominal. [in]"""
     inspection = a.inspection
     found: list[tuple[float, float]] = []
@@ -205,7 +252,10 @@ def _measured_along(gear: Gear, a: Assessment, start: float, end: float) -> list
         found.append((start, inspection.plunger_down_lock_in))
     if inspection.actuator_extension_in is not None and inspection.plunger_position_in is not None:
         found.append((inspection.actuator_extension_in, inspection.plunger_position_in))
-    displaced = [(place, position - float(gear.model.plunger(np.array([place]))[0])) for place, position in found]
+    displaced = [
+        (place, position - float(gear.model.plunger(np.array([place]))[0]))
+        for place, position in found
+    ]
     if inspection.measured_displacement_in is not None:
         displaced.append((end, inspection.measured_displacement_in))
     return [(place, value) for place, value in displaced if math.isfinite(value)]

@@ -1,4 +1,6 @@
-"""What the reports of one inspection and of a batch are made from; the sentences and tables stand in the templates."""
+"""What the reports of one inspection and of a batch are made from; the sentences and tables stand
+in the templates.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,11 @@ from typing import Any
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Outcome, RowSource, Side
 from mlg_troubleshoot.decision.order import WORST_FIRST, latest_of_each_gear
-from mlg_troubleshoot.decision.sentences import chance_wrong_sentence, no_repair_set, rigging_sentence
+from mlg_troubleshoot.decision.sentences import (
+    chance_wrong_sentence,
+    no_repair_set,
+    rigging_sentence,
+)
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import inspection_figures as drawn
@@ -37,16 +43,22 @@ def inspection_document(
     unit: LengthUnit = LengthUnit.INCH,
     steps: Sequence[Mapping[str, Any]] = (),
 ) -> Document:
-    """Make the document of one inspection; `steps` are the gear's inspections up to this one, side by side."""
+    """Make the document of one inspection; `steps` are the gear's inspections up to this one, side
+    by side.
+    """
     lengths = Lengths(unit)
     if isinstance(judgement, Rejected):
         row = judgement.row
-        stem = safe_stem(row.tail_no, row.side.value if row.side else None, row.record_id, *_place(row.source))
+        stem = safe_stem(
+            row.tail_no, row.side.value if row.side else None, row.record_id, *_place(row.source)
+        )
         context = {
             **_identified(judgement, gear, provenance, lengths),
             "carried": [],
             "correct": row.correct,
-            "problems": [p for p in problems if (p.file, p.sheet, str(p.row or "")) == _place(row.source, "")],
+            "problems": [
+                p for p in problems if (p.file, p.sheet, str(p.row or "")) == _place(row.source, "")
+            ],
         }
         return Document("rejected.html.j2", context, stem)
     inspection = judgement.inspection
@@ -55,7 +67,9 @@ def inspection_document(
     return Document("inspection.html.j2", context, stem)
 
 
-def _identified(j: Judgement, gear: Gear, provenance: ReportProvenance, lengths: Lengths) -> dict[str, Any]:
+def _identified(
+    j: Judgement, gear: Gear, provenance: ReportProvenance, lengths: Lengths
+) -> dict[str, Any]:
     """What every report of one row has: who, the verdict with its sign, title and footer."""
     row = j.row
     side, tail = (row.side.value if row.side else "?"), row.tail_no or "tail not known"
@@ -74,9 +88,13 @@ def _identified(j: Judgement, gear: Gear, provenance: ReportProvenance, lengths:
     }
 
 
-def _inspection(a: Assessment, gear: Gear, provenance: ReportProvenance, lengths: Lengths) -> dict[str, Any]:
+def _inspection(
+    a: Assessment, gear: Gear, provenance: ReportProvenance, lengths: Lengths
+) -> dict[str, Any]:
     inspection = a.inspection
-    carried = [(k.replace("_", " "), v) for k, v in inspection.carried.items() if v and k not in _MANUAL]
+    carried = [
+        (k.replace("_", " "), v) for k, v in inspection.carried.items() if v and k not in _MANUAL
+    ]
     in_front = [(short(label, 60), short(value, 120)) for label, value in carried[:_MOST_IN_FRONT]]
     known = _identified(a, gear, provenance, lengths)
     warnings = known["warnings"]
@@ -98,12 +116,17 @@ def _inspection(a: Assessment, gear: Gear, provenance: ReportProvenance, lengths
         "rows": _joints(gear, a, lengths),
         "curve": drawn.plunger_curve(gear, a, lengths),
         "cases": _sequence(gear, a, lengths),
-        "signatories": [(role, inspection.technician_id or "" if i == 0 else "") for i, role in enumerate(SIGNATORIES)],
+        "signatories": [
+            (role, inspection.technician_id or "" if i == 0 else "")
+            for i, role in enumerate(SIGNATORIES)
+        ],
         "intervals": {i.joint: i for i in a.posterior.intervals} if a.posterior else {},
     }
 
 
-def _place(source: RowSource, absent: str | None = None) -> tuple[str | None, str | None, str | None]:
+def _place(
+    source: RowSource, absent: str | None = None
+) -> tuple[str | None, str | None, str | None]:
     return source.file, source.sheet, absent if source.row is None else str(source.row)
 
 
@@ -114,7 +137,9 @@ def _joints(gear: Gear, a: Assessment, lengths: Lengths) -> list[dict[str, Any]]
     def bar_end(finding: JointFinding) -> float:
         if finding.contribution_in is None:
             return drawn.bar_stand_in(finding)
-        return finding.contribution_in + 2.0 * gauge_u(finding.joint) * finding.plunger_amplification
+        return (
+            finding.contribution_in + 2.0 * gauge_u(finding.joint) * finding.plunger_amplification
+        )
 
     longest = max([1e-6, *(bar_end(f) for f in a.joints)])
     return [
@@ -132,7 +157,9 @@ def _joints(gear: Gear, a: Assessment, lengths: Lengths) -> list[dict[str, Any]]
 
 
 def _allowance(finding: JointFinding) -> float | None:
-    """How much further a joint may wear: to the margin, and no further than to its own limit. [in]"""
+    """How much further a joint may wear: to the margin, and no further than to its own limit.
+    [in]
+    """
     if finding.allowance_in is None or finding.clearance_in is None:
         return None
     return max(0.0, min(finding.allowance_in, finding.limit_in - finding.clearance_in))
@@ -146,13 +173,17 @@ def _as_entered(entered: EnteredClearance | None) -> str | None:
 
 
 def _sequence(gear: Gear, a: Assessment, lengths: Lengths) -> Facts:
-    """What the plunger's position means in the sequence: each sentence with the positions that it holds for."""
+    """What the plunger's position means in the sequence: each sentence with the positions that it
+    holds for.
+    """
     if gear.cycle is None:
         return []
     places: list[tuple[str, float]] = []
     if a.inspection.measured_displacement_in is not None:
         places.append(("measured", a.inspection.measured_displacement_in))
-    worst = sorted((v for v in (a.over_travel_in, a.under_travel_in) if v is not None), key=abs, reverse=True)
+    worst = sorted(
+        (v for v in (a.over_travel_in, a.under_travel_in) if v is not None), key=abs, reverse=True
+    )
     places += [("worst case", v) for v in worst if abs(v) > a.margin_in or v == worst[0]]
     said: dict[str, list[str]] = {}
     for name, value in places:
@@ -170,14 +201,22 @@ def batch_document(
     links: Mapping[int, tuple[str, str]] | None = None,
     unit: LengthUnit = LengthUnit.INCH,
 ) -> Document:
-    """Make the document of a batch summary; `links` lead from a place to its HTML and its PDF report."""
+    """Make the document of a batch summary; `links` lead from a place to its HTML and its PDF
+    report.
+    """
     lengths = Lengths(unit)
     source = ", ".join(Path(name).name for name in provenance.input_sha256) or "inspections"
     counted = Counter(j.verdict for j in judgements)
     latest, earlier = latest_of_each_gear(judgements)
     judged = [j for j in judgements if isinstance(j, Assessment)]
     context = {
-        **head(f"Batch summary – {source}", f"Batch summary · {short(source, 40)}", gear, provenance, lengths),
+        **head(
+            f"Batch summary – {source}",
+            f"Batch summary · {short(source, 40)}",
+            gear,
+            provenance,
+            lengths,
+        ),
         "source": source,
         "asked": len(judgements),
         "judged": judged,

@@ -1,4 +1,6 @@
-"""The JSON contracts of a check and a diagnosis: lengths in inches, numbers not rounded, null where not known."""
+"""The JSON contracts of a check and a diagnosis: lengths in inches, numbers not rounded, null where
+not known.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,13 @@ from mlg_troubleshoot.schemas import SCHEMA_VERSION
 _AS_THEY_ARE = frozenset((str, int, bool, type(None)))
 _SINGLE = (Enum, np.generic)
 _NUMBERS = (
-    *("predicted_displacement_in", "over_travel_in", "under_travel_in", "predicted_upper_in", "bound_in"),
+    *(
+        "predicted_displacement_in",
+        "over_travel_in",
+        "under_travel_in",
+        "predicted_upper_in",
+        "bound_in",
+    ),
     *(
         "margin_in",
         "remaining_in",
@@ -33,18 +41,32 @@ _NUMBERS = (
     *("geometry_spread_in", "explained_at_most_in", "unexplained_in"),
 )
 _JOINT = (
-    *("joint", "name", "clearance_in", "over_limit", "contribution_in", "first_order", "total_order"),
+    *(
+        "joint",
+        "name",
+        "clearance_in",
+        "over_limit",
+        "contribution_in",
+        "first_order",
+        "total_order",
+    ),
     *("plunger_amplification", "rank", "rank_range", "allowance_in"),
 )
 _OF_JOINT = attrgetter(*_JOINT)
 # What the geometry says of a joint of every gear, and so is not kept with each assessment.
-_KEPT = tuple(name for name in _JOINT if name not in ("name", "first_order", "total_order", "plunger_amplification"))
+_KEPT = tuple(
+    name
+    for name in _JOINT
+    if name not in ("name", "first_order", "total_order", "plunger_amplification")
+)
 _KEPT_OF_JOINT = attrgetter(*_KEPT)
 _PARTS = ("repair_sets", "rigging", "measuring", "confidence", "posterior")
 
 
 def plain(value: Any) -> Any:
-    """Return a value as JSON can hold it: records as objects, arrays as lists, names as text, nothing but numbers."""
+    """Return a value as JSON can hold it: records as objects, arrays as lists, names as text,
+    nothing but numbers.
+    """
     kind = value.__class__
     if kind is float:
         return value if math.isfinite(value) else None
@@ -70,21 +92,40 @@ def chosen(record: Any, *names: str) -> dict[str, Any]:
 
 
 def check_as_json(
-    gear: Gear, judgements: Iterable[Judgement], problems: Sequence[Problem], warnings: Sequence[str], seed: int = 1
+    gear: Gear,
+    judgements: Iterable[Judgement],
+    problems: Sequence[Problem],
+    warnings: Sequence[str],
+    seed: int = 1,
 ) -> dict[str, Any]:
-    return {**_head(gear, seed), "inspections": [_inspection(j, gear) for j in judgements], **_tail(problems, warnings)}
+    return {
+        **_head(gear, seed),
+        "inspections": [_inspection(j, gear) for j in judgements],
+        **_tail(problems, warnings),
+    }
 
 
 def kept_as_json(assessment: Assessment) -> dict[str, Any]:
-    """An assessment as a store keeps it: as in the form of a check, without what the geometry's hash says already."""
-    joints = [dict(zip(_KEPT, map(plain, _KEPT_OF_JOINT(finding)), strict=True)) for finding in assessment.joints]
+    """An assessment as a store keeps it: as in the form of a check, without what the geometry's
+    hash says already.
+    """
+    joints = [
+        dict(zip(_KEPT, map(plain, _KEPT_OF_JOINT(finding)), strict=True))
+        for finding in assessment.joints
+    ]
     return _assessment(assessment, joints)
 
 
 def check_json_pieces(
-    gear: Gear, judgements: Iterable[Judgement], problems: Sequence[Problem], warnings: Sequence[str], seed: int = 1
+    gear: Gear,
+    judgements: Iterable[Judgement],
+    problems: Sequence[Problem],
+    warnings: Sequence[str],
+    seed: int = 1,
 ) -> Iterator[str]:
-    """Write the same form as JSON text piece by piece, one inspection a line: a large batch never stands in memory."""
+    """Write the same form as JSON text piece by piece, one inspection a line: a large batch never
+    stands in memory.
+    """
     yield _text(_head(gear, seed))[:-1] + ', "inspections": [\n'
     separator = ""
     for judgement in judgements:
@@ -98,7 +139,11 @@ def _text(value: dict[str, Any]) -> str:
 
 
 def _head(gear: Gear, seed: int) -> dict[str, Any]:
-    return {"schema_version": SCHEMA_VERSION, "seed": seed, "gear": chosen(gear, "id", "geometry_sha256", "provenance")}
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "seed": seed,
+        "gear": chosen(gear, "id", "geometry_sha256", "provenance"),
+    }
 
 
 def _tail(problems: Sequence[Problem], warnings: Sequence[str]) -> dict[str, Any]:
@@ -136,11 +181,18 @@ def _assessment(a: Assessment, joints: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _identity(row: Any, judgement: Judgement, headline: str) -> dict[str, Any]:
-    return {**chosen(row, "record_id", "tail_no", "side"), "verdict": judgement.verdict.value, "headline": headline}
+    return {
+        **chosen(row, "record_id", "tail_no", "side"),
+        "verdict": judgement.verdict.value,
+        "headline": headline,
+    }
 
 
 def _joint(finding: JointFinding) -> dict[str, Any]:
-    return {**dict(zip(_JOINT, map(plain, _OF_JOINT(finding)), strict=True)), "acts_like": list(finding.alike)}
+    return {
+        **dict(zip(_JOINT, map(plain, _OF_JOINT(finding)), strict=True)),
+        "acts_like": list(finding.alike),
+    }
 
 
 def _course(judgement: Judgement) -> dict[str, Any]:
@@ -155,14 +207,18 @@ def diagnosis_as_json(
     return {
         "schema_version": SCHEMA_VERSION,
         "rows": {"read": d.rows_read, "used": d.rows_used, "set_aside": d.rows_read - d.rows_used},
-        "data_faults": [chosen(f, "row", "record_id", "column", "kind", "value", "suggested") for f in d.faults],
+        "data_faults": [
+            chosen(f, "row", "record_id", "column", "kind", "value", "suggested") for f in d.faults
+        ],
         "misfit": chosen(d, "mean_in", "rms_in", "repeatability_in", "repeatability_source"),
         "verdict": d.verdict,
         "causes": [_cause(c) for c in d.causes],
         "also_possible": [_possible(c.candidate) for c in d.also_possible],
         "beside": [_possible(c.candidate) for c in d.beside],
         "unlisted_variables": list(d.unlisted_variables),
-        "not_testable": [{"cause": cause, "missing_column": column} for cause, column in d.not_testable],
+        "not_testable": [
+            {"cause": cause, "missing_column": column} for cause, column in d.not_testable
+        ],
         "cannot_say": list(d.unsaid),
         "ruled_out": [{"cause": cause, "target": target} for cause, target in d.ruled_out],
         "smallest_detectable_rms_in": plain(d.smallest_rms_in),
@@ -214,7 +270,12 @@ def _extension(extension: ModelExtension) -> dict[str, Any]:
 
 def _gain(d: Diagnosis) -> dict[str, Any]:
     """What the extension gains; where the model is not extended, everything after is as before."""
-    counts = ("false_within_before", "false_within_after", "false_outside_before", "false_outside_after")
+    counts = (
+        "false_within_before",
+        "false_within_after",
+        "false_outside_before",
+        "false_outside_after",
+    )
     if d.gain is not None:
         g = d.gain
         return {

@@ -1,4 +1,6 @@
-"""HTML to PDF in a child process with a time limit, with bookmarks and a check that the fonts are inside."""
+"""HTML to PDF in a child process with a time limit, with bookmarks and a check that the fonts are
+inside.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ TIME_LIMIT_S = 30.0
 
 
 class PdfError(Exception):
-    """A PDF that could not be made, or that must not be handed out; its text is meant for the user."""
+    """A PDF that could not be made, or that must not be handed out; its text is meant for the
+    user.
+    """
 
 
 def engine_is_installed() -> bool:
@@ -25,7 +29,9 @@ def engine_is_installed() -> bool:
 
 
 class PdfEngine:
-    """One child process that makes PDFs, started at the first job and again after it had to be stopped."""
+    """One child process that makes PDFs, started at the first job and again after it had to be
+    stopped.
+    """
 
     def __init__(self, time_limit_s: float = TIME_LIMIT_S) -> None:
         self.time_limit_s = time_limit_s
@@ -39,11 +45,14 @@ class PdfEngine:
         process.communicate()
 
     def start(self) -> subprocess.Popen[bytes]:
-        """Start the child process if it is not running, so that it is ready when the first job comes."""
+        """Start the child process if it is not running, so that it is ready when the first job
+        comes.
+        """
         if not engine_is_installed():
             raise PdfError("the PDF engine plutoprint is not installed")
         if self._process is None or self._process.poll() is not None:
-            # -P keeps this folder off the child's module path: html.py here would shadow the standard library's.
+            # -P keeps this folder off the child's module path: html.py here would shadow the
+            # standard library's.
             self._process = subprocess.Popen(
                 [sys.executable, "-P", str(Path(__file__).with_name("engine.py"))],
                 stdin=subprocess.PIPE,
@@ -53,7 +62,9 @@ class PdfEngine:
         return self._process
 
     def convert(self, html: str, page: str, created: datetime) -> tuple[bytes, bool]:
-        """Make one PDF; also tell whether it shows the box that stands for a character that no font has."""
+        """Make one PDF; also tell whether it shows the box that stands for a character that no font
+        has.
+        """
         body = html.encode("utf-8")
         dated = created.astimezone(UTC).strftime("D:%Y%m%d%H%M%SZ")
         about = {"sections": sections_of(html), "title": title_of(html), "created": dated}
@@ -73,7 +84,9 @@ class PdfEngine:
             process.stdin.write(json.dumps(job).encode("ascii") + b"\n" + body)
             process.stdin.flush()
             line = process.stdout.readline()
-            answer: dict[str, Any] = json.loads(line) if line else {"error": "it ended without an answer", "length": 0}
+            answer: dict[str, Any] = (
+                json.loads(line) if line else {"error": "it ended without an answer", "length": 0}
+            )
             made = process.stdout.read(answer["length"])
         except (BrokenPipeError, ConnectionResetError, OSError) as error:
             answer, made = {"error": str(error), "length": 0}, b""
@@ -81,19 +94,25 @@ class PdfEngine:
             timer.cancel()
         if stopped.is_set():
             self.close()
-            raise PdfError(f"the PDF engine was stopped: it took longer than {self.time_limit_s:g} s")
+            raise PdfError(
+                f"the PDF engine was stopped: it took longer than {self.time_limit_s:g} s"
+            )
         if answer["error"] is not None:
             self.close()
             raise PdfError(f"the PDF engine failed: {answer['error']}")
         return made, bool(answer["boxes"])
 
 
-_HEADING = re.compile(r'<h2\b[^>]*\bid="(?P<id>[a-z0-9-]+)"[^>]*><a href="#(?P=id)">(?P<text>.*?)</a></h2>', re.DOTALL)
+_HEADING = re.compile(
+    r'<h2\b[^>]*\bid="(?P<id>[a-z0-9-]+)"[^>]*><a href="#(?P=id)">(?P<text>.*?)</a></h2>', re.DOTALL
+)
 _TITLE = re.compile(r"<title>(.*?)</title>", re.DOTALL)
 
 
 def sections_of(html: str) -> dict[str, str]:
-    """Return anchor and heading of each section of a document made from the base template, for the bookmarks."""
+    """Return anchor and heading of each section of a document made from the base template, for the
+    bookmarks.
+    """
     return {
         found["id"]: " ".join(html_text.unescape(re.sub(r"<[^>]*>", " ", found["text"])).split())
         for found in _HEADING.finditer(html)

@@ -17,8 +17,9 @@ from mlg_troubleshoot.gear.gear import Gear
 class ReportProvenance:
     """Program, inputs and moment behind a report.
 
-    input_sha256: hash of the bytes of each input file by its name; empty for prompts and the command line.
-    remembered: remembered settings that shaped the report, and the file that they come from.
+    input_sha256: hash of the bytes of each input file by its name; empty for prompts and the
+    command line. remembered: remembered settings that shaped the report, and the file that they
+    come from.
     """
 
     program_version: str
@@ -48,7 +49,9 @@ def program_version() -> str:
 
 
 def moment_of_report() -> datetime:
-    """Return the present moment, or the one of ``SOURCE_DATE_EPOCH`` where a report must be the same bytes again."""
+    """Return the present moment, or the one of ``SOURCE_DATE_EPOCH`` where a report must be the
+    same bytes again.
+    """
     given = os.environ.get("SOURCE_DATE_EPOCH")
     if given is None:
         return datetime.now(UTC).astimezone()
@@ -56,5 +59,6 @@ def moment_of_report() -> datetime:
         return datetime.fromtimestamp(int(given), UTC)
     except (ValueError, OverflowError, OSError):
         raise UsageError(
-            f"SOURCE_DATE_EPOCH is {given!r}", "Set it to seconds since 1970-01-01 UTC, or leave it out."
+            f"SOURCE_DATE_EPOCH is {given!r}",
+            "Set it to seconds since 1970-01-01 UTC, or leave it out.",
         ) from None

@@ -65,7 +65,9 @@ class WrittenReport:
 
 
 def safe_stem(*identity: str | None) -> str:
-    """Make a file name from texts of users: readable, safe on every system, different for different texts."""
+    """Make a file name from texts of users: readable, safe on every system, different for different
+    texts.
+    """
     parts = []
     for text in identity:
         plain = unicodedata.normalize("NFKD", text or "").encode("ascii", "ignore").decode("ascii")
@@ -88,7 +90,9 @@ def publish(
     unknown = sorted(set(formats) - set(FORMATS))
     if unknown or page not in PAGES:
         asked, known = (unknown[0], FORMATS) if unknown else (page, PAGES)
-        raise UsageError(f"a report cannot be written as {asked!r}", f"Give one of {', '.join(known)}.")
+        raise UsageError(
+            f"a report cannot be written as {asked!r}", f"Give one of {', '.join(known)}."
+        )
     running = engine or PdfEngine()
     wanted, notes = set(formats), []
     made: dict[str, Path] = {}
@@ -133,10 +137,14 @@ def _pdf(document: Document, page: str, engine: PdfEngine) -> tuple[bytes, list[
     if not missing or not boxes:
         return made, []
     note = (
-        f"No font on this computer can draw {' '.join(missing[:12])}{' …' if len(missing) > 12 else ''}: "
-        "they stand in the PDF by their sound or code in ‹ ›; the HTML report has them as entered."
+        "No font on this computer can draw"
+        f" {' '.join(missing[:12])}{' …' if len(missing) > 12 else ''}: they stand in the PDF by"
+        " their sound or code in ‹ ›; the HTML report has them as entered."
     )
-    on_paper = "Text in ‹ › stands for characters that this PDF's fonts lack; the HTML report has them as entered."
+    on_paper = (
+        "Text in ‹ › stands for characters that this PDF's fonts lack; the HTML report has them as"
+        " entered."
+    )
     html = render(document, page, for_pdf=True, glyph_note=on_paper)
     return engine.convert(spell_out(html, missing), page, document.created)[0], [note]
 
@@ -173,12 +181,14 @@ def publish_all(
     seen: Counter[str] = Counter()
     try:
         for document in documents:
-            # Files of inspections that carry the same identity are numbered: none overwrites another.
+            # Files of inspections that carry the same identity are numbered: none overwrites
+            # another.
             seen[document.stem] += 1
             again = seen[document.stem]
             named = document if again == 1 else replace(document, stem=f"{document.stem}-{again}")
             waiting.append(pool.submit(one, named))
-            # Documents are handed out a few at a time, so that a long batch does not stand in memory.
+            # Documents are handed out a few at a time, so that a long batch does not stand in
+            # memory.
             if len(waiting) > 2 * count:
                 take()
         while waiting:

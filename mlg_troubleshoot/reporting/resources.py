@@ -19,6 +19,7 @@ def templates_folder() -> Path:
         if (folder / "base.html.j2").is_file():
             return folder
     raise OutputError(
-        f"the report templates are missing: neither {candidates[0]} nor {candidates[1]} holds base.html.j2",
+        f"the report templates are missing: neither {candidates[0]} nor {candidates[1]} holds"
+        " base.html.j2",
         "Install the package again.",
     )

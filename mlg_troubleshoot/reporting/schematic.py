@@ -1,4 +1,6 @@
-"""The linkage drawn in its planes: joints numbered in place, distinguished by shape, clearances exaggerated."""
+"""The linkage drawn in its planes: joints numbered in place, distinguished by shape, clearances
+exaggerated.
+"""
 
 from __future__ import annotations
 
@@ -15,19 +17,33 @@ from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot, needs
-from mlg_troubleshoot.reporting.figures import INK, PALE, PAPER, RULE, SOFT, Anchor, Canvas, Place, text_width
+from mlg_troubleshoot.reporting.figures import (
+    INK,
+    PALE,
+    PAPER,
+    RULE,
+    SOFT,
+    Anchor,
+    Canvas,
+    Place,
+    text_width,
+)
 from mlg_troubleshoot.reporting.formats import Lengths
 
 JointState = Literal["over", "fine", "missing"]
-JOINT_STATES: dict[JointState, str] = {"over": "over its limit", "fine": "within its limit", "missing": "not measured"}
+JOINT_STATES: dict[JointState, str] = {
+    "over": "over its limit",
+    "fine": "within its limit",
+    "missing": "not measured",
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Schematic:
     """The linkage drawn in its planes, all at one scale.
 
-    panels: name of each plane, its drawing and the drawing's width [canvas units].
-    exaggeration: how many times larger than life the virtual links are drawn; None if there are none.
+    panels: name of each plane, its drawing and the drawing's width [canvas units]. exaggeration:
+    how many times larger than life the virtual links are drawn; None if there are none.
     """
 
     panels: tuple[tuple[str, Markup, float], ...]
@@ -54,8 +70,12 @@ Segment = tuple[Place, Place]
 _At = Callable[[str], Place]
 
 
-def schematic(gear: Gear, assessment: Assessment, lengths: Lengths | None = None, width: float = _WIDTH) -> Schematic:
-    """Draw the linkage at mid-position, its joints numbered in place and their clearances exaggerated."""
+def schematic(
+    gear: Gear, assessment: Assessment, lengths: Lengths | None = None, width: float = _WIDTH
+) -> Schematic:
+    """Draw the linkage at mid-position, its joints numbered in place and their clearances
+    exaggerated.
+    """
     over = (assessment.over_travel_in or 0.0) >= -(assessment.under_travel_in or 0.0)
     directions = assessment.over_directions_rad if over else assessment.under_directions_rad
     return _drawn(gear, assessment.joints, directions, lengths or Lengths(), width)
@@ -64,16 +84,26 @@ def schematic(gear: Gear, assessment: Assessment, lengths: Lengths | None = None
 def blank_schematic(gear: Gear) -> Schematic:
     """Draw the linkage with its joints numbered and named, none of them measured yet."""
     nothing = tuple(
-        JointFinding(j.number, j.name, None, j.limit.value, False, None, 0.0, 0.0, 0.0, j.number, (1, 1), ())
+        JointFinding(
+            j.number, j.name, None, j.limit.value, False, None, 0.0, 0.0, 0.0, j.number, (1, 1), ()
+        )
         for j in gear.joints
     )
     return _drawn(gear, nothing, (), Lengths(), _WIDTH)
 
 
 def _drawn(
-    gear: Gear, findings: Sequence[JointFinding], directions: Sequence[float], lengths: Lengths, width: float
+    gear: Gear,
+    findings: Sequence[JointFinding],
+    directions: Sequence[float],
+    lengths: Lengths,
+    width: float,
 ) -> Schematic:
-    drawings = [d for d in (_PlaneDrawing(gear, plane.name) for plane in gear.reference.mechanism.planes) if d.points]
+    drawings = [
+        d
+        for d in (_PlaneDrawing(gear, plane.name) for plane in gear.reference.mechanism.planes)
+        if d.points
+    ]
     gap, side = 6.0, 74.0
     free = width - gap * (len(drawings) - 1) - 2 * side * len(drawings)
     scale = free / sum(d.extent()[2] - d.extent()[0] for d in drawings)
@@ -88,12 +118,16 @@ def _drawn(
         exaggeration or 0,
         lengths,
     )
-    return Schematic(tuple(drawing.draw(scale, side, height, shown) for drawing in drawings), exaggeration)
+    return Schematic(
+        tuple(drawing.draw(scale, side, height, shown) for drawing in drawings), exaggeration
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class _Shown:
-    """What is shown at the joints: findings, directions of their clearances and how these are drawn."""
+    """What is shown at the joints: findings, directions of their clearances and how these are
+    drawn.
+    """
 
     findings: dict[int, JointFinding]
     angles: dict[int, float]
@@ -104,10 +138,13 @@ class _Shown:
         finding = self.findings[joint]
         if finding.clearance_in is None:
             return "not measured"
-        return f"{self.lengths.full(finding.clearance_in)}{' over its limit' if finding.over_limit else ''}"
+        over = " over its limit" if finding.over_limit else ""
+        return f"{self.lengths.full(finding.clearance_in)}{over}"
 
     def arrow(self, joint: int, place: Place, scale: float) -> Segment | None:
-        """The joint's clearance as an arrow from the edge of its marker; None if it would be too short to see."""
+        """The joint's clearance as an arrow from the edge of its marker; None if it would be too
+        short to see.
+        """
         length = (self.findings[joint].clearance_in or 0.0) * scale * self.exaggeration
         if joint not in self.angles or length <= _SHORTEST_ARROW:
             return None
@@ -120,7 +157,9 @@ class _Shown:
         lines = [_Line(part, 8.5, False) for part in ([name] if strong else _two_lines(name))]
         if finding.clearance_in is not None:
             mark = " OVER LIMIT" if strong else " OVER" if finding.over_limit else ""
-            lines.append(_Line(self.lengths.bare(finding.clearance_in) + mark, 10.5 if strong else 9.5, True))
+            lines.append(
+                _Line(self.lengths.bare(finding.clearance_in) + mark, 10.5 if strong else 9.5, True)
+            )
         return lines
 
 
@@ -139,7 +178,9 @@ class _PlaneDrawing:
         self.gear = gear
         self.mechanism: Mechanism = gear.reference.mechanism
         self.plane = plane
-        self.steps = [s for s in self.mechanism.steps if self.mechanism.point(s.joint).plane == plane]
+        self.steps = [
+            s for s in self.mechanism.steps if self.mechanism.point(s.joint).plane == plane
+        ]
         names = {name for step in self.steps for name in (step.joint, *needs(step))}
         # Points of another plane are drawn where they stand above this one.
         origin, axes = self.mechanism.frame(plane)
@@ -166,13 +207,19 @@ class _PlaneDrawing:
         xs, ys = zip(*self.points.values(), strict=True)
         return min(xs), min(ys), max(xs), max(ys)
 
-    def draw(self, scale: float, side: float, height: float, shown: _Shown) -> tuple[str, Markup, float]:
-        """Draw the plane: links and supports, then joints with their clearances, then their names."""
+    def draw(
+        self, scale: float, side: float, height: float, shown: _Shown
+    ) -> tuple[str, Markup, float]:
+        """Draw the plane: links and supports, then joints with their clearances, then their
+        names.
+        """
         x0, y0, x1, y1 = self.extent()
         width = (x1 - x0) * scale + 2 * side
         name = self.plane.replace("_", " ") + " plane"
         said = ", ".join(
-            f"joint {j.number} {shown.state(j.number)}" for j in self.gear.joints if j.point in self.points
+            f"joint {j.number} {shown.state(j.number)}"
+            for j in self.gear.joints
+            if j.point in self.points
         )
         canvas = Canvas(width, height, f"Linkage schematic, {name}", said)
         lift = (height - _ABOVE - _BELOW - (y1 - y0) * scale) / 2
@@ -190,7 +237,13 @@ class _PlaneDrawing:
         states = {number: joint_state(finding) for number, finding in shown.findings.items()}
         for joint in self.gear.joints:
             if joint.point in self.points and not self._home(joint.point):
-                _mark(canvas, *markers[joint.number], str(joint.number), states[joint.number], faded=True)
+                _mark(
+                    canvas,
+                    *markers[joint.number],
+                    str(joint.number),
+                    states[joint.number],
+                    faded=True,
+                )
         for joint in here:
             arrow = shown.arrow(joint.number, at(joint.point), scale)
             if arrow is not None:
@@ -240,7 +293,9 @@ class _PlaneDrawing:
         return places
 
     def _obstacles(self, at: _At) -> list[Box]:
-        """Boxes of what labels must not cover: markers, supports, the slot, actuator and plunger with their names."""
+        """Boxes of what labels must not cover: markers, supports, the slot, actuator and plunger
+        with their names.
+        """
         boxes: list[Box] = [(0.0, 0.0, 130.0, 14.0)]
         pins = {s.pin for s in self.steps if isinstance(s, Slot)}
         for point in self.points:
@@ -255,7 +310,9 @@ class _PlaneDrawing:
             if isinstance(step, Slider):
                 ux, uy = math.cos(step.axis), -math.sin(step.axis)
                 ends = (x + 20 * ux, x + 60 * ux), (y + 20 * uy, y + 60 * uy)
-                boxes.append((min(ends[0]) - 60, min(ends[1]) - 6, max(ends[0]) + 10, max(ends[1]) + 6))
+                boxes.append(
+                    (min(ends[0]) - 60, min(ends[1]) - 6, max(ends[0]) + 10, max(ends[1]) + 6)
+                )
             if isinstance(step, Dyad) and step.driven:
                 fx, fy = at(step.upstream)
                 boxes.append((min(x, fx) - 62, (y + fy) / 2 - 12, max(x, fx) + 8, max(y, fy)))
@@ -265,7 +322,9 @@ class _PlaneDrawing:
         return point in self.points and self.mechanism.point(point).plane == self.plane
 
     def _links(self, canvas: Canvas, at: _At) -> list[Segment]:
-        """Draw the rigid parts below, the links above; return the segments for the placing of labels."""
+        """Draw the rigid parts below, the links above; return the segments for the placing of
+        labels.
+        """
         segments = self._rigid_parts(canvas, at)
         for step in self.steps:
             place = at(step.joint)
@@ -300,7 +359,10 @@ class _PlaneDrawing:
 
     def _rigid(self, joint: str, pivot: str) -> bool:
         """Tell whether two points are already drawn as an edge of a rigid part."""
-        return any(isinstance(s, Lever) and s.pivot == pivot and joint in (s.follows, s.joint) for s in self.steps)
+        return any(
+            isinstance(s, Lever) and s.pivot == pivot and joint in (s.follows, s.joint)
+            for s in self.steps
+        )
 
 
 def _bar(canvas: Canvas, a: Place, b: Place) -> None:
@@ -323,10 +385,20 @@ def _actuator(canvas: Canvas, far: Place, joint: Place) -> None:
     canvas.line(*neck, *far, colour=PALE, width=12)
     for k in (-1, 1):
         x, y = far[0] + 3 * k * ux, far[1] + 3 * k * uy
-        canvas.line(x - 10 * uy - 3 * ux, y + 10 * ux - 3 * uy, x + 10 * uy + 3 * ux, y - 10 * ux + 3 * uy)
+        canvas.line(
+            x - 10 * uy - 3 * ux, y + 10 * ux - 3 * uy, x + 10 * uy + 3 * ux, y - 10 * ux + 3 * uy
+        )
     outside = -1.0 if neck[0] < canvas.width / 2 else 1.0
     anchor: Anchor = "end" if outside < 0 else "start"
-    canvas.text(neck[0] + 12 * outside, neck[1] + 16, "actuator", size=9, bold=True, colour=SOFT, anchor=anchor)
+    canvas.text(
+        neck[0] + 12 * outside,
+        neck[1] + 16,
+        "actuator",
+        size=9,
+        bold=True,
+        colour=SOFT,
+        anchor=anchor,
+    )
 
 
 def _slot(canvas: Canvas, pivot: Place, pin: Place) -> None:
@@ -345,12 +417,16 @@ def _plunger(canvas: Canvas, joint: Place, axis: float) -> Segment:
     canvas.line(*tip, *end, width=24)
     canvas.line(*tip, *end, width=21, colour=PALE)
     x = (tip[0] + end[0]) / 2
-    canvas.text(x - 18, (tip[1] + end[1]) / 2 - 7, "plunger", size=9, bold=True, colour=SOFT, anchor="end")
+    canvas.text(
+        x - 18, (tip[1] + end[1]) / 2 - 7, "plunger", size=9, bold=True, colour=SOFT, anchor="end"
+    )
     return joint, end
 
 
 def _ground(canvas: Canvas, x: float, y: float) -> None:
-    canvas.polyline([(x, y), (x + 12, y + 19), (x - 12, y + 19)], fill=PAPER, width=1.4, closed=True)
+    canvas.polyline(
+        [(x, y), (x + 12, y + 19), (x - 12, y + 19)], fill=PAPER, width=1.4, closed=True
+    )
     for k in range(-2, 3):
         canvas.line(x + 5 * k + 1, y + 19, x + 5 * k - 3, y + 24)
 
@@ -364,12 +440,18 @@ def joint_state(finding: JointFinding) -> JointState:
 def _mark(canvas: Canvas, x: float, y: float, text: str, state: str, faded: bool = False) -> None:
     size = _MARKER
     if state == "over":
-        canvas.rectangle(x - size, y - size, 2 * size, 2 * size, fill=SOFT if faded else INK, colour=PAPER)
+        canvas.rectangle(
+            x - size, y - size, 2 * size, 2 * size, fill=SOFT if faded else INK, colour=PAPER
+        )
         canvas.text(x, y + 4, text, bold=True, colour=PAPER, anchor="middle")
         return
     missing, pale = state == "missing", state == "missing" or faded
     colour, dash = SOFT if pale else INK, "3 2.2" if missing else None
-    outline: dict[str, Any] = {"stroke": colour, "stroke_width": 1.3 if pale else 2.2, "stroke_dasharray": dash}
+    outline: dict[str, Any] = {
+        "stroke": colour,
+        "stroke_width": 1.3 if pale else 2.2,
+        "stroke_dasharray": dash,
+    }
     canvas.add("circle", cx=x, cy=y, r=size, fill=PAPER, **outline)
     canvas.text(x, y + 4, text, bold=not missing, colour=colour, anchor="middle")
 
@@ -387,7 +469,11 @@ def _arrow(canvas: Canvas, start: Place, end: Place) -> None:
     base = (end[0] - head * ux, end[1] - head * uy)
     canvas.line(*start, *end, colour=PAPER, width=5.5)
     canvas.line(*start, *base, width=2.4)
-    corners = [end, (base[0] - 4.2 * uy, base[1] + 4.2 * ux), (base[0] + 4.2 * uy, base[1] - 4.2 * ux)]
+    corners = [
+        end,
+        (base[0] - 4.2 * uy, base[1] + 4.2 * ux),
+        (base[0] + 4.2 * uy, base[1] - 4.2 * ux),
+    ]
     canvas.polyline(corners, fill=INK, width=0.5, closed=True)
 
 
@@ -399,33 +485,64 @@ class _Line:
 
 
 def _callout(
-    canvas: Canvas, joint: Place, lines: list[_Line], boxes: list[Box], segments: list[Segment], framed: bool
+    canvas: Canvas,
+    joint: Place,
+    lines: list[_Line],
+    boxes: list[Box],
+    segments: list[Segment],
+    framed: bool,
 ) -> None:
     """Write a label where it covers least, and remember its box."""
-    width = max(text_width(line.text, line.size) * (1.12 if line.bold else 1.0) for line in lines) + 6
+    width = (
+        max(text_width(line.text, line.size) * (1.12 if line.bold else 1.0) for line in lines) + 6
+    )
     height = sum(line.size + 2.0 for line in lines) + 3
-    # From the marker's edge outwards until the label's box clears it, in every direction and at several distances.
+    # From the marker's edge outwards until the label's box clears it, in every direction and at
+    # several distances.
     with np.errstate(divide="ignore"):
         clears = np.minimum(width / 2 / np.abs(_COSINES), height / 2 / np.abs(_SINES))
     reach = _MARKER + 2 + _RINGS[:, None] + clears
     x, y = (joint[0] + _COSINES * reach).ravel(), (joint[1] + _SINES * reach).ravel()
     tried = np.column_stack([x - width / 2, y - height / 2, x + width / 2, y + height / 2])
-    cost = np.repeat(1.1 * _RINGS, len(_COSINES)) + _overlap(tried, np.array(boxes)) + _covered(tried, segments)
-    outside = (tried[:, 0] < 0) | (tried[:, 2] > canvas.width) | (tried[:, 1] < 14) | (tried[:, 3] > canvas.height)
+    cost = (
+        np.repeat(1.1 * _RINGS, len(_COSINES))
+        + _overlap(tried, np.array(boxes))
+        + _covered(tried, segments)
+    )
+    outside = (
+        (tried[:, 0] < 0)
+        | (tried[:, 2] > canvas.width)
+        | (tried[:, 1] < 14)
+        | (tried[:, 3] > canvas.height)
+    )
     box: Box = tuple(tried[int(np.argmin(np.round(cost + 2000.0 * outside, 6)))].tolist())
     boxes.append(box)
     edge = (min(max(joint[0], box[0]), box[2]), min(max(joint[1], box[1]), box[3]))
     away = math.hypot(edge[0] - joint[0], edge[1] - joint[1])
     if away > _MARKER + 14:
         ux, uy = _unit(joint, edge)
-        canvas.line(joint[0] + (_MARKER + 1) * ux, joint[1] + (_MARKER + 1) * uy, *edge, colour=SOFT, width=0.8)
+        canvas.line(
+            joint[0] + (_MARKER + 1) * ux,
+            joint[1] + (_MARKER + 1) * uy,
+            *edge,
+            colour=SOFT,
+            width=0.8,
+        )
     if framed:
         canvas.rectangle(box[0], box[1], width, height, fill=PAPER, colour=INK, width=1.4)
     base, middle = box[1] + 0.5, (box[0] + box[2]) / 2
     for line in lines:
         base += line.size + 2.0
         colour = INK if line.bold else SOFT
-        canvas.text(middle, base - 1.5, line.text, size=line.size, bold=line.bold, anchor="middle", colour=colour)
+        canvas.text(
+            middle,
+            base - 1.5,
+            line.text,
+            size=line.size,
+            bold=line.bold,
+            anchor="middle",
+            colour=colour,
+        )
 
 
 def _two_lines(name: str) -> list[str]:

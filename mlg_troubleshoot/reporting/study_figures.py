@@ -1,4 +1,6 @@
-"""Figures of the study report: plunger over the release, and indices side by side (counterparts of Figs. 12 and 13)."""
+"""Figures of the study report: plunger over the release, and indices side by side (counterparts of
+Figs. 12 and 13).
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,19 @@ from markupsafe import Markup
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting.figures import INK, PALE, RULE, SOFT, Axis, Bar, Canvas, Plot, Series, Style, draw_bar
+from mlg_troubleshoot.reporting.figures import (
+    INK,
+    PALE,
+    RULE,
+    SOFT,
+    Axis,
+    Bar,
+    Canvas,
+    Plot,
+    Series,
+    Style,
+    draw_bar,
+)
 from mlg_troubleshoot.reporting.formats import Lengths, number
 
 _POINTS = 81
@@ -23,7 +37,9 @@ _WIDTH, _LABEL_WIDTH = 430.0, 30.0
 
 @dataclass(frozen=True, slots=True)
 class BarSeries:
-    """One kind of bar in a chart of groups: NaN draws none, a spread is an interval of each bar, shape (n, 2). [1]"""
+    """One kind of bar in a chart of groups: NaN draws none, a spread is an interval of each bar,
+    shape (n, 2). [1]
+    """
 
     label: str
     values: Array
@@ -31,8 +47,12 @@ class BarSeries:
     spread: Array | None = None
 
 
-def grouped_bars(labels: Sequence[str], series: Sequence[BarSeries], title: str, description: str) -> Markup:
-    """Draw horizontal bars in groups: a group for each label, in it a bar of each series with its value."""
+def grouped_bars(
+    labels: Sequence[str], series: Sequence[BarSeries], title: str, description: str
+) -> Markup:
+    """Draw horizontal bars in groups: a group for each label, in it a bar of each series with its
+    value.
+    """
     row = _BAR_HEIGHT * len(series) + _GAP
     canvas = Canvas(_WIDTH, _TOP + row * len(labels) + 2, title, description)
     x = _LABEL_WIDTH
@@ -41,7 +61,9 @@ def grouped_bars(labels: Sequence[str], series: Sequence[BarSeries], title: str,
         canvas.text(x + 23, 11.5, one.label, size=9.5)
         x += 36 + 5.6 * len(one.label)
     ends = [one.values for one in series] + [one.spread for one in series if one.spread is not None]
-    longest = max((float(v) for part in ends for v in part.ravel() if math.isfinite(v)), default=0.0)
+    longest = max(
+        (float(v) for part in ends for v in part.ravel() if math.isfinite(v)), default=0.0
+    )
     per_value = (_WIDTH - _LABEL_WIDTH - 46) / longest if longest > 0.0 else 0.0
     for i, label in enumerate(labels):
         top = _TOP + row * i
@@ -60,21 +82,25 @@ def grouped_bars(labels: Sequence[str], series: Sequence[BarSeries], title: str,
 
 
 def release_curve(gear: Gear, lengths: Lengths) -> Markup:
-    """Draw the plunger over the release of the Down Lock (Fig. 12), on the reference and on the other linkages."""
+    """Draw the plunger over the release of the Down Lock (Fig. 12), on the reference and on the
+    other linkages.
+    """
     share = np.linspace(0.0, 1.0, _POINTS)
     curves = []
     for model in gear.ensemble_models:
         start, end = model.stroke
         curves.append(model.plunger(start + share * (end - start)) * lengths.unit.per_inch)
     x = tuple(share.tolist())
-    others = [Series("other linkages", x, tuple(c.tolist()), colour=RULE, width=1.0) for c in curves[1:]]
+    others = [
+        Series("other linkages", x, tuple(c.tolist()), colour=RULE, width=1.0) for c in curves[1:]
+    ]
     reference = Series(f"linkage {gear.reference.name}", x, tuple(curves[0].tolist()), width=2.4)
     canvas = Canvas(
         _WIDTH,
         262.0,
         "Plunger over the release of the Down Lock, without clearance",
-        "Plunger position against the share of the release stroke, on the reference linkage and on the others; "
-        "the margin around mid-position is marked",
+        "Plunger position against the share of the release stroke, on the reference linkage and on"
+        " the others; the margin around mid-position is marked",
     )
     mid, margin = float(curves[0][-1]), gear.margin.value * lengths.unit.per_inch
     values = [float(v) for curve in curves for v in (curve.min(), curve.max())]

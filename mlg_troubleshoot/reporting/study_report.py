@@ -1,4 +1,6 @@
-"""The report of a sensitivity study: indices, the counterparts of Figs. 12 and 13, each statement, the bound."""
+"""The report of a sensitivity study: indices, the counterparts of Figs. 12 and 13, each statement,
+the bound.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ from mlg_troubleshoot.units import LengthUnit
 # A reason that explains less than a third of an excess is not its reason.
 _CLEARLY = 3.0
 _DIRECTIONS = {
-    Directions.WORST: "in the directions that move the plunger farthest, in the worse of the two senses",
+    Directions.WORST: (
+        "in the directions that move the plunger farthest, in the worse of the two senses"
+    ),
     Directions.OVER: "in the directions of the largest over-travel",
     Directions.UNDER: "in the directions of the largest under-travel",
     Directions.RANDOM: "in random directions, every direction alike",
@@ -49,7 +53,13 @@ def _context(f: StudyFindings, provenance: ReportProvenance, lengths: Lengths) -
     table = f.result.table
     order = sorted(table.joints, key=lambda e: (e.rank, e.joint))
     return {
-        **head(f"Sensitivity study – {f.gear.name}", f"Sensitivity study · {f.gear.id}", f.gear, provenance, lengths),
+        **head(
+            f"Sensitivity study – {f.gear.name}",
+            f"Sensitivity study · {f.gear.id}",
+            f.gear,
+            provenance,
+            lengths,
+        ),
         "f": f,
         "table": table,
         "limits": sorted({entry.limit_in for entry in table.joints}),
@@ -59,7 +69,9 @@ def _context(f: StudyFindings, provenance: ReportProvenance, lengths: Lengths) -
         "top_share": sum(e.first_order for e in order[:5]),
         "half": float(np.ptp([e.first_order_interval for e in table.joints], axis=1).max()) / 2.0,
         "counts": [sum(s.outcome is outcome for s in f.statements) for outcome in Outcome],
-        "rows": list(zip(f.gear.joints, table.joints, f.result.growth.local_stage.tolist(), strict=True)),
+        "rows": list(
+            zip(f.gear.joints, table.joints, f.result.growth.local_stage.tolist(), strict=True)
+        ),
         "pairs": [g for g in f.result.groups if len(g.joints) > 1],
         "tiny": _tiny,
         "curve": drawn.release_curve(f.gear, lengths),
@@ -104,7 +116,9 @@ def _orders(f: StudyFindings) -> Markup:
 
 
 def _interactions(f: StudyFindings) -> tuple[int, float] | None:
-    """Joint with the largest difference of total and first order, and that difference; None without total orders."""
+    """Joint with the largest difference of total and first order, and that difference; None without
+    total orders.
+    """
     difference = f.result.table.total_order - f.result.table.first_order
     if not np.all(np.isfinite(difference)):
         return None
@@ -120,7 +134,9 @@ def _shares(f: StudyFindings) -> tuple[Array, Array, Array]:
     """Shares by the amplification method, maxima and mid-position, and by the exact gradient."""
     growth = f.result.growth
     limits = np.array([e.limit_in for e in f.result.table.joints])
-    found = (growth.shares(p, limits) for p in (growth.max_plunger, growth.local_plunger, growth.exact))
+    found = (
+        growth.shares(p, limits) for p in (growth.max_plunger, growth.local_plunger, growth.exact)
+    )
     return next(found), next(found), next(found)
 
 
@@ -136,7 +152,8 @@ def _methods(f: StudyFindings) -> Markup | None:
             BarSeries("amplification, mid-position", local, "open"),
         ],
         "Index by computation and by the amplification method",
-        "Three bars per joint: first order, share by the largest indices of the release, share at mid-position",
+        "Three bars per joint: first order, share by the largest indices of the release, share at"
+        " mid-position",
     )
 
 
@@ -152,7 +169,13 @@ def _stage_that_leads(f: StudyFindings, lengths: Lengths) -> dict[str, Any]:
     excess, curvature = float(by_maxima[k] - first[k]), float(np.abs(exact - first).max())
     return {
         "joint": f.gear.joint_numbers[k],
-        "place": "Down Lock" if at <= start else "mid-position" if at >= end else f"{lengths.full(at)} of the stroke",
+        "place": (
+            "Down Lock"
+            if at <= start
+            else "mid-position"
+            if at >= end
+            else f"{lengths.full(at)} of the stroke"
+        ),
         "others": [] if f.gear.joint_numbers[k] in largest_at_mid else largest_at_mid,
         "by_maxima": float(by_maxima[k]),
         "first": float(first[k]),
@@ -177,13 +200,16 @@ def _designs(f: StudyFindings) -> Markup | None:
             for found, style in zip(f.designs, styles, strict=True)
         ],
         "Share of each joint by the designs of the paper",
-        "Three bars per joint: Latin hypercube, with composite points, composite points only; normalised to 1 in total",
+        "Three bars per joint: Latin hypercube, with composite points, composite points only;"
+        " normalised to 1 in total",
     )
 
 
 def _designs_compared(f: StudyFindings) -> dict[str, Any] | None:
     first = f.result.table.first_order
-    if not f.designs or not all(np.all(np.isfinite(values)) for values in (first, *(d.plain for d in f.designs))):
+    if not f.designs or not all(
+        np.all(np.isfinite(values)) for values in (first, *(d.plain for d in f.designs))
+    ):
         return None
     top = np.sort(np.argsort(first)[::-1][:5])
     return {

@@ -1,4 +1,6 @@
-"""The report of a survey: what was read, what follows, what remains unknown, the linkage before and now."""
+"""The report of a survey: what was read, what follows, what remains unknown, the linkage before and
+now.
+"""
 
 from __future__ import annotations
 
@@ -23,14 +25,19 @@ _WIDTH, _EDGE = 330.0, 26.0
 
 
 def survey_document(
-    result: SurveyResult, found: Survey, provenance: ReportProvenance, unit: LengthUnit = LengthUnit.INCH
+    result: SurveyResult,
+    found: Survey,
+    provenance: ReportProvenance,
+    unit: LengthUnit = LengthUnit.INCH,
 ) -> Document:
     mark = sha256(repr([(r.words, r.value, r.u) for r in found.readings]).encode()).hexdigest()[:8]
     context = _context(result, found, provenance, Lengths(unit))
     return Document("survey.html.j2", context, safe_stem("survey", result.gear.id, mark))
 
 
-def _context(result: SurveyResult, found: Survey, provenance: ReportProvenance, lengths: Lengths) -> dict[str, Any]:
+def _context(
+    result: SurveyResult, found: Survey, provenance: ReportProvenance, lengths: Lengths
+) -> dict[str, Any]:
     gear, mode = result.gear, found.modes[0]
     fitted = found.linkage.predicted(found.read, mode.vector[None])[0]
     width = np.log(result.interval[:, 1] / result.interval[:, 0])
@@ -40,7 +47,9 @@ def _context(result: SurveyResult, found: Survey, provenance: ReportProvenance, 
         "found": found,
         "determined": f"{mode.parameters:.1f} of {len(mode.vector)}",
         "widest": f"± {100 * float(np.expm1(width.max() / 2)):.1f} %",
-        "rows": list(zip(gear.joints, result.amplification, result.interval, result.before, strict=True)),
+        "rows": list(
+            zip(gear.joints, result.amplification, result.interval, result.before, strict=True)
+        ),
         "panels": _panels(gear.reference, found),
         "readings": [
             (r, number((value - r.value) / r.u, 1, True), value)
@@ -50,18 +59,25 @@ def _context(result: SurveyResult, found: Survey, provenance: ReportProvenance, 
 
 
 def _panels(before: Linkage, found: Survey) -> list[tuple[str, Markup]]:
-    """Both linkages in each plane, at one scale: the old one grey and dashed, the surveyed one over it."""
+    """Both linkages in each plane, at one scale: the old one grey and dashed, the surveyed one over
+    it.
+    """
     now = found.linkage.linkage(found.modes[0].vector, "now")
     panels = []
     for plane in before.mechanism.planes:
-        drawn = [{p.name: (p.x, p.y) for p in each.mechanism.points if p.plane == plane.name} for each in (before, now)]
+        drawn = [
+            {p.name: (p.x, p.y) for p in each.mechanism.points if p.plane == plane.name}
+            for each in (before, now)
+        ]
         places = np.array([place for one in drawn for place in one.values()])
         if len(places) < 4:
             continue
         low, high = places.min(axis=0), places.max(axis=0)
         scale = (_WIDTH - 2 * _EDGE) / max(*(high - low), 1e-9)
         height = float((high - low)[1] * scale + 2 * _EDGE)
-        canvas = Canvas(_WIDTH, height, f"Plane {plane.name}", "The linkage before, dashed, and as surveyed")
+        canvas = Canvas(
+            _WIDTH, height, f"Plane {plane.name}", "The linkage before, dashed, and as surveyed"
+        )
         for points, colour, dash in ((drawn[0], RULE, "4 3"), (drawn[1], INK, None)):
             at = {
                 name: (_EDGE + (x - low[0]) * scale, height - _EDGE - (y - low[1]) * scale)

@@ -1,4 +1,6 @@
-"""JSON Schemas (draft 2020-12) of what ``mlg check``, ``mlg diagnose`` and ``mlg study`` write with ``--json``."""
+"""JSON Schemas (draft 2020-12) of what ``mlg check``, ``mlg diagnose`` and ``mlg study`` write with
+``--json``.
+"""
 
 from __future__ import annotations
 

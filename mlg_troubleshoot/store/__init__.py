@@ -1,6 +1,16 @@
 """The records of a gear's life: an append-only, hash-chained store on SQLite or PostgreSQL."""
 
-from mlg_troubleshoot.store.database import Added, Broken, Kind, Record, Store, StoreError, files_of, own_file, packed
+from mlg_troubleshoot.store.database import (
+    Added,
+    Broken,
+    Kind,
+    Record,
+    Store,
+    StoreError,
+    files_of,
+    own_file,
+    packed,
+)
 from mlg_troubleshoot.store.drafts import Draft, Drafts
 from mlg_troubleshoot.store.inspections import inspection_from, inspection_record, same_inspection
 

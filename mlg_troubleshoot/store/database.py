@@ -1,8 +1,9 @@
 """The chain of records and the database that holds it.
 
-Records are only ever added. Each carries the hash of its own content together with the hash of the record before it, so
-that a change anywhere is found by walking the chain. That shows tampering; it does not show who did it, and it is not
-an electronic signature. All records of one call are one transaction, and writers wait for each other.
+Records are only ever added. Each carries the hash of its own content together with the hash of the
+record before it, so that a change anywhere is found by walking the chain. That shows tampering; it
+does not show who did it, and it is not an electronic signature. All records of one call are one
+transaction, and writers wait for each other.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.store.place import Place
 
 SCHEMA_VERSION = 1
-# What SQLite writes into the head of a file so that it can be told from another program's: "mlg1". [1]
+# What SQLite writes into the head of a file so that it can be told from another program's: "mlg1".
+# [1]
 APPLICATION_ID = 0x6D6C6731
 GENESIS = "0" * 64
 # How long a writer waits for others. [s]
@@ -35,11 +37,12 @@ _ADVISORY_LOCK = 0x6D6C675F73746F72
 _AT_ONCE = 500
 # The content of a record, packed and unpacked. [bytes]
 MOST_BYTES = 1_000_000
-# How many of the newest records are walked before another is added: 0.1 s and 6 MB from a server; `verify` and `export`
-# walk all of them. [1]
+# How many of the newest records are walked before another is added: 0.1 s and 6 MB from a server;
+# `verify` and `export` walk all of them. [1]
 _NEWEST = 10_000
 
-# What records of this schema version often say, given to zlib in advance: it belongs to the version, as columns do.
+# What records of this schema version often say, given to zlib in advance: it belongs to the
+# version, as columns do.
 _OFTEN = Path(__file__).with_name(f"often-{SCHEMA_VERSION}.txt").read_bytes()
 
 _tables = sql.MetaData()
@@ -58,7 +61,8 @@ _records = sql.Table(
     sql.Column("hash", sql.LargeBinary(32), nullable=False),
 )
 sql.Index("mlg_records_by_gear", _records.c.tail_no, _records.c.side)
-# Entries of the prompts that are not finished: no records, in no chain, and written over as answers come.
+# Entries of the prompts that are not finished: no records, in no chain, and written over as answers
+# come.
 DRAFTS = sql.Table(
     "mlg_drafts",
     _tables,
@@ -75,8 +79,10 @@ _MIGRATIONS: Mapping[int, Callable[[sql.Connection], None]] = {}
 
 # What SQLite itself keeps records by; dropped or changed, nothing there refuses to change a record.
 _TRIGGERS = {
-    f"mlg_no_{change.lower()}": f"CREATE TRIGGER mlg_no_{change.lower()} BEFORE {change} ON mlg_records "
-    "BEGIN SELECT RAISE(ABORT, 'records are only ever added'); END"
+    f"mlg_no_{change.lower()}": (
+        f"CREATE TRIGGER mlg_no_{change.lower()} BEFORE {change} ON mlg_records "
+        "BEGIN SELECT RAISE(ABORT, 'records are only ever added'); END"
+    )
     for change in ("UPDATE", "DELETE")
 }
 _OWN = {*_tables.tables, *_TRIGGERS, *(str(index.name) for index in _records.indexes)}
@@ -102,7 +108,9 @@ _KINDS = frozenset(kind.value for kind in Kind)
 _TEXTS = ("kind", "record_id", "tail_no", "side", "day")
 _BYTES = ("identity", "body", "hash")
 # A body that is too large is not fetched at all.
-_BOUNDED = sql.case((sql.func.length(_records.c.body) <= MOST_BYTES, _records.c.body), else_=None).label("body")
+_BOUNDED = sql.case(
+    (sql.func.length(_records.c.body) <= MOST_BYTES, _records.c.body), else_=None
+).label("body")
 _COLUMNS = [_BOUNDED if column.name == "body" else column for column in _records.c]
 
 
@@ -110,8 +118,8 @@ _COLUMNS = [_BOUNDED if column.name == "body" else column for column in _records
 class Record:
     """One record; ``day`` is ISO 8601 or empty, ``packed`` its content as compressed JSON.
 
-    ``identity`` names what must not stand twice in the store; without one, the whole content does. ``judge`` says what
-    is wrong with the content of a record that was read, empty if nothing is.
+    ``identity`` names what must not stand twice in the store; without one, the whole content does.
+    ``judge`` says what is wrong with the content of a record that was read, empty if nothing is.
     """
 
     kind: Kind
@@ -127,7 +135,9 @@ class Record:
 
     @property
     def body(self) -> Any:
-        """The content as plain JSON values; `StoreError` if it is not the content of such a record."""
+        """The content as plain JSON values; `StoreError` if it is not the content of such a
+        record.
+        """
         try:
             found = _unpacked(self.packed)
             wrong = "" if self.judge is None else self.judge(self, found)
@@ -145,7 +155,13 @@ class Record:
     @property
     def identity_hash(self) -> bytes:
         """Hash of the identity, or of the whole content where there is none."""
-        what = self.identity or (self.record_id, self.tail_no, self.side, self.day, self.packed.hex())
+        what = self.identity or (
+            self.record_id,
+            self.tail_no,
+            self.side,
+            self.day,
+            self.packed.hex(),
+        )
         return hashlib.sha256(_canonical([self.kind.value, *what]).encode()).digest()
 
 
@@ -199,7 +215,9 @@ def _unpacked(body: bytes) -> Any:
 def _chained(before: bytes, row: Mapping[str, Any]) -> bytes:
     """Hash of a record with all of its columns, and of the record before it."""
     texts = [row["seq"], *(row[name] for name in _TEXTS)]
-    return hashlib.sha256(before + _canonical(texts).encode() + row["identity"] + row["body"]).digest()
+    return hashlib.sha256(
+        before + _canonical(texts).encode() + row["identity"] + row["body"]
+    ).digest()
 
 
 def own_file() -> str:
@@ -215,7 +233,11 @@ def files_of(place: str | Path | None = None) -> tuple[Path, ...]:
         file = Place(str(place or os.environ.get("MLG_STORE") or own_file())).file
     except UsageError:
         return ()
-    return () if file is None else tuple(Path(f"{file}{end}") for end in ("", "-journal", "-wal", "-shm"))
+    return (
+        ()
+        if file is None
+        else tuple(Path(f"{file}{end}") for end in ("", "-journal", "-wal", "-shm"))
+    )
 
 
 class Store:
@@ -225,20 +247,32 @@ class Store:
     """
 
     def __init__(
-        self, place: str | Path | None = None, patience_s: int = _PATIENCE_S, judge: Judge | None = None
+        self,
+        place: str | Path | None = None,
+        patience_s: int = _PATIENCE_S,
+        judge: Judge | None = None,
     ) -> None:
         # Where nobody says: ``MLG_STORE``, or the user's own file.
-        self._at = Place(str(place) if place is not None else os.environ.get("MLG_STORE") or own_file())
+        self._at = Place(
+            str(place) if place is not None else os.environ.get("MLG_STORE") or own_file()
+        )
         self.judge = judge
         self._postgres = self._at.file is None
         wait = {"connect_timeout" if self._postgres else "timeout": patience_s}
         try:
-            self._engine = sql.create_engine(self._at.url, connect_args=wait, poolclass=sql.NullPool)
+            self._engine = sql.create_engine(
+                self._at.url, connect_args=wait, poolclass=sql.NullPool
+            )
         except NoSuchModuleError as error:
-            raise UsageError(f"--store {self.place}: there is no such driver", Place.REMEDY) from error
+            raise UsageError(
+                f"--store {self.place}: there is no such driver", Place.REMEDY
+            ) from error
         except ModuleNotFoundError as error:
-            raise UsageError(f"--store needs {error.name}, which is not installed", _EXTRA) from error
-        # The driver begins transactions late and reads without one; here every one begins when it is told to.
+            raise UsageError(
+                f"--store needs {error.name}, which is not installed", _EXTRA
+            ) from error
+        # The driver begins transactions late and reads without one; here every one begins when it
+        # is told to.
         if not self._postgres:
             sql.event.listen(self._engine, "connect", _as_bytes_are)
         self._ready = False
@@ -269,28 +303,43 @@ class Store:
             with engine.connect() as connection:
                 if self._postgres:
                     if writing:
-                        connection.execute(sql.select(sql.func.pg_advisory_xact_lock(_ADVISORY_LOCK)))
+                        connection.execute(
+                            sql.select(sql.func.pg_advisory_xact_lock(_ADVISORY_LOCK))
+                        )
                 else:
                     connection.exec_driver_sql("BEGIN IMMEDIATE" if writing else "BEGIN")
                 self._prepare(connection, writing=writing)
                 yield connection
                 connection.commit()
         except OSError as error:
-            raise StoreError(f"store {self.place}: {error.strerror}: nothing was kept", Place.REMEDY) from error
+            raise StoreError(
+                f"store {self.place}: {error.strerror}: nothing was kept", Place.REMEDY
+            ) from error
         except UnicodeDecodeError as error:
-            raise StoreError(f"store {self.place} holds text that is not UTF-8: nothing was kept", _FOREIGN) from error
+            raise StoreError(
+                f"store {self.place} holds text that is not UTF-8: nothing was kept", _FOREIGN
+            ) from error
         except SQLAlchemyError as error:
-            said = str(error.orig if isinstance(error, DBAPIError) else error).strip().splitlines()[0]
+            said = (
+                str(error.orig if isinstance(error, DBAPIError) else error).strip().splitlines()[0]
+            )
             foreign = "not a database" in said
             raise StoreError(
                 f"store {self.place}: {self._at.masked(said)}: nothing was kept",
-                _FOREIGN
-                if foreign
-                else "Check the place, the permissions and the free space; existing records are unchanged.",
+                (
+                    _FOREIGN
+                    if foreign
+                    else (
+                        "Check the place, the permissions and the free space; existing records are"
+                        " unchanged."
+                    )
+                ),
             ) from error
 
     def _prepare(self, connection: sql.Connection, *, writing: bool) -> None:
-        """Make the tables of an empty store, mark one that is not marked yet, or bring an older one forward."""
+        """Make the tables of an empty store, mark one that is not marked yet, or bring an older one
+        forward.
+        """
         self._ready = sql.inspect(connection).has_table(_meta.name)
         if not self._postgres:
             self._mark(connection, writing=writing)
@@ -305,56 +354,85 @@ class Store:
         found = connection.execute(sql.select(sql.func.max(_meta.c.schema_version))).scalar_one()
         if not isinstance(found, int) or not 1 <= found <= SCHEMA_VERSION:
             raise StoreError(
-                f"store {self.place} has schema version {found!r}, and this program knows {SCHEMA_VERSION}",
+                f"store {self.place} has schema version {found!r}, and this program knows"
+                f" {SCHEMA_VERSION}",
                 "Use the program that wrote it, or a newer one.",
             )
         for version in range(found, SCHEMA_VERSION):
             if not writing:
                 raise StoreError(
-                    f"store {self.place} has schema version {version}", "Run mlg check --keep once to upgrade it."
+                    f"store {self.place} has schema version {version}",
+                    "Run mlg check --keep once to upgrade it.",
                 )
             _MIGRATIONS[version](connection)
             connection.execute(_meta.insert().values(schema_version=version + 1))
         self._ready = True
 
     def _mark(self, connection: sql.Connection, *, writing: bool) -> None:
-        """Refuse a database of another program; mark one of ours, which has our tables or nothing at all."""
+        """Refuse a database of another program; mark one of ours, which has our tables or nothing
+        at all.
+        """
         found = connection.exec_driver_sql("PRAGMA application_id").scalar_one()
         if not self._ready:
             others = connection.exec_driver_sql("SELECT count(*) FROM sqlite_master").scalar_one()
             if others or found not in (0, APPLICATION_ID):
-                raise StoreError(f"{self.place} is a database of another program: nothing was read or kept", _FOREIGN)
+                raise StoreError(
+                    f"{self.place} is a database of another program: nothing was read or kept",
+                    _FOREIGN,
+                )
         # A view under the name of a table may compute without end.
-        views = connection.exec_driver_sql("SELECT name FROM sqlite_master WHERE type = 'view'").scalars()
+        views = connection.exec_driver_sql(
+            "SELECT name FROM sqlite_master WHERE type = 'view'"
+        ).scalars()
         if not _tables.tables.keys().isdisjoint(views):
-            raise StoreError(f"{self.place} has a view in place of a table: nothing was read or kept", _FOREIGN)
-        triggers = connection.exec_driver_sql("SELECT name, sql FROM sqlite_master WHERE type = 'trigger'").all()
+            raise StoreError(
+                f"{self.place} has a view in place of a table: nothing was read or kept", _FOREIGN
+            )
+        triggers = connection.exec_driver_sql(
+            "SELECT name, sql FROM sqlite_master WHERE type = 'trigger'"
+        ).all()
         if writing and any(_TRIGGERS.get(name) != text for name, text in triggers):
-            raise StoreError(f"{self.place} has a trigger that may change records: nothing was kept", _VERIFY)
+            raise StoreError(
+                f"{self.place} has a trigger that may change records: nothing was kept", _VERIFY
+            )
         if writing and found == 0:
             connection.exec_driver_sql(f"PRAGMA application_id = {APPLICATION_ID}")
 
     def _rows(self, connection: sql.Connection, *where: Any) -> Iterator[Any]:
         if self._ready:
-            yield from connection.execute(sql.select(*_COLUMNS).where(*where).order_by(_records.c.seq))
+            yield from connection.execute(
+                sql.select(*_COLUMNS).where(*where).order_by(_records.c.seq)
+            )
 
     def _record(self, row: Any) -> Record:
         """A row as a record; a column that cannot be one is named."""
         columns = row._mapping
         odd = next((name for name in _TEXTS if not isinstance(columns[name], str)), None)
-        odd = odd or next((name for name in _BYTES if not isinstance(columns[name], bytes | memoryview)), None)
+        odd = odd or next(
+            (name for name in _BYTES if not isinstance(columns[name], bytes | memoryview)), None
+        )
         if odd is None and row.kind not in _KINDS:
             odd = "kind"
         if odd is not None:
             found = "too large" if columns[odd] is None else repr(columns[odd])[:60]
-            raise StoreError(f"store {self.place}: record {row.seq}, column {odd!r} cannot be read: {found}", _VERIFY)
+            raise StoreError(
+                f"store {self.place}: record {row.seq}, column {odd!r} cannot be read: {found}",
+                _VERIFY,
+            )
         texts = row.record_id, row.tail_no, row.side, row.day
         return Record(
-            Kind(row.kind), *texts, bytes(row.body), seq=row.seq, digest=bytes(row.hash).hex(), judge=self.judge
+            Kind(row.kind),
+            *texts,
+            bytes(row.body),
+            seq=row.seq,
+            digest=bytes(row.hash).hex(),
+            judge=self.judge,
         )
 
     def _walk(self, connection: sql.Connection, after: int = 0) -> Iterator[Any]:
-        """Rows of the chain from one on, each of which fits the one before; `_MisfitError` where one does not."""
+        """Rows of the chain from one on, each of which fits the one before; `_MisfitError` where
+        one does not.
+        """
         before = bytes.fromhex(GENESIS) if after == 0 else b""
         count = max(after - 1, 0)
         for row in self._rows(connection, _records.c.seq > count):
@@ -368,12 +446,18 @@ class Store:
             yield row
 
     def _head(self, connection: sql.Connection) -> tuple[int, bytes]:
-        """Number and hash of the last record; a chain whose newest records do not fit takes no more."""
-        count, last = connection.execute(sql.select(sql.func.count(), sql.func.max(_records.c.seq))).one()
+        """Number and hash of the last record; a chain whose newest records do not fit takes no
+        more.
+        """
+        count, last = connection.execute(
+            sql.select(sql.func.count(), sql.func.max(_records.c.seq))
+        ).one()
         before = bytes.fromhex(GENESIS)
         try:
             if count != (last or 0):
-                raise _MisfitError(None, f"it holds {count} records, and the last one is number {last}")
+                raise _MisfitError(
+                    None, f"it holds {count} records, and the last one is number {last}"
+                )
             for row in self._walk(connection, max(count - _NEWEST, 0)):
                 before = bytes(row.hash)
         except _MisfitError as misfit:
@@ -384,22 +468,31 @@ class Store:
         at = "" if misfit.row is None else f" at record {misfit.row.seq}"
         return StoreError(f"store {self.place}: the chain does not fit{at}: {misfit.why}", _VERIFY)
 
-    def add(self, records: Sequence[Record], judge: Callable[[Record, Record], bool] | None = None) -> Added:
+    def add(
+        self, records: Sequence[Record], judge: Callable[[Record, Record], bool] | None = None
+    ) -> Added:
         """Add records in one transaction; those that stand there already are left out.
 
-        ``judge`` is asked about a known identity, with the record kept and the new one: False refuses the whole call.
+        ``judge`` is asked about a known identity, with the record kept and the new one: False
+        refuses the whole call.
         """
         distinct = {record.identity_hash: record for record in records}
         with self.transaction(writing=True) as connection:
             known = self._known(connection, list(distinct))
-            others = [r for identity, r in known.items() if judge is not None and not judge(r, distinct[identity])]
+            others = [
+                r
+                for identity, r in known.items()
+                if judge is not None and not judge(r, distinct[identity])
+            ]
             if others:
-                named = ", ".join(f"{r.record_id} ({r.tail_no} {r.side} {r.day or 'no date'})" for r in others[:5])
+                named = ", ".join(
+                    f"{r.record_id} ({r.tail_no} {r.side} {r.day or 'no date'})" for r in others[:5]
+                )
                 more = f" and {len(others) - 5} more" if len(others) > 5 else ""
                 raise StoreError(
                     f"kept already with other content: {named}{more}; nothing of this was kept",
-                    "If the new one is right: mlg history correct RECORD FILE. If it is another inspection, give it "
-                    "its own record_id or date.",
+                    "If the new one is right: mlg history correct RECORD FILE. If it is another"
+                    " inspection, give it its own record_id or date.",
                 )
             new = [record for identity, record in distinct.items() if identity not in known]
             seq, before = self._head(connection)
@@ -423,7 +516,9 @@ class Store:
         with self.transaction(writing=False) as connection:
             return self._known(connection, identities)
 
-    def _known(self, connection: sql.Connection, identities: Sequence[bytes]) -> dict[bytes, Record]:
+    def _known(
+        self, connection: sql.Connection, identities: Sequence[bytes]
+    ) -> dict[bytes, Record]:
         known = {}
         for first in range(0, len(identities), _AT_ONCE):
             wanted = identities[first : first + _AT_ONCE]
@@ -468,23 +563,37 @@ class Store:
         return count, None
 
     def departures(self) -> list[str]:
-        """What a store file should have and has not, or has and should not; nothing is said of a server's."""
+        """What a store file should have and has not, or has and should not; nothing is said of a
+        server's.
+        """
         if self._postgres:
             return []
         with self.transaction(writing=False) as connection:
-            rows = connection.exec_driver_sql("SELECT type, name, sql FROM sqlite_master ORDER BY name").all()
+            rows = connection.exec_driver_sql(
+                "SELECT type, name, sql FROM sqlite_master ORDER BY name"
+            ).all()
             if not self._ready:
                 return []
         found = {name: text for _type, name, text in rows}
-        dropped = [f"the trigger {n} was dropped or changed" for n, text in _TRIGGERS.items() if found.get(n) != text]
+        dropped = [
+            f"the trigger {n} was dropped or changed"
+            for n, text in _TRIGGERS.items()
+            if found.get(n) != text
+        ]
         # SQLite's own names begin so, and nobody else's can.
-        foreign = [(kind, name) for kind, name, _ in rows if name not in _OWN and not name.startswith("sqlite_")]
+        foreign = [
+            (kind, name)
+            for kind, name, _ in rows
+            if name not in _OWN and not name.startswith("sqlite_")
+        ]
         return dropped + [f"the {kind} {name!r} is not one of a store" for kind, name in foreign]
 
     def export(self) -> Iterator[str]:
-        """The chain as JSON Lines: every column as it stands, and under ``content`` what the body says.
+        """The chain as JSON Lines: every column as it stands, and under ``content`` what the body
+        says.
 
-        A chain that does not fit is refused, and content that is not void and that nobody could import again.
+        A chain that does not fit is refused, and content that is not void and that nobody could
+        import again.
         """
         wrong: dict[str, StoreError] = {}
         with self.transaction(writing=False) as connection:
@@ -509,21 +618,25 @@ class Store:
         if why:
             wrong[record.digest] = StoreError(
                 f"{at}: {record.named}: {why}",
-                "Void the record where it stands: mlg history void HASH --why TEXT. All of them: mlg history verify",
+                "Void the record where it stands: mlg history void HASH --why TEXT. All of them:"
+                " mlg history verify",
             )
         elif record.kind is Kind.VOID:
             wrong.pop(content["voids"], None)
 
     def restore(self, lines: Iterable[str], name: str) -> Added:
-        """Add an exported chain to what is here: whole to an empty store, or the rest of the same chain.
+        """Add an exported chain to what is here: whole to an empty store, or the rest of the same
+        chain.
 
-        The chain must fit from its first record on, and its content be that of such records unless a later one voids
-        it; a line of which that is not true is named, and nothing is added.
+        The chain must fit from its first record on, and its content be that of such records unless
+        a later one voids it; a line of which that is not true is named, and nothing is added.
         """
         rows = list(self._fitting(lines, name))
         with self.transaction(writing=True) as connection:
             self._head(connection)
-            hashes = connection.execute(sql.select(_records.c.hash).order_by(_records.c.seq)).scalars()
+            hashes = connection.execute(
+                sql.select(_records.c.hash).order_by(_records.c.seq)
+            ).scalars()
             here = [bytes(found) for found in hashes]
             common = min(len(here), len(rows))
             if here[:common] != [row["hash"] for row in rows[:common]]:
@@ -536,13 +649,17 @@ class Store:
         return Added(len(rows) - common, common)
 
     def _fitting(self, lines: Iterable[str], name: str) -> Iterator[dict[str, Any]]:
-        """Rows of an exported chain, each judged; what is wrong and not void is refused at the end."""
+        """Rows of an exported chain, each judged; what is wrong and not void is refused at the
+        end.
+        """
         before = bytes.fromhex(GENESIS)
         wrong: dict[str, StoreError] = {}
         for number, line in enumerate(lines, 1):
             at = f"{name}, line {number}"
             if number > _MOST_IMPORTED:
-                raise StoreError(f"{at}: at most {_MOST_IMPORTED} records are imported", "Copy the store itself.")
+                raise StoreError(
+                    f"{at}: at most {_MOST_IMPORTED} records are imported", "Copy the store itself."
+                )
             row, content = _imported(line, at)
             if row["seq"] != number or _chained(before, row) != row["hash"]:
                 raise StoreError(
@@ -576,7 +693,9 @@ _MOST_IMPORTED, _MOST_WRONG = 100_000, 1_000
 
 
 def _as_bytes_are(raw: Any, _record: Any) -> None:
-    """Let a SQLite connection begin when it is told to, and read bytes that are not text as they are."""
+    """Let a SQLite connection begin when it is told to, and read bytes that are not text as they
+    are.
+    """
     raw.isolation_level = None
     raw.text_factory = lambda found: found.decode("utf-8", "surrogateescape")
 

@@ -8,7 +8,14 @@ from datetime import date
 from enum import Enum
 from typing import Any
 
-from mlg_troubleshoot.decision.inspection import Approach, EnteredClearance, Inspection, Outcome, RowSource, Side
+from mlg_troubleshoot.decision.inspection import (
+    Approach,
+    EnteredClearance,
+    Inspection,
+    Outcome,
+    RowSource,
+    Side,
+)
 from mlg_troubleshoot.store.database import Kind, Record, packed
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
@@ -57,8 +64,12 @@ def inspection_record(inspection: Inspection, kind: Kind = Kind.INSPECTION, **mo
 
 # How a field is read back where it does not stand in JSON as it is.
 _READ: dict[str, Callable[[Any], Any]] = {
-    **dict.fromkeys(_BY_JOINT, lambda found: {int(number): value for number, value in found.items()}),
-    "entered": lambda found: {int(n): EnteredClearance(text, LengthUnit(unit)) for n, (text, unit) in found.items()},
+    **dict.fromkeys(
+        _BY_JOINT, lambda found: {int(number): value for number, value in found.items()}
+    ),
+    "entered": lambda found: {
+        int(n): EnteredClearance(text, LengthUnit(unit)) for n, (text, unit) in found.items()
+    },
     "source": lambda found: RowSource(*found),
     "inspection_date": date.fromisoformat,
     **{"side": Side, "convention": ClearanceConvention, "outcome": Outcome, "approach": Approach},
@@ -74,5 +85,8 @@ def inspection_from(record: Record) -> Inspection:
 
 def same_inspection(one: Record, two: Record) -> bool:
     """Tell whether two records say the same was found, wherever it was entered."""
-    bare = [{k: v for k, v in r.body.get("inspection", {}).items() if k not in _NOT_CONTENT} for r in (one, two)]
+    bare = [
+        {k: v for k, v in r.body.get("inspection", {}).items() if k not in _NOT_CONTENT}
+        for r in (one, two)
+    ]
     return bare[0] == bare[1]

@@ -17,7 +17,9 @@ _LIKE_A_URL = re.compile(r"[\w+.\-]+:.*@")
 
 
 class Place:
-    """A place as it was given (``--store``, ``MLG_STORE``); `UsageError` if no store can be there."""
+    """A place as it was given (``--store``, ``MLG_STORE``); `UsageError` if no store can be
+    there.
+    """
 
     REMEDY = "Give a file that you may write to, or postgresql+psycopg://USER@HOST/DATABASE."
 
@@ -28,7 +30,10 @@ class Place:
         backend = self.url.get_backend_name()
         self._secrets = [
             str(text)
-            for text in (self.url.password, *(v for name, v in self.url.query.items() if "password" in name.lower()))
+            for text in (
+                self.url.password,
+                *(v for name, v in self.url.query.items() if "password" in name.lower()),
+            )
             if text
         ]
         self.file: Path | None = None
@@ -40,8 +45,15 @@ class Place:
             raise UsageError(f"--store {self.shown} is neither SQLite nor PostgreSQL", self.REMEDY)
 
     def _rendered(self) -> str:
-        query = {name: _HIDDEN if "password" in name.lower() else value for name, value in self.url.query.items()}
-        return self.url.set(query=query).render_as_string(hide_password=True).replace("%2A%2A%2A", _HIDDEN)
+        query = {
+            name: _HIDDEN if "password" in name.lower() else value
+            for name, value in self.url.query.items()
+        }
+        return (
+            self.url.set(query=query)
+            .render_as_string(hide_password=True)
+            .replace("%2A%2A%2A", _HIDDEN)
+        )
 
     def masked(self, said: str) -> str:
         """What a driver said, without the password."""
@@ -51,16 +63,21 @@ class Place:
 
 
 def _url(given: str) -> sql.URL:
-    """A URL; one that cannot be read is not shown, since nobody knows where in it the password stands."""
+    """A URL; one that cannot be read is not shown, since nobody knows where in it the password
+    stands.
+    """
     scheme, _, rest = given.partition("://")
     shown = f"--store {scheme}://{_HIDDEN}"
     if rest.partition("?")[0].count("@") > 1:
-        raise UsageError(f"{shown} holds more than one @", "Write an @ of the password as %40, or use ~/.pgpass.")
+        raise UsageError(
+            f"{shown} holds more than one @", "Write an @ of the password as %40, or use ~/.pgpass."
+        )
     try:
         return sql.make_url(given)
     except (ArgumentError, ValueError):
         raise UsageError(
-            f"{shown} is not a URL of a database, with a number as its port if it has one", Place.REMEDY
+            f"{shown} is not a URL of a database, with a number as its port if it has one",
+            Place.REMEDY,
         ) from None
 
 

@@ -1,4 +1,6 @@
-"""Which readings are worth taking: the rows of a template, the next reading, and what a survey leaves unknown."""
+"""Which readings are worth taking: the rows of a template, the next reading, and what a survey
+leaves unknown.
+"""
 
 from __future__ import annotations
 
@@ -8,18 +10,26 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.surveying.readings import DEFAULT_U, MINUTES, Kind, Quantity, Reading, SurveyedLinkage
+from mlg_troubleshoot.surveying.readings import (
+    DEFAULT_U,
+    MINUTES,
+    Kind,
+    Quantity,
+    Reading,
+    SurveyedLinkage,
+)
 from mlg_troubleshoot.surveying.survey import Prior
 
-# Between each two members of the ensemble a template is planned for so many linkages, where they close. An index
-# known to two percent needs no better reading.
+# Between each two members of the ensemble a template is planned for so many linkages, where they
+# close. An index known to two percent needs no better reading.
 _BETWEEN, _WELL_KNOWN = (0.25, 0.5, 0.75), 0.02
 # A reading counts as checked by the others if they predict it to three times its own uncertainty.
 _CHECKED, _SWEEPS = 0.1, 8
 # What a check by the others is worth compared with a well-known index.
 _BRACING, _LOOSE = 0.2, 0.02
 
-# A reading that narrows less than this is not worth taking; one that so many of the draws cannot reach is not possible.
+# A reading that narrows less than this is not worth taking; one that so many of the draws cannot
+# reach is not possible.
 _LEAST_NARROWING, _OPEN = 0.01, 0.05
 
 
@@ -34,14 +44,18 @@ class Suggested:
 def planned(gear: Gear, distances: int = 24) -> tuple[tuple[Reading, bool], ...]:
     """The rows of a template, each with whether the others check it.
 
-    The extension, the plunger over the stroke, the angles, and distances at the reference position: those that leave
-    the least unknown of the logarithms of the amplification indices, by a linear estimate on average over linkages of
-    the ensemble and between them, and that check each other. From the rigid pairs each is exchanged for a better one
-    until none is better: other choices to begin with end worse.
+    The extension, the plunger over the stroke, the angles, and distances at the reference position:
+    those that leave the least unknown of the logarithms of the amplification indices, by a linear
+    estimate on average over linkages of the ensemble and between them, and that check each other.
+    From the rigid pairs each is exchanged for a better one until none is better: other choices to
+    begin with end worse.
     """
     design = _Design(SurveyedLinkage(gear))
     count = min(distances, len(design.free))
-    rows = [*design.given, *sorted(design.exchanged(design.free[: min(count, len(design.linkage.rigid))], count))]
+    rows = [
+        *design.given,
+        *sorted(design.exchanged(design.free[: min(count, len(design.linkage.rigid))], count)),
+    ]
     held = np.median(design.held(rows), axis=0)
     return tuple((design.pool[i], bool(h > _CHECKED)) for i, h in zip(rows, held, strict=True))
 
@@ -50,11 +64,19 @@ class _Design:
     """Slopes of everything that can be read, in variables in which the prior is the unit sphere."""
 
     def __init__(
-        self, linkage: SurveyedLinkage, taken: tuple[Reading, ...] = (), quantity: Quantity | None = None
+        self,
+        linkage: SurveyedLinkage,
+        taken: tuple[Reading, ...] = (),
+        quantity: Quantity | None = None,
     ) -> None:
         prior = Prior(linkage)
         members = prior.members
-        between = [(1 - t) * a + t * b for i, a in enumerate(members) for b in members[:i] for t in _BETWEEN]
+        between = [
+            (1 - t) * a + t * b
+            for i, a in enumerate(members)
+            for b in members[:i]
+            for t in _BETWEEN
+        ]
         points = np.array([*members, *between])
         points = points[linkage.closes(points)]
         self.linkage, self.pool = linkage, (*linkage.candidates(), *taken)
@@ -76,20 +98,25 @@ class _Design:
         return np.asarray(np.linalg.inv(self.known + np.swapaxes(g, 1, 2) @ g))
 
     def held(self, rows: list[int]) -> Array:
-        """How much of each reading the others check, shape (n_linkages, n_rows): 1 if they tell it exactly. [1]"""
+        """How much of each reading the others check, shape (n_linkages, n_rows): 1 if they tell it
+        exactly. [1]
+        """
         g = self.slopes[:, rows]
         return np.asarray(1.0 - (g @ self.covariance(rows) * g).sum(axis=2))
 
     def after(self, rows: list[int], others: list[int]) -> tuple[Array, Array, Array, Array]:
         """Variances of the wanted logarithms after these readings and one of the others.
 
-        Returns the variances, shape (n_linkages, n_quantities, n_others), [1] and with what they were found: the
-        covariance, how each other reading moves the variables, and its variance in units of its own.
+        Returns the variances, shape (n_linkages, n_quantities, n_others), [1] and with what they
+        were found: the covariance, how each other reading moves the variables, and its variance in
+        units of its own.
         """
         covariance, g = self.covariance(rows), self.slopes[:, others]
         moved = np.swapaxes(g @ covariance, 1, 2)
         size = 1.0 + (np.swapaxes(g, 1, 2) * moved).sum(axis=1)[:, None, :]
-        wanted = (self.wanted @ covariance * self.wanted).sum(axis=2)[:, :, None] - (self.wanted @ moved) ** 2 / size
+        wanted = (self.wanted @ covariance * self.wanted).sum(axis=2)[:, :, None] - (
+            self.wanted @ moved
+        ) ** 2 / size
         return wanted, covariance, moved, size
 
     def best(self, taken: list[int]) -> int:
@@ -97,8 +124,12 @@ class _Design:
         rows, others = [*self.given, *taken], [j for j in self.free if j not in taken]
         wanted, covariance, moved, size = self.after(rows, others)
         known = self.slopes[:, rows]
-        held = 1.0 - (known @ covariance * known).sum(axis=2)[:, :, None] + (known @ moved) ** 2 / size
-        checks = np.log(np.maximum(np.concatenate([held, 1.0 / size], axis=1), 0.0) + _LOOSE).sum(axis=1)
+        held = (
+            1.0 - (known @ covariance * known).sum(axis=2)[:, :, None] + (known @ moved) ** 2 / size
+        )
+        checks = np.log(np.maximum(np.concatenate([held, 1.0 / size], axis=1), 0.0) + _LOOSE).sum(
+            axis=1
+        )
         cost = np.log(np.maximum(wanted, 0.0) + _WELL_KNOWN**2).sum(axis=1) - _BRACING * checks
         return others[int(np.argmin(cost.mean(axis=0)))]
 
@@ -115,11 +146,14 @@ class _Design:
         return taken
 
 
-def suggested_early(linkage: SurveyedLinkage, taken: tuple[Reading, ...], quantity: Quantity) -> Suggested | None:
+def suggested_early(
+    linkage: SurveyedLinkage, taken: tuple[Reading, ...], quantity: Quantity
+) -> Suggested | None:
     """The reading that narrows the wanted quantities most per minute while little is known.
 
-    What fits a few readings may be far from any gear that is built, so that it tells little about the next: this is
-    the linear estimate on average over the linkages of the ensemble and between them, as for a template.
+    What fits a few readings may be far from any gear that is built, so that it tells little about
+    the next: this is the linear estimate on average over the linkages of the ensemble and between
+    them, as for a template.
     """
     design, known = _Design(linkage, taken, quantity), {r.what for r in taken}
     first = len(design.pool) - len(taken)
@@ -137,15 +171,21 @@ def suggested_early(linkage: SurveyedLinkage, taken: tuple[Reading, ...], quanti
 def _worth_most(candidates: tuple[Reading, ...], narrowing: Array) -> Suggested | None:
     """The reading that narrows most per minute, None if it hardly does."""
     best = int(np.argmax(narrowing / np.array([MINUTES[c.kind] for c in candidates])))
-    return Suggested(candidates[best], float(narrowing[best])) if narrowing[best] >= _LEAST_NARROWING else None
+    return (
+        Suggested(candidates[best], float(narrowing[best]))
+        if narrowing[best] >= _LEAST_NARROWING
+        else None
+    )
 
 
-def suggested(linkage: SurveyedLinkage, draws: Array, wanted: Array, taken: tuple[Reading, ...]) -> Suggested | None:
+def suggested(
+    linkage: SurveyedLinkage, draws: Array, wanted: Array, taken: tuple[Reading, ...]
+) -> Suggested | None:
     """The reading that narrows the wanted quantities most per minute, None if none of them matters.
 
-    By how much is the linear estimate over the draws: a reading y with uncertainty u leaves of the variance of q the
-    share 1 − cov(q, y)² / (var q · (var y + u²)).
-    wanted, shape (n_draws, n_quantities): quantities in one unit, on which the variances add. [any]
+    By how much is the linear estimate over the draws: a reading y with uncertainty u leaves of the
+    variance of q the share 1 − cov(q, y)² / (var q · (var y + u²)). wanted, shape (n_draws,
+    n_quantities): quantities in one unit, on which the variances add. [any]
     """
     known = {r.what for r in taken}
     candidates = tuple(c for c in linkage.candidates() if c.what not in known)

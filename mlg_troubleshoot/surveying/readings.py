@@ -1,4 +1,6 @@
-"""What a survey reads, and what a linkage predicts for it: distances, plunger positions, angles, the extension."""
+"""What a survey reads, and what a linkage predicts for it: distances, plunger positions, angles,
+the extension.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ from mlg_troubleshoot.geometry.program import write_program
 # Positive quantities of a batch of linkages, shape (n_vectors, n_quantities).
 Quantity = Callable[[Array], Array]
 _STEP = 1e-5
-# Positions over the stroke among which the plunger's least displacement is sought, and plunger positions to read.
+# Positions over the stroke among which the plunger's least displacement is sought, and plunger
+# positions to read.
 _POSITIONS, _PLUNGER_READINGS = 25, 9
 
 
@@ -31,14 +34,16 @@ class Kind(StrEnum):
     PLUNGER = "PLUNGER"
     ANGLE = "ANGLE"
     EXTENSION = "EXTENSION"
-    # Not a row of a table: the travel that the technical order prescribes (section 4.2) counts as one more reading.
+    # Not a row of a table: the travel that the technical order prescribes (section 4.2) counts as
+    # one more reading.
     TRAVEL = "TRAVEL"
-    # Nor this, the mean of the logarithms of the amplification indices: most of what fits a few readings would stand
-    # near a dead centre.
+    # Nor this, the mean of the logarithms of the amplification indices: most of what fits a few
+    # readings would stand near a dead centre.
     ORDER = "ORDER"
 
 
-# Standard uncertainties where a reading states none: in, in, rad, in; for the travel, in, and the order of the indices.
+# Standard uncertainties where a reading states none: in, in, rad, in; for the travel, in, and the
+# order of the indices.
 DEFAULT_U = {
     Kind.DISTANCE: 0.01,
     Kind.PLUNGER: 0.0015,
@@ -50,11 +55,14 @@ DEFAULT_U = {
 
 
 def default_u(kind: Kind, *, is_angle: bool) -> float:
-    """Standard uncertainty of a reading that states none; an output that turns is read as an angle. [in or rad]"""
+    """Standard uncertainty of a reading that states none; an output that turns is read as an angle.
+    [in or rad]
+    """
     return DEFAULT_U[Kind.ANGLE if is_angle else kind]
 
 
-# Minutes that a reading takes at the gear, assumed: two hands and a caliper; the dial stands once for all positions.
+# Minutes that a reading takes at the gear, assumed: two hands and a caliper; the dial stands once
+# for all positions.
 MINUTES = {Kind.DISTANCE: 3.0, Kind.PLUNGER: 2.0, Kind.ANGLE: 6.0, Kind.EXTENSION: 2.0}
 
 
@@ -62,13 +70,11 @@ MINUTES = {Kind.DISTANCE: 3.0, Kind.PLUNGER: 2.0, Kind.ANGLE: 6.0, Kind.EXTENSIO
 class Reading:
     """One row of a survey.
 
-    start, end: point names, or plane and ``hinge`` or ``dihedral``, or slider and ``axis``; empty where not needed.
-    value: NaN for a reading that is planned. [in or rad]
-    u: its standard uncertainty. [in or rad]
-    extension: input at the reading, from Down Lock; None at the reference position. [in or rad]
-    row: row of the file; None for a planned one and for the prescribed travel.
-    is_angle: true if the value is an angle.
-    driven_in: unit of the input.
+    start, end: point names, or plane and ``hinge`` or ``dihedral``, or slider and ``axis``; empty
+    where not needed. value: NaN for a reading that is planned. [in or rad] u: its standard
+    uncertainty. [in or rad] extension: input at the reading, from Down Lock; None at the reference
+    position. [in or rad] row: row of the file; None for a planned one and for the prescribed
+    travel. is_angle: true if the value is an angle. driven_in: unit of the input.
     """
 
     kind: Kind
@@ -88,8 +94,12 @@ class Reading:
 
     @property
     def words(self) -> str:
-        """What is read, in words; as in all sentences of a survey, lengths are in inches with four decimals."""
-        at = "" if self.extension is None else f" at extension {self.extension:.4f} {self.driven_in}"
+        """What is read, in words; as in all sentences of a survey, lengths are in inches with four
+        decimals.
+        """
+        at = (
+            "" if self.extension is None else f" at extension {self.extension:.4f} {self.driven_in}"
+        )
         match self.kind:
             case Kind.DISTANCE:
                 return f"distance {self.start} to {self.end}{at}"
@@ -112,7 +122,9 @@ class Reading:
 
 
 class SurveyedLinkage:
-    """Design variables of a gear's linkage with its calibration, and what they predict, for batches of vectors."""
+    """Design variables of a gear's linkage with its calibration, and what they predict, for batches
+    of vectors.
+    """
 
     def __init__(self, gear: Gear) -> None:
         self.gear = gear
@@ -120,11 +132,17 @@ class SurveyedLinkage:
         self.kernel = Kernel(gear.reference.mechanism)
         self.travel = gear.calibration.travel_in
         self.names = (*self.space.names, *(("travel",) if self.travel is not None else ()))
-        self.angles = np.array([n.endswith((".direction", ".dihedral", ".axis")) for n in self.names])
+        self.angles = np.array(
+            [n.endswith((".direction", ".dihedral", ".axis")) for n in self.names]
+        )
         # Signs of the variables of the same linkage, seen from the other side.
-        self.mirror = np.where(self.angles | np.array([n.endswith(".y") for n in self.names]), -1.0, 1.0)
+        self.mirror = np.where(
+            self.angles | np.array([n.endswith(".y") for n in self.names]), -1.0, 1.0
+        )
         self.low = gear.reference.stroke[0]
-        self.driven_in = "rad" if any(isinstance(s, Crank) for s in self.space.mechanism.steps) else "in"
+        self.driven_in = (
+            "rad" if any(isinstance(s, Crank) for s in self.space.mechanism.steps) else "in"
+        )
         self._beyond = gear.reference.stroke[1] - gear.reference.mechanism.reference_input
 
     def vector(self, linkage: Linkage) -> Array:
@@ -138,14 +156,19 @@ class SurveyedLinkage:
     def _assembled(self, vectors: Array) -> tuple[Mechanism, Array]:
         """Mechanisms of a batch and their reference inputs, shape (n_vectors, 1)."""
         mechanism = self.space.assembled(vectors[:, : len(self.space.names)])
-        return mechanism, np.broadcast_to(np.asarray(mechanism.reference_input, float), len(vectors))[:, None]
+        return (
+            mechanism,
+            np.broadcast_to(np.asarray(mechanism.reference_input, float), len(vectors))[:, None],
+        )
 
     def _numbers(self, mechanism: Mechanism, count: int) -> list[Any]:
         numbers = write_program(mechanism).parameters.values()
         return [np.broadcast_to(np.asarray(v, float), count)[:, None] for v in numbers]
 
     def _rate(self, vectors: Array, numbers: list[Any], reference: Array) -> Any:
-        """Rate k of section 4.2 by a parabola through the least position and its neighbours, shape (n, 1). [1]"""
+        """Rate k of section 4.2 by a parabola through the least position and its neighbours, shape
+        (n, 1). [1]
+        """
         if self.travel is None:
             return 1.0
         at = self.low + (reference + self._beyond - self.low) * np.linspace(0.0, 1.0, _POSITIONS)
@@ -160,7 +183,9 @@ class SurveyedLinkage:
         return direction * vectors[:, -1:] / (along[:, -1:] - least[:, None])
 
     def predicted(self, readings: tuple[Reading, ...], vectors: Array) -> Array:
-        """What each vector predicts for each reading, shape (n_vectors, n_readings); NaN where it does not close."""
+        """What each vector predicts for each reading, shape (n_vectors, n_readings); NaN where it
+        does not close.
+        """
         mechanism, reference = self._assembled(vectors)
         moves = [r for r in readings if r.kind is Kind.PLUNGER or r.extension is not None]
         extensions = list(dict.fromkeys(r.extension for r in moves))
@@ -169,16 +194,25 @@ class SurveyedLinkage:
         curve = np.empty(())
         if moves:
             numbers = self._numbers(mechanism, len(vectors))
-            at = [reference if e is None else np.full_like(reference, self.low + e) for e in extensions]
+            at = [
+                reference if e is None else np.full_like(reference, self.low + e)
+                for e in extensions
+            ]
             inputs = np.concatenate(at, axis=1)
             if any(r.kind is Kind.DISTANCE for r in moves):
                 positions = self.kernel.positions(inputs, nothing, numbers)
-                for name in {name for r in moves if r.kind is Kind.DISTANCE for name in (r.start, r.end)}:
+                for name in {
+                    name for r in moves if r.kind is Kind.DISTANCE for name in (r.start, r.end)
+                }:
                     origin, axes = mechanism.frame(mechanism.point(name).plane)
                     x, y = (np.broadcast_to(c, inputs.shape)[..., None] for c in positions[name])
-                    moved[name] = origin[..., None, :] + x * axes[..., None, 0, :] + y * axes[..., None, 1, :]
+                    moved[name] = (
+                        origin[..., None, :] + x * axes[..., None, 0, :] + y * axes[..., None, 1, :]
+                    )
             if any(r.kind is Kind.PLUNGER for r in moves):
-                curve = self.kernel.output(inputs, nothing, numbers) - self.kernel.output(reference, nothing, numbers)
+                curve = self.kernel.output(inputs, nothing, numbers) - self.kernel.output(
+                    reference, nothing, numbers
+                )
                 curve = curve * self._rate(vectors, numbers, reference)
         still = {p.name: mechanism.reference_in_space(p.name) for p in mechanism.points}
         found = np.empty((len(vectors), len(readings)))
@@ -188,7 +222,10 @@ class SurveyedLinkage:
                     places = (
                         still
                         if r.extension is None
-                        else {name: moved[name][:, extensions.index(r.extension)] for name in (r.start, r.end)}
+                        else {
+                            name: moved[name][:, extensions.index(r.extension)]
+                            for name in (r.start, r.end)
+                        }
                     )
                     apart = places[r.start] - places[r.end]
                     found[:, i] = np.sqrt((apart * apart).sum(axis=-1))
@@ -198,7 +235,9 @@ class SurveyedLinkage:
                     name = f"{r.start}.{'direction' if r.end == 'hinge' else r.end}"
                     turned = vectors[:, self.names.index(name)]
                     # The nearest of the turns that mean the same direction.
-                    found[:, i] = turned - 2 * np.pi * np.round((turned - np.nan_to_num(r.value)) / (2 * np.pi))
+                    found[:, i] = turned - 2 * np.pi * np.round(
+                        (turned - np.nan_to_num(r.value)) / (2 * np.pi)
+                    )
                 case Kind.EXTENSION:
                     found[:, i] = reference[:, 0] - self.low
                 case Kind.TRAVEL:
@@ -208,40 +247,56 @@ class SurveyedLinkage:
         return found
 
     def slopes(self, readings: tuple[Reading, ...], vectors: Array) -> tuple[Array, Array]:
-        """Predictions and their derivatives by central differences, shape (n_vectors, n_readings, n_variables)."""
+        """Predictions and their derivatives by central differences, shape (n_vectors, n_readings,
+        n_variables).
+        """
         count, n = vectors.shape
         steps = np.concatenate([np.zeros((1, n)), np.eye(n), -np.eye(n)]) * _STEP
-        found = self.predicted(readings, (vectors[:, None, :] + steps).reshape(-1, n)).reshape(count, 2 * n + 1, -1)
+        found = self.predicted(readings, (vectors[:, None, :] + steps).reshape(-1, n)).reshape(
+            count, 2 * n + 1, -1
+        )
         slopes: Array = ((found[:, 1 : n + 1] - found[:, n + 1 :]) / (2 * _STEP)).swapaxes(1, 2)
         return found[:, 0], slopes
 
     def _gradient(self, vectors: Array) -> tuple[Array, Array, list[Any], Any]:
-        """Derivatives of the displacement by the virtual links, with what a further solution needs."""
+        """Derivatives of the displacement by the virtual links, with what a further solution
+        needs.
+        """
         mechanism, reference = self._assembled(vectors)
         numbers = self._numbers(mechanism, len(vectors))
         n = len(self.kernel.no_clearance())
         links = np.concatenate([np.eye(n), -np.eye(n)]) * _STEP
         rate = self._rate(vectors, numbers, reference)
-        moved = self.kernel.output(reference + self._beyond, [links[:, i] for i in range(n)], numbers)
+        moved = self.kernel.output(
+            reference + self._beyond, [links[:, i] for i in range(n)], numbers
+        )
         return (moved[:, :n] - moved[:, n:]) / (2 * _STEP) * rate, reference, numbers, rate
 
     def amplification(self, vectors: Array) -> Array:
-        """Plunger amplification index A_iP of each joint (Eq. 8) for a batch, shape (n_vectors, n_joints). [1]"""
+        """Plunger amplification index A_iP of each joint (Eq. 8) for a batch, shape (n_vectors,
+        n_joints). [1]
+        """
         gradient = self._gradient(vectors)[0]
         return np.asarray(np.hypot(gradient[:, 0::2], gradient[:, 1::2]))
 
     def displacement(self, vectors: Array, clearance_in: Array) -> Array:
-        """Displacement of the plunger, the larger of both senses, every clearance along its own gradient.
+        """Displacement of the plunger, the larger of both senses, every clearance along its own
+        gradient.
 
-        clearance_in, shape (n_cases, n_joints): radial clearances. [in]
-        Returns, shape (n_vectors, n_cases): displacement; NaN where the linkage does not close. [in]
+        clearance_in, shape (n_cases, n_joints): radial clearances. [in] Returns, shape (n_vectors,
+        n_cases): displacement; NaN where the linkage does not close. [in]
         """
         gradient, reference, numbers, rate = self._gradient(vectors)
-        length = np.repeat(np.maximum(np.hypot(gradient[:, 0::2], gradient[:, 1::2]), 1e-12), 2, axis=1)
+        length = np.repeat(
+            np.maximum(np.hypot(gradient[:, 0::2], gradient[:, 1::2]), 1e-12), 2, axis=1
+        )
         link = np.repeat(clearance_in, 2, axis=1)[None] * (gradient / length)[:, None]
         at, none = reference + self._beyond, self.kernel.no_clearance()
         zero = self.kernel.output(at, none, numbers)
-        ends = [self.kernel.output(at, [*np.moveaxis(sense * link, -1, 0)], numbers) - zero for sense in (1.0, -1.0)]
+        ends = [
+            self.kernel.output(at, [*np.moveaxis(sense * link, -1, 0)], numbers) - zero
+            for sense in (1.0, -1.0)
+        ]
         return np.asarray(np.max(np.abs(ends), axis=0) * np.abs(rate))
 
     def log_slopes(self, vectors: Array, quantity: Quantity | None = None) -> Array:
@@ -256,14 +311,22 @@ class SurveyedLinkage:
         return np.asarray(((found[:, :n] - found[:, n:]) / (20.0 * _STEP)).swapaxes(1, 2))
 
     def closes(self, vectors: Array) -> Mask:
-        """Tell which vectors make a linkage that moves over its stroke and moves its plunger as prescribed."""
+        """Tell which vectors make a linkage that moves over its stroke and moves its plunger as
+        prescribed.
+        """
         mechanism, reference = self._assembled(vectors)
         at = self.low + (reference + self._beyond - self.low) * np.linspace(0.0, 1.0, _POSITIONS)
-        curve = self.kernel.output(at, self.kernel.no_clearance(), self._numbers(mechanism, len(vectors)))
-        return np.asarray(np.isfinite(curve).all(axis=1) & np.isfinite(self.amplification(vectors)).all(axis=1))
+        curve = self.kernel.output(
+            at, self.kernel.no_clearance(), self._numbers(mechanism, len(vectors))
+        )
+        return np.asarray(
+            np.isfinite(curve).all(axis=1) & np.isfinite(self.amplification(vectors)).all(axis=1)
+        )
 
     def candidates(self) -> tuple[Reading, ...]:
-        """Everything that can be read: the extension, the plunger over the stroke, every angle, every distance."""
+        """Everything that can be read: the extension, the plunger over the stroke, every angle,
+        every distance.
+        """
         m, (low, high) = self.space.mechanism, self.gear.reference.stroke
         found = [Reading(Kind.EXTENSION)] if self.space.moves_reference else []
         # A round figure of each ninth of the stroke is easier to set than the ninth.
@@ -271,8 +334,12 @@ class SurveyedLinkage:
         at.pop(0 if not self.space.moves_reference else _PLUNGER_READINGS)
         found += [Reading(Kind.PLUNGER, extension=e, is_angle=m.output.kind == "angle") for e in at]
         for plane in self.space.planes:
-            found += [Reading(Kind.ANGLE, plane, what, is_angle=True) for what in ("hinge", "dihedral")]
-        found += [Reading(Kind.ANGLE, slider, "axis", is_angle=True) for slider in self.space.sliders]
+            found += [
+                Reading(Kind.ANGLE, plane, what, is_angle=True) for what in ("hinge", "dihedral")
+            ]
+        found += [
+            Reading(Kind.ANGLE, slider, "axis", is_angle=True) for slider in self.space.sliders
+        ]
         names = [p.name for p in m.points]
         pairs = [*map(tuple, self.rigid), *combinations(names, 2)]
         ends = (sorted(p, key=names.index) for p in pairs)
@@ -291,9 +358,17 @@ class SurveyedLinkage:
                 case Dyad():
                     pairs += [(step.upstream, step.joint), (step.joint, step.downstream)]
                 case Lever():
-                    pairs += [(step.pivot, step.joint), (step.follows, step.joint), (step.pivot, step.follows)]
+                    pairs += [
+                        (step.pivot, step.joint),
+                        (step.follows, step.joint),
+                        (step.pivot, step.follows),
+                    ]
                 case Slot():
-                    pairs += [(step.pivot, step.joint), (step.pivot, step.pin), (step.pin, step.joint)]
+                    pairs += [
+                        (step.pivot, step.joint),
+                        (step.pivot, step.pin),
+                        (step.pin, step.joint),
+                    ]
                 case Slider():
                     pairs.append((step.upstream, step.joint))
                 case _:

@@ -14,7 +14,9 @@ from mlg_troubleshoot.surveying.survey import Survey
 
 @dataclass(frozen=True, slots=True)
 class InspectedGear:
-    """What the geometry leaves open of one inspection's displacement in the worst directions. [in]"""
+    """What the geometry leaves open of one inspection's displacement in the worst directions.
+    [in]
+    """
 
     record_id: str
     displacement_in: float
@@ -26,8 +28,9 @@ class InspectedGear:
         """The same in words."""
         low, high = self.interval_in
         return (
-            f"{self.displacement_in:.4f} in in the worst directions, 90 % {low:.4f} to {high:.4f} in; within the "
-            f"margin on {100 * self.probability_within_margin:.0f} % of the linkages that fit"
+            f"{self.displacement_in:.4f} in in the worst directions, 90 % {low:.4f} to {high:.4f}"
+            f" in; within the margin on {100 * self.probability_within_margin:.0f} % of the"
+            " linkages that fit"
         )
 
 
@@ -35,16 +38,13 @@ class InspectedGear:
 class SurveyResult:
     """What a survey gave.
 
-    gear: the gear as it was before.
-    survey: the fit; None if nothing was read.
-    problems: cells that are wrong; their rows were not used.
-    before, interval, shape (n_joints, 2): 90 % intervals of the amplification indices, before and after. [1]
-    amplification, shape (n_joints,): indices of the surveyed linkage. [1]
-    suggestion: the reading to take next; None if none would narrow anything.
-    inspections: joints that given inspections leave open.
-    warnings: assemblies, published numbers that this gear leaves, and what else a reader must know.
-    gear_file: the gear file that was written.
-    input_sha256: hash of the table.
+    gear: the gear as it was before. survey: the fit; None if nothing was read. problems: cells that
+    are wrong; their rows were not used. before, interval, shape (n_joints, 2): 90 % intervals of
+    the amplification indices, before and after. [1] amplification, shape (n_joints,): indices of
+    the surveyed linkage. [1] suggestion: the reading to take next; None if none would narrow
+    anything. inspections: joints that given inspections leave open. warnings: assemblies, published
+    numbers that this gear leaves, and what else a reader must know. gear_file: the gear file that
+    was written. input_sha256: hash of the table.
     """
 
     gear: Gear

@@ -1,10 +1,12 @@
-"""A linkage from measurements: design variables by damped least squares from every linkage of the ensemble.
+"""A linkage from measurements: design variables by damped least squares from every linkage of the
+ensemble.
 
-The prior is normal about the mean of the ensemble, with its covariance shrunk: ten members say little about thirty
-numbers' correlations. Each member and some draws are starts; the posterior is normal about its mode (Laplace). A slip
-must not bend the linkage: the first fit is robust (Student's t with four degrees of freedom, the uncertainties widened
-at first), and a reading counts as a misfit by what the others predict for it. Draws are random maximum likelihood: a
-draw of the prior and of the readings' errors, fitted anew by a few steps (Oliver et al. 1996).
+The prior is normal about the mean of the ensemble, with its covariance shrunk: ten members say
+little about thirty numbers' correlations. Each member and some draws are starts; the posterior is
+normal about its mode (Laplace). A slip must not bend the linkage: the first fit is robust
+(Student's t with four degrees of freedom, the uncertainties widened at first), and a reading counts
+as a misfit by what the others predict for it. Draws are random maximum likelihood: a draw of the
+prior and of the readings' errors, fitted anew by a few steps (Oliver et al. 1996).
 """
 
 from __future__ import annotations
@@ -29,31 +31,40 @@ _BELIEVED = 0.5
 # A gear file without an ensemble: half of the linkage's size, thirty degrees.
 _ALONE_SIZE, _ALONE_ANGLE = 0.5, float(np.radians(30.0))
 _LEAST_SPREAD = 0.01
-# Robust fit: uncertainties widened by these factors in turn, with so many steps each; then few starts are left.
+# Robust fit: uncertainties widened by these factors in turn, with so many steps each; then few
+# starts are left.
 _WIDENED, _STEPS, _KEPT = (300.0, 100.0, 30.0, 10.0, 3.0, 1.0), 6, 6
-# Draws of the prior that are starts in addition to the ensemble. The loss of a reading where the linkage is open.
+# Draws of the prior that are starts in addition to the ensemble. The loss of a reading where the
+# linkage is open.
 _AROUND, _OPEN, _LAST_STEPS, _TRIALS = 80, 100.0, 25, 8
-# The best few are left and fitted again with uncertainties widened so far, from so many points around each.
+# The best few are left and fitted again with uncertainties widened so far, from so many points
+# around each.
 _REHEATED, _TRIED, _AGAIN, _REHEAT_STEPS, _BESIDE = (10.0, 3.0), 100, 12, 4, 0.03
-# One reading in a hundred is a slip, anywhere within some twenty inches: minus twice the logarithm of that density
-# over the one at no error. Without a limit one large slip would cost more than a wrong linkage with small ones.
+# One reading in a hundred is a slip, anywhere within some twenty inches: minus twice the logarithm
+# of that density over the one at no error. Without a limit one large slip would cost more than a
+# wrong linkage with small ones.
 _SLIP = 23.0
 _FREEDOM, _TRUSTED = 4.0, 6.0
 # Of a fit: the search, that of slips, what does not fit, the modes, the draws.
 _STAGES = 5
-# In search of a slip: as many starts as make so many residuals, so many steps each; so many points are left at least.
+# In search of a slip: as many starts as make so many residuals, so many steps each; so many points
+# are left at least.
 _RESIDUALS, _FEW_STEPS, _FEWEST = 175_000, 3, 60
-# The greatest of forty clean residuals exceeds 3.9 in 0.4 % of surveys, in about 1 % where the fit bends.
+# The greatest of forty clean residuals exceeds 3.9 in 0.4 % of surveys, in about 1 % where the fit
+# bends.
 MISFIT = 3.9
-# Two readings contradict each other, neither of them alone is wrong, if leaving out one or the other fits alike.
+# Two readings contradict each other, neither of them alone is wrong, if leaving out one or the
+# other fits alike.
 _ALIKE = 9.0
 # With more misfits than this share of the readings nobody knows which of them to believe.
 _MOST_MISFITS = 0.1
-# Two points of the posterior are one if they stand on the same sides and no index differs by more than this share.
+# Two points of the posterior are one if they stand on the same sides and no index differs by more
+# than this share.
 _SAME, _LEAST_WEIGHT = 0.01, 1e-3
 # One reading in a hundred is exchanged, with any of twenty others.
 _EXCHANGE = 16.0
-# A joint's other side is tried where the readings place the joint: to a fifth of its distance from the line between.
+# A joint's other side is tried where the readings place the joint: to a fifth of its distance from
+# the line between.
 _PLACED = 0.2
 # With fewer readings than this share of the numbers of the linkage few of them are determined.
 FEW = 0.6
@@ -72,9 +83,9 @@ _MISREAD_IN = (1.0, 0.5, 0.25, 0.125, 0.1)
 class Misfit:
     """A reading that the others contradict.
 
-    expected, spread: what the others predict for it, and with what standard uncertainty. [in or rad]
-    suggestion: what would fit.
-    group: rows that contradict each other, this one among them; of one alone it is the slip.
+    expected, spread: what the others predict for it, and with what standard uncertainty. [in or
+    rad] suggestion: what would fit. group: rows that contradict each other, this one among them; of
+    one alone it is the slip.
     """
 
     reading: Reading
@@ -88,7 +99,10 @@ class Misfit:
         """What would fit, and with which rows it contradicts."""
         if len(self.group) < 2:
             return self.suggestion
-        return f"rows {', '.join(map(str, self.group))} contradict each other; of this one: {self.suggestion}"
+        return (
+            f"rows {', '.join(map(str, self.group))} contradict each other; of this one:"
+            f" {self.suggestion}"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,10 +110,9 @@ class Mode:
     """One assembly that the survey allows.
 
     mean, shape (n_variables,): the prior's middle, mirrored with the assembly. [in or rad]
-    covariance, shape (n_variables, n_variables): of the design variables. [in², rad²]
-    weight: share of the posterior. [1]
-    parameters: how many numbers the readings determine. [1]
-    sides: branch sign of each joint on two links or a slider, and on which side of a crank the rest stands.
+    covariance, shape (n_variables, n_variables): of the design variables. [in², rad²] weight: share
+    of the posterior. [1] parameters: how many numbers the readings determine. [1] sides: branch
+    sign of each joint on two links or a slider, and on which side of a crank the rest stands.
     """
 
     vector: Array
@@ -144,7 +157,9 @@ class Survey:
 
     @property
     def contradicts(self) -> bool:
-        """True if readings contradict each other so that nobody can tell which of them is wrong, or too many do."""
+        """True if readings contradict each other so that nobody can tell which of them is wrong, or
+        too many do.
+        """
         most = max(2, _MOST_MISFITS * len(self.read))
         return len(self.misfits) > most or any(len(m.group) > 1 for m in self.misfits)
 
@@ -162,13 +177,16 @@ class Prior:
         members = np.array([linkage.vector(each) for each in gear.ensemble])
         angles = linkage.angles
         # The same direction, one turn further, is not a distance.
-        members[:, angles] -= 2 * np.pi * np.round((members[:, angles] - members[0, angles]) / (2 * np.pi))
+        members[:, angles] -= (
+            2 * np.pi * np.round((members[:, angles] - members[0, angles]) / (2 * np.pi))
+        )
         self.members, self.linkage = members, linkage
         size = float(np.std([c for p in gear.reference.mechanism.points for c in (p.x, p.y)]))
         alone = np.where(angles, _ALONE_ANGLE, _ALONE_SIZE * size)
         least = _LEAST_SPREAD * alone
         if linkage.travel is not None:
-            # What the technical order prescribes is not a number of the ensemble: wide here, a reading elsewhere.
+            # What the technical order prescribes is not a number of the ensemble: wide here, a
+            # reading elsewhere.
             least[-1] = 0.1 * linkage.travel
         covariance = np.diag(alone**2)
         if len(members) > 2:
@@ -185,14 +203,21 @@ class Prior:
         return np.asarray(self.mean + rng.standard_normal((n, len(self.mean))) @ self.root.T)
 
     def closing(self, n: int, rng: Generator, readings: tuple[Reading, ...] = ()) -> Array:
-        """Draws of it that close, about so many, as the readings have it that speak of one variable each."""
+        """Draws of it that close, about so many, as the readings have it that speak of one variable
+        each.
+        """
         found = self.drawn(_DRAWN_FOR_ONE * n, rng)
         own = tuple(r for r in readings if r.kind in (Kind.ANGLE, Kind.EXTENSION, Kind.TRAVEL))
         if own:
             slopes = self.linkage.slopes(own, self.mean[None])[1][0] @ self.root
-            gain = np.linalg.solve(slopes @ slopes.T + np.diag([r.u**2 for r in own]), slopes) @ self.root.T
+            gain = (
+                np.linalg.solve(slopes @ slopes.T + np.diag([r.u**2 for r in own]), slopes)
+                @ self.root.T
+            )
             found = found + ([r.value for r in own] - self.linkage.predicted(own, found)) @ gain
-        apart = (self.linkage.predicted((self.order,), found)[:, 0] - self.order.value) / self.order.u
+        apart = (
+            self.linkage.predicted((self.order,), found)[:, 0] - self.order.value
+        ) / self.order.u
         likely = np.exp(-0.5 * apart * apart) > rng.random(len(found))
         return found[likely & self.linkage.closes(found)][:n]
 
@@ -200,7 +225,9 @@ class Prior:
 class Fitting:
     """The readings of one survey against one prior."""
 
-    def __init__(self, linkage: SurveyedLinkage, prior: Prior, readings: tuple[Reading, ...]) -> None:
+    def __init__(
+        self, linkage: SurveyedLinkage, prior: Prior, readings: tuple[Reading, ...]
+    ) -> None:
         self.linkage, self.prior, self.readings = linkage, prior, readings
         self.value = np.array([r.value for r in readings])
         self.u = np.array([r.u for r in readings])
@@ -209,13 +236,23 @@ class Fitting:
     def still(self) -> list[int]:
         """Which of them are read at the reference position, and so need no motion."""
         moves = (Kind.PLUNGER, Kind.ORDER)
-        return [i for i, r in enumerate(self.readings) if r.extension is None and r.kind not in moves]
+        return [
+            i for i, r in enumerate(self.readings) if r.extension is None and r.kind not in moves
+        ]
 
     def residuals(self, points: Array) -> Array:
         with np.errstate(all="ignore"):
             return np.asarray((self.linkage.predicted(self.readings, points) - self.value) / self.u)
 
-    def loss(self, points: Array, means: Array, widened: float, kept: Mask, robust: bool, noise: Any = 0.0) -> Array:
+    def loss(
+        self,
+        points: Array,
+        means: Array,
+        widened: float,
+        kept: Mask,
+        robust: bool,
+        noise: Any = 0.0,
+    ) -> Array:
         r = np.where(kept, (self.residuals(points) - noise) / widened, 0.0)
         open_ = ~np.isfinite(r)
         r = np.where(open_, 0.0, r)
@@ -224,12 +261,23 @@ class Fitting:
         return np.asarray(data.sum(axis=1) + (z * z).sum(axis=1))
 
     def descend(
-        self, points: Array, kept: Mask, widened: float, steps: int, robust: bool, means: Any = None, noise: Any = 0.0
+        self,
+        points: Array,
+        kept: Mask,
+        widened: float,
+        steps: int,
+        robust: bool,
+        means: Any = None,
+        noise: Any = 0.0,
     ) -> tuple[Array, Array]:
-        """Damped least squares of all starts at once, in variables in which the prior is the unit sphere."""
+        """Damped least squares of all starts at once, in variables in which the prior is the unit
+        sphere.
+        """
         points = points.copy()
         means = np.broadcast_to(self.prior.mean if means is None else means, points.shape)
-        noise, kept = (np.broadcast_to(each, (len(points), len(self.readings))) for each in (noise, kept))
+        noise, kept = (
+            np.broadcast_to(each, (len(points), len(self.readings))) for each in (noise, kept)
+        )
         loss = self.loss(points, means, widened, kept, robust, noise)
         damping = np.full(len(points), 1e-2)
         moving, n = np.arange(len(points)), points.shape[1]
@@ -237,23 +285,34 @@ class Fitting:
             x, before = points[moving], loss[moving]
             with np.errstate(all="ignore"):
                 found, slopes = self.linkage.slopes(self.readings, x)
-            r = np.where(kept[moving], ((found - self.value) / self.u - noise[moving]) / widened, 0.0)
+            r = np.where(
+                kept[moving], ((found - self.value) / self.u - noise[moving]) / widened, 0.0
+            )
             weight = _robust(r)[1] if robust else np.ones_like(r)
-            g = np.where(kept[moving][..., None], slopes / (self.u * widened)[:, None], 0.0) @ self.prior.root
+            g = (
+                np.where(kept[moving][..., None], slopes / (self.u * widened)[:, None], 0.0)
+                @ self.prior.root
+            )
             # A position that does not close pulls nowhere.
             bad = ~(np.isfinite(g).all(axis=2) & np.isfinite(r))
             r, g = np.where(bad, 0.0, r), np.where(bad[..., None], 0.0, g)
             gram = np.swapaxes(g, 1, 2) @ (weight[..., None] * g) + np.eye(n)
-            down = np.einsum("smi,sm->si", g, weight * r) + (x - means[moving]) @ self.prior.whiten.T
+            down = (
+                np.einsum("smi,sm->si", g, weight * r) + (x - means[moving]) @ self.prior.whiten.T
+            )
             left = np.arange(len(moving))
             for _ in range(4 if robust else _TRIALS):
                 at = moving[left]
-                step = np.linalg.solve(gram[left] + damping[at, None, None] * np.eye(n), down[left][..., None])[..., 0]
+                step = np.linalg.solve(
+                    gram[left] + damping[at, None, None] * np.eye(n), down[left][..., None]
+                )[..., 0]
                 trial = x[left] - np.where(np.isfinite(step), step, 0.0) @ self.prior.root.T
                 new = self.loss(trial, means[at], widened, kept[at], robust, noise[at])
                 better = new < loss[at]
                 points[at[better]], loss[at[better]] = trial[better], new[better]
-                damping[at] = np.where(better, damping[at] / 5.0, damping[at] * 8.0).clip(1e-9, 1e12)
+                damping[at] = np.where(better, damping[at] / 5.0, damping[at] * 8.0).clip(
+                    1e-9, 1e12
+                )
                 left = left[~better]
                 if not len(left):
                     break
@@ -265,8 +324,9 @@ class Fitting:
     def robust(self, points: Array) -> Array:
         """Fit from every start with uncertainties that shrink to their own; the best few remain.
 
-        What is read at the reference position needs no motion: it comes first and closes from every start. What it
-        does not tell stays as the start has it, so that starts which also move are among them.
+        What is read at the reference position needs no motion: it comes first and closes from every
+        start. What it does not tell stays as the start has it, so that starts which also move are
+        among them.
         """
         everything = np.ones(len(self.readings), dtype=bool)
         still = self.still
@@ -274,9 +334,13 @@ class Fitting:
         if len(still) > 2:
             standing = Fitting(self.linkage, self.prior, tuple(self.readings[i] for i in still))
             for widened in _WIDENED:
-                points, _ = standing.descend(points, everything[: len(still)], widened, _STEPS, True, starts)
+                points, _ = standing.descend(
+                    points, everything[: len(still)], widened, _STEPS, True, starts
+                )
             # Of the linkages that stand right, those that also move are the ones to go on with.
-            order = np.argsort(self.loss(points, starts, _WIDENED[2], everything, robust=True))[: 3 * _KEPT]
+            order = np.argsort(self.loss(points, starts, _WIDENED[2], everything, robust=True))[
+                : 3 * _KEPT
+            ]
             points, starts = points[order], starts[order]
         for k, widened in enumerate(_WIDENED[1:] if len(still) > 2 else _WIDENED):
             points, loss = self.descend(points, everything, widened, _STEPS, True, starts)
@@ -287,29 +351,39 @@ class Fitting:
         return points[np.argsort(loss)][:_KEPT]
 
     def suspected(self, starts: Array) -> tuple[Array, Mask, Array]:
-        """Fit what stands still without each reading in turn, and with each two distances exchanged.
+        """Fit what stands still without each reading in turn, and with each two distances
+        exchanged.
 
-        A slip leads a fit that begins with it into another valley, where readings that are right look wrong. All
-        begin at every start, and the worse two thirds are given up whenever the uncertainties shrink.
-        Returns the points of the likeliest few, which readings each keeps, and how far it takes each reading to be off
-        in the reading's uncertainty.
+        A slip leads a fit that begins with it into another valley, where readings that are right
+        look wrong. All begin at every start, and the worse two thirds are given up whenever the
+        uncertainties shrink. Returns the points of the likeliest few, which readings each keeps,
+        and how far it takes each reading to be off in the reading's uncertainty.
         """
         still = self.still
         part = Fitting(self.linkage, self.prior, tuple(self.readings[i] for i in still))
-        pairs = list(combinations([i for i, r in enumerate(part.readings) if r.kind is Kind.DISTANCE], 2))
-        kept = np.concatenate([~np.eye(len(still), dtype=bool), np.ones((len(pairs), len(still)), dtype=bool)])
+        pairs = list(
+            combinations([i for i, r in enumerate(part.readings) if r.kind is Kind.DISTANCE], 2)
+        )
+        kept = np.concatenate(
+            [~np.eye(len(still), dtype=bool), np.ones((len(pairs), len(still)), dtype=bool)]
+        )
         noise, starts = np.zeros(kept.shape), starts[: max(1, _RESIDUALS // kept.size)]
         for row, (i, j) in zip(noise[len(still) :], pairs, strict=True):
             row[[i, j]] = np.array([1.0, -1.0]) * (part.value[j] - part.value[i]) / part.u[[i, j]]
         points = means = np.tile(starts, (len(kept), 1))
         which = np.repeat(np.arange(len(kept)), len(starts))
         for widened in _WIDENED:
-            points, loss = part.descend(points, kept[which], widened, _FEW_STEPS, False, means, noise[which])
+            points, loss = part.descend(
+                points, kept[which], widened, _FEW_STEPS, False, means, noise[which]
+            )
             better = np.argsort(loss)[: max(_FEWEST, len(loss) // 3)]
             points, means, which = points[better], means[better], which[better]
         likely = np.isin(which, list(dict.fromkeys(which))[:_KEPT])
         points, means, which = points[likely], means[likely], which[likely]
-        held, off = np.ones((len(points), len(self.readings)), dtype=bool), np.zeros((len(points), len(self.readings)))
+        held, off = (
+            np.ones((len(points), len(self.readings)), dtype=bool),
+            np.zeros((len(points), len(self.readings))),
+        )
         held[:, still], off[:, still] = kept[which], noise[which]
         for widened in _WIDENED[1:]:
             points, loss = self.descend(points, held, widened, _FEW_STEPS, False, means, off)
@@ -317,37 +391,60 @@ class Fitting:
         best = np.concatenate([of[self._apart(points[of], loss[of], 2)] for of in each])
         return points[best], held[best], off[best]
 
-    def reheated(self, points: Array, rng: Generator, kept: Any = True, noise: Any = 0.0) -> tuple[Array, Array]:
-        """Fit once more from around each point, as far as wider uncertainties would let it go; the best few remain.
+    def reheated(
+        self, points: Array, rng: Generator, kept: Any = True, noise: Any = 0.0
+    ) -> tuple[Array, Array]:
+        """Fit once more from around each point, as far as wider uncertainties would let it go; the
+        best few remain.
 
-        Next to a valley there often lies a better one, behind a low ridge or where more of the readings close.
-        kept, shape (n_points, n_readings): what each is fitted to at first; all of the readings judge in the end.
-        noise, shape (n_points, n_readings): how far each takes the readings to be off where two are exchanged.
+        Next to a valley there often lies a better one, behind a low ridge or where more of the
+        readings close. kept, shape (n_points, n_readings): what each is fitted to at first; all of
+        the readings judge in the end. noise, shape (n_points, n_readings): how far each takes the
+        readings to be off where two are exchanged.
         """
-        kept, noise = (np.broadcast_to(each, (len(points), len(self.readings))) for each in (kept, noise))
+        kept, noise = (
+            np.broadcast_to(each, (len(points), len(self.readings))) for each in (kept, noise)
+        )
         with np.errstate(all="ignore"):
             found, slopes = self.linkage.slopes(self.readings, points)
-        weight = np.where(kept, np.nan_to_num(_robust((found - self.value) / self.u - noise)[1]), 0.0)
+        weight = np.where(
+            kept, np.nan_to_num(_robust((found - self.value) / self.u - noise)[1]), 0.0
+        )
         g = np.nan_to_num(slopes, posinf=0.0, neginf=0.0) / self.u[:, None] @ self.prior.root
         values, turned = np.linalg.eigh(np.swapaxes(g, 1, 2) @ (weight[..., None] * g))
-        around, which, tried = [points], np.arange(len(points)), _AGAIN if (kept & (noise == 0.0)).all() else _TRIED
+        around, which, tried = (
+            [points],
+            np.arange(len(points)),
+            _AGAIN if (kept & (noise == 0.0)).all() else _TRIED,
+        )
         held, off = (np.repeat(each, tried, axis=0) for each in (kept, noise))
         for widened in _REHEATED:
             z = rng.standard_normal((len(points), tried, points.shape[1]))
             z /= np.sqrt(1.0 + np.maximum(values, 0.0) / widened**2)[:, None]
             trial = points[:, None] + np.einsum("pij,pkj->pki", turned, z) @ self.prior.root.T
             trial = trial.reshape(-1, points.shape[1])
-            # Of many around a fit of what stands still, those that also move are the ones to go on with.
-            loss = self.loss(trial, self.prior.mean, widened, held, True, off).reshape(len(points), -1)
-            best = (np.argsort(loss, axis=1)[:, :_AGAIN] + tried * np.arange(len(points))[:, None]).ravel()
-            found, _ = self.descend(trial[best], held[best], widened, _REHEAT_STEPS, robust=True, noise=off[best])
+            # Of many around a fit of what stands still, those that also move are the ones to go on
+            # with.
+            loss = self.loss(trial, self.prior.mean, widened, held, True, off).reshape(
+                len(points), -1
+            )
+            best = (
+                np.argsort(loss, axis=1)[:, :_AGAIN] + tried * np.arange(len(points))[:, None]
+            ).ravel()
+            found, _ = self.descend(
+                trial[best], held[best], widened, _REHEAT_STEPS, robust=True, noise=off[best]
+            )
             around.append(found)
         which = np.concatenate([which, *len(_REHEATED) * [np.repeat(which, _AGAIN)]])
         points, everything = np.concatenate(around), np.ones(len(self.readings), dtype=bool)
         for steps, most in ((_STEPS, 3 * _KEPT), (_LAST_STEPS, 2 * _KEPT)):
-            points, loss = self.descend(points, everything, 1.0, steps, robust=True, noise=noise[which])
+            points, loss = self.descend(
+                points, everything, 1.0, steps, robust=True, noise=noise[which]
+            )
             # A few readings may be fitted by what does not move over its stroke.
-            loss = np.where(self.linkage.closes(points), loss, np.inf) + _EXCHANGE * noise[which].any(axis=1)
+            loss = np.where(self.linkage.closes(points), loss, np.inf) + _EXCHANGE * noise[
+                which
+            ].any(axis=1)
             apart = self._apart(points, loss, most)
             points, loss, which = points[apart], loss[apart], which[apart]
         return points, loss
@@ -357,12 +454,17 @@ class Fitting:
         found: list[int] = []
         whitened = points @ self.prior.whiten.T
         for k in map(int, np.argsort(loss)):
-            if len(found) < most and (np.abs(whitened[found] - whitened[k]).max(axis=1) > _BESIDE).all():
+            if (
+                len(found) < most
+                and (np.abs(whitened[found] - whitened[k]).max(axis=1) > _BESIDE).all()
+            ):
                 found.append(k)
         return found
 
     def modes(self, points: Array, means: Array, kept: Mask) -> tuple[Mode, ...]:
-        """Least squares on the readings kept, from every point; each mode with its Laplace posterior and evidence."""
+        """Least squares on the readings kept, from every point; each mode with its Laplace
+        posterior and evidence.
+        """
         points, loss = self.descend(points, kept, 1.0, _LAST_STEPS, robust=False, means=means)
         with np.errstate(all="ignore"):
             found, slopes = self.linkage.slopes(self.readings, points)
@@ -378,15 +480,19 @@ class Fitting:
             values = np.maximum(values, 0.0)
             root = self.prior.root @ (turned / np.sqrt(1.0 + values))
             sides = self._sides(points[k])
-            # A valley along which no index changes, as where all of a driving part may turn about its pivot, is one.
+            # A valley along which no index changes, as where all of a driving part may turn about
+            # its pivot, is one.
             if any(
-                m.sides == sides and np.abs(np.log(a / index[k])).max() < _SAME for m, a in zip(modes, own, strict=True)
+                m.sides == sides and np.abs(np.log(a / index[k])).max() < _SAME
+                for m, a in zip(modes, own, strict=True)
             ):
                 continue
             own.append(index[k])
             r = ((found[k] - self.value) / self.u)[kept]
             determined = float(np.sum(values / (1.0 + values)))
-            modes.append(Mode(points[k], means[k], root @ root.T, 0.0, float(r @ r), determined, sides))
+            modes.append(
+                Mode(points[k], means[k], root @ root.T, 0.0, float(r @ r), determined, sides)
+            )
             evidence.append(-0.5 * loss[k] - 0.5 * float(np.log1p(values).sum()))
         if not modes:
             return ()
@@ -400,16 +506,21 @@ class Fitting:
         signs = [int(s.sign) for s in m.steps if isinstance(s, (Dyad, Slider))]
         for crank in (s for s in m.steps if isinstance(s, Crank)):
             plane = m.point(crank.joint).plane
-            other = next(p.name for p in m.points if p.plane == plane and p.name not in (crank.joint, crank.pivot))
+            other = next(
+                p.name
+                for p in m.points
+                if p.plane == plane and p.name not in (crank.joint, crank.pivot)
+            )
             arm, away = (m.seen_in_plane(plane, crank.pivot, name) for name in (crank.joint, other))
             signs.append(1 if arm[0] * away[1] >= arm[1] * away[0] else -1)
         return tuple(signs)
 
     def with_mirrored(self, modes: tuple[Mode, ...], kept: Mask) -> tuple[Mode, ...]:
-        """Try the other side of each joint on two links: where the readings allow it, both assemblies are kept.
+        """Try the other side of each joint on two links: where the readings allow it, both
+        assemblies are kept.
 
-        The ensemble's side says nothing of this gear's: the prior's middle is mirrored with its joint. A linkage
-        that a crank drives moves otherwise if all of it is mirrored.
+        The ensemble's side says nothing of this gear's: the prior's middle is mirrored with its
+        joint. A linkage that a crank drives moves otherwise if all of it is mirrored.
         """
         best, names = modes[0], list(self.linkage.names)
         points, means = [m.vector for m in modes], [m.mean for m in modes]
@@ -425,7 +536,9 @@ class Fitting:
                 base = np.array(m.seen_in_plane(plane, step.upstream, step.downstream))
                 across = np.array([-base[1], base[0]]) / np.hypot(*base)
             far = float(arm @ across)
-            if np.sqrt(across @ best.covariance[i : i + 2, i : i + 2] @ across) > _PLACED * abs(far):
+            if np.sqrt(across @ best.covariance[i : i + 2, i : i + 2] @ across) > _PLACED * abs(
+                far
+            ):
                 continue
             moved = np.zeros(len(names))
             moved[i : i + 2] = -2.0 * far * across
@@ -434,10 +547,16 @@ class Fitting:
         if any(isinstance(step, Crank) for step in m.steps):
             points += [p * self.linkage.mirror for p in points]
             means += [c * self.linkage.mirror for c in means]
-        return self.modes(np.array(points), np.array(means), kept) or modes if len(points) > len(modes) else modes
+        return (
+            self.modes(np.array(points), np.array(means), kept) or modes
+            if len(points) > len(modes)
+            else modes
+        )
 
     def misfits(self, mode: Mode, kept: Mask) -> tuple[tuple[Misfit, ...], Mask]:
-        """Readings that the others contradict, one after the other, and the readings that remain."""
+        """Readings that the others contradict, one after the other, and the readings that
+        remain.
+        """
         kept, back = kept.copy(), np.zeros_like(kept)
         for _ in range(len(self.readings)):
             mode = (self.modes(mode.vector[None], mode.mean[None], kept) or (mode,))[0]
@@ -458,25 +577,38 @@ class Fitting:
         for i in map(int, np.flatnonzero(~kept)):
             words, sure = self._suggestion(mode, i, gap, spread, ~kept)
             group = (i,) if sure else self._alike(mode, kept, i, float(gap[i] / spread[i]))
-            rows = tuple(sorted(r.row for r in (self.readings[j] for j in group) if r.row is not None))
+            rows = tuple(
+                sorted(r.row for r in (self.readings[j] for j in group) if r.row is not None)
+            )
             own = self.readings[i]
-            found[own.row] = Misfit(own, float(self.value[i] - gap[i]), float(spread[i]), words, rows)
+            found[own.row] = Misfit(
+                own, float(self.value[i] - gap[i]), float(spread[i]), words, rows
+            )
             for other in (self.readings[j] for j in group if j != i):
-                also = Misfit(other, other.value, other.u, "contradicts the others of its group", rows)
+                also = Misfit(
+                    other, other.value, other.u, "contradicts the others of its group", rows
+                )
                 found.setdefault(other.row, also)
         return tuple(m for row, m in found.items() if row is not None), kept
 
     def _left_out(self, mode: Mode, kept: Mask) -> tuple[Array, Array]:
-        """How far each reading is from what the others predict, and the standard uncertainty of that."""
+        """How far each reading is from what the others predict, and the standard uncertainty of
+        that.
+        """
         found, slopes = self.linkage.slopes(self.readings, mode.vector[None])
         gap, g = self.value - found[0], slopes[0]
         known = np.einsum("mi,ij,mj->m", g, mode.covariance, g) / self.u**2
-        # With the reading among those kept its own weight is taken out; else the prediction's is added.
+        # With the reading among those kept its own weight is taken out; else the prediction's is
+        # added.
         held = np.clip(1.0 - known, 1e-9, None)
-        return np.where(kept, gap / held, gap), self.u * np.where(kept, 1.0 / np.sqrt(held), np.sqrt(1.0 + known))
+        return np.where(kept, gap / held, gap), self.u * np.where(
+            kept, 1.0 / np.sqrt(held), np.sqrt(1.0 + known)
+        )
 
     def _alike(self, mode: Mode, kept: Mask, i: int, size: float) -> tuple[int, ...]:
-        """Readings one of which is wrong without anybody telling which: leaving out any of them fits alike."""
+        """Readings one of which is wrong without anybody telling which: leaving out any of them
+        fits alike.
+        """
         slopes = self.linkage.slopes(self.readings, mode.vector[None])[1][0] / self.u[:, None]
         column = mode.covariance @ slopes[i]
         covariance = mode.covariance - np.outer(column, column) / (1.0 + slopes[i] @ column)
@@ -486,15 +618,21 @@ class Fitting:
         alike = residual[at] ** 2 / np.clip(residual[at, at] * np.diag(residual), 1e-12, None)
         return tuple(int(j) for j in rows[(1.0 - np.minimum(alike, 1.0)) * size**2 < _ALIKE])
 
-    def _suggestion(self, mode: Mode, i: int, gap: Array, spread: Array, out: Mask) -> tuple[str, bool]:
-        """What would make a misfit fit, and whether that says that this reading is the wrong one."""
+    def _suggestion(
+        self, mode: Mode, i: int, gap: Array, spread: Array, out: Mask
+    ) -> tuple[str, bool]:
+        """What would make a misfit fit, and whether that says that this reading is the wrong
+        one.
+        """
         reading, near = self.readings[i], 3.5 * float(spread[i])
         value, expected = reading.value, reading.value - float(gap[i])
         for j in map(int, np.flatnonzero(out)):
             other = self.readings[j]
             if j != i and other.row is not None and other.kind is reading.kind:
                 back = other.value - float(gap[j])
-                if abs(other.value - expected) < near and abs(value - back) < 3.5 * float(spread[j]):
+                if abs(other.value - expected) < near and abs(value - back) < 3.5 * float(
+                    spread[j]
+                ):
                     return f"swapped with row {other.row}: {other.words}", True
         if not reading.is_angle:
             for slip in _SLIPS:
@@ -504,7 +642,10 @@ class Fitting:
                 ):
                     if abs(value * factor - expected) < near:
                         right = f"{reading.shown(value * factor)} would fit"
-                        return f"{right}: the value is {slip.factor:g} times too {size}, {words}", True
+                        return (
+                            f"{right}: the value is {slip.factor:g} times too {size}, {words}",
+                            True,
+                        )
         if reading.kind is Kind.DISTANCE:
             names = [p.name for p in self.linkage.space.mechanism.points]
             others = [
@@ -516,14 +657,26 @@ class Fitting:
             best = int(np.nanargmin(np.abs(guess - value)))
             if abs(guess[best] - value) < 3.5 * reading.u:
                 return (
-                    f"a wrong pin: {others[best].start} to {others[best].end} measures {reading.shown(guess[best])}",
+                    (
+                        f"a wrong pin: {others[best].start} to {others[best].end} measures"
+                        f" {reading.shown(guess[best])}"
+                    ),
                     True,
                 )
         if not reading.is_angle:
             for inches in _MISREAD_IN:
                 if near < 0.4 * inches and abs(abs(gap[i]) - inches) < near:
-                    return f"misread by {reading.shown(inches)}: {reading.shown(expected)} would fit", True
-        return f"the others give {reading.shown(expected)} ± {reading.shown(float(spread[i]))}: read it again", False
+                    return (
+                        f"misread by {reading.shown(inches)}: {reading.shown(expected)} would fit",
+                        True,
+                    )
+        return (
+            (
+                f"the others give {reading.shown(expected)} ± {reading.shown(float(spread[i]))}:"
+                " read it again"
+            ),
+            False,
+        )
 
     def draws(self, modes: tuple[Mode, ...], kept: Mask, rng: Generator) -> Array:
         """Draws from the posterior, all of which close: of each mode its share."""
@@ -539,43 +692,58 @@ class Fitting:
             # A valley is curved: each draw begins as far along its linear step as that helps.
             steps = [mode.vector + t * pulled @ mode.covariance for t in _ALONG]
             if mode.parameters < FEW * n:
-                # So little is known that the modes say little: each draw begins at its own draw of the prior.
+                # So little is known that the modes say little: each draw begins at its own draw of
+                # the prior.
                 means = steps[0] = np.concatenate([prior.closing(count, rng), means])[:count]
                 del steps[1:]
             losses = [self.loss(x, means, 1.0, kept, False, noise) for x in steps]
             begun.append((np.choose(np.argmin(losses, axis=0)[:, None], steps), means, noise))
         points, means, noise = (np.concatenate(parts) for parts in zip(*begun, strict=True))
-        # The remaining loss of a draw that arrived is chi-squared, with as many degrees as readings.
+        # The remaining loss of a draw that arrived is chi-squared, with as many degrees as
+        # readings.
         enough = kept.sum() + _FAR * np.sqrt(2.0 * kept.sum())
         loss, late = np.full(len(points), np.inf), np.arange(len(points))
         for _ in range(_BEGUN):
             points[late], loss[late] = self.descend(
-                points[late], kept, 1.0, _DRAW_STEPS, robust=False, means=means[late], noise=noise[late]
+                points[late],
+                kept,
+                1.0,
+                _DRAW_STEPS,
+                robust=False,
+                means=means[late],
+                noise=noise[late],
             )
             late = np.flatnonzero(loss > enough)
             if not len(late):
                 break
-            # One that is held up in another valley begins again at the nearest that is in the right one.
+            # One that is held up in another valley begins again at the nearest that is in the right
+            # one.
             sound = np.concatenate([[mode.vector for mode in modes], points[loss <= enough]])
             apart = (((means[late][:, None] - sound) @ prior.whiten.T) ** 2).sum(axis=2)
             points[late] = sound[np.argmin(apart, axis=1)]
         arrived = points[(loss <= enough) & self.linkage.closes(points)]
         if len(arrived) < 2:
             raise InconclusiveDataError(
-                "no linkage near the fitted one moves over its whole stroke", "Check the extensions and their unit."
+                "no linkage near the fitted one moves over its whole stroke",
+                "Check the extensions and their unit.",
             )
         return np.asarray(rng.permutation(arrived))
 
 
 def _robust(r: Array) -> tuple[Array, Array]:
-    """Loss of residuals and their weights: Student's t, or a slip, which costs the same however large it is."""
+    """Loss of residuals and their weights: Student's t, or a slip, which costs the same however
+    large it is.
+    """
     loss = (_FREEDOM + 1.0) * np.log1p(r * r / _FREEDOM)
     sound = 1.0 / (1.0 + np.exp((loss - _SLIP) / 2.0))
     return loss + 2.0 * np.log(sound), sound * (_FREEDOM + 1.0) / (_FREEDOM + r * r)
 
 
 def fit(
-    gear: Gear, readings: tuple[Reading, ...], rng: Generator, told: Callable[[int, int], None] = lambda *_: None
+    gear: Gear,
+    readings: tuple[Reading, ...],
+    rng: Generator,
+    told: Callable[[int, int], None] = lambda *_: None,
 ) -> Survey:
     """Find the linkages that fit the readings, what does not fit, and draws from the posterior.
 
@@ -600,13 +768,15 @@ def fit(
         held, off = np.concatenate([nothing == 0.0, held]), np.concatenate([nothing, off])
         points, loss = fitting.reheated(np.concatenate([points, without]), rng, held, off)
         kept = np.abs(fitting.residuals(points[:1])[0]) < _TRUSTED
-    # What is that much less likely, each slip counted, is not a mode: without what was exchanged it might seem one.
+    # What is that much less likely, each slip counted, is not a mode: without what was exchanged it
+    # might seem one.
     points = points[loss <= loss[0] - 2.0 * np.log(_LEAST_WEIGHT)]
     told(2, _STAGES)
     modes = fitting.modes(points, np.broadcast_to(prior.mean, points.shape), kept)
     if not modes:
         raise InconclusiveDataError(
-            "no linkage of this type has these dimensions: none of the starts can be assembled with them",
+            "no linkage of this type has these dimensions: none of the starts can be assembled with"
+            " them",
             "Check the units and the points of the readings.",
         )
     told(_STAGES - 2, _STAGES)

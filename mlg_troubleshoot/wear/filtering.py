@@ -1,4 +1,5 @@
-"""What readings say of the level and the drift of each unit, for many posterior draws and many units at once.
+"""What readings say of the level and the drift of each unit, for many posterior draws and many
+units at once.
 
 Level x and drift b of a path run over a clock c = usage^q:
 
@@ -6,10 +7,11 @@ Level x and drift b of a path run over a clock c = usage^q:
     b(c + d) = b(c) + v W(d)               integrated Wiener: the drift itself wanders
     x(c + d) = x(c) + Gamma(d / s², b s²)  gamma increments: mean b d, variance b² s² d
 
-Paths begin at x ~ N(start, start_sd²) with b = unit's drift + N(0, (1 - kept) drift_sd²), and the unit's drift is
-N(drift, kept drift_sd²), so that a restored part keeps a share of its own pace. A reading is x + N(0, r²). Wiener and
-integrated Wiener are filtered exactly (Kalman); gamma increments by their mean and their variance, which is what is
-expected of it from the readings so far: s² d E[b²] = s² d (mean² + variance of the drift).
+Paths begin at x ~ N(start, start_sd²) with b = unit's drift + N(0, (1 - kept) drift_sd²), and the
+unit's drift is N(drift, kept drift_sd²), so that a restored part keeps a share of its own pace. A
+reading is x + N(0, r²). Wiener and integrated Wiener are filtered exactly (Kalman); gamma
+increments by their mean and their variance, which is what is expected of it from the readings so
+far: s² d E[b²] = s² d (mean² + variance of the drift).
 """
 
 from __future__ import annotations
@@ -22,15 +24,18 @@ from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.wear.paths import Steps
 
 _LOG_2PI = float(np.log(2.0 * np.pi))
-# A reading is a thousandth of the whole rise worse than it says: where all parts begin at exactly the same number the
-# posterior would be a needle, of which its samples hit one point. Of measured cracks (tests/wear/real.py) the chance of
-# one kind was 0.19 to 0.97 by seed without it; with it 0.22 to 0.23, and 970 to 1,230 of 1,600 draws count. [1]
+# A reading is a thousandth of the whole rise worse than it says: where all parts begin at exactly
+# the same number the posterior would be a needle, of which its samples hit one point. Of measured
+# cracks (tests/wear/real.py) the chance of one kind was 0.19 to 0.97 by seed without it; with it
+# 0.22 to 0.23, and 970 to 1,230 of 1,600 draws count. [1]
 _LEAST_VARIANCE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Draws:
-    """Parameters, each of shape (draws, 1), in the units of ``Scale``; ``gamma`` says that increments are gamma."""
+    """Parameters, each of shape (draws, 1), in the units of ``Scale``; ``gamma`` says that
+    increments are gamma.
+    """
 
     gamma: Mask
     start: Array
@@ -64,7 +69,9 @@ def clock(usage: Array, power: Array) -> Array:
 
 
 def follow(steps: Steps, draws: Draws) -> tuple[Array, State]:
-    """Filter the readings of every unit; return log likelihood (draws, units) and the state at the end."""
+    """Filter the readings of every unit; return log likelihood (draws, units) and the state at the
+    end.
+    """
     shape = (len(draws.start), steps.seen.shape[1])
     x, b = np.broadcast_to(draws.start, shape), np.broadcast_to(draws.drift, shape)
     unit = b
@@ -79,7 +86,10 @@ def follow(steps: Steps, draws: Draws) -> tuple[Array, State]:
         now = clock(usage, draws.power)
         if begins.any():
             x, b = np.where(begins, draws.start, x), np.where(begins, unit, b)
-            pxx, pxb, pxu = (np.where(begins, v, p) for v, p in ((draws.start_sd**2, pxx), (0.0, pxb), (0.0, pxu)))
+            pxx, pxb, pxu = (
+                np.where(begins, v, p)
+                for v, p in ((draws.start_sd**2, pxx), (0.0, pxb), (0.0, pxu))
+            )
             pbb, pbu = np.where(begins, puu + own, pbb), np.where(begins, puu, pbu)
         d, before = now - np.where(begins, 0.0, before), now
         x = x + b * d

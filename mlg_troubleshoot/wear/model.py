@@ -18,16 +18,19 @@ from mlg_troubleshoot.wear.posterior import members, posterior
 _DRAWS = 128
 # Simulated paths of a unit of a population of few units and of many. [1]
 _PATHS, _PATHS_OF_MANY, _MANY = 4096, 256, 64
-# Units read twice or more, and other units, that the population is learnt from at most: more would not narrow it. [1]
+# Units read twice or more, and other units, that the population is learnt from at most: more would
+# not narrow it. [1]
 _LEARN_FROM, _LEARN_FROM_OTHERS = 160, 40
-# Beyond the usage that any unit has reached, the clock of drift and increments runs faster or slower by this share
-# (one standard deviation): nothing read so far can tell of a curve that bends later. [1]
+# Beyond the usage that any unit has reached, the clock of drift and increments runs faster or
+# slower by this share (one standard deviation): nothing read so far can tell of a curve that bends
+# later. [1]
 _DOUBT = 0.25
 # The clock of a simulated path never stops. [1]
 _SLOWEST = 0.1
 # Least drift of gamma increments, as a share of the fleet's typical one. [1]
 _LEAST_DRIFT = 1e-3
-# Where an integrated Wiener path is looked at, in multiples of the time that it would need about. [1]
+# Where an integrated Wiener path is looked at, in multiples of the time that it would need about.
+# [1]
 _GRID = np.concatenate([[0.0], np.geomspace(0.02, 40.0, 44)])
 
 
@@ -46,7 +49,8 @@ class Samples:
     def quantile(self, probability: ArrayLike) -> Array:
         """Quantiles of the samples, at a probability or several, shape (p,). [1]
 
-        Returns, shape (..., p): infinite, never NaN, where a quantile lies among samples that never happen. [as asked]
+        Returns, shape (..., p): infinite, never NaN, where a quantile lies among samples that never
+        happen. [as asked]
         """
         ordered = np.sort(self.samples, axis=-1)
         at = np.asarray(probability, float) * (ordered.shape[-1] - 1)
@@ -80,14 +84,16 @@ class WearModel:
     draws: Draws
     seed: int
 
-    def forecast(self, unit: str | Sequence[str], usage: ArrayLike, *, reading: bool = True) -> Samples:
+    def forecast(
+        self, unit: str | Sequence[str], usage: ArrayLike, *, reading: bool = True
+    ) -> Samples:
         """Forecast readings of the current path of a unit, or of n units at once.
 
-        unit: one that is not known is a new one of the same population.
-        usage, shape (m,) or (n, m): usage since the last restoration, the same for all or one row per unit; before
+        unit: one that is not known is a new one of the same population. usage, shape (m,) or (n,
+        m): usage since the last restoration, the same for all or one row per unit; before
           the last reading the path is followed back along its drift. [usage]
-        reading: of a new reading, with its error; otherwise of the wear itself. Along the usages a sample is one path.
-        Returns samples of shape (m, n_samples) or (n, m, n_samples). [value]
+        reading: of a new reading, with its error; otherwise of the wear itself. Along the usages a
+        sample is one path. Returns samples of shape (m, n_samples) or (n, m, n_samples). [value]
         """
         units = [unit] if isinstance(unit, str) else list(unit)
         asked = np.asarray(usage, float)
@@ -102,21 +108,27 @@ class WearModel:
             ascending = np.take_along_axis(wanted[chosen], order, axis=1) / self.scale.usage
             last, known = self._last(names), self._known_reading(names)
             ends = self._ends(names, count, rng)
-            found = np.concatenate([end.follow(ascending, last, known, rng, reading=reading) for end in ends])
+            found = np.concatenate(
+                [end.follow(ascending, last, known, rng, reading=reading) for end in ends]
+            )
             samples = np.moveaxis(found, (0, 1, 2, 3), (2, 0, 3, 1)).reshape(*ascending.shape, -1)
             back = np.take_along_axis(samples, np.argsort(order, axis=1)[:, :, None], axis=1)
             parts.append(self.scale.start + self.scale.value * back)
         return Samples(parts[0][0] if isinstance(unit, str) else np.concatenate(parts))
 
     def usage_to_limit(self, unit: str | Sequence[str], limit: ArrayLike) -> Samples:
-        """Forecast the usage at which the wear itself of one unit or n, not a reading of it, crosses a limit.
+        """Forecast the usage at which the wear itself of one unit or n, not a reading of it,
+        crosses a limit.
 
-        limit, one for all or shape (n,): the limit. [value]
-        Returns samples of shape (n_samples,) or (n, n_samples): usage since the last restoration at the crossing,
-          infinite where there never is one; at the last reading where the limit is passed already. [usage]
+        limit, one for all or shape (n,): the limit. [value] Returns samples of shape (n_samples,)
+        or (n, n_samples): usage since the last restoration at the crossing,
+          infinite where there never is one; at the last reading where the limit is passed already.
+          [usage]
         """
         units = [unit] if isinstance(unit, str) else list(unit)
-        limits = np.broadcast_to((np.asarray(limit, float) - self.scale.start) / self.scale.value, (len(units),))
+        limits = np.broadcast_to(
+            (np.asarray(limit, float) - self.scale.start) / self.scale.value, (len(units),)
+        )
         rng = np.random.default_rng(self.seed)
         parts = []
         for chosen, count in self._chunks(len(units)):
@@ -128,7 +140,9 @@ class WearModel:
         return Samples(samples[0] if isinstance(unit, str) else samples)
 
     def _chunks(self, units: int) -> Iterator[tuple[Places, int]]:
-        """Units that are worked out at once, and simulated paths of each: as many whoever else is asked for."""
+        """Units that are worked out at once, and simulated paths of each: as many whoever else is
+        asked for.
+        """
         size, count = (_MANY, _PATHS) if len(self.paths) <= _MANY else (250, _PATHS_OF_MANY)
         for first in range(0, units, size):
             yield np.arange(first, min(first + size, units)), count
@@ -137,10 +151,15 @@ class WearModel:
         return self.paths[unit] if unit in self.paths else (WearPath(unit, (), ()),)
 
     def _last(self, units: Sequence[str]) -> Array:
-        return np.array([np.max(self._paths(u)[-1].usage, initial=0.0) for u in units]) / self.scale.usage
+        return (
+            np.array([np.max(self._paths(u)[-1].usage, initial=0.0) for u in units])
+            / self.scale.usage
+        )
 
     def _known_reading(self, units: Sequence[str]) -> Array:
-        """Variance of the next reading, NaN where it is estimated: a new reading is like the last ones."""
+        """Variance of the next reading, NaN where it is estimated: a new reading is like the last
+        ones.
+        """
         default = next(iter(self.paths.values()))[-1].reading_u
         last = [self.paths[u][-1].reading_u if u in self.paths else default for u in units]
         return np.array([np.nan if u is None else (u / self.scale.value) ** 2 for u in last])
@@ -160,7 +179,9 @@ class WearModel:
 
 @dataclass(frozen=True, slots=True)
 class _Ends:
-    """Level, drift and pace beyond the reach of paths at their last reading, each (draws, units, repeats)."""
+    """Level, drift and pace beyond the reach of paths at their last reading, each (draws, units,
+    repeats).
+    """
 
     draws: Draws
     level: Array
@@ -172,7 +193,8 @@ class _Ends:
         """Sample levels and drifts jointly."""
         shape = (*state.level.shape[:2], repeats)
         level, drift, level_var, cov, drift_var = (
-            getattr(state, name)[:, :, None] for name in ("level", "drift", "level_var", "both_cov", "drift_var")
+            getattr(state, name)[:, :, None]
+            for name in ("level", "drift", "level_var", "both_cov", "drift_var")
         )
         sd = np.sqrt(np.maximum(level_var, 1e-30))
         one, two, three = rng.standard_normal((3, *shape))
@@ -180,13 +202,22 @@ class _Ends:
         pace = np.maximum(1.0 + _DOUBT * three, _SLOWEST)
         drift = drift + cov / sd * one + rest * two
         # What wears by gamma increments never goes back.
-        return cls(draws, level + sd * one, np.maximum(drift, _LEAST_DRIFT) if draws.gamma.any() else drift, pace)
+        return cls(
+            draws,
+            level + sd * one,
+            np.maximum(drift, _LEAST_DRIFT) if draws.gamma.any() else drift,
+            pace,
+        )
 
     def _column(self, name: str) -> Array:
         return np.asarray(getattr(self.draws, name))[:, :, None]
 
-    def follow(self, usage: Array, last: Array, known: Array, rng: np.random.Generator, *, reading: bool) -> Array:
-        """Simulate the paths on to ascending usages (units, m); return (draws, units, repeats, m)."""
+    def follow(
+        self, usage: Array, last: Array, known: Array, rng: np.random.Generator, *, reading: bool
+    ) -> Array:
+        """Simulate the paths on to ascending usages (units, m); return (draws, units, repeats,
+        m).
+        """
         power, s, v = self._column("power"), self._column("increment_sd"), self._column("wander_sd")
         x, b, before = self.level, self.drift, np.zeros_like(self.level)
         start = clock(last[None, :, None], power)
@@ -201,11 +232,20 @@ class _Ends:
                 x = x + np.where(d > 0.0, b * s**2 * rng.standard_gamma(shape), b * d)
             else:
                 one, two = rng.standard_normal((2, *x.shape))
-                x = x + b * d + v * span**1.5 * one / 2.0 + np.sqrt(v * v * span**3 / 12.0 + s * s * span) * two
+                x = (
+                    x
+                    + b * d
+                    + v * span**1.5 * one / 2.0
+                    + np.sqrt(v * v * span**3 / 12.0 + s * s * span) * two
+                )
                 b = b + v * np.sqrt(span) * one
             out[..., j] = x
             if reading:
-                sd = np.where(np.isnan(known)[None, :, None], self._column("reading_sd"), np.sqrt(known)[None, :, None])
+                sd = np.where(
+                    np.isnan(known)[None, :, None],
+                    self._column("reading_sd"),
+                    np.sqrt(known)[None, :, None],
+                )
                 out[..., j] += sd * rng.standard_normal(x.shape)
         return out
 
@@ -219,8 +259,12 @@ class _Ends:
         else:
             wanders = v[:, 0, 0] > 0.0
             time = np.empty(away.shape)
-            time[~wanders] = _wiener_passage(ahead[~wanders], self.drift[~wanders], s[~wanders], rng)
-            time[wanders] = _integrated_passage(ahead[wanders], self.drift[wanders], v[wanders], rng)
+            time[~wanders] = _wiener_passage(
+                ahead[~wanders], self.drift[~wanders], s[~wanders], rng
+            )
+            time[wanders] = _integrated_passage(
+                ahead[wanders], self.drift[wanders], v[wanders], rng
+            )
         start = clock(last[None, :, None], power)
         within = np.maximum(1.0 - start, 0.0)
         at = start + np.minimum(time, within) + np.maximum(time - within, 0.0) / self.pace
@@ -229,21 +273,29 @@ class _Ends:
 
 
 def _wiener_passage(away: Array, drift: Array, sd: Array, rng: np.random.Generator) -> Array:
-    """First passage of a Wiener process with drift: inverse Gaussian, sampled after Michael, Schucany and Haas (1976).
+    """First passage of a Wiener process with drift: inverse Gaussian, sampled after Michael,
+    Schucany and Haas (1976).
 
-    Against its drift it passes with probability exp(2 drift away / sd²) only, and then as if the drift were turned.
+    Against its drift it passes with probability exp(2 drift away / sd²) only, and then as if the
+    drift were turned.
     """
     speed = np.maximum(np.abs(drift), 1e-9)
     mean = away / speed
     phi = rng.standard_normal(away.shape) ** 2 * sd * sd / (away * speed)
     short = mean / (1.0 + phi / 2.0 + np.sqrt(phi + phi * phi / 4.0))
-    time = np.where(rng.uniform(size=away.shape) * (mean + short) <= mean, short, mean * (mean / short))
-    against = (drift < 0.0) & (rng.uniform(size=away.shape) > np.exp(-2.0 * speed * away / np.maximum(sd, 1e-9) ** 2))
+    time = np.where(
+        rng.uniform(size=away.shape) * (mean + short) <= mean, short, mean * (mean / short)
+    )
+    against = (drift < 0.0) & (
+        rng.uniform(size=away.shape) > np.exp(-2.0 * speed * away / np.maximum(sd, 1e-9) ** 2)
+    )
     return np.where(against, np.inf, time)
 
 
 def _integrated_passage(away: Array, drift: Array, sd: Array, rng: np.random.Generator) -> Array:
-    """First passage when the drift itself wanders: paths on a grid, the same for every unit, scaled to each."""
+    """First passage when the drift itself wanders: paths on a grid, the same for every unit, scaled
+    to each.
+    """
     draws, _units, repeats = away.shape
     gap = np.diff(_GRID)
     one, two = rng.standard_normal((2, draws, 1, repeats, len(gap)))
@@ -252,7 +304,11 @@ def _integrated_passage(away: Array, drift: Array, sd: Array, rng: np.random.Gen
     area = np.cumsum(begins * gap + gap**1.5 * (one / 2.0 + two / np.sqrt(12.0)), axis=-1)
     scale = away / (np.maximum(drift, 0.0) + (sd * sd * away) ** (1.0 / 3.0))
     rate, rough = drift * scale, sd * scale**1.5
-    time, below, found = np.full(away.shape, np.inf), np.zeros(away.shape), np.zeros(away.shape, bool)
+    time, below, found = (
+        np.full(away.shape, np.inf),
+        np.zeros(away.shape),
+        np.zeros(away.shape, bool),
+    )
     for k in range(len(gap)):
         level = rate * _GRID[k + 1] + rough * area[..., k]
         new = (level >= away) & ~found
@@ -264,7 +320,8 @@ def _integrated_passage(away: Array, drift: Array, sd: Array, rng: np.random.Gen
 
 
 def _gamma_passage(away: Array, rng: np.random.Generator) -> Array:
-    """Shape at which a gamma process of scale 1 passes ``away``: its distribution inverted by bisection.
+    """Shape at which a gamma process of scale 1 passes ``away``: its distribution inverted by
+    bisection.
 
     The quantile of a gamma distribution is taken after Wilson and Hilferty (1931).
     """
@@ -273,7 +330,10 @@ def _gamma_passage(away: Array, rng: np.random.Generator) -> Array:
     for _ in range(40):
         middle = (low + high) / 2.0
         shape = np.maximum(middle, 1e-9)
-        over = shape * np.maximum(1.0 - 1.0 / (9.0 * shape) + z / (3.0 * np.sqrt(shape)), 0.0) ** 3 >= away
+        over = (
+            shape * np.maximum(1.0 - 1.0 / (9.0 * shape) + z / (3.0 * np.sqrt(shape)), 0.0) ** 3
+            >= away
+        )
         low, high = np.where(over, low, middle), np.where(over, middle, high)
     return (low + high) / 2.0
 
@@ -281,10 +341,11 @@ def _gamma_passage(away: Array, rng: np.random.Generator) -> Array:
 def fit_wear(paths: Sequence[WearPath], *, seed: int = 0) -> WearModel:
     """Learn how a population of units wears, from readings of some of them.
 
-    Each unit has a drift from the population's; increments are correlated along a path (Wiener, integrated Wiener or
-    gamma) in proportion to usage or to a power of it, all averaged in the measure of their evidence; readings have
-    errors, at least of the resolution that they show; a restoration starts a new path of the same unit. See
-    ``filtering`` for the equations and ``posterior`` for the priors.
+    Each unit has a drift from the population's; increments are correlated along a path (Wiener,
+    integrated Wiener or gamma) in proportion to usage or to a power of it, all averaged in the
+    measure of their evidence; readings have errors, at least of the resolution that they show; a
+    restoration starts a new path of the same unit. See ``filtering`` for the equations and
+    ``posterior`` for the priors.
 
     Parameters
     ----------
@@ -310,7 +371,9 @@ def fit_wear(paths: Sequence[WearPath], *, seed: int = 0) -> WearModel:
         by_unit.setdefault(path.unit, []).append(path)
     rng = np.random.default_rng(seed)
     scale = scale_of(paths)
-    readings = {unit: max(len(np.asarray(path.usage)) for path in own) for unit, own in by_unit.items()}
+    readings = {
+        unit: max(len(np.asarray(path.usage)) for path in own) for unit, own in by_unit.items()
+    }
     learn: list[str] = []
     for most, pool in (
         (_LEARN_FROM, [u for u, n in readings.items() if n > 1]),
@@ -323,4 +386,6 @@ def fit_wear(paths: Sequence[WearPath], *, seed: int = 0) -> WearModel:
         restored=any(len(by_unit[unit]) > 1 for unit in learn),
     )
     draws, shares = posterior(steps, scale, _DRAWS, rng, kinds)
-    return WearModel({unit: tuple(own) for unit, own in by_unit.items()}, shares, scale, draws, seed)
+    return WearModel(
+        {unit: tuple(own) for unit, own in by_unit.items()}, shares, scale, draws, seed
+    )

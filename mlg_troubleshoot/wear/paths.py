@@ -1,4 +1,6 @@
-"""Wear read at irregular usages, and the same readings laid out for filtering many units at once."""
+"""Wear read at irregular usages, and the same readings laid out for filtering many units at
+once.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ from mlg_troubleshoot.errors import UsageError
 
 # Decimals beyond which a difference between two readings is taken for rounding in the computer. [1]
 _DECIMALS = 9
-# Readings lie on a grid if it has at least this many readings to a step of their range, and not by chance. [1]
+# Readings lie on a grid if it has at least this many readings to a step of their range, and not by
+# chance. [1]
 _MOST_STEPS = 2000
 # Share of the parts whose values fall from which on wear is taken to fall. [1]
 _FALLING = 0.75
@@ -28,8 +31,8 @@ class WearPath:
     unit : str
         The part. Paths of one unit stand in the order of time; a restoration begins a new one.
     usage : array_like of shape (n,)
-        Usage at each reading, counted from the restoration, ascending; empty for a part restored and not read since.
-        [usage]
+        Usage at each reading, counted from the restoration, ascending; empty for a part restored
+        and not read since. [usage]
     value : array_like of shape (n,)
         Wear as read. [value]
     reading_u : float or None
@@ -45,24 +48,35 @@ class WearPath:
         usage, value = (np.array(numbers, float).ravel() for numbers in (self.usage, self.value))
         if len(usage) != len(value):
             raise UsageError(
-                f"path of {self.unit}: {len(usage)} usages and {len(value)} values", "Give one value per usage."
+                f"path of {self.unit}: {len(usage)} usages and {len(value)} values",
+                "Give one value per usage.",
             )
         if not (np.isfinite(usage).all() and np.isfinite(value).all()):
-            raise UsageError(f"path of {self.unit}: a usage or a value is not a finite number", "Leave it out.")
+            raise UsageError(
+                f"path of {self.unit}: a usage or a value is not a finite number", "Leave it out."
+            )
         if (usage < 0.0).any() or (np.diff(usage) < 0.0).any():
             raise UsageError(
-                f"path of {self.unit}: usage must ascend from 0, not {', '.join(f'{u:g}' for u in usage[:8])}",
+                f"path of {self.unit}: usage must ascend from 0, not"
+                f" {', '.join(f'{u:g}' for u in usage[:8])}",
                 "Count the usage from the last restoration and begin a new path there.",
             )
-        if self.reading_u is not None and not (np.isfinite(self.reading_u) and self.reading_u >= 0.0):
-            raise UsageError(f"path of {self.unit}: reading_u is {self.reading_u:g}", "Give zero or more, or None.")
+        if self.reading_u is not None and not (
+            np.isfinite(self.reading_u) and self.reading_u >= 0.0
+        ):
+            raise UsageError(
+                f"path of {self.unit}: reading_u is {self.reading_u:g}",
+                "Give zero or more, or None.",
+            )
         object.__setattr__(self, "usage", frozen(usage))
         object.__setattr__(self, "value", frozen(value))
 
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """What one usage and one value are in the numbers that the filters see: about 1 over all that was read."""
+    """What one usage and one value are in the numbers that the filters see: about 1 over all that
+    was read.
+    """
 
     usage: float
     value: float
@@ -72,9 +86,11 @@ class Scale:
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """Readings of many units side by side, arrays of shape (steps, units): in each step a unit is read once at most.
+    """Readings of many units side by side, arrays of shape (steps, units): in each step a unit is
+    read once at most.
 
-    ``begins`` marks the first step of a path, ``seen`` a reading; ``known_r2`` is NaN where it is to be estimated.
+    ``begins`` marks the first step of a path, ``seen`` a reading; ``known_r2`` is NaN where it is
+    to be estimated.
     """
 
     begins: Mask
@@ -96,7 +112,9 @@ def grid_step(values: Array) -> float:
 
 
 def scale_of(paths: Sequence[WearPath]) -> Scale:
-    """Find the scales of usage and value, the common start, and which way the wear goes (the sign of the value)."""
+    """Find the scales of usage and value, the common start, and which way the wear goes (the sign
+    of the value).
+    """
     usages = [np.asarray(path.usage) for path in paths]
     values = [np.asarray(path.value) for path in paths]
     everything = np.concatenate([*values, np.empty(0)])
@@ -108,7 +126,10 @@ def scale_of(paths: Sequence[WearPath]) -> Scale:
     if not rise:
         rise = float(np.std(everything)) if len(everything) > 1 else 0.0
     known = [path.reading_u for path in paths if path.reading_u]
-    least = max(2.0 * float(np.median(known)) if known else 0.0, 1e-3 * float(np.ptp(everything)) if pairs else 0.0)
+    least = max(
+        2.0 * float(np.median(known)) if known else 0.0,
+        1e-3 * float(np.ptp(everything)) if pairs else 0.0,
+    )
     size = max(abs(rise), least) or max(abs(start), 1.0)
     # Wear grows unless most parts say otherwise.
     falls = len(rates) > 0 and float(np.mean(rates < 0.0)) >= _FALLING
@@ -116,7 +137,9 @@ def scale_of(paths: Sequence[WearPath]) -> Scale:
 
 
 def lay_out(groups: Sequence[Sequence[WearPath]], scale: Scale) -> Steps:
-    """Lay the paths of each unit behind each other; shorter units are padded in front, so that all end together."""
+    """Lay the paths of each unit behind each other; shorter units are padded in front, so that all
+    end together.
+    """
     lengths = [sum(max(len(np.asarray(path.usage)), 1) for path in group) for group in groups]
     shape = (max(lengths, default=0), len(groups))
     begins, seen = np.zeros(shape, bool), np.zeros(shape, bool)
@@ -124,7 +147,10 @@ def lay_out(groups: Sequence[Sequence[WearPath]], scale: Scale) -> Steps:
     for column, (group, length) in enumerate(zip(groups, lengths, strict=True)):
         row = shape[0] - length
         for path in group:
-            at, read = np.asarray(path.usage) / scale.usage, (np.asarray(path.value) - scale.start) / scale.value
+            at, read = (
+                np.asarray(path.usage) / scale.usage,
+                (np.asarray(path.value) - scale.start) / scale.value,
+            )
             rows = slice(row, row + max(len(at), 1))
             begins[row, column] = True
             if len(at):

@@ -1,8 +1,9 @@
 """Posterior draws of the wear model, over its kinds in the measure of their evidence.
 
-For each kind the mode of the posterior is found, and the posterior is sampled from a Student distribution about it
-with importance weights, whose mean is the evidence. The draws of all kinds are then resampled together: Bayesian model
-averaging. Plugged-in estimates would make forecasts of few units far too sure.
+For each kind the mode of the posterior is found, and the posterior is sampled from a Student
+distribution about it with importance weights, whose mean is the evidence. The draws of all kinds
+are then resampled together: Bayesian model averaging. Plugged-in estimates would make forecasts of
+few units far too sure.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.wear.filtering import Draws, follow
 from mlg_troubleshoot.wear.paths import Scale, Steps
 
-# Mean and standard deviation of the normal prior of each parameter, logarithms where it is a scale, in units of the
-# whole usage and the whole rise that was read: weak on purpose, and the same for all kinds so that evidence compares.
+# Mean and standard deviation of the normal prior of each parameter, logarithms where it is a scale,
+# in units of the whole usage and the whole rise that was read: weak on purpose, and the same for
+# all kinds so that evidence compares.
 _PRIOR = {
     "start": (0.0, 2.0),
     "start_sd": (np.log(0.1), 1.5),
@@ -88,13 +90,17 @@ def _log_posterior(member: Member, steps: Steps, resolution: float) -> Callable[
             for i in range(0, len(theta), size)
         ]
         prior = -0.5 * ((theta - mean) / sd) ** 2 - np.log(sd) - 0.5 * np.log(2.0 * np.pi)
-        return np.asarray(np.nan_to_num(np.concatenate(likely), nan=-1e12, neginf=-1e12) + prior.sum(axis=1))
+        return np.asarray(
+            np.nan_to_num(np.concatenate(likely), nan=-1e12, neginf=-1e12) + prior.sum(axis=1)
+        )
 
     return value
 
 
 def _mode(value: Callable[[Array], Array], start: Array) -> tuple[Array, Array]:
-    """Find the mode and the curvature there; differences of both sides are computed in one batch."""
+    """Find the mode and the curvature there; differences of both sides are computed in one
+    batch.
+    """
     n = len(start)
     step = 1e-4 * np.eye(n)
 
@@ -102,10 +108,18 @@ def _mode(value: Callable[[Array], Array], start: Array) -> tuple[Array, Array]:
         found = value(np.vstack([theta, theta + step, theta - step]))
         return -float(found[0]), -(found[1 : n + 1] - found[n + 1 :]) / 2e-4
 
-    mode = np.asarray(minimize(descent, start, jac=True, method="L-BFGS-B", options={"maxiter": 80}).x)
+    mode = np.asarray(
+        minimize(descent, start, jac=True, method="L-BFGS-B", options={"maxiter": 80}).x
+    )
     h = 0.02
     offsets = h * np.eye(n)
-    pairs = [a * offsets[i] + b * offsets[j] for i in range(n) for j in range(n) for a in (1, -1) for b in (1, -1)]
+    pairs = [
+        a * offsets[i] + b * offsets[j]
+        for i in range(n)
+        for j in range(n)
+        for a in (1, -1)
+        for b in (1, -1)
+    ]
     found = value(mode + np.array(pairs)).reshape(n, n, 4)
     hessian = -(found[..., 0] - found[..., 1] - found[..., 2] + found[..., 3]) / (4.0 * h * h)
     return mode, hessian
@@ -122,19 +136,29 @@ def _student(centre: Array, root: Array, n: int, rng: np.random.Generator) -> tu
 def _student_density(theta: Array, centre: Array, root: Array) -> Array:
     p = len(centre)
     off = np.linalg.solve(root, (theta - centre).T)
-    constant = gammaln((_FREEDOM + p) / 2.0) - gammaln(_FREEDOM / 2.0) - 0.5 * p * np.log(_FREEDOM * np.pi)
+    constant = (
+        gammaln((_FREEDOM + p) / 2.0) - gammaln(_FREEDOM / 2.0) - 0.5 * p * np.log(_FREEDOM * np.pi)
+    )
     log_det = np.log(np.abs(np.diag(root))).sum()
-    return np.asarray(constant - log_det - 0.5 * (_FREEDOM + p) * np.log1p((off**2).sum(axis=0) / _FREEDOM))
+    return np.asarray(
+        constant - log_det - 0.5 * (_FREEDOM + p) * np.log1p((off**2).sum(axis=0) / _FREEDOM)
+    )
 
 
-def _sample(member: Member, value: Callable[[Array], Array], rng: np.random.Generator) -> tuple[Array, Array]:
-    """Sample one kind's posterior; return the draws and their log weights, the mean of which is the evidence."""
+def _sample(
+    member: Member, value: Callable[[Array], Array], rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Sample one kind's posterior; return the draws and their log weights, the mean of which is the
+    evidence.
+    """
     mean, sd = np.array([_PRIOR[name] for name in member.names]).T
     mode, hessian = _mode(value, mean)
     # No direction is taken for wider than its prior, nor for exactly known.
     per_prior = np.outer(sd, sd)
     size, vectors = np.linalg.eigh(per_prior * (hessian + hessian.T) / 2.0)
-    root = np.asarray(np.linalg.cholesky(per_prior * ((vectors / np.clip(size, 0.5, 1e8)) @ vectors.T)), float)
+    root = np.asarray(
+        np.linalg.cholesky(per_prior * ((vectors / np.clip(size, 0.5, 1e8)) @ vectors.T)), float
+    )
     theta, density = _student(mode, root, _SAMPLES, rng)
     first = value(theta)
     weight = first - density
@@ -145,7 +169,9 @@ def _sample(member: Member, value: Callable[[Array], Array], rng: np.random.Gene
     second = np.asarray(np.linalg.cholesky(0.9 * spread + 0.1 * root @ root.T), float)
     again, _density = _student(centre, second, _SAMPLES, rng)
     both = np.vstack([theta, again])
-    mixture = np.logaddexp(_student_density(both, mode, root), _student_density(both, centre, second)) - np.log(2.0)
+    mixture = np.logaddexp(
+        _student_density(both, mode, root), _student_density(both, centre, second)
+    ) - np.log(2.0)
     return both, np.concatenate([first, value(again)]) - mixture
 
 
@@ -158,11 +184,16 @@ def posterior(
     weights = np.concatenate([weight for _theta, weight in found])
     share = np.exp(weights - logsumexp(weights))
     owner = np.repeat(np.arange(len(kinds)), [len(weight) for _theta, weight in found])
-    chosen = np.searchsorted(np.cumsum(share), (np.arange(count) + rng.uniform()) / count).clip(max=len(share) - 1)
+    chosen = np.searchsorted(np.cumsum(share), (np.arange(count) + rng.uniform()) / count).clip(
+        max=len(share) - 1
+    )
     first = np.cumsum([0, *(len(weight) for _theta, weight in found)])
     parts = [
-        member.draws(found[k][0][chosen[owner[chosen] == k] - first[k]], resolution) for k, member in enumerate(kinds)
+        member.draws(found[k][0][chosen[owner[chosen] == k] - first[k]], resolution)
+        for k, member in enumerate(kinds)
     ]
-    draws = Draws(*(np.concatenate([getattr(p, name) for p in parts]) for name in Draws.__dataclass_fields__))
+    draws = Draws(
+        *(np.concatenate([getattr(p, name) for p in parts]) for name in Draws.__dataclass_fields__)
+    )
     names = [f"{member.kind}{' power' if 'power' in member.names else ''}" for member in kinds]
     return draws, {name: float(share[owner == k].sum()) for k, name in enumerate(names)}

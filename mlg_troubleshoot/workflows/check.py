@@ -34,7 +34,8 @@ ALL_JUDGED, NOT_ALL_WITHIN, NOTHING_JUDGED = 0, 1, 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckOptions(TableOptions):
-    """What the user asks of a check, in addition to what :class:`TableOptions` declare about its tables.
+    """What the user asks of a check, in addition to what :class:`TableOptions` declare about its
+    tables.
 
     Parameters
     ----------
@@ -43,7 +44,8 @@ class CheckOptions(TableOptions):
     remembered : str or None
         What was remembered, in words for the report.
     advice : bool or None
-        Compute what is looked at for one gear: Monte Carlo, re-rigging, worn joints; None does so for a single one.
+        Compute what is looked at for one gear: Monte Carlo, re-rigging, worn joints; None does so
+        for a single one.
     seed : int
         Seed of the Monte Carlo draws.
     extension : Extension or None
@@ -128,7 +130,12 @@ def check_files(
 
     gear = load_gear(options.gear)
     read = read_many(sources, ReadOptions.of(gear, options), progress=on_read)
-    told = {"problems": read.problems, "notes": read.notes, "inputs_sha256": read.inputs_sha256, "read": read}
+    told = {
+        "problems": read.problems,
+        "notes": read.notes,
+        "inputs_sha256": read.inputs_sha256,
+        "read": read,
+    }
     return _judge(gear, read.rows, options, on_judged, **told)
 
 
@@ -148,12 +155,14 @@ def check(
     Parameters
     ----------
     inspection : Inspection
-        What was measured. It is judged as a row of a table is: without `entered` its clearances and their
-        uncertainties are readings in its convention; with `entered` they were read before and are radial. [in]
+        What was measured. It is judged as a row of a table is: without `entered` its clearances and
+        their uncertainties are readings in its convention; with `entered` they were read before and
+        are radial. [in]
     gear : Gear, str or Path
         The gear, its shipped name, or a gear file.
     advice : bool
-        Check the probability by Monte Carlo, find worn joints, and say what further measuring and re-rigging are worth.
+        Check the probability by Monte Carlo, find worn joints, and say what further measuring and
+        re-rigging are worth.
     extension : Extension, optional
         An extension of the model.
 
@@ -177,21 +186,24 @@ def check(
     return judged
 
 
-def predict(clearance_in: Mapping[int, float] | ArrayLike, gear: Gear | str | Path = DEFAULT_GEAR) -> WorstCase:
+def predict(
+    clearance_in: Mapping[int, float] | ArrayLike, gear: Gear | str | Path = DEFAULT_GEAR
+) -> WorstCase:
     """Predict the plunger displacement in the worst directions, from Python.
 
     Parameters
     ----------
     clearance_in : mapping of int to float, or array_like of shape (n_joints,) or (n, n_joints)
-        Radial clearances: of one gear by joint number, joints that are not named being tight, or of n gears in
-        the order of the joints. [in]
+        Radial clearances: of one gear by joint number, joints that are not named being tight, or of
+        n gears in the order of the joints. [in]
     gear : Gear, str or Path
         The gear, its shipped name, or a gear file.
 
     Returns
     -------
     WorstCase
-        Over-travel, under-travel, the larger of the two and the directions, one row per gear. [in, rad]
+        Over-travel, under-travel, the larger of the two and the directions, one row per gear. [in,
+        rad]
 
     Raises
     ------
@@ -204,16 +216,20 @@ def predict(clearance_in: Mapping[int, float] | ArrayLike, gear: Gear | str | Pa
         unknown = sorted(set(clearance_in) - set(numbers))
         if unknown:
             raise UsageError(
-                f"{known.name} has no joint {unknown[0]}", f"Its joints are {', '.join(map(str, numbers))}."
+                f"{known.name} has no joint {unknown[0]}",
+                f"Its joints are {', '.join(map(str, numbers))}.",
             )
         clearance_in = [clearance_in.get(number, 0.0) for number in numbers]
     rows = np.atleast_2d(np.asarray(clearance_in, float))
     if rows.ndim != 2 or rows.shape[1] != len(numbers):
         raise UsageError(
-            f"clearances of shape {rows.shape} do not fit {len(numbers)} joints", "Give one column per joint."
+            f"clearances of shape {rows.shape} do not fit {len(numbers)} joints",
+            "Give one column per joint.",
         )
     if not np.all(rows >= 0.0):
-        raise UsageError(f"{rows[~(rows >= 0.0)][0]:g} in is not a valid clearance", "Give zero or more.")
+        raise UsageError(
+            f"{rows[~(rows >= 0.0)][0]:g} in is not a valid clearance", "Give zero or more."
+        )
     return worst_case(known.model, rows)
 
 
@@ -289,21 +305,36 @@ def write_reports(
         If the folder cannot be written to.
     """
     if directory.exists() and not directory.is_dir():
-        raise OutputError(f"{directory} is a file, not a folder", "Give a folder that you may write to.")
-    from mlg_troubleshoot.reporting import batch_document, inspection_document, provenance_of, publish, publish_all
+        raise OutputError(
+            f"{directory} is a file, not a folder", "Give a folder that you may write to."
+        )
+    from mlg_troubleshoot.reporting import (
+        batch_document,
+        inspection_document,
+        provenance_of,
+        publish,
+        publish_all,
+    )
 
     gear, judgements, problems = result.gear, result.judgements, result.problems
     extension = None if options.extension is None else options.extension.describe()
-    made = provenance_of(gear, result.inputs_sha256, extension=extension, remembered=options.remembered)
+    made = provenance_of(
+        gear, result.inputs_sha256, extension=extension, remembered=options.remembered
+    )
     documents = (
         inspection_document(j, gear, made, problems, unit, steps)
         for j, steps in zip(judgements, before or [()] * len(judgements), strict=True)
     )
-    reports = publish_all(documents, len(judgements), directory, formats=formats, page=page, progress=on_written)
+    reports = publish_all(
+        documents, len(judgements), directory, formats=formats, page=page, progress=on_written
+    )
     if len(reports) == 1:
         return tuple(reports)
     names = ((report.html, report.pdf) for report in reports)
-    links = {place: (html.name if html else "", pdf.name if pdf else "") for place, (html, pdf) in enumerate(names)}
+    links = {
+        place: (html.name if html else "", pdf.name if pdf else "")
+        for place, (html, pdf) in enumerate(names)
+    }
     summary = batch_document(judgements, problems, gear, made, result.notes, links, unit)
     return (publish(summary, directory, formats=formats, page=page), *reports)
 
@@ -311,7 +342,9 @@ def write_reports(
 def write_template(
     file: Path, gear: str = DEFAULT_GEAR, *, page: str = "A4", unit: LengthUnit = LengthUnit.INCH
 ) -> None:
-    """Write an empty inspection workbook or, where the name ends in .pdf or .html, a form to fill in by hand."""
+    """Write an empty inspection workbook or, where the name ends in .pdf or .html, a form to fill
+    in by hand.
+    """
     loaded = load_gear(gear)
     if file.suffix.lower() != ".xlsx":
         from mlg_troubleshoot.reporting.form import write_form
@@ -323,9 +356,16 @@ def write_template(
     write(file, loaded, unit=unit)
 
 
-# Columns of the verdicts that bear the names of what an assessment holds; margin_used_in is its margin.
+# Columns of the verdicts that bear the names of what an assessment holds; margin_used_in is its
+# margin.
 _NUMBERS = (
-    *("predicted_displacement_in", "over_travel_in", "under_travel_in", "margin_used_in", "remaining_in"),
+    *(
+        "predicted_displacement_in",
+        "over_travel_in",
+        "under_travel_in",
+        "margin_used_in",
+        "remaining_in",
+    ),
     *("probability_within_margin", "probability_exceed_random_directions"),
 )
 _VERDICT_HEADER = (
@@ -341,8 +381,13 @@ def _verdict_columns(judgement: Judgement) -> dict[str, str | float | None]:
     return {
         "verdict": str(judgement.verdict),
         "basis": None if a is None else str(a.basis),
-        **{name: getattr(a, "margin_in" if name == "margin_used_in" else name, None) for name in _NUMBERS},
-        "joints_over_limit": None if a is None else ", ".join(f"#{f.joint}" for f in a.joints if f.over_limit),
+        **{
+            name: getattr(a, "margin_in" if name == "margin_used_in" else name, None)
+            for name in _NUMBERS
+        },
+        "joints_over_limit": (
+            None if a is None else ", ".join(f"#{f.joint}" for f in a.joints if f.over_limit)
+        ),
         "next_action": judgement.next_action.text,
         "end": str(judgement.end),
     }

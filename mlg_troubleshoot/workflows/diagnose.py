@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DiagnoseOptions(TableOptions):
-    """What the user asks of a diagnosis, in addition to what :class:`TableOptions` declare about its tables.
+    """What the user asks of a diagnosis, in addition to what :class:`TableOptions` declare about
+    its tables.
 
     Parameters
     ----------
@@ -66,7 +67,9 @@ _ANY_LENGTH_IN = 10.0
 
 
 def diagnose_files(
-    sources: Sequence[Path | BinaryIO], options: DiagnoseOptions, progress: Callable[[float], None] | None = None
+    sources: Sequence[Path | BinaryIO],
+    options: DiagnoseOptions,
+    progress: Callable[[float], None] | None = None,
 ) -> DiagnoseResult:
     """Compare the measured displacements of tables with the model's predictions.
 
@@ -89,21 +92,35 @@ def diagnose_files(
     InconclusiveDataError
         If the tables cannot answer the question.
     """
-    from mlg_troubleshoot.diagnosis import ModelExtension, diagnose, load_causes, table_from_inspections
+    from mlg_troubleshoot.diagnosis import (
+        ModelExtension,
+        diagnose,
+        load_causes,
+        table_from_inspections,
+    )
     from mlg_troubleshoot.records import ReadOptions, read_many
 
     gear = load_gear(options.gear)
     own = tuple(cause for file in options.cause_files for cause in load_causes(file))
     reading = replace(
-        ReadOptions.of(gear, options), clearance_hard_max_in=_ANY_LENGTH_IN, plunger_hard_max_in=_ANY_LENGTH_IN
+        ReadOptions.of(gear, options),
+        clearance_hard_max_in=_ANY_LENGTH_IN,
+        plunger_hard_max_in=_ANY_LENGTH_IN,
     )
     read = read_many(sources, reading)
     valid = read.inspections
     if not valid:
         first = read.problems[0] if read.problems else None
-        why = "no row could be read" if first is None else f"{first.place()}: expected {first.expected}"
-        raise InconclusiveDataError(f"nothing to diagnose: {why}", "" if first is None else first.remedy)
-    # The same inspection again is not further evidence. Rows that share an id and differ were refused.
+        why = (
+            "no row could be read"
+            if first is None
+            else f"{first.place()}: expected {first.expected}"
+        )
+        raise InconclusiveDataError(
+            f"nothing to diagnose: {why}", "" if first is None else first.remedy
+        )
+    # The same inspection again is not further evidence. Rows that share an id and differ were
+    # refused.
     once = list({(i.source.file, i.record_id): i for i in reversed(valid)}.values())[::-1]
     notes = (*read.notes, *_evidence_notes(once, len(valid) - len(once), gear))
     diagnosis = diagnose(
@@ -140,15 +157,21 @@ def diagnose_files(
 
 
 def _as_written(fault: DataFault, inspection: Inspection) -> DataFault:
-    """A fault in a clearance with the unit and the convention in which it was entered, not as the model has it."""
+    """A fault in a clearance with the unit and the convention in which it was entered, not as the
+    model has it.
+    """
     kind, _, rest = fault.column.partition("_")
     joint = int(rest.split("_")[0]) if kind == "clearance" else 0
     entered = inspection.entered.get(joint)
-    if entered is None or (entered.unit is LengthUnit.INCH and inspection.convention is ClearanceConvention.RADIAL):
+    if entered is None or (
+        entered.unit is LengthUnit.INCH and inspection.convention is ClearanceConvention.RADIAL
+    ):
         return fault
     suggested = fault.suggested
     if suggested is not None:
-        suggested = f"{entered.unit.from_inches(float(suggested) * inspection.convention.per_radial):.4g}"
+        suggested = (
+            f"{entered.unit.from_inches(float(suggested) * inspection.convention.per_radial):.4g}"
+        )
     column = f"clearance_{joint}_{entered.unit.value}"
     return replace(fault, column=column, value=entered.text, suggested=suggested)
 
@@ -157,26 +180,44 @@ def _evidence_notes(inspections: Sequence[Inspection], again: int, gear: Gear) -
     """What a diagnosis cannot use: inspections that stand twice, joints that nobody measured."""
     if again:
         yield f"duplicate inspections count once: rows left out: {again}"
-    unread = [n for n in gear.model.joint_numbers if all(i.clearance_in.get(n) is None for i in inspections)]
+    unread = [
+        n
+        for n in gear.model.joint_numbers
+        if all(i.clearance_in.get(n) is None for i in inspections)
+    ]
     if len(unread) == len(gear.joint_numbers):
         yield "no clearance was read in any row: what wear adds is left open"
     elif unread:
         listed = ", ".join(f"#{n}" for n in unread)
-        yield f"not measured in any row: {listed}; counted as worn like the others of their gear, and not testable"
+        yield (
+            f"not measured in any row: {listed}; counted as worn like the others of their gear, and"
+            " not testable"
+        )
 
 
 def write_diagnosis_report(
-    result: DiagnoseResult, options: DiagnoseOptions, directory: Path, page: str, *, unit: LengthUnit = LengthUnit.INCH
+    result: DiagnoseResult,
+    options: DiagnoseOptions,
+    directory: Path,
+    page: str,
+    *,
+    unit: LengthUnit = LengthUnit.INCH,
 ) -> WrittenReport:
     from mlg_troubleshoot.reporting import provenance_of, publish
     from mlg_troubleshoot.reporting.diagnosis_report import diagnosis_document
 
-    made = provenance_of(result.gear, result.inputs_sha256, seed=options.seed, remembered=options.remembered)
+    made = provenance_of(
+        result.gear, result.inputs_sha256, seed=options.seed, remembered=options.remembered
+    )
     told = (result.extension, unit, result.problems, result.notes)
-    return publish(diagnosis_document(result.diagnosis, result.gear, made, *told), directory, page=page)
+    return publish(
+        diagnosis_document(result.diagnosis, result.gear, made, *told), directory, page=page
+    )
 
 
-def load_model_extension(files: Sequence[Path], gear: str, cause_files: Sequence[Path] = ()) -> ModelExtension | None:
+def load_model_extension(
+    files: Sequence[Path], gear: str, cause_files: Sequence[Path] = ()
+) -> ModelExtension | None:
     """Load the extensions that a check shall predict with.
 
     Parameters

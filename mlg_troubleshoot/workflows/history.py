@@ -59,19 +59,22 @@ _ASKED = _AHEAD[[0, 8, 14, 18, 22, 25, 28]]
 _GEARS_AT_ONCE = 100
 # Stands for the worst case of a linkage that does not close: beyond any margin. [in]
 _NOT_CLOSING_IN = 1e3
-# A drop of this many forecast standard deviations is not wear: a restoration that nobody recorded. [1]
+# A drop of this many forecast standard deviations is not wear: a restoration that nobody recorded.
+# [1]
 _DROP = 4.0
-# Two gears that both fit their own wear as badly as this share of sound ones, and each other's better by this much of
-# the log likelihood, were exchanged. [1]
+# Two gears that both fit their own wear as badly as this share of sound ones, and each other's
+# better by this much of the log likelihood, were exchanged. [1]
 _POOR, _EXCHANGED = 0.02, 8.0
-# An inspection that fits another gear's wear as badly as this was not taken there: without it a restored gear passed
-# for exchanged in 3 of 20 fleets of 100. [1]
+# An inspection that fits another gear's wear as badly as this was not taken there: without it a
+# restored gear passed for exchanged in 3 of 20 fleets of 100. [1]
 _NO_FIT = 0.001
 
 
 @dataclass(frozen=True)
 class Seen:
-    """An inspection as it stands after corrections, with the last assessment of it; unpacked when it is asked for."""
+    """An inspection as it stands after corrections, with the last assessment of it; unpacked when
+    it is asked for.
+    """
 
     record: Record
     assessed: Record | None = None
@@ -88,9 +91,11 @@ class Seen:
 
 @dataclass(frozen=True)
 class GearLife:
-    """What stands of one gear: inspections and repairs in the order of time, outcomes, and every record as it came.
+    """What stands of one gear: inspections and repairs in the order of time, outcomes, and every
+    record as it came.
 
-    warnings: the records whose dates and landings disagree, and how to correct them; with any there is no forecast.
+    warnings: the records whose dates and landings disagree, and how to correct them; with any there
+    is no forecast.
     """
 
     key: GearKey
@@ -114,7 +119,8 @@ class GearLife:
 
 @dataclass(frozen=True, slots=True)
 class Forecast:
-    """Landings that remain from a gear's last inspection, of the joints ever read; infinite beyond the horizon.
+    """Landings that remain from a gear's last inspection, of the joints ever read; infinite beyond
+    the horizon.
 
     limit_joint: the joint that most often is the first at its limit.
     due_now: why nothing remains, in words; empty where something may.
@@ -167,15 +173,22 @@ class Kept(Added):
 
 
 def keep(
-    result: CheckResult, options: CheckOptions, store: Store, same_tail: Callable[[str, str], bool] | None = None
+    result: CheckResult,
+    options: CheckOptions,
+    store: Store,
+    same_tail: Callable[[str, str], bool] | None = None,
 ) -> Kept:
     """Add the judged inspections of a check and their assessments, all or none.
 
-    ``same_tail`` answers whether two spellings of a tail number mean one aircraft; without it they are refused.
+    ``same_tail`` answers whether two spellings of a tail number mean one aircraft; without it they
+    are refused.
     """
     judged = [j for j in result.judgements if isinstance(j, Assessment)]
     tails = _settled_tails(judged, store, same_tail)
-    written = [replace(j.inspection, tail_no=tails.get(j.inspection.tail_no, j.inspection.tail_no)) for j in judged]
+    written = [
+        replace(j.inspection, tail_no=tails.get(j.inspection.tail_no, j.inspection.tail_no))
+        for j in judged
+    ]
     found = [inspection_record(inspection) for inspection in _under_first_ids(written, store)]
     known = store.known([record.identity_hash for record in found])
     records: list[Record] = []
@@ -183,12 +196,18 @@ def keep(
         # Wherever an inspection was entered again, it is the first entry that was assessed.
         first = known.setdefault(record.identity_hash, record)
         records += [record, _assessment(result.gear, options, assessment, record, first)]
-    added = store.add(records, lambda kept, new: new.kind is not Kind.INSPECTION or _agrees(store, kept, new))
-    return Kept(added.new, added.known, tuple(warnings_of(store, {(r.tail_no, r.side) for r in records})))
+    added = store.add(
+        records, lambda kept, new: new.kind is not Kind.INSPECTION or _agrees(store, kept, new)
+    )
+    return Kept(
+        added.new, added.known, tuple(warnings_of(store, {(r.tail_no, r.side) for r in records}))
+    )
 
 
 def _under_first_ids(inspections: Sequence[Inspection], store: Store) -> list[Inspection]:
-    """The same row of a renamed file has another made id: it is the inspection that was kept first."""
+    """The same row of a renamed file has another made id: it is the inspection that was kept
+    first.
+    """
     gears: set[GearKey] = set()
     first: dict[tuple[str, ...], Record] = {}
 
@@ -212,28 +231,44 @@ def _under_first_ids(inspections: Sequence[Inspection], store: Store) -> list[In
 def _agrees(store: Store, kept: Record, new: Record) -> bool:
     """The same as kept, or as what the kept one was corrected to."""
     return same_inspection(kept, new) or any(
-        record.kind is Kind.CORRECTION and record.body["supersedes"] == kept.digest and same_inspection(record, new)
+        record.kind is Kind.CORRECTION
+        and record.body["supersedes"] == kept.digest
+        and same_inspection(record, new)
         for record in store.of_gear(kept.tail_no, kept.side)
     )
 
 
 def _assessment(
-    gear: Gear, options: CheckOptions, assessment: Assessment, of: Record, first: Record | None = None
+    gear: Gear,
+    options: CheckOptions,
+    assessment: Assessment,
+    of: Record,
+    first: Record | None = None,
 ) -> Record:
     from mlg_troubleshoot.reporting.json_form import kept_as_json
     from mlg_troubleshoot.reporting.provenance import program_version
 
     extension = None if options.extension is None else options.extension.describe()
-    by = {"program_version": program_version(), "geometry_sha256": gear.geometry_sha256, "extension": extension}
+    by = {
+        "program_version": program_version(),
+        "geometry_sha256": gear.geometry_sha256,
+        "extension": extension,
+    }
     body = packed({**by, "result": kept_as_json(assessment)})
-    identity = (of.identity_hash.hex(), *(str(value) for value in by.values()), (first or of).packed.hex())
+    identity = (
+        of.identity_hash.hex(),
+        *(str(value) for value in by.values()),
+        (first or of).packed.hex(),
+    )
     return replace(of, kind=Kind.ASSESSMENT, packed=body, identity=identity)
 
 
 def _settled_tails(
     judged: Sequence[Assessment], store: Store, same_tail: Callable[[str, str], bool] | None
 ) -> dict[str, str]:
-    """Spellings that differ only in case, blanks or dashes: never one aircraft without being asked."""
+    """Spellings that differ only in case, blanks or dashes: never one aircraft without being
+    asked.
+    """
     known = dict.fromkeys(tail for tail, _side in store.gears())
     by_key: dict[str, str] = {}
     for tail in known:
@@ -245,7 +280,8 @@ def _settled_tails(
             continue
         if same_tail is None:
             raise StoreError(
-                f"tail {tail!r} differs from {other!r} only in case, blanks or dashes; nothing was kept",
+                f"tail {tail!r} differs from {other!r} only in case, blanks or dashes; nothing was"
+                " kept",
                 "Correct it, or say --tails same (one aircraft) or --tails apart (two).",
             )
         if same_tail(tail, other):
@@ -257,7 +293,9 @@ def _tail_key(tail: str) -> str:
     return re.sub(r"[\s_‐-―−-]+", "", tail).casefold()
 
 
-def lives(store: Store, tail: str | None = None, side: str | None = None) -> dict[GearKey, GearLife]:
+def lives(
+    store: Store, tail: str | None = None, side: str | None = None
+) -> dict[GearKey, GearLife]:
     """Every gear's life, or those of one aircraft."""
     found: dict[GearKey, list[Record]] = {}
     for record in store.all() if tail is None else store.of_gear(tail, side):
@@ -289,7 +327,10 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
         if record.kind is Kind.INSPECTION:
             seen[record.digest] = Seen(record)
         elif record.kind is Kind.CORRECTION:
-            first = next((k for k, s in seen.items() if record.body["supersedes"] in (k, s.record.digest)), None)
+            first = next(
+                (k for k, s in seen.items() if record.body["supersedes"] in (k, s.record.digest)),
+                None,
+            )
             if first is not None:
                 seen[first] = Seen(record)
         elif record.kind is Kind.VOID:
@@ -297,7 +338,11 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
             seen = {k: s for k, s in seen.items() if gone not in (k, s.record.digest)}
             events.pop(gone, None)
         elif record.kind is Kind.ASSESSMENT:
-            same = [k for k, s in seen.items() if (s.record.record_id, s.record.day) == (record.record_id, record.day)]
+            same = [
+                k
+                for k, s in seen.items()
+                if (s.record.record_id, s.record.day) == (record.record_id, record.day)
+            ]
             if same:
                 seen[same[-1]] = replace(seen[same[-1]], assessed=record)
         else:
@@ -345,7 +390,9 @@ def _moment(event: Seen | Record) -> Moment:
     return Moment(event.day, event.body.get("landings"))
 
 
-def _disagreements(key: GearKey, counted: Sequence[Seen | Record], moments: Sequence[Moment]) -> tuple[str, ...]:
+def _disagreements(
+    key: GearKey, counted: Sequence[Seen | Record], moments: Sequence[Moment]
+) -> tuple[str, ...]:
     """Name the records whose dates and landings disagree, each with how to correct it."""
 
     def name(place: int) -> str:
@@ -361,7 +408,11 @@ def _disagreements(key: GearKey, counted: Sequence[Seen | Record], moments: Sequ
         record = _record_of(counted[places[0]]).digest[:10] if len(places) == 1 else "RECORD"
         voids = f"mlg history void {record} --why TEXT"
         repaired = any(isinstance(counted[place], Record) for place in places)
-        corrects = f"{voids}, then mlg history repair" if repaired else f"mlg history correct {record} FILE, or {voids}"
+        corrects = (
+            f"{voids}, then mlg history repair"
+            if repaired
+            else f"mlg history correct {record} FILE, or {voids}"
+        )
         warnings.append(f"{' '.join(key)}: {said}. No forecast until this is corrected: {corrects}")
     return tuple(warnings)
 
@@ -376,20 +427,36 @@ def warnings_of(store: Store, keys: Collection[GearKey]) -> list[str]:
 
 
 def find(store: Store, record_id: str) -> Record:
-    """Find the record that a command names: by its id, or by the first letters of its hash where an id is not one."""
+    """Find the record that a command names: by its id, or by the first letters of its hash where an
+    id is not one.
+    """
     live = [
         record
         for life in lives(store).values()
         for record in (*(s.record for s in life.inspections), *life.repairs, *life.outcomes)
     ]
-    found = [r for r in live if r.record_id == record_id and r.kind in (Kind.INSPECTION, Kind.CORRECTION)]
-    found = found or [r for r in live if len(record_id) >= _LEAST_OF_A_HASH and r.digest.startswith(record_id.lower())]
+    found = [
+        r for r in live if r.record_id == record_id and r.kind in (Kind.INSPECTION, Kind.CORRECTION)
+    ]
+    found = found or [
+        r
+        for r in live
+        if len(record_id) >= _LEAST_OF_A_HASH and r.digest.startswith(record_id.lower())
+    ]
     if len(found) == 1:
         return found[0]
     if not found:
-        raise UsageError(f"no record {record_id!r} stands in {store.place}", "See the records: mlg history TAIL SIDE")
-    named = ", ".join(f"{r.digest[:10]} ({r.tail_no} {r.side} {r.day or 'no date'})" for r in found[:6])
-    raise UsageError(f"{len(found)} records are called {record_id!r}: {named}", "Name one by the start of its hash.")
+        raise UsageError(
+            f"no record {record_id!r} stands in {store.place}",
+            "See the records: mlg history TAIL SIDE",
+        )
+    named = ", ".join(
+        f"{r.digest[:10]} ({r.tail_no} {r.side} {r.day or 'no date'})" for r in found[:6]
+    )
+    raise UsageError(
+        f"{len(found)} records are called {record_id!r}: {named}",
+        "Name one by the start of its hash.",
+    )
 
 
 def key_of(tail: str, side: str) -> GearKey:
@@ -407,15 +474,23 @@ def work(
     landings: float | str | None = None,
     joints: Sequence[int] | None = None,
 ) -> Record:
-    """Record that joints were restored, or the reversing valve re-rigged: the joints wear on, the plunger moved."""
+    """Record that joints were restored, or the reversing valve re-rigged: the joints wear on, the
+    plunger moved.
+    """
     key = key_of(*gear)
     said = {"inspection_date": day, "gear_landings": landings, "work_order": work_order}
-    flags = {"inspection_date": "--date", "gear_landings": "--landings", "work_order": "--work-order"}
+    flags = {
+        "inspection_date": "--date",
+        "gear_landings": "--landings",
+        "work_order": "--work-order",
+    }
     labels = {column: f"{flags[column]} {str(value)!r}" for column, value in said.items()}
     found = admit({**_ANY, **said}, ReadOptions(), labels)
     done = found.inspection_date
     if done is None:
-        raise UsageError(f"{labels['inspection_date']} says no day", "Give the day on which it was done.")
+        raise UsageError(
+            f"{labels['inspection_date']} says no day", "Give the day on which it was done."
+        )
     life_of(store, *key)
     body: dict[str, Any] = {"landings": found.gear_landings, "work_order": work_order}
     if joints is not None:
@@ -433,13 +508,15 @@ def correct(store: Store, record_id: str, result: CheckResult, options: CheckOpt
     judged = [j for j in result.judgements if isinstance(j, Assessment)]
     if len(judged) != 1 or len(result.judgements) != 1:
         raise UsageError(
-            f"a correction is one inspection, and the file holds {len(result.judgements)} ({len(judged)} sound)",
+            f"a correction is one inspection, and the file holds {len(result.judgements)}"
+            f" ({len(judged)} sound)",
             "Give a file with the one right row.",
         )
     right = judged[0].inspection
     if (right.tail_no, right.side.value) != (wrong.tail_no, wrong.side):
         raise UsageError(
-            f"the correction is of {right.tail_no} {right.side}, the record of {wrong.tail_no} {wrong.side}",
+            f"the correction is of {right.tail_no} {right.side}, the record of {wrong.tail_no}"
+            f" {wrong.side}",
             "Void the record (mlg history void) and keep the right one: mlg check FILE --keep",
         )
     record = inspection_record(right, Kind.CORRECTION, supersedes=wrong.digest)
@@ -468,7 +545,9 @@ def outcome(store: Store, record_id: str, found: str, joint: int | None) -> Reco
     judge_text("--found", found, "Say what was found.")
     of = find(store, record_id)
     if of.kind not in (Kind.INSPECTION, Kind.CORRECTION):
-        raise UsageError(f"{record_id!r} is a {of.kind}", "Give the record of the inspection that advised.")
+        raise UsageError(
+            f"{record_id!r} is a {of.kind}", "Give the record of the inspection that advised."
+        )
     body = {"of": of.digest, "found": found, "joint": joint}
     return _added(store, replace(of, kind=Kind.OUTCOME, packed=packed(body), identity=()))
 
@@ -484,7 +563,9 @@ def advice(found: Iterable[GearLife]) -> Advice:
     for life in found:
         for record in life.outcomes:
             joint = record.body["joint"]
-            seen = next((s for s in life.inspections if s.record.record_id == record.record_id), None)
+            seen = next(
+                (s for s in life.inspections if s.record.record_id == record.record_id), None
+            )
             if joint is not None and seen is not None and seen.result:
                 advised = (seen.result.get("next_action") or {}).get("joints") or ()
                 asked, right = asked + 1, right + (joint in (worst_joint(seen), *advised))
@@ -514,7 +595,9 @@ def _placed_in_time(life: GearLife) -> list[tuple[int, float]]:
 
 @dataclass(slots=True)
 class _Stretch:
-    """What was read of a joint between two restorations: landings (None: not stated), clearance and its uncertainty."""
+    """What was read of a joint between two restorations: landings (None: not stated), clearance and
+    its uncertainty.
+    """
 
     begun: float
     readings: list[tuple[float | None, float, float]]
@@ -542,7 +625,9 @@ def _stretches(life: GearLife, joints: Sequence[int]) -> dict[int, list[_Stretch
 
 
 def wear_paths(life: GearLife, joints: Sequence[int]) -> dict[int, tuple[list[WearPath], float]]:
-    """Paths of each joint between its restorations, and the landings at which the current one began."""
+    """Paths of each joint between its restorations, and the landings at which the current one
+    began.
+    """
     found = {}
     for joint, stretches in _stretches(life, joints).items():
         paths = []
@@ -551,7 +636,11 @@ def wear_paths(life: GearLife, joints: Sequence[int]) -> dict[int, tuple[list[We
             placed = stretch.placed
             reading_u = placed[-1][2] if placed else reading_u
             usage = [max(at - stretch.begun, 0.0) for at, _value, _u in placed]
-            paths.append(WearPath(unit_of(life.key, joint), usage, [value for _at, value, _u in placed], reading_u))
+            paths.append(
+                WearPath(
+                    unit_of(life.key, joint), usage, [value for _at, value, _u in placed], reading_u
+                )
+            )
         found[joint] = paths, stretches[-1].begun
     return found
 
@@ -562,7 +651,9 @@ def unit_of(key: GearKey, joint: int) -> str:
 
 
 def fit_fleet(found: Iterable[GearLife], gear: Gear) -> WearModel | None:
-    """Learn the wear of all joints of all gears whose dates and landings agree; None if none states its landings."""
+    """Learn the wear of all joints of all gears whose dates and landings agree; None if none states
+    its landings.
+    """
     paths = [
         path
         for life in found
@@ -582,8 +673,8 @@ def forecast(
 ) -> dict[GearKey, Forecast]:
     """Forecast gears from their last inspection on.
 
-    Nothing remains to one that is due now, whatever else is wrong with its records. Another one without landings, or
-    whose dates and landings disagree, has no forecast.
+    Nothing remains to one that is due now, whatever else is wrong with its records. Another one
+    without landings, or whose dates and landings disagree, has no forecast.
     """
     forecasts = {life.key: _due_now(life, gear) or Forecast() for life in found if life.latest}
     known = [
@@ -595,10 +686,14 @@ def forecast(
     ]
     if model is not None:
         done = 0
-        parts = [known[first : first + _GEARS_AT_ONCE] for first in range(0, len(known), _GEARS_AT_ONCE)]
+        parts = [
+            known[first : first + _GEARS_AT_ONCE] for first in range(0, len(known), _GEARS_AT_ONCE)
+        ]
         # NumPy lets others work meanwhile.
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            for part, some in zip(parts, pool.map(lambda p: [*_forecast_some(p, model, gear)], parts), strict=True):
+            for part, some in zip(
+                parts, pool.map(lambda p: [*_forecast_some(p, model, gear)], parts), strict=True
+            ):
                 forecasts.update(zip((life.key for life in part), some, strict=True))
                 done += len(part)
                 progress("Looking ahead", done, len(known))
@@ -606,19 +701,32 @@ def forecast(
 
 
 def _due_now(life: GearLife, gear: Gear) -> Forecast | None:
-    """The forecast of a gear that is outside its margin or has a joint over its limit: nothing remains of anything."""
+    """The forecast of a gear that is outside its margin or has a joint over its limit: nothing
+    remains of anything.
+    """
     last = {n: s[-1].readings[-1:] for n, s in _stretches(life, gear.joint_numbers).items()}
-    over = {n: read[0][1] for n, read in last.items() if read and gear.joint(n).is_over_limit(read[0][1])}
+    over = {
+        n: read[0][1]
+        for n, read in last.items()
+        if read and gear.joint(n).is_over_limit(read[0][1])
+    }
     outside = life.inspections[-1].result.get("verdict") == Verdict.OUTSIDE_MARGIN.value
     reasons = ["outside the margin at the last inspection"] * outside
-    # Nobody can say that an inspection without a date is an earlier one, unless the gear was restored after it.
+    # Nobody can say that an inspection without a date is an earlier one, unless the gear was
+    # restored after it.
     restored = max((record.seq for record in life.repairs), default=-1)
-    undated = [seen for seen in life.inspections[:-1] if not seen.record.day and seen.record.seq > restored]
+    undated = [
+        seen for seen in life.inspections[:-1] if not seen.record.day and seen.record.seq > restored
+    ]
     for seen in undated:
-        read_over = {n: c for n, c in seen.inspection.clearance_in.items() if gear.joint(n).is_over_limit(c)}
+        read_over = {
+            n: c for n, c in seen.inspection.clearance_in.items() if gear.joint(n).is_over_limit(c)
+        }
         over.update(read_over)
         if read_over or seen.result.get("verdict") == Verdict.OUTSIDE_MARGIN.value:
-            reasons.append(f"inspection {seen.record.record_id} has no date and may be the last one")
+            reasons.append(
+                f"inspection {seen.record.record_id} has no date and may be the last one"
+            )
     if not (over or reasons):
         return None
     listed = ", ".join(f"#{n}" for n in over)
@@ -631,59 +739,89 @@ def _due_now(life: GearLife, gear: Gear) -> Forecast | None:
 def _forecast_some(part: Sequence[GearLife], model: WearModel, gear: Gear) -> Iterator[Forecast]:
     numbers = gear.joint_numbers
     now = np.array([life.inspections[-1].inspection.gear_landings for life in part], float)
-    begun = np.array([[start for _own, start in wear_paths(life, numbers).values()] for life in part])
+    begun = np.array(
+        [[start for _own, start in wear_paths(life, numbers).values()] for life in part]
+    )
     ahead = gear.horizon.value * _AHEAD
     usage = np.maximum(now[:, None, None] + ahead - begun[:, :, None], 0.0)
-    # Gear by gear, each from the model's seed: the forecast of a gear is the same whoever else is asked for.
+    # Gear by gear, each from the model's seed: the forecast of a gear is the same whoever else is
+    # asked for.
     asked_of = [[unit_of(life.key, number) for number in numbers] for life in part]
-    wear = np.stack([model.forecast(u, at, reading=False).samples for u, at in zip(asked_of, usage, strict=True)])
+    wear = np.stack(
+        [
+            model.forecast(u, at, reading=False).samples
+            for u, at in zip(asked_of, usage, strict=True)
+        ]
+    )
     wear = np.maximum(wear, 0.0)
     amplification = gear.model.plunger_amplification()
-    read = np.array([[any(n in s.inspection.clearance_in for s in life.inspections) for n in numbers] for life in part])
+    read = np.array(
+        [
+            [any(n in s.inspection.clearance_in for s in life.inspections) for n in numbers]
+            for life in part
+        ]
+    )
     # A joint that was never read counts as it does in the prediction: not at all.
     wear = np.where(read[:, :, None, None], wear, 0.0)
     straight = np.einsum("j,gjts->gts", amplification, wear)
-    # The model itself says how far the worst case departs from the sum of amplified clearances as they wear.
+    # The model itself says how far the worst case departs from the sum of amplified clearances as
+    # they wear.
     asked = np.searchsorted(_AHEAD, _ASKED)
     middle = np.median(wear[:, :, asked, :], axis=3)
-    predicted = worst_case(gear.model, np.moveaxis(middle, 1, 2).reshape(-1, len(numbers))).magnitude_in
+    predicted = worst_case(
+        gear.model, np.moveaxis(middle, 1, 2).reshape(-1, len(numbers))
+    ).magnitude_in
     summed = np.einsum("j,gjt->gt", amplification, middle)
     # A linkage that does not close is outside any margin.
-    ratio = np.where(np.isnan(predicted), _NOT_CLOSING_IN, predicted).reshape(summed.shape) / np.maximum(summed, 1e-12)
+    ratio = np.where(np.isnan(predicted), _NOT_CLOSING_IN, predicted).reshape(
+        summed.shape
+    ) / np.maximum(summed, 1e-12)
     for g, life in enumerate(part):
         stated = life.inspections[-1].inspection.margin_in
         margin = gear.margin.value if stated is None else stated
         displacement = straight[g] * np.interp(_AHEAD, _ASKED, ratio[g])[:, None]
-        to_limit = np.stack([_first_passage(ahead, wear[g, j], gear.limits_in[j]) for j in range(len(numbers))])
+        to_limit = np.stack(
+            [_first_passage(ahead, wear[g, j], gear.limits_in[j]) for j in range(len(numbers))]
+        )
         of_joints = {number: Samples(to_limit[j]) for j, number in enumerate(numbers) if read[g, j]}
         to_margin, to_any = _first_passage(ahead, displacement, margin), to_limit.min(axis=0)
         due = float(Samples(np.minimum(to_any, to_margin)).quantile(gear.accepted_chance.value))
         first = to_limit.argmin(axis=0)[np.isfinite(to_any)]
         joint = numbers[int(np.bincount(first).argmax())] if len(first) else None
-        yield Forecast(of_joints, Samples(to_any), joint, Samples(to_margin), due if np.isfinite(due) else None)
+        yield Forecast(
+            of_joints, Samples(to_any), joint, Samples(to_margin), due if np.isfinite(due) else None
+        )
 
 
 def _first_passage(ahead: Array, paths: Array, limit: float) -> Array:
-    """Landings at which each simulated path (ahead, samples) first passes a limit, infinite beyond the horizon."""
+    """Landings at which each simulated path (ahead, samples) first passes a limit, infinite beyond
+    the horizon.
+    """
     over = paths > limit
     k = np.argmax(over, axis=0)
     sample = np.arange(paths.shape[1])
     high, low = paths[k, sample], paths[np.maximum(k - 1, 0), sample]
     with np.errstate(invalid="ignore"):
-        part = np.where(np.isfinite(high), (limit - low) / np.where(high > low, high - low, 1.0), 1.0)
+        part = np.where(
+            np.isfinite(high), (limit - low) / np.where(high > low, high - low, 1.0), 1.0
+        )
     at = ahead[np.maximum(k - 1, 0)] + part * (ahead[k] - ahead[np.maximum(k - 1, 0)])
     return np.where(over.any(axis=0), np.where(k == 0, 0.0, at), np.inf)
 
 
 def suggestions(found: Sequence[GearLife], model: WearModel | None, gear: Gear) -> list[str]:
-    """Name last inspections that look like a restoration nobody recorded, or like two gears exchanged."""
+    """Name last inspections that look like a restoration nobody recorded, or like two gears
+    exchanged.
+    """
     if model is None:
         return []
     # Seen twice, the last time with its landings.
     kept = [
         life
         for life in found
-        if len(life.inspections) > 1 and not life.warnings and life.inspections[-1].inspection.gear_landings is not None
+        if len(life.inspections) > 1
+        and not life.warnings
+        and life.inspections[-1].inspection.gear_landings is not None
     ]
     off = _departures([(life, life) for life in kept], model, gear)
     said: list[str] = []
@@ -691,8 +829,14 @@ def suggestions(found: Sequence[GearLife], model: WearModel | None, gear: Gear) 
     poor = [i for i, z in enumerate(off) if _fit(z) < _POOR]
     # Gears are exchanged on one aircraft, or by those who entered one day's sheets.
     days = [life.inspections[-1].record.day for life in kept]
-    pairs = [(i, j) for i, j in combinations(poor, 2) if kept[i].key[0] == kept[j].key[0] or days[i] == days[j]]
-    crossed = _departures([(kept[a], kept[b]) for i, j in pairs for a, b in ((i, j), (j, i))], model, gear)
+    pairs = [
+        (i, j)
+        for i, j in combinations(poor, 2)
+        if kept[i].key[0] == kept[j].key[0] or days[i] == days[j]
+    ]
+    crossed = _departures(
+        [(kept[a], kept[b]) for i, j in pairs for a, b in ((i, j), (j, i))], model, gear
+    )
     gains = []
     for n, (i, j) in enumerate(pairs):
         others = crossed[2 * n : 2 * n + 2]
@@ -704,14 +848,19 @@ def suggestions(found: Sequence[GearLife], model: WearModel | None, gear: Gear) 
         if not {i, j} & swapped:
             swapped |= {i, j}
             one, two = (" ".join(kept[k].key) for k in (i, j))
-            said.append(f"The last inspections of {one} and {two} fit each other's wear: were they exchanged?")
+            said.append(
+                f"The last inspections of {one} and {two} fit each other's wear: were they"
+                " exchanged?"
+            )
     for i, (life, z) in enumerate(zip(kept, off, strict=True)):
-        dropped = [number for number, score in zip(gear.joint_numbers, z, strict=True) if score <= -_DROP]
+        dropped = [
+            number for number, score in zip(gear.joint_numbers, z, strict=True) if score <= -_DROP
+        ]
         if dropped and i not in swapped:
             listed = ", ".join(f"#{number}" for number in dropped)
             said.append(
-                f"{' '.join(life.key)}: {listed} read much tighter than before. Restored without a record? "
-                f"mlg history repair {' '.join(life.key)} --joint {dropped[0]} --date D"
+                f"{' '.join(life.key)}: {listed} read much tighter than before. Restored without a"
+                f" record? mlg history repair {' '.join(life.key)} --joint {dropped[0]} --date D"
             )
     return said
 
@@ -727,8 +876,12 @@ def _square(*scores: Array) -> float:
     return float(sum(np.nansum(z**2) for z in scores))
 
 
-def _departures(pairs: Sequence[tuple[GearLife, GearLife]], model: WearModel, gear: Gear) -> list[Array]:
-    """How far the newest inspections of gears lie from what others' histories promised, in standard deviations."""
+def _departures(
+    pairs: Sequence[tuple[GearLife, GearLife]], model: WearModel, gear: Gear
+) -> list[Array]:
+    """How far the newest inspections of gears lie from what others' histories promised, in standard
+    deviations.
+    """
     numbers = gear.joint_numbers
     paths: dict[str, tuple[WearPath, ...]] = {}
     at: list[tuple[int, int]] = []
@@ -736,7 +889,9 @@ def _departures(pairs: Sequence[tuple[GearLife, GearLife]], model: WearModel, ge
     for n, (history, newest) in enumerate(pairs):
         last = newest.inspections[-1].inspection
         landings = last.gear_landings or 0.0
-        before = replace(history, events=tuple(event for event in history.events if event is not history.latest))
+        before = replace(
+            history, events=tuple(event for event in history.events if event is not history.latest)
+        )
         for j, (own, begun) in enumerate(wear_paths(before, numbers).values()):
             if numbers[j] in last.clearance_in and len(np.asarray(own[-1].usage)):
                 paths[f"{n} {j}"] = tuple(own)
@@ -745,8 +900,14 @@ def _departures(pairs: Sequence[tuple[GearLife, GearLife]], model: WearModel, ge
                 read.append(last.clearance_in[numbers[j]])
     scores = np.full((len(pairs), len(numbers)), np.nan)
     if at:
-        samples = replace(model, paths=paths).forecast(list(paths), np.array(ahead)[:, None]).samples[:, 0]
-        scores[tuple(np.array(at).T)] = (np.array(read) - samples.mean(axis=1)) / samples.std(axis=1)
+        samples = (
+            replace(model, paths=paths)
+            .forecast(list(paths), np.array(ahead)[:, None])
+            .samples[:, 0]
+        )
+        scores[tuple(np.array(at).T)] = (np.array(read) - samples.mean(axis=1)) / samples.std(
+            axis=1
+        )
     return list(scores)
 
 
@@ -755,7 +916,10 @@ def quantiles(samples: Samples | None) -> dict[str, float | None] | None:
     if samples is None:
         return None
     ends = samples.quantile([0.05, 0.5, 0.95])
-    return {n: float(end) if np.isfinite(end) else None for n, end in zip(("p05", "p50", "p95"), ends, strict=True)}
+    return {
+        n: float(end) if np.isfinite(end) else None
+        for n, end in zip(("p05", "p50", "p95"), ends, strict=True)
+    }
 
 
 def span(ends: Mapping[str, float | None] | None, gear: Gear) -> str:
@@ -772,7 +936,9 @@ def landings_shown(count: float | None, gear: Gear) -> str:
 
 
 def outlook_words(life: GearLife, ahead: Forecast, gear: Gear) -> str:
-    """Say how many landings a gear has left, to which margin and by which joint; empty where nothing was forecast."""
+    """Say how many landings a gear has left, to which margin and by which joint; empty where
+    nothing was forecast.
+    """
     if ahead.due_now:
         return f"No landings left: {ahead.due_now}. Next inspection due now."
     if life.latest is not None and life.latest.inspection.gear_landings is None:
@@ -780,23 +946,32 @@ def outlook_words(life: GearLife, ahead: Forecast, gear: Gear) -> str:
     if ahead.limit is None:
         return ""
     told = _outlook(life, ahead)
-    joint = "" if ahead.limit_joint is None else f", where #{ahead.limit_joint} most likely reaches its limit first"
+    joint = (
+        ""
+        if ahead.limit_joint is None
+        else f", where #{ahead.limit_joint} most likely reaches its limit first"
+    )
     after, day = ahead.next_inspection, told["due_date"]
     due = "beyond the horizon" if after is None else f"in {landings_shown(after, gear)} landings"
     return (
-        f"Landings left from the last inspection: to a joint's limit {span(told['landings_to_limit'], gear)}{joint}; "
-        f"to the margin, by the worst-case bound, {span(told['landings_to_margin'], gear)}. "
-        f"Next inspection due {due}{f', about {day}' if day else ''} "
-        f"(accepted chance {gear.accepted_chance.value:.0%})."
+        "Landings left from the last inspection: to a joint's limit"
+        f" {span(told['landings_to_limit'], gear)}{joint}; to the margin, by the worst-case bound,"
+        f" {span(told['landings_to_margin'], gear)}. Next inspection due"
+        f" {due}{f', about {day}' if day else ''} (accepted chance"
+        f" {gear.accepted_chance.value:.0%})."
     )
 
 
 def worst_joint(seen: Seen) -> int | None:
     """The joint to look at first."""
-    return next((joint["joint"] for joint in seen.result.get("joints", ()) if joint["rank"] == 1), None)
+    return next(
+        (joint["joint"] for joint in seen.result.get("joints", ()) if joint["rank"] == 1), None
+    )
 
 
-def fleet_as_json(found: Sequence[GearLife], forecasts: Mapping[GearKey, Forecast]) -> dict[str, Any]:
+def fleet_as_json(
+    found: Sequence[GearLife], forecasts: Mapping[GearKey, Forecast]
+) -> dict[str, Any]:
     """One line per gear, worst first: verdict, then landings to its next inspection."""
     lines = []
     for life in found:
@@ -818,7 +993,12 @@ def fleet_as_json(found: Sequence[GearLife], forecasts: Mapping[GearKey, Forecas
         )
     lines.sort(key=_urgency)
     warnings = [warning for life in found for warning in life.warnings]
-    return {"schema_version": SCHEMA_VERSION, "gears": lines, "advice": advice(found).describe(), "warnings": warnings}
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "gears": lines,
+        "advice": advice(found).describe(),
+        "warnings": warnings,
+    }
 
 
 def _outlook(life: GearLife, ahead: Forecast) -> dict[str, Any]:
@@ -833,7 +1013,9 @@ def _outlook(life: GearLife, ahead: Forecast) -> dict[str, Any]:
 
 
 def _due_date(life: GearLife, ahead: Forecast) -> str | None:
-    """The day on which the next inspection is due if the gear goes on landing as often as between its inspections."""
+    """The day on which the next inspection is due if the gear goes on landing as often as between
+    its inspections.
+    """
     last = life.latest
     if last is None or not last.record.day or ahead.next_inspection is None:
         return None
@@ -841,11 +1023,17 @@ def _due_date(life: GearLife, ahead: Forecast) -> str | None:
     days = 0.0
     if not ahead.due_now:
         placed = _placed_in_time(life)
-        flown, passed = (placed[-1][1] - placed[0][1], placed[-1][0] - placed[0][0]) if placed else (0.0, 0)
+        flown, passed = (
+            (placed[-1][1] - placed[0][1], placed[-1][0] - placed[0][0]) if placed else (0.0, 0)
+        )
         if flown <= 0.0 or passed <= 0:
             return None
         days = ahead.next_inspection * passed / flown
-    return date.fromordinal(latest + int(days)).isoformat() if latest + days < date.max.toordinal() else None
+    return (
+        date.fromordinal(latest + int(days)).isoformat()
+        if latest + days < date.max.toordinal()
+        else None
+    )
 
 
 def _urgency(line: Mapping[str, Any]) -> tuple[int, float, str, str]:
@@ -856,7 +1044,9 @@ def _urgency(line: Mapping[str, Any]) -> tuple[int, float, str, str]:
 
 
 def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
-    """One gear's events in the order of the chain, and each joint's readings since it was last restored."""
+    """One gear's events in the order of the chain, and each joint's readings since it was last
+    restored.
+    """
     current = {s.record.digest: s for s in life.inspections}
     events = []
     for record in life.records:
@@ -870,8 +1060,13 @@ def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
         }
         if record.kind is Kind.ASSESSMENT:
             result = body["result"]
-            event |= {name: result.get(name) for name in ("verdict", "predicted_displacement_in", "margin_in")}
-            event |= {name: body.get(name) for name in ("program_version", "geometry_sha256", "extension")}
+            event |= {
+                name: result.get(name)
+                for name in ("verdict", "predicted_displacement_in", "margin_in")
+            }
+            event |= {
+                name: body.get(name) for name in ("program_version", "geometry_sha256", "extension")
+            }
         elif record.kind in (Kind.INSPECTION, Kind.CORRECTION):
             event |= {"counts": record.digest in current, "supersedes": body.get("supersedes")}
             event["clearance_in"] = body["inspection"].get("clearance_in", {})
@@ -884,13 +1079,26 @@ def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
             {
                 "joint": number,
                 "limit_in": gear.joint(number).limit.value,
-                "readings": [[landings, clearance] for landings, clearance, _u in stretches[-1].placed],
+                "readings": [
+                    [landings, clearance] for landings, clearance, _u in stretches[-1].placed
+                ],
                 "landings_to_limit": quantiles(ahead.joints.get(number)),
             }
         )
     tail, side = life.key
-    told = {"schema_version": SCHEMA_VERSION, "tail_no": tail, "side": side, "events": events, "joints": joints}
-    return {**told, **_outlook(life, ahead), "advice": advice([life]).describe(), "warnings": list(life.warnings)}
+    told = {
+        "schema_version": SCHEMA_VERSION,
+        "tail_no": tail,
+        "side": side,
+        "events": events,
+        "joints": joints,
+    }
+    return {
+        **told,
+        **_outlook(life, ahead),
+        "advice": advice([life]).describe(),
+        "warnings": list(life.warnings),
+    }
 
 
 def import_file(store: Store, file: Path) -> Added:
@@ -898,12 +1106,16 @@ def import_file(store: Store, file: Path) -> Added:
     remedy = "Give a file written by: mlg history export"
     try:
         # A pipe that nobody writes to would be waited for.
-        with os.fdopen(os.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), encoding="utf-8") as chain:
+        with os.fdopen(
+            os.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), encoding="utf-8"
+        ) as chain:
             found = os.fstat(chain.fileno())
             if not stat.S_ISREG(found.st_mode):
                 raise UsageError(f"{file} is not a regular file", remedy)
             if found.st_size > _MOST_BYTES:
-                raise UsageError(f"{file} has {found.st_size} bytes, at most {_MOST_BYTES} are read", remedy)
+                raise UsageError(
+                    f"{file} has {found.st_size} bytes, at most {_MOST_BYTES} are read", remedy
+                )
             return store.restore(_lines(chain, file.name), file.name)
     except (OSError, ValueError) as error:
         raise UsageError(f"{file} cannot be read: {error}", remedy) from error
@@ -913,7 +1125,9 @@ def _lines(chain: TextIO, name: str) -> Iterator[str]:
     for number, line in enumerate(iter(partial(chain.readline, _LONGEST_LINE), ""), 1):
         if len(line) == _LONGEST_LINE:
             raise StoreError(
-                f"{name}, line {number} has more than {_LONGEST_LINE} characters; nothing was imported", "Export again."
+                f"{name}, line {number} has more than {_LONGEST_LINE} characters; nothing was"
+                " imported",
+                "Export again.",
             )
         yield line
 
@@ -922,8 +1136,9 @@ def _lines(chain: TextIO, name: str) -> Iterator[str]:
 class Verified:
     """What a walk along the chain showed.
 
-    ``count`` records fit, the hash of the last of them is ``last``, and that of number ``expected`` is the one that was
-    asked for (None if there is none); ``wrong`` says what else departs from a store as it should be.
+    ``count`` records fit, the hash of the last of them is ``last``, and that of number ``expected``
+    is the one that was asked for (None if there is none); ``wrong`` says what else departs from a
+    store as it should be.
     """
 
     count: int
@@ -934,7 +1149,9 @@ class Verified:
 
 
 def verify(store: Store, expect: str | None = None) -> Verified:
-    """Walk the chain, read every content that is not void, and look whether a hash noted before still stands there."""
+    """Walk the chain, read every content that is not void, and look whether a hash noted before
+    still stands there.
+    """
     last, expected = "", None
     wrong: dict[str, str] = {}
 
@@ -957,12 +1174,18 @@ _SIDE_BY_SIDE = 4
 
 
 def side_by_side(life: GearLife, now: Assessment | None = None) -> list[dict[str, Any]]:
-    """The last inspections of a gear, up to one that is not kept yet, each with what was restored since the one before.
+    """The last inspections of a gear, up to one that is not kept yet, each with what was restored
+    since the one before.
 
     Nothing where that one has none before it.
     """
     rows = [
-        (s.inspection, (s.record.day, s.record.seq), s.result.get("predicted_displacement_in"), s.result.get("verdict"))
+        (
+            s.inspection,
+            (s.record.day, s.record.seq),
+            s.result.get("predicted_displacement_in"),
+            s.result.get("verdict"),
+        )
         for s in life.inspections
     ]
     if now is not None:
@@ -978,7 +1201,9 @@ def side_by_side(life: GearLife, now: Assessment | None = None) -> list[dict[str
         steps.append(
             {
                 "record_id": inspection.record_id,
-                "date": inspection.inspection_date.isoformat() if inspection.inspection_date else "",
+                "date": (
+                    inspection.inspection_date.isoformat() if inspection.inspection_date else ""
+                ),
                 "gear_landings": inspection.gear_landings,
                 "clearance_in": inspection.clearance_in,
                 "restored": sorted({joint for r in since for joint in r.body.get("joints", ())}),
@@ -992,7 +1217,9 @@ def side_by_side(life: GearLife, now: Assessment | None = None) -> list[dict[str
 
 
 def seen_before(judgements: Sequence[Judgement], store: Store) -> list[list[dict[str, Any]]]:
-    """What each judged gear was like before, side by side with what it is now; empty for one that is new."""
+    """What each judged gear was like before, side by side with what it is now; empty for one that
+    is new.
+    """
     known = set(store.gears())
 
     def of(judgement: Judgement) -> list[dict[str, Any]]:
@@ -1018,7 +1245,9 @@ def write_pages(
     """Write the page of each gear's life and, for a fleet, the page that links them."""
     from mlg_troubleshoot.reporting import fleet_report, provenance_of, publish
 
-    last = max((record for life in found for record in life.records), key=lambda r: r.seq, default=None)
+    last = max(
+        (record for life in found for record in life.records), key=lambda r: r.seq, default=None
+    )
     hashes = {} if last is None else {f"store up to record {last.seq}": last.digest}
     made = provenance_of(gear, hashes, remembered=remembered)
     written = []

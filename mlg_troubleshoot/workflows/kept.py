@@ -1,4 +1,6 @@
-"""The content of kept records, judged as cells are whenever it is read: a store or an export may come from anybody."""
+"""The content of kept records, judged as cells are whenever it is read: a store or an export may
+come from anybody.
+"""
 
 from __future__ import annotations
 
@@ -36,14 +38,17 @@ class _WrongError(Exception):
 
 
 class KeptGate:
-    """Says what is wrong with the content of a record, empty if nothing is; the gear says what its joints are."""
+    """Says what is wrong with the content of a record, empty if nothing is; the gear says what its
+    joints are.
+    """
 
     def __init__(self, gear: Gear) -> None:
         options = ReadOptions.of(gear)
         self._joints = options.joint_numbers
         most = options.plunger_hard_max_in
         lengths = {
-            f"{kind.value}_in": _number(*ends, above=kind is Kind.MARGIN) for kind, ends in LENGTH_RANGE_IN.items()
+            f"{kind.value}_in": _number(*ends, above=kind is Kind.MARGIN)
+            for kind, ends in LENGTH_RANGE_IN.items()
         }
         loose = {kind.value: _cell(read) for kind, read in LOOSE_CELLS.items()}
         known = {field.name: _anything for field in fields(Inspection)}
@@ -56,7 +61,9 @@ class KeptGate:
             "side": _one_of(Side),
             "convention": _one_of(ClearanceConvention),
             "clearance_in": self._by_joint(_number(0.0, options.clearance_hard_max_in)),
-            "gauge_u_by_joint_in": self._by_joint(_number(*LENGTH_RANGE_IN[Kind.GAUGE_U], above=True)),
+            "gauge_u_by_joint_in": self._by_joint(
+                _number(*LENGTH_RANGE_IN[Kind.GAUGE_U], above=True)
+            ),
             "axial_float_in": self._by_joint(_number(*LENGTH_RANGE_IN[Kind.AXIAL_FLOAT])),
             "entered": self._by_joint(_entered),
             "readings_in": _each(_number(-most, most)),
@@ -105,7 +112,9 @@ class KeptGate:
         beside = {"record_id": record.record_id, "tail_no": record.tail_no, "side": record.side}
         for name, value in (*beside.items(), ("inspection_date", record.day or None)):
             if found.get(name) != value:
-                raise _WrongError(name, found.get(name), f"what the record is filed under ({value!r})")
+                raise _WrongError(
+                    name, found.get(name), f"what the record is filed under ({value!r})"
+                )
 
     def _correction(self, record: Record, body: Mapping[str, Any]) -> None:
         _hash(body, "supersedes")
@@ -125,7 +134,9 @@ class KeptGate:
             _any_number("rank", finding.get("rank"))
         action = result.get("next_action")
         if action is not None:
-            _each(self._joint)("next_action", _taken(_taken(result, "next_action", dict), "joints", list, []))
+            _each(self._joint)(
+                "next_action", _taken(_taken(result, "next_action", dict), "joints", list, [])
+            )
 
     def _work(self, _record: Record, body: Mapping[str, Any]) -> None:
         if body.get("landings") is not None:
@@ -155,7 +166,9 @@ class KeptGate:
                 raise _WrongError(column, value, "a table of values by joint")
             for joint, found in value.items():
                 if joint not in names:
-                    raise _WrongError(column, joint, f"a joint of this gear ({_listed(self._joints)})")
+                    raise _WrongError(
+                        column, joint, f"a joint of this gear ({_listed(self._joints)})"
+                    )
                 check(f"{column}, joint {joint}", found)
 
         return each
@@ -189,7 +202,11 @@ def _flag(column: str, value: Any) -> None:
 
 
 def _number(low: float = -1e12, high: float = 1e12, *, above: bool = False) -> _Check:
-    expected = f"a number from {low:g} to {high:g}" if not above else f"a number above {low:g}, at most {high:g}"
+    expected = (
+        f"a number from {low:g} to {high:g}"
+        if not above
+        else f"a number above {low:g}, at most {high:g}"
+    )
 
     def check(column: str, value: Any) -> None:
         number = isinstance(value, int | float) and not isinstance(value, bool)
@@ -219,7 +236,11 @@ def _cell(read: Callable[[bool, str, Any], object]) -> _Check:
     """A value as the cell of its column: what comes back is what was kept."""
 
     def check(column: str, value: Any) -> None:
-        kept = float(value) if isinstance(value, int) and not isinstance(value, bool) and abs(value) < 1e15 else value
+        kept = (
+            float(value)
+            if isinstance(value, int) and not isinstance(value, bool) and abs(value) < 1e15
+            else value
+        )
         if not isinstance(kept, str | float):
             raise _WrongError(column, value, "a text or a number")
         try:
@@ -261,7 +282,9 @@ def _source(column: str, value: Any) -> None:
     kinds = (str, str, int)
     if not isinstance(value, list) or len(value) != len(kinds):
         raise _WrongError(column, value, "a file, a sheet and a row")
-    if not all(found is None or isinstance(found, kind) for found, kind in zip(value, kinds, strict=True)):
+    if not all(
+        found is None or isinstance(found, kind) for found, kind in zip(value, kinds, strict=True)
+    ):
         raise _WrongError(column, value, "a file, a sheet and a row")
 
 

@@ -1,4 +1,6 @@
-"""Where coordinates come from: a linkage that meets printed numbers, and the ensemble's text for it."""
+"""Where coordinates come from: a linkage that meets printed numbers, and the ensemble's text for
+it.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,9 @@ def reconstruct_linkage(
     out: Path | None = None,
     progress: Callable[[str, int, int | None], None] | None = None,
 ) -> tuple[Reconstruction, str]:
-    """Search a linkage, or polish the one named `start`; return it with its text for an ensemble file."""
+    """Search a linkage, or polish the one named `start`; return it with its text for an ensemble
+    file.
+    """
     from mlg_troubleshoot.paper.reconstruct import reconstruct
 
     if not name.isidentifier():
@@ -44,7 +48,9 @@ def reconstruct_linkage(
     wanted = load_targets(targets_file(known) if targets is None else targets)
     linkages = {linkage.name: linkage for linkage in known.ensemble}
     if start is not None and start not in linkages:
-        raise UsageError(f"{known.name} has no linkage {start!r}", f"Give one of {', '.join(linkages)}.")
+        raise UsageError(
+            f"{known.name} has no linkage {start!r}", f"Give one of {', '.join(linkages)}."
+        )
     begin = None if start is None else linkages[start]
     found = reconstruct(known, wanted, np.random.default_rng(seed), seed, begin, minutes, progress)
     text = tomli_w.dumps({"members": {name: member_values(found.linkage)}})

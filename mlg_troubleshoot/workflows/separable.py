@@ -28,12 +28,15 @@ from mlg_troubleshoot.misfit.search import ALIKE, beside
 from mlg_troubleshoot.records.columns import Kind
 from mlg_troubleshoot.records.headers import parse_canonical
 
-# The planned fleet: two years of twenty aircraft (assumed), and what one row scatters, tail by tail [in]
-# (docs/explanation/diagnosis.md: a gauge that repeats to 1.5 thou, and what clearances and pins add).
+# The planned fleet: two years of twenty aircraft (assumed), and what one row scatters, tail by tail
+# [in] (docs/explanation/diagnosis.md: a gauge that repeats to 1.5 thou, and what clearances and
+# pins add).
 TAILS, VISITS, ROW_IN = 20, 5, 0.0025
-# Expected distance in log-likelihood at which two are distinguished with 80 % power: d²/2 − 0.84 d = RULED_OUT.
+# Expected distance in log-likelihood at which two are distinguished with 80 % power: d²/2 − 0.84 d
+# = RULED_OUT.
 _APART = 0.84 + float(np.sqrt(0.84**2 + 2.0 * RULED_OUT))
-# Effect over the error of its mean (S) from which some hundred candidates let one stand out with 80 % power.
+# Effect over the error of its mean (S) from which some hundred candidates let one stand out with 80
+# % power.
 _FOUND = 5.0
 # Columns in addition to clearances, cheapest first: written down anyway, read off, to be measured.
 FURTHER = {
@@ -49,7 +52,8 @@ FURTHER = {
     ALONG: Kind.ACTUATOR_EXTENSION,
     "axial_float": Kind.AXIAL_FLOAT,
 }
-# Of what is tried for all-joint effects, the middle one: directions spread by 45°, linkages half as far apart.
+# Of what is tried for all-joint effects, the middle one: directions spread by 45°, linkages half as
+# far apart.
 _MIDDLE = 1
 _JOINT = re.compile(r"clearance_(\d+)_in")
 _NAMES = {kind: name for name, kind in FURTHER.items()} | {Kind.PLUNGER_POSITION: ALONG}
@@ -60,8 +64,9 @@ Key = tuple[str, str | None]
 class CausePlanned:
     """What the planned columns could say about one cause.
 
-    found_from_in: root mean square from which it is detected with 80 % power; None if it cannot be tested. [in]
-    told_apart_from_in: root mean square from which it is distinguished from that with 80 % power; None if never.
+    found_from_in: root mean square from which it is detected with 80 % power; None if it cannot be
+    tested. [in] told_apart_from_in: root mean square from which it is distinguished from that with
+    80 % power; None if never.
         [in]
     further_column: cheapest column that halves that size, or makes it finite.
     separating_reading: the reading that distinguishes them whatever the columns.
@@ -77,8 +82,12 @@ class CausePlanned:
     separating_reading: str
 
 
-def separable(gear: str = DEFAULT_GEAR, columns: Sequence[str] | None = None) -> tuple[CausePlanned, ...]:
-    """Say which causes the planned columns can distinguish; without clearance columns all joints are read."""
+def separable(
+    gear: str = DEFAULT_GEAR, columns: Sequence[str] | None = None
+) -> tuple[CausePlanned, ...]:
+    """Say which causes the planned columns can distinguish; without clearance columns all joints
+    are read.
+    """
     model = load_gear(gear)
     recorded, joints = _planned(columns, model)
     here = _Plan(model, recorded, joints)
@@ -87,12 +96,16 @@ def separable(gear: str = DEFAULT_GEAR, columns: Sequence[str] | None = None) ->
     def beside_it(column: str) -> _Plan:
         number = _JOINT.fullmatch(column)
         return (
-            _Plan(model, recorded, joints | {int(number[1])}) if number else _Plan(model, recorded | {column}, joints)
+            _Plan(model, recorded, joints | {int(number[1])})
+            if number
+            else _Plan(model, recorded | {column}, joints)
         )
 
     access = sorted((j.access.value, j.number) for j in model.joints if j.number not in joints)
     further = [name for name in FURTHER if name not in {*recorded, ALONG}]
-    further += [f"clearance_{number}_in" for _min, number in access] + [ALONG] * (ALONG not in recorded)
+    further += [f"clearance_{number}_in" for _min, number in access] + [ALONG] * (
+        ALONG not in recorded
+    )
     with threadpool_limits(1, "blas"):
         keys = [*(key for key in here.keys if key not in here.stand_ins), *here.blocks]
         judged = tuple(_judged(here, beside_it, further, key) for key in keys)
@@ -111,7 +124,9 @@ def _planned(columns: Sequence[str] | None, gear: Gear) -> tuple[set[str], set[i
     for name in columns:
         field = parse_canonical(name, gear.joint_numbers)
         if field is None:
-            raise UsageError(f"{name} is not a column of an inspection table", "see docs/reference/columns.md")
+            raise UsageError(
+                f"{name} is not a column of an inspection table", "see docs/reference/columns.md"
+            )
         if field.kind in _NAMES:
             recorded.add(_NAMES[field.kind])
         elif field.kind is Kind.CLEARANCE and field.number in gear.joint_numbers:
@@ -120,13 +135,25 @@ def _planned(columns: Sequence[str] | None, gear: Gear) -> tuple[set[str], set[i
 
 
 class _Plan:
-    """Effects of all testable causes in a planned fleet, as far as bias, slope and tails leave them."""
+    """Effects of all testable causes in a planned fleet, as far as bias, slope and tails leave
+    them.
+    """
 
     def __init__(self, gear: Gear, recorded: set[str], joints: set[int]) -> None:
         table = _fleet(gear, recorded, joints)
         scene, rows = build_scene(gear.model, table, gear.discrepancies)
-        found = [c for cause in CATALOGUE if set(cause.needs) <= recorded for c in cause.candidates(scene)]
-        found += [c for cause in CATALOGUE if not set(cause.needs) <= recorded for c in cause.stand_ins(scene)]
+        found = [
+            c
+            for cause in CATALOGUE
+            if set(cause.needs) <= recorded
+            for c in cause.candidates(scene)
+        ]
+        found += [
+            c
+            for cause in CATALOGUE
+            if not set(cause.needs) <= recorded
+            for c in cause.stand_ins(scene)
+        ]
         effects = effect_columns(scene, found)
         effects[:, [not _speaks_for_all(c, table) for c in found]] = 0.0
         tails = TAIL_RATIOS[1] * (table.tails[:, None] == np.unique(table.tails))
@@ -141,7 +168,9 @@ class _Plan:
         left, seen = beside(white, level)
         size = np.linalg.norm(left, axis=0)
         self.sign = np.array([c.cause.sign for c in found])
-        self.unit = np.where(seen, left / np.where(seen, size, 1.0), 0.0) * np.where(self.sign == 0, 1, self.sign)
+        self.unit = np.where(seen, left / np.where(seen, size, 1.0), 0.0) * np.where(
+            self.sign == 0, 1, self.sign
+        )
         # Root mean square of an effect over what of it can be seen.
         self.hidden = np.linalg.norm(effects, axis=0) / np.where(seen, size, np.inf)
         self.candidates = found
@@ -169,7 +198,9 @@ class _Plan:
         return self.candidates[self.keys[key][0]].separates
 
     def nearest(self, key: Key) -> tuple[str | None, float]:
-        """The cause that looks most like one, and the size that distinguishes them; infinite if never. [in]"""
+        """The cause that looks most like one, and the size that distinguishes them; infinite if
+        never. [in]
+        """
         if key in self.blocks:
             rival = next(other for other in self.blocks if other != key)
             lead = partial(_divergence, true=self.blocks[key], other=self.blocks[rival])
@@ -185,12 +216,16 @@ class _Plan:
                 if alike > best:
                     best, name = alike, " ".join(part for part in other if part)
         apart = 1.0 - best
-        return name, float("inf") if apart < ALIKE else _APART * self._row(key) / float(np.sqrt(apart))
+        return name, (
+            float("inf") if apart < ALIKE else _APART * self._row(key) / float(np.sqrt(apart))
+        )
 
     def found_from(self, key: Key) -> float:
         """Size from which a cause stands out. [in]"""
         if key in self.blocks:
-            lead = partial(_divergence, true=self.blocks[key], other=np.zeros_like(self.blocks[key]))
+            lead = partial(
+                _divergence, true=self.blocks[key], other=np.zeros_like(self.blocks[key])
+            )
             return _size_of(lead, 0.5 * _FOUND**2)
         return _FOUND * self._row(key)
 
@@ -199,9 +234,11 @@ class _Plan:
 
 
 def _divergence(size_in: float, true: Array, other: Array) -> float:
-    """Log-likelihood by which all-joint effects of one kind lead those of another, of the size that fits best. [1]
+    """Log-likelihood by which all-joint effects of one kind lead those of another, of the size that
+    fits best. [1]
 
-    true, other, shape (n, k): independent effects of one kind, of root mean square 1 together, whitened.
+    true, other, shape (n, k): independent effects of one kind, of root mean square 1 together,
+    whitened.
     """
     basis = np.linalg.qr(np.hstack([true, other]))[0]
     one, two = (basis.T @ effects / ROW_IN for effects in (true, other))
@@ -211,7 +248,9 @@ def _divergence(size_in: float, true: Array, other: Array) -> float:
     for size in size_in * np.geomspace(0.2, 5.0, 15):
         wrong = unit + size**2 * two @ two.T
         excess = np.trace(np.linalg.solve(wrong, truth)) - len(one)
-        least = min(least, 0.5 * float(excess + np.linalg.slogdet(wrong)[1] - np.linalg.slogdet(truth)[1]))
+        least = min(
+            least, 0.5 * float(excess + np.linalg.slogdet(wrong)[1] - np.linalg.slogdet(truth)[1])
+        )
     return least
 
 
@@ -228,19 +267,29 @@ def _key(candidate: Candidate) -> Key:
 
 
 def _speaks_for_all(candidate: Candidate, table: DiagnosisTable) -> bool:
-    """One aircraft, gauge or technician stands for all of them, and the middle of the time for every date."""
+    """One aircraft, gauge or technician stands for all of them, and the middle of the time for
+    every date.
+    """
     target = candidate.target or ""
     first = {str(texts[0]) for texts in table.factors.values()}
     day = candidate.setting.get("day")
     middle = day is None or abs(float(day) - 365.0) < 40.0
-    return middle and (not target or target.startswith("joint") or target.split(" ", 1)[-1] in first)
+    return middle and (
+        not target or target.startswith("joint") or target.split(" ", 1)[-1] in first
+    )
 
 
-def _judged(here: _Plan, beside_it: Callable[[str], _Plan], further: Sequence[str], key: Key) -> CausePlanned:
+def _judged(
+    here: _Plan, beside_it: Callable[[str], _Plan], further: Sequence[str], key: Key
+) -> CausePlanned:
     name, apart = here.nearest(key)
     split = None
     if apart > 2.0 * here.found_from(key):
-        better = (c for c in further if beside_it(c).tests(key) and beside_it(c).nearest(key)[1] < 0.5 * apart)
+        better = (
+            c
+            for c in further
+            if beside_it(c).tests(key) and beside_it(c).nearest(key)[1] < 0.5 * apart
+        )
         found = next(better, None)
         split = FURTHER[found].value if found in FURTHER else found
     told = max(apart, here.found_from(key)) if np.isfinite(apart) else None
@@ -248,7 +297,9 @@ def _judged(here: _Plan, beside_it: Callable[[str], _Plan], further: Sequence[st
 
 
 def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
-    """Rows as a planned fleet would give them: wear along landings, seasons, hand pump or not, people at bases."""
+    """Rows as a planned fleet would give them: wear along landings, seasons, hand pump or not,
+    people at bases.
+    """
     rng = np.random.default_rng(0)
     n = TAILS * 2 * VISITS
     tail = np.repeat(np.arange(TAILS), 2 * VISITS)
@@ -256,13 +307,20 @@ def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
     day = np.sort(rng.uniform(0.0, 730.0, (2 * TAILS, VISITS)), axis=1).ravel()
     landings = rng.uniform(500.0, 6000.0, 2 * TAILS)[gears] + 2.5 * day
     limits = gear.limits_in
-    wear = rng.lognormal(0.0, 0.4, (2 * TAILS, len(limits)))[gears] * limits * landings[:, None] / 8000.0
+    wear = (
+        rng.lognormal(0.0, 0.4, (2 * TAILS, len(limits)))[gears]
+        * limits
+        * landings[:, None]
+        / 8000.0
+    )
     clearance = np.abs(wear + DEFAULT_GAUGE_U_IN * rng.standard_normal(wear.shape))
     clearance[:, [joint not in joints for joint in gear.joint_numbers]] = np.nan
     quantities = {
         "day": day,
         "gear_landings": landings,
-        "temperature_c": 12.0 - 14.0 * np.cos(2.0 * np.pi * day / 365.25) + 6.0 * rng.standard_normal(n),
+        "temperature_c": (
+            12.0 - 14.0 * np.cos(2.0 * np.pi * day / 365.25) + 6.0 * rng.standard_normal(n)
+        ),
         "hydraulic_pressure_psi": rng.choice([1500.0, 2200.0, 2900.0, 3000.0, 3050.0], n),
     }
     if ALONG in recorded:
@@ -272,7 +330,9 @@ def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
         "side": np.where(gears % 2 == 0, "LH", "RH"),
         "approach": rng.choice(["EXTENDING", "RETRACTING"], n),
         "gauge_id": np.where(rng.random(n) < 0.7, tail % 4, rng.integers(0, 4, n)).astype(str),
-        "technician_id": np.array([f"W{k}" for k in np.where(rng.random(n) < 0.7, tail % 5, rng.integers(0, 5, n))]),
+        "technician_id": np.array(
+            [f"W{k}" for k in np.where(rng.random(n) < 0.7, tail % 5, rng.integers(0, 5, n))]
+        ),
     }
     floats = rng.uniform(0.0, 0.02, clearance.shape) if "axial_float" in recorded else None
     planned = DiagnosisTable(
@@ -290,5 +350,7 @@ def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
         return planned
     # Beside each reading at mid-position one along the stroke.
     both = planned.take(np.tile(np.arange(n), 2))
-    stroke = np.r_[np.full(n, np.nan), rng.permutation(np.linspace(0.0, gear.reference.stroke[1], n))]
+    stroke = np.r_[
+        np.full(n, np.nan), rng.permutation(np.linspace(0.0, gear.reference.stroke[1], n))
+    ]
     return replace(both, quantities={**both.quantities, ALONG: stroke})

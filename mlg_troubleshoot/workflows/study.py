@@ -1,4 +1,5 @@
-"""A study and what goes with it: statements, proofs, indices of measured inspections, table, report.
+"""A study and what goes with it: statements, proofs, indices of measured inspections, table,
+report.
 
 What computes is imported where it is needed: a check must not wait for scipy.
 """
@@ -32,7 +33,9 @@ from mlg_troubleshoot.units import LengthUnit
 
 @dataclass(frozen=True, slots=True)
 class GivenDataResult:
-    """First-order indices of measured inspections; used are valid rows that have a measured displacement."""
+    """First-order indices of measured inspections; used are valid rows that have a measured
+    displacement.
+    """
 
     file: str
     rows_read: int
@@ -52,7 +55,8 @@ def run_study(
     designs: bool = False,
     progress: Progress | None = None,
 ) -> StudyFindings:
-    """Recompute the sensitivity and amplification indices of a gear, and what is asked for with them.
+    """Recompute the sensitivity and amplification indices of a gear, and what is asked for with
+    them.
 
     Parameters
     ----------
@@ -86,14 +90,19 @@ def run_study(
     wanted = options or study.StudyOptions()
     told = progress or (lambda _stage, _done, _total: None)
     if statements and not targets_file(known).exists():
-        raise UsageError(f"{known.name} has no printed statements", f"Write {targets_file(known).name} next to it.")
+        raise UsageError(
+            f"{known.name} has no printed statements",
+            f"Write {targets_file(known).name} next to it.",
+        )
     findings = study.StudyFindings(known, wanted, study.run_study(known, wanted, told))
     if not findings.result.finished:
         return findings
     if designs:
         findings = replace(findings, designs=study.compare_designs(known, wanted, told))
     if statements:
-        found = check_statements(known, progress=lambda done, total: told("statements", done, total))
+        found = check_statements(
+            known, progress=lambda done, total: told("statements", done, total)
+        )
         findings = replace(findings, statements=found)
     if bound:
         findings = replace(findings, searches=_searches(known, wanted, told))
@@ -117,21 +126,28 @@ def refuse_other_tables(options: StudyOptions) -> None:
     if not options.is_standard:
         raise UsageError(
             "--write-table with other than the standard study",
-            "Use design fast, sampled or tensor, without --directions, --distribution, --limit, --beyond-margin.",
+            "Use design fast, sampled or tensor, without --directions, --distribution, --limit,"
+            " --beyond-margin.",
         )
 
 
 def write_study_table(findings: StudyFindings) -> Path:
-    """Write the table of indices that goes with the gear; one that is not complete or not standard is refused."""
+    """Write the table of indices that goes with the gear; one that is not complete or not standard
+    is refused.
+    """
     refuse_other_tables(findings.options)
     if not findings.result.finished:
-        raise UsageError("the study was interrupted, its table is not complete", "Run it again to the end.")
+        raise UsageError(
+            "the study was interrupted, its table is not complete", "Run it again to the end."
+        )
     write_index_table(findings.result.table, findings.gear.indices_file)
     return findings.gear.indices_file
 
 
 def given_data_study(file: Path, gear: Gear, seed: int) -> GivenDataResult:
-    """Estimate first-order indices from the inspections of a table: no model, only what was measured."""
+    """Estimate first-order indices from the inspections of a table: no model, only what was
+    measured.
+    """
     from mlg_troubleshoot.diagnosis import table_from_inspections
     from mlg_troubleshoot.indices.given_data import given_data_indices
     from mlg_troubleshoot.records import ReadOptions, read_many
@@ -185,7 +201,10 @@ def study_values(findings: StudyFindings, given: GivenDataResult | None = None) 
             **chosen(growth, "local_stage", "max_stage", "local_plunger", "max_plunger"),
             "exact_plunger": growth.exact,
         },
-        "statements": [{**plain(statement), "paragraph": statement.paragraph} for statement in findings.statements],
+        "statements": [
+            {**plain(statement), "paragraph": statement.paragraph}
+            for statement in findings.statements
+        ],
         "bounds": [
             {
                 "sense": "over-travel" if found.sense > 0 else "under-travel",
@@ -203,7 +222,9 @@ def study_values(findings: StudyFindings, given: GivenDataResult | None = None) 
             **chosen(given, "file", "rows_read", "rows_used"),
             "joints": [
                 {"joint": number, "first_order": first, "first_order_interval": ends, "rows": rows}
-                for number, first, ends, rows in zip(findings.gear.joint_numbers, *lists, strict=True)
+                for number, first, ends, rows in zip(
+                    findings.gear.joint_numbers, *lists, strict=True
+                )
             ],
         }
     cleaned: dict[str, Any] = plain(values)
@@ -211,10 +232,22 @@ def study_values(findings: StudyFindings, given: GivenDataResult | None = None) 
 
 
 _HEADS = (
-    "joint", "name", "first_order", "first_order_low", "first_order_high", "total_order", "total_order_low",
-    "total_order_high", "plunger_amplification", "max_amplification_index", "rank", "rank_least", "rank_greatest",
-    "first_order_least", "first_order_greatest",
-)  # fmt: skip
+    "joint",
+    "name",
+    "first_order",
+    "first_order_low",
+    "first_order_high",
+    "total_order",
+    "total_order_low",
+    "total_order_high",
+    "plunger_amplification",
+    "max_amplification_index",
+    "rank",
+    "rank_least",
+    "rank_greatest",
+    "first_order_least",
+    "first_order_greatest",
+)
 STUDY_CSV = OutputKind.marked("is not a table of a study", csv_text(_HEADS, ()))
 
 
@@ -222,9 +255,22 @@ def write_study_csv(findings: StudyFindings, path: Path) -> None:
     rows = []
     for joint, e in zip(findings.gear.joints, findings.result.table.joints, strict=True):
         numbers = (
-            e.first_order, *e.first_order_interval, e.total_order, *e.total_order_interval,
-            e.plunger_amplification, e.max_amplification_index,
-        )  # fmt: skip
+            e.first_order,
+            *e.first_order_interval,
+            e.total_order,
+            *e.total_order_interval,
+            e.plunger_amplification,
+            e.max_amplification_index,
+        )
         known = [v if math.isfinite(v) else None for v in (*numbers, *e.first_order_spread)]
-        rows.append((e.joint, joint.name, *known[: len(numbers)], e.rank, *e.rank_range, *known[len(numbers) :]))
+        rows.append(
+            (
+                e.joint,
+                joint.name,
+                *known[: len(numbers)],
+                e.rank,
+                *e.rank_range,
+                *known[len(numbers) :],
+            )
+        )
     write_csv(path, _HEADS, rows)

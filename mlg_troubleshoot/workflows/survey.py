@@ -41,14 +41,19 @@ _UNREAD = 2000
 _STAND_FOR_ALL = 20
 
 
-def write_survey_template(file: Path, gear: str | Path = DEFAULT_GEAR, unit: LengthUnit = LengthUnit.INCH) -> None:
+def write_survey_template(
+    file: Path, gear: str | Path = DEFAULT_GEAR, unit: LengthUnit = LengthUnit.INCH
+) -> None:
     """Write the rows that are worth reading on a gear, as CSV or xlsx, in inches or millimetres."""
     from mlg_troubleshoot.records.survey_table import write_survey_template as write
     from mlg_troubleshoot.surveying.plan import planned
     from mlg_troubleshoot.surveying.readings import SurveyedLinkage
 
     if file.suffix.lower() not in (".csv", ".xlsx"):
-        raise UsageError(f"{file.name!r} ends neither in .csv nor in .xlsx", "Give a name that ends in one of them.")
+        raise UsageError(
+            f"{file.name!r} ends neither in .csv nor in .xlsx",
+            "Give a name that ends in one of them.",
+        )
     known = load_gear(gear)
     write(file, SurveyedLinkage(known), planned(known), unit)
 
@@ -62,10 +67,11 @@ def survey_gear(
     seed: int = 0,
     told: Callable[[int, int], None] = lambda *_: None,
 ) -> SurveyResult:
-    """Find the linkage that a survey speaks of, and write it as a gear file with ensemble and index table.
+    """Find the linkage that a survey speaks of, and write it as a gear file with ensemble and index
+    table.
 
-    Nothing is written if readings contradict each other. With inspections, the next reading narrows what is unknown
-    of their displacement, in place of the indices.
+    Nothing is written if readings contradict each other. With inspections, the next reading narrows
+    what is unknown of their displacement, in place of the indices.
     """
     from mlg_troubleshoot.records.survey_table import read_survey
     from mlg_troubleshoot.surveying.plan import suggested, suggested_early
@@ -99,16 +105,21 @@ def survey_gear(
     clearance = np.array([c for _, c in cases]).reshape(len(cases), len(known.joints))
     moved = linkage.displacement(draws, clearance)
     own = linkage.displacement(middle, clearance)
-    # Logarithms: a few linkages near a dead centre would else decide alone. Without clearance nothing moves.
+    # Logarithms: a few linkages near a dead centre would else decide alone. Without clearance
+    # nothing moves.
     unknown = np.log(np.maximum(moved if cases else linkage.amplification(draws), 1e-9))
     if found is None or found.modes[0].parameters < FEW * len(linkage.names):
         some = clearance[:: max(1, len(cases) // _STAND_FOR_ALL)]
-        quantity = partial(linkage.displacement, clearance_in=some) if cases else linkage.amplification
+        quantity = (
+            partial(linkage.displacement, clearance_in=some) if cases else linkage.amplification
+        )
         suggestion = suggested_early(linkage, readings, quantity)
     else:
         suggestion = suggested(linkage, draws, unknown, readings)
     judged = tuple(
-        InspectedGear(name, float(d), (float(low), float(high)), float(np.mean(each <= known.margin.value)))
+        InspectedGear(
+            name, float(d), (float(low), float(high)), float(np.mean(each <= known.margin.value))
+        )
         for (name, _), d, each in zip(cases, own[0], moved.T, strict=True)
         for low, high in [np.nanquantile(each, [0.05, 0.95])]
     )
@@ -120,7 +131,10 @@ def survey_gear(
 def written_with(write: Path) -> list[OutputFile]:
     """What is written for a surveyed gear: its file, its ensemble, its table of indices."""
     if write.suffix.lower() != ".toml" or not is_name(write.stem) or len(write.stem) > LONGEST_NAME:
-        raise UsageError(f"{write.name!r} cannot be the name of a gear file", "Give a short name that ends in .toml.")
+        raise UsageError(
+            f"{write.name!r} cannot be the name of a gear file",
+            "Give a short name that ends in .toml.",
+        )
     ensemble, indices = _beside(write)
     kinds = ((write, SURVEYED), (ensemble, SURVEYED), (indices, INDEX_TABLE))
     return [OutputFile("--write", path, kind) for path, kind in kinds]
@@ -132,14 +146,19 @@ def _beside(path: Path) -> tuple[Path, Path]:
 
 
 def _clearances(file: Path | None, gear: Gear) -> list[tuple[str, Array]]:
-    """Clearances of given inspections; as in the prediction of a check, a joint that was not read counts 0."""
+    """Clearances of given inspections; as in the prediction of a check, a joint that was not read
+    counts 0.
+    """
     if file is None:
         return []
     from mlg_troubleshoot.records import ReadOptions, read_many
 
     read = read_many([file], ReadOptions.of(gear))
     if not read.inspections:
-        raise UsageError(f"{file}: no inspection in it can be judged", "Run mlg check on it and correct what it names.")
+        raise UsageError(
+            f"{file}: no inspection in it can be judged",
+            "Run mlg check on it and correct what it names.",
+        )
     return [
         (each.record_id, np.array([each.clearance_in.get(n) or 0.0 for n in gear.joint_numbers]))
         for each in read.inspections
@@ -150,7 +169,9 @@ def _assemblies(found: Survey) -> tuple[str, ...]:
     """Both assemblies, or both shapes of one assembly, where the survey allows two."""
     steps = [s for s in found.linkage.space.mechanism.steps if hasattr(s, "sign")]
     modes = [mode for mode in found.modes if mode.weight >= _WORTH_NAMING]
-    places = [f"joint {s.joint} on the {{}} of the line between its links' other ends" for s in steps]
+    places = [
+        f"joint {s.joint} on the {{}} of the line between its links' other ends" for s in steps
+    ]
     places += ["the rest on the {} of the crank"] * (len(found.modes[0].sides) - len(steps))
     shares: dict[str, float] = {}
     for mode in modes:
@@ -162,7 +183,13 @@ def _assemblies(found: Survey) -> tuple[str, ...]:
         if len({m.sides for m in modes}) == 1:
             moved = np.where(found.linkage.angles, 0.0, np.abs(mode.vector - modes[0].vector))
             name = found.linkage.names[int(np.argmax(moved))].split(".")[0]
-            parts = [f"one with point {name} elsewhere by {moved.max():.4f} in" if moved.any() else "as written"]
+            parts = [
+                (
+                    f"one with point {name} elsewhere by {moved.max():.4f} in"
+                    if moved.any()
+                    else "as written"
+                )
+            ]
         text = ", ".join(parts)
         shares[text] = shares.get(text, 0.0) + mode.weight
     texts = "; ".join(f"{text} ({100 * share:.0f} %)" for text, share in shares.items())
@@ -170,7 +197,9 @@ def _assemblies(found: Survey) -> tuple[str, ...]:
 
 
 def _left_targets(before: Gear, path: Path) -> tuple[str, ...]:
-    """Published numbers that the surveyed gear leaves: they are another gear's, or the paper's alone."""
+    """Published numbers that the surveyed gear leaves: they are another gear's, or the paper's
+    alone.
+    """
     from mlg_troubleshoot.paper.verification import verify
 
     targets = targets_file(before)
@@ -178,9 +207,9 @@ def _left_targets(before: Gear, path: Path) -> tuple[str, ...]:
         return ()
     left = [n for n in verify(load_gear(path), targets) if n.target.expected and not n.holds]
     return tuple(
-        f"{t.quantity}: the paper prints {t.printed}, this gear has {n.computed:.4g} {t.unit}".rstrip()
+        f"{n.target.quantity}: the paper prints {n.target.printed}, "
+        f"this gear has {n.computed:.4g} {n.target.unit}".rstrip()
         for n in left
-        for t in [n.target]
     )
 
 
@@ -204,31 +233,55 @@ def _write_gear(gear: Gear, found: Survey, path: Path, source: str) -> Path:
         write_text(path, _HEADING + tomli_w.dumps(values))
         write_index_table(run_study(load_gear(path), StudyOptions()).table, indices)
     except (GearFileError, MechanismError) as error:
-        raise UsageError(f"the surveyed gear cannot be written: {error.message}", error.remedy) from error
+        raise UsageError(
+            f"the surveyed gear cannot be written: {error.message}", error.remedy
+        ) from error
     return path
 
 
 def _put(values: dict[str, Any], found: Survey, source: str) -> None:
-    """Put the surveyed numbers into a gear file's values, each with a source that says its uncertainty."""
+    """Put the surveyed numbers into a gear file's values, each with a source that says its
+    uncertainty.
+    """
     linkage, mode = found.linkage, found.modes[0]
     new = member_values(linkage.linkage(np.round(mode.vector, _DECIMALS), "A"))
     spread = dict(zip(linkage.names, np.std(found.draws, axis=0), strict=True))
     sources = values["sources"]
 
-    def put(entry: dict[str, Any], numbers: dict[str, Any], what: str, *parts: tuple[str, str, float, str]) -> None:
+    def put(
+        entry: dict[str, Any],
+        numbers: dict[str, Any],
+        what: str,
+        *parts: tuple[str, str, float, str],
+    ) -> None:
         entry.update(numbers)
-        known = [f"{label} ± {spread[name] * scale:.2g} {unit}" for name, label, scale, unit in parts if name in spread]
-        text = f"Survey {source}: {what}, standard uncertainty {', '.join(known) or 'none: held in place'}."
+        known = [
+            f"{label} ± {spread[name] * scale:.2g} {unit}"
+            for name, label, scale, unit in parts
+            if name in spread
+        ]
+        text = (
+            f"Survey {source}: {what}, standard uncertainty"
+            f" {', '.join(known) or 'none: held in place'}."
+        )
         entry["source"] = f"survey_{len(sources)}"
         sources[entry["source"]] = {"kind": "measured", "text": text}
 
     turned = float(np.degrees(1.0))
     stroke = {"range": new["range"], "reference": new["reference"]}
-    put(values["input"], stroke, "actuator extension", ("extension", "extension", 1.0, linkage.driven_in))
+    put(
+        values["input"],
+        stroke,
+        "actuator extension",
+        ("extension", "extension", 1.0, linkage.driven_in),
+    )
     for plane in values["planes"]:
         if plane["name"] in new.get("planes", {}):
             name = plane["name"]
-            parts = ((f"{name}.direction", "hinge", turned, "°"), (f"{name}.dihedral", "dihedral", turned, "°"))
+            parts = (
+                (f"{name}.direction", "hinge", turned, "°"),
+                (f"{name}.dihedral", "dihedral", turned, "°"),
+            )
             put(plane, new["planes"][name], f"plane {name}", *parts)
     for point in values["points"]:
         name = point["name"]
@@ -237,18 +290,27 @@ def _put(values: dict[str, Any], found: Survey, source: str) -> None:
     for step in values["steps"]:
         step.update(new["steps"].get(step["joint"], {}))
         if "axis_deg" in step:
-            put(step, {}, f"axis of {step['joint']}", (f"{step['joint']}.axis", "axis", turned, "°"))
+            put(
+                step, {}, f"axis of {step['joint']}", (f"{step['joint']}.axis", "axis", turned, "°")
+            )
     if linkage.travel is not None:
         old = sources[values["calibration"]["source"]]["text"]
         travel = {"travel": float(round(mode.vector[-1], _DECIMALS))}
-        put(values["calibration"], travel, f"travel; the rest as before: {old}", ("travel", "travel", 1.0, "in"))
+        put(
+            values["calibration"],
+            travel,
+            f"travel; the rest as before: {old}",
+            ("travel", "travel", 1.0, "in"),
+        )
 
 
 def survey_values(result: SurveyResult) -> dict[str, Any]:
     """Return a survey as plain values, as the JSON contract has it."""
     found, suggestion = result.survey, result.suggestion
     mode = None if found is None else found.modes[0]
-    rows = zip(result.gear.joints, result.amplification, result.interval, result.before, strict=True)
+    rows = zip(
+        result.gear.joints, result.amplification, result.interval, result.before, strict=True
+    )
     values: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "gear_file": None if result.gear_file is None else str(result.gear_file),
@@ -261,17 +323,19 @@ def survey_values(result: SurveyResult) -> dict[str, Any]:
             }
             for joint, a, after, before in rows
         ],
-        "next": []
-        if suggestion is None
-        else [
-            {
-                "kind": suggestion.reading.kind.value,
-                "from": suggestion.reading.start or None,
-                "to": suggestion.reading.end or None,
-                "extension_in": suggestion.reading.extension,
-                "expected_narrowing": suggestion.narrowing,
-            }
-        ],
+        "next": (
+            []
+            if suggestion is None
+            else [
+                {
+                    "kind": suggestion.reading.kind.value,
+                    "from": suggestion.reading.start or None,
+                    "to": suggestion.reading.end or None,
+                    "extension_in": suggestion.reading.extension,
+                    "expected_narrowing": suggestion.narrowing,
+                }
+            ]
+        ),
         "misfits": [
             {
                 "row": m.reading.row,

@@ -1,7 +1,9 @@
-"""The advice beside other ways to go about it: ``python tests/benchmarks/bench_advice.py [--gears 2000] [--true B]``.
+"""The advice beside other ways to go about it: ``python tests/benchmarks/bench_advice.py [--gears
+2000] [--true B]``.
 
-Not collected by pytest. A robot that knows the true clearances and directions does what each policy says; gears,
-linkage and costs share no code with the product (`tests/decision/robot.py`). Every figure is printed beside its target.
+Not collected by pytest. A robot that knows the true clearances and directions does what each policy
+says; gears, linkage and costs share no code with the product (`tests/decision/robot.py`). Every
+figure is printed beside its target.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ PAPER_ORDER = (2, 3, 4, 5, 1, 6, 7, 8, 9, 10)
 
 def _rows(gears: Gears, folder: Path, which: np.ndarray) -> dict[int, dict[str, Any]]:
     return (
-        {} if not len(which) else dict(zip(which.tolist(), robot.judged(folder / "t.csv", gears, which), strict=True))
+        {}
+        if not len(which)
+        else dict(zip(which.tolist(), robot.judged(folder / "t.csv", gears, which), strict=True))
     )
 
 
@@ -36,7 +40,9 @@ def _measure(gears: Gears, i: int, joints: list[int], rng: np.random.Generator) 
 
 
 def _best_repair(gears: Gears, folder: Path, rng: np.random.Generator) -> None:
-    """Restore the best set of a gear that failed and is not within its margin, else what is over its limit."""
+    """Restore the best set of a gear that failed and is not within its margin, else what is over
+    its limit.
+    """
     for i, row in _rows(gears, folder, np.arange(len(gears.kind))).items():
         over = [j["joint"] for j in row["joints"] if j["over_limit"]]
         wanted = bool(gears.failed[i]) and row["verdict"] != "WITHIN_MARGIN"
@@ -56,13 +62,22 @@ def measure_all(gears: Gears, folder: Path, rng: np.random.Generator) -> None:
 
 
 def paper_order(gears: Gears, folder: Path, rng: np.random.Generator) -> None:
-    """Measure in the order of the paper's indices until there is a verdict, then the best repair."""
+    """Measure in the order of the paper's indices until there is a verdict, then the best
+    repair.
+    """
     going = np.arange(len(gears.kind))
     while len(going):
         found = _rows(gears, folder, going)
-        going = np.array([i for i in going if found[int(i)]["verdict"] == "INCOMPLETE"], dtype=np.intp)
+        going = np.array(
+            [i for i in going if found[int(i)]["verdict"] == "INCOMPLETE"], dtype=np.intp
+        )
         for i in going:
-            _measure(gears, int(i), [next(j for j in PAPER_ORDER if np.isnan(gears.read_in[i, j - 1]))], rng)
+            _measure(
+                gears,
+                int(i),
+                [next(j for j in PAPER_ORDER if np.isnan(gears.read_in[i, j - 1]))],
+                rng,
+            )
     _best_repair(gears, folder, rng)
 
 
@@ -91,10 +106,10 @@ def main() -> None:
     parser.add_argument("--only", action="append", help="a policy; may repeat")
     chosen = parser.parse_args()
     print(
-        f"Cost model (assumed, from the gear file): areas {AREA_MIN} min an opening, joints {READ_MIN} min to read, "
-        f"{RESTORE_MIN} min to restore, {PLUNGER_MIN} min for the plunger.\n{chosen.gears} gears of linkage "
-        f"{chosen.true}, a third failed through clearance, a third through something else, a third not; 0, 2, 5 or 10 "
-        "joints read."
+        f"Cost model (assumed, from the gear file): areas {AREA_MIN} min an opening, joints"
+        f" {READ_MIN} min to read, {RESTORE_MIN} min to restore, {PLUNGER_MIN} min for the"
+        f" plunger.\n{chosen.gears} gears of linkage {chosen.true}, a third failed through"
+        " clearance, a third through something else, a third not; 0, 2, 5 or 10 joints read."
     )
     found: dict[str, Figures] = {}
     for policy in (advice, measure_all, paper_order, oracle, go_on):
@@ -128,7 +143,12 @@ def _show(name: str, f: Figures, base: Figures | None) -> None:
 
 def _targets(f: Figures, base: Figures, wrong: float) -> None:
     for what, value, target, met in (
-        ("ended within twelve rounds", f.ended, "100 %", f.ended == 1.0 and f.most_rounds <= robot.ROUNDS),
+        (
+            "ended within twelve rounds",
+            f.ended,
+            "100 %",
+            f.ended == 1.0 and f.most_rounds <= robot.ROUNDS,
+        ),
         ("median of the rounds", f.median_rounds, "<= 4", f.median_rounds <= 4),
         ("second repair of the repaired", f.second_repair, "<= 2 %", f.second_repair <= 0.02),
         (
@@ -138,15 +158,30 @@ def _targets(f: Figures, base: Figures, wrong: float) -> None:
             f.wrong_within <= wrong,
         ),
         ("failures by clearance that retract at the end", f.retract, ">= 98 %", f.retract >= 0.98),
-        ("other failures with a sound joint restored", f.other_sound, "<= 10 %", f.other_sound <= 0.10),
+        (
+            "other failures with a sound joint restored",
+            f.other_sound,
+            "<= 10 %",
+            f.other_sound <= 0.10,
+        ),
         (
             "sound joints of the restored, more than measure_all",
             f.sound_share - base.sound_share,
             "<= 2 points",
             f.sound_share - base.sound_share <= 0.02,
         ),
-        ("end with a joint over its limit overlooked", f.overlooked, "<= 3 %", f.overlooked <= 0.03),
-        ("minutes of measure_all", f.minutes / base.minutes, "<= 85 %", f.minutes <= 0.85 * base.minutes),
+        (
+            "end with a joint over its limit overlooked",
+            f.overlooked,
+            "<= 3 %",
+            f.overlooked <= 0.03,
+        ),
+        (
+            "minutes of measure_all",
+            f.minutes / base.minutes,
+            "<= 85 %",
+            f.minutes <= 0.85 * base.minutes,
+        ),
     ):
         print(f"{what:<56} {value:8.3f}   {target:<12} {'met' if met else 'NOT MET'}")
 

@@ -1,7 +1,7 @@
 """How long the command line takes, and how much memory: ``python tests/benchmarks/bench_check.py``.
 
-Not collected by pytest. Each command runs in a process of its own; the least of several runs is compared with
-its target, because other work on the machine only ever adds time.
+Not collected by pytest. Each command runs in a process of its own; the least of several runs is
+compared with its target, because other work on the machine only ever adds time.
 """
 
 from __future__ import annotations
@@ -50,11 +50,22 @@ def write_inspections(path: Path, rows: int) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(
-            ["record_id", "tail_no", "side", "clearance_convention", *(f"clearance_{n}_in" for n in range(1, 11))]
+            [
+                "record_id",
+                "tail_no",
+                "side",
+                "clearance_convention",
+                *(f"clearance_{n}_in" for n in range(1, 11)),
+            ]
         )
         for row in range(rows):
-            values = ["" if none else value for value, none in zip(clearances[row], blank[row], strict=True)]
-            writer.writerow([f"R{row:05d}", f"N{row % 97:03d}", "LH" if row % 2 else "RH", "RADIAL", *values])
+            values = [
+                "" if none else value
+                for value, none in zip(clearances[row], blank[row], strict=True)
+            ]
+            writer.writerow(
+                [f"R{row:05d}", f"N{row % 97:03d}", "LH" if row % 2 else "RH", "RADIAL", *values]
+            )
 
 
 def measure(arguments: Sequence[str], runs: int) -> Measured:
@@ -92,16 +103,27 @@ def main() -> int:
         cases = [
             Case("mlg --help", ("--help",), 0.2, options.runs),
             Case("mlg check, one gear from CSV", ("check", one), 1.0, options.runs),
-            Case("mlg check, one gear from xlsx", ("check", one.replace(".csv", ".xlsx")), 1.0, options.runs),
+            Case(
+                "mlg check, one gear from xlsx",
+                ("check", one.replace(".csv", ".xlsx")),
+                1.0,
+                options.runs,
+            ),
             Case("mlg check --json, one gear", ("check", one, "--json"), 1.0, options.runs),
             Case(f"mlg check, {options.rows:,} rows", ("check", str(batch)), 20.0, 1),
-            Case(f"mlg check --json, {options.rows:,} rows", ("check", str(batch), "--json"), 20.0, 1),
+            Case(
+                f"mlg check --json, {options.rows:,} rows", ("check", str(batch), "--json"), 20.0, 1
+            ),
         ]
-        print(f"{'command':<36}{'wall s':>9}{'target s':>10}{'processor s':>13}{'memory MiB':>12}{'target MiB':>12}")
+        print(
+            f"{'command':<36}{'wall s':>9}{'target s':>10}{'processor s':>13}"
+            f"{'memory MiB':>12}{'target MiB':>12}"
+        )
         missed = 0
         if hasattr(os, "getloadavg"):
             print(
-                f"(load average {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores: if higher, wall exceeds processor)"
+                f"(load average {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores: if higher, wall"
+                " exceeds processor)"
             )
         for case in cases:
             found = measure(case.arguments, case.runs)

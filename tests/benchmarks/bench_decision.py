@@ -1,7 +1,8 @@
-"""What the decision can do, measured on simulated fleets: ``python tests/benchmarks/bench_decision.py``.
+"""What the decision can do, measured on simulated fleets: ``python
+tests/benchmarks/bench_decision.py``.
 
-Not collected by pytest. The fleets come from ``worn_gears``, which shares no code with the product. Every figure is
-printed beside its target; one that is not reached is printed all the same.
+Not collected by pytest. The fleets come from ``worn_gears``, which shares no code with the product.
+Every figure is printed beside its target; one that is not reached is printed all the same.
 """
 
 from __future__ import annotations
@@ -48,7 +49,9 @@ def repair_sets(gear: Gear, of: Inspection, margin_in: float = 0.03) -> tuple[Re
     """Repair sets of one gear."""
     cases = Cases.of(gear, [replace(of, margin_in=margin_in)])
     upper = predict_batch(cases).upper
-    found = repair.calibrated(cases, repair.search(cases, upper.displacement_in, upper.u_clearances_in))
+    found = repair.calibrated(
+        cases, repair.search(cases, upper.displacement_in, upper.u_clearances_in)
+    )
     return repair.repair_sets(cases, found, np.array([True]))[0]
 
 
@@ -82,7 +85,9 @@ class Explained:
     open_groups: int
 
 
-def _explain_some(rows: Sequence[int], fleet: worn_gears.Fleet, measured: NDArray[np.bool_]) -> list[Explained]:
+def _explain_some(
+    rows: Sequence[int], fleet: worn_gears.Fleet, measured: NDArray[np.bool_]
+) -> list[Explained]:
     gear = load_gear()
     found = []
     for row in rows:
@@ -100,7 +105,10 @@ def _explain_some(rows: Sequence[int], fleet: worn_gears.Fleet, measured: NDArra
                 tuple(ok for j, ok in enumerate(inside) if measured[row, j]),
                 min(places, default=-1),
                 bool(answer.called_worn),
-                sum(any(j + 1 not in read for j in np.array(group) - 1) for group in worn_gears.GROUPS),
+                sum(
+                    any(j + 1 not in read for j in np.array(group) - 1)
+                    for group in worn_gears.GROUPS
+                ),
             )
         )
     return found
@@ -113,7 +121,9 @@ def explained(fleet: worn_gears.Fleet, measured: NDArray[np.bool_]) -> list[Expl
     """Explain every gear of a fleet, on two processes."""
     rows = np.array_split(np.arange(len(fleet.true_in)), 8)
     with ProcessPoolExecutor(2) as pool:
-        return list(itertools.chain(*pool.map(partial(_explain_some, fleet=fleet, measured=measured), rows)))
+        return list(
+            itertools.chain(*pool.map(partial(_explain_some, fleet=fleet, measured=measured), rows))
+        )
 
 
 def posterior(n: int) -> None:
@@ -131,23 +141,36 @@ def posterior(n: int) -> None:
     )
     cover = float(np.mean([ok for e in found for ok in e.covered_measured]))
     show("the same, joints that were read", f"{cover:.1%}", "88-92 %", met=0.88 <= cover <= 0.92)
-    healthy = [e for e, true in zip(found, fleet.true_in, strict=True) if np.all(true <= worn_gears.LIMIT_IN)]
+    healthy = [
+        e
+        for e, true in zip(found, fleet.true_in, strict=True)
+        if np.all(true <= worn_gears.LIMIT_IN)
+    ]
     false = float(np.mean([e.called for e in healthy]))
     show(f"healthy gears ({len(healthy)}) called worn", f"{false:.2%}", "<= 1 %", met=false <= 0.01)
     worn = worn_gears.explained_fleet(n, rng, worn=None, other=0.0)
     measured = rng.random((n, 10)) < 0.5
     found = explained(worn, measured)
     top = float(np.mean([0 <= e.place < 2 for e in found]))
-    show(f"{n} gears, one worn joint, half read: worn group in the top two", f"{top:.1%}", ">= 95 %", met=top >= 0.95)
+    show(
+        f"{n} gears, one worn joint, half read: worn group in the top two",
+        f"{top:.1%}",
+        ">= 95 %",
+        met=top >= 0.95,
+    )
     best = worn_gears.best_places(worn, measured, rng)
     print(
-        f"    the best that anyone could do who knows how these gears were drawn: {np.mean(best < 2):.1%}", flush=True
+        "    the best that anyone could do who knows how these gears were drawn:"
+        f" {np.mean(best < 2):.1%}",
+        flush=True,
     )
     for k in range(8):
         some = [e for e in found if e.open_groups == k]
         if len(some) >= 20:
             top = float(np.mean([0 <= e.place < 2 for e in some]))
-            print(f"    {k} of 7 groups not fully read ({len(some)} gears): in the top two {top:.1%}")
+            print(
+                f"    {k} of 7 groups not fully read ({len(some)} gears): in the top two {top:.1%}"
+            )
 
 
 def _quick_error(gear: Gear) -> float:
@@ -170,9 +193,10 @@ class Tally:
         said_within = np.array([v is Verdict.WITHIN_MARGIN for v in self.verdicts])
         said_outside = np.array([v is Verdict.OUTSIDE_MARGIN for v in self.verdicts])
         return (
-            f"{self.readings.mean():5.2f} readings {self.minutes.mean():6.1f} min   verdict WITHIN "
-            f"{said_within.mean():5.1%}, OUTSIDE {said_outside.mean():5.1%}; wrong WITHIN "
-            f"{np.mean(said_within & ~within):.2%}, wrong OUTSIDE {np.mean(said_outside & within):.2%}"
+            f"{self.readings.mean():5.2f} readings {self.minutes.mean():6.1f} min   verdict WITHIN"
+            f" {said_within.mean():5.1%}, OUTSIDE {said_outside.mean():5.1%}; wrong WITHIN"
+            f" {np.mean(said_within & ~within):.2%}, wrong OUTSIDE"
+            f" {np.mean(said_outside & within):.2%}"
         )
 
 
@@ -223,7 +247,9 @@ def measure(gear: Gear, read: Array, order: Order, stop: str) -> Tally:
         for row in going:
             joint = order(gear, read[row], measured[row])
             taken = [int(j) + 1 for j in np.flatnonzero(measured[row])]
-            minutes[row] += minutes_to_measure(gear, [joint], frozenset(gear.joint(n).area for n in taken))
+            minutes[row] += minutes_to_measure(
+                gear, [joint], frozenset(gear.joint(n).area for n in taken)
+            )
             measured[row, joint - 1] = True
         now = _verdicts(gear, read[going], measured[going])
         for row, found in zip(going, now, strict=True):
@@ -285,7 +311,9 @@ def _by_hand(gear: Gear, joints: Sequence[int]) -> float:
 def _beaten(gear: Gear, read: Array, best: RepairSet | None) -> bool:
     """True if another set reaches 95 % in less time, or in the same time with fewer joints."""
     must = {j + 1 for j in range(10) if read[j] > worn_gears.LIMIT_IN}
-    every = [s for k in range(11) for s in itertools.combinations(range(1, 11), k) if must <= set(s)]
+    every = [
+        s for k in range(11) for s in itertools.combinations(range(1, 11), k) if must <= set(s)
+    ]
     if best is None:
         rival = every
     else:
@@ -293,9 +321,13 @@ def _beaten(gear: Gear, read: Array, best: RepairSet | None) -> bool:
         rival = [s for s in every if (_by_hand(gear, s), len(s)) < key]
     if not rival:
         return False
-    after = np.array([[min(read[j], 0.0005) if j + 1 in s else read[j] for j in range(10)] for s in rival])
+    after = np.array(
+        [[min(read[j], 0.0005) if j + 1 in s else read[j] for j in range(10)] for s in rival]
+    )
     n = len(rival)
-    found = predict(gear, [inspection({})] * n, after, np.ones((n, 10), bool), np.full(n, worn_gears.GAUGE_U_IN))
+    found = predict(
+        gear, [inspection({})] * n, after, np.ones((n, 10), bool), np.full(n, worn_gears.GAUGE_U_IN)
+    )
     enough = found.probability_within(np.full(n, MARGIN_IN), np.zeros(n)) >= 0.95
     return bool(enough.any())
 
@@ -310,7 +342,9 @@ def repairs(n: int) -> None:
     read = worn_gears.readings(true_in, rng)
     beaten, repaired, none, not_needed = 0, [], 0, 0
     for row in range(n):
-        sets = repair_sets(gear, inspection({j + 1: float(read[row, j]) for j in range(10)}), MARGIN_IN)
+        sets = repair_sets(
+            gear, inspection({j + 1: float(read[row, j]) for j in range(10)}), MARGIN_IN
+        )
         if sets:
             beaten += _beaten(gear, read[row], sets[0])
             after = true_in[row].copy()
@@ -331,7 +365,10 @@ def repairs(n: int) -> None:
     moved = moved + rng.normal(size=len(rows)) * np.maximum(0.003, 0.1 * moved)
     share = float(np.mean(moved <= MARGIN_IN))
     show(
-        f"simulated gear within its margin after the repair ({len(rows)})", f"{share:.1%}", ">= 95 %", met=share >= 0.95
+        f"simulated gear within its margin after the repair ({len(rows)})",
+        f"{share:.1%}",
+        ">= 95 %",
+        met=share >= 0.95,
     )
 
 
@@ -357,9 +394,18 @@ def main() -> None:
     """Run the benchmarks."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", choices=("speed", "measuring", "repairs", "posterior"))
-    parser.add_argument("--gears", type=int, default=10_000, help="size of the fleet of the posterior")
-    parser.add_argument("--measured", type=int, default=2_000, help="size of the fleet that is measured joint by joint")
-    parser.add_argument("--repaired", type=int, default=1_000, help="size of the fleet that is repaired")
+    parser.add_argument(
+        "--gears", type=int, default=10_000, help="size of the fleet of the posterior"
+    )
+    parser.add_argument(
+        "--measured",
+        type=int,
+        default=2_000,
+        help="size of the fleet that is measured joint by joint",
+    )
+    parser.add_argument(
+        "--repaired", type=int, default=1_000, help="size of the fleet that is repaired"
+    )
     chosen = parser.parse_args()
     parts: dict[str, Callable[[], None]] = {
         "speed": speed,

@@ -1,8 +1,10 @@
-"""How often ``diagnose_simulation`` is right: rigs with hidden errors, groups, outliers, heavy tails, large changes.
+"""How often ``diagnose_simulation`` is right: rigs with hidden errors, groups, outliers, heavy
+tails, large changes.
 
-``python -m tests.benchmarks.bench_simulation [sets of each rig]`` prints for each rig, with nothing wrong and with one
-parameter wrong at S = 10, the share of alarms, of true classes in the set, and of wrong unique names, and the time of
-a set with 300 rows × 3 outputs, 24 suspects and 30 nuisance parameters.
+``python -m tests.benchmarks.bench_simulation [sets of each rig]`` prints for each rig, with nothing
+wrong and with one parameter wrong at S = 10, the share of alarms, of true classes in the set, and
+of wrong unique names, and the time of a set with 300 rows × 3 outputs, 24 suspects and 30 nuisance
+parameters.
 """
 
 from __future__ import annotations
@@ -37,9 +39,19 @@ def one_set(rig_name: str, number: int, wrong: bool) -> tuple[str | None, Simula
         noise = rig.seen(name, change) * np.sqrt(readings_read) / S / np.sqrt(1.0 + scatter**2)
         values = {name: nominal + change}
     read = readings(
-        rig, values, noise, rng, groups, scatter, 0.02 * rng.integers(2), missing=0.01, heavy=bool(rng.integers(2))
+        rig,
+        values,
+        noise,
+        rng,
+        groups,
+        scatter,
+        0.02 * rng.integers(2),
+        missing=0.01,
+        heavy=bool(rng.integers(2)),
     )
-    found = diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown, groups, permutations=DRAWS, seed=number)
+    found = diagnose_simulation(
+        rig.predict, read, rig.suspected, rig.unknown, groups, permutations=DRAWS, seed=number
+    )
     return name, found
 
 
@@ -80,11 +92,20 @@ def main(sets: int) -> None:
                 if name is not None:
                     count["true class in the set"] += name in said(found)
                     unique = found.verdict is Verdict.NAMED
-                    count["wrong unique name"] += unique and any(name not in (c.name, *c.aliases) for c in found.causes)
-            print(f"{rig_name:12} {'one wrong' if wrong else 'nothing wrong':14}", dict(count), flush=True)
+                    count["wrong unique name"] += unique and any(
+                        name not in (c.name, *c.aliases) for c in found.causes
+                    )
+            print(
+                f"{rig_name:12} {'one wrong' if wrong else 'nothing wrong':14}",
+                dict(count),
+                flush=True,
+            )
             total += count
         print("all", dict(total))
-    print(f"300 × 3 readings, 24 suspects, 30 nuisance parameters, 999 draws: {timed():.2f} s of processor time")
+    print(
+        f"300 × 3 readings, 24 suspects, 30 nuisance parameters, 999 draws: {timed():.2f} s of"
+        " processor time"
+    )
 
 
 if __name__ == "__main__":

@@ -1,8 +1,10 @@
-"""A large store, timed: ``python tests/benchmarks/bench_store.py [--gears 5000] [--visits 20] [--store PATH|URL]``.
+"""A large store, timed: ``python tests/benchmarks/bench_store.py [--gears 5000] [--visits 20]
+[--store PATH|URL]``.
 
-Not collected by pytest. Inspections are drawn here; one in a hundred is judged, and the others carry an assessment of
-that size, so that what is timed is keeping and reading back, not judging. Then slips are planted in a fleet of 100
-gears and the suggestions counted. Every figure stands beside its target, reached or not.
+Not collected by pytest. Inspections are drawn here; one in a hundred is judged, and the others
+carry an assessment of that size, so that what is timed is keeping and reading back, not judging.
+Then slips are planted in a fleet of 100 gears and the suggestions counted. Every figure stands
+beside its target, reached or not.
 """
 
 from __future__ import annotations
@@ -41,7 +43,9 @@ def show(what: str, found: str, target: str, *, met: bool) -> None:
 
 
 def timed(what: str, most_s: float, work: Callable[[], T]) -> T:
-    """Time one piece of work, by the clock and by the processor: on a busy machine only the second says something."""
+    """Time one piece of work, by the clock and by the processor: on a busy machine only the second
+    says something.
+    """
     start, worked = time.perf_counter(), time.process_time()
     result = work()
     taken, worked = time.perf_counter() - start, time.process_time() - worked
@@ -83,14 +87,17 @@ def records(drawn: list[list[Inspection]], gear: Gear) -> list[Record]:
         of = judged[n // 100]
         assert isinstance(of, Assessment)
         found.append(inspection_record(inspection))
-        found.append(history._assessment(gear, CheckOptions(), replace(of, inspection=inspection), found[-1]))
+        found.append(
+            history._assessment(gear, CheckOptions(), replace(of, inspection=inspection), found[-1])
+        )
     return found
 
 
 def slips(gear: Gear, rng: np.random.Generator, trials: int) -> None:
     """Plant missed restorations and exchanged gears in fleets of 100, and count what is suggested.
 
-    A gear restored after 2,800 landings drops by five forecast standard deviations at a joint of mean pace.
+    A gear restored after 2,800 landings drops by five forecast standard deviations at a joint of
+    mean pace.
     """
     drawn = lives(100, 14, rng)
     found_restored = found_exchanged = asked = false = 0
@@ -106,11 +113,23 @@ def slips(gear: Gear, rng: np.random.Generator, trials: int) -> None:
         names = [f"N{i // 2} {'RH' if i % 2 else 'LH'}" for i in (restored, one, two)]
         asked += 1
         found_restored += any(line.startswith(f"{names[0]}: ") for line in said)
-        found_exchanged += any(f"{names[1]} and" in line or f"and {names[1]} " in line for line in said)
+        found_exchanged += any(
+            f"{names[1]} and" in line or f"and {names[1]} " in line for line in said
+        )
         if trial == 0:
             false = len(suggested(drawn, gear))
-    show("missed restorations suggested", f"{found_restored} of {asked}", ">= 95 %", met=found_restored >= 0.95 * asked)
-    show("exchanged gears suggested", f"{found_exchanged} of {asked}", ">= 95 %", met=found_exchanged >= 0.95 * asked)
+    show(
+        "missed restorations suggested",
+        f"{found_restored} of {asked}",
+        ">= 95 %",
+        met=found_restored >= 0.95 * asked,
+    )
+    show(
+        "exchanged gears suggested",
+        f"{found_exchanged} of {asked}",
+        ">= 95 %",
+        met=found_exchanged >= 0.95 * asked,
+    )
     show("suggested in 100 sound gears", str(false), "<= 1", met=false <= 1)
 
 
@@ -128,7 +147,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--gears", type=int, default=5000)
     parser.add_argument("--visits", type=int, default=20)
-    parser.add_argument("--slips", type=int, default=20, help="fleets of 100 gears with planted slips")
+    parser.add_argument(
+        "--slips", type=int, default=20, help="fleets of 100 gears with planted slips"
+    )
     parser.add_argument("--store")
     given = parser.parse_args()
     gear, rng = load_gear(), np.random.default_rng(1)
@@ -137,7 +158,11 @@ def main() -> None:
     count = given.gears * given.visits
     with tempfile.TemporaryDirectory() as folder:
         store = Store(given.store or Path(folder) / "store.sqlite")
-        timed(f"keeping {count} inspections of {given.gears} gears", 60.0, lambda: store.add(records(drawn, gear)))
+        timed(
+            f"keeping {count} inspections of {given.gears} gears",
+            60.0,
+            lambda: store.add(records(drawn, gear)),
+        )
         if given.store is None:
             size = Path(store.place).stat().st_size / 1e6
             show("size of the store", f"{size:.0f} MB", "<= 250 MB", met=size <= 250)
@@ -149,7 +174,11 @@ def main() -> None:
             return found
 
         found = timed("the fleet without forecasts", 10.0, page)
-        timed("the fleet's forecasts", 60.0, lambda: history.forecast(found, history.fit_fleet(found, gear), gear))
+        timed(
+            "the fleet's forecasts",
+            60.0,
+            lambda: history.forecast(found, history.fit_fleet(found, gear), gear),
+        )
 
 
 if __name__ == "__main__":

@@ -1,8 +1,10 @@
-"""Forward model and sensitivity indices beside other libraries: ``python tests/benchmarks/bench_studies.py``.
+"""Forward model and sensitivity indices beside other libraries: ``python
+tests/benchmarks/bench_studies.py``.
 
-Not collected by pytest. Everything runs in one process on one core in turn, so that the ratios mean something on
-a shared machine; each time is the least of several runs. A library that is not installed is left out and named:
-``pip install numba SALib openturns pylinkage python-solvespace``. ``--full`` adds the paper-size total-order study.
+Not collected by pytest. Everything runs in one process on one core in turn, so that the ratios mean
+something on a shared machine; each time is the least of several runs. A library that is not
+installed is left out and named: ``pip install numba SALib openturns pylinkage python-solvespace``.
+``--full`` adds the paper-size total-order study.
 """
 
 # The number of threads must be set before numpy is imported.
@@ -106,10 +108,16 @@ def forward(response: HeldDirections) -> list[Line]:
 
     lines = []
     numpy_rate = rate(compiled=False)
-    lines.append(Line("real linkage, numpy", f"{numpy_rate / 1e6:.1f} M/s", "≥ 8 M/s", numpy_rate >= 8e6))
+    lines.append(
+        Line("real linkage, numpy", f"{numpy_rate / 1e6:.1f} M/s", "≥ 8 M/s", numpy_rate >= 8e6)
+    )
     if numba_is_installed():
         numba_rate = rate(compiled=True)
-        lines.append(Line("real linkage, numba", f"{numba_rate / 1e6:.1f} M/s", "≥ 50 M/s", numba_rate >= 50e6))
+        lines.append(
+            Line(
+                "real linkage, numba", f"{numba_rate / 1e6:.1f} M/s", "≥ 50 M/s", numba_rate >= 50e6
+            )
+        )
     return lines + _chain_rates()
 
 
@@ -126,7 +134,10 @@ def _chain_rates() -> list[Line]:
     own_rate = count / least(own)
     lines = [Line("small chain, this package", f"{own_rate / 1e6:.1f} M/s", "", None)]
     here = kernel.positions(0.5, kernel.no_clearance())["K"]
-    for name, peer, factor in (("pylinkage simulate_batch", _pylinkage, 100), ("python-solvespace", _solvespace, 3000)):
+    for name, peer, factor in (
+        ("pylinkage simulate_batch", _pylinkage, 100),
+        ("python-solvespace", _solvespace, 3000),
+    ):
         try:
             peer_rate, place = peer()
         except ImportError:
@@ -137,7 +148,10 @@ def _chain_rates() -> list[Line]:
         ratio = own_rate / peer_rate
         lines.append(
             Line(
-                f"small chain, {name}", f"{peer_rate / 1e3:.1f} k/s, ratio {ratio:.0f}", f"≥ {factor}", ratio >= factor
+                f"small chain, {name}",
+                f"{peer_rate / 1e3:.1f} k/s, ratio {ratio:.0f}",
+                f"≥ {factor}",
+                ratio >= factor,
             )
         )
     return lines
@@ -152,13 +166,19 @@ def _pylinkage() -> tuple[float, tuple[float, float]]:
     m = chain()
     ground = {p.name: Ground(p.x, p.y, name=p.name) for p in m.points if p.fixed}
     parts: dict[str, object] = dict(ground)
-    parts["B"] = PeerCrank(ground["A"], radius=2.0, angular_velocity=0.0, initial_angle=0.5, name="B")
+    parts["B"] = PeerCrank(
+        ground["A"], radius=2.0, angular_velocity=0.0, initial_angle=0.5, name="B"
+    )
     for joint, start, end, first, second in DYADS:
         p = m.point(joint)
         parts[joint] = RRRDyad(parts[start], parts[end], first, second, x=p.x, y=p.y, name=joint)
     k = m.point("K")
     ends = Ground(0.0, LINE, name="L1"), Ground(30.0, LINE, name="L2")
-    parts |= {"L1": ends[0], "L2": ends[1], "K": RRPDyad(parts["H"], *ends, ROD, x=k.x, y=k.y, name="K")}
+    parts |= {
+        "L1": ends[0],
+        "L2": ends[1],
+        "K": RRPDyad(parts["H"], *ends, ROD, x=k.x, y=k.y, name="K"),
+    }
     linkage = Linkage(list(parts.values()))
     data = linkage_to_solver_data(linkage)
     count = 2000
@@ -166,7 +186,10 @@ def _pylinkage() -> tuple[float, tuple[float, float]]:
     positions = np.tile(data.positions, (count, 1, 1))
     track = simulate_batch(data, constraints, positions, 1)
     place = track[0, 0, -1]
-    return count / least(lambda: simulate_batch(data, constraints, positions, 1)), (float(place[0]), float(place[1]))
+    return count / least(lambda: simulate_batch(data, constraints, positions, 1)), (
+        float(place[0]),
+        float(place[1]),
+    )
 
 
 def _solvespace() -> tuple[float, tuple[float, float]]:
@@ -189,7 +212,10 @@ def _solvespace() -> tuple[float, tuple[float, float]]:
     system.distance(handles["K"], handles["H"], ROD, plane)
     count = 200
     rng = np.random.default_rng(0)
-    starts = [(m.point("K").x + dx, m.point("K").y + dy) for dx, dy in 0.01 * rng.standard_normal((count, 2))]
+    starts = [
+        (m.point("K").x + dx, m.point("K").y + dy)
+        for dx, dy in 0.01 * rng.standard_normal((count, 2))
+    ]
 
     def work() -> None:
         for x, y in starts:
@@ -208,7 +234,9 @@ def indices(response: HeldDirections) -> list[Line]:
     exact = tensor_indices(response, limits, order=4)
 
     def error(first: Array, total: Array) -> float:
-        return float(max(np.abs(first - exact.first_order).max(), np.abs(total - exact.total_order).max()))
+        return float(
+            max(np.abs(first - exact.first_order).max(), np.abs(total - exact.total_order).max())
+        )
 
     own_errors, own_counts = [], []
     for seed in range(SEEDS):
@@ -236,7 +264,10 @@ def indices(response: HeldDirections) -> list[Line]:
             lines.append(Line(f"indices, {name}", "not installed", "", None))
             continue
         ratio = seconds / own
-        text = f"{seconds * 1e3:.1f} ms, {needed} evaluations, worst error {worst:.1g}, ratio {ratio:.0f}"
+        text = (
+            f"{seconds * 1e3:.1f} ms, {needed} evaluations, worst error {worst:.1g}, ratio"
+            f" {ratio:.0f}"
+        )
         lines.append(Line(f"indices, {name}", text, f"≥ {factor}", ratio >= factor))
     return lines
 
@@ -289,7 +320,9 @@ def _openturns(cube: Callable[[Array], Array], error: Error) -> tuple[int, float
 
     ot.Log.Show(ot.Log.NONE)
     inputs = ot.JointDistribution([ot.Uniform(0.0, 1.0)] * 10)
-    basis = ot.OrthogonalProductPolynomialFactory([ot.LegendreFactory()] * 10, ot.LinearEnumerateFunction(10))
+    basis = ot.OrthogonalProductPolynomialFactory(
+        [ot.LegendreFactory()] * 10, ot.LinearEnumerateFunction(10)
+    )
 
     def run(seed: int) -> tuple[Array, Array]:
         ot.RandomGenerator.SetSeed(seed)
@@ -298,7 +331,9 @@ def _openturns(cube: Callable[[Array], Array], error: Error) -> tuple[int, float
         best = None
         for degree in (1, 2, 3):
             size = basis.getEnumerateFunction().getBasisSizeFromTotalDegree(degree)
-            algorithm = ot.LeastSquaresExpansion(sample[:384], ot.Sample(values[:384, None]), inputs, basis, size, "QR")
+            algorithm = ot.LeastSquaresExpansion(
+                sample[:384], ot.Sample(values[:384, None]), inputs, basis, size, "QR"
+            )
             algorithm.run()
             result = algorithm.getResult()
             misses = np.asarray(result.getMetaModel()(sample[384:]))[:, 0] - values[384:]
@@ -330,7 +365,10 @@ def paper_study(response: HeldDirections) -> list[Line]:
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     return [
         Line(
-            f"total-order study, {study.evaluations / 1e9:.3f}e9 solutions", f"{seconds:.1f} s", "≤ 90 s", seconds <= 90
+            f"total-order study, {study.evaluations / 1e9:.3f}e9 solutions",
+            f"{seconds:.1f} s",
+            "≤ 90 s",
+            seconds <= 90,
         ),
         Line("its memory", f"{memory:.0f} MiB", "≤ 500 MiB", memory <= 500),
     ]

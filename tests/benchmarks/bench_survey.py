@@ -1,11 +1,13 @@
-"""Surveys of linkages that the tool has not seen: ``python -m tests.benchmarks.bench_survey [--linkages N]``.
+"""Surveys of linkages that the tool has not seen: ``python -m tests.benchmarks.bench_survey
+[--linkages N]``.
 
-Not collected by pytest. A hidden linkage lies between two of the ten, at random on the line, and every coordinate is
-moved by a normal error of a tenth of its spread over the ten; it must move over its whole stroke and, as the ten do,
-close in the worst directions with every clearance at its limit. Its numbers are drawn from the two data files, its
-readings and its indices come from the loops of ``tests/gear/independent_solver.py``: neither shares code with the
-product. The template says what is read, each reading has the error that it states, and plunger positions are read at
-the same shares of the linkage's own stroke. Every figure stands beside its target, reached or not.
+Not collected by pytest. A hidden linkage lies between two of the ten, at random on the line, and
+every coordinate is moved by a normal error of a tenth of its spread over the ten; it must move over
+its whole stroke and, as the ten do, close in the worst directions with every clearance at its
+limit. Its numbers are drawn from the two data files, its readings and its indices come from the
+loops of ``tests/gear/independent_solver.py``: neither shares code with the product. The template
+says what is read, each reading has the error that it states, and plunger positions are read at the
+same shares of the linkage's own stroke. Every figure stands beside its target, reached or not.
 """
 
 from __future__ import annotations
@@ -39,15 +41,20 @@ GEAR = load_gear()
 POINTS = ("F", "E", "Q", "4", "1", "2", "3", "5", "6", "7", "8", "9", "10")
 TRAVEL, LIMIT = 0.45, 0.0075
 U = {"DISTANCE": 0.01, "PLUNGER": 0.0015, "EXTENSION": 0.005, "ANGLE": 1.0}
-# Leave-one-out standard deviations that a slip counts from. No distance has a smaller one than its own uncertainty.
+# Leave-one-out standard deviations that a slip counts from. No distance has a smaller one than its
+# own uncertainty.
 LEAST_SIZE = 6.0
 SLIPS = ("x25.4", "x2.54", "wrong pin", "swapped pair")
 
 
 def numbers_of_the_ten() -> np.ndarray:
-    """Coordinates, hinge, dihedral and axis in degrees, stroke: one row a linkage, from the data files alone."""
+    """Coordinates, hinge, dihedral and axis in degrees, stroke: one row a linkage, from the data
+    files alone.
+    """
     reference = tomllib.loads(GEAR.path.read_text(encoding="utf-8"))
-    members = tomllib.loads((GEAR.path.parent / reference["ensemble"]).read_text(encoding="utf-8"))["members"]
+    members = tomllib.loads((GEAR.path.parent / reference["ensemble"]).read_text(encoding="utf-8"))[
+        "members"
+    ]
     plane = reference["planes"][1]
     own = {
         "points": {p["name"]: p["at"] for p in reference["points"]},
@@ -58,7 +65,11 @@ def numbers_of_the_ten() -> np.ndarray:
     rows = []
     for m in (own, *members.values()):
         turned = m["planes"]["link_assembly"]
-        angles = [turned["hinge_direction_deg"], turned["dihedral_deg"], m["steps"]["10"]["axis_deg"]]
+        angles = [
+            turned["hinge_direction_deg"],
+            turned["dihedral_deg"],
+            m["steps"]["10"]["axis_deg"],
+        ]
         rows.append([c for p in POINTS for c in m["points"][p]] + angles + [m["range"][1]])
     found = np.array(rows)
     for column in (-4, -3, -2):
@@ -110,7 +121,11 @@ def drawn(ten: np.ndarray, rng: np.random.Generator) -> Hidden:
     while True:
         a, b = rng.choice(len(ten), 2, replace=False)
         share = rng.random()
-        x = (1 - share) * ten[a] + share * ten[b] + 0.1 * ten.std(axis=0) * rng.standard_normal(ten.shape[1])
+        x = (
+            (1 - share) * ten[a]
+            + share * ten[b]
+            + 0.1 * ten.std(axis=0) * rng.standard_normal(ten.shape[1])
+        )
         try:
             with np.errstate(all="ignore"):
                 found = Hidden(x)
@@ -135,7 +150,11 @@ def surveyed(
         rows.append({**row, column: value, "extension_in": "" if at is None else at})
     if not slip:
         return rows, set()
-    places = [i for i, row in enumerate(rows) if row["kind"] == "DISTANCE" and "NOT" not in str(row["how"])]
+    places = [
+        i
+        for i, row in enumerate(rows)
+        if row["kind"] == "DISTANCE" and "NOT" not in str(row["how"])
+    ]
     while True:
         i, j = (int(k) for k in rng.choice(places, 2, replace=False))
         right, rows_wrong = float(str(rows[i]["value_in"])), {i + 2}
@@ -156,28 +175,43 @@ def surveyed(
 
 
 def variables(hidden: Hidden, linkage: SurveyedLinkage) -> np.ndarray:
-    """The numbers of a hidden linkage in the order of the product's design variables. [in or rad]"""
+    """The numbers of a hidden linkage in the order of the product's design variables. [in or
+    rad]
+    """
     x = hidden.x
-    numbers = {f"{p}.{axis}": x[2 * i + k] for i, p in enumerate(POINTS) for k, axis in enumerate("xy")}
+    numbers = {
+        f"{p}.{axis}": x[2 * i + k] for i, p in enumerate(POINTS) for k, axis in enumerate("xy")
+    }
     turned = dict(
-        zip(("link_assembly.direction", "link_assembly.dihedral", "10.axis"), np.radians(x[-4:-1]), strict=True)
+        zip(
+            ("link_assembly.direction", "link_assembly.dihedral", "10.axis"),
+            np.radians(x[-4:-1]),
+            strict=True,
+        )
     )
     numbers |= {"5.r": numbers["5.x"], **turned, "extension": x[-1], "travel": TRAVEL}
     return np.array([numbers[n] for n in linkage.names])
 
 
 def size_of_slip(hidden: Hidden, readings: tuple[Reading, ...], wrong: set[int]) -> float:
-    """How far the wrong readings are from what all right ones predict for them, in its standard deviations; the least.
+    """How far the wrong readings are from what all right ones predict for them, in its standard
+    deviations; the least.
 
     The right readings are fitted from the hidden linkage, so that no other valley counts.
     """
     linkage = SurveyedLinkage(GEAR)
     prior = Prior(linkage)
     kept = np.array([r.row not in wrong for r in readings])
-    mode = Fitting(linkage, prior, readings).modes(variables(hidden, linkage)[None], prior.mean[None], kept)[0]
+    mode = Fitting(linkage, prior, readings).modes(
+        variables(hidden, linkage)[None], prior.mean[None], kept
+    )[0]
     predicted, slopes = linkage.slopes(readings, mode.vector[None])
-    variance = np.einsum("mi,ij,mj->m", slopes[0], mode.covariance, slopes[0]) + [r.u**2 for r in readings]
-    return float(np.min((np.abs(predicted[0] - [r.value for r in readings]) / np.sqrt(variance))[~kept]))
+    variance = np.einsum("mi,ij,mj->m", slopes[0], mode.covariance, slopes[0]) + [
+        r.u**2 for r in readings
+    ]
+    return float(
+        np.min((np.abs(predicted[0] - [r.value for r in readings]) / np.sqrt(variance))[~kept])
+    )
 
 
 def run(rows: list[dict[str, object]], folder: Path) -> SurveyResult:
@@ -190,51 +224,80 @@ def run(rows: list[dict[str, object]], folder: Path) -> SurveyResult:
 
 
 def left_open(
-    linkage: SurveyedLinkage, prior: Prior, x: np.ndarray, readings: tuple[Reading, ...], wanted: np.ndarray
+    linkage: SurveyedLinkage,
+    prior: Prior,
+    x: np.ndarray,
+    readings: tuple[Reading, ...],
+    wanted: np.ndarray,
 ) -> np.ndarray:
-    """What readings leave open of logarithms on a linkage: their standard deviations by the linear estimate. [1]
+    """What readings leave open of logarithms on a linkage: their standard deviations by the linear
+    estimate. [1]
 
-    wanted, shape (n_wanted, n_variables): derivatives of the logarithms, in variables in which the prior is the unit
-    sphere. [1]
+    wanted, shape (n_wanted, n_variables): derivatives of the logarithms, in variables in which the
+    prior is the unit sphere. [1]
     """
     rows = (*readings, Reading(Kind.TRAVEL, value=TRAVEL, u=0.005))
-    slopes = linkage.slopes(rows, x[None])[1][0] / np.array([r.u for r in rows])[:, None] @ prior.root
+    slopes = (
+        linkage.slopes(rows, x[None])[1][0] / np.array([r.u for r in rows])[:, None] @ prior.root
+    )
     slopes = slopes[np.isfinite(slopes).all(axis=1)]
     covariance = np.linalg.inv(np.eye(len(x)) + slopes.T @ slopes)
     return np.sqrt(np.einsum("ki,ij,kj->k", wanted, covariance, wanted))
 
 
 def reachable(
-    linkage: SurveyedLinkage, prior: Prior, hidden: Hidden, readings: tuple[Reading, ...], clearance: np.ndarray
+    linkage: SurveyedLinkage,
+    prior: Prior,
+    hidden: Hidden,
+    readings: tuple[Reading, ...],
+    clearance: np.ndarray,
 ) -> list[float]:
     """Shares of worn gears that the best possible estimate would have within three percent. [1]
 
-    By the linear estimate at the hidden linkage, for these readings and with every distance of the gear among them.
+    By the linear estimate at the hidden linkage, for these readings and with every distance of the
+    gear among them.
     """
     x = variables(hidden, linkage)
-    wanted = linkage.log_slopes(x[None], partial(linkage.displacement, clearance_in=clearance))[0] @ prior.root
+    wanted = (
+        linkage.log_slopes(x[None], partial(linkage.displacement, clearance_in=clearance))[0]
+        @ prior.root
+    )
     every = [r for r in readings if r.kind is not Kind.DISTANCE]
     every += [r for r in linkage.candidates() if r.kind is Kind.DISTANCE]
     spreads = [left_open(linkage, prior, x, rows, wanted) for rows in (readings, tuple(every))]
-    return [float(np.mean(norm.cdf(np.log1p(0.03) / s) - norm.cdf(np.log1p(-0.03) / s))) for s in spreads]
+    return [
+        float(np.mean(norm.cdf(np.log1p(0.03) / s) - norm.cdf(np.log1p(-0.03) / s)))
+        for s in spreads
+    ]
 
 
-def orders(linkage: SurveyedLinkage, prior: Prior, x: np.ndarray, clearance: np.ndarray) -> list[list[float]]:
-    """What each reading leaves open of a worn gear's displacement: in the template's order, and as ``next`` asks. [1]
+def orders(
+    linkage: SurveyedLinkage, prior: Prior, x: np.ndarray, clearance: np.ndarray
+) -> list[list[float]]:
+    """What each reading leaves open of a worn gear's displacement: in the template's order, and as
+    ``next`` asks. [1]
 
-    It is the standard deviation of the logarithm on the hidden linkage by the linear estimate: the 90 % interval of a
-    hundred draws is too rough to tell one reading from the next. Plunger positions of the template are read at the same
-    shares of the linkage's own stroke.
+    It is the standard deviation of the logarithm on the hidden linkage by the linear estimate: the
+    90 % interval of a hundred draws is too rough to tell one reading from the next. Plunger
+    positions of the template are read at the same shares of the linkage's own stroke.
     """
     quantity = partial(linkage.displacement, clearance_in=clearance)
     wanted = linkage.log_slopes(x[None], quantity)[0] @ prior.root
     reach = x[linkage.names.index("extension")] / GEAR.reference.stroke[1]
-    rows = [replace(r, extension=None if r.extension is None else r.extension * reach) for r, _ in planned(GEAR)]
+    rows = [
+        replace(r, extension=None if r.extension is None else r.extension * reach)
+        for r, _ in planned(GEAR)
+    ]
     asked: tuple[Reading, ...] = ()
-    while len(asked) < len(rows) and (found := suggested_early(linkage, asked, quantity)) is not None:
+    while (
+        len(asked) < len(rows) and (found := suggested_early(linkage, asked, quantity)) is not None
+    ):
         asked = (*asked, found.reading)
     return [
-        [float(left_open(linkage, prior, x, tuple(order[:n]), wanted)[0]) for n in range(len(order) + 1)]
+        [
+            float(left_open(linkage, prior, x, tuple(order[:n]), wanted)[0])
+            for n in range(len(order) + 1)
+        ]
         for order in (rows, list(asked))
     ]
 
@@ -249,21 +312,32 @@ def follow(count: int, seed: int) -> None:
         x = prior.members[a] + rng.random() * (prior.members[b] - prior.members[a])
         x = x + 0.1 * prior.members.std(axis=0) * rng.standard_normal(len(x))
         clearance = rng.uniform(0.0, LIMIT, (1, 10))
-        if not (linkage.closes(x[None])[0] and np.isfinite(linkage.displacement(x[None], clearance)).all()):
+        if not (
+            linkage.closes(x[None])[0]
+            and np.isfinite(linkage.displacement(x[None], clearance)).all()
+        ):
             continue
         plain, asked = orders(linkage, prior, x, clearance)
         first = [
-            [next((n for n, left in enumerate(order) if left <= share * order[0]), len(plain)) for share in (0.5, 0.25)]
+            [
+                next((n for n, left in enumerate(order) if left <= share * order[0]), len(plain))
+                for share in (0.5, 0.25)
+            ]
             for order in (plain, asked)
         ]
         needed.append((first[0], first[1]))
-        print(f"{len(needed)}: template {first[0]}, next {first[1]} readings to a half and a quarter", flush=True)
+        print(
+            f"{len(needed)}: template {first[0]}, next {first[1]} readings to a half and a quarter",
+            flush=True,
+        )
     for k, name in enumerate(("half", "a quarter of")):
         shares = np.array([asked[k] / plain[k] for plain, asked in needed])
         sums = [sum(each[order][k] for each in needed) for order in (1, 0)]
         print(
-            f"{name} the first width: {sums[0]} of {sums[1]} readings ({100 * sums[0] / sums[1]:.0f} %), median of the "
-            f"linkages {100 * np.median(shares):.0f} %, at most 60 % on {ends(int((shares <= 0.6).sum()), count)}"
+            f"{name} the first width: {sums[0]} of {sums[1]} readings"
+            f" ({100 * sums[0] / sums[1]:.0f} %), median of the linkages"
+            f" {100 * np.median(shares):.0f} %, at most 60 % on"
+            f" {ends(int((shares <= 0.6).sum()), count)}"
         )
 
 
@@ -278,9 +352,13 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--linkages", type=int, default=100)
     parser.add_argument("--slips", type=int, default=10, help="Linkages for each kind of slip.")
-    parser.add_argument("--worn", type=int, default=1000, help="Worn gears on all linkages together.")
+    parser.add_argument(
+        "--worn", type=int, default=1000, help="Worn gears on all linkages together."
+    )
     parser.add_argument("--seed", type=int, default=20261122)
-    parser.add_argument("--follow", type=int, help="Only: what ``next`` saves, on so many linkages.")
+    parser.add_argument(
+        "--follow", type=int, help="Only: what ``next`` saves, on so many linkages."
+    )
     chosen = parser.parse_args()
     if chosen.follow:
         follow(chosen.follow, chosen.seed)
@@ -292,7 +370,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_survey_template(folder / "template.csv")
-        template = list(csv.DictReader((folder / "template.csv").read_text(encoding="utf-8").splitlines()))
+        template = list(
+            csv.DictReader((folder / "template.csv").read_text(encoding="utf-8").splitlines())
+        )
         for k in range(chosen.linkages):
             hidden = drawn(ten, rng)
             rows, _ = surveyed(hidden, template, rng)
@@ -306,7 +386,9 @@ def main() -> None:
             seconds.append(time.process_time() - start)
             errors.append(np.abs(found.amplification / hidden.indices - 1.0))
             before.append(np.abs(GEAR.model.plunger_amplification() / hidden.indices - 1.0))
-            held.append((found.interval[:, 0] <= hidden.indices) & (hidden.indices <= found.interval[:, 1]))
+            held.append(
+                (found.interval[:, 0] <= hidden.indices) & (hidden.indices <= found.interval[:, 1])
+            )
             assert found.survey is not None
             alarms += bool(found.survey.misfits)
             if not found.survey.contradicts:
@@ -315,7 +397,8 @@ def main() -> None:
                 best.append(reachable(linkage, prior, hidden, found.survey.read, clearance))
             if k % 10 == 9:
                 print(
-                    f"{k + 1}: median {100 * np.median(errors):.2f} %, 95 % {100 * np.quantile(errors, 0.95):.1f} %",
+                    f"{k + 1}: median {100 * np.median(errors):.2f} %, 95 %"
+                    f" {100 * np.quantile(errors, 0.95):.1f} %",
                     flush=True,
                 )
         n = len(errors)
@@ -333,11 +416,13 @@ def main() -> None:
         print(f"false misfit in a clean survey: {ends(alarms, n)} (target 2 %)")
         most = [f"{100 * share:.0f} %" for share in np.mean(best, axis=0)]
         print(
-            f"displacement of {len(apart)} worn gears within 3 %: {100 * np.mean(apart <= 0.03):.1f} % (the best "
-            f"estimate would reach {most[0]}, with every distance of the gear read {most[1]}; target 95 %)"
+            f"displacement of {len(apart)} worn gears within 3 %:"
+            f" {100 * np.mean(apart <= 0.03):.1f} % (the best estimate would reach {most[0]}, with"
+            f" every distance of the gear read {most[1]}; target 95 %)"
         )
         print(
-            f"a full survey: median {np.median(seconds):.1f} s, at most {max(seconds):.1f} s of one core (target 10 s)"
+            f"a full survey: median {np.median(seconds):.1f} s, at most {max(seconds):.1f} s of one"
+            " core (target 10 s)"
         )
         for slip in SLIPS:
             hits = tried = 0
@@ -358,15 +443,21 @@ def main() -> None:
 
 
 def displacements(found: SurveyResult, hidden: Hidden, clearance: np.ndarray) -> np.ndarray:
-    """How far the surveyed linkage's worst displacement of worn gears is from the hidden one's. [1]"""
+    """How far the surveyed linkage's worst displacement of worn gears is from the hidden one's.
+    [1]
+    """
     assert found.survey is not None
     linkage = found.survey.linkage
-    own = worst_case(GEAR.model_of(linkage.linkage(found.survey.modes[0].vector, "own")), clearance).magnitude_in
+    own = worst_case(
+        GEAR.model_of(linkage.linkage(found.survey.modes[0].vector, "own")), clearance
+    ).magnitude_in
     return np.abs(own / true_displacement(hidden, clearance) - 1.0)
 
 
 def true_displacement(hidden: Hidden, clearance: np.ndarray) -> np.ndarray:
-    """Worst displacement of the hidden linkage: each clearance along its gradient, both senses, loops closed. [in]"""
+    """Worst displacement of the hidden linkage: each clearance along its gradient, both senses,
+    loops closed. [in]
+    """
     units = np.zeros((10, 2))
     for joint in range(10):
         for axis in (0, 1):
@@ -377,7 +468,10 @@ def true_displacement(hidden: Hidden, clearance: np.ndarray) -> np.ndarray:
     at = hidden.loops.release
     return np.array(
         [
-            max(abs(hidden.rate * hidden.loops.solve(at, s * c[:, None] * units)[4]) for s in (1.0, -1.0))
+            max(
+                abs(hidden.rate * hidden.loops.solve(at, s * c[:, None] * units)[4])
+                for s in (1.0, -1.0)
+            )
             for c in clearance
         ]
     )

@@ -1,9 +1,11 @@
-"""Forecasts of wear beside other ways to forecast: ``python tests/benchmarks/bench_wear.py [--fleets N] [--quick]``.
+"""Forecasts of wear beside other ways to forecast: ``python tests/benchmarks/bench_wear.py
+[--fleets N] [--quick]``.
 
-Not collected by pytest. Liners and cracks are measured series beside the checkout (``../shared/real``); cracks are
-forecast in 1/sqrt(length), in which their paths are nearly straight, and to their limit of 1.2 in both in length and
-so. The simulated fleets come from ``tests/wear/worlds.py``, which shares no code with the product: four worlds as the
-model thinks of them and four that it does not know. Every figure stands beside its target, reached or not.
+Not collected by pytest. Liners and cracks are measured series beside the checkout
+(``../shared/real``); cracks are forecast in 1/sqrt(length), in which their paths are nearly
+straight, and to their limit of 1.2 in both in length and so. The simulated fleets come from
+``tests/wear/worlds.py``, which shares no code with the product: four worlds as the model thinks of
+them and four that it does not know. Every figure stands beside its target, reached or not.
 """
 
 from __future__ import annotations
@@ -117,7 +119,10 @@ def forecasts(name: str, known: Known, later: Known, least: float, most_crps: fl
             own_error = float(np.mean(scores))
     limit = own_error if most_crps is None else min(most_crps, own_error)
     for who, (held_count, n, below_share, score) in rows.items():
-        figures = f"held {held_count}/{n} = {held_count / n:.0%}, below {below_share:.0%}, CRPS {score:.4f}"
+        figures = (
+            f"held {held_count}/{n} = {held_count / n:.0%}, below {below_share:.0%}, CRPS"
+            f" {score:.4f}"
+        )
         if who == "this project":
             target = f"held >= {least:.0%}, CRPS <= {limit:.4f}"
             show(name, who, figures, target, met=bool(held_count / n >= least and score <= limit))
@@ -142,9 +147,18 @@ def crack_limit(seen: float, least: int, transform: Callable[[Array], Array], na
 
     held, early = count(ends)
     figures = f"held {held}/{len(asked)}, before the 5 % end {early}"
-    show(name, "this project", figures, f"held >= {least}, early <= 1", met=held >= least and early <= 1)
-    # A life distribution of the whole population, of the crossings that each unit's own line promises.
-    slope = {unit: line(np.column_stack([h[:, 0], transform(h[:, 1])])) for unit, h in known.items()}
+    show(
+        name,
+        "this project",
+        figures,
+        f"held >= {least}, early <= 1",
+        met=held >= least and early <= 1,
+    )
+    # A life distribution of the whole population, of the crossings that each unit's own line
+    # promises.
+    slope = {
+        unit: line(np.column_stack([h[:, 0], transform(h[:, 1])])) for unit, h in known.items()
+    }
     promised = np.array([(limit - b) / a for a, b in slope.values()])
     weibull = surpyval.Weibull.fit(x=promised)
     population = np.asarray(weibull.qf(np.array([0.05, 0.95])), float)
@@ -165,7 +179,9 @@ def simulated(kind: str, fleets: int) -> None:
         paths = [WearPath(life.unit, life.usage, life.read) for part in parts for life in part[:-1]]
         seen = rng.integers(1, 6, len(parts))
         now = [(part[-1], n) for part, n in zip(parts, seen, strict=True)]
-        model = fit_wear([*paths, *(WearPath(life.unit, life.usage[:n], life.read[:n]) for life, n in now)])
+        model = fit_wear(
+            [*paths, *(WearPath(life.unit, life.usage[:n], life.read[:n]) for life, n in now)]
+        )
         for life, n in now:
             samples = model.forecast(life.unit, life.usage[n:]).samples
             low, high = Samples(samples).quantile([0.05, 0.95]).T
@@ -177,14 +193,26 @@ def simulated(kind: str, fleets: int) -> None:
             if crossing > life.usage[n - 1]:
                 low, high = model.usage_to_limit(life.unit, 1.6).quantile([0.05, 0.95])
                 early.append(crossing < low)
-                limit_held.append(low <= crossing <= high if np.isfinite(crossing) else high > life.grid[-1])
+                limit_held.append(
+                    low <= crossing <= high if np.isfinite(crossing) else high > life.grid[-1]
+                )
     known, most = kind in worlds.KINDS, 0.10 if kind == "gamma" else 0.07
     figures = (
         f"held {np.mean(held):.1%}, limit {np.mean(limit_held):.1%}, early {np.mean(early):.1%}, "
         f"CRPS {np.mean(scores):.3f} ({np.mean(errors):.3f})"
     )
-    met = 0.88 <= np.mean(held) <= 0.95 and np.mean(early) <= most and np.mean(scores) <= np.mean(errors)
-    show(f"simulated: {kind}", "this project", figures, f"88-95 %, early <= {most:.0%}" if known else "", met=bool(met))
+    met = (
+        0.88 <= np.mean(held) <= 0.95
+        and np.mean(early) <= most
+        and np.mean(scores) <= np.mean(errors)
+    )
+    show(
+        f"simulated: {kind}",
+        "this project",
+        figures,
+        f"88-95 %, early <= {most:.0%}" if known else "",
+        met=bool(met),
+    )
 
 
 def speed(gears: int) -> None:
@@ -213,12 +241,20 @@ def speed(gears: int) -> None:
 def main() -> None:
     """Print the table."""
     arguments = argparse.ArgumentParser(description=__doc__)
-    arguments.add_argument("--fleets", type=int, default=4, help="simulated fleets of 60 parts of each kind")
+    arguments.add_argument(
+        "--fleets", type=int, default=4, help="simulated fleets of 60 parts of each kind"
+    )
     arguments.add_argument("--gears", type=int, default=10_000)
     given = arguments.parse_args()
     data = real.liners()
     known = {unit: h[: max(len(h) - 1, 1)] for unit, h in data.items()}
-    forecasts("liners, last visit", known, {u: h[-1:] for u, h in data.items() if len(h) > 1}, 14 / 17, 0.20)
+    forecasts(
+        "liners, last visit",
+        known,
+        {u: h[-1:] for u, h in data.items() if len(h) > 1},
+        14 / 17,
+        0.20,
+    )
     data = real.cracks()
     for name, transform, least, most in (
         ("cracks, 1/sqrt, 2nd half", lambda y: y**-0.5, 0.8, 0.0110),

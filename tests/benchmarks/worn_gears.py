@@ -1,7 +1,9 @@
-"""A fleet of worn gears from code that shares nothing with the product, for the benchmarks of the decision.
+"""A fleet of worn gears from code that shares nothing with the product, for the benchmarks of the
+decision.
 
-The linkage is the independent simulator's: a closed chain in space solved by Newton's method. Wear is drawn here, as
-the priors of the product describe it in words, by other code; what a technician reads is drawn from it.
+The linkage is the independent simulator's: a closed chain in space solved by Newton's method. Wear
+is drawn here, as the priors of the product describe it in words, by other code; what a technician
+reads is drawn from it.
 """
 
 from __future__ import annotations
@@ -90,13 +92,23 @@ def linkages() -> tuple[str, ...]:
 
 
 def explained_fleet(
-    n: int, rng: np.random.Generator, *, worn: float | None = 0.05, other: float = 0.05, healthy: str = "falling"
+    n: int,
+    rng: np.random.Generator,
+    *,
+    worn: float | None = 0.05,
+    other: float = 0.05,
+    healthy: str = "falling",
 ) -> Fleet:
-    """Draw gears whose plunger was read: wear by link or pivot, random directions, now and then another cause.
+    """Draw gears whose plunger was read: wear by link or pivot, random directions, now and then
+    another cause.
 
     ``worn=None`` makes every gear have exactly one worn joint, each link or pivot as often.
     """
-    share = rng.triangular(0.0, 0.0, 1.0, (n, 10)) if healthy == "falling" else rng.uniform(0.0, 0.5, (n, 10))
+    share = (
+        rng.triangular(0.0, 0.0, 1.0, (n, 10))
+        if healthy == "falling"
+        else rng.uniform(0.0, 0.5, (n, 10))
+    )
     if worn is None:
         for row, group in enumerate(rng.integers(len(GROUPS), size=n)):
             share[row, rng.choice(GROUPS[group]) - 1] = rng.uniform(1.0, 2.0)
@@ -107,26 +119,35 @@ def explained_fleet(
                 share[hit, joint - 1] = rng.uniform(1.0, 2.0, int(hit.sum()))
     true_in = LIMIT_IN * share
     moved = displacement(true_in, rng.uniform(0.0, 2.0 * np.pi, (n, 10)))
-    # The uncertainty that the decision rule declares for the model, until measured data supply a better one.
+    # The uncertainty that the decision rule declares for the model, until measured data supply a
+    # better one.
     moved = moved + rng.normal(size=n) * np.maximum(0.003, 0.10 * np.abs(moved))
     elsewhere = rng.random(n) < other
-    plunger = moved + np.where(elsewhere, rng.normal(0.0, 0.06, n), 0.0) + rng.normal(0.0, GAUGE_U_IN, n)
+    plunger = (
+        moved + np.where(elsewhere, rng.normal(0.0, 0.06, n), 0.0) + rng.normal(0.0, GAUGE_U_IN, n)
+    )
     return Fleet(true_in, readings(true_in, rng), plunger, elsewhere)
 
 
 def amplifications(linkage: str = "A") -> Array:
-    """How far the plunger moves by a small clearance of each joint in its worst direction, (10,) [-]."""
+    """How far the plunger moves by a small clearance of each joint in its worst direction, (10,)
+    [-].
+    """
     geometry = load(linkage)
     build, rigid = Build.nominal(geometry, 1), np.zeros((1, 10, 2))
     slopes: Array = np.linalg.norm(plunger_gradient(build, rigid, close(build, rigid))[0], axis=-1)
     return slopes
 
 
-def best_places(fleet: Fleet, measured: NDArray[np.bool_], rng: np.random.Generator, draws: int = 4000) -> Array:
-    """Rank the worn group as well as anyone could who knows how the fleet was drawn, (n,) 0 for first.
+def best_places(
+    fleet: Fleet, measured: NDArray[np.bool_], rng: np.random.Generator, draws: int = 4000
+) -> Array:
+    """Rank the worn group as well as anyone could who knows how the fleet was drawn, (n,) 0 for
+    first.
 
-    The fleet has exactly one worn joint a gear and no other cause. For each joint the chance of what was read, if
-    it is the worn one, is found by drawing all that was not read; the plunger moves in proportion to clearances.
+    The fleet has exactly one worn joint a gear and no other cause. For each joint the chance of
+    what was read, if it is the worn one, is found by drawing all that was not read; the plunger
+    moves in proportion to clearances.
     """
     slopes = amplifications()
     shares = (np.arange(800) + 0.5) / 400.0
@@ -142,8 +163,13 @@ def best_places(fleet: Fleet, measured: NDArray[np.bool_], rng: np.random.Genera
         for state, prior in (("sound", sound), ("worn", worn)):
             weight = fits * prior + 1e-300
             up_to = np.cumsum(weight, axis=1)
-            at = [np.searchsorted(up_to[j], rng.uniform(0.0, up_to[j, -1], draws)) for j in range(10)]
-            drawn[state] = (up_to[:, -1], moves * LIMIT_IN * shares[np.minimum(at, len(shares) - 1)])
+            at = [
+                np.searchsorted(up_to[j], rng.uniform(0.0, up_to[j, -1], draws)) for j in range(10)
+            ]
+            drawn[state] = (
+                up_to[:, -1],
+                moves * LIMIT_IN * shares[np.minimum(at, len(shares) - 1)],
+            )
         still = drawn["sound"][1]
         chance = np.zeros(10)
         for j in range(10):
@@ -164,6 +190,8 @@ def readings(true_in: Array, rng: np.random.Generator) -> Array:
 
 
 def mixed_fleet(n: int, rng: np.random.Generator) -> Array:
-    """Clearances of gears from new to worn out: one level of wear a gear, joints scattered about it, (n, 10) [in]."""
+    """Clearances of gears from new to worn out: one level of wear a gear, joints scattered about
+    it, (n, 10) [in].
+    """
     level = np.exp(rng.uniform(np.log(0.05), np.log(1.0), n))
     return LIMIT_IN * np.minimum(level[:, None] * rng.exponential(1.0, (n, 10)), 1.5)

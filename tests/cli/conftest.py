@@ -45,7 +45,9 @@ class Run:
 
 def mlg(*arguments: object, stdin: bytes = b"") -> Run:
     """Run the command in this process, without a terminal."""
-    streams = [io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2)]
+    streams = [
+        io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2)
+    ]
     before = sys.stdin
     sys.stdin = io.TextIOWrapper(io.BytesIO(stdin), encoding="utf-8")
     code = 0
@@ -84,7 +86,9 @@ def table(tmp_path: Path) -> Table:
     def write(*rows: Mapping[str, str], name: str = "table.csv") -> Path:
         path = tmp_path / name
         with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, fieldnames=list(dict.fromkeys(c for r in rows for c in r)))
+            writer = csv.DictWriter(
+                file, fieldnames=list(dict.fromkeys(c for r in rows for c in r))
+            )
             writer.writeheader()
             writer.writerows(rows)
         return path
@@ -112,4 +116,6 @@ def fleet_json() -> Run:
 
 def ranked(inspection: Mapping[str, Any]) -> Sequence[int]:
     """Joints in the order in which to inspect them."""
-    return [joint["joint"] for joint in sorted(inspection["joints"], key=lambda joint: joint["rank"])]
+    return [
+        joint["joint"] for joint in sorted(inspection["joints"], key=lambda joint: joint["rank"])
+    ]

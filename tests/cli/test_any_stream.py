@@ -1,4 +1,6 @@
-"""Any terminal and any pipe: what a stream cannot show is shown as what it can; no character ends a run."""
+"""Any terminal and any pipe: what a stream cannot show is shown as what it can; no character ends a
+run.
+"""
 
 from __future__ import annotations
 
@@ -52,11 +54,21 @@ EVERYDAY = [
     ("refused", "cp1252"),
     ("gear", "C"),
 ]
-ALL = [(command, stream) for command in COMMANDS for stream in STREAMS if (command, stream) not in EVERYDAY]
+ALL = [
+    (command, stream)
+    for command in COMMANDS
+    for stream in STREAMS
+    if (command, stream) not in EVERYDAY
+]
 
 
 def run(command: str, stream: str, folder: Path) -> tuple[int, bytes, bytes]:
-    environment = {"PATH": os.environ["PATH"], "HOME": str(folder), "PYTHONPATH": str(ROOT), **STREAMS[stream]}
+    environment = {
+        "PATH": os.environ["PATH"],
+        "HOME": str(folder),
+        "PYTHONPATH": str(ROOT),
+        **STREAMS[stream],
+    }
     arguments, _code = COMMANDS[command]
     done = subprocess.run(
         [sys.executable, "-m", "mlg_troubleshoot", *arguments],
@@ -78,22 +90,34 @@ def as_documented(command: str, stream: str, folder: Path) -> None:
 
 
 @pytest.mark.parametrize(("command", "stream"), EVERYDAY, ids=lambda each: each)
-def test_a_command_ends_as_documented_on_a_plain_stream(command: str, stream: str, tmp_path: Path) -> None:
+def test_a_command_ends_as_documented_on_a_plain_stream(
+    command: str, stream: str, tmp_path: Path
+) -> None:
     as_documented(command, stream, tmp_path)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("command", "stream"), ALL, ids=lambda each: each)
-def test_every_command_ends_as_documented_on_every_stream(command: str, stream: str, tmp_path: Path) -> None:
+def test_every_command_ends_as_documented_on_every_stream(
+    command: str, stream: str, tmp_path: Path
+) -> None:
     as_documented(command, stream, tmp_path)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 @pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning")
 def test_a_terminal_of_a_plain_locale_gets_ascii(tmp_path: Path) -> None:
-    environment = {"PATH": os.environ["PATH"], "HOME": str(tmp_path), "PYTHONPATH": str(ROOT), "LC_ALL": "C"}
+    environment = {
+        "PATH": os.environ["PATH"],
+        "HOME": str(tmp_path),
+        "PYTHONPATH": str(ROOT),
+        "LC_ALL": "C",
+    }
     child = pexpect.spawn(
-        sys.executable, ["-m", "mlg_troubleshoot", "check", str(FAILURE)], env=environment, timeout=60
+        sys.executable,
+        ["-m", "mlg_troubleshoot", "check", str(FAILURE)],
+        env=environment,
+        timeout=60,
     )
     shown = child.read()
     child.close()
@@ -102,7 +126,9 @@ def test_a_terminal_of_a_plain_locale_gets_ascii(tmp_path: Path) -> None:
     assert b"OUTSIDE MARGIN" in shown
 
 
-def test_json_holds_every_character_on_a_stream_that_cannot(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_json_holds_every_character_on_a_stream_that_cannot(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     plain = io.TextIOWrapper(io.BytesIO(), encoding="ascii", write_through=True)
     monkeypatch.setattr(sys, "stdout", plain)
     output.write_json({"tail": "Größe–1\udcff"})

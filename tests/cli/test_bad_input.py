@@ -1,4 +1,6 @@
-"""Bad input: exit 2 or 3, a message that says what to do, never a traceback; good rows still work."""
+"""Bad input: exit 2 or 3, a message that says what to do, never a traceback; good rows still
+work.
+"""
 
 from __future__ import annotations
 
@@ -55,7 +57,11 @@ BAD_CELLS = {
     "negative": ({"clearance_3_in": "-0.001"}, "clearance_3_in", "less than zero"),
     "not a number": ({"clearance_3_in": "NaN"}, "clearance_3_in", "NaN"),
     "infinite": ({"clearance_3_in": "inf"}, "clearance_3_in", "inf"),
-    "millimetres as inches": ({"clearance_3_in": "0.33"}, "clearance_3_in", "millimetres (factor 25.4)"),
+    "millimetres as inches": (
+        {"clearance_3_in": "0.33"},
+        "clearance_3_in",
+        "millimetres (factor 25.4)",
+    ),
     "thou as inches": ({"clearance_3_in": "13"}, "clearance_3_in", "thou (factor 1000)"),
     "decimal comma": ({"clearance_3_in": "0,013"}, "clearance_3_in", "--decimal-comma"),
     "no side": ({"side": ""}, "side", "LH or RH"),
@@ -79,7 +85,9 @@ def test_a_bad_cell_makes_its_row_invalid_and_says_why(
     assert said in json.dumps(problem, ensure_ascii=False)
 
 
-@pytest.mark.parametrize("changes", [changes for changes, _, _ in BAD_CELLS.values()], ids=BAD_CELLS)
+@pytest.mark.parametrize(
+    "changes", [changes for changes, _, _ in BAD_CELLS.values()], ids=BAD_CELLS
+)
 def test_good_rows_survive_bad_ones(changes: dict[str, str], table: Table) -> None:
     bad = row(**{"record_id": "B", "tail_no": "N9", **changes})
     path = table(row(record_id="A"), bad, row(record_id="C", side="RH"))
@@ -122,7 +130,11 @@ def test_a_problem_is_one_line_of_a_file_however_long_it_is(table: Table) -> Non
 
 def test_an_invalid_row_carries_no_number(table: Table) -> None:
     found = mlg("check", table(row(side="")), "--json").one
-    numbers = {key: value for key, value in found.items() if key.endswith("_in") or key.startswith("probability")}
+    numbers = {
+        key: value
+        for key, value in found.items()
+        if key.endswith("_in") or key.startswith("probability")
+    }
     assert len(numbers) == 14
     assert set(numbers.values()) == {None}
 
@@ -151,7 +163,9 @@ def test_a_joint_given_twice_is_refused() -> None:
 
 
 def test_an_empty_tail_number_is_refused() -> None:
-    found = mlg("check", "--tail", " ", "--side", "LH", "--convention", "RADIAL", "--set", "3=0.001in")
+    found = mlg(
+        "check", "--tail", " ", "--side", "LH", "--convention", "RADIAL", "--set", "3=0.001in"
+    )
     refused(found, 2, "--tail", "a tail number (text)")
 
 
@@ -173,7 +187,11 @@ def test_a_bad_option_is_refused_with_what_is_allowed(option: str, value: str, s
 
 
 def test_values_by_hand_beside_a_file_are_refused() -> None:
-    refused(mlg("check", FAILURE, "--set", "3=0.001in"), 2, "Give either a FILE or the values of one gear.")
+    refused(
+        mlg("check", FAILURE, "--set", "3=0.001in"),
+        2,
+        "Give either a FILE or the values of one gear.",
+    )
 
 
 def test_a_mapping_without_a_column_is_refused() -> None:
@@ -190,7 +208,9 @@ def test_a_template_that_was_not_filled_in_says_so(tmp_path: Path) -> None:
     refused(mlg("check", tmp_path / "empty.xlsx"), 3, "there is no inspection in it")
 
 
-@pytest.mark.parametrize("source", ["lost.csv", DATA / "failure_case.csv"], ids=["no file", "no measurement"])
+@pytest.mark.parametrize(
+    "source", ["lost.csv", DATA / "failure_case.csv"], ids=["no file", "no measurement"]
+)
 def test_a_diagnosis_of_nothing_exits_3(source: object) -> None:
     refused(mlg("diagnose", source), 3)
 

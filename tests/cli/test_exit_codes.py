@@ -27,7 +27,10 @@ def test_a_failed_outcome_exits_1_whatever_the_prediction_says(table: Table) -> 
 @pytest.mark.parametrize(
     ("verdict", "changes"),
     [
-        ("OUTSIDE_MARGIN", {"clearance_2_in": "0.0075", "clearance_3_in": "0.0075", "clearance_4_in": "0.0075"}),
+        (
+            "OUTSIDE_MARGIN",
+            {"clearance_2_in": "0.0075", "clearance_3_in": "0.0075", "clearance_4_in": "0.0075"},
+        ),
         ("INCOMPLETE", {"clearance_4_in": ""}),
         ("INCONCLUSIVE", {"clearance_3_in": "0.007", "clearance_4_in": "0.003"}),
     ],
@@ -45,7 +48,9 @@ def test_no_row_that_could_be_judged_exits_3(table: Table) -> None:
     assert mlg("check", table(row(side=""))).code == 3
 
 
-@pytest.mark.parametrize("arguments", [("check", "--wrong"), ("chek",), ("check", FAILURE, "--format", "docx")])
+@pytest.mark.parametrize(
+    "arguments", [("check", "--wrong"), ("chek",), ("check", FAILURE, "--format", "docx")]
+)
 def test_usage_exits_2(arguments: tuple[object, ...]) -> None:
     assert mlg(*arguments).code == 2
 

@@ -17,7 +17,9 @@ PERMUTATIONS = ("--permutations", "99")
 def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Sixty inspections of a simulated fleet in which one gauge reads 0.026 in too much."""
     path = tmp_path_factory.mktemp("fleet") / "measured.csv"
-    write_csv(draw_fleet(3, "single", strength=25.0, cause="gauge_bias", rows=60, faults=False), path)
+    write_csv(
+        draw_fleet(3, "single", strength=25.0, cause="gauge_bias", rows=60, faults=False), path
+    )
     return path
 
 
@@ -83,7 +85,11 @@ def test_the_extension_moves_only_what_it_concerns(plain: Run, extended: Run) ->
 
 def test_the_extension_brings_the_uncertainty_of_the_model(plain: Run, extended: Run) -> None:
     before, after = (
-        [i["standard_uncertainty_in"] for i in run.json["inspections"] if i["standard_uncertainty_in"]]
+        [
+            i["standard_uncertainty_in"]
+            for i in run.json["inspections"]
+            if i["standard_uncertainty_in"]
+        ]
         for run in (plain, extended)
     )
     assert sum(after) < sum(before)
@@ -102,6 +108,8 @@ def test_an_extension_of_another_geometry_is_refused(extension: Path, diagnosed:
 def test_an_extension_that_cannot_be_written_exits_5(measured: Path) -> None:
     occupied = measured.with_name("occupied")
     occupied.touch()
-    found = mlg("diagnose", measured, *PERMUTATIONS, "--quiet", "--write-extension", occupied / "e.toml")
+    found = mlg(
+        "diagnose", measured, *PERMUTATIONS, "--quiet", "--write-extension", occupied / "e.toml"
+    )
     assert found.code == 5
     assert "What to do:" in found.err

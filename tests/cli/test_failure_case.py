@@ -39,7 +39,9 @@ def test_the_eight_joints_that_the_paper_does_not_give_are_unmeasured(failure_js
 
 
 def test_the_bound_and_the_chance_with_random_directions_stand_together(failure: Run) -> None:
-    assert "worst case 0.0472 in, chance with random directions 25 %" in " ".join(failure.out.replace("│", "").split())
+    assert "worst case 0.0472 in, chance with random directions 25 %" in " ".join(
+        failure.out.replace("│", "").split()
+    )
 
 
 def test_it_says_could_and_never_will(failure_json: Run) -> None:
@@ -49,7 +51,10 @@ def test_it_says_could_and_never_will(failure_json: Run) -> None:
 
 
 def test_the_workbook_says_what_the_csv_says(failure_json: Run) -> None:
-    assert mlg("check", DATA / "failure_case.xlsx", "--json").json["inspections"] == failure_json.json["inspections"]
+    assert (
+        mlg("check", DATA / "failure_case.xlsx", "--json").json["inspections"]
+        == failure_json.json["inspections"]
+    )
 
 
 @pytest.mark.parametrize(
@@ -72,13 +77,22 @@ def test_on_the_command_line_every_unit_and_convention_gives_the_same(
     expected = failure_json.one
     assert found.code == 1
     assert found.one["verdict"] == expected["verdict"]
-    assert found.one["predicted_displacement_in"] == pytest.approx(expected["predicted_displacement_in"], abs=1e-12)
+    assert found.one["predicted_displacement_in"] == pytest.approx(
+        expected["predicted_displacement_in"], abs=1e-12
+    )
 
 
 @pytest.mark.parametrize(
     ("changes", "unit"),
     [
-        ({"clearance_convention": "TOTAL_PLAY", "clearance_3_in": "0.026", "clearance_5_in": "0.014"}, "in"),
+        (
+            {
+                "clearance_convention": "TOTAL_PLAY",
+                "clearance_3_in": "0.026",
+                "clearance_5_in": "0.014",
+            },
+            "in",
+        ),
         ({"clearance_3_in": "0.3302", "clearance_5_in": "0.1778"}, "mm"),
         ({"clearance_3_in": "13", "clearance_5_in": "7"}, "thou"),
     ],
@@ -87,7 +101,10 @@ def test_on_the_command_line_every_unit_and_convention_gives_the_same(
 def test_in_a_table_every_unit_and_convention_gives_the_same(
     changes: dict[str, str], unit: str, table: Table, failure_json: Run
 ) -> None:
-    cells = {column.replace("_in", f"_{unit}"): value for column, value in row(**(BLANK | changes)).items()}
+    cells = {
+        column.replace("_in", f"_{unit}"): value
+        for column, value in row(**(BLANK | changes)).items()
+    }
     cells["outcome"] = "FAILED"
     found = mlg("check", table(cells), "--json").one
     assert found["verdict"] == "OUTSIDE_MARGIN"
@@ -131,8 +148,13 @@ def test_the_convention_of_a_table_can_be_declared(table: Table) -> None:
 
 
 def test_the_factor_2_of_the_convention_changes_the_verdict(table: Table) -> None:
-    path = table(row(clearance_convention=None, **{f"clearance_{n}_in": "0.004" for n in range(1, 6)}))
-    verdicts = [mlg("check", path, "--convention", c, "--json").one["verdict"] for c in ("RADIAL", "TOTAL_PLAY")]
+    path = table(
+        row(clearance_convention=None, **{f"clearance_{n}_in": "0.004" for n in range(1, 6)})
+    )
+    verdicts = [
+        mlg("check", path, "--convention", c, "--json").one["verdict"]
+        for c in ("RADIAL", "TOTAL_PLAY")
+    ]
     assert verdicts == ["OUTSIDE_MARGIN", "WITHIN_MARGIN"]
 
 
@@ -150,7 +172,11 @@ def test_the_shipped_files_carry_the_two_published_clearances_and_no_other() -> 
     sheet = openpyxl.load_workbook(Path(DATA / "failure_case.xlsx")).worksheets[0]
     header, *rows = [[cell.value for cell in cells] for cells in sheet.iter_rows()]
     (cells,) = [dict(zip(header, values, strict=True)) for values in rows]
-    assert {n: cells[f"clearance_{n}_in"] for n in range(1, 11) if cells[f"clearance_{n}_in"] is not None} == {
+    assert {
+        n: cells[f"clearance_{n}_in"]
+        for n in range(1, 11)
+        if cells[f"clearance_{n}_in"] is not None
+    } == {
         3: 0.013,
         5: 0.007,
     }

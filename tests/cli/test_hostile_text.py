@@ -1,4 +1,6 @@
-"""Data are shown as they are: no markup, no escape sequence and no direction mark in them acts on a terminal."""
+"""Data are shown as they are: no markup, no escape sequence and no direction mark in them acts on a
+terminal.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,8 @@ from rich.rule import Rule
 from mlg_troubleshoot.cli.output import console
 from tests.cli.conftest import FAILURE, HAND, ROOT, Run, Table, mlg, row
 
-# Markup of rich, an OSC link, a C1 introducer, an override of the writing direction, a lone surrogate.
+# Markup of rich, an OSC link, a C1 introducer, an override of the writing direction, a lone
+# surrogate.
 HOSTILE = "WO[/b][link=http://x][conceal]\x1b]8;;http://x\x07\x9b31m\u202egnp\udcff"
 GEAR = ROOT / "mlg_troubleshoot" / "gear" / "data"
 
@@ -38,14 +41,18 @@ def test_a_cell_acts_on_neither_stream(column: str, table: Table) -> None:
 @pytest.mark.parametrize("column", ["record_id", "tail_no"])
 @pytest.mark.parametrize("rows", [1, 2])
 def test_markup_in_an_identity_is_shown_as_it_is(column: str, rows: int, table: Table) -> None:
-    found = mlg("check", table(*[row(**{column: "[/b][conceal]X"}), row(record_id="B", side="RH")][:rows]))
+    found = mlg(
+        "check", table(*[row(**{column: "[/b][conceal]X"}), row(record_id="B", side="RH")][:rows])
+    )
     harmless(found)
     assert "[/b][conceal]X" in found.out
 
 
 def test_a_record_id_of_two_lines_stays_on_one(table: Table) -> None:
     path = table(row(record_id="R1\n= WITHIN_MARGIN N9 LH"), row(record_id="B", side="RH"))
-    assert not any(line.startswith("= WITHIN_MARGIN N9") for line in mlg("check", path).out.splitlines())
+    assert not any(
+        line.startswith("= WITHIN_MARGIN N9") for line in mlg("check", path).out.splitlines()
+    )
 
 
 def test_two_inspections_of_one_gear_side_by_side_show_their_ids_as_they_are(table: Table) -> None:
@@ -96,7 +103,9 @@ def test_a_gear_file_acts_on_neither_stream(tmp_path: Path) -> None:
         (tmp_path / source.name).write_bytes(source.read_bytes())
     path = tmp_path / "[b]\x1b[31mmine.toml"
     text = (GEAR / "hawker-800xp.toml").read_text(encoding="utf-8")
-    path.write_text(text.replace('name = "Hawker', 'name = "[/b][conceal]Hawker', 1), encoding="utf-8")
+    path.write_text(
+        text.replace('name = "Hawker', 'name = "[/b][conceal]Hawker', 1), encoding="utf-8"
+    )
     harmless(mlg("gear", "--gear", path))
     harmless(mlg("check", FAILURE, "--gear", path))
     path.write_text("[[points", encoding="utf-8")
@@ -111,7 +120,11 @@ def test_an_extension_acts_on_neither_stream(tmp_path: Path) -> None:
 
 def test_the_names_of_outputs_act_on_neither_stream(tmp_path: Path) -> None:
     names = [tmp_path / f"[b]\x1b[31m.{ending}" for ending in ("csv", "xlsx", "d")]
-    outputs = [part for pair in zip(("--csv", "--annotate", "--report"), names, strict=True) for part in pair]
+    outputs = [
+        part
+        for pair in zip(("--csv", "--annotate", "--report"), names, strict=True)
+        for part in pair
+    ]
     harmless(mlg("check", FAILURE.with_suffix(".xlsx"), *outputs, "--format", "html"))
 
 

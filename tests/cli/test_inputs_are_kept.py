@@ -1,4 +1,6 @@
-"""No output replaces an input, a store or a file of another kind: refused with exit code 2 before anything is read."""
+"""No output replaces an input, a store or a file of another kind: refused with exit code 2 before
+anything is read.
+"""
 
 from __future__ import annotations
 
@@ -71,7 +73,9 @@ def test_a_diagnosis_does_not_replace_its_table(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("flag", ["--extension", "--causes"])
-def test_a_file_that_a_check_reads_beside_the_table_is_not_replaced(flag: str, measured: Path) -> None:
+def test_a_file_that_a_check_reads_beside_the_table_is_not_replaced(
+    flag: str, measured: Path
+) -> None:
     other = measured.with_name("other.toml")
     other.write_text("what was found", encoding="utf-8")
     kept(mlg("check", measured, flag, other, "--csv", other), other, b"what was found", "--csv")
@@ -86,7 +90,9 @@ def test_a_file_that_a_check_reads_beside_the_table_is_not_replaced(flag: str, m
         (("diagnose", FAILURE, "--write-extension"), "mine-targets.toml"),
     ],
 )
-def test_no_file_of_a_gear_is_replaced(command: tuple[object, ...], name: str, own_gear: Path) -> None:
+def test_no_file_of_a_gear_is_replaced(
+    command: tuple[object, ...], name: str, own_gear: Path
+) -> None:
     path = own_gear.with_name(name)
     path.touch()
     before = path.read_bytes()
@@ -106,9 +112,13 @@ def test_a_study_does_not_replace_the_measured_table(measured: Path) -> None:
 
 
 def test_a_study_may_write_its_table_again_but_not_over_the_gear(own_gear: Path) -> None:
-    text = own_gear.read_text(encoding="utf-8").replace('"hawker-800xp-indices.json"', '"mine.toml"')
+    text = own_gear.read_text(encoding="utf-8").replace(
+        '"hawker-800xp-indices.json"', '"mine.toml"'
+    )
     own_gear.write_text(text, encoding="utf-8")
-    kept(mlg("study", "--gear", own_gear, "--write-table"), own_gear, text.encode(), "--write-table")
+    kept(
+        mlg("study", "--gear", own_gear, "--write-table"), own_gear, text.encode(), "--write-table"
+    )
 
 
 def test_a_report_does_not_replace_an_input_of_its_name(measured: Path) -> None:
@@ -133,7 +143,9 @@ def test_a_special_file_is_not_replaced(tmp_path: Path) -> None:
 
 @posix
 @pytest.mark.parametrize("old", [False, True], ids=["new", "old"])
-def test_an_output_respects_the_umask_and_the_mode_of_the_old_file(old: bool, tmp_path: Path) -> None:
+def test_an_output_respects_the_umask_and_the_mode_of_the_old_file(
+    old: bool, tmp_path: Path
+) -> None:
     path = tmp_path / "out.csv"
     if old:
         path.touch(mode=0o640)
@@ -169,11 +181,20 @@ def text(tmp_path: Path) -> Path:
 @pytest.fixture
 def extended(tmp_path: Path) -> tuple[object, ...]:
     """A diagnosis that writes an extension, up to the name of the file."""
-    return ("diagnose", DATA / "measured_pressure.csv", "-q", "--permutations", 99, "--write-extension")
+    return (
+        "diagnose",
+        DATA / "measured_pressure.csv",
+        "-q",
+        "--permutations",
+        99,
+        "--write-extension",
+    )
 
 
 @pytest.mark.parametrize(
-    "command", [("check", "--csv"), ("diagnose", "--permutations", 99, "--write-extension")], ids=lambda c: c[0]
+    "command",
+    [("check", "--csv"), ("diagnose", "--permutations", 99, "--write-extension")],
+    ids=lambda c: c[0],
 )
 def test_a_table_is_not_replaced_through_a_folder_that_is_missing(
     command: tuple[object, ...], measured: Path, monkeypatch: pytest.MonkeyPatch
@@ -186,13 +207,20 @@ def test_a_table_is_not_replaced_through_a_folder_that_is_missing(
 
 def test_a_gear_file_is_not_replaced_through_a_folder_that_is_missing(own_gear: Path) -> None:
     before = own_gear.read_bytes()
-    found = mlg("check", FAILURE, "--gear", own_gear, "--csv", f"{own_gear.parent}/no/../{own_gear.name}")
+    found = mlg(
+        "check", FAILURE, "--gear", own_gear, "--csv", f"{own_gear.parent}/no/../{own_gear.name}"
+    )
     kept(found, own_gear, before, "--csv")
 
 
 def test_an_export_does_not_replace_its_store_through_a_folder_that_is_missing(store: Path) -> None:
     before = store.read_bytes()
-    kept(mlg("history", "export", f"{store.parent}/no/../{store.name}", "--store", store), store, before, "export")
+    kept(
+        mlg("history", "export", f"{store.parent}/no/../{store.name}", "--store", store),
+        store,
+        before,
+        "export",
+    )
 
 
 @pytest.mark.parametrize("option", ["--csv", "--annotate"])
@@ -210,7 +238,9 @@ def test_a_check_does_not_replace_the_store(
 
 
 def test_an_output_is_not_the_store_that_the_run_would_make(tmp_path: Path) -> None:
-    found = mlg("check", FAILURE, "-q", "--keep", "--store", tmp_path / "new", "--csv", tmp_path / "new")
+    found = mlg(
+        "check", FAILURE, "-q", "--keep", "--store", tmp_path / "new", "--csv", tmp_path / "new"
+    )
     assert found.code == 2
     assert "is one of the inputs" in found.err
     assert not (tmp_path / "new").exists()
@@ -219,10 +249,17 @@ def test_an_output_is_not_the_store_that_the_run_would_make(tmp_path: Path) -> N
 @pytest.mark.parametrize("place", ["sqlite:///{}", "sqlite+pysqlite:///{}"])
 def test_an_export_does_not_replace_its_store_by_url(place: str, store: Path) -> None:
     before = store.read_bytes()
-    kept(mlg("history", "export", store, "--store", place.format(store), "--force"), store, before, "export")
+    kept(
+        mlg("history", "export", store, "--store", place.format(store), "--force"),
+        store,
+        before,
+        "export",
+    )
 
 
-@pytest.mark.parametrize("place", ["sqlite+pysqlite:///{}?timeout=3", "sqlite:///file:{}?mode=ro&uri=true"])
+@pytest.mark.parametrize(
+    "place", ["sqlite+pysqlite:///{}?timeout=3", "sqlite:///file:{}?mode=ro&uri=true"]
+)
 def test_a_store_by_a_url_with_parameters_is_refused_and_stays(place: str, store: Path) -> None:
     before = store.read_bytes()
     run = mlg("history", "export", store, "--store", place.format(store), "--force")
@@ -239,12 +276,16 @@ def test_another_store_is_not_replaced_by_an_export(force: tuple[str, ...], stor
     assert other.read_bytes() == store.read_bytes()
 
 
-def test_an_export_may_be_written_again_and_not_over_that_of_another_store(store: Path, tmp_path: Path) -> None:
+def test_an_export_may_be_written_again_and_not_over_that_of_another_store(
+    store: Path, tmp_path: Path
+) -> None:
     file = tmp_path / "chain.jsonl"
     assert mlg("history", "export", file, "--store", store).code == 0
     assert mlg("history", "export", file, "--store", store).code == 0
     before = file.read_bytes()
-    assert mlg("check", DATA / "fleet_batch.csv", "-q", "--keep", "--store", tmp_path / "b").code == 1
+    assert (
+        mlg("check", DATA / "fleet_batch.csv", "-q", "--keep", "--store", tmp_path / "b").code == 1
+    )
     for other in (tmp_path / "b", tmp_path / "empty"):
         found = mlg("history", "export", file, "--store", other)
         assert found.code == 2
@@ -267,7 +308,9 @@ def test_an_export_may_be_written_again_and_not_over_that_of_another_store(store
     ],
     ids=lambda command: " ".join(str(word) for word in command if not isinstance(word, Path)),
 )
-def test_a_file_that_something_else_wrote_is_not_replaced(command: tuple[object, ...], text: Path) -> None:
+def test_a_file_that_something_else_wrote_is_not_replaced(
+    command: tuple[object, ...], text: Path
+) -> None:
     path = text.rename(text.with_name("letter.xlsx"))
     found = mlg(*command, path)
     assert found.code == 2, found.err
@@ -277,7 +320,9 @@ def test_a_file_that_something_else_wrote_is_not_replaced(command: tuple[object,
 
 
 @pytest.mark.parametrize("name", ["mine.toml", "mine-ensemble.toml", "mine-indices.json"])
-def test_a_surveyed_gear_does_not_replace_a_file_that_something_else_wrote(name: str, tmp_path: Path) -> None:
+def test_a_surveyed_gear_does_not_replace_a_file_that_something_else_wrote(
+    name: str, tmp_path: Path
+) -> None:
     mlg("gear", "survey", "template", tmp_path / "s.csv")
     (tmp_path / name).write_text("mine", encoding="utf-8")
     found = mlg("gear", "survey", tmp_path / "s.csv", "--write", tmp_path / "mine.toml")
@@ -286,7 +331,9 @@ def test_a_surveyed_gear_does_not_replace_a_file_that_something_else_wrote(name:
     assert (tmp_path / name).read_text(encoding="utf-8") == "mine"
 
 
-def test_a_table_of_a_study_does_not_replace_a_file_that_something_else_wrote(own_gear: Path) -> None:
+def test_a_table_of_a_study_does_not_replace_a_file_that_something_else_wrote(
+    own_gear: Path,
+) -> None:
     indices = own_gear.with_name("hawker-800xp-indices.json")
     indices.write_text("{}", encoding="utf-8")
     found = mlg("study", "--gear", own_gear, "--write-table")
@@ -330,7 +377,9 @@ def test_an_earlier_extension_is_replaced(extended: tuple[object, ...], tmp_path
 
 
 @pytest.mark.parametrize("suffix", [".html", ".pdf"])
-def test_an_earlier_report_is_replaced_and_another_file_of_its_name_is_not(suffix: str, tmp_path: Path) -> None:
+def test_an_earlier_report_is_replaced_and_another_file_of_its_name_is_not(
+    suffix: str, tmp_path: Path
+) -> None:
     command = ("check", FAILURE, "-q", "--report", tmp_path, "--format", suffix[1:])
     assert [mlg(*command).code for _ in range(2)] == [1, 1]
     (report,) = tmp_path.glob(f"*{suffix}")
@@ -345,7 +394,9 @@ def test_an_earlier_report_is_replaced_and_another_file_of_its_name_is_not(suffi
     assert mlg(*command, "--force").code == 1
 
 
-def test_a_report_in_a_folder_through_one_that_is_missing_does_not_replace_another_file(tmp_path: Path) -> None:
+def test_a_report_in_a_folder_through_one_that_is_missing_does_not_replace_another_file(
+    tmp_path: Path,
+) -> None:
     command = ("check", FAILURE, "-q", "--format", "html", "--report")
     mlg(*command, tmp_path)
     (report,) = tmp_path.glob("*.html")
@@ -357,19 +408,35 @@ def test_a_report_in_a_folder_through_one_that_is_missing_does_not_replace_anoth
 @pytest.mark.parametrize("option", ["--annotate", "--report"])
 def test_two_outputs_of_one_run_are_two_files(option: str, tmp_path: Path) -> None:
     csv = tmp_path / ("mlg-x.html" if option == "--report" else "o.xlsx")
-    found = mlg("check", DATA / "failure_case.xlsx", "--csv", csv, option, tmp_path if option == "--report" else csv)
+    found = mlg(
+        "check",
+        DATA / "failure_case.xlsx",
+        "--csv",
+        csv,
+        option,
+        tmp_path if option == "--report" else csv,
+    )
     assert found.code == 2
     assert found.out == ""
     assert not csv.exists()
 
 
-def test_a_table_may_have_the_name_of_a_report_in_another_folder_than_the_reports(tmp_path: Path) -> None:
+def test_a_table_may_have_the_name_of_a_report_in_another_folder_than_the_reports(
+    tmp_path: Path,
+) -> None:
     csv = tmp_path / "mlg-x.html"
-    assert mlg("check", FAILURE, "--csv", csv, "--report", tmp_path / "reports", "--format", "html").code == 1
+    assert (
+        mlg(
+            "check", FAILURE, "--csv", csv, "--report", tmp_path / "reports", "--format", "html"
+        ).code
+        == 1
+    )
     assert csv.exists()
 
 
-@pytest.mark.parametrize("command", [("check", FAILURE, "--csv"), ("history", "export")], ids=lambda c: c[0])
+@pytest.mark.parametrize(
+    "command", [("check", FAILURE, "--csv"), ("history", "export")], ids=lambda c: c[0]
+)
 def test_a_dash_is_not_taken_for_a_file(
     command: tuple[object, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -398,7 +465,12 @@ def test_a_table_that_is_standard_input_is_not_replaced(measured: Path) -> None:
 def test_the_settings_are_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mlg.toml").write_text('show = "in"\n', encoding="utf-8")
-    kept(mlg("check", FAILURE, "--csv", "mlg.toml", "--force"), tmp_path / "mlg.toml", b'show = "in"\n', "--csv")
+    kept(
+        mlg("check", FAILURE, "--csv", "mlg.toml", "--force"),
+        tmp_path / "mlg.toml",
+        b'show = "in"\n',
+        "--csv",
+    )
 
 
 def test_a_template_that_was_filled_in_is_not_replaced(tmp_path: Path) -> None:
@@ -412,6 +484,8 @@ def test_a_template_that_was_filled_in_is_not_replaced(tmp_path: Path) -> None:
 
 def test_a_state_file_that_is_not_text_is_refused(text: Path) -> None:
     text.write_bytes(b"\xff\xfe\x00")
-    found = mlg("study", "--design", "lhs", "--state", text, "--iterations", 1, "--n1", 2, "--n2", 2)
+    found = mlg(
+        "study", "--design", "lhs", "--state", text, "--iterations", 1, "--n1", 2, "--n2", 2
+    )
     assert found.code == 2
     assert text.read_bytes() == b"\xff\xfe\x00"

@@ -13,7 +13,9 @@ NOTE = (DATA / "README.md").read_text(encoding="utf-8")
 
 def test_every_file_is_named_in_the_note() -> None:
     named = re.findall(r"`([\w*]+\.\w+)`", NOTE.partition("\n**")[0])
-    files = {p.name for p in DATA.iterdir() if p.is_file() and not p.name.startswith(".")} - {"README.md"}
+    files = {p.name for p in DATA.iterdir() if p.is_file() and not p.name.startswith(".")} - {
+        "README.md"
+    }
     assert {f for f in files if not any(fnmatch.fnmatch(f, pattern) for pattern in named)} == set()
 
 
@@ -34,7 +36,11 @@ def test_the_batch_has_at_least_40_inspections_of_a_small_fleet() -> None:
 
 
 def test_the_batch_mixes_the_conventions() -> None:
-    assert {row["clearance_convention"] for row in fleet_rows()} == {"RADIAL", "DIAMETRAL", "TOTAL_PLAY"}
+    assert {row["clearance_convention"] for row in fleet_rows()} == {
+        "RADIAL",
+        "DIAMETRAL",
+        "TOTAL_PLAY",
+    }
 
 
 def test_the_batch_mixes_the_verdicts(fleet_json: Run) -> None:

@@ -40,7 +40,9 @@ def test_the_gear_as_json_has_ten_joints_with_their_sources() -> None:
 
 
 def test_every_printed_number_that_should_hold_holds(verified: Run) -> None:
-    assert [n["quantity"] for n in verified.json["numbers"] if n["should_hold"] and not n["holds"]] == []
+    assert [
+        n["quantity"] for n in verified.json["numbers"] if n["should_hold"] and not n["holds"]
+    ] == []
     assert verified.code == 0
 
 

@@ -80,8 +80,21 @@ def test_answers_lead_to_a_verdict_and_the_exit_code(start: Start) -> None:
     assert finish(child) == 1
 
 
-def test_a_shown_result_is_reported_and_corrected_and_shown_in_the_unit_of_entry(start: Start, tmp_path: Path) -> None:
-    child = start("check", "--tail", "N77", "--side", "RH", "--unit", "thou", "--convention", "RADIAL", cwd=tmp_path)
+def test_a_shown_result_is_reported_and_corrected_and_shown_in_the_unit_of_entry(
+    start: Start, tmp_path: Path
+) -> None:
+    child = start(
+        "check",
+        "--tail",
+        "N77",
+        "--side",
+        "RH",
+        "--unit",
+        "thou",
+        "--convention",
+        "RADIAL",
+        cwd=tmp_path,
+    )
     answer(child, "13", "done", *ENTERS, "")
     child.expect_exact(" thou")
     child.expect_exact("contributes")
@@ -97,7 +110,9 @@ def test_a_shown_result_is_reported_and_corrected_and_shown_in_the_unit_of_entry
 
 
 def test_a_result_that_was_shown_is_still_open_while_the_last_question_stands(start: Start) -> None:
-    child = start("check", "--tail", "N77", "--side", "RH", "--unit", "in", "--convention", "RADIAL")
+    child = start(
+        "check", "--tail", "N77", "--side", "RH", "--unit", "in", "--convention", "RADIAL"
+    )
     answer(child, ".001", "done", *ENTERS, "")
     child.expect_exact("Enter = done")
     child.kill(signal.SIGHUP)
@@ -130,7 +145,9 @@ def test_an_interrupted_entry_goes_on_where_it_stopped(start: Start) -> None:
 
 
 def test_flags_answer_questions_beforehand(start: Start) -> None:
-    child = start("check", "--tail", "N77", "--side", "RH", "--unit", "thou", "--convention", "TOTAL_PLAY")
+    child = start(
+        "check", "--tail", "N77", "--side", "RH", "--unit", "thou", "--convention", "TOTAL_PLAY"
+    )
     child.expect_exact("N77 RH")
     child.expect_exact("joint 1 of 10")
     interrupt(child)
@@ -138,7 +155,9 @@ def test_flags_answer_questions_beforehand(start: Start) -> None:
 
 
 def test_a_joint_that_was_just_skipped_is_not_asked_for_next(start: Start) -> None:
-    child = start("check", "--tail", "N77", "--side", "RH", "--unit", "in", "--convention", "RADIAL")
+    child = start(
+        "check", "--tail", "N77", "--side", "RH", "--unit", "in", "--convention", "RADIAL"
+    )
     answer(child, ".001", ".001", ".001", ".001", "s")
     child.expect_exact("joint 6 of 10")
     assert "Most useful next reading: #5" not in child.before

@@ -1,4 +1,6 @@
-"""``mlg.toml``: what is shown and how unknown headers are read is remembered, never what could turn a verdict."""
+"""``mlg.toml``: what is shown and how unknown headers are read is remembered, never what could turn
+a verdict.
+"""
 
 from __future__ import annotations
 
@@ -68,7 +70,17 @@ def test_how_a_header_is_read_is_remembered_and_said(here: Path, table: Table) -
 
 def test_what_is_remembered_stays_beside_what_is_remembered_later(here: Path, table: Table) -> None:
     path = table(row(clearance_3_in=None, **{"Spiel Drei": "0.002"}))
-    mlg("check", path, "--map", "Spiel Drei=clearance_3", "--unit", "in", "--show", "thou", "--remember")
+    mlg(
+        "check",
+        path,
+        "--map",
+        "Spiel Drei=clearance_3",
+        "--unit",
+        "in",
+        "--show",
+        "thou",
+        "--remember",
+    )
     mlg("check", FAILURE, "--page", "Letter", "--remember")
     said = mlg("check", path, "--unit", "in").err
     assert "lengths shown in thou, page Letter, header 'Spiel Drei' read as clearance_3" in said
@@ -123,8 +135,12 @@ def test_a_format_without_a_report_is_said() -> None:
     assert "without --report DIR none is written" in mlg("check", FAILURE, "--format", "html").err
 
 
-def test_no_setting_turns_a_measured_failure_into_a_verdict_within_margin(here: Path, table: Table) -> None:
-    (here / "mlg.toml").write_text('[headers]\n"plunger_displacement_in" = "carry"\n"outcome" = "carry"\n')
+def test_no_setting_turns_a_measured_failure_into_a_verdict_within_margin(
+    here: Path, table: Table
+) -> None:
+    (here / "mlg.toml").write_text(
+        '[headers]\n"plunger_displacement_in" = "carry"\n"outcome" = "carry"\n'
+    )
     assert mlg("check", table(FAILED), "-q").code == 2
 
 
@@ -171,23 +187,31 @@ def test_what_a_header_in_doubt_means_is_remembered(here: Path, table: Table) ->
     assert mlg("check", path, "--unit", "in", "--json").one["joints"][2]["clearance_in"] == 0.002
 
 
-def test_another_meaning_for_a_header_that_is_understood_is_not_kept(here: Path, table: Table) -> None:
+def test_another_meaning_for_a_header_that_is_understood_is_not_kept(
+    here: Path, table: Table
+) -> None:
     found = mlg("check", table(FAILED), "--map", "outcome=carry", "--remember")
     assert found.code == 2
     assert not (here / "mlg.toml").exists()
 
 
-def test_the_gear_says_which_headers_are_understood(here: Path, table: Table, tmp_path: Path) -> None:
+def test_the_gear_says_which_headers_are_understood(
+    here: Path, table: Table, tmp_path: Path
+) -> None:
     shipped = ROOT / "mlg_troubleshoot" / "gear" / "data"
     for file in shipped.glob("hawker*"):
         shutil.copy(file, tmp_path)
     gear = tmp_path / "hawker-800xp.toml"
     gear.write_text(gear.read_text(encoding="utf-8").replace('"plunger pin"', '"spool fork"'))
-    (here / "mlg.toml").write_text('[headers]\n"Joint 10 spool fork" = "remarks"\n', encoding="utf-8")
+    (here / "mlg.toml").write_text(
+        '[headers]\n"Joint 10 spool fork" = "remarks"\n', encoding="utf-8"
+    )
     assert mlg("check", table(row()), "-q", "--gear", gear).code == 2
 
 
-def test_a_column_by_its_letter_is_not_remembered_from_another_table(here: Path, table: Table) -> None:
+def test_a_column_by_its_letter_is_not_remembered_from_another_table(
+    here: Path, table: Table
+) -> None:
     letter = chr(ord("A") + list(FAILED).index("plunger_displacement_in"))
     (here / "mlg.toml").write_text(f'[headers]\n"{letter}" = "carry"\n', encoding="utf-8")
     assert mlg("check", table(FAILED), "--json").one["verdict"] == "OUTSIDE_MARGIN"
@@ -221,7 +245,9 @@ def test_what_was_remembered_stands_in_the_json_of_a_check(here: Path, table: Ta
 
 def test_what_was_remembered_stands_in_the_json_of_a_diagnosis(here: Path) -> None:
     (here / "mlg.toml").write_text('[headers]\n"Spiel Drei" = "clearance_3"', encoding="utf-8")
-    found = mlg("diagnose", DATA / "measured_pressure.csv", "--permutations", 99, "--json", "-q").json
+    found = mlg(
+        "diagnose", DATA / "measured_pressure.csv", "--permutations", 99, "--json", "-q"
+    ).json
     assert "remembered in mlg.toml: header 'Spiel Drei' read as clearance_3" in found["warnings"]
 
 
@@ -234,7 +260,9 @@ def test_what_was_remembered_stands_in_the_json_of_a_diagnosis(here: Path) -> No
     ],
     ids=lambda command: command[0],
 )
-def test_what_was_remembered_stands_in_every_report(command: tuple[object, ...], here: Path) -> None:
+def test_what_was_remembered_stands_in_every_report(
+    command: tuple[object, ...], here: Path
+) -> None:
     (here / "mlg.toml").write_text('show = "mm"', encoding="utf-8")
     mlg(*command, "--report", here)
     (page,) = here.glob("*.html")

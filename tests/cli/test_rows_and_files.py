@@ -1,4 +1,6 @@
-"""What else a check writes: every row once, the verdicts as CSV, the annotated workbook, reports, the template."""
+"""What else a check writes: every row once, the verdicts as CSV, the annotated workbook, reports,
+the template.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,12 @@ def test_every_data_row_stands_exactly_once_in_the_json(fleet_json: Run) -> None
 
 
 def test_every_data_row_stands_exactly_once_even_if_it_is_bad(table: Table) -> None:
-    rows = [row(record_id="A", side=""), row(record_id="B", clearance_3_in="worn"), row(record_id=""), row()]
+    rows = [
+        row(record_id="A", side=""),
+        row(record_id="B", clearance_3_in="worn"),
+        row(record_id=""),
+        row(),
+    ]
     found = mlg("check", table(*rows), "--json").json["inspections"]
     assert [i["record_id"] for i in found] == ["A", "B", None, "R1"]
 
@@ -41,7 +48,10 @@ def test_the_seed_decides_the_draws_of_a_check_and_stands_in_its_json() -> None:
 
 def test_two_files_give_their_rows_in_order(table: Table) -> None:
     first, second = table(row(record_id="A"), name="1.csv"), table(row(record_id="B"), name="2.csv")
-    assert [i["record_id"] for i in mlg("check", first, second, "--json").json["inspections"]] == ["A", "B"]
+    assert [i["record_id"] for i in mlg("check", first, second, "--json").json["inspections"]] == [
+        "A",
+        "B",
+    ]
 
 
 def test_a_folder_gives_the_rows_of_its_tables(table: Table, tmp_path: Path) -> None:
@@ -65,7 +75,9 @@ def test_an_unknown_column_is_named_and_not_dropped_in_silence(table: Table) -> 
 
 def test_the_order_of_the_columns_does_not_matter(table: Table) -> None:
     turned = dict(reversed(row(clearance_3_in="0.013").items()))
-    found = [mlg("check", table(cells), "--json").one for cells in (row(clearance_3_in="0.013"), turned)]
+    found = [
+        mlg("check", table(cells), "--json").one for cells in (row(clearance_3_in="0.013"), turned)
+    ]
     assert found[0] == found[1]
 
 
@@ -77,11 +89,15 @@ def test_a_gears_own_margin_decides_about_it(table: Table) -> None:
 
 def test_a_measured_displacement_beyond_the_margin_is_said_first() -> None:
     found = mlg(*HAND, "--convention", "RADIAL", "--set", "3=0.001in", "--measured", "-0.041in")
-    assert found.out.splitlines()[1].startswith("│ MEASURED: the plunger stands 0.0410 in short of mid-position")
+    assert found.out.splitlines()[1].startswith(
+        "│ MEASURED: the plunger stands 0.0410 in short of mid-position"
+    )
 
 
 def test_a_margin_can_be_given_by_hand() -> None:
-    found = mlg(*HAND, "--convention", "RADIAL", "--set", "3=0.001in", "--margin", "0.028in", "--json")
+    found = mlg(
+        *HAND, "--convention", "RADIAL", "--set", "3=0.001in", "--margin", "0.028in", "--json"
+    )
     assert found.one["margin_in"] == 0.028
 
 
@@ -101,7 +117,9 @@ def test_every_gear_of_a_batch_has_its_repair_sets(table: Table) -> None:
 def test_the_csv_has_one_line_for_each_row_in_its_order(tmp_path: Path) -> None:
     mlg("check", FLEET, "--csv", tmp_path / "out.csv")
     found = data_rows(tmp_path / "out.csv")
-    assert [cells["record_id"] for cells in found] == [cells["record_id"] for cells in data_rows(FLEET)]
+    assert [cells["record_id"] for cells in found] == [
+        cells["record_id"] for cells in data_rows(FLEET)
+    ]
     assert {cells["verdict"] for cells in found} <= VERDICTS
 
 
@@ -110,7 +128,9 @@ def test_the_annotated_workbook_keeps_every_cell_and_adds_the_verdict(tmp_path: 
     mlg("check", source, "--annotate", out)
     before, after = (openpyxl.load_workbook(path).worksheets[0] for path in (source, out))
     kept = [[cell.value for cell in cells] for cells in after.iter_rows(max_col=before.max_column)]
-    assert kept[: before.max_row] == [[cell.value for cell in cells] for cells in before.iter_rows()]
+    assert kept[: before.max_row] == [
+        [cell.value for cell in cells] for cells in before.iter_rows()
+    ]
     added = [cell.value for cell in after[2][before.max_column :]]
     assert "OUTSIDE_MARGIN" in added
 
@@ -145,10 +165,13 @@ def test_the_fonts_of_the_pdf_are_embedded(reports: Sequence[Path]) -> None:
     for page in pypdf.PdfReader(reports[1]).pages:
         fonts = page["/Resources"]["/Font"]
         descriptors = [
-            (f.get_object().get("/DescendantFonts") or [f])[0].get_object()["/FontDescriptor"] for f in fonts.values()
+            (f.get_object().get("/DescendantFonts") or [f])[0].get_object()["/FontDescriptor"]
+            for f in fonts.values()
         ]
         assert descriptors
-        assert all({"/FontFile", "/FontFile2", "/FontFile3"} & set(d.get_object()) for d in descriptors)
+        assert all(
+            {"/FontFile", "/FontFile2", "/FontFile3"} & set(d.get_object()) for d in descriptors
+        )
 
 
 @pytest.mark.parametrize("kind", ["html", "pdf"])
@@ -181,7 +204,16 @@ def test_a_template_that_was_filled_in_reads_back(tmp_path: Path) -> None:
     path = tmp_path / "inspections.xlsx"
     mlg("template", path)
     clearances = {f"clearance_{n}_in": {3: 0.013, 5: 0.007}.get(n, 0.001) for n in range(1, 11)}
-    fill_in(path, {"record_id": "R1", "tail_no": "N1", "side": "RH", "clearance_convention": "RADIAL", **clearances})
+    fill_in(
+        path,
+        {
+            "record_id": "R1",
+            "tail_no": "N1",
+            "side": "RH",
+            "clearance_convention": "RADIAL",
+            **clearances,
+        },
+    )
     found = mlg("check", path, "--json").one
     assert found["side"] == "RH"
     assert {f"clearance_{j['joint']}_in": j["clearance_in"] for j in found["joints"]} == clearances

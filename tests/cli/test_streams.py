@@ -47,7 +47,10 @@ def test_json_holds_no_number_that_is_not_one(fleet_json: Run) -> None:
 def closed_after_one_line(arguments: Sequence[object]) -> tuple[int, str]:
     """Run a command whose reader takes one line and goes away."""
     process = subprocess.Popen(
-        [*COMMAND, *(str(a) for a in arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, bufsize=0
+        [*COMMAND, *(str(a) for a in arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        bufsize=0,
     )
     assert process.stdout is not None
     assert process.stderr is not None
@@ -63,7 +66,9 @@ def closed_after_one_line(arguments: Sequence[object]) -> tuple[int, str]:
     [(("check", FLEET), 1), (("check", FAILURE, "--json"), 1), (("gear",), 0)],
     ids=["text", "json", "gear"],
 )
-def test_a_closed_pipe_is_no_error_and_keeps_the_exit_code(arguments: tuple[object, ...], code: int) -> None:
+def test_a_closed_pipe_is_no_error_and_keeps_the_exit_code(
+    arguments: tuple[object, ...], code: int
+) -> None:
     assert closed_after_one_line(arguments) == (code, "")
 
 
@@ -78,7 +83,10 @@ def test_a_closed_pipe_does_not_lose_the_verdicts_that_go_to_a_file(tmp_path: Pa
 def test_a_full_disk_behind_stdout_exits_5(more: tuple[str, ...]) -> None:
     with Path("/dev/full").open("wb") as full:
         done = subprocess.run(
-            [*COMMAND, "check", str(FAILURE), *more], stdout=full, stderr=subprocess.PIPE, check=False
+            [*COMMAND, "check", str(FAILURE), *more],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            check=False,
         )
     assert done.returncode == 5
     assert b"cannot be written: No space left on device" in done.stderr

@@ -1,4 +1,6 @@
-"""``mlg study`` as a command: its report, indices from measured data, and what it refuses before it works."""
+"""``mlg study`` as a command: its report, indices from measured data, and what it refuses before it
+works.
+"""
 
 from __future__ import annotations
 
@@ -18,10 +20,14 @@ SMALL = ("--n1", "10", "--n2", "50", "--iterations", "2")
 
 
 def proved_at_once(_model: object, _clearance: object, sense: float, *_: Any) -> WorstSearch:
-    return WorstSearch(sense, 0, 0.1, 0.1, 1, CertifiedBound(sense, 0.1, 0.1, np.zeros(10), 0.687, 1))
+    return WorstSearch(
+        sense, 0, 0.1, 0.1, 1, CertifiedBound(sense, 0.1, 0.1, np.zeros(10), 0.687, 1)
+    )
 
 
-def test_a_report_is_written_as_html_and_pdf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_report_is_written_as_html_and_pdf(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("mlg_troubleshoot.paper.worst_search.search_worst", proved_at_once)
     run = mlg("study", *SMALL, "--report", tmp_path / "out")
     assert run.code == 0, run.err
@@ -29,7 +35,9 @@ def test_a_report_is_written_as_html_and_pdf(tmp_path: Path, monkeypatch: pytest
     assert run.err.count("Report: ") == 2
 
 
-def test_a_report_does_not_change_what_stdout_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_report_does_not_change_what_stdout_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("mlg_troubleshoot.paper.worst_search.search_worst", proved_at_once)
     assert mlg("study", *SMALL, "--report", tmp_path).out == mlg("study", *SMALL).out
 
@@ -41,7 +49,9 @@ def test_an_unknown_paper_is_refused_before_the_study(tmp_path: Path) -> None:
     assert "Letter" in run.err
 
 
-def test_the_worst_case_is_said_in_the_unit_that_the_user_reads(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_worst_case_is_said_in_the_unit_that_the_user_reads(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr("mlg_troubleshoot.paper.worst_search.search_worst", proved_at_once)
     said = " ".join(mlg("study", *SMALL, "--bound", "--show", "mm").out.split())
     assert "2.54000 mm, proved ≤ 2.54000 mm over all directions" in said

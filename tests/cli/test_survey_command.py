@@ -21,12 +21,27 @@ from mlg_troubleshoot.workflows.survey import survey_gear, survey_values
 from .conftest import FAILURE, mlg
 
 FOUR_BAR = Path(__file__).parents[1] / "geometry" / "data" / "four-bar.toml"
-HEADER = ["kind", "from", "to", "value_in", "value_mm", "value_deg", "u_in", "extension_in", "extension_mm"]
+HEADER = [
+    "kind",
+    "from",
+    "to",
+    "value_in",
+    "value_mm",
+    "value_deg",
+    "u_in",
+    "extension_in",
+    "extension_mm",
+]
 # With the ground at 12 degrees from the crank, by hand.
 GOOD = [
-    ("O2", "A", 2.1, ""), ("A", "B", 7.15, ""), ("B", "O4", 9.1, ""), ("O2", "O4", 6.05, ""), ("A", "O4", 4.0197, ""),
-    ("O2", "B", 7.5415, ""), ("A", "O4", 4.4919, 0.4),
-]  # fmt: skip
+    ("O2", "A", 2.1, ""),
+    ("A", "B", 7.15, ""),
+    ("B", "O4", 9.1, ""),
+    ("O2", "O4", 6.05, ""),
+    ("A", "O4", 4.0197, ""),
+    ("O2", "B", 7.5415, ""),
+    ("A", "O4", 4.4919, 0.4),
+]
 
 
 def table(path: Path, rows: list[list[object]]) -> Path:
@@ -57,7 +72,12 @@ def test_the_workbook_has_the_rows_and_a_sketch_of_the_linkage(tmp_path: Path) -
     assert survey("template", tmp_path / "s.xlsx").code == 0
     book = openpyxl.load_workbook(tmp_path / "s.xlsx")
     assert [c.value for c in book["Survey"][1]][:3] == ["kind", "from", "to"]
-    assert {row[0].value for row in book["Sketch"].iter_rows(min_row=2, max_col=1)} >= {"O2", "A", "B", "O4"}
+    assert {row[0].value for row in book["Sketch"].iter_rows(min_row=2, max_col=1)} >= {
+        "O2",
+        "A",
+        "B",
+        "O4",
+    }
     assert len(book["Sketch"]._charts) == 1
 
 
@@ -83,7 +103,15 @@ def test_a_word_without_its_file_says_what_to_give(word: str) -> None:
 
 def test_the_json_has_the_keys_of_the_contract(surveyed: tuple[Path, dict[str, object]]) -> None:
     values = surveyed[1]
-    assert {"schema_version", "gear_file", "joints", "next", "misfits", "chi2", "degrees_of_freedom"} <= set(values)
+    assert {
+        "schema_version",
+        "gear_file",
+        "joints",
+        "next",
+        "misfits",
+        "chi2",
+        "degrees_of_freedom",
+    } <= set(values)
     joints = values["joints"]
     assert isinstance(joints, list)
     assert set(joints[0]) == {"joint", "plunger_amplification", "interval_90", "before"}
@@ -106,14 +134,18 @@ def test_the_gear_file_is_a_gear_with_its_table_and_says_that_it_was_surveyed(
         assert ((a.x - b.x) ** 2 + (a.y - b.y) ** 2) ** 0.5 == pytest.approx(length, abs=0.02)
 
 
-def test_every_surveyed_number_says_its_uncertainty(surveyed: tuple[Path, dict[str, object]]) -> None:
+def test_every_surveyed_number_says_its_uncertainty(
+    surveyed: tuple[Path, dict[str, object]],
+) -> None:
     gear = load_gear(surveyed[0])
     told = [n.source for n in gear.numbers if n.kind == "measured" and "point B" in n.source]
     assert told
     assert all("standard uncertainty x ± 0.0" in text for text in told)
 
 
-def test_the_same_seed_gives_the_same_gear(tmp_path: Path, surveyed: tuple[Path, dict[str, object]]) -> None:
+def test_the_same_seed_gives_the_same_gear(
+    tmp_path: Path, surveyed: tuple[Path, dict[str, object]]
+) -> None:
     again = survey_gear(surveyed[0].with_name("s.csv"), FOUR_BAR, write=tmp_path / "mine.toml")
     assert (tmp_path / "mine.toml").read_bytes() == surveyed[0].read_bytes()
     assert survey_values(again)["joints"] == surveyed[1]["joints"]
@@ -124,10 +156,14 @@ def test_millimetres_and_inches_give_one_gear(tmp_path: Path) -> None:
     inches = survey(table(tmp_path / "in.csv", good_rows()), "--json").json["joints"]
     metric = survey(table(tmp_path / "mm.csv", rows), "--json").json["joints"]
     for one, other in zip(inches, metric, strict=True):
-        assert one["plunger_amplification"] == pytest.approx(other["plunger_amplification"], rel=1e-9)
+        assert one["plunger_amplification"] == pytest.approx(
+            other["plunger_amplification"], rel=1e-9
+        )
 
 
-def test_contradicting_readings_are_named_together_and_no_gear_file_is_written(tmp_path: Path) -> None:
+def test_contradicting_readings_are_named_together_and_no_gear_file_is_written(
+    tmp_path: Path,
+) -> None:
     rows = [*good_rows()[:5], ["DISTANCE", "A", "B", 7.36, "", "", 0.005, ""]]
     run = survey(table(tmp_path / "s.csv", rows), "--write", tmp_path / "mine.toml", "--json")
     assert run.code == 1
@@ -157,7 +193,9 @@ def test_contradicting_readings_are_named_together_and_no_gear_file_is_written(t
         (["PLUNGER", "A", "", "", "", 3, "", ""], "B2", "a blank cell"),
     ],
 )
-def test_a_bad_cell_is_named_and_its_row_not_used(tmp_path: Path, row: list[object], cell: str, expected: str) -> None:
+def test_a_bad_cell_is_named_and_its_row_not_used(
+    tmp_path: Path, row: list[object], cell: str, expected: str
+) -> None:
     run = survey(table(tmp_path / "s.csv", [row]), "--json")
     assert run.code == 3
     (problem,) = run.json["problems"]
@@ -182,7 +220,9 @@ def test_the_gear_that_a_survey_starts_from_is_not_replaced(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("inspections", [(), ("--for", FAILURE)])
-def test_from_an_empty_survey_the_plunger_is_asked_for_first(tmp_path: Path, inspections: tuple[object, ...]) -> None:
+def test_from_an_empty_survey_the_plunger_is_asked_for_first(
+    tmp_path: Path, inspections: tuple[object, ...]
+) -> None:
     run = mlg("gear", "survey", table(tmp_path / "s.csv", []), *inspections, "--json")
     assert run.code == 3
     (reading,) = run.json["next"]
@@ -207,7 +247,9 @@ def test_a_report_shows_what_was_read_what_follows_and_both_linkages(tmp_path: P
 
 
 @pytest.fixture(scope="module", params=["in", "thou", "mm"])
-def shown(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str, str]:
+def shown(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[str, str, str]:
     """Screen and report of a survey with one slip and two assemblies, in a unit."""
     folder = tmp_path_factory.mktemp("shown")
     rows = good_rows()
@@ -215,20 +257,34 @@ def shown(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     report = ("--report", folder, "--page", "Letter")
     run = survey(table(folder / "s.csv", rows), "--show", request.param, *report)
     (page,) = folder.glob("*.html")
-    body = re.sub(r"<style>.*?</style>|<[^>]*>", " ", page.read_text(encoding="utf-8"), flags=re.DOTALL)
-    return request.param, " ".join(run.out.split()), " ".join(unescape(body).replace("\u00a0", " ").split())
+    body = re.sub(
+        r"<style>.*?</style>|<[^>]*>", " ", page.read_text(encoding="utf-8"), flags=re.DOTALL
+    )
+    return (
+        request.param,
+        " ".join(run.out.split()),
+        " ".join(unescape(body).replace("\u00a0", " ").split()),
+    )
 
 
-def test_screen_and_report_of_a_survey_stand_in_the_readers_unit(shown: tuple[str, str, str]) -> None:
+def test_screen_and_report_of_a_survey_stand_in_the_readers_unit(
+    shown: tuple[str, str, str],
+) -> None:
     unit, *pages = shown
-    fits = {"in": "7.1500 in would fit", "thou": "7150.0 thou would fit", "mm": "181.610 mm would fit"}[unit]
+    fits = {
+        "in": "7.1500 in would fit",
+        "thou": "7150.0 thou would fit",
+        "mm": "181.610 mm would fit",
+    }[unit]
     others = {"in", "thou", "mm"} - {unit}
     for page in pages:
         assert fits in page
         assert not re.search(rf"\d ({'|'.join(others)})\b", page)
 
 
-def test_the_unit_of_a_survey_is_remembered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_unit_of_a_survey_is_remembered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "mlg.toml").write_text('show = "mm"\npage = "Letter"\n')
     monkeypatch.chdir(tmp_path)
     assert survey("template", "s.csv").code == 0
@@ -237,7 +293,10 @@ def test_the_unit_of_a_survey_is_remembered(tmp_path: Path, monkeypatch: pytest.
 
 def test_a_template_in_millimetres_means_the_same_as_one_in_inches(tmp_path: Path) -> None:
     linkage = SurveyedLinkage(load_gear())
-    plan = [(Reading(Kind.PLUNGER, u=0.0015, extension=0.5), True), (Reading(Kind.DISTANCE, "F", "1", u=0.01), True)]
+    plan = [
+        (Reading(Kind.PLUNGER, u=0.0015, extension=0.5), True),
+        (Reading(Kind.DISTANCE, "F", "1", u=0.01), True),
+    ]
     readings = []
     for unit, factor in ((LengthUnit.INCH, 1.0), (LengthUnit.MILLIMETRE, 25.4)):
         file = tmp_path / f"{unit}.csv"

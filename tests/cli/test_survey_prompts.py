@@ -46,7 +46,9 @@ class Typed:
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    write_survey_template(tmp_path / "s.csv", SurveyedLinkage(load_gear(FOUR_BAR)), [(r, True) for r in PLAN])
+    write_survey_template(
+        tmp_path / "s.csv", SurveyedLinkage(load_gear(FOUR_BAR)), [(r, True) for r in PLAN]
+    )
     return tmp_path / "s.csv"
 
 
@@ -99,9 +101,16 @@ def test_without_a_terminal_a_template_is_asked_for(tmp_path: Path) -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 @pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning")
 def test_an_interrupt_at_the_line_loses_nothing_and_says_how_to_go_on(tmp_path: Path) -> None:
-    environment = {"PATH": os.environ["PATH"], "HOME": str(tmp_path), "PYTHONPATH": str(ROOT), "TERM": "dumb"}
+    environment = {
+        "PATH": os.environ["PATH"],
+        "HOME": str(tmp_path),
+        "PYTHONPATH": str(ROOT),
+        "TERM": "dumb",
+    }
     command = ["-m", "mlg_troubleshoot", "gear", "--gear", str(FOUR_BAR), "survey", "ask", "s.csv"]
-    child = pexpect.spawn(sys.executable, command, env=environment, cwd=tmp_path, encoding="utf-8", timeout=60)
+    child = pexpect.spawn(
+        sys.executable, command, env=environment, cwd=tmp_path, encoding="utf-8", timeout=60
+    )
     child.expect_exact("> ")
     child.sendline("1.5")
     child.expect_exact("2 of")

@@ -59,14 +59,18 @@ def test_no_line_is_wider_than_the_terminal(shown: Run, width: int) -> None:
 
 
 @WIDTHS
-def test_the_verdict_stands_in_words_with_a_mark_that_needs_no_colour(shown: Run, width: int) -> None:
+def test_the_verdict_stands_in_words_with_a_mark_that_needs_no_colour(
+    shown: Run, width: int
+) -> None:
     assert "[!] OUTSIDE MARGIN" in shown.out
 
 
 VERDICT_LINE = re.compile(r"[!~?X=] ")
 
 
-def test_the_failure_fits_a_terminal_of_80_columns_and_24_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_failure_fits_a_terminal_of_80_columns_and_24_lines(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     lines = at_width(monkeypatch, 80, "check", FAILURE).out.splitlines()
     assert len(lines) <= 23
     assert max(map(len, lines)) <= 80
@@ -87,7 +91,10 @@ def fleet() -> Run:
 
 def test_a_batch_has_one_line_for_each_gear_with_its_latest_inspection(fleet: Run) -> None:
     rows = list(csv.DictReader(FLEET.read_text(encoding="utf-8").splitlines()))
-    latest = {(r["tail_no"], r["side"]): r["inspection_date"] for r in sorted(rows, key=lambda r: r["inspection_date"])}
+    latest = {
+        (r["tail_no"], r["side"]): r["inspection_date"]
+        for r in sorted(rows, key=lambda r: r["inspection_date"])
+    }
     lines = [line for line in fleet.out.splitlines() if VERDICT_LINE.match(line)]
     for (tail, side), day in latest.items():
         assert sum(re.search(rf" {tail} +{side} +{day} ", line) is not None for line in lines) == 1
@@ -101,7 +108,9 @@ def test_all_shows_every_inspection_of_a_batch(width: int, monkeypatch: pytest.M
     assert len(verdicts) == len(FLEET.read_text(encoding="utf-8").splitlines()) - 1
 
 
-def test_tail_and_side_are_never_cut_for_width(table: Table, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tail_and_side_are_never_cut_for_width(
+    table: Table, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = table(row(tail_no="N" + "1" * 30, record_id="R" * 30), row(record_id="B", side="RH"))
     shown = at_width(monkeypatch, 80, "check", path).out
     assert f" N{'1' * 30} LH " in shown
@@ -115,8 +124,15 @@ def test_the_exit_code_counts_inspections_that_are_not_shown(table: Table) -> No
 
 
 def test_the_worst_gear_of_a_batch_stands_first(table: Table) -> None:
-    within, measured = row(record_id="A"), row(record_id="B", side="RH", plunger_displacement_in="-0.045")
-    lines = [line for line in mlg("check", table(within, measured)).out.splitlines() if VERDICT_LINE.match(line)]
+    within, measured = (
+        row(record_id="A"),
+        row(record_id="B", side="RH", plunger_displacement_in="-0.045"),
+    )
+    lines = [
+        line
+        for line in mlg("check", table(within, measured)).out.splitlines()
+        if VERDICT_LINE.match(line)
+    ]
     assert [line.split()[0] for line in lines] == ["!", "="]
     assert "OUT, MEASURED" in lines[0]
 
@@ -129,7 +145,9 @@ def test_a_gear_measured_outside_is_never_shown_as_within(table: Table) -> None:
 
 def test_a_batch_counts_its_verdicts(fleet: Run) -> None:
     counts = " ".join(fleet.out.split())
-    assert counts.startswith("46 inspections: 8 outside margin · 9 incomplete · 22 within margin · 7 inconclusive")
+    assert counts.startswith(
+        "46 inspections: 8 outside margin · 9 incomplete · 22 within margin · 7 inconclusive"
+    )
 
 
 @pytest.mark.parametrize(("unit", "worst"), [("in", "0.0472"), ("thou", "47.2"), ("mm", "1.199")])
@@ -142,7 +160,9 @@ def test_lengths_are_shown_in_the_unit_that_was_asked_for(unit: str, worst: str)
 
 @pytest.mark.parametrize("source", [FAILURE, FLEET], ids=["one", "batch"])
 def test_the_provenance_travels_into_every_view(source: object) -> None:
-    assert "reconstructed from published figures, not drawing data" in " ".join(mlg("check", source).out.split())
+    assert "reconstructed from published figures, not drawing data" in " ".join(
+        mlg("check", source).out.split()
+    )
 
 
 @pytest.mark.parametrize("source", [FAILURE, FLEET], ids=["one", "batch"])
@@ -153,7 +173,9 @@ def test_every_view_says_that_it_is_no_approval(source: object) -> None:
 
 
 @pytest.mark.parametrize("read", [True, False])
-def test_the_chance_of_a_wrong_verdict_says_how_unread_joints_count(read: bool, table: Table) -> None:
+def test_the_chance_of_a_wrong_verdict_says_how_unread_joints_count(
+    read: bool, table: Table
+) -> None:
     unread = {} if read else {"clearance_9_in": ""}
     words = " ".join(mlg("check", table(row(**unread)), "--detail").out.split())
     assert "of this gear lies on the other side of the margin with a chance of" in words
@@ -197,10 +219,15 @@ def test_a_plunger_outside_its_down_lock_range_is_said_once(table: Table) -> Non
     shown = mlg("check", table(row(plunger_down_lock_in="0.06")))
     assert (shown.out + shown.err).count("Down Lock") == 1
     words = " ".join(shown.out.split())
-    assert "Plunger at Down Lock 0.0600 in is outside 0.01 to 0.05 in: check the rigging first." in words
+    assert (
+        "Plunger at Down Lock 0.0600 in is outside 0.01 to 0.05 in: check the rigging first."
+        in words
+    )
 
 
 def test_no_chance_passes_one_by_rounding(table: Table) -> None:
     tight = {f"clearance_{n}_in": "0.0005" for n in range(1, 11)}
-    found = mlg("check", table(row(**tight, tail_no="7", plunger_displacement_in="-0.04")), "--json")
+    found = mlg(
+        "check", table(row(**tight, tail_no="7", plunger_displacement_in="-0.04")), "--json"
+    )
     assert found.json["inspections"][0]["posterior"]["no_joint_worn"] <= 1.0

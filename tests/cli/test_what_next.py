@@ -1,4 +1,6 @@
-"""What the terminal says about the next joint, the repair, re-rigging and the joints that explain a reading."""
+"""What the terminal says about the next joint, the repair, re-rigging and the joints that explain a
+reading.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,9 @@ def test_the_next_joint_is_named_with_its_minutes(incomplete: str) -> None:
 
 
 def test_what_the_plan_expects_stands_below_with_its_minutes_and_its_end(failure: str) -> None:
-    assert re.search(r"Then, as expected: measure #\d.* \(\d+ min\).* Go on with fault isolation", failure)
+    assert re.search(
+        r"Then, as expected: measure #\d.* \(\d+ min\).* Go on with fault isolation", failure
+    )
 
 
 def test_a_verdict_that_more_measuring_cannot_change_says_so(failure: str) -> None:
@@ -49,9 +53,13 @@ def test_a_verdict_that_more_measuring_cannot_change_says_so(failure: str) -> No
 
 def test_the_quickest_repair_is_shown_with_what_it_leaves() -> None:
     clearances = dict.fromkeys(range(1, 11), 0.001) | {3: 0.013, 5: 0.007}
-    flags = (flag for joint, value in clearances.items() for flag in ("--set", f"{joint}={value}in"))
+    flags = (
+        flag for joint, value in clearances.items() for flag in ("--set", f"{joint}={value}in")
+    )
     shown = said(*HAND, "--detail", *flags)
-    assert re.search(r"restore minutes worst case in probability within #3, #5 \d+ 0\.01\d\d", shown)
+    assert re.search(
+        r"restore minutes worst case in probability within #3, #5 \d+ 0\.01\d\d", shown
+    )
     assert "A restored joint counts with the 0.0005 in radial of a new part." in shown
 
 
@@ -64,7 +72,9 @@ def test_the_probability_carries_its_own_error(failure: str) -> None:
     assert re.search(r"Monte Carlo 0\.03 ± 0\.01 %", failure)
 
 
-def test_the_joints_that_explain_a_reading_are_given_as_pairs_that_act_alike(explained: str) -> None:
+def test_the_joints_that_explain_a_reading_are_given_as_pairs_that_act_alike(
+    explained: str,
+) -> None:
     assert "#3 or #5" in explained
 
 
@@ -75,5 +85,7 @@ def test_that_it_may_not_be_clearance_at_all_has_its_own_share(explained: str) -
 def test_a_gear_that_no_further_joint_will_settle_is_told_so() -> None:
     clearances = [flag for joint in (1, 2, 3, 4, 5) for flag in ("--set", f"{joint}=0.0022in")]
     text = said(*HAND, "--detail", *clearances)
-    assert re.search(r"measuring them will hardly settle it: too close to the margin \(chance 9[\d.]+ %\)", text)
+    assert re.search(
+        r"measuring them will hardly settle it: too close to the margin \(chance 9[\d.]+ %\)", text
+    )
     assert "Measure the plunger displacement at mid-position" in text

@@ -36,12 +36,16 @@ def inspected(clearance_in: Mapping[int, float], **more: Any) -> Inspection:
 
 def every_joint(clearance_in: float, **others: float) -> dict[int, float]:
     """All ten joints at one clearance, some at another: ``every_joint(0.001, j3=0.013)``."""
-    return dict.fromkeys(range(1, 11), clearance_in) | {int(name[1:]): value for name, value in others.items()}
+    return dict.fromkeys(range(1, 11), clearance_in) | {
+        int(name[1:]): value for name, value in others.items()
+    }
 
 
 @dataclass(frozen=True)
 class Shifted:
-    """An extension that shifts the plunger, whose residuals scatter by 1 thou and which needs the gauge."""
+    """An extension that shifts the plunger, whose residuals scatter by 1 thou and which needs the
+    gauge.
+    """
 
     shift_in: float = 0.004
     residual_u_in: float = 0.001
@@ -58,11 +62,17 @@ class Shifted:
 
 @pytest.fixture(scope="session")
 def judge(gear: Gear, table: IndexTable) -> Judge:
-    """Judge one inspection of the shipped gear; the same inspection is judged once, for judgements cannot change."""
+    """Judge one inspection of the shipped gear; the same inspection is judged once, for judgements
+    cannot change.
+    """
     judged: dict[Any, Assessment] = {}
 
     def judge_one(
-        clearance_in: Mapping[int, float], *, advice: bool = False, extension: Extension | None = None, **more: Any
+        clearance_in: Mapping[int, float],
+        *,
+        advice: bool = False,
+        extension: Extension | None = None,
+        **more: Any,
     ) -> Assessment:
         key = (frozenset(clearance_in.items()), advice, extension, frozenset(more.items()))
         if key not in judged:

@@ -1,7 +1,9 @@
-"""A robot that does what the next action says, on gears whose clearances and directions it alone knows.
+"""A robot that does what the next action says, on gears whose clearances and directions it alone
+knows.
 
-The gears are drawn and moved by the independent simulator's linkage, solved as a closed chain in space; costs are read
-from the gear file as plain TOML. The robot speaks to the product through a table and its JSON alone.
+The gears are drawn and moved by the independent simulator's linkage, solved as a closed chain in
+space; costs are read from the gear file as plain TOML. The robot speaks to the product through a
+table and its JSON alone.
 """
 
 from __future__ import annotations
@@ -27,7 +29,9 @@ MARGIN_IN, GAUGE_U_IN, PLUNGER_U_IN = 0.03, 0.0005, 0.0005
 CLEARANCE, OTHER, NONE = range(3)
 ROUNDS = 12
 _RAW = tomllib.loads(
-    (Path(mlg_troubleshoot.__file__).parent / "gear" / "data" / "hawker-800xp.toml").read_text(encoding="utf-8")
+    (Path(mlg_troubleshoot.__file__).parent / "gear" / "data" / "hawker-800xp.toml").read_text(
+        encoding="utf-8"
+    )
 )
 AREA = [joint["area"] for joint in _RAW["joints"]]
 AREA_MIN = {area["name"]: float(area["access_min"]) for area in _RAW["areas"]}
@@ -61,7 +65,11 @@ class Gears:
         self.own_u_in, self.plunger_in = np.full((n, 10), np.nan), np.full(n, np.nan)
         self.minutes = np.zeros(n)
         self.rounds, self.repairs, self.restored, self.sound = (np.zeros(n, int) for _ in range(4))
-        self.end, self.opened, self.done = [""] * n, [set() for _ in range(n)], [[] for _ in range(n)]
+        self.end, self.opened, self.done = (
+            [""] * n,
+            [set() for _ in range(n)],
+            [[] for _ in range(n)],
+        )
         self.failed = (self.kind == OTHER) | (np.abs(self.moved()) > MARGIN_IN)
 
     def moved(self) -> Array:
@@ -78,8 +86,12 @@ class Gears:
         self.minutes[i] += sum(AREA_MIN[name] for name in needed)
         self.opened[i] |= needed
 
-    def restore(self, i: int, joints: list[int], rng: np.random.Generator, *, read: bool = True) -> None:
-        """Restore joints: small clearances, new directions, areas closed, the plunger somewhere else."""
+    def restore(
+        self, i: int, joints: list[int], rng: np.random.Generator, *, read: bool = True
+    ) -> None:
+        """Restore joints: small clearances, new directions, areas closed, the plunger somewhere
+        else.
+        """
         self.open(i, joints)
         for j in joints:
             self.minutes[i] += RESTORE_MIN[j - 1]
@@ -95,7 +107,9 @@ class Gears:
 
 
 def drawn(n: int, rng: np.random.Generator, linkage: str = "A") -> Gears:
-    """A third failed through clearance, a third through something else, a third not; 0, 2, 5 or 10 joints read."""
+    """A third failed through clearance, a third through something else, a third not; 0, 2, 5 or 10
+    joints read.
+    """
     parts = []
     for kind in (CLEARANCE, OTHER, NONE):
         found: list[tuple[Array, Array]] = []
@@ -103,7 +117,9 @@ def drawn(n: int, rng: np.random.Generator, linkage: str = "A") -> Gears:
             share = rng.triangular(0.0, 0.0, 1.0, (4 * n, 10))
             for group in GROUPS:
                 hit = rng.random(4 * n) < (0.15 if kind == CLEARANCE else 0.01)
-                share[hit, rng.choice(group, int(hit.sum())) - 1] = rng.uniform(1.0, 2.0, int(hit.sum()))
+                share[hit, rng.choice(group, int(hit.sum())) - 1] = rng.uniform(
+                    1.0, 2.0, int(hit.sum())
+                )
             true, angles = LIMIT_IN * share, rng.uniform(0.0, 2.0 * np.pi, share.shape)
             keep = (np.abs(displacement(true, angles, linkage)) > MARGIN_IN) == (kind == CLEARANCE)
             found.append((true[keep], angles[keep]))
@@ -139,8 +155,18 @@ def write_table(file: Path, gears: Gears, rows: NDArray[np.intp]) -> None:
         writer.writerow(header)
         for i in rows:
             outcome = "FAILED" if gears.failed[i] else "RETRACTED"
-            start = [f"R{i}", f"N{i}", "LH", "RADIAL", GAUGE_U_IN, outcome, text(gears.plunger_in[i])]
-            writer.writerow(start + [text(v) for v in gears.read_in[i]] + [text(v) for v in gears.own_u_in[i]])
+            start = [
+                f"R{i}",
+                f"N{i}",
+                "LH",
+                "RADIAL",
+                GAUGE_U_IN,
+                outcome,
+                text(gears.plunger_in[i]),
+            ]
+            writer.writerow(
+                start + [text(v) for v in gears.read_in[i]] + [text(v) for v in gears.own_u_in[i]]
+            )
 
 
 def judged(file: Path, gears: Gears, rows: NDArray[np.intp]) -> list[dict[str, Any]]:
@@ -153,7 +179,12 @@ def judged(file: Path, gears: Gears, rows: NDArray[np.intp]) -> list[dict[str, A
 
 
 def play(
-    gears: Gears, folder: Path, rng: np.random.Generator, *, read_new: bool = True, rounds: int = ROUNDS
+    gears: Gears,
+    folder: Path,
+    rng: np.random.Generator,
+    *,
+    read_new: bool = True,
+    rounds: int = ROUNDS,
 ) -> dict[int, list[dict[str, Any]]]:
     """Do what the next action says, all gears in one table a round, until every plan has ended."""
     said: dict[int, list[dict[str, Any]]] = {}
@@ -167,12 +198,16 @@ def play(
             _obey(gears, int(i), row, rng, read_new)
         repaired = [i for i in going if gears.done[i][-1][0] == "RESTORE"]
         if repaired:
-            gears.failed[repaired] = (gears.kind[repaired] == OTHER) | (np.abs(gears.moved()[repaired]) > MARGIN_IN)
+            gears.failed[repaired] = (gears.kind[repaired] == OTHER) | (
+                np.abs(gears.moved()[repaired]) > MARGIN_IN
+            )
         going = np.array([i for i in going if not gears.end[i]], dtype=np.intp)
     return said
 
 
-def _obey(gears: Gears, i: int, row: dict[str, Any], rng: np.random.Generator, read_new: bool) -> None:
+def _obey(
+    gears: Gears, i: int, row: dict[str, Any], rng: np.random.Generator, read_new: bool
+) -> None:
     step = row["next_action"]
     joints = step["joints"]
     gears.done[i].append((step["action"], tuple(joints)))

@@ -23,24 +23,35 @@ def table(tmp_path: Path, *rows: str) -> Path:
 
 
 def row(record: str, tail: str, day: str, clearance_in: dict[int, float]) -> str:
-    return ",".join([record, tail, "LH", "RADIAL", day, *(str(clearance_in[n]) for n in range(1, 11))])
+    return ",".join(
+        [record, tail, "LH", "RADIAL", day, *(str(clearance_in[n]) for n in range(1, 11))]
+    )
 
 
 def test_two_records_of_one_gear_are_shown_side_by_side(tmp_path: Path) -> None:
-    file = table(tmp_path, row("OLD", "N1", "2024-01-01", WORN), row("NEW", "N1", "2024-01-03", every_joint(0.001)))
+    file = table(
+        tmp_path,
+        row("OLD", "N1", "2024-01-01", WORN),
+        row("NEW", "N1", "2024-01-03", every_joint(0.001)),
+    )
     shown = mlg("check", file).out
     assert "Before and after" in shown
     assert "-0.0120" in shown
 
 
 def test_two_different_gears_are_not_compared(tmp_path: Path) -> None:
-    file = table(tmp_path, row("OLD", "N1", "2024-01-01", WORN), row("NEW", "N2", "2024-01-03", every_joint(0.001)))
+    file = table(
+        tmp_path,
+        row("OLD", "N1", "2024-01-01", WORN),
+        row("NEW", "N2", "2024-01-03", every_joint(0.001)),
+    )
     assert "Before and after" not in mlg("check", file).out
 
 
 def test_the_dates_decide_which_is_before(judge: Judge) -> None:
     late, early = (
-        judge(every_joint(0.001), inspection_date=date(2024, 1, day), record_id=f"day {day}") for day in (9, 2)
+        judge(every_joint(0.001), inspection_date=date(2024, 1, day), record_id=f"day {day}")
+        for day in (9, 2)
     )
     assert before_and_after((late, early)) == (early, late)
 

@@ -32,7 +32,11 @@ def test_suspects_are_what_the_smallest_removals_take_away(pairs: list[tuple[int
     given_ = moments(pairs)
     places = range(len(given_))
     for count in range(len(given_)):
-        removals = [set(c) for c in combinations(places, count) if fits([given_[i] for i in places if i not in c])]
+        removals = [
+            set(c)
+            for c in combinations(places, count)
+            if fits([given_[i] for i in places if i not in c])
+        ]
         if removals:
             break
     assert set(contradictions(given_, str)) == set().union(*removals)
@@ -62,8 +66,14 @@ def test_records_of_one_date_do_not_contradict_each_other() -> None:
 @pytest.mark.parametrize(
     ("pairs", "said"),
     [
-        ([(1, 1), (2, 5), (3, 2), (4, 3)], {1: "500 landings on 2024-02-01 (1) disagree with 200 landings on 2024-03"}),
-        ([(1, 1), (2, 2), (3, 3), (4, 0)], {3: "0 landings on 2024-04-01 (3) disagree with 300 landings on 2024-03"}),
+        (
+            [(1, 1), (2, 5), (3, 2), (4, 3)],
+            {1: "500 landings on 2024-02-01 (1) disagree with 200 landings on 2024-03"},
+        ),
+        (
+            [(1, 1), (2, 2), (3, 3), (4, 0)],
+            {3: "0 landings on 2024-04-01 (3) disagree with 300 landings on 2024-03"},
+        ),
     ],
 )
 def test_the_record_that_alone_may_be_wrong_is_named_with_the_nearest_it_contradicts(

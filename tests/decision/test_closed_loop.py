@@ -31,7 +31,9 @@ def test_every_plan_ends_within_twelve_rounds_and_most_within_four(figures: Figu
     assert figures.most_rounds <= 9
 
 
-def test_nothing_is_done_twice_without_new_information(followed: tuple[Gears, dict[int, list[dict]]]) -> None:
+def test_nothing_is_done_twice_without_new_information(
+    followed: tuple[Gears, dict[int, list[dict]]],
+) -> None:
     for done in followed[0].done:
         since: list[tuple[str, tuple[int, ...]]] = []
         for step in done:
@@ -56,7 +58,9 @@ def test_a_failure_with_another_cause_seldom_has_a_sound_joint_restored(figures:
     assert figures.other_sound <= 0.10
 
 
-def test_the_plunger_is_read_only_while_no_reading_stands(followed: tuple[Gears, dict[int, list[dict]]]) -> None:
+def test_the_plunger_is_read_only_while_no_reading_stands(
+    followed: tuple[Gears, dict[int, list[dict]]],
+) -> None:
     for rows in followed[1].values():
         for row in rows:
             if row["next_action"]["action"] == "READ_PLUNGER":
@@ -77,7 +81,9 @@ def test_a_gear_within_its_margin_has_only_joints_over_their_limit_restored(
     for rows in followed[1].values():
         for row in rows:
             if row["verdict"] == "WITHIN_MARGIN" and row["next_action"]["action"] == "RESTORE":
-                assert all(row["joints"][joint - 1]["over_limit"] for joint in row["next_action"]["joints"])
+                assert all(
+                    row["joints"][joint - 1]["over_limit"] for joint in row["next_action"]["joints"]
+                )
 
 
 def test_a_repair_holds_with_unmeasured_joints_at_their_limit_or_is_of_joints_over_theirs(
@@ -89,7 +95,9 @@ def test_a_repair_holds_with_unmeasured_joints_at_their_limit_or_is_of_joints_ov
             if step["action"] == "RESTORE":
                 sure = [s for s in row["repair_sets"] if s["probability_within_margin"] >= 0.95]
                 over = [j["joint"] for j in row["joints"] if j["over_limit"]]
-                assert sorted(step["joints"]) == over or sorted(step["joints"]) in [s["joints"] for s in sure]
+                assert sorted(step["joints"]) == over or sorted(step["joints"]) in [
+                    s["joints"] for s in sure
+                ]
 
 
 def published(others_in: float) -> Gears:
@@ -107,7 +115,9 @@ def published(others_in: float) -> Gears:
 
 
 @pytest.mark.parametrize("others_in", [0.001, 0.003, LIMIT_IN])
-def test_the_published_failure_is_repaired_once_and_ends_within_its_margin(tmp_path: Path, others_in: float) -> None:
+def test_the_published_failure_is_repaired_once_and_ends_within_its_margin(
+    tmp_path: Path, others_in: float
+) -> None:
     gears = published(others_in)
     robot.play(gears, tmp_path, np.random.default_rng(2))
     assert (gears.repairs[0], gears.end[0], bool(gears.failed[0])) == (1, "WITHIN", False)

@@ -36,15 +36,23 @@ def test_the_analytic_value_is_the_probability_of_the_contract(judge: Judge) -> 
 
 def test_advice_does_not_change_the_verdict_or_its_probability(judge: Judge) -> None:
     plain, advised = judge(every_joint(0.002)), judge(every_joint(0.002), advice=True)
-    assert (plain.verdict, plain.probability_within_margin) == (advised.verdict, advised.probability_within_margin)
+    assert (plain.verdict, plain.probability_within_margin) == (
+        advised.verdict,
+        advised.probability_within_margin,
+    )
 
 
-def test_the_error_of_one_monte_carlo_value_is_the_scatter_of_many(gear: Gear, judge: Judge) -> None:
+def test_the_error_of_one_monte_carlo_value_is_the_scatter_of_many(
+    gear: Gear, judge: Judge
+) -> None:
     found = judge(every_joint(0.002), gauge_u_in=0.004)
     one = Cases.of(gear, [found.inspection])
     assert found.budget is not None
     worst = found.over_travel_in or 0.0, found.under_travel_in or 0.0
-    many = [check_probability(one, worst, found.budget, np.random.default_rng(seed)) for seed in range(150)]
+    many = [
+        check_probability(one, worst, found.budget, np.random.default_rng(seed))
+        for seed in range(150)
+    ]
     scatter = float(np.std([c.monte_carlo for c in many], ddof=1))
     assert scatter == pytest.approx(np.mean([c.standard_error for c in many]), rel=0.2)
 
@@ -79,20 +87,27 @@ def test_the_uncertainty_of_the_margin_is_in_the_monte_carlo_value(judge: Judge)
 
 
 @pytest.mark.parametrize(("shift_in", "chance"), [(-0.02, 0.0), (0.02, 1.0)])
-def test_re_rigging_takes_back_what_shifts_the_plunger_already(gear: Gear, shift_in: float, chance: float) -> None:
+def test_re_rigging_takes_back_what_shifts_the_plunger_already(
+    gear: Gear, shift_in: float, chance: float
+) -> None:
     one = Cases.of(gear, [inspected(every_joint(0.0))], Shifted(0.02))
     assert exact_chance(one, one.filled(0.0), shift_in) == [chance]
 
 
-def test_the_monte_carlo_value_is_off_the_linear_one_by_what_errors_of_the_readings_do_to_the_worst_case(
+def test_the_monte_carlo_value_differs_from_the_linear_one_by_what_reading_errors_do(
     gear: Gear, judge: Judge
 ) -> None:
     found = judge(every_joint(0.001), advice=True, gauge_u_in=0.004)
     errors = 0.004 * np.random.default_rng(8).standard_normal((1500, 10))
     errors, start = np.vstack([errors, -errors]), np.full(10, 0.001)
     steps = 1e-5 * np.eye(10)
-    slopes = (worst_case(gear.model, start + steps).over_in - worst_case(gear.model, start - steps).over_in) / 2e-5
-    links = np.array(links_from(start + errors, worst_case(gear.model, start[None]).over_directions))
+    slopes = (
+        worst_case(gear.model, start + steps).over_in
+        - worst_case(gear.model, start - steps).over_in
+    ) / 2e-5
+    links = np.array(
+        links_from(start + errors, worst_case(gear.model, start[None]).over_directions)
+    )
     assert found.budget is not None
     assert found.confidence is not None
     rest = np.hypot(found.budget.geometry_in, found.budget.model_in)
@@ -101,7 +116,9 @@ def test_the_monte_carlo_value_is_off_the_linear_one_by_what_errors_of_the_readi
     under = worst_case(gear.model, start[None]).under_directions
     curved = np.maximum(curved, -gear.model.displacement(links_from(start + errors, under)))
     moved = norm.cdf((0.03 - curved) / rest) - norm.cdf((0.03 - linear) / rest)
-    assert found.confidence.monte_carlo - found.confidence.analytic == pytest.approx(np.mean(moved), abs=0.001)
+    assert found.confidence.monte_carlo - found.confidence.analytic == pytest.approx(
+        np.mean(moved), abs=0.001
+    )
 
 
 def test_the_error_stands_beside_the_probability(judge: Judge) -> None:
@@ -109,12 +126,18 @@ def test_the_error_stands_beside_the_probability(judge: Judge) -> None:
     assert confidence_words(None) == ""
 
 
-def test_re_rigging_leaves_half_of_the_range_between_both_worst_cases(gear: Gear, judge: Judge) -> None:
+def test_re_rigging_leaves_half_of_the_range_between_both_worst_cases(
+    gear: Gear, judge: Judge
+) -> None:
     found = judge(every_joint(0.004), advice=True).rigging
     exact = worst_case(gear.model, np.full((1, 10), 0.004))
     assert found is not None
-    assert found.predicted_displacement_in == pytest.approx(0.5 * (exact.over_in[0] - exact.under_in[0]), abs=1e-12)
-    assert exact.over_in[0] + found.shift_in == pytest.approx(-(exact.under_in[0] + found.shift_in), abs=1e-12)
+    assert found.predicted_displacement_in == pytest.approx(
+        0.5 * (exact.over_in[0] - exact.under_in[0]), abs=1e-12
+    )
+    assert exact.over_in[0] + found.shift_in == pytest.approx(
+        -(exact.under_in[0] + found.shift_in), abs=1e-12
+    )
 
 
 def test_re_rigging_cannot_clear_the_published_failure(judge: Judge) -> None:
@@ -136,7 +159,9 @@ def test_the_sentence_on_re_rigging_says_that_the_joints_stay_worn(judge: Judge)
 
 def test_the_seed_decides_the_draws_and_stands_in_the_json(gear: Gear, table: IndexTable) -> None:
     one, again, other = (
-        assess([inspected(every_joint(0.002), gauge_u_in=0.002)], gear, table, advice=True, seed=seed)[0]
+        assess(
+            [inspected(every_joint(0.002), gauge_u_in=0.002)], gear, table, advice=True, seed=seed
+        )[0]
         for seed in (4, 4, 5)
     )
     assert one == again

@@ -54,7 +54,9 @@ def test_a_displacement_raises_the_chance_of_wear(gear: Gear) -> None:
     assert chance(explained(gear, sound, 0.025), 2) > 3.0 * chance(explained(gear, sound, 0.0), 2)
 
 
-def test_a_joint_that_moves_the_plunger_more_explains_a_large_displacement_better(gear: Gear) -> None:
+def test_a_joint_that_moves_the_plunger_more_explains_a_large_displacement_better(
+    gear: Gear,
+) -> None:
     sound = {j: 0.0005 for j in range(1, 11) if j not in (2, 8)}
     found = explained(gear, sound, 0.02)
     assert chance(found, 2) > chance(found, 8)
@@ -66,7 +68,9 @@ def test_a_joint_read_beyond_its_limit_is_worn(gear: Gear) -> None:
 
 def test_the_interval_of_a_measured_joint_is_its_reading_with_its_uncertainty(gear: Gear) -> None:
     found = explained(gear, every_joint(0.004), 0.0).intervals[5]
-    assert (found.low_in, found.high_in) == pytest.approx((0.004 - 1.645 * 0.0005, 0.004 + 1.645 * 0.0005), abs=1e-4)
+    assert (found.low_in, found.high_in) == pytest.approx(
+        (0.004 - 1.645 * 0.0005, 0.004 + 1.645 * 0.0005), abs=1e-4
+    )
 
 
 def test_no_joint_is_taken_to_be_worn_beyond_twice_its_limit(gear: Gear) -> None:
@@ -83,7 +87,9 @@ def test_the_two_ends_of_an_unmeasured_link_get_the_same_interval(gear: Gear) ->
 
 def test_the_sense_of_the_displacement_tells_little(gear: Gear) -> None:
     sound = {j: 0.0005 for j in range(1, 11) if j != 2}
-    assert chance(explained(gear, sound, 0.02), 2) == pytest.approx(chance(explained(gear, sound, -0.02), 2), abs=0.1)
+    assert chance(explained(gear, sound, 0.02), 2) == pytest.approx(
+        chance(explained(gear, sound, -0.02), 2), abs=0.1
+    )
 
 
 def test_what_is_assumed_beforehand_matters(gear: Gear, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -120,7 +126,9 @@ def test_ninety_percent_intervals_cover_the_clearances_of_a_simulated_fleet(gear
         )
         assert found is not None
         inside += [
-            i.low_in <= fleet.true_in[row, i.joint - 1] <= i.high_in for i in found.intervals if i.joint not in read
+            i.low_in <= fleet.true_in[row, i.joint - 1] <= i.high_in
+            for i in found.intervals
+            if i.joint not in read
         ]
     assert 0.86 < np.mean(inside) < 0.94
 
@@ -140,8 +148,11 @@ def test_what_clearance_does_not_explain_names_no_joint(gear: Gear) -> None:
     assert "#" not in explained(gear, every_joint(0.0005), 0.04).text
 
 
-def test_the_model_that_explains_is_uncertain_by_ten_percent_of_what_it_predicts(gear: Gear) -> None:
-    # One joint with play, nothing else: its direction alone is not known. The reading is a little beyond its reach.
+def test_the_model_that_explains_is_uncertain_by_ten_percent_of_what_it_predicts(
+    gear: Gear,
+) -> None:
+    # One joint with play, nothing else: its direction alone is not known. The reading is a little
+    # beyond its reach.
     reading_in, gauge_u_in, angles = 0.055, 0.0005, np.linspace(0.0, 2.0 * np.pi, 2001)
     true_in, turns = np.zeros((len(angles), 10)), np.zeros((len(angles), 10))
     true_in[:, 0], turns[:, 0] = 0.03, angles

@@ -13,16 +13,45 @@ from mlg_troubleshoot.reporting.json_form import check_as_json
 from tests.decision.conftest import Judge, every_joint
 
 INSPECTION = {
-    *("record_id", "tail_no", "side", "verdict", "predicted_displacement_in", "over_travel_in", "under_travel_in"),
-    *("predicted_upper_in", "margin_in", "remaining_in", "standard_uncertainty_in", "probability_within_margin"),
-    *("probability_exceed_random_directions", "measured_displacement_in", "geometry_spread_in", "joints"),
+    *(
+        "record_id",
+        "tail_no",
+        "side",
+        "verdict",
+        "predicted_displacement_in",
+        "over_travel_in",
+        "under_travel_in",
+    ),
+    *(
+        "predicted_upper_in",
+        "margin_in",
+        "remaining_in",
+        "standard_uncertainty_in",
+        "probability_within_margin",
+    ),
+    *(
+        "probability_exceed_random_directions",
+        "measured_displacement_in",
+        "geometry_spread_in",
+        "joints",
+    ),
     *("next_action", "repair_sets", "warnings"),
 }
 JOINT = {
-    *("joint", "name", "clearance_in", "over_limit", "contribution_in", "first_order", "total_order"),
+    *(
+        "joint",
+        "name",
+        "clearance_in",
+        "over_limit",
+        "contribution_in",
+        "first_order",
+        "total_order",
+    ),
     *("plunger_amplification", "rank"),
 }
-PROBLEM = Problem("negative", "a.csv", None, 2, "clearance_3_in", "F2", "-1", "0 or more", "Correct the cell.")
+PROBLEM = Problem(
+    "negative", "a.csv", None, 2, "clearance_3_in", "F2", "-1", "0 or more", "Correct the cell."
+)
 
 
 @pytest.fixture
@@ -63,7 +92,13 @@ def test_a_step_has_its_five_keys(form: dict) -> None:
 
 
 def test_a_repair_set_has_its_five_keys(gear: Gear, judge: Judge) -> None:
-    keys = {"joints", "predicted_displacement_in", "probability_within_margin", "access_minutes", "minutes"}
+    keys = {
+        "joints",
+        "predicted_displacement_in",
+        "probability_within_margin",
+        "access_minutes",
+        "minutes",
+    }
     (row,) = check_as_json(gear, [judge(every_joint(0.004))], [], [])["inspections"]
     assert row["repair_sets"][0].keys() == keys
 
@@ -71,8 +106,15 @@ def test_a_repair_set_has_its_five_keys(gear: Gear, judge: Judge) -> None:
 def test_the_numbers_of_an_invalid_row_are_null(form: dict) -> None:
     row = form["inspections"][1]
     assert row["verdict"] == "INVALID"
-    assert {row[key] for key in INSPECTION if key.endswith("_in") or key.startswith("probability")} == {None}
-    assert {value for joint in row["joints"] for key, value in joint.items() if key not in {"joint", "name"}} == {None}
+    assert {
+        row[key] for key in INSPECTION if key.endswith("_in") or key.startswith("probability")
+    } == {None}
+    assert {
+        value
+        for joint in row["joints"]
+        for key, value in joint.items()
+        if key not in {"joint", "name"}
+    } == {None}
 
 
 def test_the_identity_of_an_invalid_row_is_given_as_far_as_it_could_be_read(form: dict) -> None:
@@ -81,7 +123,9 @@ def test_the_identity_of_an_invalid_row_is_given_as_far_as_it_could_be_read(form
     assert row["warnings"] == ["noticed"]
 
 
-def test_a_clearance_that_was_not_measured_is_null_and_one_measured_as_zero_is_zero(gear: Gear, judge: Judge) -> None:
+def test_a_clearance_that_was_not_measured_is_null_and_one_measured_as_zero_is_zero(
+    gear: Gear, judge: Judge
+) -> None:
     joints = check_as_json(gear, [judge({3: 0.0})], [], [])["inspections"][0]["joints"]
     assert (joints[2]["clearance_in"], joints[3]["clearance_in"]) == (0.0, None)
 
@@ -97,8 +141,12 @@ def test_a_problem_has_its_nine_keys_in_order(form: dict) -> None:
 
 
 def test_what_was_not_asked_for_is_null(form: dict) -> None:
-    assert [form["inspections"][0][key] for key in ("measuring", "confidence", "posterior")] == [None] * 3
-    assert [form["inspections"][1][key] for key in ("rigging", "measuring", "confidence", "posterior")] == [None] * 4
+    assert [form["inspections"][0][key] for key in ("measuring", "confidence", "posterior")] == [
+        None
+    ] * 3
+    assert [
+        form["inspections"][1][key] for key in ("rigging", "measuring", "confidence", "posterior")
+    ] == [None] * 4
 
 
 def test_with_advice_the_posterior_names_groups_and_intervals(gear: Gear, judge: Judge) -> None:

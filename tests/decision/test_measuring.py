@@ -39,7 +39,9 @@ from tests.decision.conftest import Judge, every_joint, inspected
 MARGIN_IN = 0.03
 
 
-def advised(gear: Gear, clearance_in: dict[int, float], margin_in: float = MARGIN_IN) -> MeasuringAdvice:
+def advised(
+    gear: Gear, clearance_in: dict[int, float], margin_in: float = MARGIN_IN
+) -> MeasuringAdvice:
     return advise(Cases.of(gear, [inspected(clearance_in, margin_in=margin_in)]))
 
 
@@ -62,24 +64,37 @@ def test_the_second_order_displacement_follows_the_linkage_in_any_direction(gear
 def test_an_anchored_expansion_is_exact_for_its_gear(gear: Gear) -> None:
     clearance = np.array([every_joint(0.004)[j] for j in range(1, 11)])
     exact = worst_case(gear.model, clearance[None, :])
-    anchored = responses(gear)[0].anchored(clearance, float(exact.over_in[0]), float(exact.under_in[0]))
-    assert anchored.worst(clearance) == pytest.approx((exact.over_in[0], exact.under_in[0]), abs=1e-15)
+    anchored = responses(gear)[0].anchored(
+        clearance, float(exact.over_in[0]), float(exact.under_in[0])
+    )
+    assert anchored.worst(clearance) == pytest.approx(
+        (exact.over_in[0], exact.under_in[0]), abs=1e-15
+    )
 
 
 def test_the_quick_uncertainty_agrees_with_the_rule(gear: Gear) -> None:
     clearance = np.random.default_rng(6).uniform(0.0, 0.004, (50, 10))
-    exact = predict(gear, [inspected({})] * 50, clearance, np.ones((50, 10), bool), np.full(50, 0.0005))
+    exact = predict(
+        gear, [inspected({})] * 50, clearance, np.ones((50, 10), bool), np.full(50, 0.0005)
+    )
     worst, _slopes, u = uncertainty_parts(responses(gear), clearance, 0.0005, 0.001)
     wanted = np.sqrt(exact.u_clearances_in**2 + exact.u_geometry_in**2 + 0.001**2)
     assert worst == pytest.approx(exact.displacement_in, rel=0.005)
     assert u == pytest.approx(wanted, rel=0.03)
 
 
-def test_the_quick_chance_with_random_directions_is_the_share_of_displacements_beyond_the_margin(gear: Gear) -> None:
-    response, clearance = responses(gear)[0], np.array([[0.0] * 2 + [0.015] + [0.0] * 7, [0.0075] * 10])
+def test_the_quick_chance_with_random_directions_is_the_share_of_displacements_beyond_the_margin(
+    gear: Gear,
+) -> None:
+    response, clearance = (
+        responses(gear)[0],
+        np.array([[0.0] * 2 + [0.015] + [0.0] * 7, [0.0075] * 10]),
+    )
     links = np.array(links_from(clearance[:, None, :], random_directions(10, 512)))
     share = [np.mean(np.abs(response.displacement(links[:, k].T)) > 0.03) for k in range(2)]
-    assert response.chance_beyond(clearance, np.full(2, 0.03), 512) == pytest.approx(np.array(share), abs=1e-12)
+    assert response.chance_beyond(clearance, np.full(2, 0.03), 512) == pytest.approx(
+        np.array(share), abs=1e-12
+    )
 
 
 def test_the_minutes_of_a_reading_are_those_in_an_area_that_is_open_already(gear: Gear) -> None:
@@ -139,13 +154,17 @@ def test_the_chance_of_being_within_agrees_with_drawing_gears(gear: Gear) -> Non
     level = rng.choice(len(weights), 400, p=weights)
     clearance = 0.0075 * np.array([rng.choice(shares[k], 10) for k in level])
     clearance[:, 2], clearance[:, 4] = 0.003, 0.003
-    exact = predict(gear, [inspected({})] * 400, clearance, np.ones((400, 10), bool), np.full(400, 0.0005))
+    exact = predict(
+        gear, [inspected({})] * 400, clearance, np.ones((400, 10), bool), np.full(400, 0.0005)
+    )
     p = exact.probability_within(np.full(400, MARGIN_IN), np.zeros(400))
     assert within == pytest.approx(p.mean(), abs=3.0 * p.std() / 20.0)
 
 
 def test_the_normal_distribution_has_its_known_values() -> None:
-    assert normal_cdf(np.array([0.0, 1.6448536, -1.6448536])) == pytest.approx([0.5, 0.95, 0.05], abs=1e-7)
+    assert normal_cdf(np.array([0.0, 1.6448536, -1.6448536])) == pytest.approx(
+        [0.5, 0.95, 0.05], abs=1e-7
+    )
 
 
 def test_an_area_that_is_open_costs_no_minutes_again(gear: Gear) -> None:
@@ -167,7 +186,9 @@ def test_the_next_joint_is_worth_most_per_minute_of_access(gear: Gear) -> None:
     assert worth[0].joint != max(worth, key=lambda w: w.variance_in2 / w.minutes).joint
 
 
-def test_a_reading_that_is_worth_more_may_still_come_later_because_of_its_access(gear: Gear) -> None:
+def test_a_reading_that_is_worth_more_may_still_come_later_because_of_its_access(
+    gear: Gear,
+) -> None:
     critical = dict.fromkeys(range(1, 6), 0.0015)
     worth = {w.joint: w for w in outlook(Cases.of(gear, [inspected(critical)])).worth}
     assert worth[8].risk_drop > worth[6].risk_drop
@@ -176,9 +197,13 @@ def test_a_reading_that_is_worth_more_may_still_come_later_because_of_its_access
 
 def test_where_no_single_reading_has_a_value_the_variance_per_minute_decides(gear: Gear) -> None:
     # Two badly worn ends: no single reading can make WITHIN the better answer again.
-    worth = [w for w in outlook(Cases.of(gear, [inspected({3: 0.0074, 5: 0.0074})])).worth if w.critical]
+    worth = [
+        w for w in outlook(Cases.of(gear, [inspected({3: 0.0074, 5: 0.0074})])).worth if w.critical
+    ]
     assert {w.risk_drop for w in worth} == {0.0}
-    assert worth[0].variance_in2 / worth[0].minutes == max(w.variance_in2 / w.minutes for w in worth)
+    assert worth[0].variance_in2 / worth[0].minutes == max(
+        w.variance_in2 / w.minutes for w in worth
+    )
 
 
 def test_both_ends_of_one_link_are_worth_the_same(gear: Gear) -> None:
@@ -202,7 +227,9 @@ def test_measuring_goes_on_while_the_verdict_is_open(gear: Gear) -> None:
     assert not advised(gear, {3: 0.001, 5: 0.001}).stop
 
 
-def test_where_one_may_stop_no_reading_up_to_the_limit_changes_the_verdict(gear: Gear, judge: Judge) -> None:
+def test_where_one_may_stop_no_reading_up_to_the_limit_changes_the_verdict(
+    gear: Gear, judge: Judge
+) -> None:
     start = {3: 0.006, 5: 0.006, 2: 0.006}
     assert advised(gear, start).stop
     rng = np.random.default_rng(8)
@@ -244,20 +271,32 @@ def test_an_expectation_of_either_side_goes_before_too_close() -> None:
     assert enough(0.01, too_close=0.95) is Verdict.OUTSIDE_MARGIN
 
 
-def test_the_chance_of_being_too_close_is_that_of_gears_drawn_from_the_same_distribution(gear: Gear) -> None:
+def test_the_chance_of_being_too_close_is_that_of_gears_drawn_from_the_same_distribution(
+    gear: Gear,
+) -> None:
     measured = dict.fromkeys(range(1, 6), 0.0024)
     limits, rng = gear.limits_in, np.random.default_rng(12)
     shares = np.array([measured[j] for j in measured]) / limits[:5]
     level = rng.choice(24, p=level_weights(shares), size=3000)
     drawn = quantiles(400)[level[:, None], rng.integers(0, 400, (3000, 5))] * limits[5:]
     clearance = np.column_stack([np.tile([0.0024] * 5, (3000, 1)), drawn])
-    found = predict(gear, [inspected(measured)] * 3000, clearance, np.ones((3000, 10), bool), np.full(3000, 0.0005))
+    found = predict(
+        gear,
+        [inspected(measured)] * 3000,
+        clearance,
+        np.ones((3000, 10), bool),
+        np.full(3000, 0.0005),
+    )
     p = found.probability_within(np.full(3000, MARGIN_IN), np.zeros(3000))
     truth = np.mean((p > 0.05) & (p < 0.95))
-    assert outlook(Cases.of(gear, [inspected(measured)])).too_close == pytest.approx(truth, abs=0.05)
+    assert outlook(Cases.of(gear, [inspected(measured)])).too_close == pytest.approx(
+        truth, abs=0.05
+    )
 
 
-def test_a_gear_that_no_further_joint_will_settle_is_told_to_measure_the_plunger(gear: Gear) -> None:
+def test_a_gear_that_no_further_joint_will_settle_is_told_to_measure_the_plunger(
+    gear: Gear,
+) -> None:
     found = advised(gear, dict.fromkeys(range(1, 6), 0.0022))
     assert found.expected is Verdict.INCONCLUSIVE
     assert "Measure the plunger displacement at mid-position" in found.text
@@ -299,16 +338,20 @@ def test_slopes_are_those_of_the_sense_that_governs(gear: Gear, under_in: float)
     assert response.slopes(start) == pytest.approx(numeric, rel=1e-6)
 
 
-def test_the_variance_that_a_reading_removes_is_that_of_its_joint_s_wear_through_its_amplification(gear: Gear) -> None:
+def test_the_variance_that_a_reading_removes_is_that_of_its_joint_s_wear_through_its_amplification(
+    gear: Gear,
+) -> None:
     chance, (mean, variance) = level_weights(np.array([0.003 / gear.limits_in[1]])), moments()
     share = chance @ (variance + mean**2) - (chance @ mean) ** 2
     moved = gear.model.plunger_amplification() ** 2 * gear.limits_in**2 * share
     for worth in outlook(Cases.of(gear, [inspected({2: 0.003})])).worth:
-        assert worth.variance_in2 == pytest.approx(moved[gear.joint_numbers.index(worth.joint)], rel=0.2)
+        assert worth.variance_in2 == pytest.approx(
+            moved[gear.joint_numbers.index(worth.joint)], rel=0.2
+        )
 
 
 @pytest.mark.parametrize("gauge_u_in", [0.0003, 0.0005])
-def test_precision_may_settle_what_two_standard_uncertainties_of_the_readings_would_move_out_of_doubt(
+def test_precision_may_settle_what_two_standard_uncertainties_would_move_out_of_doubt(
     gear: Gear, table: IndexTable, gauge_u_in: float
 ) -> None:
     said = []
@@ -347,10 +390,15 @@ def test_the_advice_knows_the_own_uncertainty_of_a_joint(gear: Gear, table: Inde
     read = inspected(every_joint(0.0015), gauge_u_by_joint_in={5: 0.004})
     (judged,) = assess([read], gear, table)
     assert isinstance(judged, Assessment)
-    assert advise(Cases.of(gear, [read])).expected_within == pytest.approx(judged.probability_within_margin, abs=1e-12)
+    assert advise(Cases.of(gear, [read])).expected_within == pytest.approx(
+        judged.probability_within_margin, abs=1e-12
+    )
 
 
 def test_a_coarse_reading_leaves_more_levels_of_displacement_open(gear: Gear) -> None:
     measured = {3: 0.004, 5: 0.004}
-    fine, coarse = (outlook(Cases.of(gear, [inspected(measured, gauge_u_by_joint_in={5: u})])) for u in (0.0005, 0.01))
+    fine, coarse = (
+        outlook(Cases.of(gear, [inspected(measured, gauge_u_by_joint_in={5: u})]))
+        for u in (0.0005, 0.01)
+    )
     assert abs(coarse.within - 0.5) < abs(fine.within - 0.5)

@@ -20,18 +20,28 @@ from tests.decision.conftest import Judge, every_joint, inspected
 
 def test_a_gear_that_failed_has_its_plunger_read_first(gear: Gear, judge: Judge) -> None:
     first = judge({3: 0.013, 5: 0.007}, outcome=Outcome.FAILED).next_action
-    assert (first.action, first.joints, first.minutes) == (Action.READ_PLUNGER, (), gear.plunger_reading.value)
+    assert (first.action, first.joints, first.minutes) == (
+        Action.READ_PLUNGER,
+        (),
+        gear.plunger_reading.value,
+    )
 
 
-def test_a_plunger_measured_beyond_its_margin_is_outside_whatever_is_predicted(judge: Judge) -> None:
+def test_a_plunger_measured_beyond_its_margin_is_outside_whatever_is_predicted(
+    judge: Judge,
+) -> None:
     found = judge(every_joint(0.001), readings_in=(0.060,))
     assert (found.verdict, found.basis) == (Verdict.OUTSIDE_MARGIN, Basis.MEASURED)
-    assert found.headline.startswith("MEASURED: the plunger stands 0.0600 in beyond mid-position, outside")
+    assert found.headline.startswith(
+        "MEASURED: the plunger stands 0.0600 in beyond mid-position, outside"
+    )
     assert found.probability_within_margin is not None
     assert found.probability_within_margin > 0.95
 
 
-def test_what_the_joints_explain_and_what_they_cannot_add_up_to_what_was_measured(judge: Judge) -> None:
+def test_what_the_joints_explain_and_what_they_cannot_add_up_to_what_was_measured(
+    judge: Judge,
+) -> None:
     found = judge(every_joint(0.001), readings_in=(-0.060,))
     assert found.explained_at_most_in == pytest.approx(-(found.under_travel_in or 0.0))
     assert found.explained_at_most_in + (found.unexplained_in or 0.0) == pytest.approx(0.060)
@@ -57,9 +67,14 @@ def test_a_displacement_beyond_what_the_joints_explain_is_not_explained(judge: J
     assert found.end is End.NOT_EXPLAINED
 
 
-def test_a_joint_over_its_limit_is_restored_before_a_displacement_counts_as_unexplained(judge: Judge) -> None:
+def test_a_joint_over_its_limit_is_restored_before_a_displacement_counts_as_unexplained(
+    judge: Judge,
+) -> None:
     found = judge(every_joint(0.001, j7=0.008), readings_in=(0.060,))
-    assert [(step.action, step.joints) for step in found.plan.steps] == [(Action.RESTORE, (7,)), (Action.CONTINUE, ())]
+    assert [(step.action, step.joints) for step in found.plan.steps] == [
+        (Action.RESTORE, (7,)),
+        (Action.CONTINUE, ()),
+    ]
 
 
 def test_a_plan_ends_in_going_on_without_minutes(judge: Judge) -> None:
@@ -68,17 +83,25 @@ def test_a_plan_ends_in_going_on_without_minutes(judge: Judge) -> None:
         assert (last.action, last.minutes) == (Action.CONTINUE, 0.0)
 
 
-def test_the_next_action_of_the_json_is_the_first_step_of_its_plan(gear: Gear, judge: Judge) -> None:
+def test_the_next_action_of_the_json_is_the_first_step_of_its_plan(
+    gear: Gear, judge: Judge
+) -> None:
     form = check_as_json(gear, [judge({3: 0.013})], [], [])["inspections"][0]
     assert form["next_action"] == form["plan"][0]
     assert form["end"] in set(End)
 
 
-def test_joints_are_measured_again_where_a_better_gauge_likely_settles_the_verdict(judge: Judge) -> None:
+def test_joints_are_measured_again_where_a_better_gauge_likely_settles_the_verdict(
+    judge: Judge,
+) -> None:
     found = judge(every_joint(0.0018))
     assert found.verdict is Verdict.INCONCLUSIVE
     first = found.next_action
-    assert (first.action, first.joints, first.gauge_u_needed_in) == (Action.MEASURE_AGAIN, (2, 4, 3, 5), 0.0003)
+    assert (first.action, first.joints, first.gauge_u_needed_in) == (
+        Action.MEASURE_AGAIN,
+        (2, 4, 3, 5),
+        0.0003,
+    )
     assert found.end is End.WITHIN
 
 
@@ -91,7 +114,9 @@ def test_far_from_both_verdicts_nothing_is_measured_again(judge: Judge) -> None:
     )
 
 
-def test_a_joint_whose_own_uncertainty_is_stated_is_not_measured_again(gear: Gear, table: IndexTable) -> None:
+def test_a_joint_whose_own_uncertainty_is_stated_is_not_measured_again(
+    gear: Gear, table: IndexTable
+) -> None:
     read = inspected(every_joint(0.0018), gauge_u_by_joint_in=dict.fromkeys(range(1, 11), 0.0005))
     (found,) = assess([read], gear, table)
     assert found.next_action.action is Action.CONTINUE
@@ -99,7 +124,8 @@ def test_a_joint_whose_own_uncertainty_is_stated_is_not_measured_again(gear: Gea
 
 def test_an_area_counts_once_and_again_after_a_repair_closed_it(judge: Judge) -> None:
     steps = judge({3: 0.013, 5: 0.007}, outcome=Outcome.FAILED).plan.steps
-    # Sidestay 15 min with #2, #4, #1; link assembly 20 min with five joints; then 120 min a joint, all open.
+    # Sidestay 15 min with #2, #4, #1; link assembly 20 min with five joints; then 120 min a joint,
+    # all open.
     assert [step.minutes for step in steps] == [12.0, 50.0, 56.0, 120.0 * len(steps[3].joints), 0.0]
 
 
@@ -124,7 +150,9 @@ def test_the_joints_explain_a_displacement_up_to_two_standard_uncertainties_beyo
 ) -> None:
     found = judge(every_joint(0.0005))
     u_in = math.hypot(found.standard_uncertainty_in or 0.0, 0.0005)
-    read = inspected(every_joint(0.0005), readings_in=((found.over_travel_in or 0.0) + apart * u_in,))
+    read = inspected(
+        every_joint(0.0005), readings_in=((found.over_travel_in or 0.0) + apart * u_in,)
+    )
     cases = Cases.of(gear, [read])
     assert compare(cases, predict_batch(cases).upper).explained == [explained]
 
@@ -132,11 +160,17 @@ def test_the_joints_explain_a_displacement_up_to_two_standard_uncertainties_beyo
 def test_a_failure_that_clearances_likely_caused_is_expected_to_be_repaired(judge: Judge) -> None:
     found = judge(every_joint(0.001, j3=0.013, j5=0.007), outcome=Outcome.FAILED)
     assert 0.05 < (found.probability_exceed_random_directions or 0.0) < 0.5
-    assert [step.action for step in found.plan.steps] == [Action.READ_PLUNGER, Action.RESTORE, Action.CONTINUE]
+    assert [step.action for step in found.plan.steps] == [
+        Action.READ_PLUNGER,
+        Action.RESTORE,
+        Action.CONTINUE,
+    ]
     assert (set(found.plan.steps[1].joints), found.end) == ({3, 5}, End.WITHIN)
 
 
-def test_a_failure_that_clearances_hardly_cause_is_expected_to_have_another_cause(judge: Judge) -> None:
+def test_a_failure_that_clearances_hardly_cause_is_expected_to_have_another_cause(
+    judge: Judge,
+) -> None:
     found = judge(every_joint(0.0035), outcome=Outcome.FAILED)
     assert found.verdict is Verdict.OUTSIDE_MARGIN
     assert (found.probability_exceed_random_directions or 0.0) < 0.05
@@ -148,7 +182,10 @@ def test_a_failure_that_clearances_hardly_cause_is_expected_to_have_another_caus
 
 @pytest.mark.parametrize(
     ("outcome", "first", "end"),
-    [(None, Action.RESTORE, End.WITHIN), (Outcome.RETRACTED, Action.CONTINUE, End.OUTSIDE_NO_COMPLAINT)],
+    [
+        (None, Action.RESTORE, End.WITHIN),
+        (Outcome.RETRACTED, Action.CONTINUE, End.OUTSIDE_NO_COMPLAINT),
+    ],
 )
 def test_a_plunger_beyond_its_margin_is_a_complaint_unless_the_gear_retracted(
     judge: Judge, outcome: Outcome | None, first: Action, end: End
@@ -172,7 +209,9 @@ def test_a_joint_at_its_limit_is_not_restored_even_if_read_in_millimetres(judge:
 
 
 def test_what_tells_least_is_left_for_a_second_round_of_readings(judge: Judge) -> None:
-    rounds = [step.joints for step in judge(dict.fromkeys(range(1, 6), 0.0015)).plan.steps if step.joints]
+    rounds = [
+        step.joints for step in judge(dict.fromkeys(range(1, 6), 0.0015)).plan.steps if step.joints
+    ]
     assert [set(joints) for joints in rounds] == [{6, 7, 9, 10}, {8}]
 
 
@@ -183,8 +222,20 @@ def test_nothing_is_read_first_that_hardly_spares_a_restoration(judge: Judge) ->
     assert (first.action, set(first.joints)) == (Action.RESTORE, {2, 3, 4, 5})
 
 
-def test_reading_in_an_area_that_the_repair_opens_anyway_costs_the_reading_alone(judge: Judge) -> None:
-    read = {1: 0.0029, 2: 0.005, 3: 0.0045, 4: 0.0043, 5: 0.004, 6: 0.0069, 7: 0.0077, 9: 0.0027, 10: 0.0018}
+def test_reading_in_an_area_that_the_repair_opens_anyway_costs_the_reading_alone(
+    judge: Judge,
+) -> None:
+    read = {
+        1: 0.0029,
+        2: 0.005,
+        3: 0.0045,
+        4: 0.0043,
+        5: 0.004,
+        6: 0.0069,
+        7: 0.0077,
+        9: 0.0027,
+        10: 0.0018,
+    }
     steps = judge(read, readings_in=(0.035,), outcome=Outcome.FAILED).plan.steps
     # Joint 7 is over its limit: the link assembly, in which #8 is read, will be opened in any case.
     assert [(step.action, step.joints) for step in steps[:1]] == [(Action.MEASURE, (8,))]

@@ -22,7 +22,9 @@ def test_the_two_worn_joints_of_the_published_failure_stand_on_top(judge: Judge)
 
 def test_the_contribution_is_amplification_times_clearance(judge: Judge) -> None:
     for finding in judge(every_joint(0.002, j3=0.006)).joints:
-        assert finding.contribution_in == pytest.approx(finding.plunger_amplification * (finding.clearance_in or 0.0))
+        assert finding.contribution_in == pytest.approx(
+            finding.plunger_amplification * (finding.clearance_in or 0.0)
+        )
 
 
 def test_the_amplification_of_joint_three_is_two_and_a_quarter(judge: Judge) -> None:
@@ -56,14 +58,18 @@ def test_an_unmeasured_joint_counts_with_half_its_limit(judge: Judge) -> None:
         assert order(judge, clearance)[0] == first
 
 
-def test_ties_go_to_the_larger_total_order_index(judge: Judge, gear: Gear, table: IndexTable) -> None:
+def test_ties_go_to_the_larger_total_order_index(
+    judge: Judge, gear: Gear, table: IndexTable
+) -> None:
     ranked = order(judge, every_joint(0.0))
     total = dict(zip(gear.joint_numbers, table.total_order.round(6), strict=True))
     assert [total[j] for j in ranked] == sorted(total.values(), reverse=True)
 
 
 def test_every_joint_has_its_own_rank(judge: Judge) -> None:
-    assert sorted(finding.rank for finding in judge(every_joint(0.001)).joints) == list(range(1, 11))
+    assert sorted(finding.rank for finding in judge(every_joint(0.001)).joints) == list(
+        range(1, 11)
+    )
 
 
 def test_the_table_stands_in_the_order_of_the_joints(judge: Judge) -> None:
@@ -80,12 +86,17 @@ def test_the_rank_range_covers_the_rank_on_every_linkage(gear: Gear, judge: Judg
     clearance = every_joint(0.002)
     found = judge(clearance)
     for j, finding in enumerate(found.joints):
-        places = [1 + sum(row > row[j] + 1e-9) for row in (response.amplification for response in responses(gear))]
+        places = [
+            1 + sum(row > row[j] + 1e-9)
+            for row in (response.amplification for response in responses(gear))
+        ]
         assert finding.rank_range[0] <= finding.rank <= finding.rank_range[1]
         assert finding.rank_range[0] >= min(places)
 
 
-def test_two_to_five_lead_on_every_linkage_with_one_next_and_the_link_assembly_last(judge: Judge) -> None:
+def test_two_to_five_lead_on_every_linkage_with_one_next_and_the_link_assembly_last(
+    judge: Judge,
+) -> None:
     ranges = {finding.joint: finding.rank_range for finding in judge(every_joint(0.002)).joints}
     assert all(ranges[j][1] <= 4 for j in (2, 3, 4, 5))
     assert ranges[1] == (5, 5)
@@ -93,7 +104,11 @@ def test_two_to_five_lead_on_every_linkage_with_one_next_and_the_link_assembly_l
 
 
 def test_a_joint_that_acts_like_another_names_it(judge: Judge) -> None:
-    alike = {finding.joint: finding.alike for finding in judge(every_joint(0.001)).joints if finding.alike}
+    alike = {
+        finding.joint: finding.alike
+        for finding in judge(every_joint(0.001)).joints
+        if finding.alike
+    }
     assert alike == {3: (5,), 5: (3,), 6: (7,), 7: (6,), 9: (10,), 10: (9,)}
 
 
@@ -102,7 +117,9 @@ def test_the_order_on_each_linkage_is_that_of_its_own_amplification(gear: Gear) 
         assert response.amplification == pytest.approx(model.plunger_amplification(), rel=1e-9)
 
 
-def test_the_table_agrees_with_the_model_it_was_computed_from(gear: Gear, table: IndexTable) -> None:
+def test_the_table_agrees_with_the_model_it_was_computed_from(
+    gear: Gear, table: IndexTable
+) -> None:
     (findings,) = rank_joints(gear, table, np.full((1, 10), np.nan))
     exact = gear.model.plunger_amplification()
     assert [f.plunger_amplification for f in findings] == pytest.approx(exact.tolist(), rel=1e-8)

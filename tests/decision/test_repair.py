@@ -24,11 +24,15 @@ FULL_FAILURE = every_joint(0.001, j3=0.013, j5=0.007)
 MARGIN_IN = 0.03
 
 
-def repair_sets(gear: Gear, inspection: Inspection, margin_in: float = MARGIN_IN) -> tuple[RepairSet, ...]:
+def repair_sets(
+    gear: Gear, inspection: Inspection, margin_in: float = MARGIN_IN
+) -> tuple[RepairSet, ...]:
     """Repair sets of one gear."""
     cases = Cases.of(gear, [replace(inspection, margin_in=margin_in)])
     upper = predict_batch(cases).upper
-    found = repair.calibrated(cases, repair.search(cases, upper.displacement_in, upper.u_clearances_in))
+    found = repair.calibrated(
+        cases, repair.search(cases, upper.displacement_in, upper.u_clearances_in)
+    )
     return repair.repair_sets(cases, found, np.array([True]))[0]
 
 
@@ -42,15 +46,24 @@ def allowance(gear: Gear, inspection: Inspection) -> dict[int, float]:
 def probabilities_after(gear: Gear, *repairs: tuple[int, ...]) -> np.ndarray:
     """Probability that the failed gear is within its margin after each of these repairs."""
     n = len(repairs)
-    rows = np.array([[0.0005 if j in restored else FULL_FAILURE[j] for j in range(1, 11)] for restored in repairs])
+    rows = np.array(
+        [
+            [0.0005 if j in restored else FULL_FAILURE[j] for j in range(1, 11)]
+            for restored in repairs
+        ]
+    )
     found = predict(gear, [inspected({})] * n, rows, np.ones((n, 10), bool), np.full(n, 0.0005))
     return found.probability_within(np.full(n, MARGIN_IN), np.zeros(n))
 
 
-def test_only_what_is_measured_and_worn_beyond_a_new_part_can_be_restored_with_a_gain(gear: Gear) -> None:
+def test_only_what_is_measured_and_worn_beyond_a_new_part_can_be_restored_with_a_gain(
+    gear: Gear,
+) -> None:
     new = gear.new_parts_in
     read = {1: new[0], 2: new[1] + 5e-5, 3: new[2] + 2e-4, 4: 0.5 * new[3]}
-    assert repair.removable(Cases.of(gear, [inspected(read)]))[0].tolist() == [n == 3 for n in range(1, 11)]
+    assert repair.removable(Cases.of(gear, [inspected(read)]))[0].tolist() == [
+        n == 3 for n in range(1, 11)
+    ]
 
 
 def test_restoring_joint_three_alone_is_too_close(gear: Gear) -> None:
@@ -69,18 +82,31 @@ def sets_of_failure(gear: Gear) -> tuple[tuple[int, ...], ...]:
     return tuple(s.joints for s in repair_sets(gear, inspected(FULL_FAILURE), MARGIN_IN))
 
 
-def test_every_repair_set_reaches_95_percent(gear: Gear, sets_of_failure: tuple[tuple[int, ...], ...]) -> None:
+def test_every_repair_set_reaches_95_percent(
+    gear: Gear, sets_of_failure: tuple[tuple[int, ...], ...]
+) -> None:
     assert probabilities_after(gear, *sets_of_failure).min() >= 0.95
 
 
-def test_no_repair_set_contains_a_joint_too_many(gear: Gear, sets_of_failure: tuple[tuple[int, ...], ...]) -> None:
+def test_no_repair_set_contains_a_joint_too_many(
+    gear: Gear, sets_of_failure: tuple[tuple[int, ...], ...]
+) -> None:
     # Joint 3 is over its limit and must be in every set.
-    smaller = [tuple(j for j in joints if j != spare) for joints in sets_of_failure for spare in joints if spare != 3]
+    smaller = [
+        tuple(j for j in joints if j != spare)
+        for joints in sets_of_failure
+        for spare in joints
+        if spare != 3
+    ]
     assert probabilities_after(gear, *smaller).max() < 0.95
 
 
-def test_a_joint_over_its_limit_is_in_every_repair_set_even_where_it_moves_the_plunger_little(gear: Gear) -> None:
-    found = repair_sets(gear, inspected(every_joint(0.001, j3=0.0074, j5=0.0074, j7=0.008)), MARGIN_IN)
+def test_a_joint_over_its_limit_is_in_every_repair_set_even_where_it_moves_the_plunger_little(
+    gear: Gear,
+) -> None:
+    found = repair_sets(
+        gear, inspected(every_joint(0.001, j3=0.0074, j5=0.0074, j7=0.008)), MARGIN_IN
+    )
     assert found
     assert all(7 in s.joints for s in found)
 
@@ -100,9 +126,13 @@ def test_opening_an_area_counts_once(gear: Gear) -> None:
 
 
 def test_a_restored_joint_has_the_clearance_of_a_new_part(gear: Gear) -> None:
-    best = next(s for s in repair_sets(gear, inspected(FULL_FAILURE), MARGIN_IN) if s.joints == (3, 5))
+    best = next(
+        s for s in repair_sets(gear, inspected(FULL_FAILURE), MARGIN_IN) if s.joints == (3, 5)
+    )
     row = np.array([[0.0005 if j in (3, 5) else 0.001 for j in range(1, 11)]])
-    assert best.predicted_displacement_in == pytest.approx(worst_case(gear.model, row).magnitude_in[0], abs=1e-12)
+    assert best.predicted_displacement_in == pytest.approx(
+        worst_case(gear.model, row).magnitude_in[0], abs=1e-12
+    )
 
 
 def test_where_nothing_need_be_restored_there_is_no_repair_set(gear: Gear) -> None:
@@ -138,7 +168,9 @@ def test_a_joint_with_more_amplification_has_less_allowance(gear: Gear) -> None:
     assert found[2] < found[1] < found[6]
 
 
-def test_an_allowance_ends_at_the_limit_of_the_joint_where_that_comes_before_the_margin(gear: Gear) -> None:
+def test_an_allowance_ends_at_the_limit_of_the_joint_where_that_comes_before_the_margin(
+    gear: Gear,
+) -> None:
     assert allowance(gear, inspected(every_joint(0.0017)))[6] == pytest.approx(0.0058)
 
 
@@ -157,13 +189,18 @@ def test_the_search_knows_what_every_set_leaves_with_unread_joints_at_their_limi
     gear: Gear, unread: tuple[int, ...]
 ) -> None:
     joints = every_joint(0.001, j1=0.004, j3=0.009, j4=0.005, j5=0.006)
-    cases = Cases.of(gear, [inspected({j: value for j, value in joints.items() if j not in unread}, margin_in=0.045)])
+    cases = Cases.of(
+        gear,
+        [inspected({j: value for j, value in joints.items() if j not in unread}, margin_in=0.045)],
+    )
     upper = predict_batch(cases).upper
     found = repair.search(cases, upper.displacement_in, upper.u_clearances_in)
     sets = np.flatnonzero(np.isfinite(found.slack_in[0]))
     now, n = cases.filled(gear.limits_in)[0], len(sets)
     rows = np.where(found.table.members[sets], np.minimum(0.0005, now), now)
-    exact = predict(gear, cases.inspections * n, rows, np.repeat(cases.measured, n, axis=0), np.full(n, 0.0005))
+    exact = predict(
+        gear, cases.inspections * n, rows, np.repeat(cases.measured, n, axis=0), np.full(n, 0.0005)
+    )
     slack = 0.045 - exact.displacement_in - 1.645 * exact.standard_uncertainty(np.zeros(n))
     assert n >= 64
     assert found.slack_in[0, sets] == pytest.approx(slack, abs=0.0005)
@@ -173,23 +210,43 @@ def test_an_allowance_counts_on_what_an_extension_adds(gear: Gear) -> None:
     cases = Cases.of(gear, [inspected(every_joint(0.001))], Shifted())
     found = allowances(cases, predict_batch(cases).lower)[0]
     rows = 0.001 + np.diag(found)[1:5]
-    assert 0.004 + worst_case(gear.model, rows).over_in == pytest.approx(np.full(4, MARGIN_IN), abs=1e-4)
+    assert 0.004 + worst_case(gear.model, rows).over_in == pytest.approx(
+        np.full(4, MARGIN_IN), abs=1e-4
+    )
 
 
-def test_the_search_knows_what_restoring_takes_from_the_uncertainty_of_coarse_readings(gear: Gear) -> None:
+def test_the_search_knows_what_restoring_takes_from_the_uncertainty_of_coarse_readings(
+    gear: Gear,
+) -> None:
     joints = every_joint(0.003, j1=0.004, j3=0.009, j4=0.005, j5=0.006)
     cases = Cases.of(gear, [inspected(joints, margin_in=0.045, gauge_u_in=0.003)])
     upper = predict_batch(cases).upper
     found = repair.search(cases, upper.displacement_in, upper.u_clearances_in)
     sets = np.flatnonzero(np.isfinite(found.slack_in[0]))
     rows = np.where(found.table.members[sets], 0.0005, cases.clearance_in)
-    exact = predict(gear, cases.inspections * len(sets), rows, np.ones(rows.shape, bool), np.full(len(sets), 0.003))
+    exact = predict(
+        gear,
+        cases.inspections * len(sets),
+        rows,
+        np.ones(rows.shape, bool),
+        np.full(len(sets), 0.003),
+    )
     slack = 0.045 - exact.displacement_in - 1.645 * exact.standard_uncertainty(np.zeros(len(sets)))
     assert found.slack_in[0, sets] == pytest.approx(slack, abs=0.0005)
 
 
 def test_a_set_that_only_just_suffices_is_found(gear: Gear) -> None:
-    read = {1: 0.0042, 2: 0.0094, 3: 0.0031, 5: 0.0081, 6: 0.0029, 7: 0.009, 8: 0.0022, 9: 0.0084, 10: 0.0081}
+    read = {
+        1: 0.0042,
+        2: 0.0094,
+        3: 0.0031,
+        5: 0.0081,
+        6: 0.0029,
+        7: 0.009,
+        8: 0.0022,
+        9: 0.0084,
+        10: 0.0081,
+    }
     restored = np.array([[0.0005 if j in read else 0.0075 for j in range(1, 11)]])
     measured = np.array([[j in read for j in range(1, 11)]])
     exact = predict(gear, [inspected({})], restored, measured, np.array([0.0005]))

@@ -42,7 +42,9 @@ def test_the_standard_uncertainty_is_the_root_of_the_sum_of_squares(judge: Judge
     assert min(squares) > 0
 
 
-def test_the_part_of_the_readings_is_their_amplification_times_their_uncertainty(gear: Gear, judge: Judge) -> None:
+def test_the_part_of_the_readings_is_their_amplification_times_their_uncertainty(
+    gear: Gear, judge: Judge
+) -> None:
     def worst(joint: int, more: float) -> float:
         row = np.array([[WORN[j] + (more if j == joint else 0.0) for j in range(1, 11)]])
         return float(worst_case(gear.model, row).magnitude_in[0])
@@ -65,10 +67,12 @@ def test_the_shares_of_the_parts_add_to_one_and_follow_their_squares(judge: Judg
 def test_each_measured_joint_has_a_part_of_its_own(gear: Gear, judge: Judge) -> None:
     readings = budget(judge({3: 0.001, 6: 0.002})).readings_in
     amplification = gear.model.plunger_amplification()
-    assert readings == pytest.approx({3: 0.0005 * amplification[2], 6: 0.0005 * amplification[5]}, rel=0.02)
+    assert readings == pytest.approx(
+        {3: 0.0005 * amplification[2], 6: 0.0005 * amplification[5]}, rel=0.02
+    )
 
 
-def test_the_chance_of_a_wrong_verdict_is_that_of_the_other_side_and_only_where_a_prediction_decides(
+def test_the_chance_of_a_wrong_verdict_is_given_only_where_a_prediction_decides(
     judge: Judge,
 ) -> None:
     within, outside = judge(every_joint(0.001)), judge(every_joint(0.012))
@@ -100,12 +104,18 @@ def test_a_joint_measured_as_zero_carries_reading_uncertainty_too(judge: Judge) 
 def test_the_part_of_the_geometry_is_the_sample_standard_deviation_over_the_ten_linkages(
     gear: Gear, judge: Judge
 ) -> None:
-    assert budget(judge(WORN)).geometry_in == pytest.approx(np.std(magnitudes(gear, WORN), ddof=1), rel=1e-3)
+    assert budget(judge(WORN)).geometry_in == pytest.approx(
+        np.std(magnitudes(gear, WORN), ddof=1), rel=1e-3
+    )
 
 
-def test_the_geometry_spread_is_the_least_and_largest_prediction_of_the_ten_linkages(gear: Gear, judge: Judge) -> None:
+def test_the_geometry_spread_is_the_least_and_largest_prediction_of_the_ten_linkages(
+    gear: Gear, judge: Judge
+) -> None:
     over_all = magnitudes(gear, WORN)
-    assert judge(WORN).geometry_spread_in == pytest.approx((over_all.min(), over_all.max()), abs=1e-5)
+    assert judge(WORN).geometry_spread_in == pytest.approx(
+        (over_all.min(), over_all.max()), abs=1e-5
+    )
 
 
 @pytest.mark.parametrize(
@@ -126,7 +136,9 @@ def test_the_linkages_agree_on_the_failure_case_to_which_they_were_fitted(judge:
 
 
 @pytest.mark.parametrize(
-    ("clearance", "expected"), [(0.0, 0.003), (0.001, 0.003), (0.006, None)], ids=["none", "small", "large"]
+    ("clearance", "expected"),
+    [(0.0, 0.003), (0.001, 0.003), (0.006, None)],
+    ids=["none", "small", "large"],
 )
 def test_the_model_uncertainty_is_three_thou_or_a_tenth_of_the_prediction_if_that_is_more(
     judge: Judge, clearance: float, expected: float | None
@@ -153,7 +165,9 @@ def test_the_upper_prediction_gives_unmeasured_joints_no_reading_uncertainty(gea
     assert found.u_clearances_in[0] == 0.0
 
 
-def test_an_extension_replaces_the_model_uncertainty_by_its_residual_scatter_and_says_so(judge: Judge) -> None:
+def test_an_extension_replaces_the_model_uncertainty_by_its_residual_scatter_and_says_so(
+    judge: Judge,
+) -> None:
     found = budget(judge(WORN, extension=Shifted()))
     assert found.model_in == 0.001
     assert "plunger shifted by 0.004 in" in found.model_source
@@ -161,7 +175,12 @@ def test_an_extension_replaces_the_model_uncertainty_by_its_residual_scatter_and
 
 def test_an_extension_acts_on_every_displacement(judge: Judge) -> None:
     plain, extended = judge(WORN), judge(WORN, extension=Shifted())
-    for name in ("over_travel_in", "under_travel_in", "predicted_displacement_in", "predicted_upper_in"):
+    for name in (
+        "over_travel_in",
+        "under_travel_in",
+        "predicted_displacement_in",
+        "predicted_upper_in",
+    ):
         assert getattr(extended, name) - getattr(plain, name) == pytest.approx(0.004)
 
 
@@ -191,7 +210,11 @@ class Loaded(Shifted):
     """An extension for a fleet whose loads rest every pin beside its worst direction."""
 
     def adjust(self, inspections: Sequence[Inspection], clearance_in: np.ndarray) -> Adjustment:
-        return replace(super().adjust(inspections, clearance_in), offset_in=None, direction_factors=np.full(10, 0.4))
+        return replace(
+            super().adjust(inspections, clearance_in),
+            offset_in=None,
+            direction_factors=np.full(10, 0.4),
+        )
 
 
 @pytest.fixture(scope="module")
@@ -199,7 +222,9 @@ def loaded(judge: Judge) -> Assessment:
     return judge(WORN, extension=Loaded(), gauge_id="G-1")
 
 
-def test_the_prediction_as_loaded_is_smaller_than_the_bound(judge: Judge, loaded: Assessment) -> None:
+def test_the_prediction_as_loaded_is_smaller_than_the_bound(
+    judge: Judge, loaded: Assessment
+) -> None:
     bound = judge(WORN).predicted_displacement_in or 0.0
     assert loaded.predicted_displacement_in == pytest.approx(0.4 * bound, rel=0.02)
 
@@ -225,25 +250,34 @@ def test_a_shift_moves_the_bound_too(judge: Judge) -> None:
 
 def test_where_under_travel_governs_the_part_of_the_readings_is_of_that_sense(gear: Gear) -> None:
     row, step = np.full((1, 10), 0.005), 1e-4 * np.eye(10)
-    found = predict(gear, [inspected({})], row, np.ones((1, 10), bool), np.array([0.001]), Shifted(-0.03))
+    found = predict(
+        gear, [inspected({})], row, np.ones((1, 10), bool), np.array([0.001]), Shifted(-0.03)
+    )
     further = 0.03 - worst_case(gear.model, np.vstack([row + step, row - step])).under_in
-    assert found.u_readings_in[0] == pytest.approx(0.001 * (further[:10] - further[10:]) / 2e-4, rel=2e-3)
+    assert found.u_readings_in[0] == pytest.approx(
+        0.001 * (further[:10] - further[10:]) / 2e-4, rel=2e-3
+    )
 
 
-def test_a_gear_within_its_margin_as_loaded_says_what_other_loads_could_do(loaded: Assessment) -> None:
+def test_a_gear_within_its_margin_as_loaded_says_what_other_loads_could_do(
+    loaded: Assessment,
+) -> None:
     assert loaded.verdict is Verdict.WITHIN_MARGIN
     assert loaded.headline.startswith(
-        f"Within its margin of 0.0300 in as loaded ({loaded.predicted_displacement_in:.4f} in). Other loads than this "
-        f"fleet's could push it to {loaded.bound_in:.4f} in."
+        f"Within its margin of 0.0300 in as loaded ({loaded.predicted_displacement_in:.4f} in)."
+        f" Other loads than this fleet's could push it to {loaded.bound_in:.4f} in."
     )
 
 
 @pytest.mark.slow
-def test_the_stated_chance_of_the_other_side_is_how_often_a_gear_lies_there(gear: Gear, table: IndexTable) -> None:
+def test_the_stated_chance_of_the_other_side_is_how_often_a_gear_lies_there(
+    gear: Gear, table: IndexTable
+) -> None:
     rng = np.random.default_rng(5)
     n, margin = 3000, 0.03
     true = rng.uniform(0.0, 1.0, (n, 1)) * rng.uniform(0.0, 0.009, (n, 10))
-    # What is true of each gear: one of the ten linkages, and an error of the model as large as is stated.
+    # What is true of each gear: one of the ten linkages, and an error of the model as large as is
+    # stated.
     each = np.stack([worst_case(model, true).magnitude_in for model in gear.ensemble_models])
     bound = each[rng.integers(0, len(each), n), np.arange(n)]
     bound = bound + rng.standard_normal(n) * np.maximum(0.003, 0.1 * bound)
@@ -256,5 +290,9 @@ def test_the_stated_chance_of_the_other_side_is_how_often_a_gear_lies_there(gear
         some = (low <= stated) & (stated <= high)
         promised, held = stated[some].mean(), (bound <= margin)[some].mean()
         assert some.sum() > 90
-        assert held == pytest.approx(promised, abs=3.0 * np.sqrt(promised * (1.0 - promised) / some.sum()) + 0.002)
-        assert all((chance is None) == (0.05 < p < 0.95) for p, chance in zip(stated, wrong, strict=True))
+        assert held == pytest.approx(
+            promised, abs=3.0 * np.sqrt(promised * (1.0 - promised) / some.sum()) + 0.002
+        )
+        assert all(
+            (chance is None) == (0.05 < p < 0.95) for p, chance in zip(stated, wrong, strict=True)
+        )

@@ -1,4 +1,6 @@
-"""The verdict table: the first match wins, from the probability that the worst case is within the margin."""
+"""The verdict table: the first match wins, from the probability that the worst case is within the
+margin.
+"""
 
 from __future__ import annotations
 
@@ -44,17 +46,23 @@ def test_the_limits_of_the_zones_are_5_and_95_percent_and_belong_to_the_clear_ve
 
 
 @given(p_lower=st.floats(0, 0.05), p_upper=probability, missing=st.booleans())
-def test_outside_comes_first_even_with_critical_joints_missing(p_lower: float, p_upper: float, missing: bool) -> None:
+def test_outside_comes_first_even_with_critical_joints_missing(
+    p_lower: float, p_upper: float, missing: bool
+) -> None:
     assert verdict(p_lower, p_upper, critical_missing=missing) is Verdict.OUTSIDE_MARGIN
 
 
 @given(p_lower=st.floats(0.06, 1), p_upper=probability)
-def test_a_missing_critical_joint_is_incomplete_whatever_the_rest_says(p_lower: float, p_upper: float) -> None:
+def test_a_missing_critical_joint_is_incomplete_whatever_the_rest_says(
+    p_lower: float, p_upper: float
+) -> None:
     assert verdict(p_lower, p_upper, critical_missing=True) is Verdict.INCOMPLETE
 
 
 @given(p_lower=st.floats(0.06, 1), p_upper=probability)
-def test_verdicts_that_differ_between_zero_and_the_bound_are_incomplete(p_lower: float, p_upper: float) -> None:
+def test_verdicts_that_differ_between_zero_and_the_bound_are_incomplete(
+    p_lower: float, p_upper: float
+) -> None:
     found = verdict(p_lower, p_upper, critical_missing=False)
     assert (found is Verdict.INCOMPLETE) == (zone(p_lower) is not zone(p_upper))
 
@@ -70,10 +78,14 @@ def test_the_published_failure_is_outside_with_eight_joints_not_measured(judge: 
     assert found.predicted_displacement_in == pytest.approx(0.0472, abs=5e-5)
 
 
-def test_unmeasured_joints_count_as_zero_in_the_prediction_and_as_their_limit_in_the_upper_one(judge: Judge) -> None:
+def test_unmeasured_joints_count_as_zero_in_the_prediction_and_as_their_limit_in_the_upper_one(
+    judge: Judge,
+) -> None:
     found = judge(dict.fromkeys(range(1, 10), 0.001))
     at_zero, at_limit = judge(every_joint(0.001, j10=0.0)), judge(every_joint(0.001, j10=0.0075))
-    assert found.predicted_displacement_in == pytest.approx(at_zero.predicted_displacement_in, abs=1e-15)
+    assert found.predicted_displacement_in == pytest.approx(
+        at_zero.predicted_displacement_in, abs=1e-15
+    )
     assert found.predicted_upper_in == pytest.approx(at_limit.predicted_displacement_in, abs=1e-15)
 
 
@@ -83,7 +95,9 @@ def test_with_all_joints_measured_the_two_predictions_are_one(judge: Judge) -> N
 
 
 @pytest.mark.parametrize("missing", [1, 2, 3, 4, 5])
-def test_without_one_of_joints_one_to_five_nothing_can_be_cleared(judge: Judge, missing: int) -> None:
+def test_without_one_of_joints_one_to_five_nothing_can_be_cleared(
+    judge: Judge, missing: int
+) -> None:
     found = judge({j: 0.0 for j in range(1, 11) if j != missing})
     assert found.verdict is Verdict.INCOMPLETE
 
@@ -92,7 +106,9 @@ def test_joints_six_to_ten_may_be_missing_where_their_limit_changes_nothing(judg
     assert judge(dict.fromkeys(range(1, 10), 0.0)).verdict is Verdict.WITHIN_MARGIN
 
 
-def test_joints_six_to_ten_missing_are_incomplete_where_their_limit_changes_the_verdict(judge: Judge) -> None:
+def test_joints_six_to_ten_missing_are_incomplete_where_their_limit_changes_the_verdict(
+    judge: Judge,
+) -> None:
     assert judge(dict.fromkeys(range(1, 6), 0.002)).verdict is Verdict.INCOMPLETE
 
 
@@ -123,7 +139,9 @@ def test_what_remains_is_margin_less_prediction(judge: Judge) -> None:
 
 def test_the_prediction_is_the_larger_of_both_senses_as_a_positive_number(judge: Judge) -> None:
     found = judge(FAILURE)
-    assert (found.over_travel_in, found.under_travel_in) == pytest.approx((0.04722, -0.04286), abs=5e-6)
+    assert (found.over_travel_in, found.under_travel_in) == pytest.approx(
+        (0.04722, -0.04286), abs=5e-6
+    )
     assert found.predicted_displacement_in == found.over_travel_in
 
 
@@ -139,34 +157,49 @@ def test_an_invalid_row_is_rejected_with_what_to_correct(gear: Gear, table: Inde
     assert found.next_action.text == "Do not use. Correct: clearance_3_in, side."
 
 
-def test_every_row_is_judged_once_in_its_order_with_invalid_rows_between(gear: Gear, table: IndexTable) -> None:
+def test_every_row_is_judged_once_in_its_order_with_invalid_rows_between(
+    gear: Gear, table: IndexTable
+) -> None:
     rows = [
         inspected(every_joint(0.001), record_id="a"),
         InvalidRow("b", None, None, ("unit",)),
         inspected(FAILURE, record_id="c"),
     ]
     found = assess(rows, gear, table)
-    names = [f.inspection.record_id if isinstance(f, Assessment) else f.row.record_id for f in found]
+    names = [
+        f.inspection.record_id if isinstance(f, Assessment) else f.row.record_id for f in found
+    ]
     assert names == ["a", "b", "c"]
 
 
-def test_a_batch_judges_each_gear_as_if_it_were_alone(gear: Gear, table: IndexTable, judge: Judge) -> None:
+def test_a_batch_judges_each_gear_as_if_it_were_alone(
+    gear: Gear, table: IndexTable, judge: Judge
+) -> None:
     cases = [every_joint(0.001), FAILURE, every_joint(0.002), {1: 0.001}, every_joint(0.05)]
     batch = assess([inspected(case) for case in cases], gear, table)
     for found, case in zip(batch, cases, strict=True):
         assert isinstance(found, Assessment)
         alone = judge(case)
         assert (found.verdict, found.next_action) == (alone.verdict, alone.next_action)
-        assert found.probability_within_margin == pytest.approx(alone.probability_within_margin, abs=1e-12)
+        assert found.probability_within_margin == pytest.approx(
+            alone.probability_within_margin, abs=1e-12
+        )
 
 
 def test_progress_is_told_once_for_every_row(gear: Gear, table: IndexTable) -> None:
     told: list[int] = []
-    assess([InvalidRow(None, None, None, ())] * 1030, gear, table, progress=lambda done, _all: told.append(done))
+    assess(
+        [InvalidRow(None, None, None, ())] * 1030,
+        gear,
+        table,
+        progress=lambda done, _all: told.append(done),
+    )
     assert told == [1024, 1030]
 
 
-def test_a_gear_that_does_not_close_is_outside_with_its_numbers_absent_and_a_warning(judge: Judge) -> None:
+def test_a_gear_that_does_not_close_is_outside_with_its_numbers_absent_and_a_warning(
+    judge: Judge,
+) -> None:
     found = judge(every_joint(0.05))
     assert found.verdict is Verdict.OUTSIDE_MARGIN
     numbers = (
@@ -184,48 +217,74 @@ def test_a_gear_that_does_not_close_is_outside_with_its_numbers_absent_and_a_war
     assert any("does not close" in warning for warning in found.warnings)
 
 
-def test_where_only_some_linkages_of_the_ensemble_close_the_uncertainty_is_absent_and_said(judge: Judge) -> None:
+def test_where_only_some_linkages_of_the_ensemble_close_the_uncertainty_is_absent_and_said(
+    judge: Judge,
+) -> None:
     found = judge(every_joint(0.03))
     assert found.verdict is Verdict.OUTSIDE_MARGIN
     assert found.predicted_displacement_in is not None
-    assert (found.standard_uncertainty_in, found.geometry_spread_in, found.budget) == (None, None, None)
+    assert (found.standard_uncertainty_in, found.geometry_spread_in, found.budget) == (
+        None,
+        None,
+        None,
+    )
     assert any("linkages of the ensemble do not close" in warning for warning in found.warnings)
 
 
 @pytest.mark.parametrize("clearance", [0.0, 0.001, 0.03, 0.05])
-def test_no_clearance_gives_json_that_is_not_json(gear: Gear, judge: Judge, clearance: float) -> None:
+def test_no_clearance_gives_json_that_is_not_json(
+    gear: Gear, judge: Judge, clearance: float
+) -> None:
     json.dumps(check_as_json(gear, [judge(every_joint(clearance))], [], []), allow_nan=False)
 
 
 def test_the_probability_is_the_normal_one_of_prediction_and_uncertainty(judge: Judge) -> None:
     found = judge(every_joint(0.002))
-    z = (found.margin_in - (found.predicted_displacement_in or math.nan)) / (found.standard_uncertainty_in or math.nan)
+    z = (found.margin_in - (found.predicted_displacement_in or math.nan)) / (
+        found.standard_uncertainty_in or math.nan
+    )
     assert found.probability_within_margin == pytest.approx(norm.cdf(z), abs=1e-12)
 
 
 ENTERED = {
     "radial inches": (LengthUnit.INCH, ClearanceConvention.RADIAL, {3: 0.013, 5: 0.007}),
     "radial thou": (LengthUnit.THOU, ClearanceConvention.RADIAL, {3: 13.0, 5: 7.0}),
-    "radial millimetres": (LengthUnit.MILLIMETRE, ClearanceConvention.RADIAL, {3: 0.3302, 5: 0.1778}),
+    "radial millimetres": (
+        LengthUnit.MILLIMETRE,
+        ClearanceConvention.RADIAL,
+        {3: 0.3302, 5: 0.1778},
+    ),
     "total play in inches": (LengthUnit.INCH, ClearanceConvention.TOTAL_PLAY, {3: 0.026, 5: 0.014}),
-    "diametral millimetres": (LengthUnit.MILLIMETRE, ClearanceConvention.DIAMETRAL, {3: 0.6604, 5: 0.3556}),
+    "diametral millimetres": (
+        LengthUnit.MILLIMETRE,
+        ClearanceConvention.DIAMETRAL,
+        {3: 0.6604, 5: 0.3556},
+    ),
 }
 
 
 @pytest.mark.parametrize("way", ENTERED)
-def test_the_failure_entered_in_any_unit_and_convention_gives_one_answer(judge: Judge, way: str) -> None:
+def test_the_failure_entered_in_any_unit_and_convention_gives_one_answer(
+    judge: Judge, way: str
+) -> None:
     unit, convention, readings = ENTERED[way]
-    radial = {joint: unit.to_inches(value) / convention.per_radial for joint, value in readings.items()}
+    radial = {
+        joint: unit.to_inches(value) / convention.per_radial for joint, value in readings.items()
+    }
     found, plain = judge(radial, convention=convention), judge(FAILURE)
     assert (found.verdict, found.next_action.joints) == (plain.verdict, plain.next_action.joints)
-    assert found.predicted_displacement_in == pytest.approx(plain.predicted_displacement_in, abs=1e-12)
+    assert found.predicted_displacement_in == pytest.approx(
+        plain.predicted_displacement_in, abs=1e-12
+    )
 
 
 def shares(gear: Gear, largest: float) -> dict[Verdict, float]:
     """Shares of the verdicts over 2,048 fully measured gears, clearances spread evenly from 0."""
     clearance = largest * qmc.Sobol(10, seed=15).random(2048)
     n = len(clearance)
-    prediction = predict(gear, [inspected({})] * n, clearance, np.ones((n, 10), bool), np.full(n, 0.0005))
+    prediction = predict(
+        gear, [inspected({})] * n, clearance, np.ones((n, 10), bool), np.full(n, 0.0005)
+    )
     p = prediction.probability_within(np.full(n, 0.03), np.zeros(n))
     found = [verdict(float(x), float(x), critical_missing=False) for x in p]
     return {v: found.count(v) / n for v in Verdict}
@@ -237,7 +296,9 @@ def test_gears_worn_up_to_the_limit_are_mostly_outside_and_some_inconclusive(gea
     assert found[Verdict.INCONCLUSIVE] == pytest.approx(0.12, abs=0.03)
 
 
-def test_gears_worn_up_to_three_thou_are_mostly_within_and_the_others_inconclusive(gear: Gear) -> None:
+def test_gears_worn_up_to_three_thou_are_mostly_within_and_the_others_inconclusive(
+    gear: Gear,
+) -> None:
     found = shares(gear, 0.003)
     assert found[Verdict.WITHIN_MARGIN] == pytest.approx(0.79, abs=0.03)
     assert found[Verdict.INCONCLUSIVE] == pytest.approx(0.21, abs=0.03)

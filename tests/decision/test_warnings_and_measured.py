@@ -1,4 +1,6 @@
-"""What is laid over every verdict: limits, a failure that clearances do not explain, a measured plunger."""
+"""What is laid over every verdict: limits, a failure that clearances do not explain, a measured
+plunger.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ from mlg_troubleshoot.decision.plunger_reading import disagreement
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from tests.decision.conftest import Judge, every_joint, inspected
 
-NOT_EXPLAINED = "Joint clearances do not explain this failure: check hydraulics, reversing valve, doors."
+NOT_EXPLAINED = (
+    "Joint clearances do not explain this failure: check hydraulics, reversing valve, doors."
+)
 
 
 def said(warnings: tuple[str, ...], words: str) -> bool:
@@ -22,9 +26,13 @@ def said(warnings: tuple[str, ...], words: str) -> bool:
 
 
 @pytest.mark.parametrize("base", [0.0, 0.002, 0.006])
-def test_a_joint_above_its_limit_is_rejected_to_the_manual_whatever_the_verdict(judge: Judge, base: float) -> None:
+def test_a_joint_above_its_limit_is_rejected_to_the_manual_whatever_the_verdict(
+    judge: Judge, base: float
+) -> None:
     found = judge(every_joint(base, j7=0.008))
-    assert said(found.warnings, "#7 bellcrank input joint: 0.0080 in radial is above its limit of 0.0075 in")
+    assert said(
+        found.warnings, "#7 bellcrank input joint: 0.0080 in radial is above its limit of 0.0075 in"
+    )
     assert said(found.warnings, "reject to the manual")
     assert 7 in found.next_action.joints
     assert found.next_action.action is Action.RESTORE
@@ -50,7 +58,9 @@ def test_a_failure_within_the_margin_is_not_explained_by_clearances(judge: Judge
     assert "Joint clearances do not explain this failure" in found.headline
 
 
-def test_a_failure_within_the_margin_is_not_explained_even_with_a_joint_above_its_limit(judge: Judge) -> None:
+def test_a_failure_within_the_margin_is_not_explained_even_with_a_joint_above_its_limit(
+    judge: Judge,
+) -> None:
     assert judge(every_joint(0.001, j7=0.008), outcome=Outcome.FAILED).end is End.NOT_EXPLAINED
 
 
@@ -76,7 +86,11 @@ def test_incomplete_names_the_joints_that_are_not_measured(judge: Judge) -> None
 
 def test_a_measured_displacement_within_the_margin_is_said_quietly(judge: Judge) -> None:
     statement = judge(every_joint(0.001), readings_in=(0.012,)).measured_statement
-    assert statement == "Measured: the plunger stands 0.0120 in beyond mid-position, within its margin of 0.0300 in."
+    assert (
+        statement
+        == "Measured: the plunger stands 0.0120 in beyond mid-position, within its margin of"
+        " 0.0300 in."
+    )
 
 
 def test_without_a_reading_nothing_is_said_about_a_measurement(judge: Judge) -> None:
@@ -84,11 +98,17 @@ def test_without_a_reading_nothing_is_said_about_a_measurement(judge: Judge) -> 
 
 
 def test_the_measured_displacement_is_the_mean_of_the_readings(judge: Judge) -> None:
-    assert judge({}, readings_in=(0.01, 0.02, 0.06)).inspection.measured_displacement_in == pytest.approx(0.03)
+    assert judge(
+        {}, readings_in=(0.01, 0.02, 0.06)
+    ).inspection.measured_displacement_in == pytest.approx(0.03)
 
 
-@pytest.mark.parametrize(("apart", "flagged"), [(1.99, False), (2.01, True), (-1.99, False), (-2.01, True)])
-def test_measured_and_predicted_differ_from_two_combined_standard_uncertainties_on(apart: float, flagged: bool) -> None:
+@pytest.mark.parametrize(
+    ("apart", "flagged"), [(1.99, False), (2.01, True), (-1.99, False), (-2.01, True)]
+)
+def test_measured_and_predicted_differ_from_two_combined_standard_uncertainties_on(
+    apart: float, flagged: bool
+) -> None:
     u = math.hypot(0.004, 0.003)
     reading = inspected({}, readings_in=(0.02 + apart * u,), plunger_gauge_u_in=0.003)
     assert (disagreement(reading, 0.02, -0.02, 0.004) is not None) == flagged
@@ -124,7 +144,9 @@ AS_TOTAL_PLAY = {"convention": ClearanceConvention.TOTAL_PLAY}
 def test_an_entry_error_that_made_the_clearances_too_small_is_suggested(
     factor: float, entry: dict[str, object], words: str, sense: float
 ) -> None:
-    text = disagreement(inspected({}, readings_in=(sense * 0.02 * factor,), **entry), 0.02, -0.02, 0.001)
+    text = disagreement(
+        inspected({}, readings_in=(sense * 0.02 * factor,), **entry), 0.02, -0.02, 0.001
+    )
     assert text is not None
     assert text.endswith(f"An entry error that would explain it: {words}.")
 
@@ -136,7 +158,9 @@ def test_an_entry_error_that_this_entry_cannot_have_is_not_suggested(factor: flo
     assert "entry error" not in text
 
 
-@pytest.mark.parametrize(("off", "suggested"), [(0.96, True), (1.04, True), (0.9, False), (1.1, False)])
+@pytest.mark.parametrize(
+    ("off", "suggested"), [(0.96, True), (1.04, True), (0.9, False), (1.1, False)]
+)
 def test_an_entry_error_is_suggested_where_it_explains_the_displacement_to_a_twentieth(
     off: float, suggested: bool
 ) -> None:
@@ -147,7 +171,9 @@ def test_an_entry_error_is_suggested_where_it_explains_the_displacement_to_a_twe
 
 @pytest.mark.parametrize("factor", [25.4, 10.0, 2.0])
 def test_a_displacement_below_the_bound_suggests_no_entry_error(factor: float) -> None:
-    text = disagreement(inspected({}, readings_in=(0.1 / factor,), **AS_TOTAL_PLAY), 0.1, -0.1, 0.001)
+    text = disagreement(
+        inspected({}, readings_in=(0.1 / factor,), **AS_TOTAL_PLAY), 0.1, -0.1, 0.001
+    )
     assert text is not None
     assert "entry error" not in text
 
@@ -162,7 +188,9 @@ def test_a_suggested_slip_is_never_applied(judge: Judge) -> None:
     ("declared", "readings", "expected"),
     [(None, 1, 0.0005), (None, 4, 0.00025), (0.002, 4, 0.001)],
 )
-def test_the_mean_of_repeat_readings_is_better_than_one(declared: float | None, readings: int, expected: float) -> None:
+def test_the_mean_of_repeat_readings_is_better_than_one(
+    declared: float | None, readings: int, expected: float
+) -> None:
     found = plunger_u(inspected({}, readings_in=(0.01,) * readings, plunger_gauge_u_in=declared))
     assert found == pytest.approx(expected)
 
@@ -172,21 +200,33 @@ def test_a_default_gauge_uncertainty_is_shown_as_a_default(judge: Judge) -> None
     assert not said(judge(every_joint(0.001)).warnings, "default")
 
 
-@pytest.mark.parametrize(("down_lock", "warned"), [(0.009, True), (0.01, False), (0.05, False), (0.051, True)])
+@pytest.mark.parametrize(
+    ("down_lock", "warned"), [(0.009, True), (0.01, False), (0.05, False), (0.051, True)]
+)
 def test_a_down_lock_position_outside_the_technical_order_is_a_matter_of_rigging(
     judge: Judge, down_lock: float, warned: bool
 ) -> None:
-    assert said(judge(every_joint(0.001), plunger_down_lock_in=down_lock).warnings, "check the rigging") == warned
+    assert (
+        said(
+            judge(every_joint(0.001), plunger_down_lock_in=down_lock).warnings, "check the rigging"
+        )
+        == warned
+    )
 
 
 def test_a_failed_gear_without_a_plunger_reading_is_asked_for_one(judge: Judge) -> None:
     words = "no plunger displacement was measured"
     assert said(judge(every_joint(0.001), outcome=Outcome.FAILED).warnings, words)
-    assert not said(judge(every_joint(0.001), outcome=Outcome.FAILED, readings_in=(0.01,)).warnings, words)
+    assert not said(
+        judge(every_joint(0.001), outcome=Outcome.FAILED, readings_in=(0.01,)).warnings, words
+    )
 
 
 def test_what_the_reader_noticed_stays_with_the_judgement(judge: Judge) -> None:
-    assert judge(every_joint(0.001), warnings=("joint 3 above 0.015 in",)).warnings[0] == "joint 3 above 0.015 in"
+    assert (
+        judge(every_joint(0.001), warnings=("joint 3 above 0.015 in",)).warnings[0]
+        == "joint 3 above 0.015 in"
+    )
 
 
 @pytest.mark.parametrize("readings", [(0.045, -0.045), (0.045, 0.001), (0.060, 0.001, 0.001)])

@@ -1,4 +1,6 @@
-"""A probability is never rounded to a certainty; a gear without a fault is not sent to look for one."""
+"""A probability is never rounded to a certainty; a gear without a fault is not sent to look for
+one.
+"""
 
 from __future__ import annotations
 
@@ -24,19 +26,28 @@ from tests.decision.conftest import Judge, every_joint
         (1.0, "100 %"),
     ],
 )
-def test_a_probability_is_written_as_a_percentage_that_is_no_false_certainty(share: float, written: str) -> None:
+def test_a_probability_is_written_as_a_percentage_that_is_no_false_certainty(
+    share: float, written: str
+) -> None:
     assert percent(share) == written
 
 
-def test_a_gear_that_retracted_with_every_joint_within_needs_no_further_action_on_the_joints(judge: Judge) -> None:
+def test_a_gear_that_retracted_with_every_joint_within_needs_no_further_action_on_the_joints(
+    judge: Judge,
+) -> None:
     found = judge(every_joint(0.0005), outcome=Outcome.RETRACTED)
-    done = "Joints are within limits. No further action on the joints; this is not a release to service."
+    done = (
+        "Joints are within limits. No further action on the joints; this is not a release to"
+        " service."
+    )
     assert (found.verdict, found.next_action.text) == (Verdict.WITHIN_MARGIN, done)
     assert found.headline.endswith(done)
 
 
 @pytest.mark.parametrize("more", [{}, {"outcome": Outcome.FAILED}])
-def test_fault_isolation_goes_on_where_the_gear_did_not_retract(more: dict[str, Outcome], judge: Judge) -> None:
+def test_fault_isolation_goes_on_where_the_gear_did_not_retract(
+    more: dict[str, Outcome], judge: Judge
+) -> None:
     assert "No further action" not in judge(every_joint(0.0005), **more).headline
 
 

@@ -1,4 +1,6 @@
-"""Small fleets whose misfit is known, made from the plain prediction; hidden effects are tested elsewhere."""
+"""Small fleets whose misfit is known, made from the plain prediction; hidden effects are tested
+elsewhere.
+"""
 
 from __future__ import annotations
 
@@ -31,12 +33,16 @@ def fleet(
     seed: int = 7,
     **columns: Any,
 ) -> DiagnosisTable:
-    """Draw inspections of a fleet; `shift` is what the measured output has beyond the plain prediction."""
+    """Draw inspections of a fleet; `shift` is what the measured output has beyond the plain
+    prediction.
+    """
     rng = np.random.default_rng(seed)
     tail = np.array([f"N{100 + k}" for k in range(tails)])[np.arange(rows) % tails]
     side = np.where(np.arange(rows) // tails % 2 == 0, "LH", "RH")
     level = rng.uniform(0.001, 0.004, (tails, len(model.joint_numbers)))
-    clearance = level[np.arange(rows) % tails] * rng.lognormal(0.0, 0.3, (rows, len(model.joint_numbers)))
+    clearance = level[np.arange(rows) % tails] * rng.lognormal(
+        0.0, 0.3, (rows, len(model.joint_numbers))
+    )
     table = DiagnosisTable(
         clearance_in=clearance,
         readings_in=np.zeros((rows, 2)),
@@ -64,7 +70,9 @@ def fleet(
     over = worst_case(model, np.nan_to_num(table.clearance_in)).over_in
     measured = over if shift is None else over + shift(table, over)
     common = rng.normal(0.0, noise_in, (rows, 1))
-    return replace(table, readings_in=measured[:, None] + common + rng.normal(0.0, noise_in / 2, (rows, 2)))
+    return replace(
+        table, readings_in=measured[:, None] + common + rng.normal(0.0, noise_in / 2, (rows, 2))
+    )
 
 
 def scene_of(model: LinkageModel, table: DiagnosisTable, where: Discrepancies) -> Scene:

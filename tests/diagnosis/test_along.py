@@ -1,4 +1,6 @@
-"""Rows along the stroke: what is predicted there, which cells are wrong, what a table without clearances may say."""
+"""Rows along the stroke: what is predicted there, which cells are wrong, what a table without
+clearances may say.
+"""
 
 from __future__ import annotations
 
@@ -25,15 +27,28 @@ from .conftest import only
 NOISE_IN = 0.001
 
 
-def rig(gear: Gear, rows: int = 16, clearance_in: float | NDArray[np.float64] | None = 0.003) -> list[Inspection]:
+def rig(
+    gear: Gear, rows: int = 16, clearance_in: float | NDArray[np.float64] | None = 0.003
+) -> list[Inspection]:
     """One sound gear, a dial on its plunger, read from Down Lock to mid-position."""
     extension = np.linspace(0.05, gear.reference.stroke[1], rows)
-    worn = [] if clearance_in is None else np.broadcast_to(clearance_in, len(gear.joint_numbers)).tolist()
+    worn = (
+        []
+        if clearance_in is None
+        else np.broadcast_to(clearance_in, len(gear.joint_numbers)).tolist()
+    )
     joints = dict(zip(gear.joint_numbers, worn, strict=False))
-    table = table_from_inspections([_row(k, float(s), 0.0, joints) for k, s in enumerate(extension)], gear, along=True)
+    table = table_from_inspections(
+        [_row(k, float(s), 0.0, joints) for k, s in enumerate(extension)], gear, along=True
+    )
     moved = predicted(gear.model, table, np.nan_to_num(table.clearance_in))[0]
-    position = gear.model.plunger(extension) + moved + np.random.default_rng(1).normal(0.0, NOISE_IN, rows)
-    return [_row(k, float(s), float(p), joints) for k, (s, p) in enumerate(zip(extension, position, strict=True))]
+    position = (
+        gear.model.plunger(extension) + moved + np.random.default_rng(1).normal(0.0, NOISE_IN, rows)
+    )
+    return [
+        _row(k, float(s), float(p), joints)
+        for k, (s, p) in enumerate(zip(extension, position, strict=True))
+    ]
 
 
 def _row(k: int, extension: float, position: float, joints: dict[int, float]) -> Inspection:
@@ -50,7 +65,9 @@ def _row(k: int, extension: float, position: float, joints: dict[int, float]) ->
 
 def diagnosis(gear: Gear, rows: list[Inspection]) -> Diagnosis:
     table = table_from_inspections(rows, gear, along=True)
-    return diagnose(gear.model, table, gear.discrepancies, ensemble=gear.ensemble_models[1:], permutations=99)
+    return diagnose(
+        gear.model, table, gear.discrepancies, ensemble=gear.ensemble_models[1:], permutations=99
+    )
 
 
 def cells(found: Diagnosis) -> list[tuple[str, str, str, str | None]]:
@@ -67,7 +84,7 @@ def along(gear: Gear) -> NDArray[np.float64]:
 def test_at_full_extension_the_prediction_is_that_of_mid_position(gear: Gear) -> None:
     table = table_from_inspections(rig(gear), gear, along=True)
     at_mid = replace(table, quantities={})
-    (there, here) = (predicted(gear.model, t, t.clearance_in)[0][-1] for t in (table, at_mid))
+    there, here = (predicted(gear.model, t, t.clearance_in)[0][-1] for t in (table, at_mid))
     assert there == pytest.approx(here, abs=1e-12)
 
 
@@ -93,7 +110,9 @@ def test_a_position_beyond_reach_is_taken_for_millimetres_and_repaired(gear: Gea
     rows = rig(gear)
     right = rows[9].plunger_position_in or 0.0
     rows[9] = replace(rows[9], plunger_position_in=25.4 * right)
-    assert cells(diagnosis(gear, rows)) == [("R10", "plunger_position_in", "mm_as_in", f"{right:.4g}")]
+    assert cells(diagnosis(gear, rows)) == [
+        ("R10", "plunger_position_in", "mm_as_in", f"{right:.4g}")
+    ]
 
 
 def test_within_reach_position_and_extension_are_both_named_and_not_used(gear: Gear) -> None:
@@ -114,7 +133,10 @@ def test_an_extension_that_the_linkage_does_not_reach_is_named(gear: Gear) -> No
 
 
 def test_where_the_rod_of_one_rig_was_rigged_is_no_cause(gear: Gear) -> None:
-    rows = [replace(row, plunger_position_in=(row.plunger_position_in or 0.0) + 0.02) for row in rig(gear, rows=40)]
+    rows = [
+        replace(row, plunger_position_in=(row.plunger_position_in or 0.0) + 0.02)
+        for row in rig(gear, rows=40)
+    ]
     assert diagnosis(gear, rows).verdict == "NONE"
 
 
@@ -135,13 +157,21 @@ def test_a_covariate_that_never_varies_makes_its_cause_untestable(gear: Gear) ->
 
 def test_a_table_without_clearances_needs_no_convention(gear: Gear, tmp_path: Path) -> None:
     file = tmp_path / "rig.csv"
-    lines = [f"N1,LH,{row.actuator_extension_in},{row.plunger_position_in}" for row in rig(gear, clearance_in=None)]
-    file.write_text("\n".join(["tail_no,side,actuator_extension_in,plunger_position_in", *lines]), encoding="utf-8")
+    lines = [
+        f"N1,LH,{row.actuator_extension_in},{row.plunger_position_in}"
+        for row in rig(gear, clearance_in=None)
+    ]
+    file.write_text(
+        "\n".join(["tail_no,side,actuator_extension_in,plunger_position_in", *lines]),
+        encoding="utf-8",
+    )
     result = diagnose_files([file], DiagnoseOptions(permutations=99))
     assert (result.problems, result.diagnosis.verdict) == ((), "NONE")
 
 
-def test_a_position_without_its_extension_is_said_to_be_of_no_use(gear: Gear, tmp_path: Path) -> None:
+def test_a_position_without_its_extension_is_said_to_be_of_no_use(
+    gear: Gear, tmp_path: Path
+) -> None:
     from mlg_troubleshoot.records import ReadOptions, read_many
 
     file = tmp_path / "rig.csv"
@@ -163,10 +193,13 @@ def test_heavy_wear_is_supposed_of_a_fleet_without_clearances_where_it_is_clearl
     for number in range(8):
         worn = worn_in * rng.lognormal(0.0, 0.4, len(gear.joint_numbers))
         rows += [
-            replace(row, record_id=f"{number}-{row.record_id}", tail_no=f"N{number}") for row in rig(gear, 16, worn)
+            replace(row, record_id=f"{number}-{row.record_id}", tail_no=f"N{number}")
+            for row in rig(gear, 16, worn)
         ]
     unread = [replace(row, clearance_in={}) for row in rows]
-    scene = build_scene(gear.model, table_from_inspections(unread, gear, along=True), gear.discrepancies)[0]
+    scene = build_scene(
+        gear.model, table_from_inspections(unread, gear, along=True), gear.discrepancies
+    )[0]
     assert scene.clearance_in == pytest.approx(supposed_in)
 
 

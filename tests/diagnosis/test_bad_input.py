@@ -1,4 +1,6 @@
-"""A table that cannot answer says what it lacks and what to record: exit 3, no traceback, no name."""
+"""A table that cannot answer says what it lacks and what to record: exit 3, no traceback, no
+name.
+"""
 
 from __future__ import annotations
 
@@ -43,10 +45,18 @@ def all_zero(table: DiagnosisTable) -> DiagnosisTable:
 
 
 CANNOT: dict[str, tuple[Spoil, str, str]] = {
-    "no measured displacement": (no_measured, "no row has a measured plunger displacement", "plunger_displacement_in"),
+    "no measured displacement": (
+        no_measured,
+        "no row has a measured plunger displacement",
+        "plunger_displacement_in",
+    ),
     "five rows": (five_rows, "5 usable rows are too few", "at least 20"),
     "one tail": (one_tail, "all rows are of 1 aircraft", "at least 4 aircraft"),
-    "no clearances": (no_clearances, "no row with a measured displacement has a clearance", "clearances"),
+    "no clearances": (
+        no_clearances,
+        "no row with a measured displacement has a clearance",
+        "clearances",
+    ),
     "all clearances zero": (all_zero, "every clearance is zero", "blank"),
 }
 
@@ -68,18 +78,29 @@ def test_it_says_what_to_record_next_time(case: str, gear: Gear, plain: Diagnosi
 
 @pytest.mark.parametrize(
     ("column", "value"),
-    [("temperature_c", 15.0), ("hydraulic_pressure_psi", 2500.0), ("gear_landings", 0.0), ("day", 3.0)],
+    [
+        ("temperature_c", 15.0),
+        ("hydraulic_pressure_psi", 2500.0),
+        ("gear_landings", 0.0),
+        ("day", 3.0),
+    ],
 )
-def test_a_constant_column_names_nothing(column: str, value: float, gear: Gear, plain: DiagnosisTable) -> None:
+def test_a_constant_column_names_nothing(
+    column: str, value: float, gear: Gear, plain: DiagnosisTable
+) -> None:
     constant = {**plain.quantities, column: np.full(len(plain), value)}
-    found = diagnose(gear.model, replace(plain, quantities=constant), gear.discrepancies, permutations=199)
+    found = diagnose(
+        gear.model, replace(plain, quantities=constant), gear.discrepancies, permutations=199
+    )
     assert found.verdict == "NONE"
 
 
 @pytest.mark.parametrize("factor", ["gauge_id", "technician_id", "side", "approach"])
 def test_a_constant_name_names_nothing(factor: str, gear: Gear, plain: DiagnosisTable) -> None:
     constant = {**plain.factors, factor: np.full(len(plain), "X")}
-    found = diagnose(gear.model, replace(plain, factors=constant), gear.discrepancies, permutations=199)
+    found = diagnose(
+        gear.model, replace(plain, factors=constant), gear.discrepancies, permutations=199
+    )
     assert found.verdict == "NONE"
 
 
@@ -114,20 +135,30 @@ TABLE_IS_WRONG: dict[str, tuple[Spoil, str]] = {
     "a stuck gauge": (stuck, "Check the gauge"),
     "signs the other way round": (upside_down, "Check the sign"),
     "the plunger in millimetres": (plunger_in_millimetres, "Check the unit of the displacements"),
-    "clearances in millimetres": (clearances_in_millimetres, "Check the unit and the convention of the clearances"),
-    "one joint in millimetres": (one_joint_in_millimetres, "Check the unit and the convention of the clearances"),
+    "clearances in millimetres": (
+        clearances_in_millimetres,
+        "Check the unit and the convention of the clearances",
+    ),
+    "one joint in millimetres": (
+        one_joint_in_millimetres,
+        "Check the unit and the convention of the clearances",
+    ),
 }
 
 
 @pytest.mark.parametrize("case", TABLE_IS_WRONG)
-def test_what_is_wrong_with_the_table_is_no_cause(case: str, gear: Gear, plain: DiagnosisTable) -> None:
+def test_what_is_wrong_with_the_table_is_no_cause(
+    case: str, gear: Gear, plain: DiagnosisTable
+) -> None:
     spoil, remedy = TABLE_IS_WRONG[case]
     with pytest.raises(InconclusiveDataError) as refused:
         diagnose(gear.model, spoil(plain), gear.discrepancies, permutations=99)
     assert remedy in refused.value.remedy
 
 
-def test_a_column_with_one_value_known_is_no_reason_to_fail(gear: Gear, plain: DiagnosisTable) -> None:
+def test_a_column_with_one_value_known_is_no_reason_to_fail(
+    gear: Gear, plain: DiagnosisTable
+) -> None:
     lonely = np.full(len(plain), np.nan)
     lonely[7] = 21.0
     table = replace(plain, quantities={**plain.quantities, "temperature_c": lonely})
@@ -136,7 +167,14 @@ def test_a_column_with_one_value_known_is_no_reason_to_fail(gear: Gear, plain: D
 
 # At the command line
 
-HEADER = ["record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in"]
+HEADER = [
+    "record_id",
+    "tail_no",
+    "side",
+    "clearance_convention",
+    "clearance_3_in",
+    "clearance_5_in",
+]
 
 
 def write(file: Path, rows: list[list[object]], *columns: str) -> Path:
@@ -147,7 +185,10 @@ def write(file: Path, rows: list[list[object]], *columns: str) -> Path:
 
 def inspections(n: int, *cells: object, tails: int = 6) -> list[list[object]]:
     """Rows with two clearances and further cells."""
-    return [[f"R{k}", f"N{k % tails}", "LH", "RADIAL", 0.002 + k * 1e-5, 0.003, *cells] for k in range(n)]
+    return [
+        [f"R{k}", f"N{k % tails}", "LH", "RADIAL", 0.002 + k * 1e-5, 0.003, *cells]
+        for k in range(n)
+    ]
 
 
 def run(*arguments: str) -> Result:
@@ -157,7 +198,11 @@ def run(*arguments: str) -> Result:
 COMMANDS: dict[str, tuple[list[list[object]], tuple[str, ...], str]] = {
     "no measured displacement": (inspections(30), (), "no row has a measured plunger displacement"),
     "five rows": (inspections(5, 0.02), ("plunger_displacement_in",), "5 usable rows are too few"),
-    "one tail": (inspections(30, 0.02, tails=1), ("plunger_displacement_in",), "all rows are of 1 aircraft"),
+    "one tail": (
+        inspections(30, 0.02, tails=1),
+        ("plunger_displacement_in",),
+        "all rows are of 1 aircraft",
+    ),
     "no clearances": (
         [[*row[:4], "", "", 0.02] for row in inspections(30)],
         ("plunger_displacement_in",),
@@ -208,7 +253,9 @@ def test_an_empty_file_leaves_with_3(tmp_path: Path) -> None:
 def test_a_file_of_causes_that_is_none_leaves_with_2(text: str, tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(text, encoding="utf-8")
     rows, columns, _why = COMMANDS["five rows"]
-    found = run(str(write(tmp_path / "t.csv", rows, *columns)), "--causes", str(tmp_path / "own.py"))
+    found = run(
+        str(write(tmp_path / "t.csv", rows, *columns)), "--causes", str(tmp_path / "own.py")
+    )
     assert found.exit_code == 2
     assert "own.py" in found.stderr
 
@@ -216,7 +263,12 @@ def test_a_file_of_causes_that_is_none_leaves_with_2(text: str, tmp_path: Path) 
 def test_the_json_of_a_diagnosis_holds_no_number_that_is_none(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     rows = [[*row, 0.02 + rng.normal(0.0, 0.002)] for row in inspections(40)]
-    found = run(str(write(tmp_path / "t.csv", rows, "plunger_displacement_in")), "--json", "--permutations", "99")
+    found = run(
+        str(write(tmp_path / "t.csv", rows, "plunger_displacement_in")),
+        "--json",
+        "--permutations",
+        "99",
+    )
     assert json.loads(found.stdout)["schema_version"] == 1
     assert not {"NaN", "Infinity"} & set(found.stdout.split())
 

@@ -1,4 +1,6 @@
-"""Each cause changes the number of the model that its physics says, and its column is that change's slope."""
+"""Each cause changes the number of the model that its physics says, and its column is that change's
+slope.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ from mlg_troubleshoot.gear.gear import Gear
 from .conftest import fleet, only, scene_of
 
 BY_NAME = {cause.name: cause for cause in CATALOGUE}
-# The names, the columns they need and the allowed sign of the parameter, from the contract and the physics.
+# The names, the columns they need and the allowed sign of the parameter, from the contract and the
+# physics.
 NEEDS = {
     "out_of_plane_tilt": ("axial_float",),
     "elastic_compliance": ("hydraulic_pressure_psi",),
@@ -38,7 +41,8 @@ NEEDS = {
     "load_directions": (),
     "geometry": (),
 }
-# What a fleet with nothing wrong has candidates of: no group in doubt, and all-joint effects are fitted together.
+# What a fleet with nothing wrong has candidates of: no group in doubt, and all-joint effects are
+# fitted together.
 SINGLE = [name for name in NEEDS if name not in {"convention_slip", "load_directions", "geometry"}]
 ONE_SIGN = {
     "out_of_plane_tilt": 1,
@@ -77,11 +81,15 @@ def test_a_cause_speaks_to_a_technician(name: str) -> None:
 def test_a_cause_of_size_zero_changes_nothing(name: str, gear: Gear, scene: Scene) -> None:
     cause = BY_NAME[name]
     adjustment = cause.adjust(scene, first(cause, scene), 0.0)
-    assert adjusted_worst_case(gear.model, adjustment).over_in == pytest.approx(scene.over_in, abs=1e-12)
+    assert adjusted_worst_case(gear.model, adjustment).over_in == pytest.approx(
+        scene.over_in, abs=1e-12
+    )
 
 
 @pytest.mark.parametrize("name", SINGLE)
-def test_the_column_of_a_cause_is_the_slope_of_the_true_worst_case(name: str, gear: Gear, scene: Scene) -> None:
+def test_the_column_of_a_cause_is_the_slope_of_the_true_worst_case(
+    name: str, gear: Gear, scene: Scene
+) -> None:
     cause = BY_NAME[name]
     candidate = first(cause, scene)
     column = effect_columns(scene, [candidate])[:, 0]
@@ -108,7 +116,9 @@ def test_a_lever_is_tilted_by_the_float_of_its_pivot_alone(scene: Scene) -> None
     floats = table.axial_float_in.copy()
     floats[:, 3] = 0.0
     still = replace(scene, table=replace(table, axial_float_in=floats))
-    assert cause.adjust(still, only(cause, still), 1.0).scaled["length.5-4"] == pytest.approx(1.0, abs=0.0)
+    assert cause.adjust(still, only(cause, still), 1.0).scaled["length.5-4"] == pytest.approx(
+        1.0, abs=0.0
+    )
 
 
 def test_tilt_shortens_and_never_lengthens(scene: Scene) -> None:
@@ -122,29 +132,39 @@ def test_tilt_is_shown_as_the_bearing_span_that_it_implies() -> None:
 
 def test_a_stretch_is_nothing_at_full_pressure(scene: Scene) -> None:
     cause = BY_NAME["elastic_compliance"]
-    full = replace(scene.table, quantities={"hydraulic_pressure_psi": np.full(len(scene.table), 3000.0)})
+    full = replace(
+        scene.table, quantities={"hydraulic_pressure_psi": np.full(len(scene.table), 3000.0)}
+    )
     at_full = replace(scene, table=full)
     changed = cause.adjust(at_full, first(cause, at_full), 1e-6).changed
     assert all(np.all(change == 0.0) for change in changed.values())
 
 
 def test_growth_moves_fixed_points_and_leaves_the_links(scene: Scene) -> None:
-    scaled = BY_NAME["thermal_growth"].adjust(scene, only(BY_NAME["thermal_growth"], scene), 1e-5).scaled
+    scaled = (
+        BY_NAME["thermal_growth"].adjust(scene, only(BY_NAME["thermal_growth"], scene), 1e-5).scaled
+    )
     assert not any(name.startswith(("length.", "lever.")) for name in scaled)
 
 
 def test_growth_is_in_proportion_to_the_distance_from_20_c(scene: Scene) -> None:
     cause = BY_NAME["thermal_growth"]
     factor = next(iter(cause.adjust(scene, only(cause, scene), 1e-5).scaled.values()))
-    assert factor == pytest.approx(1.0 + 1e-5 * (scene.table.quantities["temperature_c"] - 20.0), abs=1e-12)
+    assert factor == pytest.approx(
+        1.0 + 1e-5 * (scene.table.quantities["temperature_c"] - 20.0), abs=1e-12
+    )
 
 
 @pytest.mark.parametrize("exponent", [0.85, 1.0, 1.2])
-def test_unlisted_wear_shifts_the_lever_with_a_power_of_the_landings(exponent: float, scene: Scene) -> None:
+def test_unlisted_wear_shifts_the_lever_with_a_power_of_the_landings(
+    exponent: float, scene: Scene
+) -> None:
     cause = BY_NAME["unlisted_wear"]
     candidate = next(c for c in cause.candidates(scene) if c.setting["wear_exponent"] == exponent)
     (shift,) = cause.adjust(scene, candidate, 0.002).changed.values()
-    assert shift == pytest.approx(0.002 * (scene.table.quantities["gear_landings"] / 1000.0) ** exponent)
+    assert shift == pytest.approx(
+        0.002 * (scene.table.quantities["gear_landings"] / 1000.0) ** exponent
+    )
 
 
 def test_wear_of_the_joints_stands_for_landings_that_nobody_recorded(scene: Scene) -> None:
@@ -154,17 +174,23 @@ def test_wear_of_the_joints_stands_for_landings_that_nobody_recorded(scene: Scen
     assert np.corrcoef(shift, scene.clearance_in.sum(axis=1))[0, 1] > 0.9
 
 
-def test_contact_may_cost_the_smaller_clearance_where_that_contributes_more(gear: Gear, scene: Scene) -> None:
+def test_contact_may_cost_the_smaller_clearance_where_that_contributes_more(
+    gear: Gear, scene: Scene
+) -> None:
     cause = JointContact()
     candidate = next(
-        c for c in cause.candidates(scene) if c.target == "joints 9,10" and c.setting.get("smaller") == "clearance"
+        c
+        for c in cause.candidates(scene)
+        if c.target == "joints 9,10" and c.setting.get("smaller") == "clearance"
     )
     left = cause.adjust(scene, candidate, 1.0).clearance_in[:, [8, 9]]
     assert np.all(left.max(axis=1) == scene.clearance_in[:, [8, 9]].max(axis=1))
     assert np.all(left.min(axis=1) == 0.0)
 
 
-@pytest.mark.parametrize(("name", "value"), [("direction_not_worst_case", -0.4), ("oval_wear", 0.4)])
+@pytest.mark.parametrize(
+    ("name", "value"), [("direction_not_worst_case", -0.4), ("oval_wear", 0.4)]
+)
 def test_a_joint_s_cause_touches_that_joint_alone(name: str, value: float, scene: Scene) -> None:
     cause = BY_NAME[name]
     candidate = next(c for c in cause.candidates(scene) if c.target == "joint 3")
@@ -189,20 +215,28 @@ def test_a_joint_without_any_clearance_is_no_candidate(gear: Gear, plain: Diagno
 
 def test_contact_is_tried_on_neighbours_only(scene: Scene) -> None:
     pairs = {c.target for c in JointContact().candidates(scene)}
-    assert pairs == {f"joints {p}" for p in ("1,2", "2,3", "3,5", "4,5", "5,6", "6,7", "7,8", "7,9", "9,10")}
+    assert pairs == {
+        f"joints {p}" for p in ("1,2", "2,3", "3,5", "4,5", "5,6", "6,7", "7,8", "7,9", "9,10")
+    }
 
 
 def test_contact_never_adds_clearance(scene: Scene) -> None:
     cause = JointContact()
     for candidate in cause.candidates(scene):
-        assert np.all(cause.adjust(scene, candidate, 0.7).clearance_in <= scene.clearance_in + 1e-15)
+        assert np.all(
+            cause.adjust(scene, candidate, 0.7).clearance_in <= scene.clearance_in + 1e-15
+        )
 
 
-def test_contact_takes_at_most_the_contribution_of_the_one_that_gives_less(gear: Gear, scene: Scene) -> None:
+def test_contact_takes_at_most_the_contribution_of_the_one_that_gives_less(
+    gear: Gear, scene: Scene
+) -> None:
     cause = JointContact()
     candidate = next(c for c in cause.candidates(scene) if c.target == "joints 3,5")
     least = np.min(scene.contribution_in[:, [2, 4]], axis=1)
-    lost = scene.over_in - adjusted_worst_case(gear.model, cause.adjust(scene, candidate, 1.0)).over_in
+    lost = (
+        scene.over_in - adjusted_worst_case(gear.model, cause.adjust(scene, candidate, 1.0)).over_in
+    )
     assert np.all(lost <= 1.02 * least + 1e-6)
 
 
@@ -226,13 +260,19 @@ def test_a_bias_acts_on_the_rows_of_its_level_alone(name: str, scene: Scene) -> 
 def test_an_empty_gauge_is_no_gauge(gear: Gear, plain: DiagnosisTable) -> None:
     gauges = plain.factors["gauge_id"].copy()
     gauges[:20] = ""
-    scene = scene_of(gear.model, replace(plain, factors={**plain.factors, "gauge_id": gauges}), gear.discrepancies)
+    scene = scene_of(
+        gear.model,
+        replace(plain, factors={**plain.factors, "gauge_id": gauges}),
+        gear.discrepancies,
+    )
     assert "gauge " not in {c.target for c in BY_NAME["gauge_bias"].candidates(scene)}
 
 
 def test_sides_are_not_compared_where_there_is_one(gear: Gear, plain: DiagnosisTable) -> None:
     alike = np.full(len(plain), "LH")
-    scene = scene_of(gear.model, replace(plain, factors={**plain.factors, "side": alike}), gear.discrepancies)
+    scene = scene_of(
+        gear.model, replace(plain, factors={**plain.factors, "side": alike}), gear.discrepancies
+    )
     assert list(BY_NAME["side_difference"].candidates(scene)) == []
 
 
@@ -242,7 +282,9 @@ def test_the_rate_scales_the_prediction(gear: Gear, scene: Scene) -> None:
     assert moved == pytest.approx(1.05 * scene.over_in, rel=1e-9)
 
 
-@pytest.mark.parametrize(("name", "larger"), [("approach_hysteresis", "EXTENDING"), ("side_difference", "RH")])
+@pytest.mark.parametrize(
+    ("name", "larger"), [("approach_hysteresis", "EXTENDING"), ("side_difference", "RH")]
+)
 def test_two_kinds_of_rows_differ_by_the_parameter(name: str, larger: str, scene: Scene) -> None:
     cause = BY_NAME[name]
     rows = scene.table.factors[cause.needs[0]] == larger
@@ -258,7 +300,9 @@ def test_a_rigging_change_concerns_one_aircraft_or_one_of_its_gears(scene: Scene
 
 
 def test_a_gear_and_its_aircraft_are_variants_of_one_name(scene: Scene) -> None:
-    keys = {c.key for c in RiggingOffset().candidates(scene) if str(c.target).startswith("tail N103")}
+    keys = {
+        c.key for c in RiggingOffset().candidates(scene) if str(c.target).startswith("tail N103")
+    }
     assert keys == {("rigging_offset", "tail N103")}
 
 
@@ -275,16 +319,26 @@ def test_a_gear_whose_worn_joints_were_never_read_has_no_rigging_change(gear: Ge
 
 def test_a_rigging_change_acts_from_its_day_on(scene: Scene) -> None:
     cause = RiggingOffset()
-    candidate = next(c for c in cause.candidates(scene) if c.target == "tail N103" and c.setting["day"] is not None)
+    candidate = next(
+        c
+        for c in cause.candidates(scene)
+        if c.target == "tail N103" and c.setting["day"] is not None
+    )
     offset = cause.adjust(scene, candidate, 0.01).offset_in
     own = scene.table.factors["tail_no"] == "N103"
     later = scene.table.quantities["day"] >= candidate.setting["day"]
     assert np.array_equal(offset != 0.0, own & later)
 
 
-def test_the_date_of_a_change_is_found_in_a_table_with_another_first_day(gear: Gear, scene: Scene) -> None:
+def test_the_date_of_a_change_is_found_in_a_table_with_another_first_day(
+    gear: Gear, scene: Scene
+) -> None:
     cause = RiggingOffset()
-    candidate = next(c for c in cause.candidates(scene) if c.target == "tail N103" and c.setting["day"] is not None)
+    candidate = next(
+        c
+        for c in cause.candidates(scene)
+        if c.target == "tail N103" and c.setting["day"] is not None
+    )
     since = date.fromisoformat(candidate.setting["since"])
     start = since - timedelta(days=10)
     days = np.arange(len(scene.table), dtype=float)
@@ -308,13 +362,19 @@ def test_a_change_without_dates_in_the_table_does_nothing(name: str, scene: Scen
 
 
 @pytest.mark.parametrize("name", ["elastic_compliance", "thermal_growth"])
-def test_a_missing_cell_makes_a_cause_do_nothing_in_that_row(name: str, gear: Gear, scene: Scene) -> None:
+def test_a_missing_cell_makes_a_cause_do_nothing_in_that_row(
+    name: str, gear: Gear, scene: Scene
+) -> None:
     cause = BY_NAME[name]
     column = cause.needs[0]
     values = scene.table.quantities[column].copy()
     values[3] = np.nan
-    gap = replace(scene, table=replace(scene.table, quantities={**scene.table.quantities, column: values}))
-    moved = adjusted_worst_case(gear.model, cause.adjust(gap, first(cause, gap), cause.trial)).over_in
+    gap = replace(
+        scene, table=replace(scene.table, quantities={**scene.table.quantities, column: values})
+    )
+    moved = adjusted_worst_case(
+        gear.model, cause.adjust(gap, first(cause, gap), cause.trial)
+    ).over_in
     assert moved[3] == pytest.approx(scene.over_in[3], abs=1e-12)
 
 

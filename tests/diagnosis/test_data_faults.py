@@ -1,4 +1,6 @@
-"""Slips of the pen are shown and repaired in the analysis only; what gathers in one tail is an effect."""
+"""Slips of the pen are shown and repaired in the analysis only; what gathers in one tail is an
+effect.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +51,9 @@ def swapped(table: DiagnosisTable) -> DiagnosisTable:
 
 @pytest.fixture(scope="module")
 def sound(gear: Gear) -> DiagnosisTable:
-    """A fleet with nothing wrong, one row of which has a large and a small clearance, as its gear always has."""
+    """A fleet with nothing wrong, one row of which has a large and a small clearance, as its gear
+    always has.
+    """
     table = fleet(gear.model)
     values = table.clearance_in.copy()
     own = table.gears == table.gears[ROW]
@@ -75,14 +79,25 @@ def test_a_sound_fleet_has_no_faults(gear: Gear, sound: DiagnosisTable) -> None:
         (readings(25.4, slice(1, 2)), "plunger_displacement_2_in", "mm_as_in"),
         (readings(10.0, slice(1, 2)), "plunger_displacement_2_in", "factor_10"),
     ],
-    ids=["clearance mm", "clearance x 10", "clearance / 10", "reading mm", "second reading mm", "reading x 10"],
+    ids=[
+        "clearance mm",
+        "clearance x 10",
+        "clearance / 10",
+        "reading mm",
+        "second reading mm",
+        "reading x 10",
+    ],
 )
-def test_a_slip_is_found_in_its_cell(slip: Slip, column: str, kind: str, gear: Gear, sound: DiagnosisTable) -> None:
+def test_a_slip_is_found_in_its_cell(
+    slip: Slip, column: str, kind: str, gear: Gear, sound: DiagnosisTable
+) -> None:
     assert faults(gear, slip(sound)) == [(ROW, column, kind)]
 
 
 def test_all_readings_of_a_row_in_millimetres_are_found(gear: Gear, sound: DiagnosisTable) -> None:
-    assert {(place, kind) for place, _column, kind in faults(gear, readings(25.4)(sound))} == {(ROW, "mm_as_in")}
+    assert {(place, kind) for place, _column, kind in faults(gear, readings(25.4)(sound))} == {
+        (ROW, "mm_as_in")
+    }
 
 
 def test_two_swapped_joints_are_found_together(gear: Gear, sound: DiagnosisTable) -> None:
@@ -119,7 +134,10 @@ def test_other_cells_are_not_touched(gear: Gear, sound: DiagnosisTable) -> None:
 
 
 def test_a_fault_does_not_become_a_cause(gear: Gear, sound: DiagnosisTable) -> None:
-    assert diagnose(gear.model, clearance(25.4)(sound), gear.discrepancies, permutations=199).verdict == "NONE"
+    assert (
+        diagnose(gear.model, clearance(25.4)(sound), gear.discrepancies, permutations=199).verdict
+        == "NONE"
+    )
 
 
 def test_rows_that_stand_out_in_one_tail_are_an_effect(gear: Gear) -> None:
@@ -130,11 +148,17 @@ def test_rows_that_stand_out_in_one_tail_are_an_effect(gear: Gear) -> None:
 def test_rows_that_stand_out_with_one_gauge_are_an_effect(gear: Gear) -> None:
     gauges = np.where(np.arange(120) % 30 == 4, "G-9", "G-1")
     factors = {**fleet(gear.model).factors, "gauge_id": gauges}
-    table = fleet(gear.model, lambda t, _over: np.where(t.factors["gauge_id"] == "G-9", 0.03, 0.0), factors=factors)
+    table = fleet(
+        gear.model,
+        lambda t, _over: np.where(t.factors["gauge_id"] == "G-9", 0.03, 0.0),
+        factors=factors,
+    )
     assert faults(gear, table) == []
 
 
-def test_a_row_without_explanation_is_implausible_and_not_used(gear: Gear, sound: DiagnosisTable) -> None:
+def test_a_row_without_explanation_is_implausible_and_not_used(
+    gear: Gear, sound: DiagnosisTable
+) -> None:
     values = sound.readings_in.copy()
     values[ROW] = -0.9
     _table, found, usable = screen_faults(gear.model, replace(sound, readings_in=values))
@@ -176,7 +200,9 @@ def test_a_heavily_worn_gear_is_not_at_fault(gear: Gear) -> None:
     assert faults(gear, worn_by_landings(gear)) == []
 
 
-def test_two_swapped_joints_are_found_by_the_wear_that_their_landings_make_expect(gear: Gear) -> None:
+def test_two_swapped_joints_are_found_by_the_wear_that_their_landings_make_expect(
+    gear: Gear,
+) -> None:
     table = worn_by_landings(gear)
     values = table.clearance_in.copy()
     values[ROW, [4, 6]] = values[ROW, [6, 4]]
@@ -189,11 +215,15 @@ def test_two_swapped_joints_are_found_by_the_wear_that_their_landings_make_expec
 def test_one_of_two_readings_that_cannot_be_is_not_used(gear: Gear, sound: DiagnosisTable) -> None:
     values = sound.readings_in.copy()
     values[ROW, 1] += 0.06
-    assert faults(gear, replace(sound, readings_in=values)) == [(ROW, "plunger_displacement_2_in", "implausible")]
+    assert faults(gear, replace(sound, readings_in=values)) == [
+        (ROW, "plunger_displacement_2_in", "implausible")
+    ]
 
 
 def paired(gear: Gear, day_of_visit: list[float]) -> DiagnosisTable:
-    """Five aircraft inspected on both sides at each visit; right-hand gears have 1,500 landings more."""
+    """Five aircraft inspected on both sides at each visit; right-hand gears have 1,500 landings
+    more.
+    """
     visits = len(day_of_visit)
     rows = 10 * visits
     plain = fleet(gear.model, rows=rows, tails=5)
@@ -227,7 +257,9 @@ def test_a_gear_read_twice_on_one_of_two_visits_is_no_swapped_side(gear: Gear) -
     assert faults(gear, with_side(again, 17, "LH")) == []
 
 
-def test_a_gear_inspected_twice_on_its_day_is_no_swapped_side_where_aircraft_come_in_pairs(gear: Gear) -> None:
+def test_a_gear_inspected_twice_on_its_day_is_no_swapped_side_where_aircraft_come_in_pairs(
+    gear: Gear,
+) -> None:
     table = paired(gear, [10.0, 150.0, 300.0])
     landings = table.quantities["gear_landings"].copy()
     landings[17] = landings[12]

@@ -12,7 +12,13 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot import load_gear
-from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension, diagnose, load_extension, write_extension
+from mlg_troubleshoot.diagnosis import (
+    Diagnosis,
+    ModelExtension,
+    diagnose,
+    load_extension,
+    write_extension,
+)
 from mlg_troubleshoot.diagnosis.causes.base import Candidate
 from mlg_troubleshoot.diagnosis.causes.linkage import OutOfPlaneTilt
 from mlg_troubleshoot.diagnosis.causes.together import LoadDirections, OtherGeometry
@@ -28,7 +34,8 @@ from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
 from .conftest import Array, fleet
 
 FACTORS = np.array([0.9, 0.3, 0.95, -0.2, 0.6, 0.8, 0.5, 0.9, 0.2, 0.7])
-# Loads that turn every pin against its worst direction, and ones that turn the pin of joint 3 alone, the others alike.
+# Loads that turn every pin against its worst direction, and ones that turn the pin of joint 3
+# alone, the others alike.
 AGAINST = np.array([-0.6, -0.2, -0.5, -0.5, -0.7, -0.2, -0.4, -0.8, -0.6, -0.3])
 ONE_TURNED = np.array([0.8, 0.8, 0.3, 0.8, 0.8, 0.8, 0.8, 0.8, 0.8, 0.8])
 
@@ -43,7 +50,9 @@ def loads(table: DiagnosisTable, over: Array, factors: Array = FACTORS) -> Array
     return as_loaded(load_gear(), table.clearance_in, factors) - over
 
 
-def loads_and_a_gauge(table: DiagnosisTable, over: Array, factors: Array = FACTORS, bias_in: float = 0.004) -> Array:
+def loads_and_a_gauge(
+    table: DiagnosisTable, over: Array, factors: Array = FACTORS, bias_in: float = 0.004
+) -> Array:
     return loads(table, over, factors) + np.where(table.factors["gauge_id"] == "G-2", bias_in, 0.0)
 
 
@@ -53,7 +62,9 @@ def one_technician_twice(table: DiagnosisTable) -> DiagnosisTable:
 
 
 def worn_with_landings(gear: Gear) -> DiagnosisTable:
-    """A fleet with nothing wrong whose joints wear with landings, each gear's joint at a rate of its own."""
+    """A fleet with nothing wrong whose joints wear with landings, each gear's joint at a rate of
+    its own.
+    """
     plain, rng = fleet(gear.model, rows=200), np.random.default_rng(11)
     gears = np.unique(plain.gears, return_inverse=True)[1]
     rate = 0.0014 * rng.lognormal(0.0, 0.4, (gears.max() + 1, 10))[gears]
@@ -63,12 +74,18 @@ def worn_with_landings(gear: Gear) -> DiagnosisTable:
 
 
 def worn_together(gear: Gear) -> DiagnosisTable:
-    """A fleet with nothing wrong in which the joints of a gear wear together, each at its own rate in all gears."""
+    """A fleet with nothing wrong in which the joints of a gear wear together, each at its own rate
+    in all gears.
+    """
     plain, rng = fleet(gear.model, rows=200), np.random.default_rng(12)
     gears = np.unique(plain.gears, return_inverse=True)[1]
-    hard = rng.lognormal(0.0, 0.4, (gears.max() + 1, 1)) * rng.lognormal(0.0, 0.2, (gears.max() + 1, 10))
+    hard = rng.lognormal(0.0, 0.4, (gears.max() + 1, 1)) * rng.lognormal(
+        0.0, 0.2, (gears.max() + 1, 10)
+    )
     kilo = plain.quantities["gear_landings"][:, None] / 1000.0
-    clearance = 0.0006 + rng.uniform(0.0007, 0.0021, 10) * hard[gears] * kilo ** rng.uniform(0.85, 1.2, 10)
+    clearance = 0.0006 + rng.uniform(0.0007, 0.0021, 10) * hard[gears] * kilo ** rng.uniform(
+        0.85, 1.2, 10
+    )
     return fleet(gear.model, rows=200, clearance_in=clearance, quantities=dict(plain.quantities))
 
 
@@ -82,11 +99,15 @@ def worn_where_nobody_reads(gear: Gear) -> DiagnosisTable:
     """One aircraft whose unread joints are worn much further than those of the others."""
     table = unread(worn_with_landings(gear))
     more = np.where(table.factors["tail_no"] == "N103", 0.012, 0.0)
-    return replace(table, readings_in=table.readings_in + more.reshape(-1, *[1] * (table.readings_in.ndim - 1)))
+    return replace(
+        table, readings_in=table.readings_in + more.reshape(-1, *[1] * (table.readings_in.ndim - 1))
+    )
 
 
 def worn_when_not_read(gear: Gear) -> DiagnosisTable:
-    """One aircraft whose last three inspections read further out, and leave joints 2 and 3 unread."""
+    """One aircraft whose last three inspections read further out, and leave joints 2 and 3
+    unread.
+    """
     table = worn_with_landings(gear)
     values, own = table.clearance_in.copy(), np.flatnonzero(table.factors["tail_no"] == "N103")
     last = own[np.argsort(table.quantities["day"][own])[-3:]]
@@ -110,12 +131,20 @@ def pressure_on_one_tail(table: DiagnosisTable, _over: Array) -> Array:
     return np.where(table.factors["tail_no"] == "N103", (3000.0 - pressure) / 1e5, 0.0)
 
 
-def on_another_linkage(member: int, worn_further: float = 1.0, all_further: float = 1.0) -> DiagnosisTable:
-    """A fleet whose linkage is a member of the ensemble; joint 4, or all of them, moves it further than was read."""
+def on_another_linkage(
+    member: int, worn_further: float = 1.0, all_further: float = 1.0
+) -> DiagnosisTable:
+    """A fleet whose linkage is a member of the ensemble; joint 4, or all of them, moves it further
+    than was read.
+    """
     gear, factor = load_gear(), np.full(10, all_further)
     factor[3] *= worn_further
     other = gear.ensemble_models[1 + member]
-    return fleet(gear.model, lambda t, over: worst_case(other, factor * t.clearance_in).over_in - over, rows=200)
+    return fleet(
+        gear.model,
+        lambda t, over: worst_case(other, factor * t.clearance_in).over_in - over,
+        rows=200,
+    )
 
 
 def one_pin_turned_on_another_linkage(table: DiagnosisTable, over: Array) -> Array:
@@ -140,19 +169,27 @@ FLEETS: dict[str, Callable[[Gear], DiagnosisTable]] = {
     "loads against": lambda gear: fleet(
         gear.model, lambda t, over: loads_and_a_gauge(t, over, AGAINST, 0.012), rows=200
     ),
-    "one pin turned": lambda gear: fleet(gear.model, lambda t, over: loads(t, over, ONE_TURNED), rows=200),
+    "one pin turned": lambda gear: fleet(
+        gear.model, lambda t, over: loads(t, over, ONE_TURNED), rows=200
+    ),
     "loads and a slight bend": lambda gear: fleet(gear.model, loads_and_a_bend, rows=200),
-    "readings 1.1 times as large": lambda gear: fleet(gear.model, lambda _t, over: 0.1 * over, rows=200),
+    "readings 1.1 times as large": lambda gear: fleet(
+        gear.model, lambda _t, over: 0.1 * over, rows=200
+    ),
     "convention": lambda gear: one_technician_twice(fleet(gear.model, rows=200)),
     "unread": lambda gear: unread(worn_with_landings(gear)),
     "unread, worn with the read ones": lambda gear: unread(worn_together(gear)),
     "worn unread": worn_where_nobody_reads,
     "worn when not read": worn_when_not_read,
     "oval on another linkage": lambda _gear: on_another_linkage(5, worn_further=1.5),
-    "one pin turned on another linkage": lambda gear: fleet(gear.model, one_pin_turned_on_another_linkage, rows=200),
+    "one pin turned on another linkage": lambda gear: fleet(
+        gear.model, one_pin_turned_on_another_linkage, rows=200
+    ),
     "tilt on another linkage": lambda gear: fleet(gear.model, tilt_on_another_linkage, rows=200),
     "a linkage that nobody calibrated": lambda _gear: on_another_linkage(2, all_further=1.7),
-    "all readings 1.7 times as large": lambda gear: fleet(gear.model, lambda _t, over: 0.7 * over, rows=200),
+    "all readings 1.7 times as large": lambda gear: fleet(
+        gear.model, lambda _t, over: 0.7 * over, rows=200
+    ),
     "one tail": lambda gear: fleet(gear.model, pressure_on_one_tail, rows=200),
 }
 
@@ -162,7 +199,11 @@ def found(name: str) -> Diagnosis:
     """The diagnosis of one fleet, once for all tests of a worker."""
     gear = load_gear()
     return diagnose(
-        gear.model, FLEETS[name](gear), gear.discrepancies, ensemble=gear.ensemble_models[1:], permutations=99
+        gear.model,
+        FLEETS[name](gear),
+        gear.discrepancies,
+        ensemble=gear.ensemble_models[1:],
+        permutations=99,
     )
 
 
@@ -205,12 +246,16 @@ def test_a_gauge_that_reads_off_is_named_beside_the_directions() -> None:
     assert named("loads and a gauge") == {("load_directions", None), ("gauge_bias", "gauge G-2")}
 
 
-def test_readings_against_the_prediction_are_no_slip_of_the_sign_where_the_clearances_tell_of_them() -> None:
+def test_readings_against_the_prediction_are_not_a_wrong_sign_where_clearances_explain_them() -> (
+    None
+):
     assert named("loads against") == {("load_directions", None), ("gauge_bias", "gauge G-2")}
 
 
 def test_readings_against_the_prediction_are_no_other_linkage() -> None:
-    assert "geometry" not in {a.cause.name for c in found("loads against").causes for a in c.aliases}
+    assert "geometry" not in {
+        a.cause.name for c in found("loads against").causes for a in c.aliases
+    }
 
 
 def test_a_bend_small_beside_what_the_directions_explain_does_not_refute_them() -> None:
@@ -221,7 +266,7 @@ def test_one_scale_that_the_data_do_not_reject_is_named_before_factors_of_all_jo
     assert named("readings 1.1 times as large") == {("calibration_rate", None)}
 
 
-def test_a_scale_and_one_direction_are_named_as_directions_of_all_joints_that_rows_cannot_tell_from_them() -> None:
+def test_a_scale_and_one_direction_are_named_as_the_directions_they_cannot_be_told_from() -> None:
     (cause,) = found("one pin turned").causes
     others = {other.cause.name for other in cause.aliases}
     assert (cause.candidate.cause.name, others) == (
@@ -240,13 +285,17 @@ def test_the_extension_predicts_the_plunger_as_loaded(gear: Gear) -> None:
     extension = ModelExtension(gear, found("loads").terms, 0.002, ("ab",), 200)
     (term,) = extension.terms
     scene = build_scene(gear.model, table, gear.discrepancies)[0]
-    moved = adjusted_worst_case(gear.model, term.candidate.cause.adjust(scene, term.candidate, term.value))
+    moved = adjusted_worst_case(
+        gear.model, term.candidate.cause.adjust(scene, term.candidate, term.value)
+    )
     assert moved.over_in == pytest.approx(as_loaded(gear, scene.clearance_in), abs=0.003)
     assert np.array_equal(moved.over_in, moved.under_in)
 
 
 def test_an_extension_as_loaded_comes_back_from_its_file(gear: Gear, tmp_path: Path) -> None:
-    write_extension(ModelExtension(gear, found("loads").terms, 0.002, ("ab",), 200, (6, 7)), tmp_path / "e.toml")
+    write_extension(
+        ModelExtension(gear, found("loads").terms, 0.002, ("ab",), 200, (6, 7)), tmp_path / "e.toml"
+    )
     back = load_extension([tmp_path / "e.toml"], gear)
     assert (dict(back.terms[0].candidate.setting), back.unread) == (
         dict(found("loads").terms[0].candidate.setting),
@@ -258,7 +307,9 @@ def test_a_factor_of_minus_one_turns_the_displacement_round(gear: Gear) -> None:
     clearance = np.zeros((1, 10))
     clearance[0, 2] = 0.002
     over, turned = (
-        adjusted_worst_case(gear.model, Adjustment(clearance, direction_factors=np.full(10, factor))).over_in[0]
+        adjusted_worst_case(
+            gear.model, Adjustment(clearance, direction_factors=np.full(10, factor))
+        ).over_in[0]
         for factor in (1.0, -1.0)
     )
     assert turned == pytest.approx(-over, rel=0.02)
@@ -268,20 +319,36 @@ def test_readings_against_the_prediction_that_no_clearance_tells_of_are_refused(
     own = np.random.default_rng(5).normal(-0.012, 0.004, 120)
     unrelated = fleet(gear.model, lambda _t, over: own - over)
     with pytest.raises(InconclusiveDataError, match="times the predicted"):
-        diagnose(gear.model, unrelated, gear.discrepancies, ensemble=gear.ensemble_models[1:], permutations=99)
+        diagnose(
+            gear.model,
+            unrelated,
+            gear.discrepancies,
+            ensemble=gear.ensemble_models[1:],
+            permutations=99,
+        )
 
 
-def test_small_readings_that_the_clearances_explain_are_directions_and_no_wrong_unit(gear: Gear) -> None:
+def test_small_readings_that_the_clearances_explain_are_directions_and_no_wrong_unit(
+    gear: Gear,
+) -> None:
     factors = np.array([0.1, 0.4, 0.0, 0.3, 0.0, -1.0, 0.9, 0.5, -1.0, -0.5])
     table = fleet(gear.model, lambda t, over: loads(t, over, factors), rows=200, noise_in=0.003)
-    d = diagnose(gear.model, table, gear.discrepancies, ensemble=gear.ensemble_models[1:], permutations=99)
+    d = diagnose(
+        gear.model, table, gear.discrepancies, ensemble=gear.ensemble_models[1:], permutations=99
+    )
     assert [c.candidate.cause.name for c in d.causes] == ["load_directions"]
 
 
 def test_readings_in_another_unit_are_refused(gear: Gear) -> None:
     table = fleet(gear.model, lambda _t, over: (1.0 / 25.4 - 1.0) * over, rows=200, noise_in=0.0001)
     with pytest.raises(InconclusiveDataError, match="times the predicted"):
-        diagnose(gear.model, table, gear.discrepancies, ensemble=gear.ensemble_models[1:], permutations=99)
+        diagnose(
+            gear.model,
+            table,
+            gear.discrepancies,
+            ensemble=gear.ensemble_models[1:],
+            permutations=99,
+        )
 
 
 def test_a_table_of_the_other_sign_is_still_refused(gear: Gear) -> None:
@@ -295,7 +362,9 @@ def test_a_linkage_that_does_not_close_with_what_was_read_is_not_the_gear_s(gear
     worn.clearance_in[0] = 0.018
     scene = build_scene(gear.model, worn, gear.discrepancies)[0]
     others = gear.ensemble_models[1:]
-    closing = [bool(np.isfinite(worst_of_sense(other, scene.clearance_in)[0]).all()) for other in others]
+    closing = [
+        bool(np.isfinite(worst_of_sense(other, scene.clearance_in)[0]).all()) for other in others
+    ]
     blocks = OtherGeometry().blocks(scene, others)
     assert 0 < sum(closing) < len(others)
     counts = Counter(b.columns.shape[1] for b in blocks)
@@ -316,7 +385,10 @@ def test_a_member_of_the_ensemble_is_a_linkage_of_its_own(gear: Gear) -> None:
 
 def test_what_the_joints_add_is_together_the_displacement(gear: Gear) -> None:
     scene = build_scene(gear.model, fleet(gear.model), gear.discrepancies)[0]
-    for block in (*LoadDirections().blocks(scene, ()), *OtherGeometry().blocks(scene, gear.ensemble_models[1:])):
+    for block in (
+        *LoadDirections().blocks(scene, ()),
+        *OtherGeometry().blocks(scene, gear.ensemble_models[1:]),
+    ):
         assert block.columns[:, :10].sum(axis=1) == pytest.approx(scene.over_in)
 
 
@@ -329,7 +401,10 @@ def test_an_oval_bore_is_named_beside_another_linkage() -> None:
 
 
 def test_one_pin_beside_its_worst_direction_in_another_linkage_is_no_load_on_all_pins() -> None:
-    assert named("one pin turned on another linkage") == {("direction_not_worst_case", "joint 4"), ("geometry", None)}
+    assert named("one pin turned on another linkage") == {
+        ("direction_not_worst_case", "joint 4"),
+        ("geometry", None),
+    }
 
 
 def test_a_cause_is_sought_with_the_effect_that_it_has_in_another_linkage() -> None:
@@ -348,15 +423,19 @@ def test_readings_beyond_the_bound_are_another_linkage_and_no_resting_place_of_p
 
 def test_a_scale_of_that_size_is_not_put_down_to_the_rate_alone() -> None:
     assert ("calibration_rate", None) not in named("all readings 1.7 times as large")
-    possible = {c.candidate.cause.name for c in found("all readings 1.7 times as large").also_possible}
+    possible = {
+        c.candidate.cause.name for c in found("all readings 1.7 times as large").also_possible
+    }
     assert possible >= {"calibration_rate", "geometry"}
 
 
-def test_every_clearance_in_the_other_convention_is_listed_as_it_was_entered_and_as_it_is_used() -> None:
+def test_a_clearance_in_the_other_convention_is_listed_as_entered_and_as_used() -> None:
     d = found("convention")
     entered = np.where(d.used.factors["technician_id"] == "T-2", d.used.clearance_in.T, np.nan).T
     read = np.argwhere(np.isfinite(entered))
-    assert [(c.place, c.column) for c in d.corrected] == [(i, f"clearance_{j + 1}_in") for i, j in read.tolist()]
+    assert [(c.place, c.column) for c in d.corrected] == [
+        (i, f"clearance_{j + 1}_in") for i, j in read.tolist()
+    ]
     shown = np.array([[c.value, c.suggested] for c in d.corrected], float)
     assert shown == pytest.approx(entered[tuple(read.T)][:, None] / (1.0, 2.0), rel=1e-3)
 
@@ -373,15 +452,22 @@ def test_joints_that_nobody_read_are_no_cause() -> None:
     assert found("unread").verdict == "NONE"
 
 
-def test_joints_that_nobody_read_and_that_wear_with_the_read_ones_of_their_gear_are_no_cause() -> None:
+def test_joints_that_nobody_read_and_that_wear_with_the_read_ones_of_their_gear_are_no_cause() -> (
+    None
+):
     assert named("unread, worn with the read ones") == set()
 
 
 def test_an_aircraft_whose_unread_joints_may_be_worn_is_not_named_as_re_rigged() -> None:
-    assert not {name for name, _target in named("worn unread")} & {"rigging_offset", "unlisted_wear"}
+    assert not {name for name, _target in named("worn unread")} & {
+        "rigging_offset",
+        "unlisted_wear",
+    }
 
 
-def test_an_aircraft_is_not_named_as_re_rigged_from_a_day_on_from_which_joints_were_not_read() -> None:
+def test_an_aircraft_is_not_named_as_re_rigged_from_a_day_on_from_which_joints_were_not_read() -> (
+    None
+):
     assert "rigging_offset" not in {cause for cause, _target in named("worn when not read")}
 
 
@@ -417,7 +503,9 @@ def test_a_sure_cause_is_fitted_with_what_acts_beside_it() -> None:
 
 def test_the_model_is_extended_by_the_sure_cause_alone_and_gains() -> None:
     d = found("a gauge and a scale")
-    assert [term.candidate.cause.name for term in d.terms] == [c.candidate.cause.name for c in d.causes if c.predicts]
+    assert [term.candidate.cause.name for term in d.terms] == [
+        c.candidate.cause.name for c in d.causes if c.predicts
+    ]
     assert d.gain is not None
     assert d.gain.rms_after_in < d.gain.rms_before_in
 

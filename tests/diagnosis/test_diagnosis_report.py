@@ -45,9 +45,17 @@ def make(gear: Gear, tmp_path_factory: pytest.TempPathFactory) -> Make:
 
     def made(table: DiagnosisTable) -> Made:
         found = diagnose(gear.model, table, gear.discrepancies, permutations=199, seed=4)
-        extension = ModelExtension(gear, found.terms, found.residual_u_in, (), found.rows_used) if found.terms else None
-        made_of = ReportProvenance("9.8.7", datetime(2024, 5, 17, tzinfo=UTC), "ab" * 32, {"f.csv": "cd" * 32}, seed=4)
-        document = diagnosis_document(found, gear, made_of, extension, notes=("Column 'mood' is not known.",))
+        extension = (
+            ModelExtension(gear, found.terms, found.residual_u_in, (), found.rows_used)
+            if found.terms
+            else None
+        )
+        made_of = ReportProvenance(
+            "9.8.7", datetime(2024, 5, 17, tzinfo=UTC), "ab" * 32, {"f.csv": "cd" * 32}, seed=4
+        )
+        document = diagnosis_document(
+            found, gear, made_of, extension, notes=("Column 'mood' is not known.",)
+        )
         written = publish(document, tmp_path_factory.mktemp("report"), formats=("html",))
         assert written.html is not None
         html = written.html.read_text(encoding="utf-8")
@@ -63,7 +71,11 @@ def technician_off(table: DiagnosisTable, _over: Array) -> Array:
 
 
 def cold_under_load(table: DiagnosisTable, _over: Array) -> Array:
-    return (table.quantities["temperature_c"] - 10.0) * (table.quantities["hydraulic_pressure_psi"] - 1700.0) * 2.5e-7
+    return (
+        (table.quantities["temperature_c"] - 10.0)
+        * (table.quantities["hydraulic_pressure_psi"] - 1700.0)
+        * 2.5e-7
+    )
 
 
 @pytest.fixture(scope="module")
@@ -105,24 +117,38 @@ def three_at_once(table: DiagnosisTable, over: Array) -> Array:
 def test_each_of_three_causes_is_drawn_before_and_after(gear: Gear, make: Make) -> None:
     made = make(fleet(gear.model, three_at_once, rows=200))
     assert len(made.diagnosis.causes) == 3
-    assert all(f'<p class="small strong">{cause_words(cause)}</p>' in made.html for cause in made.diagnosis.causes)
+    assert all(
+        f'<p class="small strong">{cause_words(cause)}</p>' in made.html
+        for cause in made.diagnosis.causes
+    )
 
 
-def test_the_report_shows_each_clearance_of_the_other_convention_as_entered_and_as_used(convention: Made) -> None:
+def test_the_report_shows_each_clearance_of_the_other_convention_as_entered_and_as_used(
+    convention: Made,
+) -> None:
     cells = convention.diagnosis.corrected
     first = [c for c in cells if c.place == cells[0].place]
-    entered, used = (" ".join(str(getattr(c, name)) for c in first) for name in ("value", "suggested"))
-    assert f"{first[0].row} {first[0].record_id} entered {entered} used here {used}" in convention.text
+    entered, used = (
+        " ".join(str(getattr(c, name)) for c in first) for name in ("value", "suggested")
+    )
+    assert (
+        f"{first[0].row} {first[0].record_id} entered {entered} used here {used}" in convention.text
+    )
     assert convention.text.count("used here") == len({c.place for c in cells})
 
 
 def test_the_screen_says_what_is_used_otherwise_than_entered(convention: Made) -> None:
     first, (data, *_rest) = convention.diagnosis.corrected[0], seven_lines(convention.diagnosis)
-    assert f"row {first.row}, the other convention ({first.column} {first.value} → {first.suggested}" in data.text
+    assert (
+        f"row {first.row}, the other convention ({first.column} {first.value} → {first.suggested}"
+        in data.text
+    )
     assert "Corrected for this analysis" in data.text
 
 
-def test_where_directions_are_named_the_report_says_why_readings_are_smaller(gear: Gear, make: Make) -> None:
+def test_where_directions_are_named_the_report_says_why_readings_are_smaller(
+    gear: Gear, make: Make
+) -> None:
     text = make(FLEETS["loads"](gear)).text
     assert "Why your readings are smaller than the bound" in text
     assert "Under load each pin rests where the load presses it, beside its worst direction" in text
@@ -133,8 +159,12 @@ def test_nothing_is_said_of_loads_or_conventions_that_are_not_named(named: Made)
     assert "other convention" not in named.text.replace("another convention", "")
 
 
-def test_a_cause_that_cannot_be_tested_is_a_rival_and_says_which_column_is_missing(without_landings: Made) -> None:
-    assert "shifts the lever (not testable without landings since overhaul)" in without_landings.text
+def test_a_cause_that_cannot_be_tested_is_a_rival_and_says_which_column_is_missing(
+    without_landings: Made,
+) -> None:
+    assert (
+        "shifts the lever (not testable without landings since overhaul)" in without_landings.text
+    )
 
 
 def test_what_separates_a_cause_that_cannot_be_tested_is_its_column(without_landings: Made) -> None:
@@ -172,7 +202,9 @@ def test_more_wrong_verdicts_are_not_shown_as_a_gain(named: Made) -> None:
 def test_no_identifier_of_a_cause_stands_in_the_prose(named: Made, without_landings: Made) -> None:
     for made in (named, without_landings):
         prose = made.text[: made.text.index("Assumptions and provenance")]
-        assert [cause.name for cause in CATALOGUE if "_" in cause.name and cause.name in prose] == []
+        assert [
+            cause.name for cause in CATALOGUE if "_" in cause.name and cause.name in prose
+        ] == []
 
 
 def test_residuals_are_drawn_against_the_named_column_before_and_after(named: Made) -> None:
@@ -215,7 +247,9 @@ def test_the_gain_stands_before_and_after(named: Made) -> None:
 def test_every_verdict_that_changes_is_listed(named: Made) -> None:
     assert named.diagnosis.gain is not None
     rows = named.html[named.html.index('id="changes"') :]
-    assert all(f"<bdi>{record}</bdi>" in rows for record in named.diagnosis.gain.verdicts_changed[:40])
+    assert all(
+        f"<bdi>{record}</bdi>" in rows for record in named.diagnosis.gain.verdicts_changed[:40]
+    )
 
 
 def test_no_gain_is_shown_where_the_model_was_not_extended(nothing: Made) -> None:
@@ -224,15 +258,24 @@ def test_no_gain_is_shown_where_the_model_was_not_extended(nothing: Made) -> Non
 
 def test_nothing_found_says_what_would_have_been_found(nothing: Made) -> None:
     shown = nothing.text.replace("\u00a0", " ")
-    assert f"The test had 80 % power for an effect of {nothing.diagnosis.smallest_rms_in:.5f} in rms" in shown
+    assert (
+        f"The test had 80 % power for an effect of {nothing.diagnosis.smallest_rms_in:.5f} in rms"
+        in shown
+    )
 
 
 def test_what_to_inspect_stands_on_the_front(named: Made) -> None:
-    assert "How that technician seats and zeroes the gauge." in named.text[: named.text.index("One reading repeats to")]
+    assert (
+        "How that technician seats and zeroes the gauge."
+        in named.text[: named.text.index("One reading repeats to")]
+    )
 
 
 def test_what_would_change_the_verdict_is_said(named: Made) -> None:
-    assert "Would change the verdict: one gear measured by this technician and by another" in named.text
+    assert (
+        "Would change the verdict: one gear measured by this technician and by another"
+        in named.text
+    )
 
 
 def test_a_fault_stands_with_what_was_written_and_what_was_used(gear: Gear, make: Make) -> None:
@@ -271,7 +314,11 @@ def test_hostile_names_stay_text(gear: Gear, make: Make) -> None:
     names = np.where(np.arange(120) % 3 == 0, HOSTILE, "T-1")
     factors = {**fleet(gear.model).factors, "technician_id": names}
     made = make(
-        fleet(gear.model, lambda t, _o: np.where(t.factors["technician_id"] == HOSTILE, 0.008, 0.0), factors=factors)
+        fleet(
+            gear.model,
+            lambda t, _o: np.where(t.factors["technician_id"] == HOSTILE, 0.008, 0.0),
+            factors=factors,
+        )
     )
     assert made.diagnosis.verdict in {"NAMED", "AMBIGUOUS"}
     assert "<script>" not in made.html
@@ -297,7 +344,9 @@ def test_nothing_found_and_noise_do_not_contradict_each_other(nothing: Made) -> 
 
 
 def test_where_nothing_is_found_what_is_left_is_noise(gear: Gear) -> None:
-    found = diagnose(gear.model, fleet(gear.model, rows=20, seed=11), gear.discrepancies, permutations=199)
+    found = diagnose(
+        gear.model, fleet(gear.model, rows=20, seed=11), gear.discrepancies, permutations=199
+    )
     assert found.verdict == "NONE"
     assert found.remainder_p <= 0.05
     assert found.remainder_is_noise

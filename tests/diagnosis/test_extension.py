@@ -1,4 +1,6 @@
-"""An extension is kept in a file, belongs to one geometry, stacks, and changes what a check predicts."""
+"""An extension is kept in a file, belongs to one geometry, stacks, and changes what a check
+predicts.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ HOSTILE = 'N"1\\2 [[terms]] \n# ü № "'
 
 
 def term(name: str, value: float, target: str | None = None, /, **setting: object) -> Term:
-    return Term(Candidate(BY_NAME[name], target, setting), value, tuple(sorted((0.9 * value, 1.1 * value))))
+    return Term(
+        Candidate(BY_NAME[name], target, setting), value, tuple(sorted((0.9 * value, 1.1 * value)))
+    )
 
 
 STRETCH = term("elastic_compliance", 2e-6, length="length.F-1")
@@ -66,19 +70,26 @@ def offset_of(gear: Gear, terms: tuple[Term, ...], **changes: object) -> float:
     one = inspection(**changes)
     clearance = np.array([[one.clearance_in[n] for n in gear.joint_numbers]])
     table = table_from_inspections([one], gear)
-    plain = adjusted_worst_case(gear.model, adjustment_of((), gear.model, table, clearance, gear.discrepancies)).over_in
+    plain = adjusted_worst_case(
+        gear.model, adjustment_of((), gear.model, table, clearance, gear.discrepancies)
+    ).over_in
     moved = adjusted_worst_case(
         gear.model, adjustment_of(terms, gear.model, table, clearance, gear.discrepancies)
     ).over_in
     return float(moved[0] - plain[0])
 
 
-@pytest.mark.parametrize("saved", [STRETCH, RATE, GAUGE, RIGGED, CONTACT], ids=lambda t: t.candidate.cause.name)
+@pytest.mark.parametrize(
+    "saved", [STRETCH, RATE, GAUGE, RIGGED, CONTACT], ids=lambda t: t.candidate.cause.name
+)
 def test_a_term_comes_back_from_its_file_as_it_was(saved: Term, gear: Gear, tmp_path: Path) -> None:
     write_extension(extension(gear, saved), tmp_path / "e.toml")
     (back,) = load_extension([tmp_path / "e.toml"], gear).terms
     assert (back.value, back.interval) == (saved.value, saved.interval)
-    assert (back.candidate.cause.name, back.candidate.target) == (saved.candidate.cause.name, saved.candidate.target)
+    assert (back.candidate.cause.name, back.candidate.target) == (
+        saved.candidate.cause.name,
+        saved.candidate.target,
+    )
     assert {k: v for k, v in back.candidate.setting.items() if v is not None} == {
         k: v for k, v in saved.candidate.setting.items() if v is not None
     }
@@ -87,7 +98,9 @@ def test_a_term_comes_back_from_its_file_as_it_was(saved: Term, gear: Gear, tmp_
 def test_a_term_that_came_back_predicts_the_same(gear: Gear, tmp_path: Path) -> None:
     terms = (STRETCH, RATE, GAUGE, RIGGED, CONTACT)
     write_extension(extension(gear, *terms), tmp_path / "e.toml")
-    assert offset_of(gear, load_extension([tmp_path / "e.toml"], gear).terms) == offset_of(gear, terms)
+    assert offset_of(gear, load_extension([tmp_path / "e.toml"], gear).terms) == offset_of(
+        gear, terms
+    )
 
 
 def test_hostile_text_comes_back_as_it_was(gear: Gear, tmp_path: Path) -> None:
@@ -100,7 +113,11 @@ def test_hostile_text_comes_back_as_it_was(gear: Gear, tmp_path: Path) -> None:
 def test_the_file_says_on_which_data_and_geometry_it_rests(gear: Gear, tmp_path: Path) -> None:
     write_extension(extension(gear, RATE), tmp_path / "e.toml")
     raw = tomllib.loads((tmp_path / "e.toml").read_text(encoding="utf-8"))
-    assert (raw["geometry_sha256"], raw["data_sha256"], raw["rows"]) == (gear.geometry_sha256, ["ab" * 32], 200)
+    assert (raw["geometry_sha256"], raw["data_sha256"], raw["rows"]) == (
+        gear.geometry_sha256,
+        ["ab" * 32],
+        200,
+    )
 
 
 def test_the_file_keeps_the_scatter_that_is_left(gear: Gear, tmp_path: Path) -> None:
@@ -133,7 +150,9 @@ def test_a_file_that_is_no_extension_is_refused(gear: Gear, tmp_path: Path) -> N
         ("residual_u_in = 0.0031", 'residual_u_in = "small"'),
     ],
 )
-def test_a_damaged_extension_is_refused_with_its_name(written: str, instead: str, gear: Gear, tmp_path: Path) -> None:
+def test_a_damaged_extension_is_refused_with_its_name(
+    written: str, instead: str, gear: Gear, tmp_path: Path
+) -> None:
     file = tmp_path / "e.toml"
     write_extension(extension(gear, RATE), file)
     text = file.read_text(encoding="utf-8")
@@ -147,12 +166,23 @@ def test_a_damaged_extension_is_refused_with_its_name(written: str, instead: str
     ("written", "instead", "expected"),
     [
         *(
-            ("residual_u_in = 0.0031", f"residual_u_in = {value}", "residual_u_in: expected a number")
+            (
+                "residual_u_in = 0.0031",
+                f"residual_u_in = {value}",
+                "residual_u_in: expected a number",
+            )
             for value in ("nan", "inf", "0", "-1", "true", '"0.003"', "1e308")
         ),
-        *(("rows = 200", f"rows = {value}", "rows: expected a whole number") for value in ("-5", "0", "true", "2.5")),
+        *(
+            ("rows = 200", f"rows = {value}", "rows: expected a whole number")
+            for value in ("-5", "0", "true", "2.5")
+        ),
         ("rows = 200", "rows = 1" + "0" * 308, "rows: expected a whole number"),
-        ("value = 0.05", "value = 1e9", "value: expected a number that leaves the plunger within 1 in"),
+        (
+            "value = 0.05",
+            "value = 1e9",
+            "value: expected a number that leaves the plunger within 1 in",
+        ),
         ("value = 0.05", "value = nan", "value: expected a number"),
         ("value = 0.05", "value = 0.05\nvalues = 3", "values: expected one of the known keys"),
         ("rows = 200", "rows = 200\nrow = 3", "row: expected one of the known keys"),
@@ -172,7 +202,14 @@ def test_a_number_that_cannot_be_is_refused_with_its_key(
 
 @pytest.mark.parametrize(
     "damaged",
-    ["gauge_bias", "rigging_offset", "elastic_compliance", "joint_contact", "oval_wear", "approach_hysteresis"],
+    [
+        "gauge_bias",
+        "rigging_offset",
+        "elastic_compliance",
+        "joint_contact",
+        "oval_wear",
+        "approach_hysteresis",
+    ],
 )
 def test_a_term_without_its_setting_is_refused(damaged: str, gear: Gear, tmp_path: Path) -> None:
     file = tmp_path / "e.toml"
@@ -184,7 +221,9 @@ def test_a_term_without_its_setting_is_refused(damaged: str, gear: Gear, tmp_pat
 def test_a_cause_that_is_not_known_asks_for_the_file_of_causes(gear: Gear, tmp_path: Path) -> None:
     file = tmp_path / "e.toml"
     write_extension(extension(gear, RATE), file)
-    file.write_text(file.read_text(encoding="utf-8").replace("calibration_rate", "moon_phase"), encoding="utf-8")
+    file.write_text(
+        file.read_text(encoding="utf-8").replace("calibration_rate", "moon_phase"), encoding="utf-8"
+    )
     with pytest.raises(GearFileError, match="moon_phase") as refused:
         load_extension([file], gear)
     assert "--causes" in str(refused.value)
@@ -216,7 +255,9 @@ def test_what_nobody_read_for_one_of_stacked_files_is_said(gear: Gear, tmp_path:
 
 def test_stretches_of_one_link_add_up(gear: Gear) -> None:
     twice = term("elastic_compliance", 4e-6, length="length.F-1")
-    assert offset_of(gear, (STRETCH, STRETCH)) == pytest.approx(offset_of(gear, (twice,)), abs=1e-12)
+    assert offset_of(gear, (STRETCH, STRETCH)) == pytest.approx(
+        offset_of(gear, (twice,)), abs=1e-12
+    )
 
 
 def test_a_missing_column_makes_a_term_do_nothing(gear: Gear) -> None:
@@ -224,9 +265,12 @@ def test_a_missing_column_makes_a_term_do_nothing(gear: Gear) -> None:
 
 
 @pytest.mark.parametrize(
-    ("day", "moved"), [(date(2024, 3, 4), 0.0), (date(2024, 3, 5), -0.01), (date(2030, 1, 1), -0.01)]
+    ("day", "moved"),
+    [(date(2024, 3, 4), 0.0), (date(2024, 3, 5), -0.01), (date(2030, 1, 1), -0.01)],
 )
-def test_a_change_since_a_date_acts_in_a_table_that_starts_on_another_day(day: date, moved: float, gear: Gear) -> None:
+def test_a_change_since_a_date_acts_in_a_table_that_starts_on_another_day(
+    day: date, moved: float, gear: Gear
+) -> None:
     assert offset_of(gear, (RIGGED,), inspection_date=day) == pytest.approx(moved, abs=1e-12)
 
 
@@ -249,7 +293,10 @@ def test_the_model_s_uncertainty_becomes_the_scatter_that_was_left(gear: Gear) -
 
 
 def test_an_extension_describes_itself_in_words(gear: Gear) -> None:
-    assert extension(gear, GAUGE).describe() == "Readings with gauge G-1 are shifted; fitted to 200 measured rows"
+    assert (
+        extension(gear, GAUGE).describe()
+        == "Readings with gauge G-1 are shifted; fitted to 200 measured rows"
+    )
 
 
 def test_a_scene_knows_where_a_joint_stands(scene: Scene) -> None:

@@ -18,18 +18,24 @@ ROWS, DEFAULT_GAUGE_U_IN = 200, 0.0005
 # A few fleets every day; more of them, with the alarms that chance allows, in the slow part.
 FEW, MANY = (range(41_200, 41_202), 0), (range(41_200, 41_220), 3)
 every_day_and_slow = pytest.mark.parametrize(
-    ("seeds", "allowed"), [pytest.param(*FEW, id="few"), pytest.param(*MANY, id="many", marks=pytest.mark.slow)]
+    ("seeds", "allowed"),
+    [pytest.param(*FEW, id="few"), pytest.param(*MANY, id="many", marks=pytest.mark.slow)],
 )
 
 
 def alarms(gear: Gear, draw: Callable[[int], DiagnosisTable], seeds: range) -> int:
     """Healthy fleets in which something is found."""
     tables = map(draw, seeds)
-    return sum(diagnose(gear.model, t, gear.discrepancies, permutations=199).verdict != "NONE" for t in tables)
+    return sum(
+        diagnose(gear.model, t, gear.discrepancies, permutations=199).verdict != "NONE"
+        for t in tables
+    )
 
 
 def read_exactly(gear: Gear, seed: int, high_in: float | None) -> DiagnosisTable:
-    """Exact clearances, drawn evenly up to the highest or by wear; their uncertainty is the default."""
+    """Exact clearances, drawn evenly up to the highest or by wear; their uncertainty is the
+    default.
+    """
     columns = {"gauge_u_in": np.full(ROWS, DEFAULT_GAUGE_U_IN)}
     if high_in is not None:
         columns["clearance_in"] = np.random.default_rng(seed).uniform(0.0, high_in, (ROWS, 10))
@@ -50,7 +56,9 @@ def test_clearances_drawn_evenly_and_read_exactly_are_no_cause(
 
 
 @every_day_and_slow
-def test_small_clearances_read_better_than_declared_are_no_cause(seeds: range, allowed: int, gear: Gear) -> None:
+def test_small_clearances_read_better_than_declared_are_no_cause(
+    seeds: range, allowed: int, gear: Gear
+) -> None:
     assert alarms(gear, lambda seed: read_exactly(gear, seed, None), seeds) <= allowed
 
 
@@ -77,7 +85,9 @@ def test_readers_and_aircraft_that_all_differ_a_little_are_no_cause(
 
 
 def worn_apart(gear: Gear, seed: int) -> DiagnosisTable:
-    """Every gear has a level and a rate of wear of its own, and readings are rounded to half a thousandth."""
+    """Every gear has a level and a rate of wear of its own, and readings are rounded to half a
+    thousandth.
+    """
     rng = np.random.default_rng(seed)
     rows, gears = 480, np.arange(480) % 60
     day = np.sort(rng.uniform(0.0, 730.0, rows))
@@ -90,7 +100,10 @@ def worn_apart(gear: Gear, seed: int) -> DiagnosisTable:
         seed=seed,
         clearance_in=true_in,
         quantities={"gear_landings": 1000.0 * kilo, "day": day},
-        factors={"tail_no": np.array([f"N{g // 2:03d}" for g in gears]), "side": np.array(["LH", "RH"])[gears % 2]},
+        factors={
+            "tail_no": np.array([f"N{g // 2:03d}" for g in gears]),
+            "side": np.array(["LH", "RH"])[gears % 2],
+        },
         gauge_u_in=np.full(rows, DEFAULT_GAUGE_U_IN),
     )
     read_in = np.round((true_in + rng.normal(0.0, 0.0002, true_in.shape)) / 0.0005) * 0.0005

@@ -51,7 +51,9 @@ def fitted_tails(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
 
 
 def test_the_cause_is_named(found: Diagnosis) -> None:
-    assert [(c.candidate.cause.name, c.candidate.target) for c in found.causes] == [("gauge_bias", "gauge G-2")]
+    assert [(c.candidate.cause.name, c.candidate.target) for c in found.causes] == [
+        ("gauge_bias", "gauge G-2")
+    ]
 
 
 def test_the_fitted_number_is_near_the_true_one(found: Diagnosis) -> None:
@@ -63,7 +65,9 @@ def test_the_interval_holds_the_true_number(found: Diagnosis) -> None:
     assert low < 0.006 < high
 
 
-def test_rows_of_one_tail_are_held_out_together(gear: Gear, table: DiagnosisTable, fitted_tails: list[int]) -> None:
+def test_rows_of_one_tail_are_held_out_together(
+    gear: Gear, table: DiagnosisTable, fitted_tails: list[int]
+) -> None:
     diagnose(gear.model, table, gear.discrepancies, permutations=99)
     # Ten tails of twelve rows: each fit leaves out whole tails.
     assert fitted_tails
@@ -72,7 +76,9 @@ def test_rows_of_one_tail_are_held_out_together(gear: Gear, table: DiagnosisTabl
 
 
 def test_a_cause_of_one_aircraft_is_held_out_row_by_row(gear: Gear) -> None:
-    rigged = diagnose(gear.model, fleet(gear.model, rigged_tail), gear.discrepancies, permutations=199)
+    rigged = diagnose(
+        gear.model, fleet(gear.model, rigged_tail), gear.discrepancies, permutations=199
+    )
     assert [c.candidate.cause.name for c in rigged.causes] == ["rigging_offset"]
     assert rigged.gain is not None
     assert rigged.gain.held_out_by == "row"
@@ -107,7 +113,9 @@ def nothing(gear: Gear, plain: DiagnosisTable) -> Diagnosis:
     return diagnose(gear.model, plain, gear.discrepancies, permutations=199)
 
 
-def test_wrong_verdicts_of_a_model_that_stays_are_counted_by_their_sense(nothing: Diagnosis) -> None:
+def test_wrong_verdicts_of_a_model_that_stays_are_counted_by_their_sense(
+    nothing: Diagnosis,
+) -> None:
     # Every row is measured beyond its margin and predicted within it.
     margin, none = np.full(len(nothing.predicted_in), 1e-9), np.zeros_like(nothing.predicted_in)
     kept = replace(nothing, used=replace(nothing.used, margin_in=margin), predicted_in=none)
@@ -118,7 +126,9 @@ def test_wrong_verdicts_of_a_model_that_stays_are_counted_by_their_sense(nothing
 
 @pytest.fixture(scope="module")
 def twice(gear: Gear, table: DiagnosisTable) -> list[Diagnosis]:
-    return [diagnose(gear.model, table, gear.discrepancies, permutations=99, seed=3) for _ in range(2)]
+    return [
+        diagnose(gear.model, table, gear.discrepancies, permutations=99, seed=3) for _ in range(2)
+    ]
 
 
 def test_no_gain_is_claimed_where_nothing_is_named(nothing: Diagnosis) -> None:
@@ -139,14 +149,23 @@ def test_the_seed_stands_in_the_result(twice: list[Diagnosis]) -> None:
     assert twice[0].seed == 3
 
 
-def test_the_order_of_the_rows_does_not_matter_to_the_name(gear: Gear, table: DiagnosisTable) -> None:
+def test_the_order_of_the_rows_does_not_matter_to_the_name(
+    gear: Gear, table: DiagnosisTable
+) -> None:
     turned = table.take(np.arange(len(table))[::-1])
     found = diagnose(gear.model, turned, gear.discrepancies, permutations=199)
-    assert [(c.candidate.cause.name, c.candidate.target) for c in found.causes] == [("gauge_bias", "gauge G-2")]
+    assert [(c.candidate.cause.name, c.candidate.target) for c in found.causes] == [
+        ("gauge_bias", "gauge G-2")
+    ]
 
 
 def test_a_cause_whose_column_is_missing_is_not_testable(gear: Gear, plain: DiagnosisTable) -> None:
-    bare = fleet(gear.model, quantities={}, factors={"tail_no": plain.factors["tail_no"]}, axial_float_in=None)
+    bare = fleet(
+        gear.model,
+        quantities={},
+        factors={"tail_no": plain.factors["tail_no"]},
+        axial_float_in=None,
+    )
     found = diagnose(gear.model, bare, gear.discrepancies, permutations=99)
     assert dict(found.not_testable) == {
         "out_of_plane_tilt": "axial_float",
@@ -173,7 +192,9 @@ def test_without_repeat_readings_the_declared_one_is_marked(gear: Gear) -> None:
 
 
 def test_without_either_it_is_unknown(gear: Gear) -> None:
-    single = diagnose(gear.model, _one_reading(fleet(gear.model)), gear.discrepancies, permutations=99)
+    single = diagnose(
+        gear.model, _one_reading(fleet(gear.model)), gear.discrepancies, permutations=99
+    )
     assert (single.repeatability_in, single.repeatability_source) == (None, "unknown")
 
 

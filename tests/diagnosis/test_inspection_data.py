@@ -1,4 +1,6 @@
-"""The shipped diagnosis data sets are what their description says, and its commands print what it shows."""
+"""The shipped diagnosis data sets are what their description says, and its commands print what it
+shows.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ FILES = sorted(file.name for file in FOLDER.glob("measured_*.csv"))
 @cache
 def diagnosis(name: str, *causes: str) -> Diagnosis:
     files = tuple(FOLDER / cause for cause in causes)
-    return diagnose_files([FOLDER / name], DiagnoseOptions(cause_files=files, permutations=199)).diagnosis
+    return diagnose_files(
+        [FOLDER / name], DiagnoseOptions(cause_files=files, permutations=199)
+    ).diagnosis
 
 
 @pytest.mark.parametrize("file", FILES)
@@ -39,12 +43,16 @@ def test_the_data_sets_are_called_synthetic() -> None:
 
 
 def test_the_puzzle_does_not_give_the_answer_away() -> None:
-    assert not re.search(r"stretch|grease|seed|hidden", PUZZLE.replace("measured_frozen_grease", ""))
+    assert not re.search(
+        r"stretch|grease|seed|hidden", PUZZLE.replace("measured_frozen_grease", "")
+    )
 
 
 def test_the_command_makes_the_data_sets_again_byte_for_byte(tmp_path: Path) -> None:
     assert data_sets.main([str(tmp_path)]) == 0
-    assert {f.name: f.read_bytes() for f in tmp_path.iterdir()} == {n: (FOLDER / n).read_bytes() for n in FILES}
+    assert {f.name: f.read_bytes() for f in tmp_path.iterdir()} == {
+        n: (FOLDER / n).read_bytes() for n in FILES
+    }
 
 
 def test_the_command_says_what_it_needs(capsys: pytest.CaptureFixture[str]) -> None:
@@ -53,14 +61,21 @@ def test_the_command_says_what_it_needs(capsys: pytest.CaptureFixture[str]) -> N
 
 
 def test_the_seeds_in_the_description_are_those_of_the_command() -> None:
-    said = {name: int(seed) for name, seed in re.findall(r"\| `(measured_\w+)\.csv` \|.*\| (\d+) \|", SOLUTION)}
+    said = {
+        name: int(seed)
+        for name, seed in re.findall(r"\| `(measured_\w+)\.csv` \|.*\| (\d+) \|", SOLUTION)
+    }
     made = {name: seed for name, (_spec, seed) in data_sets.DATA_SETS.items()}
-    later = {f"{name}_later": made[name] + 1000 for name in ("measured_pressure", "measured_far_below")}
+    later = {
+        f"{name}_later": made[name] + 1000 for name in ("measured_pressure", "measured_far_below")
+    }
     assert said == {**made, **later, "measured_rig": data_sets.RIG[1]}
 
 
 def test_the_pressure_is_named() -> None:
-    assert [c.candidate.cause.name for c in diagnosis("measured_pressure.csv").causes] == ["elastic_compliance"]
+    assert [c.candidate.cause.name for c in diagnosis("measured_pressure.csv").causes] == [
+        "elastic_compliance"
+    ]
 
 
 def test_the_row_in_millimetres_is_found() -> None:
@@ -71,7 +86,10 @@ def test_the_row_in_millimetres_is_found() -> None:
 
 def test_the_joint_whose_pin_rests_aside_is_named() -> None:
     (cause,) = diagnosis("measured_pin_direction.csv").causes
-    assert (cause.candidate.cause.name, cause.candidate.target) == ("direction_not_worst_case", "joint 3")
+    assert (cause.candidate.cause.name, cause.candidate.target) == (
+        "direction_not_worst_case",
+        "joint 3",
+    )
 
 
 def test_the_directions_under_load_are_named_and_take_back_most_false_outside() -> None:
@@ -83,7 +101,10 @@ def test_the_directions_under_load_are_named_and_take_back_most_false_outside() 
 
 
 def test_nothing_is_found_where_nothing_is_wrong() -> None:
-    assert (diagnosis("measured_nothing_wrong.csv").verdict, diagnosis("measured_nothing_wrong.csv").faults) == (
+    assert (
+        diagnosis("measured_nothing_wrong.csv").verdict,
+        diagnosis("measured_nothing_wrong.csv").faults,
+    ) == (
         "NONE",
         (),
     )
@@ -139,7 +160,10 @@ def test_a_fault_is_shown_in_the_unit_and_the_convention_of_its_cell(tmp_path: P
     file = in_millimetres_across(FOLDER / "measured_pressure.csv", tmp_path / "across.csv")
     found = diagnose_files([file], DiagnoseOptions(permutations=99)).diagnosis.faults
     swapped = {(f.column, f.value, f.suggested) for f in found if f.kind == "swapped_joints"}
-    assert swapped == {("clearance_2_mm", "0.7620", "0.0762"), ("clearance_6_mm", "0.0762", "0.762")}
+    assert swapped == {
+        ("clearance_2_mm", "0.7620", "0.0762"),
+        ("clearance_6_mm", "0.0762", "0.762"),
+    }
 
 
 def test_a_joint_that_nobody_measured_is_said(tmp_path: Path) -> None:

@@ -34,7 +34,11 @@ class Script:
 
     def without_idle(self) -> Script | None:
         useless = [k for k in self.chosen if any((k, other) in self.idle for other in self.chosen)]
-        return replace(self, chosen=tuple(k for k in self.chosen if k != useless[0])) if useless else None
+        return (
+            replace(self, chosen=tuple(k for k in self.chosen if k != useless[0]))
+            if useless
+            else None
+        )
 
 
 def test_causes_are_added_until_none_earns_its_place() -> None:
@@ -72,7 +76,9 @@ def test_of_a_gears_causes_the_one_that_does_nothing_is_left_out(gear: Gear) -> 
     whole = Inference(misfit, rows, candidates, columns, bank, 199, np.random.default_rng(1))
     fewer = _Together(whole, (0, 1, 2), (0.0, 0.0, 0.0), SECOND_SHARE).without_idle()
     assert fewer is not None
-    assert [candidates[k].cause.name for k in (0, 1, 2) if k not in fewer.chosen] == ["thermal_growth"]
+    assert [candidates[k].cause.name for k in (0, 1, 2) if k not in fewer.chosen] == [
+        "thermal_growth"
+    ]
 
 
 def sure(
@@ -80,8 +86,9 @@ def sure(
     beside: dict[int, tuple[int, list[int]]] | None = None,
     chances: tuple[float, float] = (1e-6, 1e-6),
 ) -> tuple[int, ...]:
-    """What is sure of the causes 0 and 1, of which 2 could stand in the place of 1; `beside` says what explains most in
-    the place of 0 beside each of them, and its rivals."""
+    """What is sure of the causes 0 and 1, of which 2 could stand in the place of 1; `beside` says
+    what explains most in the place of 0 beside each of them, and its rivals.
+    """
     told = beside or {1: (0, []), 2: (0, [])}
     whole = SimpleNamespace(
         candidates=[SimpleNamespace(key=k) for k in range(4)],
@@ -91,15 +98,21 @@ def sure(
     return inference.Inference._sure(cast(Any, whole), (0, 1), ([], [2]))
 
 
-def test_a_cause_without_rivals_is_sure_whatever_stands_beside_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cause_without_rivals_is_sure_whatever_stands_beside_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     assert sure(monkeypatch) == (0,)
 
 
-def test_a_cause_that_has_a_rival_beside_another_of_the_set_is_not_sure(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cause_that_has_a_rival_beside_another_of_the_set_is_not_sure(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     assert sure(monkeypatch, {1: (0, []), 2: (0, [3])}) == ()
 
 
-def test_a_cause_that_another_beats_beside_another_of_the_set_is_not_sure(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cause_that_another_beats_beside_another_of_the_set_is_not_sure(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     assert sure(monkeypatch, {1: (0, []), 2: (3, [])}) == ()
 
 

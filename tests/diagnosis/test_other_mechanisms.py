@@ -31,15 +31,18 @@ ROWS, RIGS = 160, 8
 
 @pytest.fixture(scope="module")
 def crank() -> Gear:
-    """The offset slider-crank: crank 2, rod 5, guide one below the crank pivot; its output is a position."""
+    """The offset slider-crank: crank 2, rod 5, guide one below the crank pivot; its output is a
+    position.
+    """
     return load_gear(str(DATA / "slider-crank.toml"))
 
 
 def furthest_wrist_pin(clearance: Array) -> Array:
-    """Largest position of the wrist pin beyond the nominal one, by closed formula, on a fine grid of directions.
+    """Largest position of the wrist pin beyond the nominal one, by closed formula, on a fine grid
+    of directions.
 
-    Clearances at the crank pivot and in the crank pin move the rod's inner end; the one in the wrist pin moves
-    its outer end. The input is at the end of its range, one radian.
+    Clearances at the crank pivot and in the crank pin move the rod's inner end; the one in the
+    wrist pin moves its outer end. The input is at the end of its range, one radian.
     """
     turn = np.linspace(0.0, 2.0 * math.pi, 7201)
     angle = 1.0
@@ -53,12 +56,17 @@ def furthest_wrist_pin(clearance: Array) -> Array:
     for k, row in enumerate(clearance):
         # All three act along the rod in their worst direction: their lengths add up at its ends.
         reach = row[0] + row[1] + row[2]
-        total[k] = np.max(position(inner[0] + reach * np.cos(turn), inner[1] + reach * np.sin(turn))) - nominal
+        total[k] = (
+            np.max(position(inner[0] + reach * np.cos(turn), inner[1] + reach * np.sin(turn)))
+            - nominal
+        )
     return total
 
 
 def bench(factor: float = 1.0, gauge_in: float = 0.0, seed: int = 11) -> DiagnosisTable:
-    """Measured wrist pin positions of worn cranks: some scale the true output, or one gauge that reads off."""
+    """Measured wrist pin positions of worn cranks: some scale the true output, or one gauge that
+    reads off.
+    """
     rng = np.random.default_rng(seed)
     clearance = rng.uniform(0.001, 0.02, (ROWS, 3))
     gauge = rng.choice(["A", "B", "C"], ROWS)
@@ -100,7 +108,9 @@ def test_the_scale_comes_out_right(crank: Gear) -> None:
 
 def test_a_gauge_that_reads_off_is_named(crank: Gear) -> None:
     found = found_in(crank, bench(gauge_in=0.002))
-    assert [(c.candidate.cause.name, c.candidate.target) for c in found.causes] == [("gauge_bias", "gauge B")]
+    assert [(c.candidate.cause.name, c.candidate.target) for c in found.causes] == [
+        ("gauge_bias", "gauge B")
+    ]
 
 
 def test_the_extension_predicts_other_benches_better(crank: Gear) -> None:
@@ -132,6 +142,10 @@ def test_an_output_in_radians_works_as_well() -> None:
     from mlg_troubleshoot.gear.directions import worst_case
 
     true = 0.85 * worst_case(four_bar.model, clearance).over_in
-    table = replace(bench(), clearance_in=clearance, readings_in=true[:, None] + rng.normal(0.0, 1e-4, (ROWS, 2)))
+    table = replace(
+        bench(),
+        clearance_in=clearance,
+        readings_in=true[:, None] + rng.normal(0.0, 1e-4, (ROWS, 2)),
+    )
     found = diagnose(four_bar.model, table, permutations=199)
     assert [c.candidate.cause.name for c in found.causes] == ["calibration_rate"]

@@ -56,7 +56,11 @@ def likelihood(columns: Array, data: Array) -> float:
 
 
 def test_the_gain_of_a_candidate_beside_a_fixed_one_is_that_of_least_squares() -> None:
-    fixed, columns, data = RNG.standard_normal((N, 1)), RNG.standard_normal((N, 4)), RNG.standard_normal((N, 1))
+    fixed, columns, data = (
+        RNG.standard_normal((N, 1)),
+        RNG.standard_normal((N, 4)),
+        RNG.standard_normal((N, 1)),
+    )
     gain = Screen(NOISE, columns, np.zeros(4), fixed).run(data)[0][:, 0]
     both = [likelihood(np.column_stack([fixed, column]), data[:, 0]) for column in columns.T]
     assert gain == pytest.approx(np.array(both) - likelihood(fixed, data[:, 0]), abs=1e-9)
@@ -66,30 +70,44 @@ def test_the_largest_gain_is_that_of_all_candidates_less_their_penalties() -> No
     columns, sets = RNG.standard_normal((N, 6)), RNG.standard_normal((N, 20))
     penalty = np.array([0.0, 1.5, 0.7, 1.5, np.inf, 0.0])
     screen = Screen(NOISE, columns, np.array([0, 1, -1, 0, 0, 1]))
-    assert screen.largest(sets, penalty) == pytest.approx(np.max(screen.run(sets)[0] - penalty[:, None], axis=0))
+    assert screen.largest(sets, penalty) == pytest.approx(
+        np.max(screen.run(sets)[0] - penalty[:, None], axis=0)
+    )
 
 
 @pytest.mark.parametrize(("sign", "explains"), [(0, True), (-1, True), (1, False)])
-def test_a_candidate_explains_nothing_with_a_sign_that_it_cannot_have(sign: int, explains: bool) -> None:
+def test_a_candidate_explains_nothing_with_a_sign_that_it_cannot_have(
+    sign: int, explains: bool
+) -> None:
     column = RNG.standard_normal((N, 1))
-    gain = Screen(NOISE, column, np.array([sign])).run(-column + 0.1 * RNG.standard_normal((N, 1)))[0][0, 0]
+    gain = Screen(NOISE, column, np.array([sign])).run(-column + 0.1 * RNG.standard_normal((N, 1)))[
+        0
+    ][0, 0]
     assert bool(gain > 1.0) is explains
 
 
 def test_a_fit_is_that_of_generalised_least_squares_with_its_errors() -> None:
     columns = RNG.standard_normal((N, 3))
-    data = columns @ np.array([1.0, -2.0, 0.5]) + np.linalg.cholesky(dense(0.4)) @ RNG.standard_normal(N)
+    data = columns @ np.array([1.0, -2.0, 0.5]) + np.linalg.cholesky(
+        dense(0.4)
+    ) @ RNG.standard_normal(N)
     found = fit(NOISE, columns, data)
     inverse = np.linalg.inv(dense(found.tail_ratio))
     covariance = np.linalg.inv(columns.T @ inverse @ columns)
     values = covariance @ columns.T @ inverse @ data
     left = data - columns @ values
     assert found.values == pytest.approx(values)
-    assert found.errors == pytest.approx(np.sqrt(np.diag(covariance) * (left @ inverse @ left) / (N - 3)))
+    assert found.errors == pytest.approx(
+        np.sqrt(np.diag(covariance) * (left @ inverse @ left) / (N - 3))
+    )
 
 
 def test_what_is_known_beforehand_shrinks_a_fit_as_bayes_says() -> None:
-    free, columns, data = RNG.standard_normal((N, 1)), RNG.standard_normal((N, 2)), RNG.standard_normal(N)
+    free, columns, data = (
+        RNG.standard_normal((N, 1)),
+        RNG.standard_normal((N, 2)),
+        RNG.standard_normal(N),
+    )
     prior = np.array([[0.02, 0.01], [0.01, 0.03]])
     values, covariance = shrunk(NOISE, free, columns, prior, data)
     both, inverse = np.hstack([free, columns]), np.linalg.inv(dense(NOISE.tail_ratios[-1]))
@@ -104,7 +122,9 @@ def test_the_gain_of_two_candidates_together_is_that_of_least_squares() -> None:
     found = Screen(NOISE, columns, np.zeros(4)).pairs(data, np.array([1, 3]))
     none = likelihood(np.empty((N, 0)), data)
     for partner, k in ((0, 1), (1, 3)):
-        assert found[0, partner] == pytest.approx(likelihood(columns[:, [0, k]], data) - none, abs=1e-9)
+        assert found[0, partner] == pytest.approx(
+            likelihood(columns[:, [0, k]], data) - none, abs=1e-9
+        )
 
 
 def test_data_sets_with_nothing_wrong_have_the_whole_covariance() -> None:
@@ -117,7 +137,9 @@ def test_effects_of_unknown_size_explain_what_is_expected_of_them_given_the_data
     wide = replace(NOISE, scale_in=1.5).beside(effects)
     low = wide.factors(wide.tail_ratios[-1])
     whole = 1.5**2 * (np.diag(wide.relative**2) + low @ low.T)
-    assert wide.share_of(effects, data) == pytest.approx(effects @ effects.T @ np.linalg.solve(whole, data))
+    assert wide.share_of(effects, data) == pytest.approx(
+        effects @ effects.T @ np.linalg.solve(whole, data)
+    )
 
 
 def gained(predicted: Array, misfit: Array, column: Array, tails: np.ndarray) -> Gain:
@@ -126,17 +148,22 @@ def gained(predicted: Array, misfit: Array, column: Array, tails: np.ndarray) ->
     noise = NoiseModel(np.ones(n), tails, tails, np.empty((n, 0)), 1e-6, 0.1, (0.0,), 0.001)
     none = np.zeros(n)
     names = tuple(f"R{k}" for k in range(n))
-    table = DiagnosisTable(none[:, None], none[:, None], names, np.arange(n), none + 0.03, none, {}, {"tail_no": tail})
+    table = DiagnosisTable(
+        none[:, None], none[:, None], names, np.arange(n), none + 0.03, none, {}, {"tail_no": tail}
+    )
     return measure_gain(noise, column[:, None], misfit, predicted, table, np.random.default_rng(1))
 
 
 def test_decisions_after_are_those_of_the_extended_prediction_in_both_senses() -> None:
     kind, tails = np.tile(np.arange(4), 20), np.repeat(np.arange(10), 8)
-    # Within and measured beyond; outside and measured within; within and measured short; right already.
+    # Within and measured beyond; outside and measured within; within and measured short; right
+    # already.
     found = gained(
-        np.array([0.02, 0.04, -0.02, 0.02])[kind], np.array([0.02, -0.02, -0.02, 0.0])[kind],
-        np.array([1.0, -1.0, -1.0, 0.0])[kind], tails,
-    )  # fmt: skip
+        np.array([0.02, 0.04, -0.02, 0.02])[kind],
+        np.array([0.02, -0.02, -0.02, 0.0])[kind],
+        np.array([1.0, -1.0, -1.0, 0.0])[kind],
+        tails,
+    )
     assert (found.false_within_before, found.false_outside_before) == (40, 20)
     assert (found.false_within_after, found.false_outside_after) == (0, 0)
     assert found.verdicts_changed == tuple(f"R{k}" for k in range(80) if k % 4 != 3)
@@ -160,6 +187,9 @@ def test_what_is_true_of_two_tails_is_learned_from_the_other_one() -> None:
 
 def test_what_pins_scatter_is_no_part_of_what_an_extension_corrects() -> None:
     predicted = np.tile([0.0274, 0.02], 40)
-    found = gained(predicted, (0.1 + EXPECTED_SLOPE) * predicted, predicted, np.repeat(np.arange(10), 8))
-    # 0.0274 in and a tenth of it are beyond the margin; less twice what pins scatter they would be within it.
+    found = gained(
+        predicted, (0.1 + EXPECTED_SLOPE) * predicted, predicted, np.repeat(np.arange(10), 8)
+    )
+    # 0.0274 in and a tenth of it are beyond the margin; less twice what pins scatter they would be
+    # within it.
     assert (found.false_within_before, found.false_within_after) == (40, 0)

@@ -39,7 +39,9 @@ def test_an_interval_holds_the_middle_95_percent_of_a_normal_distribution() -> N
     assert interval_of(0.05, 0.01) == pytest.approx(norm.interval(0.95, 0.05, 0.01), abs=1e-4)
 
 
-def test_a_link_is_shorter_below_the_reference_pressure_for_a_positive_stretch(scene: Scene) -> None:
+def test_a_link_is_shorter_below_the_reference_pressure_for_a_positive_stretch(
+    scene: Scene,
+) -> None:
     cause = BY_NAME["elastic_compliance"]
     candidate = next(iter(cause.candidates(scene)))
     (change,) = cause.adjust(scene, candidate, 1e-6).changed.values()
@@ -50,9 +52,13 @@ def test_a_link_is_shorter_below_the_reference_pressure_for_a_positive_stretch(s
 def test_two_causes_that_scale_one_length_multiply(gear: Gear, scene: Scene) -> None:
     growth = Candidate(BY_NAME["thermal_growth"])
     terms = [Term(growth, value, (0.0, 1.0)) for value in (1e-5, 3e-5)]
-    scaled = adjustment_of(terms, gear.model, scene.table, scene.clearance_in, gear.discrepancies).scaled
+    scaled = adjustment_of(
+        terms, gear.model, scene.table, scene.clearance_in, gear.discrepancies
+    ).scaled
     warmer = scene.table.quantities["temperature_c"] - 20.0
-    assert next(iter(scaled.values())) == pytest.approx((1.0 + 1e-5 * warmer) * (1.0 + 3e-5 * warmer), rel=1e-12)
+    assert next(iter(scaled.values())) == pytest.approx(
+        (1.0 + 1e-5 * warmer) * (1.0 + 3e-5 * warmer), rel=1e-12
+    )
 
 
 def test_a_healthy_fleet_reads_less_than_the_bound_by_what_pins_scatter() -> None:
@@ -61,9 +67,12 @@ def test_a_healthy_fleet_reads_less_than_the_bound_by_what_pins_scatter() -> Non
 
 
 def test_the_smallest_effect_would_be_found_four_times_in_five() -> None:
-    # An estimate of a size of t standard errors exceeds the bar, here 0, four times in five if t is this quantile.
+    # An estimate of a size of t standard errors exceeds the bar, here 0, four times in five if t is
+    # this quantile.
     bare = cast(Any, SimpleNamespace(penalty=np.zeros(3), misfit=np.zeros(100)))
-    assert Inference._smallest(bare, Chance(np.zeros(50)), 1.0) * 10.0 == pytest.approx(float(norm.ppf(0.8)), abs=0.005)
+    assert Inference._smallest(bare, Chance(np.zeros(50)), 1.0) * 10.0 == pytest.approx(
+        float(norm.ppf(0.8)), abs=0.005
+    )
 
 
 def test_a_rival_is_ruled_out_only_at_odds_of_ten_to_one() -> None:
@@ -75,7 +84,8 @@ def test_directions_and_linkage_are_told_apart_only_at_odds_of_a_hundred_to_one(
 
 
 def test_a_chance_counts_each_of_many_equals_once() -> None:
-    # One of 40 data sets that are alike is as large as the k-th largest of them with a chance of k in 40.
+    # One of 40 data sets that are alike is as large as the k-th largest of them with a chance of k
+    # in 40.
     values = np.random.default_rng(4).standard_normal(40)
     chances = sorted(Chance(np.delete(values, k)).of(values[k]) for k in range(40))
     assert chances[10:] == pytest.approx(np.arange(11, 41) / 40.0)
@@ -100,15 +110,25 @@ def test_the_robust_scale_is_the_standard_deviation_of_a_normal_distribution() -
 
 def test_the_mean_of_four_readings_is_twice_as_certain_as_one(plain: DiagnosisTable) -> None:
     readings = 0.001 * np.random.default_rng(1).standard_normal((len(plain), 4))
-    assert measured_uncertainty(replace(plain, readings_in=readings)) == pytest.approx(0.0005, rel=0.1)
+    assert measured_uncertainty(replace(plain, readings_in=readings)) == pytest.approx(
+        0.0005, rel=0.1
+    )
 
 
-def test_gauges_alone_leave_what_their_errors_do_through_the_mechanism(gear: Gear, plain: DiagnosisTable) -> None:
+def test_gauges_alone_leave_what_their_errors_do_through_the_mechanism(
+    gear: Gear, plain: DiagnosisTable
+) -> None:
     rng, n = np.random.default_rng(1), 4000
     clearance = np.tile(plain.clearance_in[0], (n, 1))
-    moved = worst_case(gear.model, clearance + 0.0003 * rng.standard_normal(clearance.shape)).over_in
-    table = replace(plain, gauge_u_in=np.full(len(plain), 0.0003), readings_in=plain.readings_in[:, :1])
-    found = _expected_scatter(gear.model, replace(table, plunger_gauge_u_in=np.full(len(plain), 0.002)), 0.002)
+    moved = worst_case(
+        gear.model, clearance + 0.0003 * rng.standard_normal(clearance.shape)
+    ).over_in
+    table = replace(
+        plain, gauge_u_in=np.full(len(plain), 0.0003), readings_in=plain.readings_in[:, :1]
+    )
+    found = _expected_scatter(
+        gear.model, replace(table, plunger_gauge_u_in=np.full(len(plain), 0.002)), 0.002
+    )
     assert found == pytest.approx(np.hypot(np.std(moved), 0.002), rel=0.05)
 
 
@@ -123,21 +143,30 @@ def test_the_share_removed_has_an_interval_of_95_percent_over_tails() -> None:
 
 
 @pytest.mark.parametrize(("spread_deg", "k"), [(25.0, 0), (45.0, 1), (70.0, 2), (None, 3)])
-def test_resting_places_of_pins_have_the_moments_of_their_angles(gear: Gear, spread_deg: float | None, k: int) -> None:
+def test_resting_places_of_pins_have_the_moments_of_their_angles(
+    gear: Gear, spread_deg: float | None, k: int
+) -> None:
     rng = np.random.default_rng(1)
     n = 400_000
-    angles = rng.uniform(0.0, 2.0 * np.pi, n) if spread_deg is None else np.radians(spread_deg) * rng.standard_normal(n)
+    angles = (
+        rng.uniform(0.0, 2.0 * np.pi, n)
+        if spread_deg is None
+        else np.radians(spread_deg) * rng.standard_normal(n)
+    )
     change = np.cos(angles) - 1.0
     found = LoadDirections().covariances(gear.model, ())[k]
     assert found[0, 0] == pytest.approx(np.mean(change**2), abs=0.005)
     assert found[0, 1] == pytest.approx(np.mean(change) ** 2, abs=0.005)
 
 
-@pytest.mark.parametrize(("k", "mean", "variance"), [(0, 0.9092, 0.0151), (1, 0.7346, 0.1063), (3, 0.0, 0.5)])
+@pytest.mark.parametrize(
+    ("k", "mean", "variance"), [(0, 0.9092, 0.0151), (1, 0.7346, 0.1063), (3, 0.0, 0.5)]
+)
 def test_directions_have_the_mean_and_variance_of_the_cosine_of_their_angles(
     gear: Gear, k: int, mean: float, variance: float
 ) -> None:
-    # exp(-s^2/2) and (1 - exp(-s^2))^2 / 2 for normal angles of s = 25 and 45 degrees; 0 and 1/2 all around.
+    # exp(-s^2/2) and (1 - exp(-s^2))^2 / 2 for normal angles of s = 25 and 45 degrees; 0 and 1/2
+    # all around.
     scene, _rows = build_scene(gear.model, fleet(gear.model), gear.discrepancies)
     covariance = LoadDirections().blocks(scene, ())[k].covariance
     assert covariance[0, 0] == pytest.approx((1.0 - mean) ** 2 + variance, abs=1e-3)
@@ -152,7 +181,10 @@ def test_a_skewed_prior_counts_the_mean_over_what_it_draws() -> None:
     along, square = np.array([-7.0, -150.0]), np.array([[40.0, 10.0], [10.0, 300.0]])
     skewed = np.stack(np.meshgrid(changes, changes), axis=-1).reshape(-1, 2)
     plain = rng.multivariate_normal(np.zeros(2), covariance, 400_000)
-    mean = [np.mean(np.exp(x @ along - 0.5 * np.einsum("ij,ij->i", x @ square, x))) for x in (skewed, plain)]
+    mean = [
+        np.mean(np.exp(x @ along - 0.5 * np.einsum("ij,ij->i", x @ square, x)))
+        for x in (skewed, plain)
+    ]
     assert block.skew(along, square) == pytest.approx(float(np.log(mean[0] / mean[1])), abs=0.05)
     assert replace(block, changes=None).skew(along, square) == 0.0
 
@@ -166,15 +198,21 @@ def test_factors_of_all_joints_have_intervals_of_95_percent() -> None:
 
 
 def test_two_changes_of_the_calibration_rate_multiply(gear: Gear, scene: Scene) -> None:
-    terms = [Term(Candidate(BY_NAME["calibration_rate"]), value, (0.0, 1.0)) for value in (0.1, 0.2)]
-    found = adjustment_of(terms, gear.model, scene.table, scene.clearance_in, gear.discrepancies).rate_factor
+    terms = [
+        Term(Candidate(BY_NAME["calibration_rate"]), value, (0.0, 1.0)) for value in (0.1, 0.2)
+    ]
+    found = adjustment_of(
+        terms, gear.model, scene.table, scene.clearance_in, gear.discrepancies
+    ).rate_factor
     assert found == pytest.approx(np.full(len(scene.table), 1.1 * 1.2))
 
 
 def test_directions_of_two_extensions_multiply(gear: Gear, scene: Scene) -> None:
     parts = [{"factors": {"3": 0.5, "5": -0.4}}, {"factors": {"3": 0.6, "4": 0.2}}]
     terms = [Term(Candidate(LoadDirections(), None, setting), 1.0, (0.0, 1.0)) for setting in parts]
-    found = adjustment_of(terms, gear.model, scene.table, scene.clearance_in, gear.discrepancies).direction_factors
+    found = adjustment_of(
+        terms, gear.model, scene.table, scene.clearance_in, gear.discrepancies
+    ).direction_factors
     assert found is not None
     assert found[[2, 3, 4]] == pytest.approx([0.3, 0.2, -0.4])
 
@@ -196,21 +234,32 @@ def test_a_cause_with_two_targets_pays_for_both_and_what_pins_scatter_is_expecte
     causes = [BY_NAME[name] for name in ("calibration_rate", "gauge_bias", "gauge_bias")]
     rows = cast(Any, SimpleNamespace(predicted_in=predicted))
     found = Inference(
-        EXPECTED_SLOPE * predicted, rows, [Candidate(c) for c in causes], np.empty((9, 3)), cast(Any, None), 9,
+        EXPECTED_SLOPE * predicted,
+        rows,
+        [Candidate(c) for c in causes],
+        np.empty((9, 3)),
+        cast(Any, None),
+        9,
         np.random.default_rng(1),
-    )  # fmt: skip
+    )
     assert found.prior == pytest.approx(np.log([1.0, 2.0, 2.0]))
     assert found.misfit == pytest.approx(np.zeros(9))
 
 
 @pytest.mark.parametrize(("wrong", "refused"), [(15, False), (30, True)])
-def test_a_table_of_which_a_third_looks_wrong_has_no_slips_of_the_pen(wrong: int, refused: bool) -> None:
-    faults = tuple(DataFault(k, k, f"R{k}", "clearance_3_in", "mm_as_in", "0.1", "0.004") for k in range(wrong))
+def test_a_table_of_which_a_third_looks_wrong_has_no_slips_of_the_pen(
+    wrong: int, refused: bool
+) -> None:
+    faults = tuple(
+        DataFault(k, k, f"R{k}", "clearance_3_in", "mm_as_in", "0.1", "0.004") for k in range(wrong)
+    )
     with pytest.raises(InconclusiveDataError) if refused else nullcontext():
         _single_slips(faults, 100)
 
 
-def test_a_reading_that_is_too_large_by_chance_predicts_too_much(gear: Gear, plain: DiagnosisTable) -> None:
+def test_a_reading_that_is_too_large_by_chance_predicts_too_much(
+    gear: Gear, plain: DiagnosisTable
+) -> None:
     clearance = plain.clearance_in.copy()
     clearance[5, 2] += 0.002
     table = replace(plain, clearance_in=clearance, gauge_u_in=np.full(len(plain), 0.001))
@@ -218,7 +267,9 @@ def test_a_reading_that_is_too_large_by_chance_predicts_too_much(gear: Gear, pla
     assert found.drawn_in[5] > 0.0003
 
 
-def test_a_gauge_that_reads_better_than_declared_leaves_little_doubt(gear: Gear, plain: DiagnosisTable) -> None:
+def test_a_gauge_that_reads_better_than_declared_leaves_little_doubt(
+    gear: Gear, plain: DiagnosisTable
+) -> None:
     # The displacements of this fleet follow its readings of clearance exactly.
     declared = replace(plain, gauge_u_in=np.full(len(plain), 0.0005))
     _scene, found = build_scene(gear.model, declared, gear.discrepancies)

@@ -35,7 +35,9 @@ class Worn:
     def history(self, read_in: Array | None = None) -> WearHistory:
         """Expect the joint from its readings, declared as uncertain by 0.5 thou each."""
         readings = self.read_in if read_in is None else read_in
-        return wear_history(readings, self.gears, self.kilo, np.full(len(self.gears), DECLARED_IN**2))
+        return wear_history(
+            readings, self.gears, self.kilo, np.full(len(self.gears), DECLARED_IN**2)
+        )
 
 
 def worn(error_in: float, scatter: float = 0.0) -> Worn:
@@ -64,7 +66,9 @@ def test_readings_better_than_declared_are_recognised() -> None:
 
 
 def test_readings_as_good_as_declared_are_taken_as_declared() -> None:
-    assert np.sqrt(worn(DECLARED_IN).history().reading_in2).max() == pytest.approx(DECLARED_IN, rel=0.2)
+    assert np.sqrt(worn(DECLARED_IN).history().reading_in2).max() == pytest.approx(
+        DECLARED_IN, rel=0.2
+    )
 
 
 def test_readings_are_never_taken_to_be_worse_than_declared() -> None:
@@ -73,7 +77,9 @@ def test_readings_are_never_taken_to_be_worse_than_declared() -> None:
 
 def test_scatter_of_wear_about_its_line_is_told_from_errors_of_reading() -> None:
     gear = worn(0.0001, scatter=0.3)
-    assert rms(np.sqrt(gear.history().scatter_in2)) == pytest.approx(0.3 * rms(gear.true_in), rel=0.25)
+    assert rms(np.sqrt(gear.history().scatter_in2)) == pytest.approx(
+        0.3 * rms(gear.true_in), rel=0.25
+    )
 
 
 def test_a_joint_that_was_not_read_is_expected_from_its_gear_s_other_inspections() -> None:
@@ -124,7 +130,12 @@ def test_a_joint_that_is_tight_everywhere_stays_so() -> None:
 
 
 def test_one_reading_alone_is_its_own_expectation() -> None:
-    alone = wear_history(np.array([0.002, np.nan]), np.array([0, 1]), np.array([1.0, 2.0]), np.full(2, DECLARED_IN**2))
+    alone = wear_history(
+        np.array([0.002, np.nan]),
+        np.array([0, 1]),
+        np.array([1.0, 2.0]),
+        np.full(2, DECLARED_IN**2),
+    )
     assert alone.expected_in == pytest.approx([0.002, 0.002])
 
 
@@ -133,7 +144,9 @@ def test_a_gear_s_line_is_that_of_a_linear_mixed_model() -> None:
     gears, x = np.repeat(np.arange(3), [1, 4, 6]), rng.uniform(0.2, 2.0, (11, 1))
     y, weight = rng.normal(1.0, 0.3, (11, 1)), rng.uniform(5.0, 20.0, (11, 1))
     fleet, spread = np.array([[0.6], [0.4]]), np.array([[0.05], [-0.02], [0.03]])
-    lines, unsure = _lines((np.arange(3)[:, None] == gears).astype(float), x, y, weight, fleet, spread)
+    lines, unsure = _lines(
+        (np.arange(3)[:, None] == gears).astype(float), x, y, weight, fleet, spread
+    )
     prior = np.linalg.inv(np.array([[0.05, -0.02], [-0.02, 0.03]]))
     for gear in range(3):
         own = gears == gear
@@ -154,14 +167,18 @@ def test_readings_on_a_grid_have_the_error_of_rounding(plain: DiagnosisTable) ->
     )
 
 
-def test_a_reading_is_overruled_by_two_of_its_standard_errors_at_most(plain: DiagnosisTable) -> None:
+def test_a_reading_is_overruled_by_two_of_its_standard_errors_at_most(
+    plain: DiagnosisTable,
+) -> None:
     written = plain.clearance_in.copy()
     written[5, 2] = 0.02
     table = replace(plain, clearance_in=written, gauge_u_in=np.full(len(plain), 0.0005))
     assert 0.02 - 0.0011 < likely_clearances(table).likely_in[5, 2] < 0.02
 
 
-def test_an_unread_joint_is_expected_to_be_worn_more_where_the_joints_of_its_gear_are(plain: DiagnosisTable) -> None:
+def test_an_unread_joint_is_expected_to_be_worn_more_where_the_joints_of_its_gear_are(
+    plain: DiagnosisTable,
+) -> None:
     worn_gear = (plain.factors["tail_no"] == "N103") & (plain.factors["side"] == "LH")
     clearance = plain.clearance_in * np.where(worn_gear, 2.0, 1.0)[:, None]
     clearance[:, 9] = np.nan
@@ -171,28 +188,45 @@ def test_an_unread_joint_is_expected_to_be_worn_more_where_the_joints_of_its_gea
 
 
 def fleet_of(plain: DiagnosisTable, together: float, apart: float) -> tuple[DiagnosisTable, Array]:
-    """A fleet that reads all joints but the last, and its clearances; gears and their joints wear apart by these."""
+    """A fleet that reads all joints but the last, and its clearances; gears and their joints wear
+    apart by these.
+    """
     rng, (gears, rows) = np.random.default_rng(4), np.unique(plain.gears, return_inverse=True)
-    hard = rng.lognormal(0.0, together, (len(gears), 1)) * rng.lognormal(0.0, apart, (len(gears), 10))
+    hard = rng.lognormal(0.0, together, (len(gears), 1)) * rng.lognormal(
+        0.0, apart, (len(gears), 10)
+    )
     true_in = (0.0006 + 0.0012 * plain.quantities["gear_landings"][:, None] / 1000.0) * hard[rows]
     read = true_in.copy()
     read[:, 9] = np.nan
     return replace(plain, clearance_in=read), true_in
 
 
-def test_an_unread_joint_follows_the_others_of_its_gear_as_far_as_joints_wear_together(plain: DiagnosisTable) -> None:
+def test_an_unread_joint_follows_the_others_of_its_gear_as_far_as_joints_wear_together(
+    plain: DiagnosisTable,
+) -> None:
     for together, apart, least, most in ((0.4, 0.1, 0.8, 1.2), (0.0, 0.4, -0.2, 0.6)):
         table, true_in = fleet_of(plain, together, apart)
-        others = np.log(true_in[:, :9].mean(axis=1) / (0.0006 + 0.0012 * table.quantities["gear_landings"] / 1000.0))
-        filled = np.log(likely_clearances(table).likely_in[:, 9] / table.quantities["gear_landings"])
-        shape = np.column_stack([np.ones(len(others)), others, 1.0 / table.quantities["gear_landings"]])
+        others = np.log(
+            true_in[:, :9].mean(axis=1)
+            / (0.0006 + 0.0012 * table.quantities["gear_landings"] / 1000.0)
+        )
+        filled = np.log(
+            likely_clearances(table).likely_in[:, 9] / table.quantities["gear_landings"]
+        )
+        shape = np.column_stack(
+            [np.ones(len(others)), others, 1.0 / table.quantities["gear_landings"]]
+        )
         assert least < np.linalg.lstsq(shape, filled, rcond=None)[0][1] < most
 
 
-def test_an_unread_joint_of_a_row_without_landings_is_as_worn_as_the_row_s_other_joints(plain: DiagnosisTable) -> None:
+def test_an_unread_joint_of_a_row_without_landings_is_as_worn_as_the_row_s_other_joints(
+    plain: DiagnosisTable,
+) -> None:
     table, true_in = fleet_of(plain, 0.3, 0.05)
     latest = int(np.argmax(table.quantities["gear_landings"]))
     gap = table.quantities["gear_landings"].copy()
     gap[latest] = np.nan
-    likely = likely_clearances(replace(table, quantities={**table.quantities, "gear_landings": gap})).likely_in
+    likely = likely_clearances(
+        replace(table, quantities={**table.quantities, "gear_landings": gap})
+    ).likely_in
     assert likely[latest, 9] == pytest.approx(true_in[latest, 9], rel=0.25)

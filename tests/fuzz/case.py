@@ -18,7 +18,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 ALLOWED = {0, 1, 2, 3, 5}
 SLOWEST_S, MOST_MB = 10.0, 500.0
-# A command that waits for something uses no processor time: it is ended after so many seconds of the clock.
+# A command that waits for something uses no processor time: it is ended after so many seconds of
+# the clock.
 PATIENCE_S = 20
 # What keeps the machine whole while a command asks for any amount of memory. [bytes]
 _MOST_SPACE = 3_000_000_000
@@ -27,7 +28,8 @@ _SQLITE_LEAVES = ("-journal", "-wal", "-shm")
 
 @dataclass(frozen=True)
 class Case:
-    """Command lines, and what they were asked to change: files, folders for new files, stores to add to.
+    """Command lines, and what they were asked to change: files, folders for new files, stores to
+    add to.
 
     Paths are relative to the folder in which the commands run; `home` beside it is the user's.
     """
@@ -45,7 +47,9 @@ class Case:
 
 @dataclass(frozen=True)
 class Ended:
-    """How a case ended: the worst exit code, time, memory, and files that it should not have changed."""
+    """How a case ended: the worst exit code, time, memory, and files that it should not have
+    changed.
+    """
 
     code: int
     seconds: float
@@ -72,16 +76,27 @@ def snapshot(folder: Path) -> dict[str, tuple[object, ...]]:
             known = path.lstat()
             content: object = None
             if stat.S_ISREG(known.st_mode):
-                content = hashlib.sha256(path.read_bytes()).digest() if known.st_size < 10_000_000 else known.st_size
+                content = (
+                    hashlib.sha256(path.read_bytes()).digest()
+                    if known.st_size < 10_000_000
+                    else known.st_size
+                )
             elif stat.S_ISLNK(known.st_mode):
                 content = str(path.readlink())
             inode = None if stat.S_ISDIR(known.st_mode) else known.st_ino
-            found[str(path.relative_to(folder))] = (stat.S_IFMT(known.st_mode), inode, known.st_mode, content)
+            found[str(path.relative_to(folder))] = (
+                stat.S_IFMT(known.st_mode),
+                inode,
+                known.st_mode,
+                content,
+            )
     return found
 
 
 def run(case: Case, folder: Path, *, commands: bool = False) -> Ended:
-    """Run the lines of a case one after the other; the first that does not end as documented is the last."""
+    """Run the lines of a case one after the other; the first that does not end as documented is the
+    last.
+    """
     before, rows = snapshot(folder), {name: _rows(folder / name) for name in case.keeps}
     code, seconds, megabytes, output = 0, 0.0, 0.0, ""
     for line in case.lines or ((),):
@@ -98,7 +113,9 @@ def run(case: Case, folder: Path, *, commands: bool = False) -> Ended:
 
 
 def _asked(name: str, case: Case, before: Mapping[str, object], *, refused: bool) -> bool:
-    """Whether a case was asked to change or make this; a refused line leaves the store that it found as it was."""
+    """Whether a case was asked to change or make this; a refused line leaves the store that it
+    found as it was.
+    """
     if any(wanted.startswith(f"{name}/") for wanted in (*case.writes, *case.keeps, *case.fills)):
         # A missing folder on the way to an output.
         return True
@@ -109,7 +126,9 @@ def _asked(name: str, case: Case, before: Mapping[str, object], *, refused: bool
             return True
         if name == store:
             return not (refused and name in before)
-    return name not in before and any(name == to or name.startswith(f"{to}/") or to == "." for to in case.fills)
+    return name not in before and any(
+        name == to or name.startswith(f"{to}/") or to == "." for to in case.fills
+    )
 
 
 def _rows(store: Path) -> list[tuple[object, ...]]:
@@ -121,9 +140,13 @@ def _rows(store: Path) -> list[tuple[object, ...]]:
     try:
         with sqlite3.connect(f"file:{store}?mode=ro", uri=True) as raw:
             raw.text_factory = bytes
-            if raw.execute("SELECT type FROM sqlite_master WHERE name = 'mlg_records'").fetchone() != (b"table",):
+            if raw.execute(
+                "SELECT type FROM sqlite_master WHERE name = 'mlg_records'"
+            ).fetchone() != (b"table",):
                 return []
-            return raw.execute("SELECT CAST(seq AS TEXT), CAST(hash AS BLOB) FROM mlg_records ORDER BY 1").fetchall()
+            return raw.execute(
+                "SELECT CAST(seq AS TEXT), CAST(hash AS BLOB) FROM mlg_records ORDER BY 1"
+            ).fetchall()
     except sqlite3.Error:
         return []
 
@@ -132,8 +155,12 @@ def _lost(before: Sequence[object], store: Path) -> bool:
     return bool(set(before) - set(_rows(store))) if before else False
 
 
-def _started(case: Case, line: Sequence[str], folder: Path, *, commands: bool) -> tuple[int, float, float, str]:
-    """Run one line in a child; exit code (negative: killed by a signal), seconds, megabytes, what it said."""
+def _started(
+    case: Case, line: Sequence[str], folder: Path, *, commands: bool
+) -> tuple[int, float, float, str]:
+    """Run one line in a child; exit code (negative: killed by a signal), seconds, megabytes, what
+    it said.
+    """
     environment = {
         "PATH": os.environ["PATH"],
         "HOME": str(folder / "home"),
@@ -145,7 +172,9 @@ def _started(case: Case, line: Sequence[str], folder: Path, *, commands: bool) -
     with tempfile.TemporaryFile() as said:
         child = os.fork()
         if child == 0:
-            _in_the_child(case, line, folder / "work", environment, said.fileno(), commands=commands)
+            _in_the_child(
+                case, line, folder / "work", environment, said.fileno(), commands=commands
+            )
         _, status, used = os.wait4(child, 0)
         said.seek(0)
         output = said.read()[-3000:].decode("utf-8", "replace")
@@ -155,7 +184,13 @@ def _started(case: Case, line: Sequence[str], folder: Path, *, commands: bool) -
 
 
 def _in_the_child(
-    case: Case, line: Sequence[str], work: Path, environment: Mapping[str, str], said: int, *, commands: bool
+    case: Case,
+    line: Sequence[str],
+    work: Path,
+    environment: Mapping[str, str],
+    said: int,
+    *,
+    commands: bool,
 ) -> None:
     """Become the program: its folder, streams, limits; never returns."""
     code = 99
@@ -170,12 +205,16 @@ def _in_the_child(
         for new, old in ((given, 0), (said, 1), (said, 2)):
             os.dup2(new, old)
         if commands and case.action is None:
-            os.execve(sys.executable, [sys.executable, "-m", "mlg_troubleshoot", *line], dict(environment))
+            os.execve(
+                sys.executable, [sys.executable, "-m", "mlg_troubleshoot", *line], dict(environment)
+            )
         os.environ.clear()
         os.environ.update(environment)
         sys.stdin = io.TextIOWrapper(io.FileIO(0, closefd=False), encoding="utf-8")
         for name, number in (("stdout", 1), ("stderr", 2)):
-            setattr(sys, name, io.TextIOWrapper(io.FileIO(number, "w", closefd=False), encoding="utf-8"))
+            setattr(
+                sys, name, io.TextIOWrapper(io.FileIO(number, "w", closefd=False), encoding="utf-8")
+            )
         code = _called(line) if case.action is None else case.action()
         sys.stdout.flush()
         sys.stderr.flush()

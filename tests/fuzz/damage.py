@@ -48,10 +48,32 @@ HOSTILE = (
     ),
 )
 NUMBERS = (
-    *("nan", "inf", "-inf", "1e308", "-1e308", "1e-320", "0", "-1", "true", "false", '"0.003"', "[]"),
-    *("[[[[[[]]]]]]", "{}", "9" * 400, "1_000", "0x10", "'x'", "2026-01-01", "[1, 2, 3]", ),
+    *(
+        "nan",
+        "inf",
+        "-inf",
+        "1e308",
+        "-1e308",
+        "1e-320",
+        "0",
+        "-1",
+        "true",
+        "false",
+        '"0.003"',
+        "[]",
+    ),
+    *(
+        "[[[[[[]]]]]]",
+        "{}",
+        "9" * 400,
+        "1_000",
+        "0x10",
+        "'x'",
+        "2026-01-01",
+        "[1, 2, 3]",
+    ),
     *("[nan, nan]", "-0.0", "0.5", "1000000", "1.0e99"),
-)  # fmt: skip
+)
 
 
 def damaged(text: str, rng: random.Random) -> bytes:
@@ -69,7 +91,11 @@ def damaged(text: str, rng: random.Random) -> bytes:
             text = "\n".join(lines)
         else:
             place = rng.randrange(len(text) + 1)
-            text = text[:place] + rng.choice(("[" * 5000, "\x00", "\ufeff", "a.b" * 200, text[:200])) + text[place:]
+            text = (
+                text[:place]
+                + rng.choice(("[" * 5000, "\x00", "\ufeff", "a.b" * 200, text[:200]))
+                + text[place:]
+            )
     data = bytearray(text.encode("utf-8", "surrogatepass"))
     if rng.random() < 0.1 and data:
         data[rng.randrange(len(data))] = rng.randrange(256)
@@ -118,6 +144,34 @@ def _nested(depth: int) -> list[Any]:
 
 # What stands in a tree of JSON instead of what belongs there.
 WRONG = (
-    *(None, True, "", "x", "nan", "N\x1b[2J", "\ud800", "x" * 5000, [], {}, [[]], {"x": 1}, [None] * 50),
-    *(0, -1, -5.0, 99, 1e300, -1e300, 1e-320, 10**400, "1e308", "9999-99-99", "0001-01-01", "LH", _nested(400)),
+    *(
+        None,
+        True,
+        "",
+        "x",
+        "nan",
+        "N\x1b[2J",
+        "\ud800",
+        "x" * 5000,
+        [],
+        {},
+        [[]],
+        {"x": 1},
+        [None] * 50,
+    ),
+    *(
+        0,
+        -1,
+        -5.0,
+        99,
+        1e300,
+        -1e300,
+        1e-320,
+        10**400,
+        "1e308",
+        "9999-99-99",
+        "0001-01-01",
+        "LH",
+        _nested(400),
+    ),
 )

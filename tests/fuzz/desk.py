@@ -60,7 +60,20 @@ page = "Letter"
 STORE = "kept.sqlite"
 LIFE = (
     ("check", "in.csv", "-q", "--keep", "--store", STORE),
-    ("history", "repair", "N1", "LH", "--joint", "3", "--date", "2026-03-06", "--landings", "2101", "--store", STORE),
+    (
+        "history",
+        "repair",
+        "N1",
+        "LH",
+        "--joint",
+        "3",
+        "--date",
+        "2026-03-06",
+        "--landings",
+        "2101",
+        "--store",
+        STORE,
+    ),
     ("history", "rerig", "N1", "LH", "--date", "2026-03-07", "--store", STORE),
     ("history", "outcome", "R1", "--found", "worn bearing", "--joint", "3", "--store", STORE),
     ("history", "correct", "R2", "right.csv", "--store", STORE),
@@ -89,10 +102,14 @@ class Shelf:
         (work / "in.csv").write_text(TABLE, encoding="utf-8")
         (work / "outside.csv").write_text(OUTSIDE, encoding="utf-8")
         right = [line for line in TABLE.splitlines() if not line.startswith(("R1", "R3"))]
-        (work / "right.csv").write_text("\n".join(right).replace("0.006", "0.005") + "\n", encoding="utf-8")
+        (work / "right.csv").write_text(
+            "\n".join(right).replace("0.006", "0.005") + "\n", encoding="utf-8"
+        )
         self._workbook(work / "in.xlsx")
         (work / "mine.txt").write_text("words of somebody\n", encoding="utf-8")
-        (work / "ext.toml").write_text(EXTENSION % gear_file.load_gear().geometry_sha256, encoding="utf-8")
+        (work / "ext.toml").write_text(
+            EXTENSION % gear_file.load_gear().geometry_sha256, encoding="utf-8"
+        )
         shutil.copy(DATA / "measured_pressure.csv", work / "far.csv")
         made = run(Case("shelf", (*LIFE, *OWN)), folder)
         if made.code not in (0, 1):
@@ -131,12 +148,18 @@ class Desk:
     def write(self, name: str, content: str | bytes) -> str:
         path = self.work / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content.encode("utf-8", "surrogatepass") if isinstance(content, str) else content)
+        path.write_bytes(
+            content.encode("utf-8", "surrogatepass") if isinstance(content, str) else content
+        )
         return name
 
     def spoil(self, name: str, text: str | None = None) -> str:
         """Write a sound file of the shelf, or a text, damaged."""
-        whole = (self.shelf.folder / "work" / name).read_text(encoding="utf-8") if text is None else text
+        whole = (
+            (self.shelf.folder / "work" / name).read_text(encoding="utf-8")
+            if text is None
+            else text
+        )
         return self.write(name, damaged(whole, self.rng))
 
     def special(self, name: str) -> str:

@@ -1,4 +1,6 @@
-"""Cases of damaged inputs: tables, workbooks, names, gear files and what they name, extensions, drafts, settings."""
+"""Cases of damaged inputs: tables, workbooks, names, gear files and what they name, extensions,
+drafts, settings.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +15,12 @@ from tests.fuzz.case import Case
 from tests.fuzz.damage import HOSTILE, NUMBERS, damaged
 from tests.fuzz.desk import DATA, GEAR_FILES, SETTINGS, Desk
 
-DRAFT = """{"schema_version": 1, "id": "draft", "gear": "hawker-800xp", "started": "2026-03-04T10:00:00",
-"complete": false, "record_id": "R1", "tail_no": "N1", "side": "LH", "unit": "in", "convention": "RADIAL",
-"joints": {"3": {"text": ".013", "unit": "in", "confirmed": true}, "5": null}, "plunger_in": 0.02, "margin_in": null,
+DRAFT = """{"schema_version": 1, "id": "draft", "gear": "hawker-800xp",
+"started": "2026-03-04T10:00:00",
+"complete": false, "record_id": "R1", "tail_no": "N1", "side": "LH",
+"unit": "in", "convention": "RADIAL",
+"joints": {"3": {"text": ".013", "unit": "in", "confirmed": true}, "5": null},
+"plunger_in": 0.02, "margin_in": null,
 "outcome": null}"""
 FAILURE = str(DATA / "failure_case.csv")
 COLUMNS = (
@@ -90,7 +95,17 @@ def targets(desk: Desk) -> Case:
     """Damaged numbers to meet; those that are still numbers give up at once."""
     whole = (desk.shelf.folder / "work" / "hawker-800xp-targets.toml").read_text(encoding="utf-8")
     file = desk.spoil("targets.toml", whole)
-    line = ["gear", "reconstruct", "--targets", file, "--start", "A", "--minutes", "0.01", "--quiet"]
+    line = [
+        "gear",
+        "reconstruct",
+        "--targets",
+        file,
+        "--start",
+        "A",
+        "--minutes",
+        "0.01",
+        "--quiet",
+    ]
     return Case("targets", [line])
 
 
@@ -117,14 +132,23 @@ def draft(desk: Desk) -> Case:
 
 
 def settings(desk: Desk) -> Case:
-    """A damaged or hostile mlg.toml, here or in the user's folder: it turns no verdict, and no other file changes."""
+    """A damaged or hostile mlg.toml, here or in the user's folder: it turns no verdict, and no
+    other file changes.
+    """
     rng = desk.rng
     place = "work/mlg.toml" if rng.random() < 0.7 else "home/.config/mlg-troubleshoot/mlg.toml"
     _settings_file(desk, Path(place))
     desk.take("outside.csv", "in.csv", "kept.sqlite")
     if rng.random() < 0.6:
         more = rng.choice(
-            ([], ["-q"], ["--json"], ["--remember", "--show", "mm"], ["--csv", "out.csv"], ["--map", "X=remarks"])
+            (
+                [],
+                ["-q"],
+                ["--json"],
+                ["--remember", "--show", "mm"],
+                ["--csv", "out.csv"],
+                ["--map", "X=remarks"],
+            )
         )
         line = ["check", "outside.csv", *more]
         writes = {"work/out.csv", "work/mlg.toml"} if "--remember" in more else {"work/out.csv"}
@@ -148,7 +172,10 @@ def _settings_file(desk: Desk, place: Path) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     what = rng.random()
     if what < 0.45:
-        taken = {*rng.sample(COLUMNS, rng.randint(0, 3)), *rng.choice((DECISIVE, DECISIVE, COLUMNS[:1]))}
+        taken = {
+            *rng.sample(COLUMNS, rng.randint(0, 3)),
+            *rng.choice((DECISIVE, DECISIVE, COLUMNS[:1])),
+        }
         lines = [f'"{column}" = "{rng.choice(READ_AS)}"' for column in sorted(taken)]
         file.write_text("[headers]\n" + "\n".join(lines) + "\n", encoding="utf-8")
     elif what < 0.9:

@@ -1,4 +1,6 @@
-"""Cases of outputs: every option that writes, at every place where something stands or could stand."""
+"""Cases of outputs: every option that writes, at every place where something stands or could
+stand.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ SMALL = ["study", "--design", "lhs", "--n1", "2", "--n2", "20", "--iterations", 
 
 @dataclass(frozen=True)
 class Output:
-    """A command up to the name of its output, what it reads beside store and settings, and its own earlier file."""
+    """A command up to the name of its output, what it reads beside store and settings, and its own
+    earlier file.
+    """
 
     line: Sequence[str]
     reads: tuple[str, ...] = ()
@@ -31,9 +35,17 @@ class Output:
 OUTPUTS = (
     Output(["check", "in.csv", "-q", "--csv"], ("in.csv",), "old-verdicts.csv"),
     Output(
-        ["check", "in.csv", "-q", "--keep", "--csv"], ("in.csv",), "old-verdicts.csv", takes_a_store=True, keeps=True
+        ["check", "in.csv", "-q", "--keep", "--csv"],
+        ("in.csv",),
+        "old-verdicts.csv",
+        takes_a_store=True,
+        keeps=True,
     ),
-    Output(["check", "in.csv", "-q", "--extension", "ext.toml", "--csv"], ("in.csv", "ext.toml"), "old-verdicts.csv"),
+    Output(
+        ["check", "in.csv", "-q", "--extension", "ext.toml", "--csv"],
+        ("in.csv", "ext.toml"),
+        "old-verdicts.csv",
+    ),
     Output(
         ["check", "in.csv", "-q", "--gear", "own.toml", "--csv"],
         # The printed numbers of the shipped gear are not those of own.toml.
@@ -43,19 +55,48 @@ OUTPUTS = (
     Output(["check", "-", "-q", "--csv"], ("in.csv",), "old-verdicts.csv"),
     Output(["check", "in.xlsx", "-q", "--annotate"], ("in.xlsx",), "old-marked.xlsx"),
     Output(["check", "in.csv", "-q", "--annotate"], ("in.csv",), "old-marked.xlsx"),
-    Output(["check", "in.csv", "-q", "--format", "html", "--report"], ("in.csv",), "old-report", folder=True),
+    Output(
+        ["check", "in.csv", "-q", "--format", "html", "--report"],
+        ("in.csv",),
+        "old-report",
+        folder=True,
+    ),
     Output(["history", "export"], (), "old-chain.jsonl", takes_a_store=True),
-    Output(["history", "N1", "LH", "--no-forecast", "--report"], (), "", folder=True, takes_a_store=True),
+    Output(
+        ["history", "N1", "LH", "--no-forecast", "--report"],
+        (),
+        "",
+        folder=True,
+        takes_a_store=True,
+    ),
     Output(["fleet", "--no-forecast", "-q", "--report"], (), "", folder=True, takes_a_store=True),
     Output(["template"], (), ""),
     Output(["gear", "survey", "template"], (), ""),
-    Output(["diagnose", "far.csv", "-q", "--permutations", "99", "--write-extension"], ("far.csv",), rare=True),
+    Output(
+        ["diagnose", "far.csv", "-q", "--permutations", "99", "--write-extension"],
+        ("far.csv",),
+        rare=True,
+    ),
     Output([*SMALL, "--csv"], (), "", rare=True),
     Output([*SMALL, "--state"], (), "", rare=True),
     Output(["gear", "--gear", FOUR_BAR, "survey", SURVEY, "-q", "--write"], (), "", rare=True),
-    Output(["gear", "reconstruct", "--start", "A", "--minutes", "0.01", "-q", "--out"], (), "", rare=True),
+    Output(
+        ["gear", "reconstruct", "--start", "A", "--minutes", "0.01", "-q", "--out"],
+        (),
+        "",
+        rare=True,
+    ),
 )
-FOREIGN = ("mine.txt", "other.sqlite", "in.xlsx", "in.csv", "far.csv", "old-marked.xlsx", "old-chain.jsonl", "own.toml")
+FOREIGN = (
+    "mine.txt",
+    "other.sqlite",
+    "in.xlsx",
+    "in.csv",
+    "far.csv",
+    "old-marked.xlsx",
+    "old-chain.jsonl",
+    "own.toml",
+)
 NEW = (
     "new.csv",
     "new.xlsx",
@@ -73,7 +114,9 @@ NOT_FILES = ("-", "pipe", "folder", "/dev/full", "/dev/null", ".", "..", "", "in
 
 
 def outputs(desk: Desk) -> Case:
-    """An output at a place: only what is new or its own kind is written, or another's file with ``--force``."""
+    """An output at a place: only what is new or its own kind is written, or another's file with
+    ``--force``.
+    """
     rng = desk.rng
     output = rng.choice([each for each in OUTPUTS if not each.rare or rng.random() < 0.05])
     _furnish(desk)
@@ -120,11 +163,15 @@ def _known_store(desk: Desk) -> tuple[set[str], dict[str, str]]:
     """How the store of the case is known: by an option, or by the environment."""
     if desk.rng.random() < 0.5:
         return set(), {}
-    return {STORE}, {"MLG_STORE": desk.rng.choice((STORE, f"sqlite:///{STORE}", str(desk.work / STORE)))}
+    return {STORE}, {
+        "MLG_STORE": desk.rng.choice((STORE, f"sqlite:///{STORE}", str(desk.work / STORE)))
+    }
 
 
 def _place(desk: Desk, output: Output, inputs: set[str]) -> tuple[str, str | None]:
-    """What is named, and the file of the folder that would be written, None where it can be none."""
+    """What is named, and the file of the folder that would be written, None where it can be
+    none.
+    """
     rng = desk.rng
     kind = rng.random()
     if kind < 0.15:
@@ -152,7 +199,12 @@ def _spelt(desk: Desk, name: str) -> tuple[str, str]:
         return f"hard{suffix}", f"hard{suffix}"
     if way == 5:
         (desk.work / "here").symlink_to(".")
-    spellings = {0: f"no/../{name}", 1: f"folder/../{name}", 2: str(desk.work / name), 5: f"here/no/../{name}"}
+    spellings = {
+        0: f"no/../{name}",
+        1: f"folder/../{name}",
+        2: str(desk.work / name),
+        5: f"here/no/../{name}",
+    }
     return spellings.get(way, name), real
 
 
@@ -165,11 +217,15 @@ def _asked(
         return frozenset(), (".",) if output.folder else ()
     target = desk.work / real
     if output.folder:
-        stands = [f"work/{real}/{file.name}" for file in target.iterdir()] if real == output.own else []
+        stands = (
+            [f"work/{real}/{file.name}" for file in target.iterdir()] if real == output.own else []
+        )
         return frozenset(stands), (f"work/{real}",)
     if not target.exists():
         return frozenset({f"work/{real}"}), ()
-    protected = any((desk.work / name).exists() and target.samefile(desk.work / name) for name in inputs)
+    protected = any(
+        (desk.work / name).exists() and target.samefile(desk.work / name) for name in inputs
+    )
     own = bool(output.own) and target.samefile(desk.work / output.own)
     allowed = target.is_file() and not protected and (own or forced)
     return frozenset({f"work/{real}"} if allowed else ()), ()

@@ -1,4 +1,6 @@
-"""Cases of stores and of exported chains: damaged, hostile, or sound by their hashes and wrong in what they say."""
+"""Cases of stores and of exported chains: damaged, hostile, or sound by their hashes and wrong in
+what they say.
+"""
 
 from __future__ import annotations
 
@@ -68,7 +70,9 @@ def rechained(desk: Desk) -> Case:
 
 
 def chain(desk: Desk) -> Case:
-    """An exported chain that is damaged, wrong, endless or no file, imported; what was taken in is read."""
+    """An exported chain that is damaged, wrong, endless or no file, imported; what was taken in is
+    read.
+    """
     rng = desk.rng
     name = "in.jsonl"
     desk.rng.choice(CHAINS)(desk.work / name, desk)
@@ -136,11 +140,15 @@ def wrong_rows(rows: Sequence[dict[str, Any]], rng: random.Random) -> list[dict[
         elif what < 0.85:
             column = rng.choice(TEXTS)
             text = rng.choice((*HOSTILE, "XX", "9999-99-99", "N1", "RH", "0001-01-01"))
-            row[column] = rng.choice(KINDS) if column == "kind" else text.encode("utf-8", "replace").decode()
+            row[column] = (
+                rng.choice(KINDS) if column == "kind" else text.encode("utf-8", "replace").decode()
+            )
         elif what < 0.95:
             wrong.insert(rng.randrange(len(wrong)), deepcopy(rng.choice(wrong)))
         else:
-            row["body"] = rng.choice((b"", b"x", pressed(b'{"x":' * 3000), pressed(b"[" + b"0," * 2_000_000 + b"0]")))
+            row["body"] = rng.choice(
+                (b"", b"x", pressed(b'{"x":' * 3000), pressed(b"[" + b"0," * 2_000_000 + b"0]"))
+            )
     return in_a_chain(wrong)
 
 
@@ -151,12 +159,14 @@ def _fill(place: Path, rows: Sequence[dict[str, Any]]) -> None:
         raw.execute("CREATE TABLE mlg_meta (schema_version INTEGER NOT NULL)")
         raw.execute("INSERT INTO mlg_meta VALUES (1)")
         raw.execute(
-            "CREATE TABLE mlg_records (seq INTEGER PRIMARY KEY NOT NULL, kind VARCHAR(16) NOT NULL, record_id TEXT NOT "
-            "NULL, tail_no TEXT NOT NULL, side VARCHAR(2) NOT NULL, day VARCHAR(10) NOT NULL, identity BLOB NOT NULL "
-            "UNIQUE, body BLOB NOT NULL, hash BLOB NOT NULL)"
+            "CREATE TABLE mlg_records (seq INTEGER PRIMARY KEY NOT NULL, kind VARCHAR(16) NOT NULL,"
+            " record_id TEXT NOT NULL, tail_no TEXT NOT NULL, side VARCHAR(2) NOT NULL, day"
+            " VARCHAR(10) NOT NULL, identity BLOB NOT NULL UNIQUE, body BLOB NOT NULL, hash BLOB"
+            " NOT NULL)"
         )
         raw.executemany(
-            f"INSERT INTO mlg_records ({', '.join(columns)}) VALUES ({', '.join('?' * len(columns))})",
+            f"INSERT INTO mlg_records ({', '.join(columns)}) VALUES"
+            f" ({', '.join('?' * len(columns))})",
             [[row[name] for name in columns] for row in rows],
         )
 
@@ -176,13 +186,19 @@ def _by_hand(place: Path, *statements: str, values: Sequence[Any] = ()) -> None:
 def _a_cell(place: Path, desk: Desk) -> None:
     column = desk.rng.choice(("seq", *TEXTS, "identity", "body", "hash"))
     text = desk.rng.choice(HOSTILE).encode("utf-8", "replace")
-    value = desk.rng.choice((None, -1, 0, 10**15, 1.5, "", "x", "XX", text, text.decode(), b"", desk.rng.randbytes(32)))
+    value = desk.rng.choice(
+        (None, -1, 0, 10**15, 1.5, "", "x", "XX", text, text.decode(), b"", desk.rng.randbytes(32))
+    )
     row = desk.rng.randint(1, len(desk.shelf.rows))
-    _by_hand(place, f"UPDATE OR IGNORE mlg_records SET {column} = ? WHERE seq = {row}", values=(value,))
+    _by_hand(
+        place, f"UPDATE OR IGNORE mlg_records SET {column} = ? WHERE seq = {row}", values=(value,)
+    )
 
 
 def _a_huge_body(place: Path, desk: Desk) -> None:
-    big = desk.rng.choice((pressed(b" " * 600_000_000 + b"1"), pressed(b"[" * 2_000_000), 99999999999))
+    big = desk.rng.choice(
+        (pressed(b" " * 600_000_000 + b"1"), pressed(b"[" * 2_000_000), 99999999999)
+    )
     _by_hand(place, "UPDATE mlg_records SET body = ? WHERE seq = 2", values=(big,))
 
 
@@ -195,7 +211,10 @@ def _a_table(place: Path, desk: Desk) -> None:
                 ["DROP TABLE mlg_records"],
                 ["DROP TABLE mlg_meta"],
                 ["DROP TABLE mlg_drafts"],
-                ["DROP INDEX mlg_records_by_gear", f"ALTER TABLE mlg_records RENAME COLUMN {column} TO other"],
+                [
+                    "DROP INDEX mlg_records_by_gear",
+                    f"ALTER TABLE mlg_records RENAME COLUMN {column} TO other",
+                ],
                 ["CREATE TABLE customers (name TEXT)", "INSERT INTO customers VALUES ('x')"],
                 ["DELETE FROM mlg_records WHERE seq = 3"],
                 ["DELETE FROM mlg_records WHERE seq > 4"],
@@ -204,9 +223,12 @@ def _a_table(place: Path, desk: Desk) -> None:
                 ["CREATE TRIGGER t AFTER INSERT ON mlg_records BEGIN DELETE FROM mlg_records; END"],
                 [
                     "DROP TABLE mlg_records",
-                    "CREATE VIEW mlg_records AS WITH RECURSIVE n(seq) AS (SELECT 1 UNION ALL SELECT seq + 1 FROM n) "
-                    "SELECT seq, 'inspection' AS kind, 'R' AS record_id, 'N1' AS tail_no, 'LH' AS side, '' AS day, "
-                    "x'00' AS identity, x'00' AS body, x'00' AS hash FROM n",
+                    (
+                        "CREATE VIEW mlg_records AS WITH RECURSIVE n(seq) AS (SELECT 1 UNION ALL"
+                        " SELECT seq + 1 FROM n) SELECT seq, 'inspection' AS kind, 'R' AS"
+                        " record_id, 'N1' AS tail_no, 'LH' AS side, '' AS day, x'00' AS identity,"
+                        " x'00' AS body, x'00' AS hash FROM n"
+                    ),
                 ],
                 ["PRAGMA application_id = 1196444487"],
             )
@@ -216,7 +238,11 @@ def _a_table(place: Path, desk: Desk) -> None:
 
 def _a_version(place: Path, desk: Desk) -> None:
     value = desk.rng.choice((0, 2, 99, -1, None, "abc", b"\x01", 1.5, 10**15))
-    statements = ["DROP TABLE mlg_meta", "CREATE TABLE mlg_meta (schema_version)", "INSERT INTO mlg_meta VALUES (?)"]
+    statements = [
+        "DROP TABLE mlg_meta",
+        "CREATE TABLE mlg_meta (schema_version)",
+        "INSERT INTO mlg_meta VALUES (?)",
+    ]
     _by_hand(place, *statements[: desk.rng.choice((2, 3, 3, 3, 3))], values=(value,))
 
 
@@ -225,7 +251,9 @@ def _bytes_of_it(place: Path, desk: Desk) -> None:
     rng = desk.rng
     for _ in range(rng.choice((1, 1, 3, 30))):
         data[rng.randrange(len(data))] = rng.randrange(256)
-    place.write_bytes(data[: rng.choice((len(data), len(data), len(data), rng.randrange(len(data)), 100, 0))])
+    place.write_bytes(
+        data[: rng.choice((len(data), len(data), len(data), rng.randrange(len(data)), 100, 0))]
+    )
 
 
 def _another_file(place: Path, desk: Desk) -> None:
@@ -261,7 +289,10 @@ def _lines(rows: Sequence[dict[str, Any]]) -> list[str]:
 
 
 def _wrong(path: Path, desk: Desk) -> None:
-    path.write_text("".join(line + "\n" for line in _lines(wrong_rows(desk.shelf.rows, desk.rng))), encoding="utf-8")
+    path.write_text(
+        "".join(line + "\n" for line in _lines(wrong_rows(desk.shelf.rows, desk.rng))),
+        encoding="utf-8",
+    )
 
 
 def _hurt(path: Path, desk: Desk) -> None:
@@ -280,7 +311,9 @@ def _large(path: Path, desk: Desk) -> None:
         path.write_text("".join(line + "\n" for line in _lines(in_a_chain(big))), encoding="utf-8")
     elif what < 0.6:
         deep = "[" * 200_000
-        path.write_text(desk.rng.choice((deep, f'{{"seq": {deep}', f'{{"content": {deep}')), encoding="utf-8")
+        path.write_text(
+            desk.rng.choice((deep, f'{{"seq": {deep}', f'{{"content": {deep}')), encoding="utf-8"
+        )
     elif what < 0.8:
         big[0]["body"] = pressed(b" " * 600_000_000 + b"1")
         path.write_text("".join(line + "\n" for line in _lines(in_a_chain(big))), encoding="utf-8")

@@ -1,8 +1,9 @@
-"""A second solver of the down-lock linkage that shares nothing with the package but the coordinates.
+"""A second solver of the down-lock linkage that shares nothing with the package but the
+coordinates.
 
-Each loop of the mechanism is closed numerically in three dimensions: five unknowns (four lever angles and the
-plunger's travel), five residuals (one a loop), a general root finder. There is no law of cosines, no reduction
-to a plane and no order of the mechanism in it.
+Each loop of the mechanism is closed numerically in three dimensions: five unknowns (four lever
+angles and the plunger's travel), five residuals (one a loop), a general root finder. There is no
+law of cosines, no reduction to a plane and no order of the mechanism in it.
 """
 
 from __future__ import annotations
@@ -31,12 +32,15 @@ class LoopClosure:
     points : dict of str to tuple of float
         Coordinates at mid-position, each in its own plane. [in]
     hinge_deg, dihedral_deg, axis_deg : float
-        Hinge direction in the sidestay plane, dihedral angle, plunger axis in the link-assembly plane. [deg]
+        Hinge direction in the sidestay plane, dihedral angle, plunger axis in the link-assembly
+        plane. [deg]
     release : float
         Actuator extension at mid-position. [in]
     """
 
-    def __init__(self, points: Flat, hinge_deg: float, dihedral_deg: float, axis_deg: float, release: float) -> None:
+    def __init__(
+        self, points: Flat, hinge_deg: float, dihedral_deg: float, axis_deg: float, release: float
+    ) -> None:
         tau, delta, alpha = np.radians([hinge_deg, dihedral_deg, axis_deg])
         self.release = release
         hinge = np.array([np.cos(tau), np.sin(tau), 0.0])
@@ -55,8 +59,16 @@ class LoopClosure:
         }
         # The same for every call: arms of the levers and what turning them by 90° gives.
         self.arm = {
-            (pivot, joint): (self.p[joint] - self.p[pivot], np.cross(normal, self.p[joint] - self.p[pivot]))
-            for pivot, joints, normal in (("E", "12", Z), ("Q", "23", Z), ("4", "56", Z), ("8", "79", self.normal))
+            (pivot, joint): (
+                self.p[joint] - self.p[pivot],
+                np.cross(normal, self.p[joint] - self.p[pivot]),
+            )
+            for pivot, joints, normal in (
+                ("E", "12", Z),
+                ("Q", "23", Z),
+                ("4", "56", Z),
+                ("8", "79", self.normal),
+            )
             for joint in joints
         }
 
@@ -86,12 +98,16 @@ class LoopClosure:
 
     def jacobian(self, unknown: np.ndarray, stroke: float, v: np.ndarray) -> np.ndarray:
         """Derivatives of the residuals by the complex step. [in/rad and 1]"""
-        columns = [self.residuals(unknown + 1e-30j * row, stroke, v).imag / 1e-30 for row in np.eye(5)]
+        columns = [
+            self.residuals(unknown + 1e-30j * row, stroke, v).imag / 1e-30 for row in np.eye(5)
+        ]
         return np.array(columns).T
 
     @cached_property
     def without_clearance(self) -> tuple[np.ndarray, np.ndarray]:
-        """Strokes and unknowns, followed from mid-position to Down Lock so that no branch is changed."""
+        """Strokes and unknowns, followed from mid-position to Down Lock so that no branch is
+        changed.
+        """
         strokes = np.linspace(self.release, 0.0, 13)
         followed = [np.zeros(5)]
         for stroke in strokes[1:]:
@@ -99,13 +115,16 @@ class LoopClosure:
         return strokes, np.array(followed)
 
     def solve(self, stroke: float, v: np.ndarray | None = None) -> np.ndarray:
-        """Unknowns at one stroke: four angles [rad] and the plunger's travel from mid-position [in]."""
+        """Unknowns at one stroke: four angles [rad] and the plunger's travel from mid-position
+        [in].
+        """
         strokes, followed = self.without_clearance
         start = followed[np.argmin(np.abs(strokes - stroke))]
         return self._root(start, stroke, np.zeros((10, 2)) if v is None else v)
 
     def _root(self, start: np.ndarray, stroke: float, v: np.ndarray) -> np.ndarray:
-        # Counted from 1 and not from 0: the root finder scales its first step by the size of its start.
+        # Counted from 1 and not from 0: the root finder scales its first step by the size of its
+        # start.
         found = root(
             lambda x: self.residuals(x - 1.0, stroke, v),
             start + 1.0,
@@ -121,7 +140,10 @@ class LoopClosure:
         down_lock = self.solve(0.0)[4]
         sense = np.sign(-down_lock)
         least = minimize_scalar(
-            lambda s: sense * self.solve(s)[4], bounds=(0.0, self.release), method="bounded", options={"xatol": 1e-7}
+            lambda s: sense * self.solve(s)[4],
+            bounds=(0.0, self.release),
+            method="bounded",
+            options={"xatol": 1e-7},
         )
         return float(travel / min(least.fun, sense * down_lock) * -sense)
 
@@ -135,7 +157,11 @@ def read_linkages(gear_file: Path, ensemble_file: Path) -> dict[str, LoopClosure
     axis = reference["steps"][-1]["axis_deg"]
     linkages = {
         "A": LoopClosure(
-            points, plane["hinge_direction_deg"], plane["dihedral_deg"], axis, reference["input"]["range"][1]
+            points,
+            plane["hinge_direction_deg"],
+            plane["dihedral_deg"],
+            axis,
+            reference["input"]["range"][1],
         )
     }
     for name, m in members.items():

@@ -14,13 +14,18 @@ LINK = "length.3-5"
 
 
 def test_an_empty_adjustment_changes_nothing(gear: Gear) -> None:
-    plain, adjusted = worst_case(gear.model, CLEARANCE), adjusted_worst_case(gear.model, Adjustment(CLEARANCE))
+    plain, adjusted = (
+        worst_case(gear.model, CLEARANCE),
+        adjusted_worst_case(gear.model, Adjustment(CLEARANCE)),
+    )
     assert np.array_equal(plain.over_in, adjusted.over_in)
 
 
 def test_an_offset_is_added_to_both_senses_with_its_sign(gear: Gear) -> None:
     plain = worst_case(gear.model, CLEARANCE)
-    adjusted = adjusted_worst_case(gear.model, Adjustment(CLEARANCE, offset_in=np.array([0.0, 0.004, -0.004])))
+    adjusted = adjusted_worst_case(
+        gear.model, Adjustment(CLEARANCE, offset_in=np.array([0.0, 0.004, -0.004]))
+    )
     assert adjusted.over_in - plain.over_in == pytest.approx([0.0, 0.004, -0.004])
     assert adjusted.under_in - plain.under_in == pytest.approx([0.0, 0.004, -0.004])
 
@@ -36,7 +41,9 @@ def test_a_rate_factor_multiplies_both_senses_and_not_the_offset(gear: Gear) -> 
 
 def test_a_changed_number_is_added_to_its_nominal_value(gear: Gear) -> None:
     nominal = gear.model.kernel.parameters[gear.model.kernel.parameter_index(LINK)]
-    numbers = Adjustment(CLEARANCE, changed={LINK: np.array([0.0, 0.01, -0.01])}).numbers(gear.model)
+    numbers = Adjustment(CLEARANCE, changed={LINK: np.array([0.0, 0.01, -0.01])}).numbers(
+        gear.model
+    )
     assert numbers[LINK] == pytest.approx(nominal + np.array([0.0, 0.01, -0.01]))
 
 
@@ -56,11 +63,15 @@ def test_a_longer_link_shifts_both_senses_by_what_the_link_alone_does(gear: Gear
     zero = np.zeros((1, 10))
     longer = adjusted_worst_case(gear.model, Adjustment(zero, changed={LINK: np.array([0.002])}))
     assert longer.over_in == pytest.approx(longer.under_in)
-    assert abs(longer.over_in[0]) == pytest.approx(0.002 * gear.model.plunger_amplification()[2], rel=0.02)
+    assert abs(longer.over_in[0]) == pytest.approx(
+        0.002 * gear.model.plunger_amplification()[2], rel=0.02
+    )
 
 
 def test_rows_are_adjusted_independently(gear: Gear) -> None:
-    adjusted = adjusted_worst_case(gear.model, Adjustment(CLEARANCE, changed={LINK: np.array([0.0, 0.002, 0.0])}))
+    adjusted = adjusted_worst_case(
+        gear.model, Adjustment(CLEARANCE, changed={LINK: np.array([0.0, 0.002, 0.0])})
+    )
     plain = worst_case(gear.model, CLEARANCE)
     assert (adjusted.over_in != plain.over_in).tolist() == [False, True, False]
 
@@ -79,13 +90,20 @@ def test_the_chance_with_random_directions_counts_rate_and_offset(gear: Gear) ->
 
 def test_an_offset_alone_decides_when_there_is_no_clearance(gear: Gear) -> None:
     zero, margin = np.zeros((2, 10)), np.full(2, 0.03)
-    assert chance_beyond(gear.model, zero, margin, 64, offset_in=np.array([0.029, 0.031])).tolist() == [0.0, 1.0]
+    assert chance_beyond(
+        gear.model, zero, margin, 64, offset_in=np.array([0.029, 0.031])
+    ).tolist() == [0.0, 1.0]
 
 
 def test_some_rows_of_an_adjustment_move_as_they_do_among_all(gear: Gear) -> None:
     three = np.array([0.0, 0.001, -0.001])
     whole = Adjustment(
-        CLEARANCE, {LINK: three}, {"length.6-7": 1.0 + three}, 1.0 + three, three, np.linspace(-1.0, 1.0, 10)
+        CLEARANCE,
+        {LINK: three},
+        {"length.6-7": 1.0 + three},
+        1.0 + three,
+        three,
+        np.linspace(-1.0, 1.0, 10),
     )
     all_rows, last = (
         adjusted_worst_case(gear.model, whole),
@@ -96,6 +114,11 @@ def test_some_rows_of_an_adjustment_move_as_they_do_among_all(gear: Gear) -> Non
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
-def test_without_clearance_nothing_is_displaced_anywhere_along_the_stroke(gear: Gear, share: float) -> None:
+def test_without_clearance_nothing_is_displaced_anywhere_along_the_stroke(
+    gear: Gear, share: float
+) -> None:
     low, high = gear.model.stroke
-    assert gear.model.displacement(gear.model.kernel.no_clearance(), stroke=low + share * (high - low)) == 0.0
+    assert (
+        gear.model.displacement(gear.model.kernel.no_clearance(), stroke=low + share * (high - low))
+        == 0.0
+    )

@@ -15,20 +15,33 @@ def cycle(gear: Gear) -> RetractionCycle:
 
 
 def test_the_four_stages_stand_in_the_order_of_the_text(cycle: RetractionCycle) -> None:
-    assert [stage.name for stage in cycle.stages] == ["Down Lock", "Moving Up", "Moving Down", "Up Lock"]
+    assert [stage.name for stage in cycle.stages] == [
+        "Down Lock",
+        "Moving Up",
+        "Moving Down",
+        "Up Lock",
+    ]
 
 
-def test_the_plunger_is_in_at_down_lock_mid_while_moving_and_out_at_up_lock(cycle: RetractionCycle) -> None:
+def test_the_plunger_is_in_at_down_lock_mid_while_moving_and_out_at_up_lock(
+    cycle: RetractionCycle,
+) -> None:
     assert [stage.plunger for stage in cycle.stages] == ["in", "mid", "mid", "out"]
 
 
-def test_the_valve_has_six_combinations_of_three_positions_and_two_flows(cycle: RetractionCycle) -> None:
+def test_the_valve_has_six_combinations_of_three_positions_and_two_flows(
+    cycle: RetractionCycle,
+) -> None:
     combinations = {(state.plunger, state.flow) for state in cycle.valve}
-    assert combinations == {(p, f) for p in ("in", "mid", "out") for f in ("retracting", "extending")}
+    assert combinations == {
+        (p, f) for p in ("in", "mid", "out") for f in ("retracting", "extending")
+    }
     assert len(cycle.valve) == 6
 
 
-def test_each_combination_occurs_in_a_stage_with_that_plunger_position(cycle: RetractionCycle) -> None:
+def test_each_combination_occurs_in_a_stage_with_that_plunger_position(
+    cycle: RetractionCycle,
+) -> None:
     position = {stage.name: stage.plunger for stage in cycle.stages}
     assert all(position[state.stage] == state.plunger for state in cycle.valve)
 
@@ -50,17 +63,25 @@ def test_combinations_on_which_the_text_is_silent_say_not_stated(cycle: Retracti
 def test_the_release_has_the_four_steps_of_the_text_from_the_actuator_to_the_released_lock(
     cycle: RetractionCycle,
 ) -> None:
-    words = ["actuator extends", "locking pin travels", "short link is pulled", "down lock is released"]
+    words = [
+        "actuator extends",
+        "locking pin travels",
+        "short link is pulled",
+        "down lock is released",
+    ]
     assert all(word in step for word, step in zip(words, cycle.release, strict=True))
 
 
-def test_doors_open_before_the_gear_is_lowered_and_close_last_when_it_is_raised(cycle: RetractionCycle) -> None:
+def test_doors_open_before_the_gear_is_lowered_and_close_last_when_it_is_raised(
+    cycle: RetractionCycle,
+) -> None:
     assert cycle.extension_order == ("doors open first", "gear moves down")
     assert cycle.retraction_order[-1] == "doors close last"
 
 
 @pytest.mark.parametrize(
-    ("displacement", "words"), [(0.0, "in the range"), (0.0301, "beyond the range"), (-0.0301, "short of the range")]
+    ("displacement", "words"),
+    [(0.0, "in the range"), (0.0301, "beyond the range"), (-0.0301, "short of the range")],
 )
 def test_a_displaced_plunger_is_told_in_the_words_of_the_text(
     cycle: RetractionCycle, displacement: float, words: str
@@ -69,7 +90,9 @@ def test_a_displaced_plunger_is_told_in_the_words_of_the_text(
 
 
 @pytest.mark.parametrize("displacement", [0.03, -0.03])
-def test_a_plunger_at_its_margin_is_still_within(cycle: RetractionCycle, displacement: float) -> None:
+def test_a_plunger_at_its_margin_is_still_within(
+    cycle: RetractionCycle, displacement: float
+) -> None:
     assert cycle.symptom(displacement, 0.03) == cycle.within
 
 

@@ -21,7 +21,10 @@ def moved_as_a_whole(linkage: Linkage) -> Linkage:
     for p in m.points:
         z = complex(p.x, p.y) * turn + (1.0 - 2.0j) if p.plane == base else complex(p.x, p.y)
         points.append(replace(p, x=z.real, y=z.imag))
-    planes = tuple(replace(p, hinge_direction=p.hinge_direction + 0.3) if p.parent == base else p for p in m.planes)
+    planes = tuple(
+        replace(p, hinge_direction=p.hinge_direction + 0.3) if p.parent == base else p
+        for p in m.planes
+    )
     return replace(linkage, mechanism=replace(m, points=tuple(points), planes=planes))
 
 
@@ -38,14 +41,19 @@ def test_branch_signs_are_those_of_the_coordinates(gear: Gear) -> None:
     space = DesignSpace(gear.reference)
     for member in gear.ensemble:
         again = space.linkage(space.vector(member), member.name)
-        signs = [[s.sign for s in each.mechanism.steps if isinstance(s, (Dyad, Slider))] for each in (again, member)]
+        signs = [
+            [s.sign for s in each.mechanism.steps if isinstance(s, (Dyad, Slider))]
+            for each in (again, member)
+        ]
         assert signs[0] == signs[1]
 
 
 def test_moving_and_turning_everything_together_is_no_other_design(gear: Gear) -> None:
     space = DesignSpace(gear.reference)
     for member in gear.ensemble[:4]:
-        assert space.vector(moved_as_a_whole(member)) == pytest.approx(space.vector(member), abs=1e-9)
+        assert space.vector(moved_as_a_whole(member)) == pytest.approx(
+            space.vector(member), abs=1e-9
+        )
 
 
 def test_the_numbers_of_a_batch_are_those_of_each_linkage(gear: Gear) -> None:
@@ -56,4 +64,6 @@ def test_the_numbers_of_a_batch_are_those_of_each_linkage(gear: Gear) -> None:
         alone = write_program(space.assembled(vector)).parameters
         assert list(alone) == list(together)
         for name, value in alone.items():
-            assert np.broadcast_to(together[name], len(vectors))[i] == pytest.approx(value, abs=1e-12), name
+            assert np.broadcast_to(together[name], len(vectors))[i] == pytest.approx(
+                value, abs=1e-12
+            ), name

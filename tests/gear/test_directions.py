@@ -19,7 +19,9 @@ clearances = arrays(float, 10, elements=st.floats(0, 0.0075))
 
 
 def best_over_all_directions(model: LinkageModel, clearance: np.ndarray, sense: float) -> float:
-    """The global optimum: coordinate ascent over 72 angles a joint, then finer, from many random starts."""
+    """The global optimum: coordinate ascent over 72 angles a joint, then finer, from many random
+    starts.
+    """
     rng = np.random.default_rng(10)
     starts = rng.uniform(0, 2 * np.pi, (12, 10))
     for width in (np.pi, np.pi, 0.1, 0.02, 0.004, 0.001):
@@ -35,7 +37,9 @@ def best_over_all_directions(model: LinkageModel, clearance: np.ndarray, sense: 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 @pytest.mark.parametrize(
-    "clearance", [np.full(10, 0.0075), FAILURE[0], np.linspace(0.001, 0.012, 10)], ids=["all", "failure", "mixed"]
+    "clearance",
+    [np.full(10, 0.0075), FAILURE[0], np.linspace(0.001, 0.012, 10)],
+    ids=["all", "failure", "mixed"],
 )
 def test_the_sequential_rule_is_within_four_in_ten_thousand_of_the_global_optimum(
     gear: Gear, clearance: np.ndarray, sense: float
@@ -46,7 +50,9 @@ def test_the_sequential_rule_is_within_four_in_ten_thousand_of_the_global_optimu
 
 
 @given(clearance=clearances)
-def test_over_travel_is_never_negative_and_under_travel_never_positive(gear: Gear, clearance: np.ndarray) -> None:
+def test_over_travel_is_never_negative_and_under_travel_never_positive(
+    gear: Gear, clearance: np.ndarray
+) -> None:
     worst = worst_case(gear.model, clearance)
     assert worst.under_in[0] <= 0.0 <= worst.over_in[0]
 
@@ -78,13 +84,17 @@ def test_the_magnitude_is_the_larger_sense_and_its_directions_govern(gear: Gear)
 def test_under_travel_governs_where_it_is_larger(gear: Gear) -> None:
     # Both senses of a linkage whose output is read the other way round.
     worst = worst_case(gear.model, FAILURE)
-    turned = type(worst)(-worst.under_in, -worst.over_in, worst.under_directions, worst.over_directions)
+    turned = type(worst)(
+        -worst.under_in, -worst.over_in, worst.under_directions, worst.over_directions
+    )
     assert turned.magnitude_in[0] == worst.over_in[0]
     assert np.array_equal(turned.governing_directions, worst.over_directions)
 
 
 def test_directions_are_chosen_from_the_most_remote_joint_to_the_nearest(gear: Gear) -> None:
-    """Each joint's direction is the best one while all joints nearer to the input have no clearance yet."""
+    """Each joint's direction is the best one while all joints nearer to the input have no clearance
+    yet.
+    """
     clearance = np.full(10, 0.0075)
     chosen = worst_case(gear.model, clearance).over_directions[0]
     turns = np.linspace(0, 2 * np.pi, 721)
@@ -101,10 +111,14 @@ def test_each_gear_of_a_batch_gets_the_directions_of_its_own_clearances(gear: Ge
     batch = worst_case(gear.model, clearance)
     for i in (0, 511, 512, 599):
         alone = worst_case(gear.model, clearance[i])
-        assert (alone.over_in[0], alone.under_in[0]) == pytest.approx((batch.over_in[i], batch.under_in[i]), abs=1e-14)
+        assert (alone.over_in[0], alone.under_in[0]) == pytest.approx(
+            (batch.over_in[i], batch.under_in[i]), abs=1e-14
+        )
 
 
-def test_a_joint_without_clearance_still_has_the_direction_in_which_it_would_act(gear: Gear) -> None:
+def test_a_joint_without_clearance_still_has_the_direction_in_which_it_would_act(
+    gear: Gear,
+) -> None:
     worst = worst_case(gear.model, np.zeros(10))
     tiny = gear.model.displacement(links_from(np.eye(10) * 1e-5, worst.over_directions))
     assert tiny / 1e-5 == pytest.approx(gear.model.plunger_amplification(), rel=1e-3)
@@ -121,7 +135,9 @@ def test_a_gear_that_does_not_close_is_nan_and_the_others_of_the_batch_are_not(g
 
 
 def test_the_failure_case_exceeds_its_margin_in_a_quarter_of_random_directions(gear: Gear) -> None:
-    assert chance_beyond(gear.model, FAILURE, np.array([MARGIN_IN]), 4096)[0] == pytest.approx(0.25, abs=0.01)
+    assert chance_beyond(gear.model, FAILURE, np.array([MARGIN_IN]), 4096)[0] == pytest.approx(
+        0.25, abs=0.01
+    )
 
 
 def test_with_two_worn_joints_the_chance_is_what_their_two_angles_give(gear: Gear) -> None:
@@ -135,9 +151,13 @@ def test_with_two_worn_joints_the_chance_is_what_their_two_angles_give(gear: Gea
 
 
 @pytest.mark.parametrize("offset_in", [0.012, -0.012])
-def test_what_moves_the_plunger_besides_is_added_with_its_sign(gear: Gear, offset_in: float) -> None:
+def test_what_moves_the_plunger_besides_is_added_with_its_sign(
+    gear: Gear, offset_in: float
+) -> None:
     moved = gear.model.displacement(links_from(FAILURE, random_directions(10, 64))) + offset_in
-    chance = chance_beyond(gear.model, FAILURE, np.array([MARGIN_IN]), 64, offset_in=np.array([offset_in]))[0]
+    chance = chance_beyond(
+        gear.model, FAILURE, np.array([MARGIN_IN]), 64, offset_in=np.array([offset_in])
+    )[0]
     assert chance == np.mean(np.abs(moved) > MARGIN_IN)
 
 
@@ -162,7 +182,10 @@ def test_gears_worn_up_to_the_limit_exceed_with_worst_directions_in_97_percent(
 
 
 def test_the_chance_is_zero_without_clearance(gear: Gear) -> None:
-    assert chance_beyond(gear.model, np.zeros((2, 10)), np.full(2, MARGIN_IN), 64).tolist() == [0.0, 0.0]
+    assert chance_beyond(gear.model, np.zeros((2, 10)), np.full(2, MARGIN_IN), 64).tolist() == [
+        0.0,
+        0.0,
+    ]
 
 
 def test_a_position_that_does_not_close_counts_as_beyond_the_margin(gear: Gear) -> None:

@@ -41,7 +41,11 @@ def numbers_in(value: Any) -> list[float]:
         return []
     if isinstance(value, int | float):
         return [float(value)]
-    return [n for part in (value.values() if isinstance(value, dict) else value) for n in numbers_in(part)]
+    return [
+        n
+        for part in (value.values() if isinstance(value, dict) else value)
+        for n in numbers_in(part)
+    ]
 
 
 # Names and branches, not quantities.
@@ -62,7 +66,9 @@ def test_every_number_of_the_gear_file_is_listed_with_its_source(gear: Gear) -> 
 
 def test_every_number_has_a_kind_a_source_and_a_unit(gear: Gear) -> None:
     assert all(
-        n.kind in set(SourceKind) and len(n.source) > 10 and n.unit in {"in", "deg", "min", "landings", "1"}
+        n.kind in set(SourceKind)
+        and len(n.source) > 10
+        and n.unit in {"in", "deg", "min", "landings", "1"}
         for n in gear.numbers
     )
 
@@ -94,23 +100,34 @@ def test_the_calibration_is_from_the_technical_order(gear: Gear) -> None:
 
 
 def test_the_hash_changes_with_a_coordinate(gear: Gear, edited: Edit) -> None:
-    assert load_gear(edited("at = [-1.8, -11.85]", "at = [-1.8, -11.851]")).geometry_sha256 != gear.geometry_sha256
+    assert (
+        load_gear(edited("at = [-1.8, -11.85]", "at = [-1.8, -11.851]")).geometry_sha256
+        != gear.geometry_sha256
+    )
 
 
 def test_the_hash_does_not_change_with_a_comment_or_a_name(gear: Gear, edited: Edit) -> None:
     copy = load_gear(edited('name = "locking pin"', 'name = "lock pin"  # as in the manual'))
-    assert (copy.geometry_sha256, copy.ensemble_sha256) == (gear.geometry_sha256, gear.ensemble_sha256)
+    assert (copy.geometry_sha256, copy.ensemble_sha256) == (
+        gear.geometry_sha256,
+        gear.ensemble_sha256,
+    )
 
 
 def test_a_copy_of_the_gear_file_predicts_the_same(gear: Gear, edited: Edit) -> None:
     copy = load_gear(edited("# Hawker", "# Copied from Hawker"))
-    assert copy.model.plunger_amplification() == pytest.approx(gear.model.plunger_amplification(), abs=1e-15)
+    assert copy.model.plunger_amplification() == pytest.approx(
+        gear.model.plunger_amplification(), abs=1e-15
+    )
 
 
 def test_a_gear_file_that_was_edited_is_read_anew(edited: Edit) -> None:
     path = edited("# Hawker", "# Copied from Hawker")
     before = load_gear(path).geometry_sha256
-    path.write_text(path.read_text(encoding="utf-8").replace("at = [-1.8, -11.85]", "at = [-1.8, -11.851]"), "utf-8")
+    path.write_text(
+        path.read_text(encoding="utf-8").replace("at = [-1.8, -11.85]", "at = [-1.8, -11.851]"),
+        "utf-8",
+    )
     assert load_gear(path).geometry_sha256 != before
 
 
@@ -128,20 +145,60 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
     ("old", "new", "words"),
     [
         # a key that nobody reads, with the nearest name
-        ('provenance = "rec', 'provenence = "x"\nprovenance = "rec', r"provenence: .*did you mean 'provenance'"),
-        ("down_lock = 0.03\n", "down_lock = 0.03\ntravell = 1\n", r"calibration\.travell: .*did you mean 'travel'"),
+        (
+            'provenance = "rec',
+            'provenence = "x"\nprovenance = "rec',
+            r"provenence: .*did you mean 'provenance'",
+        ),
+        (
+            "down_lock = 0.03\n",
+            "down_lock = 0.03\ntravell = 1\n",
+            r"calibration\.travell: .*did you mean 'travel'",
+        ),
         ("[margin]\n", "[margin]\nu = 0.001\n", r"margin\.u: "),
-        ("[entry]\n", "[entry]\nhard_limt = 0.001\n", r"entry\.hard_limt: .*did you mean 'hard_limit'"),
+        (
+            "[entry]\n",
+            "[entry]\nhard_limt = 0.001\n",
+            r"entry\.hard_limt: .*did you mean 'hard_limit'",
+        ),
         ("[bearing_span]\n", "[bearing_span]\nlength = 2\n", r"bearing_span\.length: "),
         ('name = "F"\n', 'name = "F"\nfixd = true\n', r"points\[F\]\.fixd: .*did you mean 'fixed'"),
-        ("driven = true\n", "driven = true\ndrive = 1\n", r"steps\[1\]\.drive: .*did you mean 'driven'"),
-        ('area = "sidestay"\n', 'area = "sidestay"\nlimt = 1\n', r"joints\[actuator rod end\]\.limt: .*'limit'"),
+        (
+            "driven = true\n",
+            "driven = true\ndrive = 1\n",
+            r"steps\[1\]\.drive: .*did you mean 'driven'",
+        ),
+        (
+            'area = "sidestay"\n',
+            'area = "sidestay"\nlimt = 1\n',
+            r"joints\[actuator rod end\]\.limt: .*'limit'",
+        ),
         # a source that is missing or unknown
-        ('value = 0.03\nsource = "margin"', "value = 0.03", r"margin\.source: expected a text, found nothing"),
-        ('value = 0.03\nsource = "margin"', 'value = 0.03\nsource = "hearsay"', r"margin\.source: .*'hearsay'"),
-        ('fixed = true\nsource = "reconstruction"', "fixed = true", r"points\[F\]\.source: .*found nothing"),
-        ('limit_source = "limit"\n', "", r"joints\[actuator rod end\]\.limit_source: .*found nothing"),
-        ('kind = "technical order"', 'kind = "a friend"', r"sources\.calibration\.kind: .*'a friend'"),
+        (
+            'value = 0.03\nsource = "margin"',
+            "value = 0.03",
+            r"margin\.source: expected a text, found nothing",
+        ),
+        (
+            'value = 0.03\nsource = "margin"',
+            'value = 0.03\nsource = "hearsay"',
+            r"margin\.source: .*'hearsay'",
+        ),
+        (
+            'fixed = true\nsource = "reconstruction"',
+            "fixed = true",
+            r"points\[F\]\.source: .*found nothing",
+        ),
+        (
+            'limit_source = "limit"\n',
+            "",
+            r"joints\[actuator rod end\]\.limit_source: .*found nothing",
+        ),
+        (
+            'kind = "technical order"',
+            'kind = "a friend"',
+            r"sources\.calibration\.kind: .*'a friend'",
+        ),
         # bad numbers
         ("at = [-1.8, -11.85]", "at = [nan, -11.85]", r"points\[F\]\.at: expected two numbers"),
         ("at = [-1.8, -11.85]", "at = [-1.8]", r"points\[F\]\.at: expected two numbers"),
@@ -150,25 +207,49 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
         ("value = 0.03\n", "value = nan\n", r"margin\.value: expected a number"),
         ("value = 0.03\n", "value = -0.03\n", r"margin\.value: expected a number above 0"),
         ("value = 0.03\n", "value = true\n", r"margin\.value: expected a number"),
-        ("limit = 0.0075\n", "limit = 0\n", r"joints\[actuator rod end\]\.limit: expected a number above 0"),
-        ("access_min = 10\n", "access_min = 0\n", r"joints\[actuator rod end\]\.access_min: expected a number above 0"),
-        ("new_part = 0.0005\n", "new_part = -1\n", r"joints\[actuator rod end\]\.new_part: expected a number of 0"),
+        (
+            "limit = 0.0075\n",
+            "limit = 0\n",
+            r"joints\[actuator rod end\]\.limit: expected a number above 0",
+        ),
+        (
+            "access_min = 10\n",
+            "access_min = 0\n",
+            r"joints\[actuator rod end\]\.access_min: expected a number above 0",
+        ),
+        (
+            "new_part = 0.0005\n",
+            "new_part = -1\n",
+            r"joints\[actuator rod end\]\.new_part: expected a number of 0",
+        ),
         ("sign = +1\ndriven", "sign = 2\ndriven", r"steps\[1\]\.sign: expected \+1 or -1"),
         # wrong types
         ("schema = 1\n", "schema = 2\n", r"schema: expected 1, found 2"),
         ("schema = 1\n", 'schema = "1"\n', r"schema: expected a whole number"),
         ("driven = true", 'driven = "yes"', r"steps\[1\]\.driven: expected true or false"),
-        ("virtual_links = [1]", "virtual_links = 1", r"steps\[1\]\.virtual_links: expected a list of whole numbers"),
+        (
+            "virtual_links = [1]",
+            "virtual_links = 1",
+            r"steps\[1\]\.virtual_links: expected a list of whole numbers",
+        ),
         (
             "virtual_links = [1]",
             "virtual_links = [0]",
             r"steps\[1\]\.virtual_links: .* from 1 to 999",
         ),
-        ('type = "slot"', 'type = "groove"', r"steps\[3\]\.type: expected crank, dyad, lever, slot or slider"),
+        (
+            'type = "slot"',
+            'type = "groove"',
+            r"steps\[3\]\.type: expected crank, dyad, lever, slot or slider",
+        ),
         ('kind = "position"', 'kind = "speed"', r"output\.kind: expected position or angle"),
         ('id = "hawker-800xp"', "id = 800", r"id: expected a text, found 800"),
         ("stages = [", "stages = 4\nstates = [", r"cycle\.stages: expected an array of tables"),
-        ('plunger = "in", flow', "plunger = 1, flow", r"cycle\.valve\[1\]\.plunger: expected a text"),
+        (
+            'plunger = "in", flow',
+            "plunger = 1, flow",
+            r"cycle\.valve\[1\]\.plunger: expected a text",
+        ),
         # what does not fit together
         ("number = 10\n", "number = 11\n", r"joints .* and virtual links .* differ"),
         ("number = 1\n", 'number = 1\npoint = "Z"\n', r"joint 1 is at point 'Z'"),
@@ -176,7 +257,9 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
         ("schema = 1", "schema = = 1", r"copy\.toml: cannot be read as TOML"),
     ],
 )
-def test_what_is_wrong_with_a_gear_file_is_named_with_its_place(edited: Edit, old: str, new: str, words: str) -> None:
+def test_what_is_wrong_with_a_gear_file_is_named_with_its_place(
+    edited: Edit, old: str, new: str, words: str
+) -> None:
     with pytest.raises(GearFileError, match=words) as caught:
         load_gear(edited(old, new))
     assert caught.value.message.startswith(("copy.toml: ", str(edited(old, new))))
@@ -188,7 +271,11 @@ def test_what_is_wrong_with_a_gear_file_is_named_with_its_place(edited: Edit, ol
     [
         ('hinge_point = "6"', 'hinge_point = "66"', "'link_assembly' is hinged at '66'"),
         ('follows = "1"', 'follows = "11"', "'2' needs '11'"),
-        ('joint = "10"\nupstream', 'joint = "100"\nupstream', "'100' locates a point that has no coordinates"),
+        (
+            'joint = "10"\nupstream',
+            'joint = "100"\nupstream',
+            "'100' locates a point that has no coordinates",
+        ),
         ("sign = +1\ndriven", "sign = -1\ndriven", r"'1' has the sign -1"),
         ("range = [0.0, 0.687]", "range = [-9.0, 0.687]", "closes over only"),
     ],
@@ -204,7 +291,9 @@ def test_a_mistake_in_the_ensemble_is_named_with_the_ensemble_file(edited: Edit)
     path = edited("schema = 1", "schema = 1 ")
     ensemble = path.with_name("hawker-800xp-ensemble.toml")
     text = ensemble.read_text(encoding="utf-8")
-    ensemble.write_text(text.replace('"1" = { sign = +1 }', '"1" = { sign = 3 }', 1), encoding="utf-8")
+    ensemble.write_text(
+        text.replace('"1" = { sign = +1 }', '"1" = { sign = 3 }', 1), encoding="utf-8"
+    )
     with pytest.raises(GearFileError, match=r"hawker-800xp-ensemble\.toml: steps\[1\]\.sign"):
         load_gear(path)
 
@@ -228,7 +317,9 @@ def test_a_joint_that_the_gear_does_not_have_is_refused(gear: Gear) -> None:
 
 
 @pytest.mark.parametrize("clearance", [0.0075, 0.1905 / 25.4, 0.381 / 25.4 / 2, 7.5 / 1000])
-def test_a_clearance_at_its_limit_is_not_over_it_in_whatever_unit_it_was_read(gear: Gear, clearance: float) -> None:
+def test_a_clearance_at_its_limit_is_not_over_it_in_whatever_unit_it_was_read(
+    gear: Gear, clearance: float
+) -> None:
     assert not gear.joint(1).is_over_limit(clearance)
 
 
@@ -251,12 +342,16 @@ def test_limits_are_an_array_in_the_order_of_the_joints(gear: Gear) -> None:
 
 
 def test_what_a_gear_file_need_not_state_is_assumed_and_says_so(edited: Edit) -> None:
-    restore = load_gear(edited('restore_min = 120\nrestore_source = "minutes"\n', "")).joints[0].restore
+    restore = (
+        load_gear(edited('restore_min = 120\nrestore_source = "minutes"\n', "")).joints[0].restore
+    )
     assert (restore.value, restore.unit, restore.kind) == (120.0, "min", SourceKind.ASSUMED)
     assert "120 min is assumed" in restore.source
 
 
 @pytest.mark.parametrize("name", ["length.F-1", "lever.6.across", "length.6-7"])
-def test_a_cause_that_would_change_no_number_of_the_linkage_is_refused(edited: Edit, name: str) -> None:
+def test_a_cause_that_would_change_no_number_of_the_linkage_is_refused(
+    edited: Edit, name: str
+) -> None:
     with pytest.raises(GearFileError, match=r"a number of the linkage instead of 'length\.1-F'"):
         load_gear(edited(f'"{name}"', '"length.1-F"'))

@@ -79,9 +79,17 @@ def test_hostile_names_never_become_code_in_the_program(hostile: Gear, gear: Gea
     assert programs[0].inputs == programs[1].inputs
 
 
-def test_a_linkage_with_hostile_names_moves_as_the_same_linkage_with_plain_names(hostile: Gear, gear: Gear) -> None:
-    assert hostile.model.plunger_amplification().tolist() == gear.model.plunger_amplification().tolist()
-    x = [list(m.model.kernel.positions(0.3, m.model.kernel.no_clearance()).values())[-1] for m in (hostile, gear)]
+def test_a_linkage_with_hostile_names_moves_as_the_same_linkage_with_plain_names(
+    hostile: Gear, gear: Gear
+) -> None:
+    assert (
+        hostile.model.plunger_amplification().tolist()
+        == gear.model.plunger_amplification().tolist()
+    )
+    x = [
+        list(m.model.kernel.positions(0.3, m.model.kernel.no_clearance()).values())[-1]
+        for m in (hostile, gear)
+    ]
     assert x[0] == x[1]
 
 
@@ -95,11 +103,15 @@ def test_hostile_names_do_not_reach_the_formulas_on_ranges(hostile: Gear, gear: 
 @pytest.mark.slow
 def test_hostile_names_do_not_reach_the_compiled_loop(hostile: Gear, gear: Gear) -> None:
     clearance = np.full((10, 3), 0.001)
-    moved = [g.model.kernel.batch(0.6, clearance, np.zeros(10), compiled=True) for g in (hostile, gear)]
+    moved = [
+        g.model.kernel.batch(0.6, clearance, np.zeros(10), compiled=True) for g in (hostile, gear)
+    ]
     assert moved[0].tolist() == moved[1].tolist()
 
 
-def test_hostile_names_are_text_in_the_drawing_of_a_report(hostile: Gear, table: IndexTable) -> None:
+def test_hostile_names_are_text_in_the_drawing_of_a_report(
+    hostile: Gear, table: IndexTable
+) -> None:
     gear = hostile
     own = replace(table, geometry_sha256=gear.geometry_sha256, ensemble_sha256=gear.ensemble_sha256)
     inspection = Inspection("R", "N1", Side.LH, ClearanceConvention.RADIAL, {3: 0.013, 5: 0.007})
@@ -115,7 +127,11 @@ def test_hostile_names_are_text_in_the_drawing_of_a_report(hostile: Gear, table:
 def test_two_numbers_that_names_make_alike_are_refused() -> None:
     # The lengths a-b to c and a to b-c would both be called length.a-b-c.
     points = [("a-b", 0.0, 0.0), ("c", 1.0, 0.0), ("a", 3.0, 0.0), ("b-c", 5.0, 0.0)]
-    text = {"planes": (Plane("base"),), "reference_input": 0.0, "output": Output("angle", "c", "a-b")}
+    text = {
+        "planes": (Plane("base"),),
+        "reference_input": 0.0,
+        "output": Output("angle", "c", "a-b"),
+    }
     parts = tuple(Point(n, "base", x, y, fixed=n in {"a-b", "a"}) for n, x, y in points)
     with pytest.raises(MechanismError, match=r"Two numbers .* 'length.a-b-c'"):
         write_program(Mechanism(points=parts, steps=(Crank("c", "a-b"), Crank("b-c", "a")), **text))
@@ -123,11 +139,29 @@ def test_two_numbers_that_names_make_alike_are_refused() -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["", " ", "x" * 41, "a\x00b", "a\x1b[31m", "a\nb", "a\u202eb", "a\u2066b", "a\u200bb", "\ud800", "a\ufffeb"],
+    [
+        "",
+        " ",
+        "x" * 41,
+        "a\x00b",
+        "a\x1b[31m",
+        "a\nb",
+        "a\u202eb",
+        "a\u2066b",
+        "a\u200bb",
+        "\ud800",
+        "a\ufffeb",
+    ],
 )
 def test_a_name_that_cannot_be_shown_as_it_is_is_refused(name: str) -> None:
     with pytest.raises(MechanismError, match="cannot be the name of a part"):
-        Mechanism((Plane("base"),), (Point(name, "base", 0.0, 0.0, True),), (), Output("angle", name, name), 0.0)
+        Mechanism(
+            (Plane("base"),),
+            (Point(name, "base", 0.0, 0.0, True),),
+            (),
+            Output("angle", name, name),
+            0.0,
+        )
 
 
 Edit = Callable[[str, str], Path]
@@ -155,31 +189,103 @@ def edited(gear: Gear, tmp_path: Path) -> Edit:
             r'name = "F\u202e"',
             r"points\[1\]\.name: expected a text .* all of them printable",
         ),
-        ('name = "locking pin"', f'name = "{"p" * 41}"', r"joints\[2\]\.name: expected a name of 1 to 40"),
-        ('provenance = "', r'provenance = "\u001b[31m', r"provenance: expected a text .* printable"),
-        ('ensemble = "hawker', 'ensemble = "../hawker', r"ensemble: expected the name of a file in the same folder"),
+        (
+            'name = "locking pin"',
+            f'name = "{"p" * 41}"',
+            r"joints\[2\]\.name: expected a name of 1 to 40",
+        ),
+        (
+            'provenance = "',
+            r'provenance = "\u001b[31m',
+            r"provenance: expected a text .* printable",
+        ),
+        (
+            'ensemble = "hawker',
+            'ensemble = "../hawker',
+            r"ensemble: expected the name of a file in the same folder",
+        ),
         (
             'ensemble = "hawker-800xp-ensemble.toml"',
             'ensemble = ""',
             r"ensemble: expected the name of a file in the same folder",
         ),
-        ('indices = "hawker', 'indices = "/etc/hawker', r"indices: expected the name of a file in the same folder"),
-        ('indices = "hawker', r'indices = "a\\hawker', r"indices: expected the name of a file in the same folder"),
+        (
+            'indices = "hawker',
+            'indices = "/etc/hawker',
+            r"indices: expected the name of a file in the same folder",
+        ),
+        (
+            'indices = "hawker',
+            r'indices = "a\\hawker',
+            r"indices: expected the name of a file in the same folder",
+        ),
         ("at = [-1.8, -11.85]", "at = [1e308, -11.85]", r"points\[F\]\.at: expected two numbers"),
-        ("at = [-1.8, -11.85]", "at = [1e5, -11.85]", r"points\[F\]\.at: expected two numbers from -10000 to 10000"),
-        ("at = [-1.8, -11.85]", f"at = [1{'0' * 400}, 1]", r"points\[F\]\.at: expected two numbers"),
-        ("range = [0.0, 0.687]", "range = [0.687, 0.687]", r"input\.range: expected two different numbers"),
-        ("dihedral_deg = 48.92", "dihedral_deg = 1e9", r"dihedral_deg: expected a number from -720 to 720"),
-        ("access_min = 15", "access_min = 1e9", r"access_min: expected a number of 0 or more, at most 100000"),
-        ("virtual_link = 4", "virtual_link = -4", r"virtual_link: expected a whole number from 1 to 999"),
-        ("virtual_links = [1]", "virtual_links = [-1]", r"virtual_links: expected whole numbers from 1 to 999"),
-        ("virtual_links = [1]", "virtual_links = [true]", r"virtual_links: expected a list of whole numbers"),
-        ("number = 1\n", f"number = {10**30}\n", r"number: expected a whole number, found a number of 100 bits"),
-        ("[0.01, 0.05]", "[0.05, 0.01]", r"down_lock_range: expected two numbers, the smaller one first"),
-        ("schema = 1", "schema = 1\nx = " + "[" * 5000 + "]" * 5000, r"nested more than 24 deep|a line has"),
+        (
+            "at = [-1.8, -11.85]",
+            "at = [1e5, -11.85]",
+            r"points\[F\]\.at: expected two numbers from -10000 to 10000",
+        ),
+        (
+            "at = [-1.8, -11.85]",
+            f"at = [1{'0' * 400}, 1]",
+            r"points\[F\]\.at: expected two numbers",
+        ),
+        (
+            "range = [0.0, 0.687]",
+            "range = [0.687, 0.687]",
+            r"input\.range: expected two different numbers",
+        ),
+        (
+            "dihedral_deg = 48.92",
+            "dihedral_deg = 1e9",
+            r"dihedral_deg: expected a number from -720 to 720",
+        ),
+        (
+            "access_min = 15",
+            "access_min = 1e9",
+            r"access_min: expected a number of 0 or more, at most 100000",
+        ),
+        (
+            "virtual_link = 4",
+            "virtual_link = -4",
+            r"virtual_link: expected a whole number from 1 to 999",
+        ),
+        (
+            "virtual_links = [1]",
+            "virtual_links = [-1]",
+            r"virtual_links: expected whole numbers from 1 to 999",
+        ),
+        (
+            "virtual_links = [1]",
+            "virtual_links = [true]",
+            r"virtual_links: expected a list of whole numbers",
+        ),
+        (
+            "number = 1\n",
+            f"number = {10**30}\n",
+            r"number: expected a whole number, found a number of 100 bits",
+        ),
+        (
+            "[0.01, 0.05]",
+            "[0.05, 0.01]",
+            r"down_lock_range: expected two numbers, the smaller one first",
+        ),
+        (
+            "schema = 1",
+            "schema = 1\nx = " + "[" * 5000 + "]" * 5000,
+            r"nested more than 24 deep|a line has",
+        ),
         ("schema = 1", "schema = 1\nx = " + "[\n" * 5000 + "]" * 5000, r"nested more than 24 deep"),
-        ("schema = 1", "schema = 1\nx = " + "{a=" * 30 + "1" + "}" * 30, r"nested more than 24 deep"),
-        ("schema = 1", "schema = 1\n" + "a." * LONGEST_LINE + "a = 1", r"a line has \d+ characters"),
+        (
+            "schema = 1",
+            "schema = 1\nx = " + "{a=" * 30 + "1" + "}" * 30,
+            r"nested more than 24 deep",
+        ),
+        (
+            "schema = 1",
+            "schema = 1\n" + "a." * LONGEST_LINE + "a = 1",
+            r"a line has \d+ characters",
+        ),
         ("schema = 1", "schema = 1\n# " + "x\n# " * MOST_BYTES, r"at most 2000000 are read"),
         ("schema = 1", "schema = 1" + "\n[[steps]]" * 300, r"steps: expected at most 200 entries"),
         ("schema = 1", "schema = 1\nseen = 2024-01-01", r"seen: expected a known key"),
@@ -204,14 +310,44 @@ def test_what_no_gear_can_have_is_refused_with_file_key_and_expectation(
             "reference = true",
             r"ensemble\.toml: members\.B\.reference: expected a number",
         ),
-        ("ensemble", "dihedral_deg = 48.656", "dihedral_deg = nan", r"dihedral_deg: expected a number, found nan"),
+        (
+            "ensemble",
+            "dihedral_deg = 48.656",
+            "dihedral_deg = nan",
+            r"dihedral_deg: expected a number, found nan",
+        ),
         ("ensemble", '"F" = [-1.243', '"F" = [inf', r"members\.B\.points\.F: expected two numbers"),
-        ("ensemble", "[members.B]", r'[members."B\u202e"]', r"expected a name of 1 to 40 printable"),
-        ("ensemble", "dihedral_deg = 48.656", "dihedral_deg = 1e6", r"expected a number from -720 to 720"),
-        ("targets", "value = 0.0472", "value = nan", r"targets\.toml: targets\[1\]\.value: expected a number"),
+        (
+            "ensemble",
+            "[members.B]",
+            r'[members."B\u202e"]',
+            r"expected a name of 1 to 40 printable",
+        ),
+        (
+            "ensemble",
+            "dihedral_deg = 48.656",
+            "dihedral_deg = 1e6",
+            r"expected a number from -720 to 720",
+        ),
+        (
+            "targets",
+            "value = 0.0472",
+            "value = nan",
+            r"targets\.toml: targets\[1\]\.value: expected a number",
+        ),
         ("targets", "{ 3 = 0.013", "{ 3 = true", r"clearance_in\.3: expected a number"),
-        ("targets", "{ 3 = 0.013", '{ "²" = 0.013', r"clearance_in\.²: expected the number of a joint"),
-        ("targets", "{ 3 = 0.013", "{ 3 = -0.013", r"clearance_in\.3: expected a number from 0 to 1"),
+        (
+            "targets",
+            "{ 3 = 0.013",
+            '{ "²" = 0.013',
+            r"clearance_in\.²: expected the number of a joint",
+        ),
+        (
+            "targets",
+            "{ 3 = 0.013",
+            "{ 3 = -0.013",
+            r"clearance_in\.3: expected a number from 0 to 1",
+        ),
     ],
 )
 def test_numbers_of_the_ensemble_and_of_the_targets_are_judged_likewise(
@@ -222,7 +358,9 @@ def test_numbers_of_the_ensemble_and_of_the_targets_are_judged_likewise(
         load_targets(targets_file(load_gear(path)))
 
 
-@pytest.mark.parametrize("text", ["[" * 5000 + "]" * 5000, '{"a": ' * 5000 + "1" + "}" * 5000, "1" * 5000, "[]", "3"])
+@pytest.mark.parametrize(
+    "text", ["[" * 5000 + "]" * 5000, '{"a": ' * 5000 + "1" + "}" * 5000, "1" * 5000, "[]", "3"]
+)
 def test_a_json_file_that_is_too_deep_or_no_table_is_refused(tmp_path: Path, text: str) -> None:
     file = tmp_path / "x.json"
     file.write_text(text)

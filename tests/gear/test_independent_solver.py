@@ -53,7 +53,9 @@ def closed_form(sample: Sample) -> np.ndarray:
     return sample.model.kernel.output(sample.stroke, [flat[:, i] for i in range(20)])
 
 
-def test_plunger_positions_agree_to_a_billionth_of_an_inch_on_every_linkage(samples: list[Sample]) -> None:
+def test_plunger_positions_agree_to_a_billionth_of_an_inch_on_every_linkage(
+    samples: list[Sample],
+) -> None:
     errors = [np.max(np.abs(closed_form(s) - s.solved[:, 4])) for s in samples]
     assert sum(len(s.stroke) for s in samples) >= 300
     assert max(errors) < 1e-9
@@ -63,12 +65,16 @@ def test_the_samples_move_the_plunger_far_more_than_the_tolerance(samples: list[
     assert np.std(np.concatenate([s.solved[:, 4] for s in samples])) > 0.05
 
 
-def test_the_calibration_rate_agrees_on_every_linkage(gear: Gear, solvers: dict[str, LoopClosure]) -> None:
+def test_the_calibration_rate_agrees_on_every_linkage(
+    gear: Gear, solvers: dict[str, LoopClosure]
+) -> None:
     for linkage, model in zip(gear.ensemble, gear.ensemble_models, strict=True):
         assert solvers[linkage.name].calibration(0.45) == pytest.approx(model.rate, rel=1e-8)
 
 
-def test_lever_joints_agree_in_space(samples: list[Sample], solvers: dict[str, LoopClosure]) -> None:
+def test_lever_joints_agree_in_space(
+    samples: list[Sample], solvers: dict[str, LoopClosure]
+) -> None:
     sample, solver = samples[0], solvers["A"]
     flat = sample.links.reshape(len(sample.stroke), 20)
     place = sample.model.kernel.positions(sample.stroke, [flat[:, i] for i in range(20)])
@@ -76,7 +82,12 @@ def test_lever_joints_agree_in_space(samples: list[Sample], solvers: dict[str, L
     worst = 0.0
     for i, (crank, release, lock, bell, _) in enumerate(sample.solved):
         v4, v8 = sample.links[i, 3], sample.links[i, 7]
-        in_side = {"1": ("E", crank, 0.0), "3": ("Q", release, 0.0), "5": ("4", lock, v4), "6": ("4", lock, v4)}
+        in_side = {
+            "1": ("E", crank, 0.0),
+            "3": ("Q", release, 0.0),
+            "5": ("4", lock, v4),
+            "6": ("4", lock, v4),
+        }
         for joint, (pivot, angle, shift) in in_side.items():
             found = solver.turned(pivot, joint, angle)[:2] + shift
             worst = max(worst, *np.abs(found - [place[joint][0][i], place[joint][1][i]]))

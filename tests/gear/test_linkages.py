@@ -1,8 +1,8 @@
 """The shipped linkages are the ten reconstructions.
 
-The literals are what the search that found the linkages recorded for each of them, five digits after the point:
-calibration rate, least plunger displacement, failure case (#3 = 0.013, #5 = 0.007 in) and all ten joints at
-0.0075 in, each of the last two for over-travel and under-travel.
+The literals are what the search that found the linkages recorded for each of them, five digits
+after the point: calibration rate, least plunger displacement, failure case (#3 = 0.013, #5 = 0.007
+in) and all ten joints at 0.0075 in, each of the last two for over-travel and under-travel.
 """
 
 from __future__ import annotations
@@ -41,10 +41,42 @@ CURVE_A = (
     (0.6183, 0.36159),
     (0.687, 0.46379),
 )
-DOWN_LOCK_A = {"1": (-7.0368, 2.4877), "2": (-1.1279, -0.5418), "3": (1.1577, -0.201), "5": (3.6403, 2.5104)}
-DOWN_LOCK_A |= {"6": (3.2198, 5.6532), "7": (0.9166, -5.4235), "9": (0.7619, -4.8444), "10": (3.3298, -1.7901)}
-AMPLIFICATION_A = (1.61656, 2.35662, 2.24656, 2.32986, 2.24656, 0.40703, 0.40703, 0.45511, 0.51395, 0.51395)
-OVER_TRAVEL_DIRECTIONS_A_DEG = (107.21, 185.63, 188.23, 2.65, 189.56, 98.12, 98.11, 350.94, 40.22, 40.19)
+DOWN_LOCK_A = {
+    "1": (-7.0368, 2.4877),
+    "2": (-1.1279, -0.5418),
+    "3": (1.1577, -0.201),
+    "5": (3.6403, 2.5104),
+}
+DOWN_LOCK_A |= {
+    "6": (3.2198, 5.6532),
+    "7": (0.9166, -5.4235),
+    "9": (0.7619, -4.8444),
+    "10": (3.3298, -1.7901),
+}
+AMPLIFICATION_A = (
+    1.61656,
+    2.35662,
+    2.24656,
+    2.32986,
+    2.24656,
+    0.40703,
+    0.40703,
+    0.45511,
+    0.51395,
+    0.51395,
+)
+OVER_TRAVEL_DIRECTIONS_A_DEG = (
+    107.21,
+    185.63,
+    188.23,
+    2.65,
+    189.56,
+    98.12,
+    98.11,
+    350.94,
+    40.22,
+    40.19,
+)
 
 FAILURE = np.array([0, 0, 0.013, 0, 0.007, 0, 0, 0, 0, 0])
 ALL_TEN = np.full(10, 0.0075)
@@ -74,13 +106,19 @@ def test_the_least_plunger_displacement_is_the_recorded_one(gear: Gear, name: st
 
 
 @each_linkage
-def test_the_failure_case_moves_the_plunger_as_recorded_in_both_senses(gear: Gear, name: str) -> None:
+def test_the_failure_case_moves_the_plunger_as_recorded_in_both_senses(
+    gear: Gear, name: str
+) -> None:
     worst = worst_case(model_of(gear, name), FAILURE)
-    assert (worst.over_in[0], worst.under_in[0]) == pytest.approx(ACHIEVED[name][2:4], abs=HALF_DIGIT)
+    assert (worst.over_in[0], worst.under_in[0]) == pytest.approx(
+        ACHIEVED[name][2:4], abs=HALF_DIGIT
+    )
 
 
 @each_linkage
-def test_all_ten_joints_at_their_limit_move_the_plunger_as_recorded_in_both_senses(gear: Gear, name: str) -> None:
+def test_all_ten_joints_at_their_limit_move_the_plunger_as_recorded_in_both_senses(
+    gear: Gear, name: str
+) -> None:
     worst = worst_case(model_of(gear, name), ALL_TEN)
     # The search looked over all directions at once; the sequential rule may fall short by 0.04 %.
     recorded = np.array(ACHIEVED[name][4:])
@@ -125,7 +163,11 @@ def test_up_to_15_thou_everything_closes_over_the_whole_stroke_on_every_linkage(
     rng = np.random.default_rng(9)
     directions = rng.uniform(0, 2 * np.pi, (300, 10))
     for model in gear.ensemble_models:
-        links = [0.015 * part[:, j] for j in range(10) for part in (np.cos(directions), np.sin(directions))]
+        links = [
+            0.015 * part[:, j]
+            for j in range(10)
+            for part in (np.cos(directions), np.sin(directions))
+        ]
         assert np.all(np.isfinite(model.kernel.output(rng.uniform(*model.stroke, 300), links)))
 
 

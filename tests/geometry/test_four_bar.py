@@ -50,7 +50,9 @@ def rocker_turn(model: LinkageModel, coupler: float) -> float:
 
 def test_the_coordinates_give_the_links_seven_and_nine(model: LinkageModel) -> None:
     numbers = dict(zip(model.kernel.parameter_names, model.kernel.parameters, strict=True))
-    assert (numbers["length.A-B"], numbers["length.B-O4"]) == pytest.approx((COUPLER, ROCKER), abs=1e-14)
+    assert (numbers["length.A-B"], numbers["length.B-O4"]) == pytest.approx(
+        (COUPLER, ROCKER), abs=1e-14
+    )
 
 
 def test_the_open_linkage_has_the_published_angles(model: LinkageModel) -> None:
@@ -66,16 +68,24 @@ def test_equal_clearances_at_the_four_joints_contribute_equally(model: LinkageMo
     assert model.plunger_amplification() == pytest.approx(np.full(4, 0.2332436), abs=5e-8)
 
 
-def test_the_contribution_is_one_over_rocker_times_sine_of_the_transmission_angle(model: LinkageModel) -> None:
+def test_the_contribution_is_one_over_rocker_times_sine_of_the_transmission_angle(
+    model: LinkageModel,
+) -> None:
     coupler, rocker = np.radians(angles_deg(model, +1.0))
-    assert model.plunger_amplification() == pytest.approx(np.full(4, 1 / (ROCKER * math.sin(rocker - coupler))))
+    assert model.plunger_amplification() == pytest.approx(
+        np.full(4, 1 / (ROCKER * math.sin(rocker - coupler)))
+    )
 
 
-def test_a_coupler_shorter_by_all_clearances_gives_the_published_worst_over_travel(model: LinkageModel) -> None:
+def test_a_coupler_shorter_by_all_clearances_gives_the_published_worst_over_travel(
+    model: LinkageModel,
+) -> None:
     assert rocker_turn(model, COUPLER - 4 * CLEARANCE) == pytest.approx(WORST_OVER_RAD, abs=1e-10)
 
 
-def test_a_coupler_longer_by_all_clearances_gives_the_published_worst_under_travel(model: LinkageModel) -> None:
+def test_a_coupler_longer_by_all_clearances_gives_the_published_worst_under_travel(
+    model: LinkageModel,
+) -> None:
     assert rocker_turn(model, COUPLER + 4 * CLEARANCE) == pytest.approx(WORST_UNDER_RAD, abs=1e-10)
 
 
@@ -84,9 +94,12 @@ def test_clearances_all_along_the_final_coupler_act_as_a_longer_or_shorter_coupl
     model: LinkageModel, sense: float
 ) -> None:
     longer = COUPLER + sense * 4 * CLEARANCE
-    place = model.kernel.positions(CRANK_RAD, model.kernel.no_clearance(), model.numbers({"length.A-B": longer}))
+    place = model.kernel.positions(
+        CRANK_RAD, model.kernel.no_clearance(), model.numbers({"length.A-B": longer})
+    )
     along = math.atan2(place["B"][1] - place["A"][1], place["B"][0] - place["A"][0])
-    # Joints 1 to 3 push the coupler's upstream end forward; joint 4 is the pivot it is pushed against.
+    # Joints 1 to 3 push the coupler's upstream end forward; joint 4 is the pivot it is pushed
+    # against.
     directions = np.array([along, along, along, along + math.pi]) + (math.pi if sense < 0 else 0.0)
     moved = model.displacement(links_from(np.full(4, CLEARANCE), directions))
     assert float(moved) == pytest.approx(rocker_turn(model, longer), abs=1e-14)
@@ -96,7 +109,9 @@ def test_the_sequential_rule_comes_within_twenty_in_a_million_of_the_exact_worst
     model: LinkageModel,
 ) -> None:
     worst = worst_case(model, np.full((1, 4), CLEARANCE))
-    assert (worst.over_in[0], worst.under_in[0]) == pytest.approx((WORST_OVER_RAD, WORST_UNDER_RAD), rel=2e-5)
+    assert (worst.over_in[0], worst.under_in[0]) == pytest.approx(
+        (WORST_OVER_RAD, WORST_UNDER_RAD), rel=2e-5
+    )
 
 
 def test_no_directions_go_beyond_the_exact_worst_case(model: LinkageModel) -> None:

@@ -41,14 +41,18 @@ def _inside(found: Range, function: Callable[[Any, Any], Any], points: np.ndarra
             ahead = function(x + dx + ex, y + dy + ey) - function(x + dx - ex, y + dy - ey)
             behind = function(x - dx + ex, y - dy + ey) - function(x - dx - ex, y - dy - ey)
             bend = (ahead - behind) / (4 * step**2)
-            assert np.all((found.bend[0][i, j] - 1e-5 <= bend) & (bend <= found.bend[1][i, j] + 1e-5))
+            assert np.all(
+                (found.bend[0][i, j] - 1e-5 <= bend) & (bend <= found.bend[1][i, j] + 1e-5)
+            )
 
 
 @pytest.mark.parametrize("name", list(FUNCTIONS))
 def test_values_slopes_and_bends_of_a_formula_lie_inside(name: str) -> None:
     low, high = np.array([[1.0], [0.6]]), np.array([[1.9], [1.3]])
     found = FUNCTIONS[name](*Box(low, high).variables())
-    grid = np.stack(np.meshgrid(np.linspace(1.0, 1.9, 31), np.linspace(0.6, 1.3, 31))).reshape(2, -1)
+    grid = np.stack(np.meshgrid(np.linspace(1.0, 1.9, 31), np.linspace(0.6, 1.3, 31))).reshape(
+        2, -1
+    )
     _inside(found, FUNCTIONS[name], grid)
 
 
@@ -68,7 +72,9 @@ def test_a_point_is_enclosed_to_a_few_units_in_the_last_place(name: str) -> None
 
 
 @pytest.mark.parametrize("function", [np.sqrt, lambda x: 1.0 / x])
-def test_where_a_formula_may_not_exist_its_range_is_not_a_number(function: Callable[[Any], Any]) -> None:
+def test_where_a_formula_may_not_exist_its_range_is_not_a_number(
+    function: Callable[[Any], Any],
+) -> None:
     (x,) = Box(np.array([[-0.1]]), np.array([[1.0]])).variables()
     assert np.isnan(function(x).value[1][0])
 
@@ -94,7 +100,9 @@ def _tip(x: Any, y: Any) -> tuple[Any, Any, Any, Any]:
 
 
 @pytest.mark.parametrize("width", [0.01, 0.05, 0.1, 0.25])
-def test_a_joint_narrowed_by_its_links_still_holds_every_true_position_slope_and_bend(width: float) -> None:
+def test_a_joint_narrowed_by_its_links_still_holds_every_true_position_slope_and_bend(
+    width: float,
+) -> None:
     low, high = np.array([[-width], [-width]]), np.array([[width], [width]])
     x, y = Box(low, high).variables()
     c = _tip(x, y)
@@ -102,13 +110,17 @@ def test_a_joint_narrowed_by_its_links_still_holds_every_true_position_slope_and
     narrowed = narrowed_by_links(c[:2], (x, y), (5.2, 0.0), 9.0, c[2])
     after = [float(np.max(part.bend[1] - part.bend[0])) for part in narrowed]
     assert after[1] < before[1] or not np.isfinite(before[1])
-    grid = width * np.stack(np.meshgrid(np.linspace(-1, 1, 15), np.linspace(-1, 1, 15))).reshape(2, -1)
+    grid = width * np.stack(np.meshgrid(np.linspace(-1, 1, 15), np.linspace(-1, 1, 15))).reshape(
+        2, -1
+    )
     for k, part in enumerate(narrowed):
         _inside(part, lambda a, b, k=k: _tip(a, b)[k], grid)
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(1e-6, 0.0075), st.floats(0.0, 1.0))
-def test_an_enclosure_of_the_linkage_holds_every_point_in_it(gear: Gear, seed: int, width: float, part: float) -> None:
+def test_an_enclosure_of_the_linkage_holds_every_point_in_it(
+    gear: Gear, seed: int, width: float, part: float
+) -> None:
     rng = np.random.default_rng(seed)
     kernel = gear.model.kernel
     middle = rng.uniform(-0.004, 0.004, 20)
@@ -125,5 +137,7 @@ def test_an_enclosure_of_the_linkage_holds_every_point_in_it(gear: Gear, seed: i
         ahead, behind = inside.copy(), inside.copy()
         ahead[:, i] += step
         behind[:, i] -= step
-        slope = (kernel.output(stroke, list(ahead.T)) - kernel.output(stroke, list(behind.T))) / (2 * step)
+        slope = (kernel.output(stroke, list(ahead.T)) - kernel.output(stroke, list(behind.T))) / (
+            2 * step
+        )
         assert np.all((found.slope[0][i] - 1e-6 <= slope) & (slope <= found.slope[1][i] + 1e-6))

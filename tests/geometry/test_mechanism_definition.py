@@ -34,7 +34,13 @@ OUTPUT = Output("angle", "B", "P")
 
 
 def build(**changes: Any) -> Mechanism:
-    parts = {"planes": PLANES, "points": POINTS, "steps": STEPS, "output": OUTPUT, "reference_input": 0.0}
+    parts = {
+        "planes": PLANES,
+        "points": POINTS,
+        "steps": STEPS,
+        "output": OUTPUT,
+        "reference_input": 0.0,
+    }
     return Mechanism(**{**parts, **changes})
 
 
@@ -52,13 +58,18 @@ def test_a_valid_mechanism_lists_its_virtual_links_in_order() -> None:
         ({"planes": (*PLANES, Plane("up", "above", "O"))}, "'up' is hinged to 'above'"),
         ({"planes": (*PLANES, Plane("up", "base", "nowhere"))}, "'up' is hinged at 'nowhere'"),
         ({"steps": STEPS[::-1]}, "'B' needs 'A'"),
-        ({"steps": (*STEPS, Crank("A", "O"))}, "'A' locates a point that is fixed or located before"),
+        (
+            {"steps": (*STEPS, Crank("A", "O"))},
+            "'A' locates a point that is fixed or located before",
+        ),
         ({"steps": (*STEPS[:1], Dyad("B", "A", "P", 1.0, (2,)))}, "virtual link is used twice"),
         ({"output": Output("angle", "C", "P")}, "reads 'C'"),
         ({"output": Output("angle", "B")}, "an angle about ''"),
     ],
 )
-def test_a_mechanism_that_refers_to_what_is_not_there_is_refused_by_name(changes: dict[str, Any], words: str) -> None:
+def test_a_mechanism_that_refers_to_what_is_not_there_is_refused_by_name(
+    changes: dict[str, Any], words: str
+) -> None:
     with pytest.raises(MechanismError, match=words):
         build(**changes)
 
@@ -73,18 +84,28 @@ def replaced(name: str, **coordinates: float) -> tuple[Point, ...]:
         ({"points": replaced("A", x=0.0)}, "O-A has no length"),
         ({"steps": (*STEPS[:1], Dyad("B", "A", "P", -1.0, (1,)))}, "'B' has the sign -1"),
         ({"output": Output("position", "B")}, "position of 'B', which is not a slider"),
-        ({"points": replaced("P", x=0.0), "steps": (STEPS[0], Lever("B", "P", "O"))}, "P-O has no length"),
-        ({"points": replaced("P", x=2.0), "steps": (STEPS[0], Slot("B", "P", "A"))}, "P-A has no length"),
+        (
+            {"points": replaced("P", x=0.0), "steps": (STEPS[0], Lever("B", "P", "O"))},
+            "P-O has no length",
+        ),
+        (
+            {"points": replaced("P", x=2.0), "steps": (STEPS[0], Slot("B", "P", "A"))},
+            "P-A has no length",
+        ),
     ],
 )
-def test_a_mechanism_whose_numbers_make_no_sense_is_refused_by_name(changes: dict[str, Any], words: str) -> None:
+def test_a_mechanism_whose_numbers_make_no_sense_is_refused_by_name(
+    changes: dict[str, Any], words: str
+) -> None:
     mechanism = build(**changes)
     with pytest.raises(MechanismError, match=words):
         write_program(mechanism)
 
 
 def test_a_slider_on_the_wrong_side_of_its_sign_is_refused() -> None:
-    mechanism = build(steps=(STEPS[0], Slider("B", "A", 0.0, 1.0)), output=Output("position", "B"), points=POINTS)
+    mechanism = build(
+        steps=(STEPS[0], Slider("B", "A", 0.0, 1.0)), output=Output("position", "B"), points=POINTS
+    )
     with pytest.raises(MechanismError, match="'B' has the sign"):
         write_program(mechanism)
 
@@ -104,6 +125,8 @@ def test_a_plane_hinged_at_a_point_of_another_plane_is_refused() -> None:
         mechanism.frame("high")
 
 
-def test_a_linkage_that_does_not_close_over_its_stroke_is_refused_with_the_share_that_closes() -> None:
+def test_a_linkage_that_does_not_close_over_its_stroke_is_refused_with_the_share_that_closes() -> (
+    None
+):
     with pytest.raises(MechanismError, match=r"closes over only \d+ % of its stroke"):
         LinkageModel(build(points=replaced("B", x=4.0, y=1.0)), (0.0, 3.0), Calibration())

@@ -27,7 +27,11 @@ def model() -> LinkageModel:
 def slider(angle: float, rod: float = ROD) -> float:
     """Position of the slider from its place at crank angle 0: the textbook formula."""
     at_zero = CRANK + math.sqrt(ROD**2 - OFFSET**2)
-    return CRANK * math.cos(angle) + math.sqrt(rod**2 - (CRANK * math.sin(angle) + OFFSET) ** 2) - at_zero
+    return (
+        CRANK * math.cos(angle)
+        + math.sqrt(rod**2 - (CRANK * math.sin(angle) + OFFSET) ** 2)
+        - at_zero
+    )
 
 
 @given(angle=st.floats(-math.pi, math.pi))

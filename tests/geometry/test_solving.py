@@ -1,4 +1,6 @@
-"""Properties of the solver that hold for every mechanism, tried on the shipped linkages with clearances."""
+"""Properties of the solver that hold for every mechanism, tried on the shipped linkages with
+clearances.
+"""
 
 from __future__ import annotations
 
@@ -17,12 +19,17 @@ from mlg_troubleshoot.geometry.mechanism import Mechanism
 
 clearances = arrays(float, 10, elements=st.floats(0, 0.015))
 directions = arrays(float, 10, elements=st.floats(-np.pi, np.pi))
-# Directions of the joints of the base plane turn with it; those of the hinged plane are seen from that plane.
+# Directions of the joints of the base plane turn with it; those of the hinged plane are seen from
+# that plane.
 IN_BASE_PLANE = 5
 
 
-def in_space(mechanism: Mechanism, place: dict, name: str, shift: np.ndarray | float = 0.0) -> np.ndarray:
-    """Coordinates of a point in space, shape (..., 3), shifted in its plane or in the plane named with it."""
+def in_space(
+    mechanism: Mechanism, place: dict, name: str, shift: np.ndarray | float = 0.0
+) -> np.ndarray:
+    """Coordinates of a point in space, shape (..., 3), shifted in its plane or in the plane named
+    with it.
+    """
     origin, axes = mechanism.frame(mechanism.point(name).plane)
     x, y = place[name]
     return origin + np.multiply.outer(x, axes[0]) + np.multiply.outer(y, axes[1]) + shift
@@ -53,13 +60,18 @@ def link_error(linkage: Linkage, kernel: Kernel, n: int = 60) -> float:
         nominal = np.linalg.norm(at_reference(a) - at_reference(b))
         if a == "F":
             nominal = nominal + stroke - mechanism.reference_input
-        found = np.linalg.norm(in_space(mechanism, place, b) - in_space(mechanism, place, a, moved_by), axis=-1)
+        found = np.linalg.norm(
+            in_space(mechanism, place, b) - in_space(mechanism, place, a, moved_by), axis=-1
+        )
         errors.append(np.max(np.abs(found - nominal)))
     return float(np.max(errors))
 
 
 def test_link_and_lever_lengths_survive_solving_on_every_linkage(gear: Gear) -> None:
-    errors = [link_error(m, model.kernel) for m, model in zip(gear.ensemble, gear.ensemble_models, strict=True)]
+    errors = [
+        link_error(m, model.kernel)
+        for m, model in zip(gear.ensemble, gear.ensemble_models, strict=True)
+    ]
     assert max(errors) < 1e-12
 
 
@@ -68,7 +80,9 @@ def test_the_pin_stays_in_its_slot(gear: Gear) -> None:
     mechanism, n = gear.reference.mechanism, 60
     links = links_from(rng.uniform(0, 0.015, (n, 10)), rng.uniform(0, 2 * np.pi, (n, 10)))
     place = gear.model.kernel.positions(rng.uniform(*gear.reference.stroke, n), links)
-    pivot, pin, arm = (np.array([mechanism.point(p).x, mechanism.point(p).y]) for p in ("Q", "2", "3"))
+    pivot, pin, arm = (
+        np.array([mechanism.point(p).x, mechanism.point(p).y]) for p in ("Q", "2", "3")
+    )
 
     def opening(pin_at: np.ndarray, arm_at: np.ndarray) -> np.ndarray:
         to_pin, to_arm = pin_at - pivot, arm_at - pivot
@@ -82,8 +96,13 @@ def test_the_pin_stays_in_its_slot(gear: Gear) -> None:
 def test_without_clearance_every_joint_stands_at_its_reference_coordinates(gear: Gear) -> None:
     errors = []
     for linkage, model in zip(gear.ensemble, gear.ensemble_models, strict=True):
-        place = model.kernel.positions(linkage.mechanism.reference_input, model.kernel.no_clearance())
-        errors += [np.hypot(place[p.name][0] - p.x, place[p.name][1] - p.y) for p in linkage.mechanism.points]
+        place = model.kernel.positions(
+            linkage.mechanism.reference_input, model.kernel.no_clearance()
+        )
+        errors += [
+            np.hypot(place[p.name][0] - p.x, place[p.name][1] - p.y)
+            for p in linkage.mechanism.points
+        ]
     assert max(errors) < 1e-12
 
 
@@ -91,11 +110,19 @@ def moved(mechanism: Mechanism, turn: float, along: tuple[float, float]) -> Mech
     """The whole mechanism turned and shifted in the base plane."""
     c, s = np.cos(turn), np.sin(turn)
     points = tuple(
-        replace(p, x=c * p.x - s * p.y + along[0], y=s * p.x + c * p.y + along[1]) if p.plane == "sidestay" else p
+        (
+            replace(p, x=c * p.x - s * p.y + along[0], y=s * p.x + c * p.y + along[1])
+            if p.plane == "sidestay"
+            else p
+        )
         for p in mechanism.points
     )
     planes = tuple(
-        plane if plane.parent is None else replace(plane, hinge_direction=plane.hinge_direction + turn)
+        (
+            plane
+            if plane.parent is None
+            else replace(plane, hinge_direction=plane.hinge_direction + turn)
+        )
         for plane in mechanism.planes
     )
     return Mechanism(planes, points, mechanism.steps, mechanism.output, mechanism.reference_input)
@@ -108,20 +135,29 @@ def moved(mechanism: Mechanism, turn: float, along: tuple[float, float]) -> Mech
     direction=directions,
 )
 def test_a_rigid_motion_of_the_whole_mechanism_changes_nothing(
-    gear: Gear, turn: float, along: tuple[float, float], clearance: np.ndarray, direction: np.ndarray
+    gear: Gear,
+    turn: float,
+    along: tuple[float, float],
+    clearance: np.ndarray,
+    direction: np.ndarray,
 ) -> None:
     kernel = Kernel(moved(gear.reference.mechanism, turn, along))
     turned = direction + turn * (np.arange(10) < IN_BASE_PLANE)
     for stroke in gear.reference.stroke:
         before = gear.model.kernel.output(stroke, links_from(clearance, direction))
-        assert float(kernel.output(stroke, links_from(clearance, turned))) == pytest.approx(float(before), abs=1e-11)
+        assert float(kernel.output(stroke, links_from(clearance, turned))) == pytest.approx(
+            float(before), abs=1e-11
+        )
 
 
 def test_a_batch_equals_a_loop(gear: Gear) -> None:
     rng = np.random.default_rng(6)
     clearance, direction = rng.uniform(0, 0.015, (50, 10)), rng.uniform(0, 2 * np.pi, (50, 10))
     batch = gear.model.displacement(links_from(clearance, direction))
-    loop = [float(gear.model.displacement(links_from(c, d))) for c, d in zip(clearance, direction, strict=True)]
+    loop = [
+        float(gear.model.displacement(links_from(c, d)))
+        for c, d in zip(clearance, direction, strict=True)
+    ]
     assert batch == pytest.approx(loop, abs=1e-14)
 
 
@@ -176,7 +212,9 @@ def test_swapping_joints_of_different_links_changes_the_result(gear: Gear) -> No
 
 
 @given(clearance=arrays(float, 10, elements=st.floats(0.001, 0.01)), direction=directions)
-def test_opposite_directions_cancel_to_first_order(gear: Gear, clearance: np.ndarray, direction: np.ndarray) -> None:
+def test_opposite_directions_cancel_to_first_order(
+    gear: Gear, clearance: np.ndarray, direction: np.ndarray
+) -> None:
     def remainder(size: float) -> float:
         there = gear.model.displacement(links_from(size * clearance, direction))
         back = gear.model.displacement(links_from(size * clearance, direction + np.pi))
@@ -188,7 +226,11 @@ def test_opposite_directions_cancel_to_first_order(gear: Gear, clearance: np.nda
 def test_a_sample_that_does_not_close_is_nan_and_its_neighbours_are_not(gear: Gear) -> None:
     clearance = np.zeros((3, 10))
     clearance[1, 0] = 30.0
-    assert np.isnan(gear.model.displacement(links_from(clearance, np.zeros(10)))).tolist() == [False, True, False]
+    assert np.isnan(gear.model.displacement(links_from(clearance, np.zeros(10)))).tolist() == [
+        False,
+        True,
+        False,
+    ]
 
 
 def test_numbers_of_the_mechanism_can_differ_row_by_row(gear: Gear) -> None:

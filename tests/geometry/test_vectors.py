@@ -1,4 +1,6 @@
-"""Equations 3 to 6 of the paper (section 3.1), and that the solver's in-plane formulas are the same equations."""
+"""Equations 3 to 6 of the paper (section 3.1), and that the solver's in-plane formulas are the same
+equations.
+"""
 
 from __future__ import annotations
 
@@ -87,7 +89,9 @@ def test_the_solver_locates_a_dyad_where_equation_six_does(
 ) -> None:
     ab, ac = np.subtract(b, a), np.subtract(c, a)
     cross = float(ab[0] * ac[1] - ab[1] * ac[0])
-    assume(abs(cross) > 1.0 and np.linalg.norm(ac) > 0.5 and np.linalg.norm(np.subtract(c, b)) > 0.5)
+    assume(
+        abs(cross) > 1.0 and np.linalg.norm(ac) > 0.5 and np.linalg.norm(np.subtract(c, b)) > 0.5
+    )
     sign = math.copysign(1.0, cross)
     mechanism = Mechanism(
         (Plane("base"), Plane("tilted", "base", "hinge", direction, dihedral)),

@@ -45,9 +45,8 @@ def rotation(normal: ArrayLike, angle: float) -> Vector:
 def locate_joint(a: ArrayLike, b: ArrayLike, ca: float, bc: float, normal: ArrayLike) -> Vector:
     """Coordinates of joint C of two links CA and BC, from joints A and B and their plane (Eq. 6).
 
-    a, b, shape (3,): joints A and B. [in]
-    ca, bc: lengths of the links CA and BC. [in]
-    normal, shape (3,): unit normal of the plane, on the side about which AB turns to the left onto AC. [1]
+    a, b, shape (3,): joints A and B. [in] ca, bc: lengths of the links CA and BC. [in] normal,
+    shape (3,): unit normal of the plane, on the side about which AB turns to the left onto AC. [1]
     Returns, shape (3,): joint C; NaN if the links do not reach each other. [in]
     """
     start = np.asarray(a, float)

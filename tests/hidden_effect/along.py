@@ -1,7 +1,9 @@
-"""How often a diagnosis along the stroke is right: ``python -m tests.hidden_effect.along [--fleets N] [--first SEED]``.
+"""How often a diagnosis along the stroke is right: ``python -m tests.hidden_effect.along [--fleets
+N] [--first SEED]``.
 
-Not collected by pytest. Fleets of twelve gears with ten readings along the stroke each, and single rigs with 24, drawn
-and moved by code that shares nothing with the program; the diagnosis reads the CSV file that the simulator wrote.
+Not collected by pytest. Fleets of twelve gears with ten readings along the stroke each, and single
+rigs with 24, drawn and moved by code that shares nothing with the program; the diagnosis reads the
+CSV file that the simulator wrote.
 """
 
 from __future__ import annotations
@@ -24,17 +26,30 @@ FIRST_SEED = 9_500
 CLEARANCES = (*(f"clearance_{joint}_in" for joint in range(1, 11)), "clearance_convention")
 FORTY = {"spread_deg": 40.0}
 RIG = {"gears": 1, "rows": 24, "fleet": False}
-# What is simulated, the columns that are left out, and the cause that is right; None where nothing is wrong.
+# What is simulated, the columns that are left out, and the cause that is right; None where nothing
+# is wrong.
 LINES: dict[str, tuple[CurveSpec, tuple[str, ...], str | None]] = {
     "fleet, nothing hidden": (CurveSpec(), (), None),
     "rig, nothing hidden": (CurveSpec(**RIG), (), None),
     "rig without clearances, nothing hidden": (CurveSpec(**RIG), CLEARANCES, None),
     "fleet without clearances, nothing hidden": (CurveSpec(), CLEARANCES, None),
     "fleet, rate": (CurveSpec(effect="calibration_rate"), (), "calibration_rate"),
-    "fleet without clearances, rate": (CurveSpec(effect="calibration_rate"), CLEARANCES, "calibration_rate"),
-    "fleet, directions 40° apart": (CurveSpec(effect="load_directions", parameters=FORTY), (), "load_directions"),
+    "fleet without clearances, rate": (
+        CurveSpec(effect="calibration_rate"),
+        CLEARANCES,
+        "calibration_rate",
+    ),
+    "fleet, directions 40° apart": (
+        CurveSpec(effect="load_directions", parameters=FORTY),
+        (),
+        "load_directions",
+    ),
     "fleet, another linkage": (CurveSpec(geometry="C"), (), "geometry"),
-    "rig without clearances, another linkage": (CurveSpec(**RIG, geometry="A-G:0.2"), CLEARANCES, "geometry"),
+    "rig without clearances, another linkage": (
+        CurveSpec(**RIG, geometry="A-G:0.2"),
+        CLEARANCES,
+        "geometry",
+    ),
 }
 
 
@@ -65,7 +80,9 @@ def main() -> None:
     kinds = ("right", "in the set", "nothing", "something", "wrong")
     print(f"| | {' | '.join(kinds)} |\n|---|{'---|' * len(kinds)}")
     for name, line in LINES.items():
-        found = Counter(outcome(*line, seed) for seed in range(given.first, given.first + given.fleets))
+        found = Counter(
+            outcome(*line, seed) for seed in range(given.first, given.first + given.fleets)
+        )
         print(f"| {name} | {' | '.join(str(found[kind]) for kind in kinds)} |", flush=True)
 
 

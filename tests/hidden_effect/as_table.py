@@ -36,12 +36,19 @@ def as_table(columns: dict[str, list[Any]]) -> DiagnosisTable:
             return np.full(n, np.nan)
         return np.array([np.nan if cell is None else float(cell) for cell in cells])
 
-    quantities = {name: values for name in _QUANTITIES if np.isfinite(values := numbers(name)).any()}
+    quantities = {
+        name: values for name in _QUANTITIES if np.isfinite(values := numbers(name)).any()
+    }
     first: date | None = None
     if any(columns.get("inspection_date", [])):
-        days = [None if cell is None else date.fromisoformat(str(cell)) for cell in columns["inspection_date"]]
+        days = [
+            None if cell is None else date.fromisoformat(str(cell))
+            for cell in columns["inspection_date"]
+        ]
         first = min(day for day in days if day is not None)
-        quantities["day"] = np.array([np.nan if day is None else (day - first).days for day in days])
+        quantities["day"] = np.array(
+            [np.nan if day is None else (day - first).days for day in days]
+        )
     floats = np.column_stack([numbers(f"axial_float_{j}_in") for j in _JOINTS])
     margin = numbers("margin_in")
     gauge = numbers("gauge_u_in")
@@ -55,7 +62,9 @@ def as_table(columns: dict[str, list[Any]]) -> DiagnosisTable:
         gauge_u_in=np.where(np.isfinite(gauge), gauge, 0.0005),
         quantities=quantities,
         factors={
-            name: np.array([cell or "" for cell in columns[name]]) for name in _FACTORS if any(columns.get(name, []))
+            name: np.array([cell or "" for cell in columns[name]])
+            for name in _FACTORS
+            if any(columns.get(name, []))
         },
         axial_float_in=floats if np.isfinite(floats).any() else None,
         first_day=None if first is None else first.isoformat(),

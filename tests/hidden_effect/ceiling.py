@@ -1,11 +1,13 @@
-"""What no method could exceed on the study's fleets: how far the true cause's effect lies from its nearest rival's.
+"""What no method could exceed on the study's fleets: how far the true cause's effect lies from its
+nearest rival's.
 
     python -m tests.hidden_effect.ceiling --write
 
-Two effects that look alike are told apart, at best, by the likelihood ratio of the true effect and the rival that
-fits it best. In independent normal noise, and with everything else known, that ratio has mean g and variance 2 g,
-with g half the squared distance of the two in units of the noise; so the best test is right with the probability
-Φ(√(g / 2)). Scatter between tails, other rivals, unknown sizes and unknown noise only make it harder.
+Two effects that look alike are told apart, at best, by the likelihood ratio of the true effect and
+the rival that fits it best. In independent normal noise, and with everything else known, that ratio
+has mean g and variance 2 g, with g half the squared distance of the two in units of the noise; so
+the best test is right with the probability Φ(√(g / 2)). Scatter between tails, other rivals,
+unknown sizes and unknown noise only make it harder.
 """
 
 from __future__ import annotations
@@ -39,7 +41,9 @@ def chance(task: Task) -> tuple[str, str, float]:
     table, gear = as_table(fleet.table), load_gear()
     usable = np.isfinite(table.measured_in)
     scene, _rows = build_scene(gear.model, table.take(usable), gear.discrepancies)
-    rivals = [c for kind in CATALOGUE for c in kind.candidates(scene) if not _same(c.key, (cause, target))]
+    rivals = [
+        c for kind in CATALOGUE for c in kind.candidates(scene) if not _same(c.key, (cause, target))
+    ]
     columns = effect_columns(scene, rivals)
     truth = fleet.label.truth_term[usable]
     along = truth @ columns
@@ -69,7 +73,9 @@ def ceiling(plan: Sequence[Task], workers: int) -> dict[str, Any]:
     return {
         "fleets": len(found),
         "right": {name: float(np.mean(values)) for name, values in groups.items()},
-        "right_by_cause_s10": {name: float(np.mean(values)) for name, values in sorted(causes.items())},
+        "right_by_cause_s10": {
+            name: float(np.mean(values)) for name, values in sorted(causes.items())
+        },
     }
 
 
@@ -78,9 +84,10 @@ def sentence(result: dict[str, Any]) -> str:
     hardest = sorted(result["right_by_cause_s10"].items(), key=lambda item: item[1])[:4]
     listed = ", ".join(f"{name} {100 * value:.0f} %" for name, value in hardest)
     return (
-        f"the best possible test between the true effect and its nearest rival alone would be right in "
-        f"{100 * result['right']['single:10']:.1f} % at S = 10 ({listed}), {100 * result['right']['single:15']:.1f} % "
-        f"at 15 and {100 * result['right']['single:25']:.1f} % at 25"
+        "the best possible test between the true effect and its nearest rival alone would be right"
+        f" in {100 * result['right']['single:10']:.1f} % at S = 10 ({listed}),"
+        f" {100 * result['right']['single:15']:.1f} % at 15 and"
+        f" {100 * result['right']['single:25']:.1f} % at 25"
     )
 
 

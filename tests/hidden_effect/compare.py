@@ -2,8 +2,9 @@
 
     python -m tests.hidden_effect.compare --fleets 50 --workers 2
 
-Needs the extra ``study``. The figure is the root mean square of what is left of the hidden effect on rows that
-were not used: in range (tails held out) and extrapolating (from rows of small to rows of large prediction).
+Needs the extra ``study``. The figure is the root mean square of what is left of the hidden effect
+on rows that were not used: in range (tails held out) and extrapolating (from rows of small to rows
+of large prediction).
 """
 
 from __future__ import annotations
@@ -71,11 +72,19 @@ def _learners() -> dict[str, Learner]:
     kernel = ConstantKernel(1.0) * RBF(5.0) + WhiteKernel(0.5)
     return {
         "Gaussian process": learner(lambda: GaussianProcessRegressor(kernel, normalize_y=True)),
-        "boosted trees": learner(lambda: HistGradientBoostingRegressor(max_iter=100, random_state=0)),
-        "lasso quadratic": learner(
-            lambda: make_pipeline(PolynomialFeatures(2), StandardScaler(), LassoCV(cv=4, alphas=20, random_state=0))
+        "boosted trees": learner(
+            lambda: HistGradientBoostingRegressor(max_iter=100, random_state=0)
         ),
-        "EBM": learner(lambda: ExplainableBoostingRegressor(interactions=0, outer_bags=2, random_state=0, n_jobs=1)),
+        "lasso quadratic": learner(
+            lambda: make_pipeline(
+                PolynomialFeatures(2), StandardScaler(), LassoCV(cv=4, alphas=20, random_state=0)
+            )
+        ),
+        "EBM": learner(
+            lambda: ExplainableBoostingRegressor(
+                interactions=0, outer_bags=2, random_state=0, n_jobs=1
+            )
+        ),
     }
 
 
@@ -97,7 +106,9 @@ def run(seed: int) -> dict[str, Any]:
     """Compare all methods on one fleet."""
     warnings.simplefilter("ignore")
     causes = list(simulator.CATALOGUE)
-    fleet = simulator.draw_fleet(seed, kind="single", cause=causes[seed % len(causes)], strength=STRENGTH, faults=False)
+    fleet = simulator.draw_fleet(
+        seed, kind="single", cause=causes[seed % len(causes)], strength=STRENGTH, faults=False
+    )
     table = as_table(fleet.table)
     usable = np.isfinite(table.measured_in)
     table, truth = table.take(usable), fleet.label.truth_term[usable]
@@ -119,18 +130,27 @@ def run(seed: int) -> dict[str, Any]:
         left["named cause inside the model"][name] = rms(_diagnosed(table, train, test))
         for learner, predict in _learners().items():
             left[learner][name] = rms(predict(x[train], misfit[train], x[test]))
-    return {"seed": seed, "cause": fleet.label.causes[0][0], "left": dict(left), "own_formula": _own_formula(seed)}
+    return {
+        "seed": seed,
+        "cause": fleet.label.causes[0][0],
+        "left": dict(left),
+        "own_formula": _own_formula(seed),
+    }
 
 
 def _own_formula(seed: int) -> dict[str, float | bool]:
-    """The same kind of fleet, once with the simulator's effect and once with the product's own formula for it."""
+    """The same kind of fleet, once with the simulator's effect and once with the product's own
+    formula for it.
+    """
     causes = list(simulator.CATALOGUE)
     cause = causes[seed % len(causes)]
     gear = load_gear()
     hidden = simulator.draw_fleet(seed, kind="single", cause=cause, strength=25.0, faults=False)
     table = as_table(hidden.table)
     found = diagnose(gear.model, table, gear.discrepancies, permutations=199)
-    result: dict[str, float | bool] = {"independent_named": any(c.candidate.cause.name == cause for c in found.causes)}
+    result: dict[str, float | bool] = {
+        "independent_named": any(c.candidate.cause.name == cause for c in found.causes)
+    }
     mine = [c for c in found.causes if c.candidate.cause.name == cause]
     if not mine or len(found.causes) != 1:
         return result
@@ -145,11 +165,15 @@ def _own_formula(seed: int) -> dict[str, float | bool]:
 
     readings = np.full_like(found.used.readings_in, np.nan)
     readings[:, 0] = values
-    again = diagnose(gear.model, replace(found.used, readings_in=readings), gear.discrepancies, permutations=199)
+    again = diagnose(
+        gear.model, replace(found.used, readings_in=readings), gear.discrepancies, permutations=199
+    )
     result["own_named"] = any(c.candidate.cause.name == cause for c in again.causes)
     if result["own_named"] and len(again.used) == len(own):
         fitted = next(c for c in again.causes if c.candidate.cause.name == cause)
-        result["own_left"] = float(np.sqrt(np.mean((own - fitted.effect_in) ** 2))) / float(np.sqrt(np.mean(own**2)))
+        result["own_left"] = float(np.sqrt(np.mean((own - fitted.effect_in) ** 2))) / float(
+            np.sqrt(np.mean(own**2))
+        )
     return result
 
 
@@ -173,7 +197,12 @@ def main() -> None:
         summary[key] = {"n": len(values), "median": float(np.median(values)) if values else None}
     for method, left in summary["left_thou"].items():
         print(f"{method:32s} {left['in range']:6.2f} {left['extrapolating']:6.2f}   thou left")
-    print("effect left, independent data:", summary["independent_left"], " own formula:", summary["own_left"])
+    print(
+        "effect left, independent data:",
+        summary["independent_left"],
+        " own formula:",
+        summary["own_left"],
+    )
     if arguments.write:
         RESULT.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
 

@@ -1,6 +1,8 @@
-"""Write the diagnosis data sets of ``inspection_data/``: ``python -m tests.hidden_effect.data_sets inspection_data``.
+"""Write the diagnosis data sets of ``inspection_data/``: ``python -m tests.hidden_effect.data_sets
+inspection_data``.
 
-They are synthetic. The independent simulator makes them from a seed, and this file says what is hidden in each.
+They are synthetic. The independent simulator makes them from a seed, and this file says what is
+hidden in each.
 """
 
 from __future__ import annotations
@@ -33,13 +35,16 @@ DATA_SETS: dict[str, tuple[FleetSpec, int]] = {
         41_002,
     ),
     "measured_far_below": (
-        FleetSpec(kind="single", effects=(EffectSpec("load_directions", parameters={"spread_deg": 90.0}),)),
+        FleetSpec(
+            kind="single", effects=(EffectSpec("load_directions", parameters={"spread_deg": 90.0}),)
+        ),
         41_005,
     ),
     "measured_nothing_wrong": (FleetSpec(), 41_003),
     "measured_frozen_grease": (FleetSpec(), 41_004),
 }
-#: One worn gear of another linkage, read along the stroke without a clearance, and the seed that made it.
+#: One worn gear of another linkage, read along the stroke without a clearance, and the seed that
+#: made it.
 RIG = CurveSpec(gears=1, rows=24, fleet=False, geometry="A-G:0.2"), 41_006
 #: What frost takes off a reading in ``measured_frozen_grease`` [in/°C].
 DRAG_IN_PER_C = 0.001
@@ -68,7 +73,8 @@ def later_rows(fleet: Fleet, seed: int) -> dict[str, list[Any]]:
 
 
 def drag(table: dict[str, list[Any]]) -> None:
-    """Take off the readings what frozen grease does: an effect that is on nobody's list but the reader's own.
+    """Take off the readings what frozen grease does: an effect that is on nobody's list but the
+    reader's own.
 
     Parameters
     ----------
@@ -96,7 +102,10 @@ def main(arguments: Sequence[str]) -> int:
         Exit code.
     """
     if len(arguments) != 1 or not Path(arguments[0]).is_dir():
-        print("Give the folder to write to: python -m tests.hidden_effect.data_sets inspection_data", file=sys.stderr)
+        print(
+            "Give the folder to write to: python -m tests.hidden_effect.data_sets inspection_data",
+            file=sys.stderr,
+        )
         return 2
     folder = Path(arguments[0])
     for name, (spec, seed) in DATA_SETS.items():
@@ -108,7 +117,8 @@ def main(arguments: Sequence[str]) -> int:
             write_columns(later_rows(fleet, seed + 1000), folder / f"{name}_later.csv")
     table = curve_table(*RIG)[0]
     write_columns(
-        {name: table[name] for name in table if not name.startswith("clearance")}, folder / "measured_rig.csv"
+        {name: table[name] for name in table if not name.startswith("clearance")},
+        folder / "measured_rig.csv",
     )
     return 0
 

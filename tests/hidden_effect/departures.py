@@ -1,9 +1,11 @@
-"""What a real fleet departs in first, diagnosed blind: the departures' rows of the study; one command writes them.
+"""What a real fleet departs in first, diagnosed blind: the departures' rows of the study; one
+command writes them.
 
     python -m tests.hidden_effect.departures --workers 2
 
-Its seeds, 5,200,000 and following, were used for no threshold. The lines near what is asked have 400 fleets. Those
-from 5,100,000, 200 a line, judged five earlier versions of the program; what was changed in between was set on others.
+Its seeds, 5,200,000 and following, were used for no threshold. The lines near what is asked have
+400 fleets. Those from 5,100,000, 200 a line, judged five earlier versions of the program; what was
+changed in between was set on others.
 """
 
 from __future__ import annotations
@@ -38,7 +40,8 @@ FIRST_SEED = 5_200_000
 # Chance below which a regression on the clearances beats one scale by more than chance.
 BEATS = 0.01
 RESULT = Path(__file__).with_name("departures_result.json")
-# The other nine, and three between two that close with worn joints and move the plunger by no more than twice as much.
+# The other nine, and three between two that close with worn joints and move the plunger by no more
+# than twice as much.
 LINKAGES = (*"BCDEFGHIJ", "A-B:0.3", "A-D:0.2", "A-H:0.3")
 UNREAD = tuple(f"clearance_{joint}_in" for joint in (1, 6, 7, 8, 9, 10))
 # Causes of reading and of circumstances, which must still be found where only #2 to #5 are read.
@@ -71,16 +74,22 @@ def _spec(group: str, i: int, seed: int) -> simulator.FleetSpec:
     if group.startswith("loads:"):
         hidden = (effect("load_directions", parameters={"spread_deg": float(group.split(":")[1])}),)
     elif group.startswith("loads and"):
-        # A gauge of the plunger: the S of a gauge of the clearances is that of the worst directions.
+        # A gauge of the plunger: the S of a gauge of the clearances is that of the worst
+        # directions.
         known = {"reading_shift_in": 0.003} if group.endswith("gauge_bias") else {}
-        hidden = (effect("load_directions"), effect(group.rsplit(maxsplit=1)[-1], strength=14.0, parameters=known))
+        hidden = (
+            effect("load_directions"),
+            effect(group.rsplit(maxsplit=1)[-1], strength=14.0, parameters=known),
+        )
     elif group == "convention":
         hidden = (effect("convention_slip"),)
     elif group == "one group":
         hidden = (effect(WITHIN[i % len(WITHIN)], strength=(10.0, 15.0)[i // len(WITHIN) % 2]),)
     elif group.endswith("one cause"):
         causes = STILL if group.startswith("read") else tuple(simulator.CATALOGUE)
-        hidden = (effect(causes[i % len(causes)], strength=21.0 if group.startswith("read") else 15.0),)
+        hidden = (
+            effect(causes[i % len(causes)], strength=21.0 if group.startswith("read") else 15.0),
+        )
     spec = replace(null, effects=hidden)
     if group.startswith("linkage"):
         spec = replace(spec, geometry=LINKAGES[i % len(LINKAGES)])
@@ -108,7 +117,11 @@ def run(task: tuple[str, int, int]) -> Record:
     gear = load_gear()
     try:
         found = diagnose(
-            gear.model, table, gear.discrepancies, ensemble=gear.ensemble_models[1:], permutations=study.PERMUTATIONS
+            gear.model,
+            table,
+            gear.discrepancies,
+            ensemble=gear.ensemble_models[1:],
+            permutations=study.PERMUTATIONS,
         )
     except InconclusiveDataError as error:
         return {
@@ -127,7 +140,10 @@ def run(task: tuple[str, int, int]) -> Record:
         "verdict": found.verdict,
         "named": [(c.candidate.cause.name, c.candidate.target) for c in found.causes],
         "class": sorted({a.cause.name for c in found.causes for a in c.aliases}),
-        "also": [(c.candidate.cause.name, c.candidate.target) for c in (*found.also_possible, *found.beside)],
+        "also": [
+            (c.candidate.cause.name, c.candidate.target)
+            for c in (*found.also_possible, *found.beside)
+        ],
         "variables": list(found.unlisted_variables),
         "truth": list(fleet.label.causes),
         "linkage": fleet.spec.geometry,
@@ -138,7 +154,9 @@ def run(task: tuple[str, int, int]) -> Record:
 
 
 def _regression(used: DiagnosisTable, predicted_in: Array) -> dict[str, Any]:
-    """Misfit of held-out tails by a plain regression on the ten clearances [in], and whether it beats one scale."""
+    """Misfit of held-out tails by a plain regression on the ten clearances [in], and whether it
+    beats one scale.
+    """
     known = np.isfinite(used.clearance_in).all(axis=1)
     y, x, one = used.measured_in[known], used.clearance_in[known], predicted_in[known]
     if len(y) < 60:
@@ -153,7 +171,10 @@ def _regression(used: DiagnosisTable, predicted_in: Array) -> dict[str, Any]:
     scaled = np.column_stack([np.ones(len(y)), one])
     alone = float(np.sum((y - scaled @ np.linalg.lstsq(scaled, y, rcond=None)[0]) ** 2))
     ratio = (alone - free) / 9.0 / (free / (len(y) - 11))
-    return {"regression": float(np.sqrt(np.mean(left**2))), "beats": bool(f.sf(ratio, 9, len(y) - 11) < BEATS)}
+    return {
+        "regression": float(np.sqrt(np.mean(left**2))),
+        "beats": bool(f.sf(ratio, 9, len(y) - 11) < BEATS),
+    }
 
 
 def _hit(name: list[str | None], truth: list[str | None]) -> bool:
@@ -161,8 +182,14 @@ def _hit(name: list[str | None], truth: list[str | None]) -> bool:
 
 
 def _false(r: Record, beside: str = "") -> bool:
-    """Something is named that is not there, apart from one cause that may stand beside it, or its class."""
-    names = [n for n in r["named"] if n[0] != beside and not (n[0] == "load_directions" and beside in r["class"])]
+    """Something is named that is not there, apart from one cause that may stand beside it, or its
+    class.
+    """
+    names = [
+        n
+        for n in r["named"]
+        if n[0] != beside and not (n[0] == "load_directions" and beside in r["class"])
+    ]
     return any(not any(_hit(n, t) for t in r["truth"]) for n in names)
 
 
@@ -177,28 +204,42 @@ def _in_set(r: Record) -> bool:
 def _loads(r: Record) -> bool:
     """Directions are named, or the class that they are in."""
     return any(
-        n[0] == "load_directions" or (n[0] == "geometry" and "load_directions" in r["class"]) for n in r["named"]
+        n[0] == "load_directions" or (n[0] == "geometry" and "load_directions" in r["class"])
+        for n in r["named"]
     )
 
 
 # Each line of the result: fleets it is about, what counts, and what is asked for.
 LINES: dict[str, tuple[str, Callable[[Record], bool], str]] = {
     **{
-        f"load directions, spread {deg}: named (or their class), where a regression beats one scale": (
+        f"load directions, spread {deg}: named (or their class), "
+        "where a regression beats one scale": (
             f"loads:{spread}",
             _loads,
             "≥ 95 %",
         )
         for spread, deg in ((40, "40°"), (90, "90°"), (180, "all around"))
     },
-    "load directions: something else named": ("loads:", lambda r: not _loads(r) and bool(r["named"]), "≤ 2 %"),
+    "load directions: something else named": (
+        "loads:",
+        lambda r: not _loads(r) and bool(r["named"]),
+        "≤ 2 %",
+    ),
     "load directions: unseen rows within 1.15 of a regression on the clearances": (
         "loads:",
         lambda r: r["after"] <= 1.15 * r["regression"],
         "",
     ),
-    "load directions and a gauge, S = 14: both named": ("loads and gauge", lambda r: _right(r, "geometry"), "≥ 85 %"),
-    "load directions and pressure, S = 14: both named": ("loads and elas", lambda r: _right(r, "geometry"), "≥ 85 %"),
+    "load directions and a gauge, S = 14: both named": (
+        "loads and gauge",
+        lambda r: _right(r, "geometry"),
+        "≥ 85 %",
+    ),
+    "load directions and pressure, S = 14: both named": (
+        "loads and elas",
+        lambda r: _right(r, "geometry"),
+        "≥ 85 %",
+    ),
     "another linkage, nothing hidden: a cause named that is not there": (
         "linkage, nothing",
         lambda r: _false(r, "geometry"),
@@ -220,10 +261,26 @@ LINES: dict[str, tuple[str, Callable[[Record], bool], str]] = {
         lambda r: r["after"] < r["before"],
         "100 %",
     ),
-    "only #2 to #5 read, nothing hidden: a cause named": ("read #2-#5, nothing", lambda r: bool(r["named"]), "≤ 2 %"),
-    "only #2 to #5 read, a gauge, pressure or temperature, S = 21: named": ("read #2-#5, one", _right, "≥ 80 %"),
-    "30 % of the clearances blank, nothing hidden: a cause named": ("blank 30", lambda r: bool(r["named"]), "≤ 2 %"),
-    "50 % of the clearances blank, nothing hidden: a cause named": ("blank 50", lambda r: bool(r["named"]), "≤ 2 %"),
+    "only #2 to #5 read, nothing hidden: a cause named": (
+        "read #2-#5, nothing",
+        lambda r: bool(r["named"]),
+        "≤ 2 %",
+    ),
+    "only #2 to #5 read, a gauge, pressure or temperature, S = 21: named": (
+        "read #2-#5, one",
+        _right,
+        "≥ 80 %",
+    ),
+    "30 % of the clearances blank, nothing hidden: a cause named": (
+        "blank 30",
+        lambda r: bool(r["named"]),
+        "≤ 2 %",
+    ),
+    "50 % of the clearances blank, nothing hidden: a cause named": (
+        "blank 50",
+        lambda r: bool(r["named"]),
+        "≤ 2 %",
+    ),
     "other convention of 8 rows and more: named with its target": ("convention", _right, "≥ 90 %"),
     "other convention of 8 rows and more: something else named": ("convention", _false, "≤ 2 %"),
     "nothing hidden: the other convention named": (
@@ -260,11 +317,14 @@ def summarise(records: list[Record]) -> dict[str, Any]:
         said[r["group"]]["+".join(sorted(str(n[0]) for n in r["named"])) or r["verdict"]] += 1
     linked = [r for r in records if r["group"] == "linkage, one cause"]
     causes = {*(r["truth"][0][0] for r in linked)} - {"?"}
-    by_cause = {c: [r for r in linked if r["truth"][0][0] == c] for c in sorted(causes)} | {"all": linked}
+    by_cause = {c: [r for r in linked if r["truth"][0][0] == c] for c in sorted(causes)} | {
+        "all": linked
+    }
     return {
         "lines": rates,
         "by_cause": {
-            c: study._rate(sum(_right(r, "geometry") for r in rows), len(rows)) for c, rows in by_cause.items()
+            c: study._rate(sum(_right(r, "geometry") for r in rows), len(rows))
+            for c, rows in by_cause.items()
         },
         "said": {group: dict(said[group]) for group in sorted(said)},
     }
@@ -273,20 +333,37 @@ def summarise(records: list[Record]) -> dict[str, Any]:
 def result_of(records: list[Record], first_seed: int) -> dict[str, Any]:
     """What is committed: how many fleets of each kind, and the rates."""
     count = dict(sorted(Counter(r["group"] for r in records).items()))
-    return {"fleets": len(records), "first_seed": first_seed, "of_each": count, **summarise(records)}
+    return {
+        "fleets": len(records),
+        "first_seed": first_seed,
+        "of_each": count,
+        **summarise(records),
+    }
 
 
 def renewed(committed: dict[str, Any], run_now: dict[str, Any]) -> dict[str, Any]:
     """A committed result with the lines of some fleets run again, the others left as they are."""
-    lines = {name: rate if rate["n"] else committed["lines"][name] for name, rate in run_now["lines"].items()}
+    lines = {
+        name: rate if rate["n"] else committed["lines"][name]
+        for name, rate in run_now["lines"].items()
+    }
     of_each = dict(sorted({**committed["of_each"], **run_now["of_each"]}.items()))
     said = dict(sorted({**committed["said"], **run_now["said"]}.items()))
-    return {**committed, "fleets": sum(of_each.values()), "of_each": of_each, "lines": lines, "said": said}
+    return {
+        **committed,
+        "fleets": sum(of_each.values()),
+        "of_each": of_each,
+        "lines": lines,
+        "said": said,
+    }
 
 
 def markdown(result: dict[str, Any]) -> str:
     """The table of a result."""
-    rows = (study.rate_line(name, aim, result["lines"][name]) for name, (_group, _hit, aim) in LINES.items())
+    rows = (
+        study.rate_line(name, aim, result["lines"][name])
+        for name, (_group, _hit, aim) in LINES.items()
+    )
     return "\n".join((*study.HEAD, *rows))
 
 
@@ -301,8 +378,12 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help=f"write {RESULT.name}")
     arguments = parser.parse_args()
     plan = {g: max(1, round(n * arguments.share)) for g, n in PLAN.items()}
-    listed = [(t[2], t) for t in tasks(plan, arguments.first_seed) if t[0].startswith(arguments.only)]
-    result = result_of(study.mapped(run, listed, arguments.workers, arguments.keep), arguments.first_seed)
+    listed = [
+        (t[2], t) for t in tasks(plan, arguments.first_seed) if t[0].startswith(arguments.only)
+    ]
+    result = result_of(
+        study.mapped(run, listed, arguments.workers, arguments.keep), arguments.first_seed
+    )
     print(markdown(result), json.dumps(result["said"], indent=1), sep="\n")
     if arguments.write and arguments.only:
         result = renewed(json.loads(RESULT.read_text(encoding="utf-8")), result)

@@ -1,21 +1,24 @@
-"""What no method could exceed on the departures' fleets: an oracle that knows the noise, the priors and the causes.
+"""What no method could exceed on the departures' fleets: an oracle that knows the noise, the priors
+and the causes.
 
     python -m tests.hidden_effect.departures_ceiling --write
 
-The fleets are the departures' own, without entry errors. The oracle is told the covariance of the noise as it came
-out in the fleet, the share that the scatter of the pins takes off the bound, and how large the effect is; scatter to be
-estimated, slips and unknown sizes only make it harder.
+The fleets are the departures' own, without entry errors. The oracle is told the covariance of the
+noise as it came out in the fleet, the share that the scatter of the pins takes off the bound, and
+how large the effect is; scatter to be estimated, slips and unknown sizes only make it harder.
 
-On another linkage it is told the spread of the linkages that the simulator takes: the displacement differs from the
-drawn linkage's by a sum of theirs, each weighed at random (normal, variance one over their number). It compares the
-marginal likelihood of a linkage with the true cause, of which it knows the whole effect, with that of a linkage alone
-and with each other cause, all of them at S = 15 in either direction that the cause allows; the targets of a cause and
-the forms of a target share its prior.
+On another linkage it is told the spread of the linkages that the simulator takes: the displacement
+differs from the drawn linkage's by a sum of theirs, each weighed at random (normal, variance one
+over their number). It compares the marginal likelihood of a linkage with the true cause, of which
+it knows the whole effect, with that of a linkage alone and with each other cause, all of them at S
+= 15 in either direction that the cause allows; the targets of a cause and the forms of a target
+share its prior.
 
-Where loads rest the pins 40 degrees apart it is told that, and compares ten directions so drawn (by sequential Monte
-Carlo over the angles) with what else may stand there: one scale of a size that such directions have, one joint's
-direction, with a factor from 1 to -1, or both (normal, with these means and variances). Each has fleets of its own, as
-large as a fleet of directions; directions are named where they lead by more than in all but 2 % of these.
+Where loads rest the pins 40 degrees apart it is told that, and compares ten directions so drawn (by
+sequential Monte Carlo over the angles) with what else may stand there: one scale of a size that
+such directions have, one joint's direction, with a factor from 1 to -1, or both (normal, with these
+means and variances). Each has fleets of its own, as large as a fleet of directions; directions are
+named where they lead by more than in all but 2 % of these.
 """
 
 from __future__ import annotations
@@ -64,10 +67,10 @@ _EVEN = 2.0 / np.sqrt(12.0)
 class Told:
     """A fleet as the oracle sees it.
 
-    scene: the rows that have a reading, with what the program makes of their clearances.
-    misfit, shape (n,): measured less the drawn linkage's bound less what scatter of the pins takes off it. [in]
-    covariance, shape (n, n): of the noise. [in²]
-    truth, shape (n,): what the hidden effects do to a gear with the clearances of the scene; what they do to the true
+    scene: the rows that have a reading, with what the program makes of their clearances. misfit,
+    shape (n,): measured less the drawn linkage's bound less what scatter of the pins takes off it.
+    [in] covariance, shape (n, n): of the noise. [in²] truth, shape (n,): what the hidden effects do
+    to a gear with the clearances of the scene; what they do to the true
         ones would tell the noise. [in]
     apart, shape (n, n_linkages): what the linkages that the simulator takes add to the bound. [in]
     another, shape (n,): what this fleet's linkage adds to it. [in]
@@ -94,33 +97,59 @@ def told(fleet: simulator.Fleet) -> Told:
     lost = float(np.mean(np.expm1(-(physics.scatter_size(world.design) ** 2) / 2.0)))
     clearance = world.design.clearance.copy()
     clearance[read] = scene.clearance_in
-    gears = physics.Gears(world.geometry, replace(world.design, clearance=clearance), np.zeros_like(clearance))
+    gears = physics.Gears(
+        world.geometry, replace(world.design, clearance=clearance), np.zeros_like(clearance)
+    )
     truth = generate._Effects(gears).shift(world.drafts)[0][read]
     tails = np.array([world.errors.tails[tail] for tail in world.design.tail])[read]
     rest = table.measured_in - fleet.label.truth_term[read] - (1.0 + lost) * own - tails
-    covariance = _covariance(rest, table.gears) + world.noise.tail**2 * (table.tails[:, None] == table.tails)
+    covariance = _covariance(rest, table.gears) + world.noise.tail**2 * (
+        table.tails[:, None] == table.tails
+    )
     apart = np.column_stack([over - drawn for over in every if np.isfinite(over).all()])
-    return Told(scene, table.measured_in - (1.0 + lost) * drawn, covariance, truth, apart, (1.0 + lost) * (own - drawn))
+    return Told(
+        scene,
+        table.measured_in - (1.0 + lost) * drawn,
+        covariance,
+        truth,
+        apart,
+        (1.0 + lost) * (own - drawn),
+    )
 
 
 def _covariance(rest: Array, gears: NDArray[np.str_]) -> Array:
     """Covariance of rows that share a gear's part, by moments of the noise as it came out. [in²]"""
     number = np.unique(gears, return_inverse=True)[1]
-    count, total, square = np.bincount(number), np.bincount(number, rest), np.bincount(number, rest**2)
+    count, total, square = (
+        np.bincount(number),
+        np.bincount(number, rest),
+        np.bincount(number, rest**2),
+    )
     shared = max(float(np.sum(total**2 - square) / np.sum(count * (count - 1))), 0.0)
     return (float(np.var(rest)) - shared) * np.eye(len(rest)) + shared * (gears[:, None] == gears)
 
 
 def beside_linkage(task: Task) -> Record:
-    """How far the true cause leads beside another linkage, of which the spread is known, and beside a known one."""
+    """How far the true cause leads beside another linkage, of which the spread is known, and beside
+    a known one.
+    """
     group, place, seed = task
     fleet = simulator.simulate_fleet(replace(departures._spec(group, place, seed), faults=()), seed)
     seen, ((cause, target),) = told(fleet), fleet.label.causes
-    candidates = [c for kind in CATALOGUE if kind.name in simulator.CATALOGUE for c in kind.candidates(seen.scene)]
+    candidates = [
+        c
+        for kind in CATALOGUE
+        if kind.name in simulator.CATALOGUE
+        for c in kind.candidates(seen.scene)
+    ]
     columns = effect_columns(seen.scene, candidates)
     size = np.sqrt(np.mean(columns**2, axis=0))
     acts = size > 1e-9 * size.max()
-    strength = float(fleet.spec.effects[0].strength or 0.0) * fleet.label.noise_rms_in / np.sqrt(fleet.spec.rows)
+    strength = (
+        float(fleet.spec.effects[0].strength or 0.0)
+        * fleet.label.noise_rms_in
+        / np.sqrt(fleet.spec.rows)
+    )
     columns = columns[:, acts] * strength / size[acts]
     candidates = [c for c, one in zip(candidates, acts, strict=True) if one]
     spread = seen.covariance + seen.apart @ seen.apart.T / seen.apart.shape[1]
@@ -143,7 +172,9 @@ def _lead(
     truth: Array,
     true: tuple[str, str | None],
 ) -> float:
-    """Log-likelihood of the true cause and target less that of the likeliest other, or of none. [1]"""
+    """Log-likelihood of the true cause and target less that of the likeliest other, or of none.
+    [1]
+    """
     along, square = columns.T @ weight @ misfit, np.einsum("ij,ij->j", columns, weight @ columns)
     sign = np.array([c.cause.sign for c in candidates])
     either = np.logaddexp(along, -along) - np.log(2.0)
@@ -157,12 +188,16 @@ def _lead(
         for key, values in forms.items()
         if not _same(key, true)
     ]
-    own = float(truth @ weight @ misfit - 0.5 * truth @ weight @ truth) - np.log(max(targets[true[0]], 1))
+    own = float(truth @ weight @ misfit - 0.5 * truth @ weight @ truth) - np.log(
+        max(targets[true[0]], 1)
+    )
     return float(own - max(*others, 0.0))
 
 
 def directions(task: Task) -> Record:
-    """How far ten directions lead each other explanation: in a fleet that has them, and in fleets of the others."""
+    """How far ten directions lead each other explanation: in a fleet that has them, and in fleets
+    of the others.
+    """
     group, place, seed = task
     rng = np.random.default_rng([seed, 40])
     spec = replace(departures._spec(group, place, seed), faults=())
@@ -174,7 +209,9 @@ def directions(task: Task) -> Record:
     both = (replace(scale, strength=share * size), replace(joint, strength=(1.0 - share) * size))
     found: Record = {"seed": seed, "directions": _directions(fleet, rng)}
     for name, hidden in zip(OTHERS, ((scale,), (joint,), both), strict=True):
-        found[name] = _directions(simulator.simulate_fleet(replace(spec, effects=hidden), seed), rng)
+        found[name] = _directions(
+            simulator.simulate_fleet(replace(spec, effects=hidden), seed), rng
+        )
     scene = told(fleet).scene
     return {**found, "beats": departures._regression(scene.table, scene.over_in)["beats"]}
 
@@ -182,7 +219,11 @@ def directions(task: Task) -> Record:
 def _directions(fleet: simulator.Fleet, rng: np.random.Generator) -> dict[str, float]:
     """Log-likelihood of ten directions less that of each other explanation. [1]"""
     seen, spread = told(fleet), np.radians(SPREAD_DEG)
-    weight, share, over = np.linalg.inv(seen.covariance), seen.scene.contribution_in, seen.scene.over_in
+    weight, share, over = (
+        np.linalg.inv(seen.covariance),
+        seen.scene.contribution_in,
+        seen.scene.over_in,
+    )
     along, square = -(share.T @ weight @ seen.misfit), share.T @ weight @ share
     lost = (1.0 - np.cos(spread * rng.standard_normal((2000, share.shape[1])))) @ share.T
     size = np.sqrt(np.mean(lost**2, axis=1) / np.mean(over**2))
@@ -198,9 +239,13 @@ def _directions(fleet: simulator.Fleet, rng: np.random.Generator) -> dict[str, f
         found = 0.5 * push @ np.linalg.solve(inner, push) - 0.5 * np.linalg.slogdet(inner)[1]
         return float(found - plain @ weight @ (seen.misfit + 0.5 * plain))
 
-    # A joint whose factor is anything from 1 to -1 loses what it adds, on average; beside it a scale may be any part.
+    # A joint whose factor is anything from 1 to -1 loses what it adds, on average; beside it a
+    # scale may be any part.
     alone = [mean(one[:, None], np.ones(1), np.full(1, _EVEN)) for one in share.T]
-    part = np.array([0.5 * level, 1.0]), np.array([np.hypot(0.5 * width, 0.5 * _EVEN * level), _EVEN])
+    part = (
+        np.array([0.5 * level, 1.0]),
+        np.array([np.hypot(0.5 * width, 0.5 * _EVEN * level), _EVEN]),
+    )
     paired = [mean(np.column_stack([over, one]), *part) for one in share.T]
     single = mean(over[:, None], np.array([level]), np.array([width]))
     others = (single, *(float(logsumexp(a) - np.log(len(a))) for a in (alone, paired)))
@@ -209,7 +254,9 @@ def _directions(fleet: simulator.Fleet, rng: np.random.Generator) -> dict[str, f
 
 
 def marginal(along: Array, square: Array, spread: float, rng: np.random.Generator) -> float:
-    """Logarithm of the mean of exp(aᵀg − gᵀQg/2), g = 1 − cos φ, over normal angles φ (sequential Monte Carlo)."""
+    """Logarithm of the mean of exp(aᵀg − gᵀQg/2), g = 1 − cos φ, over normal angles φ (sequential
+    Monte Carlo).
+    """
     joints = len(along)
     angle = spread * rng.standard_normal((_PARTICLES, joints))
 
@@ -256,7 +303,9 @@ def _rise(likelihood: Array, most: float) -> float:
 
 
 def summarise(linkages: Sequence[Record], fleets: Sequence[Record]) -> dict[str, Any]:
-    """What is committed: by cause beside another linkage, and by what else may look like directions."""
+    """What is committed: by cause beside another linkage, and by what else may look like
+    directions.
+    """
     causes: dict[str, list[Record]] = defaultdict(list)
     for record in linkages:
         causes[record["cause"]].append(record)
@@ -279,8 +328,13 @@ def summarise(linkages: Sequence[Record], fleets: Sequence[Record]) -> dict[str,
 
 
 def _told_apart(fleets: Sequence[Record], others: Sequence[str]) -> dict[str, Any]:
-    """Directions named where they lead each by more than in all but a few of the fleets that have that."""
-    least = {o: float(np.quantile([r[o][o] for r in fleets], 1.0 - FALSE, method="higher")) for o in others}
+    """Directions named where they lead each by more than in all but a few of the fleets that have
+    that.
+    """
+    least = {
+        o: float(np.quantile([r[o][o] for r in fleets], 1.0 - FALSE, method="higher"))
+        for o in others
+    }
     named = [(r["beats"], all(r["directions"][o] > least[o] for o in others)) for r in fleets]
     beats = [hit for told, hit in named if told]
     return {
@@ -300,19 +354,29 @@ def markdown(result: dict[str, Any], departed: dict[str, Any]) -> tuple[str, str
         return f"{100 * rate['rate']:.1f} % ({100 * rate['low']:.1f}–{100 * rate['high']:.1f})"
 
     linkages = [
-        "| one cause, S = 15, on another linkage | fleets | S left besides | told the linkage: clearly first "
-        "| told the spread: first | clearly first | named by the program |",
+        (
+            "| one cause, S = 15, on another linkage | fleets | S left besides | told the linkage:"
+            " clearly first | told the spread: first | clearly first | named by the program |"
+        ),
         "|---|---|---|---|---|---|---|",
     ]
     for cause, row in result["linkage"].items():
         text = band if cause == "all" else share
         shown = (text(row[name]) for name in ("known", "first", "clear"))
         named = text(departed["by_cause"][cause])
-        linkages.append(f"| {cause} | {row['first']['n']} | {row['left']:.1f} | {' | '.join(shown)} | {named} |")
+        linkages.append(
+            f"| {cause} | {row['first']['n']} | {row['left']:.1f} | {' | '.join(shown)} | {named} |"
+        )
     directed = [
-        "| directions 40° apart, distinguished from | fleets where a regression beats one scale | all fleets |",
+        (
+            "| directions 40° apart, distinguished from | fleets where a regression beats one scale"
+            " | all fleets |"
+        ),
         "|---|---|---|",
-        *(f"| {name} | {band(row['beats'])} | {band(row['all'])} |" for name, row in result["directions"].items()),
+        *(
+            f"| {name} | {band(row['beats'])} | {band(row['all'])} |"
+            for name, row in result["directions"].items()
+        ),
     ]
     return "\n".join(linkages), "\n".join(directed)
 
@@ -329,7 +393,9 @@ def main() -> None:
     found = []
     for group, judge in ((LINKAGE, beside_linkage), (SPREAD, directions)):
         own = [(task[2], task) for task in plan if task[0] == group]
-        found.append(study.mapped(judge, own[: max(1, round(arguments.share * len(own)))], arguments.workers))
+        found.append(
+            study.mapped(judge, own[: max(1, round(arguments.share * len(own)))], arguments.workers)
+        )
     result = {"first_seed": arguments.first_seed, **summarise(*found)}
     print(json.dumps(result, indent=1))
     if arguments.write:

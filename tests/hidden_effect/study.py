@@ -1,4 +1,5 @@
-"""The study: thousands of fleets with hidden effects, diagnosed blind; one command writes its table.
+"""The study: thousands of fleets with hidden effects, diagnosed blind; one command writes its
+table.
 
     python -m tests.hidden_effect.study --workers 2
 
@@ -90,19 +91,30 @@ def run(task: Task) -> Record:
     start = time.process_time()
     try:
         found: Diagnosis | None = diagnose(
-            gear.model, table, gear.discrepancies, ensemble=gear.ensemble_models[1:], permutations=PERMUTATIONS
+            gear.model,
+            table,
+            gear.discrepancies,
+            ensemble=gear.ensemble_models[1:],
+            permutations=PERMUTATIONS,
         )
     except InconclusiveDataError:
         found = None
     seconds = time.process_time() - start
-    return {"group": task["group"], "seed": task["seed"], "seconds": seconds, **_compare(fleet, found)}
+    return {
+        "group": task["group"],
+        "seed": task["seed"],
+        "seconds": seconds,
+        **_compare(fleet, found),
+    }
 
 
 def _same(name: tuple[str, str | None], truth: tuple[str, str | None]) -> bool:
     """A tail may be named for one of its gears, and a gear by its tail."""
     if name[0] != truth[0] or name[1] == truth[1]:
         return name == truth
-    return name[0] == "rigging_offset" and str(truth[1]).split(" ")[:2] == str(name[1]).split(" ")[:2]
+    return (
+        name[0] == "rigging_offset" and str(truth[1]).split(" ")[:2] == str(name[1]).split(" ")[:2]
+    )
 
 
 def _compare(fleet: simulator.Fleet, found: Diagnosis | None) -> Record:
@@ -132,7 +144,9 @@ def _compare(fleet: simulator.Fleet, found: Diagnosis | None) -> Record:
     record["cells_found"] = len(wrong_cells & {(f.record_id, f.column) for f in found.faults})
     record["false_faults"] = len(proposed - wrong_rows)
     names = [(c.candidate.cause.name, c.candidate.target) for c in found.causes]
-    also = [(c.candidate.cause.name, c.candidate.target) for c in (*found.also_possible, *found.beside)]
+    also = [
+        (c.candidate.cause.name, c.candidate.target) for c in (*found.also_possible, *found.beside)
+    ]
     record["named"] = names
     if listed and truth:
         told = not found.beside and len(names) == len(truth)
@@ -142,13 +156,15 @@ def _compare(fleet: simulator.Fleet, found: Diagnosis | None) -> Record:
         record["wrong"] = bool(names) and not all(any(_same(n, t) for t in truth) for n in names)
         aliases = [(cause, target) for cause, target in label.aliases]
         if aliases:
-            record["aliases_listed"] = all(any(_same(n, t) for n in (*names, *also)) for t in aliases)
+            record["aliases_listed"] = all(
+                any(_same(n, t) for n in (*names, *also)) for t in aliases
+            )
     else:
         record["wrong"] = bool(names)
     record["variables"] = list(found.unlisted_variables)
-    record["variables_right"] = bool(found.unlisted_variables) and set(found.unlisted_variables) <= set(
-        _own_names(label.variables)
-    )
+    record["variables_right"] = bool(found.unlisted_variables) and set(
+        found.unlisted_variables
+    ) <= set(_own_names(label.variables))
     if found.gain is not None:
         before, after = found.gain.rms_before_in**2, found.gain.rms_after_in**2
         record["worse"] = after > before
@@ -160,8 +176,12 @@ def _compare(fleet: simulator.Fleet, found: Diagnosis | None) -> Record:
 
 
 def _varying(label: simulator.Label) -> list[float]:
-    """S of what each effect does beyond a shift of all rows alike, which many causes would explain equally well."""
-    return [float(np.std(e.truth) * np.sqrt(len(e.truth)) / label.noise_rms_in) for e in label.effects]
+    """S of what each effect does beyond a shift of all rows alike, which many causes would explain
+    equally well.
+    """
+    return [
+        float(np.std(e.truth) * np.sqrt(len(e.truth)) / label.noise_rms_in) for e in label.effects
+    ]
 
 
 def _own_names(variables: Iterable[str]) -> set[str]:
@@ -183,7 +203,12 @@ def _rate(hits: int, n: int) -> dict[str, float | int]:
     centre = (p + z * z / (2 * n)) / (1 + z * z / n)
     half = z * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n)
     # At none and at all the interval ends at the rate itself, rounding apart.
-    return {"n": n, "rate": p, "low": max(min(float(centre - half), p), 0.0), "high": max(float(centre + half), p)}
+    return {
+        "n": n,
+        "rate": p,
+        "low": max(min(float(centre - half), p), 0.0),
+        "high": max(float(centre + half), p),
+    }
 
 
 def summarise(records: list[Record]) -> dict[str, Any]:
@@ -201,7 +226,10 @@ def summarise(records: list[Record]) -> dict[str, Any]:
 
     strong = [r for g in ("single:10", "single:15", "single:25") for r in by_group[g]]
     singles = [r for g, rows in by_group.items() if g.startswith("single:") for r in rows]
-    varying = {s: [r for r in singles if 0.95 * s <= least(r) < (1.2 * s if s < 10.0 else np.inf)] for s in VARYING}
+    varying = {
+        s: [r for r in singles if 0.95 * s <= least(r) < (1.2 * s if s < 10.0 else np.inf)]
+        for s in VARYING
+    }
     confounded = [r for g in ("confounded:7", "confounded:10") for r in by_group[g]]
     every = list(records)
     null = [r for g, rows in by_group.items() if g.startswith("null:") for r in rows]
@@ -211,7 +239,11 @@ def summarise(records: list[Record]) -> dict[str, Any]:
     alarmed = [r for r in alarmed if r["verdict"] in {"NAMED", "AMBIGUOUS", "UNLISTED"}]
     both_strong = [r for r in by_group["double"] if min(r["strengths"], default=0.0) >= 9.5]
     triple = [r for r in by_group["triple"] if min(r["strengths"], default=0.0) >= 9.5]
-    gains = [r["share_of_true_gain"] for r in strong if r["right"] and r.get("share_of_true_gain") is not None]
+    gains = [
+        r["share_of_true_gain"]
+        for r in strong
+        if r["right"] and r.get("share_of_true_gain") is not None
+    ]
     extended = [r for r in every if "worse" in r]
     faults = sum(r["faults"] for r in every)
     targets = {
@@ -223,12 +255,15 @@ def summarise(records: list[Record]) -> dict[str, Any]:
         "unique and right, S = 5": rate(by_group["single:5"], "right"),
         "unique and right, confounded fleet, S = 10": rate(by_group["confounded:10"], "right"),
         "unique and right, confounded fleet, S = 7": rate(by_group["confounded:7"], "right"),
-        "unique and right, clearances exact but rounded, S = 10": rate(by_group["rounded:10"], "right"),
-        "unique and right, clearances exact but rounded, S = 15": rate(by_group["rounded:15"], "right"),
+        "unique and right, clearances exact but rounded, S = 10": rate(
+            by_group["rounded:10"], "right"
+        ),
+        "unique and right, clearances exact but rounded, S = 15": rate(
+            by_group["rounded:15"], "right"
+        ),
         **{
-            f"unique and right, S without the common shift {'>=' if s == 10.0 else 'about'} {s:.0f}": rate(
-                rows, "right"
-            )
+            "unique and right, S without the common shift "
+            f"{'>=' if s == 10.0 else 'about'} {s:.0f}": rate(rows, "right")
             for s, rows in varying.items()
         },
         "unique and right, confounded fleet, S without the common shift >= 7": rate(
@@ -240,7 +275,9 @@ def summarise(records: list[Record]) -> dict[str, Any]:
         "wrong unique name, S without the common shift >= 10": rate(varying[10.0], "wrong"),
         "true cause in the reported set, given an alarm": rate(alarmed, "in_set"),
         **{
-            f"false alarm on null {g.removeprefix('null:')}": rate(rows, lambda r: r["verdict"] != "NONE")
+            f"false alarm on null {g.removeprefix('null:')}": rate(
+                rows, lambda r: r["verdict"] != "NONE"
+            )
             for g, rows in by_group.items()
             if g.startswith("null:")
         },
@@ -250,10 +287,13 @@ def summarise(records: list[Record]) -> dict[str, Any]:
         "off-catalogue: flagged, S >= 10": rate(
             [r for r in off if min(r["strengths"]) >= 9.5], lambda r: r["verdict"] != "NONE"
         ),
-        "off-catalogue: variables right": rate([r for r in off if r["verdict"] == "UNLISTED"], "variables_right"),
+        "off-catalogue: variables right": rate(
+            [r for r in off if r["verdict"] == "UNLISTED"], "variables_right"
+        ),
         "off-catalogue: misnamed": rate(off, "wrong"),
         "exactly aliased causes: all listed": rate(
-            [r for r in by_group["aliased"] if r["verdict"] != "NONE"], lambda r: r.get("aliases_listed", r["in_set"])
+            [r for r in by_group["aliased"] if r["verdict"] != "NONE"],
+            lambda r: r.get("aliases_listed", r["in_set"]),
         ),
         "two causes, each S >= 10: both named": rate(both_strong, "right"),
         "two causes, each S without the common shift >= 10: both named": rate(
@@ -264,7 +304,9 @@ def summarise(records: list[Record]) -> dict[str, Any]:
         "three causes, each S without the common shift >= 10: all named": rate(
             [r for r in triple if least(r) >= 9.5], "right"
         ),
-        "needed column removed: not misnamed": rate(by_group["missing_column"], lambda r: not r["wrong"]),
+        "needed column removed: not misnamed": rate(
+            by_group["missing_column"], lambda r: not r["wrong"]
+        ),
         "uniquely named extension makes unseen rows worse": rate(extended, "worse"),
         "data faults found (rows)": _rate(sum(r["faults_found"] for r in every), faults),
     }
@@ -277,7 +319,8 @@ def summarise(records: list[Record]) -> dict[str, Any]:
     return {
         "targets": targets,
         "by_cause_s10": {
-            cause: rate([r for r in strong if r["cause"] == cause], "right") for cause in simulator.CATALOGUE
+            cause: rate([r for r in strong if r["cause"] == cause], "right")
+            for cause in simulator.CATALOGUE
         },
         "gain_share_of_true_term": {
             "n": len(gains),
@@ -285,7 +328,9 @@ def summarise(records: list[Record]) -> dict[str, Any]:
             "first_percentile": float(np.quantile(gains, 0.01)) if gains else None,
             "at_least_0.9": float(np.mean(np.array(gains) >= 0.9)) if gains else None,
         },
-        "false_faults_per_1000_rows": 1000.0 * sum(r["false_faults"] for r in every) / sum(r["rows"] for r in every),
+        "false_faults_per_1000_rows": (
+            1000.0 * sum(r["false_faults"] for r in every) / sum(r["rows"] for r in every)
+        ),
         "confusion_s10_and_more": {cause: dict(row) for cause, row in confusion.items()},
         "seconds_per_fleet": {
             "median": float(np.median([r["seconds"] for r in every])),
@@ -294,11 +339,13 @@ def summarise(records: list[Record]) -> dict[str, Any]:
     }
 
 
-def study(plan: dict[str, int], workers: int, first_seed: int = FIRST_SEED, kept: Path | None = None) -> dict[str, Any]:
+def study(
+    plan: dict[str, int], workers: int, first_seed: int = FIRST_SEED, kept: Path | None = None
+) -> dict[str, Any]:
     """Run a plan on several processes and summarise it.
 
-    The groups are mixed, so that a part of the plan is as good a sample as the whole. With a file to keep the
-    records in, a run that was stopped goes on where it was.
+    The groups are mixed, so that a part of the plan is as good a sample as the whole. With a file
+    to keep the records in, a run that was stopped goes on where it was.
     """
     records = mapped(run, [(task["seed"], task) for task in tasks(plan, first_seed)], workers, kept)
     return {
@@ -311,9 +358,14 @@ def study(plan: dict[str, int], workers: int, first_seed: int = FIRST_SEED, kept
 
 
 def mapped(
-    one: Callable[[Any], Record], listed: list[tuple[int, Any]], workers: int, kept: Path | None = None
+    one: Callable[[Any], Record],
+    listed: list[tuple[int, Any]],
+    workers: int,
+    kept: Path | None = None,
 ) -> list[Record]:
-    """Run tasks, each with its seed, mixed on several processes; with a file a run that was stopped goes on."""
+    """Run tasks, each with its seed, mixed on several processes; with a file a run that was stopped
+    goes on.
+    """
     work = [listed[int(k)] for k in np.random.default_rng(listed[0][0]).permutation(len(listed))]
     records: list[Record] = []
     if kept is not None and kept.exists():
@@ -330,7 +382,10 @@ def mapped(
             done = len(records) - before
             if done % 100 == 0:
                 left = (time.monotonic() - start) / done * (len(work) - done) / 60
-                print(f"{len(records)} of {before + len(work)} fleets, about {left:.0f} min left", flush=True)
+                print(
+                    f"{len(records)} of {before + len(work)} fleets, about {left:.0f} min left",
+                    flush=True,
+                )
     return records
 
 
@@ -406,7 +461,8 @@ def markdown(result: dict[str, Any]) -> str:
     share = result["gain_share_of_true_term"]
     gain = f"median {100 * share['median']:.0f} %; ≥ 90 % in {100 * share['at_least_0.9']:.0f} %"
     lines.append(
-        f"| gain as a share of the true term's, S >= 10 | median ≥ 97 %; ≥ 90 % in 99 % | {gain} | | {share['n']} |"
+        f"| gain as a share of the true term's, S >= 10 | median ≥ 97 %; ≥ 90 % in 99 % | {gain} |"
+        f" | {share['n']} |"
     )
     false = f"{result['false_faults_per_1000_rows']:.2f}"
     lines.append(f"| false data faults per 1,000 rows | ≤ 0.3 | {false} | | {result['fleets']} |")
@@ -421,7 +477,9 @@ def main() -> None:
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--keep", type=Path, help="file to keep records in, to go on after a stop")
     parser.add_argument("--write", action="store_true", help=f"write {RESULT.name}")
-    parser.add_argument("--table", action="store_true", help=f"print the table of {RESULT.name} and stop")
+    parser.add_argument(
+        "--table", action="store_true", help=f"print the table of {RESULT.name} and stop"
+    )
     arguments = parser.parse_args()
     if arguments.table:
         print(markdown(json.loads(RESULT.read_text(encoding="utf-8"))))

@@ -1,9 +1,10 @@
-"""An effect is hidden along the stroke: a curve tells apart what one position cannot, and one rig is enough.
+"""An effect is hidden along the stroke: a curve tells apart what one position cannot, and one rig
+is enough.
 
-What was hidden is compared after the diagnosis, which reads the CSV file that the simulator wrote. The seeds of what
-one position cannot tell apart are those of eight at which it could not, those of a fleet without clearances once failed
-(one was AMBIGUOUS, one has a far reading that no slip explains, in one something was named, in one the rate was not);
-the others are the first ones tried.
+What was hidden is compared after the diagnosis, which reads the CSV file that the simulator wrote.
+The seeds of what one position cannot tell apart are those of eight at which it could not, those of
+a fleet without clearances once failed (one was AMBIGUOUS, one has a far reading that no slip
+explains, in one something was named, in one the rate was not); the others are the first ones tried.
 """
 
 from __future__ import annotations
@@ -66,11 +67,15 @@ def test_the_simulated_plunger_at_full_extension_reads_as_at_mid_position() -> N
 
 
 def test_at_one_position_load_directions_and_linkage_are_one_class() -> None:
-    assert [set(one) for one in named(found("DIRECTIONS", 2, ALONG))] == [{"load_directions", "geometry"}]
+    assert [set(one) for one in named(found("DIRECTIONS", 2, ALONG))] == [
+        {"load_directions", "geometry"}
+    ]
 
 
 def test_at_one_position_another_linkage_is_one_of_a_set() -> None:
-    assert "geometry" in [c.candidate.cause.name for c in found("OTHER_LINKAGE", 8, ALONG).also_possible]
+    assert "geometry" in [
+        c.candidate.cause.name for c in found("OTHER_LINKAGE", 8, ALONG).also_possible
+    ]
 
 
 def test_a_curve_tells_load_directions_from_the_linkage() -> None:
@@ -89,7 +94,9 @@ def test_a_smooth_curve_of_misfit_is_no_slip_of_the_pen() -> None:
 def test_the_rate_of_the_dial_is_found_with_its_size_in_the_travel_of_the_plunger() -> None:
     hidden = curve_table(RATE, 1)[1]
     (cause,) = found("RATE", 1).causes
-    assert cause.parameters["rate_change"] == pytest.approx(hidden["sign"] * hidden["rate_error"], abs=0.01)
+    assert cause.parameters["rate_change"] == pytest.approx(
+        hidden["sign"] * hidden["rate_error"], abs=0.01
+    )
 
 
 def test_nothing_is_found_on_a_sound_rig() -> None:
@@ -119,7 +126,9 @@ def test_one_rig_without_clearances_shows_another_linkage() -> None:
 
 def test_what_one_rig_cannot_say_stands_beside_its_verdict(tmp_path: Path) -> None:
     file = write(tmp_path / "rig.csv", RIG, 1, CLEARANCES)
-    out = CliRunner().invoke(app, ["diagnose", str(file), "--json", "--permutations", "99", "--quiet"])
+    out = CliRunner().invoke(
+        app, ["diagnose", str(file), "--json", "--permutations", "99", "--quiet"]
+    )
     said = json.loads(out.stdout)["cannot_say"]
     assert [out.exit_code, len(said)] == [0, 1]
     assert "whether other gears do the same" in said[0]

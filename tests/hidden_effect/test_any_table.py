@@ -1,4 +1,6 @@
-"""Tables of all kinds of fleets, with columns, rows and cells missing or wrong: diagnosed, or refused in words."""
+"""Tables of all kinds of fleets, with columns, rows and cells missing or wrong: diagnosed, or
+refused in words.
+"""
 
 from __future__ import annotations
 
@@ -25,11 +27,17 @@ def drawn(seed: int, rng: np.random.Generator) -> Table:
     """The table of a departure's fleet, or of readings along the stroke."""
     if rng.random() < 0.65:
         group = str(rng.choice(list(departures.PLAN)))
-        return dict(simulate_fleet(departures._spec(group, int(rng.integers(100)), seed), seed).table)
+        return dict(
+            simulate_fleet(departures._spec(group, int(rng.integers(100)), seed), seed).table
+        )
     effect = str(rng.choice(["", "calibration_rate", "load_directions", "thermal_growth"])) or None
     gears, rows = int(rng.choice([1, 2, 5, 12])), int(rng.choice([5, 10, 24]))
     geometry = str(rng.choice(["A", "C", "A-G:0.2"]))
-    return dict(curve_table(CurveSpec(gears, rows, effect, {}, geometry, fleet=bool(rng.random() < 0.6)), seed)[0])
+    return dict(
+        curve_table(
+            CurveSpec(gears, rows, effect, {}, geometry, fleet=bool(rng.random() < 0.6)), seed
+        )[0]
+    )
 
 
 def spoiled(table: Table, rng: np.random.Generator) -> Table:
@@ -39,10 +47,18 @@ def spoiled(table: Table, rng: np.random.Generator) -> Table:
     share = rng.random()
     gone = {*clearances, "clearance_convention"} if share < 0.15 else set()
     if 0.15 <= share < 0.4:
-        gone = set(rng.choice(clearances, int(rng.integers(1, len(clearances))), replace=False).tolist())
-    gone |= set(rng.choice(others, int(rng.integers(0, min(6, len(others)))), replace=False).tolist())
+        gone = set(
+            rng.choice(clearances, int(rng.integers(1, len(clearances))), replace=False).tolist()
+        )
+    gone |= set(
+        rng.choice(others, int(rng.integers(0, min(6, len(others)))), replace=False).tolist()
+    )
     count = len(table["record_id"])
-    rows = np.sort(rng.choice(count, int(rng.choice([count, count, count // 2, max(count // 10, 2)])), replace=False))
+    rows = np.sort(
+        rng.choice(
+            count, int(rng.choice([count, count, count // 2, max(count // 10, 2)])), replace=False
+        )
+    )
     left = {name: [cells[i] for i in rows] for name, cells in table.items() if name not in gone}
     for name in [name for name in left if name not in STAYS and rng.random() < 0.1]:
         for i in rng.choice(len(rows), max(1, len(rows) // 10), replace=False):

@@ -32,16 +32,25 @@ def test_the_figures_show_what_the_oracle_reaches_beside_what_the_program_does()
 
 def test_the_program_is_nowhere_better_than_the_oracle() -> None:
     lines, told = DEPARTED["lines"], COMMITTED["linkage"]["all"]["first"]
-    assert lines["another linkage, one cause, S = 15: named, with geometry or without"]["low"] <= told["rate"]
+    assert (
+        lines["another linkage, one cause, S = 15: named, with geometry or without"]["low"]
+        <= told["rate"]
+    )
     told = COMMITTED["directions"]["one scale, and one joint's direction"]["beats"]
     line = "load directions, spread 40°: named (or their class), where a regression beats one scale"
     assert lines[line]["low"] <= told["rate"]
 
 
 def test_the_mean_over_angles_is_that_of_a_fine_grid() -> None:
-    along, square, spread = np.array([30.0, -12.0]), np.array([[400.0, 150.0], [150.0, 300.0]]), np.radians(40.0)
+    along, square, spread = (
+        np.array([30.0, -12.0]),
+        np.array([[400.0, 150.0], [150.0, 300.0]]),
+        np.radians(40.0),
+    )
     at, weight = hermegauss(80)
-    loss = 1.0 - np.cos(spread * np.stack(np.meshgrid(at, at, indexing="ij"), axis=-1).reshape(-1, 2))
+    loss = 1.0 - np.cos(
+        spread * np.stack(np.meshgrid(at, at, indexing="ij"), axis=-1).reshape(-1, 2)
+    )
     likelihood = np.exp(loss @ along - 0.5 * np.einsum("ij,ij->i", loss @ square, loss))
     grid = float(np.log(likelihood @ np.outer(weight, weight).ravel() / weight.sum() ** 2))
     found = [marginal(along, square, spread, np.random.default_rng(seed)) for seed in range(4)]
@@ -67,11 +76,20 @@ def test_directions_lead_in_their_own_fleet_and_what_else_is_hidden_in_the_other
 def test_directions_are_named_where_they_lead_by_more_than_in_other_fleets() -> None:
     def record(own: float, other: float, beats: bool) -> dict[str, Any]:
         lead = dict.fromkeys(OTHERS, other)
-        return {"directions": dict.fromkeys(OTHERS, own), "beats": beats, **dict.fromkeys(OTHERS, lead)}
+        return {
+            "directions": dict.fromkeys(OTHERS, own),
+            "beats": beats,
+            **dict.fromkeys(OTHERS, lead),
+        }
 
     linkage = {"cause": "gauge_bias", "left, spread": 10.0, "spread": 3.0, "linkage": 1.0}
-    found = summarise([linkage], [record(3.0, 0.5, True), record(1.0, 2.0, True), record(0.0, -1.0, False)])
+    found = summarise(
+        [linkage], [record(3.0, 0.5, True), record(1.0, 2.0, True), record(0.0, -1.0, False)]
+    )
     assert found["directions"]["one scale"]["least"] == [2.0]
     assert found["directions"]["one scale"]["beats"]["rate"] == 0.5
     assert found["directions"]["one scale"]["all"]["n"] == 3
-    assert (found["linkage"]["gauge_bias"]["clear"]["rate"], found["linkage"]["all"]["known"]["rate"]) == (1.0, 0.0)
+    assert (
+        found["linkage"]["gauge_bias"]["clear"]["rate"],
+        found["linkage"]["all"]["known"]["rate"],
+    ) == (1.0, 0.0)

@@ -13,8 +13,16 @@ from tests.hidden_effect.departures import LINES, RESULT, markdown, renewed, res
 COMMITTED: dict[str, Any] = json.loads(RESULT.read_text(encoding="utf-8"))
 
 
-def record(group: str, named: list[list[str | None]], truth: list[list[str | None]], **more: Any) -> dict[str, Any]:
-    nothing = {"verdict": "NAMED" if named else "NONE", "class": [], "also": [], "before": 0.002, "after": 0.001}
+def record(
+    group: str, named: list[list[str | None]], truth: list[list[str | None]], **more: Any
+) -> dict[str, Any]:
+    nothing = {
+        "verdict": "NAMED" if named else "NONE",
+        "class": [],
+        "also": [],
+        "before": 0.002,
+        "after": 0.001,
+    }
     return {"group": group, "named": named, "truth": truth, "regression": None, **nothing, **more}
 
 
@@ -29,7 +37,10 @@ def test_the_figures_show_the_table_of_the_committed_result() -> None:
 
 def test_every_line_of_the_committed_result_says_on_how_many_fleets() -> None:
     assert set(COMMITTED["lines"]) == set(LINES)
-    assert all(rate["n"] > 0 and rate["low"] <= rate["rate"] <= rate["high"] for rate in COMMITTED["lines"].values())
+    assert all(
+        rate["n"] > 0 and rate["low"] <= rate["rate"] <= rate["high"]
+        for rate in COMMITTED["lines"].values()
+    )
     assert COMMITTED["fleets"] == sum(COMMITTED["of_each"].values())
 
 
@@ -50,11 +61,14 @@ def test_on_another_linkage_only_the_linkage_or_its_class_is_there(
     assert rate("another linkage, nothing hidden: a cause named that is not there", one) == false
 
 
-def test_a_hidden_cause_counts_as_named_with_the_linkage_beside_it_but_not_with_another_target() -> None:
+def test_a_hidden_cause_counts_as_named_beside_the_linkage_but_not_with_another_target() -> None:
     truth: list[list[str | None]] = [["gauge_bias", "gauge G-1"]]
     right = record("linkage, one cause", [*truth, ["geometry", None]], truth)
     wrong = record("linkage, one cause", [["gauge_bias", "gauge G-2"]], truth)
-    assert rate("another linkage, one cause, S = 15: named, with geometry or without", right, wrong) == 0.5
+    assert (
+        rate("another linkage, one cause, S = 15: named, with geometry or without", right, wrong)
+        == 0.5
+    )
 
 
 def test_what_is_named_on_another_linkage_is_told_by_cause() -> None:
@@ -91,8 +105,12 @@ def test_fleets_that_are_run_again_renew_their_own_lines_only() -> None:
     line = "nothing hidden: the other convention named"
     now = result_of([record("nothing hidden", [["convention_slip", "gauge G-1"]], [])], 0)
     after = renewed(COMMITTED, now)
-    assert {name for name in LINES if after["lines"][name] != COMMITTED["lines"].get(name)} == {line}
-    assert after["fleets"] == COMMITTED["fleets"] - COMMITTED["of_each"].get("nothing hidden", 0) + 1
+    assert {name for name in LINES if after["lines"][name] != COMMITTED["lines"].get(name)} == {
+        line
+    }
+    assert (
+        after["fleets"] == COMMITTED["fleets"] - COMMITTED["of_each"].get("nothing hidden", 0) + 1
+    )
 
 
 def test_a_table_that_is_refused_counts_as_not_named() -> None:
@@ -100,7 +118,9 @@ def test_a_table_that_is_refused_counts_as_not_named() -> None:
     assert rate("other convention of 8 rows and more: named with its target", refused) == 0.0
 
 
-def test_on_another_linkage_a_cause_is_named_although_a_single_joint_would_explain_the_rest() -> None:
+def test_on_another_linkage_a_cause_is_named_although_a_single_joint_would_explain_the_rest() -> (
+    None
+):
     one = run(("linkage, one cause", 26, 3_400_026))
     assert rate("another linkage, one cause, S = 15: named, with geometry or without", one) == 1.0
 
@@ -125,7 +145,7 @@ def test_rows_that_scatter_more_decide_no_more_between_two_joints_and_directions
     assert [name for name, _target in one["named"]] == ["load_directions"]
 
 
-def test_a_direction_is_not_named_where_beside_directions_of_all_joints_only_a_faint_cause_is_left() -> None:
+def test_a_direction_is_not_named_where_only_a_faint_cause_is_left_beside_directions() -> None:
     one = run(("loads:40", 21, 8_940_021))
     assert (one["named"], ("load_directions", None) in one["also"]) == ([], True)
 
@@ -140,7 +160,9 @@ def test_one_joint_beside_another_linkage_is_not_taken_for_directions_of_all() -
     assert rate("another linkage, one cause, S = 15: named, with geometry or without", one) == 1.0
 
 
-def test_what_moves_with_temperature_on_one_aircraft_is_no_re_rigging_of_its_last_two_rows() -> None:
+def test_what_moves_with_temperature_on_one_aircraft_is_no_re_rigging_of_its_last_two_rows() -> (
+    None
+):
     # Fleet 49 of those that the rule was set on; its other rows show what moves.
     found = run(("one group", 49, 6_300_049))
     assert (found["named"], found["variables"]) == ([], ["tail_no", "temperature_c"])

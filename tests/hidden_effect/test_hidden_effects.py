@@ -1,7 +1,8 @@
-"""An effect is hidden in a fleet by the independent simulator; the diagnosis must find it from the table alone.
+"""An effect is hidden in a fleet by the independent simulator; the diagnosis must find it from the
+table alone.
 
-The seed of each case is 40,000 plus its place in the list. No seed was chosen for its outcome. What was hidden
-is compared after the diagnosis, which reads the CSV file that the simulator wrote.
+The seed of each case is 40,000 plus its place in the list. No seed was chosen for its outcome. What
+was hidden is compared after the diagnosis, which reads the CSV file that the simulator wrote.
 """
 
 from __future__ import annotations
@@ -22,7 +23,16 @@ from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions, diagnose_files
 
 from .as_table import as_table
 from .data_sets import later_rows
-from .simulator import CATALOGUE, NULLS, EffectSpec, Fleet, draw_fleet, draw_spec, simulate_fleet, write_csv
+from .simulator import (
+    CATALOGUE,
+    NULLS,
+    EffectSpec,
+    Fleet,
+    draw_fleet,
+    draw_spec,
+    simulate_fleet,
+    write_csv,
+)
 from .simulator.records import write_csv as write_columns
 
 FIRST_SEED, STRENGTH, PERMUTATIONS = 40_000, 20.0, 199
@@ -36,7 +46,9 @@ CASES: tuple[tuple[str, dict[str, Any]], ...] = (
     ("double", {"strength": STRENGTH}),
     ("triple", {"strength": STRENGTH}),
 )
-PLACE = {words.get("cause") or words.get("null") or kind: k for k, (kind, words) in enumerate(CASES)}
+PLACE = {
+    words.get("cause") or words.get("null") or kind: k for k, (kind, words) in enumerate(CASES)
+}
 
 
 @dataclass(frozen=True)
@@ -76,7 +88,9 @@ def case(name: str) -> Hidden:
 
 @cache
 def misfit_later(name: str, extended: bool) -> float:
-    """Root mean square of measured less checked displacement on later inspections of the same gears. [in]"""
+    """Root mean square of measured less checked displacement on later inspections of the same
+    gears. [in]
+    """
     found = case(name)
     with TemporaryDirectory() as folder:
         file = Path(folder) / "later.csv"
@@ -147,13 +161,17 @@ def test_an_unlisted_effect_does_not_extend_the_model(effect: str) -> None:
 
 def test_causes_that_touch_the_same_rows_are_all_listed() -> None:
     found = case("aliased")
-    listed = {_plain(c.candidate.cause.name, c.candidate.target) for c in found.diagnosis.also_possible}
+    listed = {
+        _plain(c.candidate.cause.name, c.candidate.target) for c in found.diagnosis.also_possible
+    }
     assert found.diagnosis.verdict == "AMBIGUOUS"
     assert {_plain(*cause) for cause in found.fleet.label.aliases} <= listed
 
 
 def test_causes_that_cannot_be_told_apart_come_with_the_reading_that_splits_them() -> None:
-    assert all(len(c.candidate.cause.separates) > 20 for c in case("aliased").diagnosis.also_possible)
+    assert all(
+        len(c.candidate.cause.separates) > 20 for c in case("aliased").diagnosis.also_possible
+    )
 
 
 def test_causes_that_cannot_be_told_apart_do_not_extend_the_model() -> None:
@@ -176,20 +194,35 @@ def test_two_named_causes_gain_on_rows_that_the_fit_never_saw() -> None:
     assert gain.rms_after_in < 0.7 * gain.rms_before_in
 
 
-def test_how_the_effect_of_a_named_cause_bends_is_not_named_as_directions_or_another_linkage() -> None:
+def test_how_the_effect_of_a_named_cause_bends_is_not_named_as_directions_or_another_linkage() -> (
+    None
+):
     fleet, gear = draw_fleet(9_100_836, "double"), load_gear()
     ensemble = gear.ensemble_models[1:]
     found = diagnose(
-        gear.model, as_table(fleet.table), gear.discrepancies, ensemble=ensemble, permutations=PERMUTATIONS
+        gear.model,
+        as_table(fleet.table),
+        gear.discrepancies,
+        ensemble=ensemble,
+        permutations=PERMUTATIONS,
     )
-    assert {(c.candidate.cause.name, c.candidate.target) for c in found.causes} == set(fleet.label.causes)
+    assert {(c.candidate.cause.name, c.candidate.target) for c in found.causes} == set(
+        fleet.label.causes
+    )
 
 
-def test_two_causes_of_single_joints_are_taken_neither_for_another_linkage_nor_for_directions_of_all_joints() -> None:
+def test_two_causes_of_single_joints_are_not_taken_for_another_linkage_or_directions() -> None:
     seed = 3_460_014
-    effects = (EffectSpec("oval_wear", strength=18.0), EffectSpec("direction_not_worst_case", strength=18.0))
+    effects = (
+        EffectSpec("oval_wear", strength=18.0),
+        EffectSpec("direction_not_worst_case", strength=18.0),
+    )
     fleet = simulate_fleet(replace(draw_spec(seed, "null", null="iid"), effects=effects), seed)
     gear = load_gear()
     ensemble = gear.ensemble_models[1:]
-    found = diagnose(gear.model, as_table(fleet.table), gear.discrepancies, ensemble=ensemble, permutations=99)
-    assert {(c.candidate.cause.name, c.candidate.target) for c in found.causes} == set(fleet.label.causes)
+    found = diagnose(
+        gear.model, as_table(fleet.table), gear.discrepancies, ensemble=ensemble, permutations=99
+    )
+    assert {(c.candidate.cause.name, c.candidate.target) for c in found.causes} == set(
+        fleet.label.causes
+    )

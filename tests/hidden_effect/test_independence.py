@@ -48,7 +48,9 @@ def test_the_simulator_reads_no_file_of_the_product() -> None:
 
 
 def test_the_product_imports_nothing_of_the_tests() -> None:
-    assert not [f for f in PRODUCT if imported(f) & {"tests", "simulator", "hidden_effect", "conftest"}]
+    assert not [
+        f for f in PRODUCT if imported(f) & {"tests", "simulator", "hidden_effect", "conftest"}
+    ]
 
 
 def test_the_product_names_no_file_of_the_tests() -> None:

@@ -1,4 +1,6 @@
-"""The simulator is right about the mechanism, honest about what it hides, and independent of what it tests."""
+"""The simulator is right about the mechanism, honest about what it hides, and independent of what
+it tests.
+"""
 
 from __future__ import annotations
 
@@ -47,16 +49,22 @@ def _worn(rows: int = 40) -> np.ndarray:
 
 
 def _misfit(fleet: simulator.Fleet) -> np.ndarray:
-    """Mean reading minus the worst case at the recorded clearances, as a reader of the table sees it."""
+    """Mean reading minus the worst case at the recorded clearances, as a reader of the table sees
+    it.
+    """
     clearance = np.array([fleet.table[name] for name in CLEARANCES], dtype=float).T
-    readings = np.array([fleet.table[name] for name in DISPLACEMENTS if name in fleet.table], dtype=float)
+    readings = np.array(
+        [fleet.table[name] for name in DISPLACEMENTS if name in fleet.table], dtype=float
+    )
     return readings.mean(axis=0) - physics.worst_case(linkage.load(fleet.spec.geometry), clearance)
 
 
 def _changed(one: simulator.Fleet, other: simulator.Fleet) -> np.ndarray:
     """Rows in which any cell differs."""
     rows = len(one.table["record_id"])
-    return np.array([any(one.table[c][r] != other.table[c][r] for c in one.table) for r in range(rows)])
+    return np.array(
+        [any(one.table[c][r] != other.table[c][r] for c in one.table) for r in range(rows)]
+    )
 
 
 def _hide(*effects: EffectSpec, **changes: object) -> FleetSpec:
@@ -84,7 +92,10 @@ def test_every_loop_closes_to_a_ten_billionth_of_an_inch() -> None:
     build.lever_tilt[:], build.link_offset[:], build.spread[:] = 0.03, 0.1, 3e-4
     build.length("F1")[:] += 0.01
     angles, unknown = linkage.worst_directions(build, sizes)
-    assert linkage.closure_error(build, linkage.clearance_vectors(sizes, angles), unknown).max() < 1e-10
+    assert (
+        linkage.closure_error(build, linkage.clearance_vectors(sizes, angles), unknown).max()
+        < 1e-10
+    )
 
 
 def test_a_linkage_that_cannot_close_is_not_a_number() -> None:
@@ -117,7 +128,9 @@ def test_the_gradient_is_the_slope_of_the_reading() -> None:
         for axis in range(2):
             step = np.zeros_like(at)
             step[:, joint, axis] = 1e-5
-            up, down = (linkage.reading(build, linkage.close(build, at + s * step)) for s in (1, -1))
+            up, down = (
+                linkage.reading(build, linkage.close(build, at + s * step)) for s in (1, -1)
+            )
             assert np.allclose((up - down) / 2e-5, gradient[:, joint, axis], atol=1e-6)
 
 
@@ -129,7 +142,9 @@ def test_no_other_directions_push_the_plunger_further() -> None:
     for row, size in enumerate(sizes):
         one = linkage.Build.nominal(geometry, 1)
 
-        def short(angles: np.ndarray, size: np.ndarray = size, one: linkage.Build = one) -> tuple[float, np.ndarray]:
+        def short(
+            angles: np.ndarray, size: np.ndarray = size, one: linkage.Build = one
+        ) -> tuple[float, np.ndarray]:
             vectors = linkage.clearance_vectors(size[None, :], angles[None, :])
             unknown = linkage.close(one, vectors)
             slope = linkage.plunger_gradient(one, vectors, unknown)[0]
@@ -137,7 +152,8 @@ def test_no_other_directions_push_the_plunger_further() -> None:
             return -100.0 * float(linkage.reading(one, unknown)[0]), -100.0 * along
 
         best = max(
-            -minimize(short, rng.uniform(-np.pi, np.pi, 10), jac=True, method="BFGS").fun / 100.0 for _ in range(3)
+            -minimize(short, rng.uniform(-np.pi, np.pi, 10), jac=True, method="BFGS").fun / 100.0
+            for _ in range(3)
         )
         assert found[row] == pytest.approx(best, abs=1e-7)
 
@@ -150,7 +166,9 @@ def test_uniform_growth_of_all_parts_scales_the_reading_and_does_nothing_else() 
     vectors = linkage.clearance_vectors(_worn(1), geometry.angles)
     plain = linkage.Build.nominal(geometry, 1)
     grown = linkage.reading(build, linkage.close(build, vectors * 1.001))
-    assert grown == pytest.approx(1.001 * linkage.reading(plain, linkage.close(plain, vectors)), rel=1e-9)
+    assert grown == pytest.approx(
+        1.001 * linkage.reading(plain, linkage.close(plain, vectors)), rel=1e-9
+    )
 
 
 def _gears() -> physics.Gears:
@@ -158,7 +176,9 @@ def _gears() -> physics.Gears:
     return physics.Gears(linkage.load("A"), design, np.zeros((30, 10)))
 
 
-@pytest.mark.parametrize("part", ["actuator", "short_link", "rod", "stroke", "twist", "rate_error", "offset"])
+@pytest.mark.parametrize(
+    "part", ["actuator", "short_link", "rod", "stroke", "twist", "rate_error", "offset"]
+)
 def test_every_part_of_the_state_reaches_the_reading(part: str) -> None:
     gears = _gears()
     state = gears.sound()
@@ -166,7 +186,9 @@ def test_every_part_of_the_state_reaches_the_reading(part: str) -> None:
     assert np.abs(gears.read(state) - gears.read(gears.sound())).min() > 1e-5
 
 
-@pytest.mark.parametrize("tilted", range(4), ids=["short link", "link 6-7", "link 9-10", "locking lever"])
+@pytest.mark.parametrize(
+    "tilted", range(4), ids=["short link", "link 6-7", "link 9-10", "locking lever"]
+)
 def test_a_tilt_acts_like_a_projected_length_shrunk_by_its_cosine(tilted: int) -> None:
     gears = _gears()
     state, shrunk = gears.sound(), gears.sound()
@@ -184,7 +206,16 @@ def test_a_tilt_acts_like_a_projected_length_shrunk_by_its_cosine(tilted: int) -
 
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("**/*.py")), ids=lambda path: path.name)
 def test_the_simulator_imports_nothing_of_the_program_under_test(path: Path) -> None:
-    allowed = {"__future__", "collections", "csv", "dataclasses", "datetime", "functools", "json", "numpy"}
+    allowed = {
+        "__future__",
+        "collections",
+        "csv",
+        "dataclasses",
+        "datetime",
+        "functools",
+        "json",
+        "numpy",
+    }
     allowed |= {"pathlib", "typing"}
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
@@ -201,7 +232,9 @@ def test_the_simulator_imports_nothing_of_the_program_under_test(path: Path) -> 
 
 
 def test_no_file_of_the_simulator_names_the_program_under_test() -> None:
-    assert not [path for path in FOLDER.glob("**/*.py") if "mlg" in path.read_text(encoding="utf-8")]
+    assert not [
+        path for path in FOLDER.glob("**/*.py") if "mlg" in path.read_text(encoding="utf-8")
+    ]
 
 
 # Fleets
@@ -216,7 +249,9 @@ def test_a_seed_reproduces_the_fleet(kind: str) -> None:
 
 
 @pytest.mark.parametrize("cause", [*CATALOGUE, *OFF_CATALOGUE])
-@pytest.mark.parametrize("strength", [10.0, *(pytest.param(s, marks=pytest.mark.slow) for s in (5.0, 25.0))])
+@pytest.mark.parametrize(
+    "strength", [10.0, *(pytest.param(s, marks=pytest.mark.slow) for s in (5.0, 25.0))]
+)
 def test_the_requested_strength_is_reached(cause: str, strength: float) -> None:
     kind = "single" if cause in CATALOGUE else "off_catalogue"
     label = draw_fleet(100 + int(strength), kind, cause=cause, strength=strength).label
@@ -235,7 +270,9 @@ def test_a_gauge_that_reads_clearances_wrongly_leaves_the_plunger_readings_alone
     bias = {"clearance_bias_in": 0.001, "sign": 1.0}
     fleet = simulate_fleet(_hide(EffectSpec("gauge_bias", parameters=bias)), 3)
     sound = simulate_fleet(QUIET, 3)
-    assert all(fleet.table[name] == sound.table[name] for name in DISPLACEMENTS if name in sound.table)
+    assert all(
+        fleet.table[name] == sound.table[name] for name in DISPLACEMENTS if name in sound.table
+    )
     rest = _misfit(fleet) - fleet.label.truth_term - fleet.label.noise_term
     assert np.sqrt(np.mean(rest**2)) < 0.12 * fleet.label.effect_rms_in
     assert fleet.label.truth_term.max() <= 0.0
@@ -252,7 +289,11 @@ def test_a_sound_fleet_carries_noise_and_nothing_else(null: str) -> None:
 
 @pytest.mark.parametrize(
     ("cause", "column"),
-    [("gauge_bias", "gauge_id"), ("technician_bias", "technician_id"), ("rigging_offset", "tail_no")],
+    [
+        ("gauge_bias", "gauge_id"),
+        ("technician_bias", "technician_id"),
+        ("rigging_offset", "tail_no"),
+    ],
 )
 def test_a_cause_of_one_identity_changes_its_rows_only(cause: str, column: str) -> None:
     sound = simulate_fleet(QUIET, 9)
@@ -270,7 +311,9 @@ def test_a_cause_of_one_identity_changes_its_rows_only(cause: str, column: str) 
 
 def test_a_date_step_changes_the_later_rows_only() -> None:
     fleet = simulate_fleet(_hide(EffectSpec("date_step", strength=15.0)), 9)
-    later = np.array(fleet.table["inspection_date"]) >= fleet.label.effects[0].parameters["from_date"]
+    later = (
+        np.array(fleet.table["inspection_date"]) >= fleet.label.effects[0].parameters["from_date"]
+    )
     assert np.array_equal(_changed(simulate_fleet(QUIET, 9), fleet), later)
 
 
@@ -278,7 +321,9 @@ def test_a_date_step_changes_the_later_rows_only() -> None:
     ("cause", "column", "value"),
     [("side_difference", "side", "RH"), ("approach_hysteresis", "approach", "RETRACTING")],
 )
-def test_a_cause_of_one_half_of_the_fleet_changes_that_half(cause: str, column: str, value: str) -> None:
+def test_a_cause_of_one_half_of_the_fleet_changes_that_half(
+    cause: str, column: str, value: str
+) -> None:
     parameters = {"calibrated_at": 0.0} if cause == "approach_hysteresis" else {}
     fleet = simulate_fleet(_hide(EffectSpec(cause, strength=15.0, parameters=parameters)), 9)
     half = np.array([cell == value for cell in fleet.table[column]])
@@ -297,7 +342,9 @@ def test_a_cause_of_one_joint_grows_with_that_joints_clearance(cause: str, targe
 
 
 def test_contact_costs_displacement_and_never_adds_any() -> None:
-    truth = simulate_fleet(_hide(EffectSpec("joint_contact", "joints 3,5", 10.0)), 2).label.truth_term
+    truth = simulate_fleet(
+        _hide(EffectSpec("joint_contact", "joints 3,5", 10.0)), 2
+    ).label.truth_term
     assert truth.max() < 1e-6
     assert truth.min() < -0.001
 
@@ -316,7 +363,9 @@ def test_heat_and_pressure_act_relative_to_rigging_and_calibration() -> None:
 
 def test_a_tilted_link_acts_through_the_square_of_its_end_floats() -> None:
     halved = [
-        simulate_fleet(_hide(EffectSpec("out_of_plane_tilt", parameters={"bearing_span_in": span})), 2)
+        simulate_fleet(
+            _hide(EffectSpec("out_of_plane_tilt", parameters={"bearing_span_in": span})), 2
+        )
         for span in (1.5, 3.0)
     ]
     ratio = halved[0].label.effect_rms_in / halved[1].label.effect_rms_in
@@ -339,10 +388,14 @@ def test_an_aliased_fleet_lists_the_causes_that_touch_the_same_rows(alias: str) 
 
 
 def test_a_further_reading_separates_an_aliased_pair() -> None:
-    fleet = simulate_fleet(_hide(EffectSpec("gauge_bias", strength=20.0), alias="gauge_technician"), 8)
+    fleet = simulate_fleet(
+        _hide(EffectSpec("gauge_bias", strength=20.0), alias="gauge_technician"), 8
+    )
     (_, gauge), (_, person) = sorted(fleet.label.aliases)
     gauge, person = (gauge or "").split()[1], (person or "").split()[1]
-    more = follow_up(fleet, [{"gauge_id": gauge, "technician_id": "T-NEW"}, {"technician_id": person}] * 4, 1)
+    more = follow_up(
+        fleet, [{"gauge_id": gauge, "technician_id": "T-NEW"}, {"technician_id": person}] * 4, 1
+    )
     new = more.label.truth_term[fleet.spec.rows :]
     assert len(more.table["record_id"]) == fleet.spec.rows + 8
     assert more.table["technician_id"][-1] == person
@@ -350,7 +403,9 @@ def test_a_further_reading_separates_an_aliased_pair() -> None:
     assert len(set(more.table["record_id"])) == fleet.spec.rows + 8
 
 
-@pytest.mark.parametrize("cause", sorted(name for name, cause in CATALOGUE.items() if cause.columns))
+@pytest.mark.parametrize(
+    "cause", sorted(name for name, cause in CATALOGUE.items() if cause.columns)
+)
 def test_a_needed_column_can_be_missing(cause: str) -> None:
     fleet = draw_fleet(12, "missing_column", cause=cause)
     assert fleet.label.removed_columns
@@ -361,7 +416,9 @@ def test_every_fault_of_the_label_stands_in_the_table_and_no_other() -> None:
     kinds = ("mm_as_in", "factor_10", "swapped_joints", "swapped_side", "implausible")
     clean = simulate_fleet(FleetSpec(), 21)
     fleet = simulate_fleet(FleetSpec(faults=kinds), 21)
-    expected = {(fault.row, fault.column): (fault.right, fault.written) for fault in fleet.label.faults}
+    expected = {
+        (fault.row, fault.column): (fault.right, fault.written) for fault in fleet.label.faults
+    }
     found = {
         (row, column): (clean.table[column][row], value)
         for column, values in fleet.table.items()
@@ -381,11 +438,17 @@ def test_two_swapped_joints_exchange_their_clearances() -> None:
 
 def test_about_one_cell_in_a_hundred_is_blank() -> None:
     table = simulate_fleet(FleetSpec(rows=500), 2).table
-    cells = [value for name in (*CLEARANCES, "temperature_c", "gauge_id", "axial_float_4_in") for value in table[name]]
+    cells = [
+        value
+        for name in (*CLEARANCES, "temperature_c", "gauge_id", "axial_float_4_in")
+        for value in table[name]
+    ]
     assert 0.005 < sum(value is None for value in cells) / len(cells) < 0.016
 
 
-def test_the_table_has_the_columns_of_the_interface_and_nothing_of_the_label(tmp_path: Path) -> None:
+def test_the_table_has_the_columns_of_the_interface_and_nothing_of_the_label(
+    tmp_path: Path,
+) -> None:
     for seed, kind in enumerate(KINDS):
         fleet = draw_fleet(seed, kind)
         assert set(fleet.table) <= set(COLUMNS)
@@ -411,7 +474,12 @@ def test_gauges_and_technicians_hang_on_bases_without_being_exclusive() -> None:
     tails = sorted(set(table["tail_no"]))
     counts = np.array(
         [
-            [sum(t == tail and g == gauge for t, g in zip(table["tail_no"], table["gauge_id"], strict=True))]
+            [
+                sum(
+                    t == tail and g == gauge
+                    for t, g in zip(table["tail_no"], table["gauge_id"], strict=True)
+                )
+            ]
             for tail in tails
             for gauge in sorted(set(table["gauge_id"]))
         ]

@@ -27,8 +27,13 @@ def test_the_committed_study_ran_the_whole_plan(committed: dict[str, Any]) -> No
     assert committed["fleets"] == sum(PLAN.values()) >= 4_000
 
 
-def test_every_rate_of_the_committed_study_says_on_how_many_fleets(committed: dict[str, Any]) -> None:
-    assert all(rate["n"] > 0 and rate["low"] <= rate["rate"] <= rate["high"] for rate in committed["targets"].values())
+def test_every_rate_of_the_committed_study_says_on_how_many_fleets(
+    committed: dict[str, Any],
+) -> None:
+    assert all(
+        rate["n"] > 0 and rate["low"] <= rate["rate"] <= rate["high"]
+        for rate in committed["targets"].values()
+    )
 
 
 def test_the_readme_shows_the_table_of_the_committed_study(committed: dict[str, Any]) -> None:
@@ -45,7 +50,10 @@ def test_the_readme_says_what_no_method_could_exceed() -> None:
 def test_the_study_is_nowhere_better_than_the_best_test_could_be(committed: dict[str, Any]) -> None:
     best = json.loads(ceiling.RESULT.read_text(encoding="utf-8"))["right"]
     for strength in (10, 15, 25):
-        assert committed["targets"][f"unique and right, S = {strength}"]["low"] <= best[f"single:{strength}"]
+        assert (
+            committed["targets"][f"unique and right, S = {strength}"]["low"]
+            <= best[f"single:{strength}"]
+        )
 
 
 @pytest.mark.slow
@@ -56,7 +64,9 @@ def test_a_sample_of_the_best_test_agrees_with_the_committed_figure() -> None:
 
 
 @pytest.mark.slow
-def test_a_fresh_sample_on_other_seeds_agrees_with_the_committed_study(committed: dict[str, Any]) -> None:
+def test_a_fresh_sample_on_other_seeds_agrees_with_the_committed_study(
+    committed: dict[str, Any],
+) -> None:
     plan = {group: max(4, count // 14) for group, count in PLAN.items()}
     fresh = study(plan, 2, OTHER_SEEDS)
     apart = {}
@@ -65,7 +75,9 @@ def test_a_fresh_sample_on_other_seeds_agrees_with_the_committed_study(committed
         if not rate["n"]:
             continue
         both = (rate["n"] * rate["rate"] + other["n"] * other["rate"]) / (rate["n"] + other["n"])
-        error = math.sqrt(both * (1.0 - both) * (1.0 / rate["n"] + 1.0 / other["n"])) + 1.0 / rate["n"]
+        error = (
+            math.sqrt(both * (1.0 - both) * (1.0 / rate["n"] + 1.0 / other["n"])) + 1.0 / rate["n"]
+        )
         # Two dozen rates are compared at once: four standard errors are no chance for any of them.
         if abs(rate["rate"] - other["rate"]) > 4.0 * error:
             apart[name] = (rate, other)

@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from datetime import datetime
 
-from mlg_troubleshoot.cli.prompts import Answers, EntryInterruptedError, Line, SessionStore, ask_inspection
+from mlg_troubleshoot.cli.prompts import (
+    Answers,
+    EntryInterruptedError,
+    Line,
+    SessionStore,
+    ask_inspection,
+)
 from mlg_troubleshoot.cli.prompts.flow import Effect, Flow, State, Turn
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear import Gear
@@ -50,7 +56,9 @@ class ScriptedTerminal:
 ENTERS = [""] * 5
 
 
-def inspect(gear: Gear, store: SessionStore, typed: Iterable[str], preset: Answers = NOTHING, **more) -> Inspection:
+def inspect(
+    gear: Gear, store: SessionStore, typed: Iterable[str], preset: Answers = NOTHING, **more
+) -> Inspection:
     terminal = ScriptedTerminal(typed)
     try:
         entry = ask_inspection(gear, terminal, store, preset, now=lambda: NOON, **more)

@@ -53,13 +53,22 @@ def test_no_question_of_the_heading_has_a_default(flow: Flow, place: int) -> Non
 
 @pytest.mark.parametrize(
     ("typed", "side"),
-    [("l", Side.LH), ("R", Side.RH), ("lh", Side.LH), ("right", Side.RH), ("port", Side.LH), ("L/H", Side.LH)],
+    [
+        ("l", Side.LH),
+        ("R", Side.RH),
+        ("lh", Side.LH),
+        ("right", Side.RH),
+        ("port", Side.LH),
+        ("L/H", Side.LH),
+    ],
 )
 def test_a_side_is_one_key_or_its_name(flow: Flow, typed: str, side: Side) -> None:
     assert play(flow, ["N1", typed], Answers()).state.answers.side is side
 
 
-@pytest.mark.parametrize(("typed", "unit"), [("i", "in"), ("t", "thou"), ("m", "mm"), ("mm", "mm"), ("inch", "in")])
+@pytest.mark.parametrize(
+    ("typed", "unit"), [("i", "in"), ("t", "thou"), ("m", "mm"), ("mm", "mm"), ("inch", "in")]
+)
 def test_a_unit_is_one_key_or_its_name(flow: Flow, typed: str, unit: str) -> None:
     assert play(flow, ["N1", "l", typed], Answers()).state.answers.unit == unit
 
@@ -128,7 +137,14 @@ def test_the_limit_leads_with_the_chosen_unit(flow: Flow) -> None:
 
 @pytest.mark.parametrize(
     ("typed", "radial_in"),
-    [(".013", 0.013), ("0.013 in", 0.013), ("13 thou", 0.013), ("0.33 mm", 0.33 / 25.4), ('.013"', 0.013), ("0", 0.0)],
+    [
+        (".013", 0.013),
+        ("0.013 in", 0.013),
+        ("13 thou", 0.013),
+        ("0.33 mm", 0.33 / 25.4),
+        ('.013"', 0.013),
+        ("0", 0.0),
+    ],
 )
 def test_numbers_are_read_as_people_write_them(flow: Flow, typed: str, radial_in: float) -> None:
     assert play(flow, [typed]).state.answers.radial_in == {1: pytest.approx(radial_in, abs=1e-15)}
@@ -162,7 +178,10 @@ def test_a_value_on_the_limit_is_not_over_it(flow: Flow) -> None:
 def test_enter_alone_enters_nothing_and_offers_s(flow: Flow) -> None:
     turn = play(flow, [""])
     assert turn.state.answers.joints == {}
-    assert said(turn).strip() == "Enter alone enters nothing. Type the clearance, or s if it was not measured."
+    assert (
+        said(turn).strip()
+        == "Enter alone enters nothing. Type the clearance, or s if it was not measured."
+    )
 
 
 def test_s_leaves_a_joint_unmeasured(flow: Flow) -> None:
@@ -177,7 +196,9 @@ def test_a_decimal_comma_is_refused_with_the_suggestion(flow: Flow) -> None:
     assert "enter 0.013" in said(turn)
 
 
-@pytest.mark.parametrize("typed", ["abc", "1/8", "-.002", "−0.002", ".013 cm", "nan", "1e999", ".0 13", "y", "n"])
+@pytest.mark.parametrize(
+    "typed", ["abc", "1/8", "-.002", "−0.002", ".013 cm", "nan", "1e999", ".0 13", "y", "n"]
+)
 def test_what_is_no_clearance_is_not_taken(flow: Flow, typed: str) -> None:
     turn = play(flow, [typed])
     assert (turn.state.ask, turn.state.answers.joints) == (Ask.JOINT, {})
@@ -356,18 +377,27 @@ def test_a_confirmed_value_that_doubles_with_the_convention_is_asked_again(flow:
 
 
 def test_a_changed_unit_asks_what_the_typed_numbers_were(flow: Flow) -> None:
-    assert play(flow, ["4", "b", "b", "b", "i"], replace(RADIAL_INCHES, unit=LengthUnit.THOU)).state.ask is Ask.REREAD
+    assert (
+        play(
+            flow, ["4", "b", "b", "b", "i"], replace(RADIAL_INCHES, unit=LengthUnit.THOU)
+        ).state.ask
+        is Ask.REREAD
+    )
 
 
 def test_typed_numbers_can_keep_their_unit(flow: Flow) -> None:
     typed = [".1", "b", "b", "b", "i", "n", ".004"]
-    radial = play(flow, typed, replace(RADIAL_INCHES, unit=LengthUnit.MILLIMETRE)).state.answers.radial_in
+    radial = play(
+        flow, typed, replace(RADIAL_INCHES, unit=LengthUnit.MILLIMETRE)
+    ).state.answers.radial_in
     assert radial == {1: pytest.approx(0.1 / 25.4), 2: 0.004}
 
 
 def test_typed_numbers_can_be_read_in_the_new_unit(flow: Flow) -> None:
     typed = [".010", "b", "b", "b", "i", "y"]
-    radial = play(flow, typed, replace(RADIAL_INCHES, unit=LengthUnit.MILLIMETRE)).state.answers.radial_in
+    radial = play(
+        flow, typed, replace(RADIAL_INCHES, unit=LengthUnit.MILLIMETRE)
+    ).state.answers.radial_in
     assert radial == {1: 0.010}
 
 
@@ -376,7 +406,9 @@ def test_a_number_with_its_own_unit_does_not_raise_the_question(flow: Flow) -> N
 
 
 @pytest.mark.parametrize("tail_no", ["", "  ", "N1\x1b[31m"])
-def test_a_tail_number_from_a_flag_must_be_readable(gear: Gear, store: SessionStore, tail_no: str) -> None:
+def test_a_tail_number_from_a_flag_must_be_readable(
+    gear: Gear, store: SessionStore, tail_no: str
+) -> None:
     with pytest.raises(UsageError, match="tail"):
         inspect(gear, store, [], replace(RADIAL_INCHES, tail_no=tail_no))
 
@@ -389,7 +421,11 @@ def test_technician_order_gauge_and_date_are_asked_once_and_reach_the_inspection
 ) -> None:
     typed = ["N1", "l", "i", "r", *TEN, "", "A. Smith", "WO-7", "G-03", "2026-03-01", ""]
     found = inspect(gear, store, typed)
-    assert (found.technician_id, found.carried["work_order"], found.gauge_id) == ("A. Smith", "WO-7", "G-03")
+    assert (found.technician_id, found.carried["work_order"], found.gauge_id) == (
+        "A. Smith",
+        "WO-7",
+        "G-03",
+    )
     assert str(found.inspection_date) == "2026-03-01"
 
 
@@ -422,7 +458,9 @@ def test_b_after_a_jump_leads_back_to_where_one_came_from(flow: Flow) -> None:
 
 
 def test_advice_is_shown_after_a_critical_joint(gear: Gear) -> None:
-    flow = Flow(gear, advice=lambda measured, left: (f"Measure #{left[-1]} next: {measured}.", left[-1]))
+    flow = Flow(
+        gear, advice=lambda measured, left: (f"Measure #{left[-1]} next: {measured}.", left[-1])
+    )
     assert "→ Measure #10 next: {1: 0.004}." in said(play(flow, [".004"]))
 
 
@@ -446,7 +484,11 @@ def test_enter_alone_skips_the_optional_answers(flow: Flow) -> None:
 
 def test_the_optional_answers_fit_on_one_line(flow: Flow) -> None:
     answers = play(flow, [*TEN, "f p -.041 m .028"]).state.answers
-    assert answers.more == {"outcome": "FAILED", "plunger_displacement": "-.041 in", "margin": ".028 in"}
+    assert answers.more == {
+        "outcome": "FAILED",
+        "plunger_displacement": "-.041 in",
+        "margin": ".028 in",
+    }
 
 
 @pytest.mark.parametrize(
@@ -461,11 +503,15 @@ def test_the_optional_answers_fit_on_one_line(flow: Flow) -> None:
         ("plunger 0.1", 0.1),
     ],
 )
-def test_the_plunger_displacement_is_signed(gear: Gear, flow: Flow, typed: str, stands_in: float) -> None:
+def test_the_plunger_displacement_is_signed(
+    gear: Gear, flow: Flow, typed: str, stands_in: float
+) -> None:
     assert plunger_in(play(flow, [*TEN, typed]).state.answers, gear) == pytest.approx(stands_in)
 
 
-@pytest.mark.parametrize(("typed", "taken"), [("y", "-.3 in"), ("n", None), ("b", None), ("p .04", ".04 in")])
+@pytest.mark.parametrize(
+    ("typed", "taken"), [("y", "-.3 in"), ("n", None), ("b", None), ("p .04", ".04 in")]
+)
 def test_a_plunger_farther_off_than_worn_joints_could_push_it_is_asked_again(
     flow: Flow, typed: str, taken: str | None
 ) -> None:
@@ -481,7 +527,8 @@ def test_enter_does_not_confirm_the_plunger(flow: Flow) -> None:
 
 
 @pytest.mark.parametrize(
-    "typed", ["x y", "p", "p 0,041", "p 1/8", "p .6", "m 0", "m -.03", "m .3", "q .04", "p 1e999", ".04"]
+    "typed",
+    ["x y", "p", "p 0,041", "p 1/8", "p .6", "m 0", "m -.03", "m .3", "q .04", "p 1e999", ".04"],
 )
 def test_an_optional_answer_that_is_not_understood_changes_nothing(flow: Flow, typed: str) -> None:
     turn = play(flow, [*TEN, "r", f"f {typed}"])
@@ -489,7 +536,9 @@ def test_an_optional_answer_that_is_not_understood_changes_nothing(flow: Flow, t
 
 
 @pytest.mark.parametrize(
-    ("unit", "reading"), [("i", ".004"), ("t", "4"), ("m", ".10")], ids=["inches", "thou", "millimetres"]
+    ("unit", "reading"),
+    [("i", ".004"), ("t", "4"), ("m", ".10")],
+    ids=["inches", "thou", "millimetres"],
 )
 def test_ten_joints_take_at_most_40_keystrokes_beyond_the_numbers(
     gear: Gear, store: SessionStore, unit: str, reading: str
@@ -500,7 +549,9 @@ def test_ten_joints_take_at_most_40_keystrokes_beyond_the_numbers(
 
 
 @pytest.mark.parametrize(("unit", "echo"), [("t", "13.0 thou radial"), ("m", "0.330 mm radial")])
-def test_thou_and_millimetres_come_back_as_they_were_typed(flow: Flow, unit: str, echo: str) -> None:
+def test_thou_and_millimetres_come_back_as_they_were_typed(
+    flow: Flow, unit: str, echo: str
+) -> None:
     typed = {"t": "13", "m": ".33"}[unit]
     turn = play(flow, ["N1", "l", unit, "r", typed], NOTHING)
     assert said(turn).startswith(f" ✓ #1  {echo}")
@@ -542,7 +593,9 @@ def test_a_joint_and_the_echo_before_it_fit_on_24_lines_and_80_columns(flow: Flo
 
 def test_the_review_marks_a_joint_over_its_limit(flow: Flow) -> None:
     rows = shown(flow, play(flow, [".008", *TEN[:9], ""]).state).splitlines()
-    assert [row for row in rows if row.endswith("OVER")] == [row for row in rows if row.startswith("  1 ")]
+    assert [row for row in rows if row.endswith("OVER")] == [
+        row for row in rows if row.startswith("  1 ")
+    ]
 
 
 def test_a_joint_number_at_the_review_changes_that_joint_and_returns(flow: Flow) -> None:
@@ -569,7 +622,9 @@ def test_a_large_value_typed_from_the_review_is_confirmed_too(flow: Flow) -> Non
         ("reading", "d", "convention", ClearanceConvention.DIAMETRAL),
     ],
 )
-def test_the_heading_can_be_changed_from_the_review(flow: Flow, word: str, typed: str, name: str, value: str) -> None:
+def test_the_heading_can_be_changed_from_the_review(
+    flow: Flow, word: str, typed: str, name: str, value: str
+) -> None:
     turn = play(flow, [*TEN, *ENTERS, word, typed])
     assert (turn.state.ask, getattr(turn.state.answers, name)) == (Ask.REVIEW, value)
 
@@ -607,19 +662,29 @@ def test_an_unfinished_inspection_is_offered_when_tail_and_side_are_known(gear: 
 
 def test_yes_goes_on_at_the_first_open_joint(gear: Gear) -> None:
     turn = play(_offering(gear), ["N123AB", "l", "y"], Answers())
-    assert (turn.effect, turn.state.joint, turn.state.answers.radial_in) == (Effect.RESUME, 3, {1: 0.004, 2: 0.005})
+    assert (turn.effect, turn.state.joint, turn.state.answers.radial_in) == (
+        Effect.RESUME,
+        3,
+        {1: 0.004, 2: 0.005},
+    )
 
 
 def test_no_begins_anew_and_puts_the_old_one_away(gear: Gear) -> None:
     turn = play(_offering(gear), ["N123AB", "l", "n"], Answers())
-    assert (turn.effect, turn.state.ask, turn.state.answers.joints) == (Effect.PUT_AWAY, Ask.UNIT, {})
+    assert (turn.effect, turn.state.ask, turn.state.answers.joints) == (
+        Effect.PUT_AWAY,
+        Ask.UNIT,
+        {},
+    )
 
 
 def test_enter_does_not_choose(gear: Gear) -> None:
     assert play(_offering(gear), ["N123AB", "l", ""], Answers()).state.ask is Ask.OFFER
 
 
-def test_an_unfinished_inspection_in_another_convention_is_not_offered_but_named(gear: Gear) -> None:
+def test_an_unfinished_inspection_in_another_convention_is_not_offered_but_named(
+    gear: Gear,
+) -> None:
     turn = _offering(gear).begin(PLAY_INCHES)
     assert turn.state.ask is Ask.JOINT
     assert "not offered: 2 of 10 joints measured, in inches, read as radial" in said(turn)
@@ -628,17 +693,25 @@ def test_an_unfinished_inspection_in_another_convention_is_not_offered_but_named
 # The whole.
 
 
-def test_the_inspection_holds_radial_clearances_and_what_was_entered(gear: Gear, store: SessionStore) -> None:
+def test_the_inspection_holds_radial_clearances_and_what_was_entered(
+    gear: Gear, store: SessionStore
+) -> None:
     typed = ["N123AB", "l", "t", "d", "26", "s", "0.33 mm", "done", "f p -41 m 28", *ENTERS, ""]
     found = inspect(gear, store, typed)
     assert found.clearance_in == {1: pytest.approx(0.013), 3: pytest.approx(0.165 / 25.4)}
-    assert {n: (e.text, e.unit) for n, e in found.entered.items()} == {1: ("26", "thou"), 3: ("0.33 mm", "mm")}
+    assert {n: (e.text, e.unit) for n, e in found.entered.items()} == {
+        1: ("26", "thou"),
+        3: ("0.33 mm", "mm"),
+    }
     assert (found.tail_no, found.side, found.convention) == ("N123AB", "LH", "DIAMETRAL")
     assert (found.outcome, found.readings_in, found.margin_in) == (Outcome.FAILED, (-0.041,), 0.028)
 
 
 def test_a_record_id_is_made_of_tail_side_and_time(gear: Gear, store: SessionStore) -> None:
-    assert inspect(gear, store, [*TEN, *ENTERS, ""], RADIAL_INCHES).record_id == "N123AB-LH-20260304-120000"
+    assert (
+        inspect(gear, store, [*TEN, *ENTERS, ""], RADIAL_INCHES).record_id
+        == "N123AB-LH-20260304-120000"
+    )
 
 
 def test_a_record_id_from_a_flag_is_kept(gear: Gear, store: SessionStore) -> None:
@@ -653,17 +726,23 @@ def test_the_day_of_the_inspection_is_the_day_it_was_begun(gear: Gear, store: Se
 def test_a_confirmed_value_travels_as_a_warning(gear: Gear, store: SessionStore) -> None:
     found = inspect(gear, store, [".0205", "y", *TEN[:9], *ENTERS, ""], RADIAL_INCHES)
     judged, asked = found.warnings
-    assert judged.startswith("joint 1: .0205 in is 0.0205 in radial, above 0.015 in: check the reading.")
+    assert judged.startswith(
+        "joint 1: .0205 in is 0.0205 in radial, above 0.015 in: check the reading."
+    )
     assert asked == "asked again and confirmed: #1"
 
 
-def test_ten_joints_in_inches_take_69_keystrokes_with_the_enters(gear: Gear, store: SessionStore) -> None:
+def test_ten_joints_in_inches_take_69_keystrokes_with_the_enters(
+    gear: Gear, store: SessionStore
+) -> None:
     terminal = ScriptedTerminal(["N123AB", "l", "i", "t", *TEN, *ENTERS, ""])
     ask_inspection(gear, terminal, store, Answers())
     assert terminal.keystrokes == 69
 
 
-def test_ten_joints_in_thou_take_39_keystrokes_with_the_enters(gear: Gear, store: SessionStore) -> None:
+def test_ten_joints_in_thou_take_39_keystrokes_with_the_enters(
+    gear: Gear, store: SessionStore
+) -> None:
     terminal = ScriptedTerminal(["N123AB", "l", "t", "t", *["4"] * 10, *ENTERS, ""])
     ask_inspection(gear, terminal, store, Answers())
     assert terminal.keystrokes == 39
@@ -676,7 +755,9 @@ def test_ten_joints_in_thou_take_39_keystrokes_with_the_enters(gear: Gear, store
 def test_the_sketch_marks_the_current_joint_only(gear: Gear, number: int) -> None:
     text = text_of(sketch(gear, number, 80))
     assert re.findall(r"\[(\d+)\]", text) == [str(number)]
-    assert sorted(map(int, re.findall(r"\((\d+)\)", text))) == [n for n in range(1, 11) if n != number]
+    assert sorted(map(int, re.findall(r"\((\d+)\)", text))) == [
+        n for n in range(1, 11) if n != number
+    ]
 
 
 @pytest.mark.parametrize("number", range(1, 11))
@@ -698,9 +779,15 @@ def _first_joints(gear: Gear, count: int, steps: tuple[Step, ...]) -> Gear:
     needed = {"F", "E", "Q", *(str(n) for n in range(1, count + 1))}
     points = tuple(point for point in whole.points if point.name in needed)
     cut = replace(
-        whole, planes=whole.planes[:1], points=points, steps=steps, output=Output("position", steps[-1].joint)
+        whole,
+        planes=whole.planes[:1],
+        points=points,
+        steps=steps,
+        output=Output("position", steps[-1].joint),
     )
-    return replace(gear, reference=replace(gear.reference, mechanism=cut), joints=gear.joints[:count])
+    return replace(
+        gear, reference=replace(gear.reference, mechanism=cut), joints=gear.joints[:count]
+    )
 
 
 def test_a_mechanism_that_branches_is_shown_as_a_row_of_joints(gear: Gear) -> None:
@@ -722,11 +809,24 @@ def test_ascii_keeps_the_columns(gear: Gear) -> None:
     assert "?" not in plain
 
 
-INCHES_AS_MILLIMETRES = (".011", ".009", ".0115", ".010", ".011", ".009", ".0105", ".010", ".011", ".009")
+INCHES_AS_MILLIMETRES = (
+    ".011",
+    ".009",
+    ".0115",
+    ".010",
+    ".011",
+    ".009",
+    ".0105",
+    ".010",
+    ".011",
+    ".009",
+)
 
 
 def in_millimetres(flow: Flow, *more: str) -> Turn:
-    """Readings in inches of a gear whose joints are all worn out, typed where millimetres were chosen."""
+    """Readings in inches of a gear whose joints are all worn out, typed where millimetres were
+    chosen.
+    """
     return play(
         flow,
         [*INCHES_AS_MILLIMETRES, "", "", "", "", "", "", *more],
@@ -734,7 +834,9 @@ def in_millimetres(flow: Flow, *more: str) -> Turn:
     )
 
 
-def test_readings_that_look_like_another_unit_are_asked_about_before_they_are_computed(flow: Flow) -> None:
+def test_readings_that_look_like_another_unit_are_asked_about_before_they_are_computed(
+    flow: Flow,
+) -> None:
     turn = in_millimetres(flow)
     assert turn.state.ask is Ask.CONFIRM_UNIT
     assert "inches, not in millimetres" in shown(flow, turn.state)

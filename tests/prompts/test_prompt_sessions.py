@@ -1,4 +1,6 @@
-"""Every answer is saved at once; an interrupted inspection can be resumed; damage is said in plain words."""
+"""Every answer is saved at once; an interrupted inspection can be resumed; damage is said in plain
+words.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,16 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.store import Draft, Drafts, Store, StoreError
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows.check import CheckOptions, CheckResult, check_inspection
-from tests.prompts.scripted import ENTERS, NOON, NOTHING, PLAY_INCHES, RADIAL_INCHES, ScriptedTerminal, inspect, play
+from tests.prompts.scripted import (
+    ENTERS,
+    NOON,
+    NOTHING,
+    PLAY_INCHES,
+    RADIAL_INCHES,
+    ScriptedTerminal,
+    inspect,
+    play,
+)
 
 TEN = [".004"] * 10
 HEADING = ["N123AB", "l", "i", "r"]
@@ -75,7 +86,9 @@ def test_every_answer_is_on_disk_before_the_next_question(gear: Gear, store: Ses
     assert counts == [0, 0, 0, 0, *range(10), *[10] * 6]
 
 
-def test_what_another_user_of_the_store_has_not_finished_is_not_offered(gear: Gear, store: SessionStore) -> None:
+def test_what_another_user_of_the_store_has_not_finished_is_not_offered(
+    gear: Gear, store: SessionStore
+) -> None:
     interrupted(gear, replace(store, owner="anna"), [*HEADING, ".004"])
     assert replace(store, owner="ben").latest() is None
     assert latest(replace(store, owner="anna")).answers.radial_in == {1: 0.004}
@@ -95,8 +108,13 @@ def test_a_save_that_fails_leaves_what_was_saved_before_it(gear: Gear, store: Se
     interrupted(gear, store, [*HEADING, ".004"])
     before = latest(store)
     with sqlite3.connect(store.place) as raw:
-        raw.execute("CREATE TRIGGER other BEFORE INSERT ON mlg_drafts BEGIN SELECT RAISE(ABORT, 'not now'); END")
-    with pytest.raises(OutputError, match=r"answers cannot be saved: .*a trigger that may change records"):
+        raw.execute(
+            "CREATE TRIGGER other BEFORE INSERT ON mlg_drafts BEGIN SELECT RAISE(ABORT, 'not"
+            " now'); END"
+        )
+    with pytest.raises(
+        OutputError, match=r"answers cannot be saved: .*a trigger that may change records"
+    ):
         store.save(replace(before, complete=True))
     assert store.latest() == before
 
@@ -110,7 +128,9 @@ def test_an_answer_does_not_wait_long_for_another_writer(gear: Gear, store: Sess
     assert monotonic() - start < 20.0
 
 
-def test_drafts_are_kept_in_a_store_that_was_made_without_them(gear: Gear, store: SessionStore) -> None:
+def test_drafts_are_kept_in_a_store_that_was_made_without_them(
+    gear: Gear, store: SessionStore
+) -> None:
     shutil.copy(Path(__file__).parents[1] / "store" / "data" / "version-1.sqlite", store.place)
     records = Store(store.place).all()
     interrupted(gear, store, [*HEADING, ".004"])
@@ -119,7 +139,21 @@ def test_drafts_are_kept_in_a_store_that_was_made_without_them(gear: Gear, store
 
 
 def test_a_session_reads_back_as_it_was_saved(gear: Gear, store: SessionStore) -> None:
-    typed = [".0205", "y", "s", "0.33 mm", "b", "b", "b", "b", "b", "t", "n", "done", "f p -.041 in m .028 in"]
+    typed = [
+        ".0205",
+        "y",
+        "s",
+        "0.33 mm",
+        "b",
+        "b",
+        "b",
+        "b",
+        "b",
+        "t",
+        "n",
+        "done",
+        "f p -.041 in m .028 in",
+    ]
     answers = play(Flow(gear), typed).state.answers
     session = Session("one", gear.id, NOON, answers)
     saved = store.save(session)
@@ -130,7 +164,9 @@ def test_a_session_reads_back_as_it_was_saved(gear: Gear, store: SessionStore) -
 
 
 @pytest.mark.parametrize("end", [EOFError, KeyboardInterrupt])
-def test_ctrl_c_and_ctrl_d_say_how_to_resume(gear: Gear, store: SessionStore, end: type[BaseException]) -> None:
+def test_ctrl_c_and_ctrl_d_say_how_to_resume(
+    gear: Gear, store: SessionStore, end: type[BaseException]
+) -> None:
     terminal, _ = interrupted(gear, store, [*HEADING, ".004"], end=end)
     assert terminal.screen.rstrip().endswith("Saved. Go on later with:  mlg check --resume")
 
@@ -154,14 +190,18 @@ def test_a_stop_before_the_first_answer_saves_nothing(gear: Gear, store: Session
 # Resuming.
 
 
-def test_a_resumed_inspection_goes_on_at_the_first_open_joint(gear: Gear, store: SessionStore) -> None:
+def test_a_resumed_inspection_goes_on_at_the_first_open_joint(
+    gear: Gear, store: SessionStore
+) -> None:
     interrupted(gear, store, [*HEADING, ".004", ".005"])
     terminal, _ = interrupted(gear, store, [], saved=latest(store))
     assert "joint 3 of 10" in terminal.screen
     assert "joint 1 of 10" not in terminal.screen
 
 
-def test_a_resumed_inspection_equals_an_uninterrupted_one(gear: Gear, store: SessionStore, tmp_path: Path) -> None:
+def test_a_resumed_inspection_equals_an_uninterrupted_one(
+    gear: Gear, store: SessionStore, tmp_path: Path
+) -> None:
     interrupted(gear, store, [*HEADING, ".0205", "y", "s", "4 thou"])
     resumed = inspect(gear, store, [*TEN[:7], "f", *ENTERS, ""], saved=latest(store))
     straight = inspect(
@@ -178,7 +218,9 @@ def test_a_resumed_inspection_stays_one_draft(gear: Gear, store: SessionStore) -
     assert len(drafts(store)) == 1
 
 
-def test_an_unfinished_inspection_of_the_same_gear_is_offered_at_the_start(gear: Gear, store: SessionStore) -> None:
+def test_an_unfinished_inspection_of_the_same_gear_is_offered_at_the_start(
+    gear: Gear, store: SessionStore
+) -> None:
     interrupted(gear, store, [*HEADING, ".004"])
     found = inspect(gear, store, ["n123ab", "l", "y", *TEN[:9], *ENTERS, ""])
     assert (found.tail_no, len(found.clearance_in)) == ("N123AB", 10)
@@ -199,7 +241,9 @@ def test_a_declined_offer_is_not_made_again(gear: Gear, store: SessionStore) -> 
 
 
 @pytest.mark.parametrize("heading", [["N123AB", "r"], ["N124AB", "l"]])
-def test_an_inspection_of_another_gear_is_not_offered(gear: Gear, store: SessionStore, heading: list[str]) -> None:
+def test_an_inspection_of_another_gear_is_not_offered(
+    gear: Gear, store: SessionStore, heading: list[str]
+) -> None:
     interrupted(gear, store, [*HEADING, ".004"])
     terminal, _ = interrupted(gear, store, heading)
     assert "is unfinished" not in terminal.screen
@@ -223,7 +267,9 @@ def test_a_computed_inspection_can_still_be_loaded_by_name(gear: Gear, store: Se
     assert len(inspect(gear, store, [*ENTERS, ""], saved=session).clearance_in) == 10
 
 
-def test_a_computed_inspection_that_is_taken_up_again_is_unfinished_again(gear: Gear, store: SessionStore) -> None:
+def test_a_computed_inspection_that_is_taken_up_again_is_unfinished_again(
+    gear: Gear, store: SessionStore
+) -> None:
     inspect(gear, store, [*HEADING, *TEN, *ENTERS, ""])
     session = read_session(drafts(store)[0])
     interrupted(gear, store, ["b", ".005"], saved=session)
@@ -231,7 +277,10 @@ def test_a_computed_inspection_that_is_taken_up_again_is_unfinished_again(gear: 
 
 
 def test_the_latest_session_is_the_one_saved_last(gear: Gear, store: SessionStore) -> None:
-    one, two = (store.save(Session(name, gear.id, NOON, play(Flow(gear), []).state.answers)) for name in ("one", "two"))
+    one, two = (
+        store.save(Session(name, gear.id, NOON, play(Flow(gear), []).state.answers))
+        for name in ("one", "two")
+    )
     assert latest(store) == two
     store.save(one)
     assert latest(store) == one
@@ -243,7 +292,9 @@ def finish(gear: Gear, store: SessionStore, count: int) -> None:
         store.finish(Session(f"s{n}", gear.id, NOON, answers))
 
 
-def test_only_the_last_twenty_computed_inspections_are_kept(gear: Gear, store: SessionStore) -> None:
+def test_only_the_last_twenty_computed_inspections_are_kept(
+    gear: Gear, store: SessionStore
+) -> None:
     finish(gear, store, 23)
     assert {draft.id for draft in drafts(store)} == {f"s{n}" for n in range(3, 23)}
 
@@ -336,7 +387,9 @@ def test_the_undamaged_example_is_read(store: SessionStore) -> None:
         ),
     ],
 )
-def test_a_damaged_draft_is_said_with_what_to_do_and_is_not_in_the_way_again(store: SessionStore, content: str) -> None:
+def test_a_damaged_draft_is_said_with_what_to_do_and_is_not_in_the_way_again(
+    store: SessionStore, content: str
+) -> None:
     put_raw(store, content)
     with pytest.raises(SessionFileError, match=r"saved inspection bad is damaged") as caught:
         store.latest()
@@ -376,10 +429,15 @@ def test_a_saved_clearance_that_cannot_be_is_asked_again(gear: Gear, store: Sess
 
 def test_what_an_older_version_saved_is_still_read(store: SessionStore) -> None:
     put(store, plunger_in=0.041, outcome="FAILED")
-    assert read_session(drafts(store)[0]).answers.more == {"outcome": "FAILED", "plunger_displacement": "0.041 in"}
+    assert read_session(drafts(store)[0]).answers.more == {
+        "outcome": "FAILED",
+        "plunger_displacement": "0.041 in",
+    }
 
 
-def test_what_a_newer_version_saved_is_kept_and_said_to_be_readable_there(store: SessionStore) -> None:
+def test_what_a_newer_version_saved_is_kept_and_said_to_be_readable_there(
+    store: SessionStore,
+) -> None:
     put(store, schema_version=3, program="9.1.0", joints="unknown to this one")
     before = drafts(store)
     with pytest.raises(SessionFileError, match=r"was saved by mlg 9\.1\.0") as caught:
@@ -421,10 +479,15 @@ def test_a_finished_entry_is_corrected_from_its_review(gear: Gear, store: Sessio
     assert (found.clearance_in[3], found.record_id) == (0.005, entry.inspection.record_id)
 
 
-def test_an_unfinished_entry_is_mentioned_at_the_next_start(gear: Gear, store: SessionStore) -> None:
+def test_an_unfinished_entry_is_mentioned_at_the_next_start(
+    gear: Gear, store: SessionStore
+) -> None:
     interrupted(gear, store, [*HEADING, ".001"])
     terminal, _ = interrupted(gear, store, ["N9"])
-    assert "Unfinished: N123AB LH, begun 2026-03-04 12:00. Go on with it:  mlg check --resume" in terminal.screen
+    assert (
+        "Unfinished: N123AB LH, begun 2026-03-04 12:00. Go on with it:  mlg check --resume"
+        in terminal.screen
+    )
 
 
 def test_without_a_store_there_is_no_latest_session_and_none_is_made(store: SessionStore) -> None:
@@ -432,17 +495,23 @@ def test_without_a_store_there_is_no_latest_session_and_none_is_made(store: Sess
     assert not Path(store.place).exists()
 
 
-def test_a_store_that_cannot_be_written_is_said_once_and_the_inspection_goes_on(gear: Gear, tmp_path: Path) -> None:
+def test_a_store_that_cannot_be_written_is_said_once_and_the_inspection_goes_on(
+    gear: Gear, tmp_path: Path
+) -> None:
     (tmp_path / "file").write_text("")
     terminal = ScriptedTerminal([*HEADING, *TEN, *ENTERS, ""])
-    found = ask_inspection(gear, terminal, SessionStore(tmp_path / "file" / "store.sqlite"), NOTHING)
+    found = ask_inspection(
+        gear, terminal, SessionStore(tmp_path / "file" / "store.sqlite"), NOTHING
+    )
     assert len(found.inspection.clearance_in) == 10
     assert terminal.screen.count("answers cannot be saved") == 1
 
 
 def test_a_stop_does_not_promise_a_resume_that_cannot_be(gear: Gear, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    terminal, stopped = interrupted(gear, SessionStore(tmp_path / "file" / "store.sqlite"), [*HEADING, ".004"])
+    terminal, stopped = interrupted(
+        gear, SessionStore(tmp_path / "file" / "store.sqlite"), [*HEADING, ".004"]
+    )
     assert stopped.session_id is None
     assert "--resume" not in terminal.screen
     assert "could not be saved" in terminal.screen
@@ -485,14 +554,18 @@ def back_again(server: SessionStore, tmp_path: Path) -> SessionStore:
     return replace(server, place=f"sqlite:///{tmp_path}/server.sqlite", away="")
 
 
-def test_while_a_server_is_away_the_answers_are_saved_on_this_machine(gear: Gear, server: SessionStore) -> None:
+def test_while_a_server_is_away_the_answers_are_saved_on_this_machine(
+    gear: Gear, server: SessionStore
+) -> None:
     terminal, stopped = interrupted(gear, server, [*HEADING, ".004"])
     assert latest(server).answers.radial_in == {1: 0.004}
     assert terminal.screen.count("the server cannot be reached") == 1
     assert stopped.session_id is not None
 
 
-def test_when_the_server_is_back_the_entry_goes_on_there(gear: Gear, server: SessionStore, tmp_path: Path) -> None:
+def test_when_the_server_is_back_the_entry_goes_on_there(
+    gear: Gear, server: SessionStore, tmp_path: Path
+) -> None:
     interrupted(gear, server, [*HEADING, ".004"])
     there = back_again(server, tmp_path)
     there.save(latest(there))
@@ -513,5 +586,7 @@ def test_a_file_that_cannot_be_written_is_not_exchanged_for_another(
     gear: Gear, tmp_path: Path, server: SessionStore
 ) -> None:
     (tmp_path / "file").write_text("")
-    _, stopped = interrupted(gear, SessionStore(tmp_path / "file" / "store.sqlite"), [*HEADING, ".004"])
+    _, stopped = interrupted(
+        gear, SessionStore(tmp_path / "file" / "store.sqlite"), [*HEADING, ".004"]
+    )
     assert (stopped.session_id, replace(server, place=None).latest()) == (None, None)

@@ -38,7 +38,8 @@ try:
     found = ask_inspection(load_gear(), RichTerminal(), store, Answers(), saved=saved).inspection
 except KeyboardInterrupt:
     sys.exit(130)
-print("RESULT", found.tail_no, found.side.value, {n: round(c, 6) for n, c in found.clearance_in.items()})
+read = {n: round(c, 6) for n, c in found.clearance_in.items()}
+print("RESULT", found.tail_no, found.side.value, read)
 """
 _HEADING = ("N123AB", "l", "i", "r")
 _PROMPT = "> "
@@ -113,7 +114,20 @@ def test_ten_joints_are_typed_and_the_result_comes_out(start: Start) -> None:
 def test_back_skip_and_a_wrong_value_work_as_typed(start: Start) -> None:
     child = start()
     seen = type_lines(
-        child, *_HEADING, ".004", "b", ".005", "s", "0,013", "", "0.33", ".0205", "y", "done", *ENTERS, ""
+        child,
+        *_HEADING,
+        ".004",
+        "b",
+        ".005",
+        "s",
+        "0,013",
+        "",
+        "0.33",
+        ".0205",
+        "y",
+        "done",
+        *ENTERS,
+        "",
     )
     child.expect_exact("RESULT N123AB LH {1: 0.005, 3: 0.0205}")
     text = " ".join(without_colour(seen).split())
@@ -166,7 +180,9 @@ def test_a_killed_terminal_loses_no_answer(start: Start) -> None:
     ],
     ids=["joint", "confirmation", "optional answers", "sign-off", "review"],
 )
-def test_no_question_loses_an_answer(start: Start, end: int, typed: tuple[str, ...], kept: str) -> None:
+def test_no_question_loses_an_answer(
+    start: Start, end: int, typed: tuple[str, ...], kept: str
+) -> None:
     child = start()
     type_lines(child, *_HEADING, *typed)
     child.expect_exact(_PROMPT)
@@ -178,13 +194,23 @@ def test_no_question_loses_an_answer(start: Start, end: int, typed: tuple[str, .
 
 
 # Every question in turn: ten joints, the optional answers, and who measured with what on which day.
-EVERY = (*(f".00{10 + n}" for n in range(10)), "f p .041", "", "A. Smith", "WO-7", "G-12", "2026-03-01")
+EVERY = (
+    *(f".00{10 + n}" for n in range(10)),
+    "f p .041",
+    "",
+    "A. Smith",
+    "WO-7",
+    "G-12",
+    "2026-03-01",
+)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGHUP], ids=["kill", "hang-up"])
 @pytest.mark.parametrize("place", range(1, len(EVERY) + 1))
-def test_every_question_can_be_the_last_one_before_a_break(start: Start, end: int, place: int) -> None:
+def test_every_question_can_be_the_last_one_before_a_break(
+    start: Start, end: int, place: int
+) -> None:
     child = start()
     type_lines(child, *_HEADING, *EVERY[:place])
     child.expect_exact(_PROMPT)
@@ -194,7 +220,14 @@ def test_every_question_can_be_the_last_one_before_a_break(start: Start, end: in
     # Answers on the last two pages are shown again: Enter keeps them.
     again = [""] * max(place - 11, 0)
     seen = " ".join(without_colour(type_lines(child, *again, *EVERY[place:], "q")).split())
-    for kept in (f"{min(place, 10)} of 10 joints measured", "outcome FAILED", "A. Smith", "WO-7", "G-12", "2026-03-01"):
+    for kept in (
+        f"{min(place, 10)} of 10 joints measured",
+        "outcome FAILED",
+        "A. Smith",
+        "WO-7",
+        "G-12",
+        "2026-03-01",
+    ):
         assert kept in seen
 
 
@@ -287,7 +320,9 @@ def test_standard_output_holds_the_result_only(start: Start, tmp_path: Path) -> 
 
 
 def test_no_line_is_wider_than_the_terminal(start: Start) -> None:
-    seen = type_lines(start(), *_HEADING, "?", ".013", *[".004"] * 9, "?", "f p -.041 m .028", *ENTERS, "?", "q")
+    seen = type_lines(
+        start(), *_HEADING, "?", ".013", *[".004"] * 9, "?", "f p -.041 m .028", *ENTERS, "?", "q"
+    )
     assert max(map(len, without_colour(seen).splitlines())) <= 80
 
 

@@ -15,7 +15,14 @@ from mlg_troubleshoot.records import ReadOptions, ReadResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from tests.records.reading import read_inspections
 
-HEADER = ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in")
+HEADER = (
+    "record_id",
+    "tail_no",
+    "side",
+    "clearance_convention",
+    "clearance_3_in",
+    "clearance_5_in",
+)
 GOOD = ("R1", "N100AB", "LH", "RADIAL", 0.013, 0.007)
 
 _MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
@@ -41,8 +48,13 @@ def read() -> Callable[..., ReadResult]:
 def table() -> Callable[..., str]:
     """Write one good row, or one with some cells replaced, as CSV with canonical headers."""
 
-    def run(header: Sequence[str] = HEADER, rows: Sequence[Sequence[object]] = (GOOD,), sep: str = ",") -> str:
-        lines = [sep.join(header), *(sep.join("" if c is None else str(c) for c in row) for row in rows)]
+    def run(
+        header: Sequence[str] = HEADER, rows: Sequence[Sequence[object]] = (GOOD,), sep: str = ","
+    ) -> str:
+        lines = [
+            sep.join(header),
+            *(sep.join("" if c is None else str(c) for c in row) for row in rows),
+        ]
         return "\n".join(lines) + "\n"
 
     return run
@@ -107,21 +119,35 @@ def package() -> Callable[..., bytes]:
     ) -> bytes:
         data = rows_xml([HEADER, GOOD]) if sheet_data is None else sheet_data
         sheet: str | bytes = sheet_xml or (
-            f'{prolog}<worksheet xmlns="{_MAIN}">{before}<sheetData>{data}</sheetData>{after}</worksheet>'
+            f"{prolog}<worksheet"
+            f' xmlns="{_MAIN}">{before}<sheetData>{data}</sheetData>{after}</worksheet>'
         )
-        relations = f'<Relationship Id="rId1" Type="{_REL}/worksheet" Target="worksheets/sheet1.xml"/>'
+        relations = (
+            f'<Relationship Id="rId1" Type="{_REL}/worksheet" Target="worksheets/sheet1.xml"/>'
+        )
         if styles is not None:
             relations += f'<Relationship Id="rId2" Type="{_REL}/styles" Target="styles.xml"/>'
         if strings is not None:
-            relations += f'<Relationship Id="rId3" Type="{_REL}/sharedStrings" Target="/xl/sharedStrings.xml"/>'
+            relations += (
+                f'<Relationship Id="rId3" Type="{_REL}/sharedStrings"'
+                ' Target="/xl/sharedStrings.xml"/>'
+            )
         content: dict[str, bytes | str] = {
-            "[Content_Types].xml": f'<Types xmlns="{_PACKAGE}content-types"><Override PartName="/xl/workbook.xml" '
-            'ContentType="application/vnd.openxmlformats-officedocument.spreadsheetml.sheet.main+xml"/></Types>',
-            "_rels/.rels": f'<Relationships xmlns="{_PACKAGE}relationships"><Relationship Id="rId1" '
-            f'Type="{_REL}/officeDocument" Target="xl/workbook.xml"/></Relationships>',
-            "xl/workbook.xml": f'<workbook xmlns="{_MAIN}" xmlns:r="{_REL}">{book_pr}<sheets>'
-            '<sheet name="Inspections" sheetId="1" r:id="rId1"/></sheets></workbook>',
-            "xl/_rels/workbook.xml.rels": f'<Relationships xmlns="{_PACKAGE}relationships">{relations}</Relationships>',
+            "[Content_Types].xml": (
+                f'<Types xmlns="{_PACKAGE}content-types"><Override PartName="/xl/workbook.xml" '
+                'ContentType="application/vnd.openxmlformats-officedocument.spreadsheetml.sheet.main+xml"/></Types>'
+            ),
+            "_rels/.rels": (
+                f'<Relationships xmlns="{_PACKAGE}relationships"><Relationship Id="rId1" '
+                f'Type="{_REL}/officeDocument" Target="xl/workbook.xml"/></Relationships>'
+            ),
+            "xl/workbook.xml": (
+                f'<workbook xmlns="{_MAIN}" xmlns:r="{_REL}">{book_pr}<sheets>'
+                '<sheet name="Inspections" sheetId="1" r:id="rId1"/></sheets></workbook>'
+            ),
+            "xl/_rels/workbook.xml.rels": (
+                f'<Relationships xmlns="{_PACKAGE}relationships">{relations}</Relationships>'
+            ),
             "xl/worksheets/sheet1.xml": sheet,
         }
         if styles is not None:

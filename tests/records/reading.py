@@ -16,7 +16,9 @@ class Named(io.BytesIO):
         self.name = name
 
 
-def read_inspections(source: str | Path | io.BytesIO, options: ReadOptions, *, name: str | None = None) -> ReadResult:
+def read_inspections(
+    source: str | Path | io.BytesIO, options: ReadOptions, *, name: str | None = None
+) -> ReadResult:
     if name is not None:
         data = source.getvalue() if isinstance(source, io.BytesIO) else Path(source).read_bytes()
         source = Named(data, name)

@@ -20,7 +20,15 @@ from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.records.annotate import annotate_workbook
 from tests.records.reading import read_inspections
 
-HEADER = ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in", "inspection_date")
+HEADER = (
+    "record_id",
+    "tail_no",
+    "side",
+    "clearance_convention",
+    "clearance_3_in",
+    "clearance_5_in",
+    "inspection_date",
+)
 ROWS = [
     ("R1", "N1", "LH", "RADIAL", 0.013, 0.007, datetime.date(2026, 3, 4)),
     ("R2", "N1", "LH", "RADIAL", -1, 0.007, datetime.date(2026, 3, 5)),
@@ -44,11 +52,15 @@ def book(tmp_path, xlsx):
         rule = DataValidation("list", formula1='"LH,RH"')
         sheet.add_data_validation(rule)
         rule.add("C2:C9")
-        sheet.conditional_formatting.add("E2:F4", CellIsRule(operator="greaterThan", formula=["0.01"]))
+        sheet.conditional_formatting.add(
+            "E2:F4", CellIsRule(operator="greaterThan", formula=["0.01"])
+        )
         other = book.create_sheet("Notes")
         other["B2"] = "=SUM(Inspections!E2:F2)"
         other.merge_cells("C1:D2")
-        book.defined_names["limit"] = openpyxl.workbook.defined_name.DefinedName("limit", attr_text="Notes!$B$2")
+        book.defined_names["limit"] = openpyxl.workbook.defined_name.DefinedName(
+            "limit", attr_text="Notes!$B$2"
+        )
 
     path = tmp_path / "in.xlsx"
     path.write_bytes(xlsx([HEADER, *ROWS], change))
@@ -72,7 +84,9 @@ def annotated(tmp_path, book):
 
 def test_bad_cells_are_filled_and_commented_with_the_problem(annotated):
     sheet = annotated["Inspections"]
-    marked = [c.coordinate for row in sheet.iter_rows() for c in row if c.fill.fgColor.rgb == "FFFFB3B3"]
+    marked = [
+        c.coordinate for row in sheet.iter_rows() for c in row if c.fill.fgColor.rgb == "FFFFB3B3"
+    ]
     assert marked == ["E3", "E4", "F4"]
     assert "25.4" in sheet["E4"].comment.text
 
@@ -96,7 +110,12 @@ def test_a_verdict_can_be_told_by_its_colour(tmp_path, xlsx):
     source.write_bytes(xlsx([HEADER, *[(f"R{n}", *ROWS[0][1:]) for n in range(3)]]))
     result = read_inspections(source, ReadOptions())
     said = ("WITHIN_MARGIN", "INCONCLUSIVE", "OUTSIDE_MARGIN")
-    annotate_workbook(source, out, result, {r.source: {"verdict": v} for r, v in zip(result.rows, said, strict=True)})
+    annotate_workbook(
+        source,
+        out,
+        result,
+        {r.source: {"verdict": v} for r, v in zip(result.rows, said, strict=True)},
+    )
     assert len(set(fills(openpyxl.load_workbook(out)["Inspections"], "H"))) == 3
 
 
@@ -170,8 +189,12 @@ def test_an_annotated_workbook_reads_like_its_source(samples, tmp_path):
     first = read_inspections(source, ReadOptions())
     annotate_workbook(source, out, first, {r.source: {"verdict": "x"} for r in first.rows})
     second = read_inspections(out, ReadOptions())
-    assert [p.as_dict() | {"file": ""} for p in second.problems] == [p.as_dict() | {"file": ""} for p in first.problems]
-    assert [dict(r.clearance_in) for r in second.inspections] == [dict(r.clearance_in) for r in first.inspections]
+    assert [p.as_dict() | {"file": ""} for p in second.problems] == [
+        p.as_dict() | {"file": ""} for p in first.problems
+    ]
+    assert [dict(r.clearance_in) for r in second.inspections] == [
+        dict(r.clearance_in) for r in first.inspections
+    ]
 
 
 def test_a_problem_of_a_header_is_marked_at_the_header(tmp_path, xlsx):
@@ -201,7 +224,9 @@ def test_a_form_gets_its_verdict_beside_it(tmp_path):
     write_template(path, load_gear())
     book = openpyxl.load_workbook(path)
     for cell, value in zip(
-        ("B4", "B5", "B6", "B7", "B8", "B11"), ("F1", "N1", "LH", "RADIAL", "in", 0.013), strict=True
+        ("B4", "B5", "B6", "B7", "B8", "B11"),
+        ("F1", "N1", "LH", "RADIAL", "in", 0.013),
+        strict=True,
     ):
         book["Form"][cell] = value
     book.save(path)
@@ -247,11 +272,17 @@ def test_a_workbook_that_the_library_cannot_write_again_is_an_output_error(book,
 def test_csv_export_keeps_numbers_exact_and_blanks_blank(tmp_path):
     write_csv(tmp_path / "o.csv", ["a", "b", "c", "d"], [["x", 0.1 + 0.2, None, 3]])
     with (tmp_path / "o.csv").open(newline="") as file:
-        assert list(csv.reader(file)) == [["a", "b", "c", "d"], ["x", "0.30000000000000004", "", "3"]]
+        assert list(csv.reader(file)) == [
+            ["a", "b", "c", "d"],
+            ["x", "0.30000000000000004", "", "3"],
+        ]
 
 
 def test_what_the_copy_cannot_take_over_is_said(book, tmp_path):
-    assert annotate_workbook(book, tmp_path / "a.xlsx", read_inspections(book, ReadOptions()), {}) == ()
+    assert (
+        annotate_workbook(book, tmp_path / "a.xlsx", read_inspections(book, ReadOptions()), {})
+        == ()
+    )
     with zipfile.ZipFile(book, "a") as archive:
         archive.writestr("xl/media/image1.png", b"picture")
         archive.writestr("xl/drawings/drawing1.xml", b"<xdr:wsDr><xdr:sp macro=''/></xdr:wsDr>")

@@ -37,12 +37,26 @@ COLUMNS = (
 )
 ROWS = 500
 SHARE = 0.03
-# What people leave in a cell, by column; a row with a bad cell of the second group can still be judged.
+# What people leave in a cell, by column; a row with a bad cell of the second group can still be
+# judged.
 SPOILING = {
     "tail_no": (None, "#N/A"),
     "side": ("both", None, "XX", 5, "#REF!"),
     "clearance_convention": ("CLEAR", None, 3),
-    "clearance": (-0.001, 0.33, 9, "0,013", "n/a?", "1/8", "0.3 mm", "−0.002", "nan", "~", "?", "#DIV/0!"),
+    "clearance": (
+        -0.001,
+        0.33,
+        9,
+        "0,013",
+        "n/a?",
+        "1/8",
+        "0.3 mm",
+        "−0.002",
+        "nan",
+        "~",
+        "?",
+        "#DIV/0!",
+    ),
     "margin_in": (-0.03, "x", 0.7),
     "outcome": ("MAYBE", 1),
 }
@@ -63,7 +77,11 @@ class Fleet:
 
 
 def kind_of(column: str) -> str:
-    return "clearance" if column.startswith("clearance_") and column != "clearance_convention" else column
+    return (
+        "clearance"
+        if column.startswith("clearance_") and column != "clearance_convention"
+        else column
+    )
 
 
 def make_fleet(seed: int) -> Fleet:
@@ -72,7 +90,9 @@ def make_fleet(seed: int) -> Fleet:
     fleet = Fleet([list(COLUMNS)])
     for n in range(ROWS):
         row: list[object] = [f"R{n:05d}", f"{n % 200:03d}", rng.choice(("LH", "RH")), "TOTAL_PLAY"]
-        row += [None if rng.random() < 0.05 else round(rng.uniform(0.0, 0.012), 4) for _ in range(10)]
+        row += [
+            None if rng.random() < 0.05 else round(rng.uniform(0.0, 0.012), 4) for _ in range(10)
+        ]
         row += [
             "2026-03-04",
             n,
@@ -113,7 +133,9 @@ WORKBOOK_TYPE = "application/vnd.openxmlformats-officedocument.spreadsheetml"
 
 
 def by_hand(fleet: Fleet) -> bytes:
-    """Write the fleet as the XML that Excel writes: shared strings, error cells, blank cells with a style."""
+    """Write the fleet as the XML that Excel writes: shared strings, error cells, blank cells with a
+    style.
+    """
     strings: dict[str, int] = {}
     lines = []
     for number, row in enumerate(fleet.rows, 1):
@@ -127,26 +149,42 @@ def by_hand(fleet: Fleet) -> bytes:
             elif value.startswith("#"):
                 cells.append(f'<c {place} t="e"><v>{value}</v></c>')
             else:
-                cells.append(f'<c {place} t="s"><v>{strings.setdefault(value, len(strings))}</v></c>')
+                cells.append(
+                    f'<c {place} t="s"><v>{strings.setdefault(value, len(strings))}</v></c>'
+                )
         lines.append(f'<row r="{number}" spans="1:{len(row)}">{"".join(cells)}</row>')
     parts = {
-        "[Content_Types].xml": f'<Types xmlns="{PACKAGE}/content-types">'
-        '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
-        '<Default Extension="xml" ContentType="application/xml"/>'
-        f'<Override PartName="/xl/workbook.xml" ContentType="{WORKBOOK_TYPE}.sheet.main+xml"/>'
-        f'<Override PartName="/xl/worksheets/sheet1.xml" ContentType="{WORKBOOK_TYPE}.worksheet+xml"/>'
-        f'<Override PartName="/xl/sharedStrings.xml" ContentType="{WORKBOOK_TYPE}.sharedStrings+xml"/></Types>',
-        "_rels/.rels": f'<Relationships xmlns="{PACKAGE}/relationships"><Relationship Id="rId1" '
-        f'Type="{OFFICE}/officeDocument" Target="xl/workbook.xml"/></Relationships>',
-        "xl/workbook.xml": f'<workbook xmlns="{MAIN}" xmlns:r="{OFFICE}"><sheets>'
-        '<sheet name="Inspections" sheetId="1" r:id="rId1"/></sheets></workbook>',
-        "xl/_rels/workbook.xml.rels": f'<Relationships xmlns="{PACKAGE}/relationships">'
-        f'<Relationship Id="rId1" Type="{OFFICE}/worksheet" Target="worksheets/sheet1.xml"/>'
-        f'<Relationship Id="rId2" Type="{OFFICE}/sharedStrings" Target="sharedStrings.xml"/></Relationships>',
-        "xl/worksheets/sheet1.xml": f'<worksheet xmlns="{MAIN}"><sheetData>{"".join(lines)}</sheetData></worksheet>',
-        "xl/sharedStrings.xml": f'<sst xmlns="{MAIN}">'
-        + "".join(f"<si><t>{text}</t></si>" for text in strings)
-        + "</sst>",
+        "[Content_Types].xml": (
+            f'<Types xmlns="{PACKAGE}/content-types"><Default Extension="rels"'
+            ' ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Default'
+            ' Extension="xml" ContentType="application/xml"/><Override PartName="/xl/workbook.xml"'
+            f' ContentType="{WORKBOOK_TYPE}.sheet.main+xml"/><Override'
+            ' PartName="/xl/worksheets/sheet1.xml"'
+            f' ContentType="{WORKBOOK_TYPE}.worksheet+xml"/><Override'
+            ' PartName="/xl/sharedStrings.xml"'
+            f' ContentType="{WORKBOOK_TYPE}.sharedStrings+xml"/></Types>'
+        ),
+        "_rels/.rels": (
+            f'<Relationships xmlns="{PACKAGE}/relationships"><Relationship Id="rId1" '
+            f'Type="{OFFICE}/officeDocument" Target="xl/workbook.xml"/></Relationships>'
+        ),
+        "xl/workbook.xml": (
+            f'<workbook xmlns="{MAIN}" xmlns:r="{OFFICE}"><sheets>'
+            '<sheet name="Inspections" sheetId="1" r:id="rId1"/></sheets></workbook>'
+        ),
+        "xl/_rels/workbook.xml.rels": (
+            f'<Relationships xmlns="{PACKAGE}/relationships"><Relationship Id="rId1"'
+            f' Type="{OFFICE}/worksheet" Target="worksheets/sheet1.xml"/><Relationship Id="rId2"'
+            f' Type="{OFFICE}/sharedStrings" Target="sharedStrings.xml"/></Relationships>'
+        ),
+        "xl/worksheets/sheet1.xml": (
+            f'<worksheet xmlns="{MAIN}"><sheetData>{"".join(lines)}</sheetData></worksheet>'
+        ),
+        "xl/sharedStrings.xml": (
+            f'<sst xmlns="{MAIN}">'
+            + "".join(f"<si><t>{text}</t></si>" for text in strings)
+            + "</sst>"
+        ),
     }
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -196,7 +234,13 @@ def test_rows_in_are_rows_judged_and_rows_reported(checked):
     assert sum(v != "INVALID" for v in verdicts) + len(fleet.spoilt) == ROWS
 
 
-HEADER = ("record_id", "tail_no", "side", "clearance_convention", *(f"clearance_{n}_in" for n in range(1, 11)))
+HEADER = (
+    "record_id",
+    "tail_no",
+    "side",
+    "clearance_convention",
+    *(f"clearance_{n}_in" for n in range(1, 11)),
+)
 
 
 def sound(record_id: str, **changes: object) -> list[object]:
@@ -227,7 +271,9 @@ def as_csv(*rows):
 
 @pytest.fixture
 def mixed(tmp_path):
-    """Write a workbook with a good row, a worn one, two bad cells in one row, and a joint over its limit."""
+    """Write a workbook with a good row, a worn one, two bad cells in one row, and a joint over its
+    limit.
+    """
     rows = [
         HEADER,
         sound("GOOD"),
@@ -273,15 +319,24 @@ def test_the_csv_says_the_same_as_the_json(mixed, tmp_path):
         lines = list(csv.DictReader(file))
     for line, inspection in zip(lines, run.json["inspections"], strict=True):
         number = inspection["predicted_displacement_in"]
-        assert (line["record_id"], line["verdict"]) == (inspection["record_id"], inspection["verdict"])
+        assert (line["record_id"], line["verdict"]) == (
+            inspection["record_id"],
+            inspection["verdict"],
+        )
         assert line["predicted_displacement_in"] == ("" if number is None else repr(number))
 
 
-def test_the_annotated_workbook_marks_exactly_the_bad_cells_and_the_joints_over_their_limit(mixed, tmp_path):
+def test_the_annotated_workbook_marks_exactly_the_bad_cells_and_the_joints_over_their_limit(
+    mixed, tmp_path
+):
     out = tmp_path / "out.xlsx"
     mlg("check", mixed, "--annotate", out)
     sheet = openpyxl.load_workbook(out).worksheets[0]
-    assert [cell.coordinate for row in sheet.iter_rows() for cell in row if cell.comment] == ["C4", "G4", "N5"]
+    assert [cell.coordinate for row in sheet.iter_rows() for cell in row if cell.comment] == [
+        "C4",
+        "G4",
+        "N5",
+    ]
 
 
 def test_the_annotated_workbook_has_a_verdict_for_every_row(mixed, tmp_path):
@@ -310,10 +365,14 @@ def test_a_workbook_that_was_refused_is_not_annotated_and_leaves_with_nothing_ju
     assert not (tmp_path / "out.xlsx").exists()
 
 
-def test_a_workbook_that_cannot_be_copied_is_an_output_error_and_the_results_still_come(mixed, tmp_path):
+def test_a_workbook_that_cannot_be_copied_is_an_output_error_and_the_results_still_come(
+    mixed, tmp_path
+):
     with zipfile.ZipFile(mixed) as old:
         parts = {name: old.read(name) for name in old.namelist()}
-    parts["xl/styles.xml"] = parts["xl/styles.xml"].replace(b"<font>", b'<font><color rgb="cornflower"/>', 1)
+    parts["xl/styles.xml"] = parts["xl/styles.xml"].replace(
+        b"<font>", b'<font><color rgb="cornflower"/>', 1
+    )
     with zipfile.ZipFile(mixed, "w") as new:
         for name, data in parts.items():
             new.writestr(name, data)
@@ -341,7 +400,9 @@ def test_a_broken_file_among_others_is_a_problem_and_the_others_are_judged(tmp_p
 
 
 def test_two_tables_in_a_workbook_are_asked_about(tmp_path):
-    path = workbook(tmp_path / "w.xlsx", ("LH", [HEADER, sound("a")]), ("RH", [HEADER, sound("b", side="RH")]))
+    path = workbook(
+        tmp_path / "w.xlsx", ("LH", [HEADER, sound("a")]), ("RH", [HEADER, sound("b", side="RH")])
+    )
     run = mlg("check", path)
     assert run.code == 3
     assert '--sheet "LH"' in run.err
@@ -362,12 +423,20 @@ def test_the_sheets_to_read_can_be_named_or_all_taken(tmp_path, sheet, expected)
 def test_a_table_comes_from_standard_input(tmp_path, kind):
     data = as_csv(HEADER, sound("a"), sound("b")).encode()
     if kind == "xlsx":
-        data = workbook(tmp_path / "w.xlsx", ("Inspections", [HEADER, sound("a"), sound("b")])).read_bytes()
+        data = workbook(
+            tmp_path / "w.xlsx", ("Inspections", [HEADER, sound("a"), sound("b")])
+        ).read_bytes()
     assert records(mlg("check", "-", "--json", stdin=data)) == ["a", "b"]
 
 
 FORM = {
-    **{"Record id": "F1", "Tail no": "007", "Side": "RH", "Clearance convention": "TOTAL_PLAY", "Unit": "mm"},
+    **{
+        "Record id": "F1",
+        "Tail no": "007",
+        "Side": "RH",
+        "Clearance convention": "TOTAL_PLAY",
+        "Unit": "mm",
+    },
     **{f"Clearance #{n}": 0.05 for n in range(1, 11)},
 }
 
@@ -385,7 +454,11 @@ def forms(tmp_path):
     path = tmp_path / "forms.xlsx"
     mlg("template", path)
     book = openpyxl.load_workbook(path)
-    (name,) = [s.title for s in book.worksheets if any(row[0].value == "Record id" for row in s.iter_rows(max_col=1))]
+    (name,) = [
+        s.title
+        for s in book.worksheets
+        if any(row[0].value == "Record id" for row in s.iter_rows(max_col=1))
+    ]
     second = book.copy_worksheet(book[name])
     second.title = "Second form"
     filled_form(book[name], FORM)
@@ -416,7 +489,9 @@ def test_a_bad_cell_of_a_form_is_named_on_its_sheet(forms):
 def test_a_long_table_is_one_inspection_a_record(tmp_path):
     header = ("record_id", "tail_no", "side", "clearance_convention", "joint", "clearance_in")
     path = tmp_path / "long.csv"
-    path.write_text(as_csv(header, *(("R1", "N1", "LH", "RADIAL", n, 0.0005) for n in range(1, 11))))
+    path.write_text(
+        as_csv(header, *(("R1", "N1", "LH", "RADIAL", n, 0.0005) for n in range(1, 11)))
+    )
     (found,) = mlg("check", path, "--json").json["inspections"]
     assert found["verdict"] == "WITHIN_MARGIN"
 
@@ -473,7 +548,9 @@ def in_a_terminal(*arguments, columns=80):
 @needs_posix
 def test_problems_stand_in_a_table_on_a_terminal(mixed):
     lines = [line.rstrip() for line in in_a_terminal("check", mixed, columns=120).splitlines()]
-    heading = next(n for n, line in enumerate(lines) if line.split()[:3] == ["cell", "column", "found"])
+    heading = next(
+        n for n, line in enumerate(lines) if line.split()[:3] == ["cell", "column", "found"]
+    )
     in_table = [line.split()[:3] for line in lines[heading + 1 : heading + 4]]
     assert ["C4", "side", "both"] in in_table
     assert ["G4", "clearance_3_in", "n/a?"] in in_table
@@ -499,8 +576,12 @@ def test_quiet_shows_no_progress(tmp_path):
 def test_the_json_of_a_batch_written_in_pieces_is_the_whole_form(gear, mixed):
     result = check_files([mixed], CheckOptions())
     parts = (gear, result.judgements, result.problems, result.notes)
-    assert json.loads("".join(check_json_pieces(*parts))) == json.loads(json.dumps(check_as_json(*parts)))
+    assert json.loads("".join(check_json_pieces(*parts))) == json.loads(
+        json.dumps(check_as_json(*parts))
+    )
 
 
 def test_the_json_of_nothing_judged_is_whole_too(gear):
-    assert json.loads("".join(check_json_pieces(gear, [], [], ["a note"])))["warnings"] == ["a note"]
+    assert json.loads("".join(check_json_pieces(gear, [], [], ["a note"])))["warnings"] == [
+        "a note"
+    ]

@@ -1,4 +1,6 @@
-"""Cells that decide about a gear: what everyone reads is read, what nobody can read stops the row."""
+"""Cells that decide about a gear: what everyone reads is read, what nobody can read stops the
+row.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,14 @@ HEALTHY = {f"clearance_{n}_in": "0.001" for n in range(1, 11)}
 
 def table(tmp_path, **columns):
     """Write one sound row with further columns."""
-    row = {"record_id": "R1", "tail_no": "N1", "side": "LH", "clearance_convention": "RADIAL", **HEALTHY, **columns}
+    row = {
+        "record_id": "R1",
+        "tail_no": "N1",
+        "side": "LH",
+        "clearance_convention": "RADIAL",
+        **HEALTHY,
+        **columns,
+    }
     file = tmp_path / "t.csv"
     file.write_text("\n".join((",".join(row), ",".join(map(str, row.values())))) + "\n")
     return file
@@ -27,7 +36,8 @@ def one(tmp_path, gear, **columns):
 
 
 @pytest.mark.parametrize(
-    "header", ["outcome", "Result", "RESULT", "Outcome", "Retracted?", "Failed?", "Gear retracted (Y/N)"]
+    "header",
+    ["outcome", "Result", "RESULT", "Outcome", "Retracted?", "Failed?", "Gear retracted (Y/N)"],
 )
 def test_usual_headers_of_an_outcome_are_understood(gear, header):
     found = recognise(header, gear.joint_numbers, {})
@@ -35,7 +45,9 @@ def test_usual_headers_of_an_outcome_are_understood(gear, header):
     assert found.field.name == "outcome"
 
 
-@pytest.mark.parametrize("word", ["fail", "FAIL", "Failed", "Failed to retract", "NG", "n.g.", "did not retract"])
+@pytest.mark.parametrize(
+    "word", ["fail", "FAIL", "Failed", "Failed to retract", "NG", "n.g.", "did not retract"]
+)
 @pytest.mark.parametrize("header", ["Result", "outcome", "Retracted?"])
 def test_words_for_a_failure_are_read(tmp_path, gear, header, word):
     assert one(tmp_path, gear, **{header: word}).outcome is Outcome.FAILED
@@ -87,14 +99,20 @@ def test_a_decisive_cell_that_cannot_be_read_never_ends_with_exit_code_0(tmp_pat
     assert run.one["verdict"] == "INVALID"
 
 
-@pytest.mark.parametrize(("convention", "stated", "taken"), [("TOTAL_PLAY", 0.0373, True), ("RADIAL", 0.0373, False)])
-def test_the_limit_of_a_gauge_uncertainty_counts_on_its_radial_value(tmp_path, gear, convention, stated, taken):
+@pytest.mark.parametrize(
+    ("convention", "stated", "taken"), [("TOTAL_PLAY", 0.0373, True), ("RADIAL", 0.0373, False)]
+)
+def test_the_limit_of_a_gauge_uncertainty_counts_on_its_radial_value(
+    tmp_path, gear, convention, stated, taken
+):
     row = one(tmp_path, gear, clearance_convention=convention, gauge_u_in=stated)
     assert isinstance(row, Inspection) is taken
 
 
 def test_without_a_convention_a_gauge_uncertainty_may_be_one_of_total_play(tmp_path, gear):
-    read = read_many([table(tmp_path, clearance_convention="", gauge_u_in=0.0373)], ReadOptions.of(gear))
+    read = read_many(
+        [table(tmp_path, clearance_convention="", gauge_u_in=0.0373)], ReadOptions.of(gear)
+    )
     assert [problem.column for problem in read.problems] == ["clearance_convention"]
 
 
@@ -104,7 +122,9 @@ def test_a_large_uncertainty_in_total_play_is_the_same_as_half_of_it_in_radial(t
     assert total.gauge_u_in == pytest.approx(radial.gauge_u_in)
 
 
-@pytest.mark.parametrize("header", ["Plunger (in)", "plunger_in", "plunger reading [in]", "Measured plunger (in)"])
+@pytest.mark.parametrize(
+    "header", ["Plunger (in)", "plunger_in", "plunger reading [in]", "Measured plunger (in)"]
+)
 def test_usual_headers_of_a_plunger_reading_are_understood(tmp_path, gear, header):
     assert one(tmp_path, gear, **{header: "0.045"}).readings_in == (0.045,)
 
@@ -135,7 +155,13 @@ def test_a_question_is_answered_as_it_is_asked(tmp_path, gear, header, word, out
 @pytest.mark.parametrize("sheet", [None, "*"])
 def test_a_sheet_that_is_not_read_is_named(tmp_path, gear, sheet):
     book = openpyxl.Workbook()
-    columns = {"record_id": "R1", "tail_no": "N1", "side": "LH", "clearance_convention": "RADIAL", **HEALTHY}
+    columns = {
+        "record_id": "R1",
+        "tail_no": "N1",
+        "side": "LH",
+        "clearance_convention": "RADIAL",
+        **HEALTHY,
+    }
     book.active.append(list(columns))
     book.active.append(list(columns.values()))
     book.create_sheet("RH").append(["words of somebody"])

@@ -70,7 +70,8 @@ def test_numbers_that_are_no_day_are_refused(text):
 
 
 @pytest.mark.parametrize(
-    ("order", "day"), [("dmy", date(2003, 2, 1)), ("mdy", date(2003, 1, 2)), ("ymd", date(2001, 2, 3))]
+    ("order", "day"),
+    [("dmy", date(2003, 2, 1)), ("mdy", date(2003, 1, 2)), ("ymd", date(2001, 2, 3))],
 )
 def test_a_stated_order_settles_a_date(order, day):
     assert read_date("01-02-03", DateOrder(order)) == day
@@ -95,7 +96,10 @@ def test_the_order_that_a_column_showed_is_said(tmp_path):
 def test_dates_that_no_other_date_settles_are_refused_by_cell(tmp_path):
     found, read = days(tmp_path, "03/04/2024", "05/06/2024")
     assert found == [None, None]
-    assert [(p.cell, p.code) for p in read.problems] == [("F2", "date_ambiguous"), ("F3", "date_ambiguous")]
+    assert [(p.cell, p.code) for p in read.problems] == [
+        ("F2", "date_ambiguous"),
+        ("F3", "date_ambiguous"),
+    ]
 
 
 def test_a_column_of_two_orders_settles_nothing(tmp_path):
@@ -118,7 +122,10 @@ def test_a_long_table_settles_its_dates_as_a_wide_one(tmp_path):
         "R1,N1,LH,RADIAL,3,0.002,03/04/2024\nR1,N1,LH,RADIAL,5,0.002,03/04/2024\nR2,N2,LH,RADIAL,3,0.002,13/01/2024\n"
     )
     read = read_many([file], ReadOptions())
-    assert [row.inspection_date for row in read.inspections] == [date(2024, 4, 3), date(2024, 1, 13)]
+    assert [row.inspection_date for row in read.inspections] == [
+        date(2024, 4, 3),
+        date(2024, 1, 13),
+    ]
 
 
 def test_the_flag_settles_a_column(tmp_path):

@@ -21,14 +21,25 @@ def fill(path):
     write_template(path, load_gear())
     book = openpyxl.load_workbook(path)
     sheet = book["Inspections"]
-    values = {"record_id": "R1", "tail_no": "007", "side": "LH", "clearance_convention": "TOTAL_PLAY"}
+    values = {
+        "record_id": "R1",
+        "tail_no": "007",
+        "side": "LH",
+        "clearance_convention": "TOTAL_PLAY",
+    }
     values |= {"clearance_3_in": 0.026, "clearance_5_in": 0.014, "work_order": "1E5"}
     for cell in sheet[1]:
         if cell.value in values:
             sheet.cell(2, cell.column).value = values[cell.value]
         if cell.value == "clearance_7_in":
             sheet.cell(2, cell.column).value = "=0.002*2"
-    form = {"Record id": "F1", "Tail no": "N2", "Side": "RH", "Clearance convention": "RADIAL", "Unit": "mm"}
+    form = {
+        "Record id": "F1",
+        "Tail no": "N2",
+        "Side": "RH",
+        "Clearance convention": "RADIAL",
+        "Unit": "mm",
+    }
     form["Clearance #3"] = 0.3302
     for row in book["Form"].iter_rows(max_col=2):
         if row[0].value in form:
@@ -136,7 +147,8 @@ def test_the_template_passes_through_libreoffice_unharmed(tmp_path, kind):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("charset", "separator", "note"), [("76", "44", None), ("1", "59", "Windows-1252"), ("65535", "9", "UTF-16")]
+    ("charset", "separator", "note"),
+    [("76", "44", None), ("1", "59", "Windows-1252"), ("65535", "9", "UTF-16")],
 )
 def test_csv_written_by_libreoffice_is_read(tmp_path, xlsx, charset, separator, note):
     source = tmp_path / "t.xlsx"
@@ -159,7 +171,9 @@ def test_libreoffice_opens_an_annotated_workbook_and_calculates_it(tmp_path, sam
 
     out = tmp_path / "annotated.xlsx"
     result = read_inspections(samples / "sample.xlsx", ReadOptions())
-    annotate_workbook(samples / "sample.xlsx", out, result, {r.source: {"verdict": "=1+1"} for r in result.rows})
+    annotate_workbook(
+        samples / "sample.xlsx", out, result, {r.source: {"verdict": "=1+1"} for r in result.rows}
+    )
     folder = tmp_path / "again"
     folder.mkdir()
     sheet = openpyxl.load_workbook(convert(out, "xlsx", folder))["Inspections"]

@@ -66,7 +66,9 @@ def test_the_untouched_template_says_that_there_is_nothing_in_it(template):
 def test_every_header_of_the_template_is_canonical(template):
     book = openpyxl.load_workbook(template)
     fill_table(
-        book["Inspections"], 2, {"record_id": "R1", "tail_no": "1", "side": "LH", "clearance_convention": "RADIAL"}
+        book["Inspections"],
+        2,
+        {"record_id": "R1", "tail_no": "1", "side": "LH", "clearance_convention": "RADIAL"},
     )
     book.save(template)
     result = read_inspections(template, ReadOptions())
@@ -74,7 +76,9 @@ def test_every_header_of_the_template_is_canonical(template):
     assert not [note for note in result.notes if "read as" in note or "not used" in note]
     (layout,) = result.layouts
     assert all(column.read_as == column.header for column in layout.columns)
-    assert {f"clearance_{n}_in" for n in range(1, 11)} <= {column.header for column in layout.columns}
+    assert {f"clearance_{n}_in" for n in range(1, 11)} <= {
+        column.header for column in layout.columns
+    }
 
 
 @pytest.mark.parametrize("unit", list(LengthUnit))
@@ -114,7 +118,11 @@ def test_a_joint_over_its_limit_is_marked_in_its_line_of_the_form(template, tmp_
     result, out = read_inspections(template, ReadOptions()), tmp_path / "out.xlsx"
     of = result.rows[0].source
     annotate_workbook(template, out, result, {of: {"verdict": "OUTSIDE_MARGIN"}}, {of: {3: 0.0075}})
-    marked = [c for c in openpyxl.load_workbook(out)["Form"]["B"] if c.comment and "over the limit" in c.comment.text]
+    marked = [
+        c
+        for c in openpyxl.load_workbook(out)["Form"]["B"]
+        if c.comment and "over the limit" in c.comment.text
+    ]
     assert [cell.value for cell in marked] == [FILLED["Clearance #3"]]
 
 
@@ -127,7 +135,13 @@ def test_many_copies_of_the_form_are_many_inspections_and_an_untouched_one_is_no
     fill_table(
         book["Inspections"],
         2,
-        {"record_id": "R1", "tail_no": "1", "side": "LH", "clearance_convention": "RADIAL", "clearance_3_in": 0.001},
+        {
+            "record_id": "R1",
+            "tail_no": "1",
+            "side": "LH",
+            "clearance_convention": "RADIAL",
+            "clearance_3_in": 0.001,
+        },
     )
     book.save(template)
     result = read_inspections(template, ReadOptions())
@@ -172,8 +186,18 @@ def test_a_form_that_is_partly_filled_in_is_an_inspection_with_problems(template
 def test_a_form_of_another_maker_is_read_and_its_labels_shown(read):
     book = openpyxl.Workbook()
     sheet = book.worksheets[0]
-    lines = [("Inspection sheet", None), ("Record No.:", "R1"), ("Tail number:", "N1"), ("Side:", "LH")]
-    lines += [("Convention:", "DIAMETRAL"), ("Joint 3 (in):", 0.026), ("Joint 5 (in):", 0.014), ("Signature", None)]
+    lines = [
+        ("Inspection sheet", None),
+        ("Record No.:", "R1"),
+        ("Tail number:", "N1"),
+        ("Side:", "LH"),
+    ]
+    lines += [
+        ("Convention:", "DIAMETRAL"),
+        ("Joint 3 (in):", 0.026),
+        ("Joint 5 (in):", 0.014),
+        ("Signature", None),
+    ]
     for row, (label, value) in enumerate(lines, 1):
         sheet.cell(row, 2, label)
         sheet.merge_cells(start_row=row, end_row=row, start_column=2, end_column=3)
@@ -188,10 +212,19 @@ def test_a_form_of_another_maker_is_read_and_its_labels_shown(read):
 
 def test_the_template_has_lists_of_choices_and_explains_each_column(template):
     sheet = openpyxl.load_workbook(template)["Inspections"]
-    choices = {rule.formula1 for rule in sheet.data_validations.dataValidation if rule.type == "list"}
-    assert {'"LH,RH"', '"RADIAL,DIAMETRAL,TOTAL_PLAY"', '"EXTENDING,RETRACTING"', '"RETRACTED,FAILED"'} <= choices
+    choices = {
+        rule.formula1 for rule in sheet.data_validations.dataValidation if rule.type == "list"
+    }
+    assert {
+        '"LH,RH"',
+        '"RADIAL,DIAMETRAL,TOTAL_PLAY"',
+        '"EXTENDING,RETRACTING"',
+        '"RETRACTED,FAILED"',
+    } <= choices
     assert all(cell.comment is not None for cell in sheet[1])
-    assert GEAR.joint(3).location in next(c.comment.text for c in sheet[1] if c.value == "clearance_3_in")
+    assert GEAR.joint(3).location in next(
+        c.comment.text for c in sheet[1] if c.value == "clearance_3_in"
+    )
     assert sheet.freeze_panes == "D2"
 
 
@@ -199,7 +232,10 @@ def test_on_paper_the_clearances_of_the_template_stand_together_on_the_first_pag
     sheet = openpyxl.load_workbook(template)["Inspections"]
     headers = [cell.value for cell in sheet[1]]
     first = min(brk.id for brk in sheet.col_breaks.brk)
-    assert headers[first - 1 : first + 1] == [f"clearance_{GEAR.joint_numbers[-1]}_in", "inspection_date"]
+    assert headers[first - 1 : first + 1] == [
+        f"clearance_{GEAR.joint_numbers[-1]}_in",
+        "inspection_date",
+    ]
 
 
 @pytest.mark.parametrize("name", ["Instructions", "Form"])
@@ -256,7 +292,11 @@ def headers_and_comments(path):
 @pytest.mark.parametrize("unit", list(LengthUnit))
 def test_a_template_is_in_the_unit_that_is_asked_for(tmp_path, unit):
     assert mlg("template", tmp_path / "t.xlsx", "--show", unit.value).code == 0
-    lengths = [name for name in headers_and_comments(tmp_path / "t.xlsx") if name.startswith(("clearance_1", "margin"))]
+    lengths = [
+        name
+        for name in headers_and_comments(tmp_path / "t.xlsx")
+        if name.startswith(("clearance_1", "margin"))
+    ]
     assert lengths[:2] == [f"clearance_1_{unit}", f"clearance_10_{unit}"]
     assert {f"margin_{unit}", f"margin_u_{unit}"} <= {*lengths}
 

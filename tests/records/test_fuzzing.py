@@ -18,18 +18,69 @@ from tests.records.reading import read_inspections
 SLOWEST_S = 5.0
 MEMORY_LIMIT_KB = 1_000_000
 
-HEADER = "record_id,tail_no,side,clearance_convention,clearance_3_in,clearance_5_in,margin_in,inspection_date,remarks\n"
+HEADER = (
+    "record_id,tail_no,side,clearance_convention,clearance_3_in,clearance_5_in,margin_in,"
+    "inspection_date,remarks\n"
+)
 CSV_SEEDS = (
-    (HEADER + 'R1,007,LH,RADIAL,0.013,.007,0.03,2026-03-04,"a, ""b"""\nR2,N1,RH,TOTAL_PLAY,0.02,,,,\n').encode(),
+    (
+        HEADER
+        + 'R1,007,LH,RADIAL,0.013,.007,0.03,2026-03-04,"a, ""b"""\nR2,N1,RH,TOTAL_PLAY,0.02,,,,\n'
+    ).encode(),
     (HEADER + "R1,N1,LH,RADIAL,0.013,0.007,,,ü\n").encode("utf-16"),
     ("sep=;\n" + HEADER.replace(",", ";") + "R1;N1;LH;RADIAL;0,013;0,007;;;x\n").encode("cp1252"),
     b"record_id,tail_no,side,clearance_convention,joint,clearance_mm\nR1,N1,LH,RADIAL,#3,0.33\nR1,N1,LH,RADIAL,5,0.1\n",
 )
 TOKENS = (
-    *(b'"', b"'", b",", b";", b"\n", b"\r", b"\t", b"\0", b"sep=", b"=", b"-", b"\xff\xfe", b"\xef\xbb\xbf"),
-    *(b"1e309", b"nan", b"0,013", b"clearance_3_in", b"J3 [mm]", b"record_id", b"99999999999", b"\xc3"),
-    *(b"<c", b"<row", b"</row>", b"<v>", b"</v>", b"<f>", b't="e"', b't="s"', b't="d"', b's="9"', b"<mergeCell"),
-    *(b'r="XFD1048576"', b"<!DOCTYPE x>", b"<!--", b"-->", b"<![CDATA[", b"]]>", b"&amp;", b"&#0;", b"&#x1F600;"),
+    *(
+        b'"',
+        b"'",
+        b",",
+        b";",
+        b"\n",
+        b"\r",
+        b"\t",
+        b"\0",
+        b"sep=",
+        b"=",
+        b"-",
+        b"\xff\xfe",
+        b"\xef\xbb\xbf",
+    ),
+    *(
+        b"1e309",
+        b"nan",
+        b"0,013",
+        b"clearance_3_in",
+        b"J3 [mm]",
+        b"record_id",
+        b"99999999999",
+        b"\xc3",
+    ),
+    *(
+        b"<c",
+        b"<row",
+        b"</row>",
+        b"<v>",
+        b"</v>",
+        b"<f>",
+        b't="e"',
+        b't="s"',
+        b't="d"',
+        b's="9"',
+        b"<mergeCell",
+    ),
+    *(
+        b'r="XFD1048576"',
+        b"<!DOCTYPE x>",
+        b"<!--",
+        b"-->",
+        b"<![CDATA[",
+        b"]]>",
+        b"&amp;",
+        b"&#0;",
+        b"&#x1F600;",
+    ),
     *(b"<sheetData>", b"</sheetData>", b"\xf0\x9f\x98\x80", b"table:number-rows-repeated"),
 )
 # What may stand in an attribute or between two elements without breaking the XML around it.
@@ -51,8 +102,29 @@ INNER = (
         b"true",
         b"XFD1048576",
     ),
-    *(b"A1", b"ZZ9", b"a1", b"A1:GR9", b"1000000", b"9999999", b"99999999999999999999", b"&lt;", b"&#10;", b"#N/A"),
-    *(b"float", b"date", b"error", b"2026-13-45", b"0,013", b"\xe2\x88\x920.1", b"hidden", b"record_id", b"_x0000_"),
+    *(
+        b"A1",
+        b"ZZ9",
+        b"a1",
+        b"A1:GR9",
+        b"1000000",
+        b"9999999",
+        b"99999999999999999999",
+        b"&lt;",
+        b"&#10;",
+        b"#N/A",
+    ),
+    *(
+        b"float",
+        b"date",
+        b"error",
+        b"2026-13-45",
+        b"0,013",
+        b"\xe2\x88\x920.1",
+        b"hidden",
+        b"record_id",
+        b"_x0000_",
+    ),
 )
 _INNER_PLACE = re.compile(rb'(?<==")[^"<]*(?=")|(?<=>)[^<]+(?=<)')
 
@@ -85,7 +157,9 @@ def mutate(data: bytes, rng: random.Random) -> bytes:
 def mutate_inside(data: bytes, rng: random.Random) -> bytes:
     """Return XML with an attribute or a text exchanged, so that it stays well-formed."""
     places = [match.span() for match in _INNER_PLACE.finditer(data)]
-    for first, last in sorted(rng.sample(places, min(len(places), rng.choice((1, 1, 2, 5)))), reverse=True):
+    for first, last in sorted(
+        rng.sample(places, min(len(places), rng.choice((1, 1, 2, 5)))), reverse=True
+    ):
         data = data[:first] + rng.choice(INNER) + data[last:]
     return data
 
@@ -143,7 +217,12 @@ def fuzz_packages(count: int, seed: int, seeds: list[bytes]) -> None:
     """Read damaged workbooks."""
     rng = random.Random(seed)
     parts = [
-        {n: c for n, c in unpacked(s).items() if not n.startswith(("docProps", "Thumb", "xl/theme"))} for s in seeds
+        {
+            n: c
+            for n, c in unpacked(s).items()
+            if not n.startswith(("docProps", "Thumb", "xl/theme"))
+        }
+        for s in seeds
     ]
     for _ in range(count):
         check(damaged_package(rng.choice(parts), rng), "f.bin")
@@ -154,9 +233,18 @@ def seeds(xlsx, package, samples):
     """Return small workbooks to damage."""
     header = HEADER.strip().split(",")
     plain = xlsx(
-        [header, ("R1", "007", "LH", "RADIAL", 0.013, 0.007, 0.03, None, "x"), ("R2", "N1", "RH", "RADIAL", 0.01)]
+        [
+            header,
+            ("R1", "007", "LH", "RADIAL", 0.013, 0.007, 0.03, None, "x"),
+            ("R2", "N1", "RH", "RADIAL", 0.01),
+        ]
     )
-    return [plain, package(), (samples / "sample.xlsx").read_bytes(), (samples / "sample.ods").read_bytes()]
+    return [
+        plain,
+        package(),
+        (samples / "sample.xlsx").read_bytes(),
+        (samples / "sample.ods").read_bytes(),
+    ]
 
 
 def test_damaged_text_files_give_problems_and_no_traceback():

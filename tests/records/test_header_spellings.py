@@ -32,7 +32,9 @@ def test_a_close_variant_is_understood_and_the_mapping_shown(read, xlsx, header)
     assert any(f'" clearance_3_{unit}' in note for note in result.notes)
 
 
-@pytest.mark.parametrize("header", ["Joint 3", "J3", "#3", "Clearance #3 – short link inner", "clearance_3"])
+@pytest.mark.parametrize(
+    "header", ["Joint 3", "J3", "#3", "Clearance #3 – short link inner", "clearance_3"]
+)
 def test_a_variant_without_a_unit_needs_the_unit_declared(read, table, header):
     text = table((*HEADER, header), [(*GOOD, 0.013)])
     assert [p.code for p in read(text).problems] == ["unit_missing"]
@@ -61,7 +63,12 @@ DOUBTFUL = [
 def test_a_doubtful_header_is_refused_with_a_hint_to_map_it(read, table, header):
     result = read(table((*HEADER, "clearance_1_in", header), [(*GOOD, 0.001, 0.013)]))
     (problem,) = result.problems
-    assert (problem.code, problem.row, problem.cell, problem.value) == ("header_doubtful", 1, "F1", header)
+    assert (problem.code, problem.row, problem.cell, problem.value) == (
+        "header_doubtful",
+        1,
+        "F1",
+        header,
+    )
     assert "--map" in problem.remedy
     assert isinstance(result.rows[0], InvalidRow)
     assert result.rows[0].correct == (header,)
@@ -69,7 +76,10 @@ def test_a_doubtful_header_is_refused_with_a_hint_to_map_it(read, table, header)
 
 def test_a_row_with_nothing_under_a_doubtful_header_is_still_read(read, table):
     result = read(
-        table((*HEADER, "clearance_1_in", "Play J3"), [(*GOOD, 0.001, None), ("R2", *GOOD[1:], 0.001, 0.013)])
+        table(
+            (*HEADER, "clearance_1_in", "Play J3"),
+            [(*GOOD, 0.001, None), ("R2", *GOOD[1:], 0.001, 0.013)],
+        )
     )
     assert [type(row) for row in result.rows] == [Inspection, InvalidRow]
 
@@ -92,16 +102,25 @@ def test_a_column_mapped_to_carry_is_not_read(read, table):
 
 def test_mapping_to_a_column_that_does_not_exist_is_a_usage_error(read, table):
     with pytest.raises(UsageError, match="clearance_42_in"):
-        read(table((*HEADER, "clearance_1_in", "x"), [(*GOOD, 0.001, 1)]), column_map={"x": "clearance_42_in"})
+        read(
+            table((*HEADER, "clearance_1_in", "x"), [(*GOOD, 0.001, 1)]),
+            column_map={"x": "clearance_42_in"},
+        )
 
 
 def test_mapping_a_header_that_is_not_there_is_a_problem(read, table):
-    result = read(table((*HEADER, "clearance_1_in"), [(*GOOD, 0.001)]), column_map={"Spiel 3": "clearance_3_mm"})
+    result = read(
+        table((*HEADER, "clearance_1_in"), [(*GOOD, 0.001)]),
+        column_map={"Spiel 3": "clearance_3_mm"},
+    )
     assert [(p.code, p.value) for p in result.problems] == [("map_header_unknown", "Spiel 3")]
 
 
 def test_identity_headers_as_people_write_them_are_understood(read, table):
-    text = table(("Record ID", "Tail No.", "Side (LH/RH)", "Clearance convention", "clearance_3_in"), [(*GOOD, 0.013)])
+    text = table(
+        ("Record ID", "Tail No.", "Side (LH/RH)", "Clearance convention", "clearance_3_in"),
+        [(*GOOD, 0.013)],
+    )
     result = read(text)
     assert not result.problems
     assert sum("read as" in note for note in result.notes) == 1
@@ -125,13 +144,17 @@ def test_a_misspelt_optional_column_is_kept_and_its_likely_name_given(read, tabl
 
 
 def test_two_columns_of_remarks_are_both_kept(read, table):
-    result = read(table((*HEADER, "clearance_3_in", "Remarks", "Comments"), [(*GOOD, 0.013, "a", "b")]))
+    result = read(
+        table((*HEADER, "clearance_3_in", "Remarks", "Comments"), [(*GOOD, 0.013, "a", "b")])
+    )
     assert not result.problems
     assert result.rows[0].carried == {"remarks": "a", "Comments": "b"}
 
 
 def test_two_columns_of_remarks_of_one_name_are_both_kept(read, table):
-    result = read(table((*HEADER, "clearance_3_in", "remarks", "remarks"), [(*GOOD, 0.013, "a", "b")]))
+    result = read(
+        table((*HEADER, "clearance_3_in", "remarks", "remarks"), [(*GOOD, 0.013, "a", "b")])
+    )
     assert result.rows[0].carried == {"remarks": "a", "remarks (again)": "b"}
 
 
@@ -142,5 +165,7 @@ def test_the_names_of_another_gear_are_known_when_given(read, table):
 
 
 def test_a_header_cell_in_a_csv_file_is_named_by_its_letter(read, table):
-    (problem,) = read(table((*HEADER, "clearance_1_in", "J12 (in)"), [(*GOOD, 0.001, 0.001)])).problems
+    (problem,) = read(
+        table((*HEADER, "clearance_1_in", "J12 (in)"), [(*GOOD, 0.001, 0.001)])
+    ).problems
     assert (problem.sheet, problem.row, problem.cell, problem.column) == (None, 1, "F1", "J12 (in)")

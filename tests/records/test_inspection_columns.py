@@ -1,4 +1,6 @@
-"""Each column of the inspection table: what is read, what is an error, and what an error does to its row."""
+"""Each column of the inspection table: what is read, what is an error, and what an error does to
+its row.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,14 @@ from mlg_troubleshoot.decision.inspection import Approach, Inspection, InvalidRo
 from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
-HEADER = ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in")
+HEADER = (
+    "record_id",
+    "tail_no",
+    "side",
+    "clearance_convention",
+    "clearance_3_in",
+    "clearance_5_in",
+)
 GOOD = ("R1", "N100AB", "LH", "RADIAL", 0.013, 0.007)
 
 
@@ -78,7 +87,9 @@ def test_a_side_that_is_not_lh_or_rh_is_an_error(read, table, text):
     assert "LH or RH" in problem.remedy
 
 
-@pytest.mark.parametrize("side", ["L", "L/H", "l.h.", "Left", "LEFT HAND", "Port", "LH side", "left gear", "L H"])
+@pytest.mark.parametrize(
+    "side", ["L", "L/H", "l.h.", "Left", "LEFT HAND", "Port", "LH side", "left gear", "L H"]
+)
 def test_the_usual_spellings_of_the_left_side_are_read(read, table, side):
     assert inspection(read(table(rows=[("R1", "N1", side, *GOOD[3:])]))).side is Side.LH
 
@@ -94,12 +105,17 @@ def test_a_side_in_lower_case_is_read(read, table):
 
 def test_a_missing_convention_is_an_error_of_each_row(read, table):
     header = [h for h in HEADER if h != "clearance_convention"]
-    result = read(table(header, [("R1", "N1", "LH", 0.013, 0.007), ("R2", "N1", "LH", 0.013, 0.007)]))
+    result = read(
+        table(header, [("R1", "N1", "LH", 0.013, 0.007), ("R2", "N1", "LH", 0.013, 0.007)])
+    )
     assert [(p.code, p.row, p.column) for p in result.problems] == [
         ("convention_missing", 2, "clearance_convention"),
         ("convention_missing", 3, "clearance_convention"),
     ]
-    assert all(isinstance(row, InvalidRow) and row.correct == ("clearance_convention",) for row in result.rows)
+    assert all(
+        isinstance(row, InvalidRow) and row.correct == ("clearance_convention",)
+        for row in result.rows
+    )
 
 
 def test_a_blank_convention_is_an_error_at_its_cell(read, table):
@@ -113,16 +129,24 @@ def test_the_declared_convention_serves_rows_without_one(read, table):
 
 
 def test_a_convention_in_the_row_goes_before_the_declared_one(read, table):
-    assert inspection(read(table(), convention="TOTAL_PLAY")).convention is ClearanceConvention.RADIAL
+    assert (
+        inspection(read(table(), convention="TOTAL_PLAY")).convention is ClearanceConvention.RADIAL
+    )
 
 
 def test_an_unknown_convention_is_an_error(read, table):
-    assert only(read(table(rows=[("R1", "N1", "LH", "CLEAR", 0.013, 0.007)]))).code == "convention_unknown"
+    assert (
+        only(read(table(rows=[("R1", "N1", "LH", "CLEAR", 0.013, 0.007)]))).code
+        == "convention_unknown"
+    )
 
 
 @pytest.mark.parametrize(("convention", "largest"), [("RADIAL", 0.05), ("DIAMETRAL", 0.1)])
 def test_the_hard_range_is_in_the_radial_clearance(read, table, convention, largest):
-    rows = [("R1", "N1", "LH", convention, largest, 0), ("R2", "N1", "LH", convention, largest + 0.0001, 0)]
+    rows = [
+        ("R1", "N1", "LH", convention, largest, 0),
+        ("R2", "N1", "LH", convention, largest + 0.0001, 0),
+    ]
     result = read(table(rows=rows))
     assert (only(result).code, only(result).cell) == ("clearance_out_of_range", "E3")
 
@@ -139,7 +163,8 @@ def test_a_clearance_to_confirm_is_read_with_a_warning(read, table):
 
 
 @pytest.mark.parametrize(
-    ("value", "words"), [(0.33, "factor 25.4"), (13, "factor 1000"), (0.13, "factor 10"), (0.022, "factor 2)")]
+    ("value", "words"),
+    [(0.33, "factor 25.4"), (13, "factor 1000"), (0.13, "factor 10"), (0.022, "factor 2)")],
 )
 def test_the_slip_that_explains_a_value_is_suggested_and_not_applied(read, table, value, words):
     result = read(table(rows=[(*GOOD[:4], value, 0.007)]))
@@ -151,7 +176,13 @@ def test_the_slip_that_explains_a_value_is_suggested_and_not_applied(read, table
 def test_every_bad_cell_of_a_row_is_reported_once_in_the_order_of_the_table(read, table):
     result = read(table((*HEADER, "outcome"), [("R1", None, "x", "RADIAL", "a", -1, "maybe")]))
     assert [p.cell for p in result.problems] == ["B2", "C2", "E2", "F2", "G2"]
-    assert result.rows[0].correct == ("tail_no", "side", "clearance_3_in", "clearance_5_in", "outcome")
+    assert result.rows[0].correct == (
+        "tail_no",
+        "side",
+        "clearance_3_in",
+        "clearance_5_in",
+        "outcome",
+    )
 
 
 def test_margin_and_its_uncertainty_are_read_in_their_units(read, table):
@@ -198,7 +229,9 @@ BAD_DECISIVE = [
 @pytest.mark.parametrize(("name", "value"), BAD_OPTIONAL)
 def test_a_bad_optional_cell_is_reported_and_reads_as_absent(read, table, name, value):
     result = read(
-        with_column(table, name, value) if "," not in str(value) else table((*HEADER, name), [(*GOOD, f'"{value}"')])
+        with_column(table, name, value)
+        if "," not in str(value)
+        else table((*HEADER, name), [(*GOOD, f'"{value}"')])
     )
     problem = only(result)
     assert (problem.column, problem.cell, problem.row) == (name, "G2", 2)
@@ -206,8 +239,18 @@ def test_a_bad_optional_cell_is_reported_and_reads_as_absent(read, table, name, 
     row = result.rows[0]
     assert isinstance(row, Inspection)
     assert row.clearance_in == plain.clearance_in
-    assert (row.gauge_u_in, row.margin_in, row.readings_in, dict(row.axial_float_in)) == (0.0005, None, (), {})
-    assert (row.outcome, row.approach, row.inspection_date, row.gear_landings) == (None, None, None, None)
+    assert (row.gauge_u_in, row.margin_in, row.readings_in, dict(row.axial_float_in)) == (
+        0.0005,
+        None,
+        (),
+        {},
+    )
+    assert (row.outcome, row.approach, row.inspection_date, row.gear_landings) == (
+        None,
+        None,
+        None,
+        None,
+    )
 
 
 @pytest.mark.parametrize(("name", "value"), BAD_DECISIVE)
@@ -258,7 +301,9 @@ def test_a_date_is_not_before_1950(read, table, day, known):
     ],
 )
 @pytest.mark.parametrize("value", ["x", 999])
-def test_what_a_clearance_may_be_is_said_in_its_own_unit_and_convention(read, table, convention, column, words, value):
+def test_what_a_clearance_may_be_is_said_in_its_own_unit_and_convention(
+    read, table, convention, column, words, value
+):
     text = table((*HEADER[:4], column), [(*GOOD[:3], convention, value)])
     assert only(read(text)).expected == f"a clearance {words}"
 
@@ -295,7 +340,12 @@ def test_the_optional_columns_are_read(read, table):
 
 
 def test_plunger_readings_keep_their_sign_and_their_order(read, table):
-    header = (*HEADER, "plunger_displacement_2_in", "plunger_displacement_in", "plunger_displacement_3_mm")
+    header = (
+        *HEADER,
+        "plunger_displacement_2_in",
+        "plunger_displacement_in",
+        "plunger_displacement_3_mm",
+    )
     row = inspection(read(table(header, [(*GOOD, -0.02, "-0.01", 0.254)])))
     assert row.readings_in == (-0.01, -0.02, pytest.approx(0.01))
 
@@ -306,7 +356,9 @@ def test_a_plunger_outside_its_down_lock_range_is_a_finding_and_not_an_error(rea
 
 
 @pytest.mark.parametrize(("convention", "expected"), [("RADIAL", 0.001), ("TOTAL_PLAY", 0.0005)])
-def test_the_gauge_uncertainty_is_in_the_convention_of_the_reading(read, table, convention, expected):
+def test_the_gauge_uncertainty_is_in_the_convention_of_the_reading(
+    read, table, convention, expected
+):
     text = table((*HEADER, "gauge_u_in"), [("R1", "N1", "LH", convention, 0.013, 0.007, 0.001)])
     row = inspection(read(text))
     assert row.gauge_u_in == expected
@@ -316,12 +368,19 @@ def test_the_gauge_uncertainty_is_in_the_convention_of_the_reading(read, table, 
 @pytest.mark.parametrize(("convention", "expected"), [("RADIAL", 0.001), ("DIAMETRAL", 0.0005)])
 def test_a_joint_may_have_an_uncertainty_of_its_own(read, table, convention, expected):
     header = (*HEADER, "gauge_u_in", "gauge_u_3_thou", "gauge_u_5_in")
-    row = inspection(read(table(header, [("R1", "N1", "LH", convention, 0.013, 0.007, 0.002, 1, None)])))
-    assert (row.gauge_u_of(3), row.gauge_u_of(5)) == (pytest.approx(expected), pytest.approx(2 * expected))
+    row = inspection(
+        read(table(header, [("R1", "N1", "LH", convention, 0.013, 0.007, 0.002, 1, None)]))
+    )
+    assert (row.gauge_u_of(3), row.gauge_u_of(5)) == (
+        pytest.approx(expected),
+        pytest.approx(2 * expected),
+    )
 
 
 def test_an_uncertainty_of_a_joint_without_a_reading_is_ignored_with_a_note(read, table):
-    row = inspection(read(table((*HEADER, "gauge_u_3_in", "gauge_u_9_in"), [(*GOOD, 0.001, 0.001)])))
+    row = inspection(
+        read(table((*HEADER, "gauge_u_3_in", "gauge_u_9_in"), [(*GOOD, 0.001, 0.001)]))
+    )
     assert row.gauge_u_by_joint_in == {3: 0.001}
     assert [w for w in row.warnings if "#9 is not used" in w] == list(row.warnings)
 
@@ -403,7 +462,9 @@ def test_a_repeated_header_row_is_skipped_and_said(read, table):
 
 
 def test_rows_and_problems_come_in_the_order_of_the_file(read, table):
-    rows = [(f"R{i}", "N1", "LH", "RADIAL", -1 if i % 3 == 0 else 0.001, 0.002) for i in range(1, 30)]
+    rows = [
+        (f"R{i}", "N1", "LH", "RADIAL", -1 if i % 3 == 0 else 0.001, 0.002) for i in range(1, 30)
+    ]
     result = read(table(rows=rows))
     assert [row.source.row for row in result.rows] == list(range(2, 31))
     assert [p.row for p in result.problems] == [i + 1 for i in range(3, 30, 3)]
@@ -428,7 +489,9 @@ def test_progress_is_told_as_the_rows_are_read(table):
 
     text = table(rows=[(f"R{i}", *GOOD[1:]) for i in range(1200)])
     told: list[int] = []
-    read_many([io.BytesIO(text.encode())], ReadOptions(), progress=lambda done, _: told.append(done))
+    read_many(
+        [io.BytesIO(text.encode())], ReadOptions(), progress=lambda done, _: told.append(done)
+    )
     assert told == [500, 1000, 1200]
 
 
@@ -455,7 +518,9 @@ def test_standard_input_is_read(table):
         "from mlg_troubleshoot.records import ReadOptions, read_many;"
         "print([r.record_id for r in read_many(['-'], ReadOptions()).rows])"
     )
-    done = subprocess.run([sys.executable, "-c", code], input=table(), check=True, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], input=table(), check=True, capture_output=True, text=True
+    )
     assert done.stdout.strip() == "['R1']"
 
 
@@ -466,7 +531,9 @@ def test_a_value_in_a_message_is_cut_and_cannot_steer_a_terminal(read, table):
 
 
 @pytest.mark.parametrize(("value", "said"), [(0.33, "millimetres"), (13, "thou")])
-def test_a_slip_is_suggested_only_where_somebody_would_write_such_a_number(read, table, value, said):
+def test_a_slip_is_suggested_only_where_somebody_would_write_such_a_number(
+    read, table, value, said
+):
     remedy = only(read(table(rows=[(*GOOD[:4], value, 0.007)]))).remedy
     assert [unit for unit in ("thou", "millimetres") if f"read in {unit}" in remedy] == [said]
 
@@ -499,7 +566,10 @@ def test_a_limit_is_met_in_millimetres_whatever_a_computer_makes_of_them(read, t
 
 
 def test_a_slip_is_suggested_for_the_number_as_it_was_entered(read, table):
-    assert "0.66 mm would be" in only(read(table(rows=[(*GOOD[:3], "TOTAL_PLAY", 0.66, 0.007)]))).remedy
+    assert (
+        "0.66 mm would be"
+        in only(read(table(rows=[(*GOOD[:3], "TOTAL_PLAY", 0.66, 0.007)]))).remedy
+    )
 
 
 def test_a_year_of_two_digits_is_of_this_century(read, table):

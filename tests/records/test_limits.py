@@ -28,20 +28,24 @@ _READ = """
 import sys, time
 from mlg_troubleshoot.records import ReadOptions
 from tests.records.reading import read_inspections
-made = {"blank lines": b"\\n" * 60_000_000, "blank lines below": sys.stdin.buffer.read() + b"\\r\\n" * 9_000_000,
+made = {"blank lines": b"\\n" * 60_000_000,
+        "blank lines below": sys.stdin.buffer.read() + b"\\r\\n" * 9_000_000,
         "commas": b"," * 100_000_000, "commas below": sys.stdin.buffer.read() + b"," * 20_000_000,
         "one line": b"x" * 24_000_000, "wide letters": "\\U0001f600".encode() * 6_000_000,
-        "stray quotes": sys.stdin.buffer.read() + (b'R,"N1' + b",LH" * 30 + b"\\n") * 90_000}[sys.argv[1]]
+        "stray quotes": sys.stdin.buffer.read()
+        + (b'R,"N1' + b",LH" * 30 + b"\\n") * 90_000}[sys.argv[1]]
 import io
 start = time.process_time()
 found = read_inspections(io.BytesIO(made), ReadOptions(), name="t.csv")
-peak = int(open("/proc/self/status").read().split("VmHWM:")[1].split()[0])  # what rusage gives is the parent's, too
+# what rusage gives is the parent's, too
+peak = int(open("/proc/self/status").read().split("VmHWM:")[1].split()[0])
 print(len(found.problems), time.process_time() - start, peak / 1000)
 """
 
 
 @pytest.mark.parametrize(
-    "made", ["blank lines", "blank lines below", "commas", "commas below", "one line", "wide letters"]
+    "made",
+    ["blank lines", "blank lines below", "commas", "commas below", "one line", "wide letters"],
 )
 def test_a_monster_is_refused_within_10_s_and_500_mb(made: str) -> None:
     run = [sys.executable, "-c", _READ, made]
@@ -108,7 +112,9 @@ def test_a_column_of_the_user_s_own_keeps_such_a_character_visible() -> None:
 
 @pytest.mark.parametrize("escape", ["_xD800_", "_xFFFE_", "_x0001_"])
 @pytest.mark.parametrize("place", ["A2", "B2", "G1", "G2", "A3"])
-def test_such_a_character_in_a_workbook_leaves_json_and_annotated_copy_whole(tmp_path, xlsx, escape, place):
+def test_such_a_character_in_a_workbook_leaves_json_and_annotated_copy_whole(
+    tmp_path, xlsx, escape, place
+):
     def change(book):
         sheet = book.worksheets[0]
         sheet["G1"], sheet["G2"] = "tool box", "red"
@@ -117,12 +123,16 @@ def test_such_a_character_in_a_workbook_leaves_json_and_annotated_copy_whole(tmp
     source, out = tmp_path / "in.xlsx", tmp_path / "out.xlsx"
     source.write_bytes(xlsx(change=change))
     result = read_many([source], ReadOptions())
-    json.dumps([str(result.rows), *(p.as_dict() for p in result.problems)], ensure_ascii=False).encode("utf-8")
+    json.dumps(
+        [str(result.rows), *(p.as_dict() for p in result.problems)], ensure_ascii=False
+    ).encode("utf-8")
     annotate_workbook(source, out, result, {row.source: {"verdict": "X"} for row in result.rows})
     assert openpyxl.load_workbook(out).worksheets[0]["B1"].value == "tail_no"
 
 
-def test_a_file_name_that_is_no_text_is_shown_in_a_way_that_every_output_can_carry(tmp_path: Path) -> None:
+def test_a_file_name_that_is_no_text_is_shown_in_a_way_that_every_output_can_carry(
+    tmp_path: Path,
+) -> None:
     name = os.fsencode(tmp_path) + b"/a\xff.csv"
     Path(os.fsdecode(name)).write_text(HEADER + GOOD)
     result = read_many([Path(os.fsdecode(name))], ReadOptions())
@@ -134,7 +144,11 @@ def test_a_comment_full_of_the_names_of_elements_costs_no_time(read, package):
     comment = "<!--" + "<mergeCell " * 60_000 + "-->"
     start = time.process_time()
     result = read(
-        package(after=comment, sheet_data='<row r="1"><c r="A1" t="inlineStr"><is><t>x</t></is></c></row>'), "t.xlsx"
+        package(
+            after=comment,
+            sheet_data='<row r="1"><c r="A1" t="inlineStr"><is><t>x</t></is></c></row>',
+        ),
+        "t.xlsx",
     )
     assert result.problems
     assert time.process_time() - start < 5 * SLOWER
@@ -144,15 +158,24 @@ def test_the_page_on_trust_states_the_limits_that_hold() -> None:
     page = (Path(__file__).parents[2] / "docs/explanation/trust.md").read_text(encoding="utf-8")
     stated = [
         f"| {read.MAX_FILE_BYTES // 10**6} MB |",
-        f"{csvfile._MAX_BYTES // 10**6} MB, {csvfile._MAX_LINES:,} lines, {csvfile._MAX_LINE_CHARACTERS:,} characters",
+        (
+            f"{csvfile._MAX_BYTES // 10**6} MB, {csvfile._MAX_LINES:,} lines,"
+            f" {csvfile._MAX_LINE_CHARACTERS:,} characters"
+        ),
         f"{csvfile._MAX_FIELDS:,} separators",
         f"{csvfile._MAX_FIELD_LINES} lines |",
         f"(.xls) | {xls.MAX_BYTES // 10**6} MB |",
         f"{zipguard.MAX_EXPANDED_BYTES // 10**6} MB unpacked, {zipguard.MAX_RATIO} times",
         f"{zipguard.MAX_MEMBERS:,} parts",
-        f"{zipguard.MAX_OPEN_BYTES // 10**6} MB of its XML; {zipguard.MAX_ITEMS:,} rows, texts or merged ranges",
+        (
+            f"{zipguard.MAX_OPEN_BYTES // 10**6} MB of its XML; {zipguard.MAX_ITEMS:,} rows, texts"
+            " or merged ranges"
+        ),
         f"{cells.MAX_ROWS:,} rows × {cells.MAX_COLUMNS} columns",
-        f"{datafile.MOST_BYTES // 10**6} MB, {datafile.LONGEST_LINE:,} characters per line, {datafile.DEEPEST} levels",
+        (
+            f"{datafile.MOST_BYTES // 10**6} MB, {datafile.LONGEST_LINE:,} characters per line,"
+            f" {datafile.DEEPEST} levels"
+        ),
         f"{datafile.LONGEST_NAME} printable characters",
         f"{pdf.TIME_LIMIT_S:.0f} s",
     ]
@@ -168,7 +191,9 @@ def test_the_page_on_trust_states_the_limits_that_hold() -> None:
         pytest.param("", "<row/>", 1_100_000, marks=pytest.mark.slow),
     ],
 )
-def test_what_would_pile_up_while_a_sheet_is_read_is_refused_within_10_s(read, package, before, repeated, count):
+def test_what_would_pile_up_while_a_sheet_is_read_is_refused_within_10_s(
+    read, package, before, repeated, count
+):
     # The comment keeps the part below the limit of its packing.
     noise = f"<!--{random.Random(1).randbytes(60_000).hex()}-->"
     data = package(noise + before + repeated * count)

@@ -26,13 +26,21 @@ def test_rows_of_one_record_are_one_inspection(read, table):
 
 @pytest.mark.parametrize("joint", ["3", "#3", "J3", "Joint 3", "joint no. 3", "3 "])
 def test_a_joint_is_named_as_people_write_it(read, table, joint):
-    assert dict(read(table(HEADER, [("R1", "N1", "LH", "RADIAL", joint, 0.013)])).rows[0].clearance_in) == {3: 0.013}
+    assert dict(
+        read(table(HEADER, [("R1", "N1", "LH", "RADIAL", joint, 0.013)])).rows[0].clearance_in
+    ) == {3: 0.013}
 
 
 def test_long_and_wide_tables_give_the_same_inspection(read, table):
     long = read(table(HEADER, [ROWS[0], ROWS[2]])).rows[0]
-    wide = read(table((*HEADER[:4], "clearance_3_in", "clearance_5_in"), [(*ROWS[0][:4], 0.013, 0.007)])).rows[0]
-    assert (long.clearance_in, long.entered, long.convention) == (wide.clearance_in, wide.entered, wide.convention)
+    wide = read(
+        table((*HEADER[:4], "clearance_3_in", "clearance_5_in"), [(*ROWS[0][:4], 0.013, 0.007)])
+    ).rows[0]
+    assert (long.clearance_in, long.entered, long.convention) == (
+        wide.clearance_in,
+        wide.entered,
+        wide.convention,
+    )
 
 
 @pytest.mark.parametrize("joint", [11, "short", None, 0, 3.5])
@@ -62,7 +70,9 @@ def test_a_joint_given_twice_with_the_same_reading_is_a_warning(read, table):
 
 def test_rows_of_a_record_that_contradict_each_other_are_an_error(read, table):
     result = read(table(HEADER, [*ROWS, ("R1", "N9", "LH", "RADIAL", 7, 0.001)]))
-    assert [(p.code, p.cell, p.value) for p in result.problems] == [("record_contradicts", "B5", "N9")]
+    assert [(p.code, p.cell, p.value) for p in result.problems] == [
+        ("record_contradicts", "B5", "N9")
+    ]
     assert isinstance(result.rows[0], InvalidRow)
 
 
@@ -82,7 +92,10 @@ def test_a_row_without_a_record_id_is_reported_on_its_own(read, table):
 def test_a_long_header_without_a_unit_is_reported_once(read, table):
     result = read(table((*HEADER[:5], "Clearance"), ROWS))
     assert [(p.code, p.cell) for p in result.problems] == [("unit_missing", "F1")]
-    assert dict(read(table((*HEADER[:5], "Clearance"), ROWS), unit="in").rows[0].clearance_in) == {3: 0.013, 5: 0.007}
+    assert dict(read(table((*HEADER[:5], "Clearance"), ROWS), unit="in").rows[0].clearance_in) == {
+        3: 0.013,
+        5: 0.007,
+    }
 
 
 def test_axial_floats_are_read_in_a_long_table_too(read, table):

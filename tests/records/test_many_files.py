@@ -44,7 +44,9 @@ def test_a_pattern_stands_for_what_it_matches(folder):
 
 
 def test_a_pattern_that_matches_nothing_is_a_problem(folder):
-    assert [p.code for p in read_many([str(folder / "*.ods")], ReadOptions()).problems] == ["file_not_found"]
+    assert [p.code for p in read_many([str(folder / "*.ods")], ReadOptions()).problems] == [
+        "file_not_found"
+    ]
 
 
 def test_a_folder_without_tables_is_a_problem(tmp_path):
@@ -54,7 +56,9 @@ def test_a_folder_without_tables_is_a_problem(tmp_path):
 def test_problems_and_rows_name_their_file(folder):
     result = read_many([folder / "a.csv", folder / "b.csv"], ReadOptions())
     assert result.problems[0].file == str(folder / "b.csv")
-    assert [row.source.file for row in result.rows] == [str(folder / n) for n in ("a.csv", "b.csv", "b.csv")]
+    assert [row.source.file for row in result.rows] == [
+        str(folder / n) for n in ("a.csv", "b.csv", "b.csv")
+    ]
 
 
 def test_ids_are_unique_within_a_file_only(folder):

@@ -60,7 +60,12 @@ def make(rows, share, seed):
     rng = random.Random(seed)
     table, bad, spoilt = [HEADER], set(), set()
     for n in range(rows):
-        row = [f"R{n:05d}", f"N{n % 90:03d}", rng.choice(("LH", "RH")), rng.choice(("RADIAL", "TOTAL_PLAY"))]
+        row = [
+            f"R{n:05d}",
+            f"N{n % 90:03d}",
+            rng.choice(("LH", "RH")),
+            rng.choice(("RADIAL", "TOTAL_PLAY")),
+        ]
         row += [rng.choice((None, 0, round(rng.uniform(0, 0.012), 4))) for _ in range(10)]
         row += [
             datetime.date(2026, 1, 1) + datetime.timedelta(days=n % 300),
@@ -71,7 +76,11 @@ def make(rows, share, seed):
         ]
         row[5] = 0.004
         for index, name in enumerate(HEADER):
-            kind = "clearance" if name.startswith("clearance_") and name != "clearance_convention" else name
+            kind = (
+                "clearance"
+                if name.startswith("clearance_") and name != "clearance_convention"
+                else name
+            )
             if kind in BAD and rng.random() < share:
                 row[index] = rng.choice(BAD[kind])
                 bad.add((n + 2, name))
@@ -117,7 +126,12 @@ def test_csv_and_workbook_give_the_same_inspections(read, xlsx):
     assert not from_csv.problems
     assert not from_xlsx.problems
     for a, b in zip(from_csv.inspections, from_xlsx.inspections, strict=True):
-        assert (a.record_id, a.tail_no, a.side, a.convention) == (b.record_id, b.tail_no, b.side, b.convention)
+        assert (a.record_id, a.tail_no, a.side, a.convention) == (
+            b.record_id,
+            b.tail_no,
+            b.side,
+            b.convention,
+        )
         assert (a.clearance_in, a.margin_in, a.outcome, a.inspection_date) == (
             b.clearance_in,
             b.margin_in,
@@ -132,25 +146,59 @@ ANY_CELL = st.one_of(
     st.floats(0, 0.06),
     st.integers(-5, 50),
     st.sampled_from(
-        ("LH", "RH", "RADIAL", "0,013", "1/8", ".013", "13 thou", "0.33 mm", '"', "''", "=1", "\0", "–0.1", "NA")
+        (
+            "LH",
+            "RH",
+            "RADIAL",
+            "0,013",
+            "1/8",
+            ".013",
+            "13 thou",
+            "0.33 mm",
+            '"',
+            "''",
+            "=1",
+            "\0",
+            "–0.1",
+            "NA",
+        )
     ),
     st.text(max_size=12),
 )
 
 
 @settings(max_examples=150, deadline=None)
-@given(rows=st.lists(st.lists(ANY_CELL, min_size=1, max_size=8), max_size=6), sep=st.sampled_from((",", ";", "\t")))
+@given(
+    rows=st.lists(st.lists(ANY_CELL, min_size=1, max_size=8), max_size=6),
+    sep=st.sampled_from((",", ";", "\t")),
+)
 def test_no_table_of_any_cells_loses_a_row_or_ends_in_an_exception(rows, sep):
-    header = ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "margin_in", "remarks")
+    header = (
+        "record_id",
+        "tail_no",
+        "side",
+        "clearance_convention",
+        "clearance_3_in",
+        "margin_in",
+        "remarks",
+    )
     buffer = io.StringIO()
     writer = csv.writer(buffer, delimiter=sep, lineterminator="\n")
     writer.writerow(header)
     for row in rows:
-        writer.writerow(["" if c is None else str(c).replace("\n", " ").replace("\r", " ") for c in row])
-    result = read_inspections(io.BytesIO(buffer.getvalue().encode("utf-8", "replace")), ReadOptions())
+        writer.writerow(
+            ["" if c is None else str(c).replace("\n", " ").replace("\r", " ") for c in row]
+        )
+    result = read_inspections(
+        io.BytesIO(buffer.getvalue().encode("utf-8", "replace")), ReadOptions()
+    )
     filled = sum(1 for row in rows if any(c is not None and str(c).strip() for c in row))
     if result.layouts:
-        aside = sum(int(n) for note in result.notes for n in re.findall(r"(\d+) rows? (?:is|are) no inspection", note))
+        aside = sum(
+            int(n)
+            for note in result.notes
+            for n in re.findall(r"(\d+) rows? (?:is|are) no inspection", note)
+        )
         assert len(result.rows) + aside == filled
     assert all(isinstance(row, Inspection | InvalidRow) for row in result.rows)
     reported = {p.row for p in result.problems}
@@ -160,8 +208,12 @@ def test_no_table_of_any_cells_loses_a_row_or_ends_in_an_exception(rows, sep):
 @settings(max_examples=80, deadline=None)
 @given(cells=st.lists(ANY_CELL, min_size=1, max_size=9))
 def test_no_header_of_any_cells_ends_in_an_exception(cells):
-    text = ",".join(["record_id", "tail_no", "side", *('"' + str(c).replace('"', "") + '"' for c in cells)])
-    result = read_inspections(io.BytesIO((text + "\nR1,N1,LH,0.1\n").encode("utf-8", "replace")), ReadOptions())
+    text = ",".join(
+        ["record_id", "tail_no", "side", *('"' + str(c).replace('"', "") + '"' for c in cells)]
+    )
+    result = read_inspections(
+        io.BytesIO((text + "\nR1,N1,LH,0.1\n").encode("utf-8", "replace")), ReadOptions()
+    )
     assert result.rows or result.problems
 
 
@@ -173,15 +225,27 @@ def test_no_header_of_any_cells_ends_in_an_exception(cells):
 )
 def test_one_clearance_in_any_unit_and_convention_is_the_same(value, unit, convention):
     entered = LengthUnit(unit).from_inches(value * ClearanceConvention(convention).per_radial)
-    text = f"record_id,tail_no,side,clearance_convention,clearance_3_{unit}\nR1,N1,LH,{convention},{entered!r}\n"
+    text = (
+        f"record_id,tail_no,side,clearance_convention,clearance_3_{unit}\n"
+        f"R1,N1,LH,{convention},{entered!r}\n"
+    )
     result = read_inspections(io.BytesIO(text.encode()), ReadOptions())
     assert result.inspections[0].clearance_in[3] == pytest.approx(value, rel=1e-12, abs=1e-18)
 
 
 def test_stray_quotation_marks_swallow_no_row(tmp_path):
-    good, bad = ",".join(["0.0012"] * 10), ",".join(["0.0012", "0.0012", "0.013", "0.0012", "0.007", *["0.0012"] * 5])
-    header = ",".join(["record_id", "tail_no", "side", "clearance_convention", *HEADER[4:14], "remarks"])
-    rows = [f'R1,N1,LH,RADIAL,{good},"worn bush', f"R2,N1,RH,RADIAL,{bad},", f'R3,N2,LH,RADIAL,{good},ok"']
+    good, bad = (
+        ",".join(["0.0012"] * 10),
+        ",".join(["0.0012", "0.0012", "0.013", "0.0012", "0.007", *["0.0012"] * 5]),
+    )
+    header = ",".join(
+        ["record_id", "tail_no", "side", "clearance_convention", *HEADER[4:14], "remarks"]
+    )
+    rows = [
+        f'R1,N1,LH,RADIAL,{good},"worn bush',
+        f"R2,N1,RH,RADIAL,{bad},",
+        f'R3,N2,LH,RADIAL,{good},ok"',
+    ]
     file = tmp_path / "t.csv"
     file.write_text("\n".join((header, *rows)) + "\n")
     result = read_inspections(file, ReadOptions())

@@ -1,4 +1,6 @@
-"""One value, four ways in: a cell, a flag, a prompt answer and Python give one result, one warning and one refusal."""
+"""One value, four ways in: a cell, a flag, a prompt answer and Python give one result, one warning
+and one refusal.
+"""
 
 from __future__ import annotations
 
@@ -22,14 +24,55 @@ from mlg_troubleshoot.workflows.check import CheckOptions
 from tests.records.reading import read_inspections
 
 VALUES = (
-    *("0", "0.0", ".013", "0.013", "0.013 in", "13 thou", "0.33 mm", '.007"', "0.381 mm", "15 thou", "0.015", "0.0151"),
-    *("0.02in", "0.05", "0.0501", "0.33", "13", "1.3e-2", "+0.004", "-0.013", "\u22120.013", "0,013", "1/64", "nan"),
+    *(
+        "0",
+        "0.0",
+        ".013",
+        "0.013",
+        "0.013 in",
+        "13 thou",
+        "0.33 mm",
+        '.007"',
+        "0.381 mm",
+        "15 thou",
+        "0.015",
+        "0.0151",
+    ),
+    *(
+        "0.02in",
+        "0.05",
+        "0.0501",
+        "0.33",
+        "13",
+        "1.3e-2",
+        "+0.004",
+        "-0.013",
+        "\u22120.013",
+        "0,013",
+        "1/64",
+        "nan",
+    ),
     *("inf", "1e309", "0.013 cm", "x", "0.0.13", "50 thou", "51 thou", "1.27 mm"),
 )
 MARGINS = ("0.03", "0.2in", "0.3in", "0", "-0.03", "0.762 mm")
 # The same as numbers in inches, as Python has them.
 NUMBERS = (
-    *(0.0, 0.0001, 0.004, 0.007, 0.0075, 0.01, 0.013, 0.33 / 25.4, 0.381 / 25.4, 0.015, 0.0151, 0.02, 0.05, 0.0501),
+    *(
+        0.0,
+        0.0001,
+        0.004,
+        0.007,
+        0.0075,
+        0.01,
+        0.013,
+        0.33 / 25.4,
+        0.381 / 25.4,
+        0.015,
+        0.0151,
+        0.02,
+        0.05,
+        0.0501,
+    ),
     *(0.1, 0.33, 0.5, 1.0, 13.0, 1e6, -0.0001, -0.013, math.nan, math.inf),
 )
 MARGIN_NUMBERS = (0.03, 0.2, 0.3, 0.0, -0.03, 0.762 / 25.4)
@@ -37,7 +80,9 @@ MARGIN_NUMBERS = (0.03, 0.2, 0.3, 0.0, -0.03, 0.762 / 25.4)
 
 @dataclass(frozen=True)
 class Found:
-    """What came of a value: its radial inches, the margin and the warnings, or the words of the refusal."""
+    """What came of a value: its radial inches, the margin and the warnings, or the words of the
+    refusal.
+    """
 
     radial_in: float | None = None
     margin_in: float | None = None
@@ -48,9 +93,12 @@ class Found:
 def by_cell(gear: Gear, value: object, margin: str, convention: Convention) -> Found:
     name = "margin" if isinstance(value, str) else "margin_in"
     clearance = "clearance_3" if isinstance(value, str) else "clearance_3_in"
-    text = f"record_id\ttail_no\tside\t{clearance}\t{name}\nR1\tN1\tLH\t{str(value).replace(chr(34), chr(34) * 4)}"
+    quoted = str(value).replace(chr(34), chr(34) * 4)
+    text = f"record_id\ttail_no\tside\t{clearance}\t{name}\nR1\tN1\tLH\t{quoted}"
     if '"' in str(value):
-        text = text.replace(str(value).replace('"', '""""'), f'"{str(value).replace(chr(34), chr(34) * 2)}"')
+        text = text.replace(
+            str(value).replace('"', '""""'), f'"{str(value).replace(chr(34), chr(34) * 2)}"'
+        )
     data = io.BytesIO(f"{text}\t{margin}\n".encode())
     options = ReadOptions.of(gear, unit=LengthUnit.INCH, convention=convention)
     result = read_inspections(data, options, name="t.csv")
@@ -72,7 +120,10 @@ def by_flag(gear: Gear, value: str, margin: str, convention: Convention) -> Foun
 
 def words(error: TroubleshootError) -> str:
     """Return a refusal as expectation and remedy, without the name of what was refused."""
-    expected = [part.partition("expected ")[2] for part in re.split(r"; (?=--|clearance|margin)", error.message)]
+    expected = [
+        part.partition("expected ")[2]
+        for part in re.split(r"; (?=--|clearance|margin)", error.message)
+    ]
     return " ".join([*expected, error.remedy])
 
 
@@ -112,22 +163,33 @@ def said(found: Found) -> set[str]:
 
 
 @pytest.mark.parametrize("value", VALUES)
-def test_a_value_gives_the_same_as_a_cell_a_flag_and_a_prompt_answer(gear: Gear, value: str) -> None:
+def test_a_value_gives_the_same_as_a_cell_a_flag_and_a_prompt_answer(
+    gear: Gear, value: str
+) -> None:
     for convention in (Convention.RADIAL, Convention.TOTAL_PLAY):
         for margin in MARGINS:
             cell = by_cell(gear, value, margin, convention)
-            for other in (by_flag(gear, value, margin, convention), by_prompt(gear, value, margin, convention)):
+            for other in (
+                by_flag(gear, value, margin, convention),
+                by_prompt(gear, value, margin, convention),
+            ):
                 assert replace(other, refused="") == replace(cell, refused="")
                 assert said(other) == said(cell)
 
 
 @pytest.mark.parametrize("value", NUMBERS)
 @pytest.mark.parametrize("convention", Convention)
-def test_a_number_gives_the_same_in_python_as_the_other_ways(gear: Gear, value: float, convention: Convention) -> None:
+def test_a_number_gives_the_same_in_python_as_the_other_ways(
+    gear: Gear, value: float, convention: Convention
+) -> None:
     for margin in MARGIN_NUMBERS:
         python = by_python(gear, value, margin, convention)
         written = repr(value), repr(margin), convention
-        others = by_cell(gear, value, repr(margin), convention), by_flag(gear, *written), by_prompt(gear, *written)
+        others = (
+            by_cell(gear, value, repr(margin), convention),
+            by_flag(gear, *written),
+            by_prompt(gear, *written),
+        )
         for other in others:
             assert replace(python, refused="") == replace(other, refused="")
             assert said(python) == said(other)
@@ -141,15 +203,27 @@ def test_the_list_holds_values_that_are_taken_warned_of_and_refused(gear: Gear) 
 
 
 def test_python_reads_total_play_as_a_table_does(gear: Gear) -> None:
-    radial = check(Inspection("R1", "N1", Side.LH, Convention.RADIAL, {3: 0.013, 5: 0.007}), gear, advice=False)
-    play = check(Inspection("R1", "N1", Side.LH, Convention.TOTAL_PLAY, {3: 0.026, 5: 0.014}), gear, advice=False)
+    radial = check(
+        Inspection("R1", "N1", Side.LH, Convention.RADIAL, {3: 0.013, 5: 0.007}), gear, advice=False
+    )
+    play = check(
+        Inspection("R1", "N1", Side.LH, Convention.TOTAL_PLAY, {3: 0.026, 5: 0.014}),
+        gear,
+        advice=False,
+    )
     assert play.predicted_displacement_in == radial.predicted_displacement_in
 
 
 def test_an_inspection_that_was_judged_is_not_halved_again(gear: Gear) -> None:
     options = ReadOptions.of(gear)
     given = Inspection(
-        "R1", "N1", Side.LH, Convention.TOTAL_PLAY, {3: 0.026}, gauge_u_in=0.002, gauge_u_by_joint_in={3: 0.001}
+        "R1",
+        "N1",
+        Side.LH,
+        Convention.TOTAL_PLAY,
+        {3: 0.026},
+        gauge_u_in=0.002,
+        gauge_u_by_joint_in={3: 0.001},
     )
     once = judge_again(given, options)
     assert (once.clearance_in, once.gauge_u_in, once.gauge_u_of(3)) == ({3: 0.013}, 0.001, 0.0005)
@@ -173,7 +247,9 @@ def test_a_joint_that_the_gear_lacks_is_refused_in_python(gear: Gear, joint: obj
         ("gauge_u_by_joint_in", {3: 0.0}, "a gauge u above 0"),
     ],
 )
-def test_whatever_a_table_would_refuse_is_refused_in_python(gear: Gear, name: str, value: object, words: str) -> None:
+def test_whatever_a_table_would_refuse_is_refused_in_python(
+    gear: Gear, name: str, value: object, words: str
+) -> None:
     good = Inspection("R1", "N1", Side.LH, Convention.RADIAL, {3: 0.01})
     with pytest.raises(TroubleshootError, match=words):
         check(replace(good, **{name: value}), gear)  # type: ignore[arg-type]

@@ -60,7 +60,8 @@ def test_values_and_places_agree_with_calamine(xlsx):
 
 
 @pytest.mark.parametrize(
-    "name", [f"{n}.{kind}" for n in ("sample", "template_filled") for kind in ("xlsx", "xls", "ods")]
+    "name",
+    [f"{n}.{kind}" for n in ("sample", "template_filled") for kind in ("xlsx", "xls", "ods")],
 )
 def test_files_of_libreoffice_agree_with_calamine(samples, name):
     data = (samples / name).read_bytes()
@@ -75,21 +76,24 @@ def test_files_of_libreoffice_agree_with_calamine(samples, name):
 
 def test_a_row_in_an_unusual_spelling_reads_like_a_usual_one(package):
     plain = package(
-        '<row r="1"><c r="A1"><v>1</v></c><c r="C1"><v>2.5</v></c></row><row r="2"><c r="B2"><v>3</v></c></row>'
+        '<row r="1"><c r="A1"><v>1</v></c><c r="C1"><v>2.5</v></c></row><row r="2"><c'
+        ' r="B2"><v>3</v></c></row>'
     )
     odd = package(
-        '<!-- <row r="8"><c r="A8"><v>8</v></c></row><row r="9"><c r="A9"><v>9</v></c></row> -->'
-        "<row spans='1:3' r='1' ><c  r='A1'\n><v >1</v></c>"
-        "<c r='C1' cm='1'><v>2.5</v><extLst/></c></row>\n<row><c/><c><v>3</v></c></row>"
+        '<!-- <row r="8"><c r="A8"><v>8</v></c></row><row r="9"><c'
+        " r=\"A9\"><v>9</v></c></row> --><row spans='1:3' r='1' ><c  r='A1'\n><v >1</v></c><c"
+        " r='C1' cm='1'><v>2.5</v><extLst/></c></row>\n<row><c/><c><v>3</v></c></row>"
     )
     assert ours(plain) == ours(odd) == {1: [1.0, None, 2.5], 2: [None, 3.0]}
 
 
 def test_a_sheet_with_prefixed_elements_is_read(package):
     xml = (
-        '<x:worksheet xmlns:x="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><x:sheetData>'
-        '<x:row r="1"><x:c r="B1" t="inlineStr"><x:is><x:r><x:t>a</x:t></x:r><x:r><x:t>b</x:t></x:r>'
-        "<x:rPh sb='0' eb='1'><x:t>no</x:t></x:rPh></x:is></x:c></x:row></x:sheetData></x:worksheet>"
+        "<x:worksheet"
+        ' xmlns:x="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><x:sheetData><x:row'
+        ' r="1"><x:c r="B1"'
+        " t=\"inlineStr\"><x:is><x:r><x:t>a</x:t></x:r><x:r><x:t>b</x:t></x:r><x:rPh sb='0'"
+        " eb='1'><x:t>no</x:t></x:rPh></x:is></x:c></x:row></x:sheetData></x:worksheet>"
     )
     assert ours(package(sheet_xml=xml)) == {1: [None, "ab"]}
 
@@ -99,12 +103,19 @@ def test_a_shared_text_in_pieces_is_joined_without_its_pronunciation(package):
         f"<sst {MAIN}><si><t>first_x0041_</t></si><si><r><t>漢</t></r><r><rPr/><t>字</t></r>"
         "<rPh sb='0' eb='1'><t>かんじ</t></rPh></si><si><t/></si></sst>"
     )
-    cells = "".join(f'<c r="{c}1" t="s"><v>{n}</v></c>' for c, n in (("A", 1), ("B", 0), ("C", 2), ("D", 1)))
-    assert ours(package(f'<row r="1">{cells}</row>', strings=strings)) == {1: ["漢字", "firstA", None, "漢字"]}
+    cells = "".join(
+        f'<c r="{c}1" t="s"><v>{n}</v></c>' for c, n in (("A", 1), ("B", 0), ("C", 2), ("D", 1))
+    )
+    assert ours(package(f'<row r="1">{cells}</row>', strings=strings)) == {
+        1: ["漢字", "firstA", None, "漢字"]
+    }
 
 
 def test_a_shared_text_that_does_not_exist_makes_the_workbook_damaged(package, read):
-    data = package('<row r="1"><c r="A1" t="s"><v>7</v></c></row>', strings=f"<sst {MAIN}><si><t>a</t></si></sst>")
+    data = package(
+        '<row r="1"><c r="A1" t="s"><v>7</v></c></row>',
+        strings=f"<sst {MAIN}><si><t>a</t></si></sst>",
+    )
     assert [p.code for p in read(data, "t.xlsx").problems] == ["file_damaged"]
 
 
@@ -128,7 +139,8 @@ def test_escaped_characters_of_a_text_are_restored(package):
 
 def test_rows_split_between_pieces_of_the_archive_are_whole(package):
     rows = "".join(
-        f'<row r="{n}"><c r="A{n}" t="inlineStr"><is><t>{"x" * 90}ü{n}</t></is></c></row>' for n in range(1, 30001)
+        f'<row r="{n}"><c r="A{n}" t="inlineStr"><is><t>{"x" * 90}ü{n}</t></is></c></row>'
+        for n in range(1, 30001)
     )
     found = ours(package(rows))
     assert len(found) == 30000
@@ -153,5 +165,7 @@ def test_a_workbook_saved_as_strict_open_xml_is_read(xlsx):
 
 
 def test_a_style_that_the_library_does_not_know_leaves_the_cells_as_they_are(package):
-    styles = f'<styleSheet {MAIN}><fonts><font><color rgb="cornflower"/></font></fonts></styleSheet>'
+    styles = (
+        f'<styleSheet {MAIN}><fonts><font><color rgb="cornflower"/></font></fonts></styleSheet>'
+    )
     assert ours(package('<row r="1"><c r="A1"><v>1</v></c></row>', styles=styles)) == {1: [1.0]}

@@ -29,16 +29,40 @@ if sys.argv[1].endswith("xlsx"):
     raw = time.process_time() - start
     import openpyxl
     start = time.process_time()
-    list(openpyxl.load_workbook(sys.argv[1], read_only=True).worksheets[0].iter_rows(values_only=True))
+    book = openpyxl.load_workbook(sys.argv[1], read_only=True)
+    list(book.worksheets[0].iter_rows(values_only=True))
     library = time.process_time() - start
 print(json.dumps([judged, peak, raw, library, *counts]))
 """
-NUMBERED = [f"clearance_{n}_in" for n in range(1, 11)] + [f"axial_float_{n}_in" for n in range(1, 11)]
+NUMBERED = [f"clearance_{n}_in" for n in range(1, 11)] + [
+    f"axial_float_{n}_in" for n in range(1, 11)
+]
 HEADER = [
-    *("record_id", "tail_no", "side", "clearance_convention", "inspection_date", "gear_landings", "temperature_c"),
-    *("hydraulic_pressure_psi", "approach", "gauge_id", "technician_id", "gauge_u_in", "plunger_gauge_u_in"),
+    *(
+        "record_id",
+        "tail_no",
+        "side",
+        "clearance_convention",
+        "inspection_date",
+        "gear_landings",
+        "temperature_c",
+    ),
+    *(
+        "hydraulic_pressure_psi",
+        "approach",
+        "gauge_id",
+        "technician_id",
+        "gauge_u_in",
+        "plunger_gauge_u_in",
+    ),
     *NUMBERED,
-    *("plunger_down_lock_in", "plunger_displacement_in", "plunger_displacement_2_in", "margin_in", "margin_u_in"),
+    *(
+        "plunger_down_lock_in",
+        "plunger_displacement_in",
+        "plunger_displacement_2_in",
+        "margin_in",
+        "margin_u_in",
+    ),
     *("outcome", "work_order"),
 ]
 
@@ -70,9 +94,11 @@ def write_workbook(path, package, rows):
     lines = []
     for number, cells in enumerate([HEADER, *(row(n, rng) for n in range(rows))], 1):
         xml = "".join(
-            f'<c r="{LETTERS[i]}{number}" t="inlineStr"><is><t>{c}</t></is></c>'
-            if isinstance(c, str)
-            else f'<c r="{LETTERS[i]}{number}"><v>{c}</v></c>'
+            (
+                f'<c r="{LETTERS[i]}{number}" t="inlineStr"><is><t>{c}</t></is></c>'
+                if isinstance(c, str)
+                else f'<c r="{LETTERS[i]}{number}"><v>{c}</v></c>'
+            )
             for i, c in enumerate(cells)
         )
         lines.append(f'<row r="{number}">{xml}</row>')
@@ -82,7 +108,9 @@ def write_workbook(path, package, rows):
 
 def measure(path):
     """Read a file in a fresh process and return the figures."""
-    done = subprocess.run([sys.executable, "-c", MEASURE, str(path)], check=True, capture_output=True, timeout=300)
+    done = subprocess.run(
+        [sys.executable, "-c", MEASURE, str(path)], check=True, capture_output=True, timeout=300
+    )
     return json.loads(done.stdout)
 
 
@@ -91,7 +119,10 @@ def test_fifty_thousand_rows_of_forty_columns_are_read_in_time_and_memory(tmp_pa
     path = tmp_path / "big.xlsx"
     write_workbook(path, package, 50_000)
     judged, peak, raw, library, rows, problems = measure(path)
-    print(f"read and checked {judged:.1f} s, {peak:.0f} MB; reading alone {raw:.1f} s, openpyxl alone {library:.1f} s")
+    print(
+        f"read and checked {judged:.1f} s, {peak:.0f} MB; reading alone {raw:.1f} s, openpyxl alone"
+        f" {library:.1f} s"
+    )
     assert (rows, problems) == (50_000, 0)
     assert judged < 4 * library
     assert peak < 400
@@ -112,9 +143,13 @@ def test_ten_thousand_rows_of_csv_are_read_in_time(tmp_path):
 
 def test_reading_a_table_loads_no_spreadsheet_library():
     code = (
-        "import io, sys; from mlg_troubleshoot.records import ReadOptions, read_many;"
-        "read_many([io.BytesIO(b'record_id,tail_no,side,clearance_3_in\\nR1,N1,LH,0.1\\n')], ReadOptions());"
-        "print([m for m in ('pandas', 'openpyxl', 'python_calamine') if m in sys.modules])"
+        "import io, sys; from mlg_troubleshoot.records import ReadOptions,"
+        " read_many;"
+        "read_many([io.BytesIO(b'record_id,tail_no,side,clearance_3_in\\nR1,N1,LH,0.1\\n')],"
+        " ReadOptions());print([m for m in ('pandas', 'openpyxl', 'python_calamine') if m in"
+        " sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60
+    )
     assert done.stdout.strip() == "[]"

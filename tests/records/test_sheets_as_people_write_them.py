@@ -1,4 +1,6 @@
-"""Thirteen sheets as people write them: each good row judged, each bad cell named, at most three lines of notes."""
+"""Thirteen sheets as people write them: each good row judged, each bad cell named, at most three
+lines of notes.
+"""
 
 from __future__ import annotations
 
@@ -58,8 +60,18 @@ def test_the_first_sheet_is_understood_as_it_was_meant():
 
 @pytest.mark.parametrize("side", ["LH", "L"])
 def test_a_row_with_a_tail_a_side_and_a_clearance_is_never_set_aside(side, table, read):
-    header = ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in")
-    rows = [("Total", "N1", side, "RADIAL", 0.013, 0.007), ("R2", "Average", side, "RADIAL", 0.013, "")]
+    header = (
+        "record_id",
+        "tail_no",
+        "side",
+        "clearance_convention",
+        "clearance_3_in",
+        "clearance_5_in",
+    )
+    rows = [
+        ("Total", "N1", side, "RADIAL", 0.013, 0.007),
+        ("R2", "Average", side, "RADIAL", 0.013, ""),
+    ]
     assert len(read(table(header, rows)).inspections) == 2
 
 

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-HEADER = ("record_id", "tail_no", "side", "clearance_convention", *(f"clearance_{n}_in" for n in range(1, 6)))
+HEADER = (
+    "record_id",
+    "tail_no",
+    "side",
+    "clearance_convention",
+    *(f"clearance_{n}_in" for n in range(1, 6)),
+)
 LEFT = (0.0012, 0.0035, 0.0061, 0.0020, 0.0044)
 RIGHT = (0.0050, 0.0011, 0.0015, 0.0062, 0.0012)
 

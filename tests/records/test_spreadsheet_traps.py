@@ -15,7 +15,14 @@ from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.records.cells import LETTERS
 from tests.machine import SLOWER
 
-HEADER = ("record_id", "tail_no", "side", "clearance_convention", "clearance_3_in", "clearance_5_in")
+HEADER = (
+    "record_id",
+    "tail_no",
+    "side",
+    "clearance_convention",
+    "clearance_3_in",
+    "clearance_5_in",
+)
 GOOD = ("R1", "N100AB", "LH", "RADIAL", 0.013, 0.007)
 
 
@@ -48,18 +55,25 @@ def clearances(result):
 
 def test_01_a_formula_that_was_never_calculated_is_an_error(read, xlsx):
     problem = only(read(xlsx(change=with_cell(E2="=0.026/2")), "t.xlsx"))
-    assert (problem.code, problem.sheet, problem.cell) == ("formula_without_value", "Inspections", "E2")
+    assert (problem.code, problem.sheet, problem.cell) == (
+        "formula_without_value",
+        "Inspections",
+        "E2",
+    )
     assert "save" in problem.remedy
 
 
 def test_01_a_formula_in_another_producer_s_spelling_without_a_value_is_an_error(read, package):
     data = (
         '<row r="1">'
-        + "".join(f'<c r="{c}1" t="inlineStr"><is><t>{h}</t></is></c>' for c, h in zip("ABCDEF", HEADER, strict=True))
-        + "</row>"
-        '<row r="2"><c r="A2" t="inlineStr"><is><t>R1</t></is></c><c r="B2" t="inlineStr"><is><t>N1</t></is></c>'
-        '<c r="C2" t="inlineStr"><is><t>LH</t></is></c><c r="D2" t="inlineStr"><is><t>RADIAL</t></is></c>'
-        '<c r="E2"><f t="shared" ref="E2:E9" si="0">A9</f></c><c r="F2"><v>0.007</v></c></row>'
+        + "".join(
+            f'<c r="{c}1" t="inlineStr"><is><t>{h}</t></is></c>'
+            for c, h in zip("ABCDEF", HEADER, strict=True)
+        )
+        + '</row><row r="2"><c r="A2" t="inlineStr"><is><t>R1</t></is></c><c r="B2"'
+        ' t="inlineStr"><is><t>N1</t></is></c><c r="C2" t="inlineStr"><is><t>LH</t></is></c><c'
+        ' r="D2" t="inlineStr"><is><t>RADIAL</t></is></c><c r="E2"><f t="shared" ref="E2:E9"'
+        ' si="0">A9</f></c><c r="F2"><v>0.007</v></c></row>'
     )
     assert only(read(package(data), "t.xlsx")).code == "formula_without_value"
 
@@ -74,10 +88,12 @@ def test_02_a_formula_with_its_last_value_is_read_and_said(read, package):
 
 def _rows_with(cells, ids="R1 N100AB LH RADIAL"):
     header = "".join(
-        f'<c r="{c}1" t="inlineStr"><is><t>{h}</t></is></c>' for c, h in zip("ABCDEF", HEADER, strict=True)
+        f'<c r="{c}1" t="inlineStr"><is><t>{h}</t></is></c>'
+        for c, h in zip("ABCDEF", HEADER, strict=True)
     )
     texts = "".join(
-        f'<c r="{c}2" t="inlineStr"><is><t>{v}</t></is></c>' for c, v in zip("ABCD", ids.split(), strict=True)
+        f'<c r="{c}2" t="inlineStr"><is><t>{v}</t></is></c>'
+        for c, v in zip("ABCD", ids.split(), strict=True)
     )
     return f'<row r="1">{header}</row><row r="2">{texts}{cells}</row>'
 
@@ -87,7 +103,10 @@ def _rows_with(cells, ids="R1 N100AB LH RADIAL"):
 
 @pytest.mark.parametrize("error", ["#N/A", "#DIV/0!", "#REF!", "#VALUE!"])
 def test_03_an_error_value_is_an_error_and_not_an_unmeasured_joint(read, package, error):
-    result = read(package(_rows_with(f'<c r="E2" t="e"><v>{error}</v></c><c r="F2"><v>0.007</v></c>')), "t.xlsx")
+    result = read(
+        package(_rows_with(f'<c r="E2" t="e"><v>{error}</v></c><c r="F2"><v>0.007</v></c>')),
+        "t.xlsx",
+    )
     problem = only(result)
     assert (problem.code, problem.cell, problem.value) == ("cell_error", "E2", error)
     assert isinstance(result.rows[0], InvalidRow)
@@ -108,13 +127,26 @@ def test_04_a_declared_decimal_comma_is_read(read, xlsx):
 
 
 @pytest.mark.parametrize(
-    "text", ['.013"', "0.013 in", "0.013\u00a0in", "\u202f0.013\u202finch ", "+0.013", "13e-3", "\ufeff0.013"]
+    "text",
+    [
+        '.013"',
+        "0.013 in",
+        "0.013\u00a0in",
+        "\u202f0.013\u202finch ",
+        "+0.013",
+        "13e-3",
+        "\ufeff0.013",
+    ],
 )
 def test_05_06_inches_as_people_write_them_are_read(read, xlsx, text):
-    assert clearances(read(xlsx(change=with_cell(E2=text)), "t.xlsx"))[3] == pytest.approx(0.013, abs=1e-15)
+    assert clearances(read(xlsx(change=with_cell(E2=text)), "t.xlsx"))[3] == pytest.approx(
+        0.013, abs=1e-15
+    )
 
 
-@pytest.mark.parametrize(("text", "inches"), [("13 thou", 0.013), ("0.33 mm", 0.33 / 25.4), ("13 mil", 0.013)])
+@pytest.mark.parametrize(
+    ("text", "inches"), [("13 thou", 0.013), ("0.33 mm", 0.33 / 25.4), ("13 mil", 0.013)]
+)
 def test_07_a_unit_in_the_cell_is_converted_under_a_header_without_one(read, xlsx, text, inches):
     rows = [[h.removesuffix("_in") for h in HEADER], [*GOOD[:4], text, '.007"']]
     assert clearances(read(xlsx(rows), "t.xlsx")) == {3: pytest.approx(inches), 5: 0.007}
@@ -210,7 +242,10 @@ def test_12_a_row_of_units_below_the_header_is_read(read, xlsx):
         [None] * 4 + ["mm", "mm"],
         (*GOOD[:4], 0.33, 0.1778),
     ]
-    assert clearances(read(xlsx(rows), "t.xlsx")) == {3: pytest.approx(0.33 / 25.4), 5: pytest.approx(0.007)}
+    assert clearances(read(xlsx(rows), "t.xlsx")) == {
+        3: pytest.approx(0.33 / 25.4),
+        5: pytest.approx(0.007),
+    }
 
 
 @pytest.mark.parametrize("again", [0.001, None])
@@ -269,7 +304,9 @@ def test_15_a_slip_of_the_pen_in_a_header_is_refused_with_the_nearest_name(read,
 
 
 def test_16_blank_rows_inside_are_skipped_and_the_row_numbers_kept(read, xlsx):
-    result = read(xlsx([HEADER, GOOD, [], ["  ", None, ""], ("R2", *GOOD[1:4], -1, 0.007)]), "t.xlsx")
+    result = read(
+        xlsx([HEADER, GOOD, [], ["  ", None, ""], ("R2", *GOOD[1:4], -1, 0.007)]), "t.xlsx"
+    )
     assert [row.source.row for row in result.rows] == [2, 5]
     assert only(result).cell == "E5"
 
@@ -306,7 +343,9 @@ def test_20_what_is_no_finite_number_is_an_error(read, table, text):
 
 @pytest.mark.parametrize("number", ["NaN", "1e309", "INF"])
 def test_20_a_number_cell_that_is_not_finite_is_an_error(read, package, number):
-    result = read(package(_rows_with(f'<c r="E2"><v>{number}</v></c><c r="F2"><v>0.007</v></c>')), "t.xlsx")
+    result = read(
+        package(_rows_with(f'<c r="E2"><v>{number}</v></c><c r="F2"><v>0.007</v></c>')), "t.xlsx"
+    )
     assert only(result).code == "not_finite"
 
 
@@ -358,7 +397,9 @@ def test_24_a_work_order_that_looks_like_a_number_is_text(read, table, xlsx):
 
 @pytest.mark.parametrize("text", ["0026-03-04", "2206-03-04"])
 def test_25_a_year_that_cannot_be_meant_is_refused(read, table, text):
-    assert only(read(table((*HEADER, "inspection_date"), [(*GOOD, text)]))).code == "date_out_of_range"
+    assert (
+        only(read(table((*HEADER, "inspection_date"), [(*GOOD, text)]))).code == "date_out_of_range"
+    )
 
 
 @pytest.mark.parametrize("text", ["03/04/2026", "3.4.2026", "03-04-26"])
@@ -383,7 +424,9 @@ def test_26_a_bare_number_as_a_date_is_an_error(read, xlsx):
     assert isinstance(result.rows[0], Inspection)
 
 
-@pytest.mark.parametrize("number_format", ["yyyy-mm-dd", "d. mmm yyyy", "[$-409]mmmm d, yyyy;@", "dd/mm/yy hh:mm"])
+@pytest.mark.parametrize(
+    "number_format", ["yyyy-mm-dd", "d. mmm yyyy", "[$-409]mmmm d, yyyy;@", "dd/mm/yy hh:mm"]
+)
 def test_26_a_number_formatted_as_a_date_is_a_date(read, xlsx, number_format):
     def change(book):
         book.worksheets[0]["G2"] = 46085
@@ -396,10 +439,17 @@ def test_26_a_number_formatted_as_a_date_is_a_date(read, xlsx, number_format):
 @pytest.mark.parametrize(("flag", "serial"), [("0", 46085), ("1", 44623), ("true", 44623)])
 def test_26_a_date_of_either_system_is_the_same_day(read, package, flag, serial):
     main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
-    styles = f'<styleSheet xmlns="{main}"><cellXfs><xf numFmtId="0"/><xf numFmtId="14"/></cellXfs></styleSheet>'
+    styles = (
+        f'<styleSheet xmlns="{main}"><cellXfs><xf numFmtId="0"/><xf'
+        ' numFmtId="14"/></cellXfs></styleSheet>'
+    )
     data = _rows_with('<c r="E2"><v>0.013</v></c>' + f'<c r="G2" s="1"><v>{serial}</v></c>')
-    data = data.replace("</row>", '<c r="G1" t="inlineStr"><is><t>inspection_date</t></is></c></row>', 1)
-    result = read(package(data, styles=styles, book_pr=f'<workbookPr date1904="{flag}"/>'), "t.xlsx")
+    data = data.replace(
+        "</row>", '<c r="G1" t="inlineStr"><is><t>inspection_date</t></is></c></row>', 1
+    )
+    result = read(
+        package(data, styles=styles, book_pr=f'<workbookPr date1904="{flag}"/>'), "t.xlsx"
+    )
     assert result.rows[0].inspection_date == datetime.date(2026, 3, 4)
 
 
@@ -481,17 +531,24 @@ def test_29_several_sheets_with_inspections_are_an_error_that_lists_them(read, x
 
 def test_29_a_sheet_of_instructions_is_no_candidate_even_with_an_example(read, xlsx):
     def change(book):
-        _second_sheet(book, [["Instructions"], ["Fill in like this:"], HEADER, ("X1", *GOOD[1:])], "How to")
+        _second_sheet(
+            book, [["Instructions"], ["Fill in like this:"], HEADER, ("X1", *GOOD[1:])], "How to"
+        )
 
     assert [r.record_id for r in read(xlsx(change=change), "t.xlsx").rows] == ["R1"]
 
 
 def test_29_the_named_sheet_is_read(read, xlsx):
-    assert [r.record_id for r in read(xlsx(change=_second_sheet), "t.xlsx", sheet="Other").rows] == ["X1"]
+    assert [
+        r.record_id for r in read(xlsx(change=_second_sheet), "t.xlsx", sheet="Other").rows
+    ] == ["X1"]
 
 
 def test_29_a_star_reads_every_sheet(read, xlsx):
-    assert [r.record_id for r in read(xlsx(change=_second_sheet), "t.xlsx", sheet="*").rows] == ["R1", "X1"]
+    assert [r.record_id for r in read(xlsx(change=_second_sheet), "t.xlsx", sheet="*").rows] == [
+        "R1",
+        "X1",
+    ]
 
 
 def test_29_a_sheet_that_does_not_exist_is_an_error_that_lists_the_others(read, xlsx):
@@ -533,7 +590,10 @@ def test_32_utf_16_is_detected_and_said(read, table, encoding):
 
 
 def test_33_semicolons_with_decimal_commas_are_read(read, table):
-    assert clearances(read(table(rows=[(*GOOD[:4], "0,013", "0,010")], sep=";"))) == {3: 0.013, 5: 0.010}
+    assert clearances(read(table(rows=[(*GOOD[:4], "0,013", "0,010")], sep=";"))) == {
+        3: 0.013,
+        5: 0.010,
+    }
 
 
 def test_33_tabs_are_read(read, table):
@@ -574,14 +634,20 @@ def test_35_a_sep_line_is_accepted(read, table, line):
 
 
 def test_35_a_quotation_mark_that_is_not_closed_loses_no_row(read, table):
-    text = table() + '"R2,N1,LH,RADIAL,0.013,0.007\nR3,N1,LH,RADIAL,0.013,0.007\nR4,N1,LH,RADIAL,0.013,0.007\n'
+    text = (
+        table()
+        + '"R2,N1,LH,RADIAL,0.013,0.007\nR3,N1,LH,RADIAL,0.013,0.007\nR4,N1,LH,RADIAL,0.013,0.007\n'
+    )
     result = read(text)
     assert (only(result).code, only(result).row) == ("csv_quote", 3)
     assert [row.record_id for row in result.inspections] == ["R1", "R3", "R4"]
 
 
 def test_35_two_stray_quotation_marks_do_not_swallow_the_rows_between_them(read, table):
-    text = table() + '"R2,N1,LH,RADIAL,0.013,0.007\nR3,N1,LH,RADIAL,0.013,0.007\nR4,N1,LH,RADIAL,0.013,"\n'
+    text = (
+        table()
+        + '"R2,N1,LH,RADIAL,0.013,0.007\nR3,N1,LH,RADIAL,0.013,0.007\nR4,N1,LH,RADIAL,0.013,"\n'
+    )
     result = read(text)
     assert [row.source.row for row in result.rows] == [2, 3, 4, 5]
     assert [row.record_id for row in result.inspections] == ["R1", "R3"]
@@ -599,17 +665,25 @@ def test_35_a_quoted_field_of_two_lines_is_one_field(read, table):
 
 def test_36_a_cell_far_outside_is_refused(read, xlsx):
     problem = only(read(xlsx(change=with_cell(XFD1048576=1)), "t.xlsx"))
-    assert (problem.code, problem.cell, problem.sheet) == ("cell_outside_limits", "XFD1048576", "Inspections")
+    assert (problem.code, problem.cell, problem.sheet) == (
+        "cell_outside_limits",
+        "XFD1048576",
+        "Inspections",
+    )
 
 
 def test_36_the_last_allowed_column_is_read(read, xlsx):
-    result = read(xlsx(change=with_cell(**{f"{LETTERS[-1]}1": "note", f"{LETTERS[-1]}2": "x"})), "t.xlsx")
+    result = read(
+        xlsx(change=with_cell(**{f"{LETTERS[-1]}1": "note", f"{LETTERS[-1]}2": "x"})), "t.xlsx"
+    )
     assert result.rows[0].carried == {"note": "x"}
 
 
 def test_36_an_empty_formatted_cell_far_outside_is_no_error(read, package):
     data = _rows_with('<c r="E2"><v>0.013</v></c><c r="F2"><v>0.007</v></c><c r="XFD2" s="0"/>')
-    result = read(package(data + '<row r="1048576" hidden="1"><c r="A1048576" s="0"/></row>'), "t.xlsx")
+    result = read(
+        package(data + '<row r="1048576" hidden="1"><c r="A1048576" s="0"/></row>'), "t.xlsx"
+    )
     assert clearances(result) == {3: 0.013, 5: 0.007}
 
 
@@ -630,10 +704,13 @@ def test_37_a_workbook_that_lies_about_its_size_is_refused(read, package):
     assert only(read(lying, "t.xlsx")).code in ("file_too_large", "file_damaged")
 
 
-def test_37_a_workbook_that_declares_too_large_a_size_is_refused_before_it_is_unpacked(read, package):
+def test_37_a_workbook_that_declares_too_large_a_size_is_refused_before_it_is_unpacked(
+    read, package
+):
     data = package(parts={"xl/media/big.bin": b"x" * 3_000_000}, compression=zipfile.ZIP_STORED)
     size = struct.pack("<I", 3_000_000)
-    # The last one stands in the list of parts: the unpacked size, which here is 83 times the packed one.
+    # The last one stands in the list of parts: the unpacked size, which here is 83 times the packed
+    # one.
     at = data.rfind(size)
     lying = data[:at] + struct.pack("<I", 250_000_000) + data[at + 4 :]
     problem = only(read(lying, "t.xlsx"))
@@ -642,7 +719,10 @@ def test_37_a_workbook_that_declares_too_large_a_size_is_refused_before_it_is_un
 
 @pytest.mark.parametrize(
     "declaration",
-    ['<!DOCTYPE x [<!ENTITY a "0.013">]>', '<!DOCTYPE worksheet SYSTEM "http://example.com/x.dtd">'],
+    [
+        '<!DOCTYPE x [<!ENTITY a "0.013">]>',
+        '<!DOCTYPE worksheet SYSTEM "http://example.com/x.dtd">',
+    ],
 )
 def test_38_a_document_type_is_refused(read, package, declaration):
     result = read(package(prolog=f'<?xml version="1.0"?>{declaration}'), "t.xlsx")
@@ -656,7 +736,11 @@ def test_38_entities_in_the_shared_strings_are_refused(read, package):
 
 
 def test_38_a_document_type_in_utf_16_is_refused(read, package):
-    xml = '<?xml version="1.0" encoding="UTF-16"?><!DOCTYPE x [<!ENTITY a "1">]><worksheet/>'.encode("utf-16")
+    xml = (
+        '<?xml version="1.0" encoding="UTF-16"?><!DOCTYPE x [<!ENTITY a "1">]><worksheet/>'.encode(
+            "utf-16"
+        )
+    )
     assert only(read(package(sheet_xml=xml), "t.xlsx")).code == "xml_declaration"
 
 
@@ -667,7 +751,10 @@ def test_38_a_document_type_behind_a_long_comment_is_refused(read, package):
 
 @pytest.mark.parametrize("reference", ["A1:XFD1048576", "A1", "A1:B1", "nonsense"])
 def test_39_a_lying_dimension_is_ignored(read, package, reference):
-    assert clearances(read(package(before=f'<dimension ref="{reference}"/>'), "t.xlsx")) == {3: 0.013, 5: 0.007}
+    assert clearances(read(package(before=f'<dimension ref="{reference}"/>'), "t.xlsx")) == {
+        3: 0.013,
+        5: 0.007,
+    }
 
 
 def test_40_a_password_protected_workbook_is_named_as_such(read, xlsx):
@@ -716,7 +803,9 @@ def test_42_files_written_by_libreoffice_are_read(read, samples, name):
 
 @pytest.mark.parametrize("name", ["sample.ods", "sample.xlsx"])
 def test_42_results_of_formulas_are_counted_where_the_file_tells_them_apart(read, samples, name):
-    (told,) = (note for note in read((samples / name).read_bytes(), name).notes if "formulas" in note)
+    (told,) = (
+        note for note in read((samples / name).read_bytes(), name).notes if "formulas" in note
+    )
     assert told.endswith("column E (1), F (3), H (2)")
 
 
@@ -733,7 +822,9 @@ def test_42_results_of_formulas_are_counted_where_the_file_tells_them_apart(read
         (b"PK\x03\x04" + b"\0" * 40, "file_damaged", "cut off"),
     ],
 )
-def test_43_another_kind_of_file_under_a_workbook_s_name_is_named_in_plain_words(read, data, code, words):
+def test_43_another_kind_of_file_under_a_workbook_s_name_is_named_in_plain_words(
+    read, data, code, words
+):
     problem = only(read(data, "t.xlsx"))
     assert problem.code == code
     assert words in problem.value
@@ -758,10 +849,23 @@ def test_43_a_truncated_workbook_is_named_as_cut_off(read, xlsx, keep):
         ("xl/workbook.bin", "application/vnd.ms-excel.sheet.binary.macroEnabled.main", "xlsb"),
     ],
 )
-def test_43_a_package_of_another_program_is_named_in_plain_words(read, package, part, content_type, words):
-    types = f'<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Override PartName="/{part}" '
-    data = package(parts={part: b"\x83", "[Content_Types].xml": f'{types}ContentType="{content_type}"/></Types>'})
-    assert (only(read(data, "t.xlsx")).code, words in only(read(data, "t.xlsx")).value) == ("file_kind", True)
+def test_43_a_package_of_another_program_is_named_in_plain_words(
+    read, package, part, content_type, words
+):
+    types = (
+        '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Override'
+        f' PartName="/{part}" '
+    )
+    data = package(
+        parts={
+            part: b"\x83",
+            "[Content_Types].xml": f'{types}ContentType="{content_type}"/></Types>',
+        }
+    )
+    assert (only(read(data, "t.xlsx")).code, words in only(read(data, "t.xlsx")).value) == (
+        "file_kind",
+        True,
+    )
 
 
 def test_43_a_pdf_named_csv_is_named_as_a_pdf(read):
@@ -772,7 +876,9 @@ def test_43_bytes_that_are_no_text_are_refused(read):
     assert only(read(bytes(range(256)) * 8, "t.csv")).code == "not_a_table"
 
 
-@pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", " =cmd|' /C calc'!A0", "＝1+1"])
+@pytest.mark.parametrize(
+    "text", ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", " =cmd|' /C calc'!A0", "＝1+1"]
+)
 def test_44_an_exported_text_is_no_formula(tmp_path, text):
     from mlg_troubleshoot.outputs import write_csv
 
@@ -796,7 +902,9 @@ def test_44_a_text_in_an_annotated_workbook_is_no_formula(tmp_path, read, xlsx):
     assert (sheet["G2"].value, sheet["G2"].data_type) == ("=1+1", "s")
 
 
-@pytest.mark.parametrize("text", ["N/A", "n/a", "-", "\u2014", "NM", "nil", "not measured", "none", " Not Measured "])
+@pytest.mark.parametrize(
+    "text", ["N/A", "n/a", "-", "\u2014", "NM", "nil", "not measured", "none", " Not Measured "]
+)
 def test_46_a_word_for_not_measured_is_a_joint_without_a_reading(read, xlsx, text):
     def change(book):
         book.worksheets[0]["E2"] = text
@@ -826,9 +934,16 @@ def test_46_no_word_leaves_out_a_margin_or_an_identity(read, table, column):
     ],
 )
 def test_47_the_usual_headers_are_read_with_one_note_for_all(read, table, header, column):
-    good = dict(zip(HEADER, GOOD, strict=True)) | {"inspection_date": "2026-03-04", "Jt 7 clr (thou)": 2}
+    good = dict(zip(HEADER, GOOD, strict=True)) | {
+        "inspection_date": "2026-03-04",
+        "Jt 7 clr (thou)": 2,
+    }
     renamed = {
-        (header if name == column or (column.startswith(name[:11]) and name[:11] == "clearance_3") else name): v
+        (
+            header
+            if name == column or (column.startswith(name[:11]) and name[:11] == "clearance_3")
+            else name
+        ): v
         for name, v in good.items()
     }
     result = read(table(tuple(renamed), [tuple(renamed.values())]))
@@ -846,11 +961,14 @@ def test_47_a_column_with_the_plain_name_goes_before_an_alias(read, table):
 
 
 @pytest.mark.parametrize(
-    "text", ["14-Jan-25", "14 Jan 2025", "14 January 2025", "Jan 14, 2025", "14.jan.2025", "14Jan2025"]
+    "text",
+    ["14-Jan-25", "14 Jan 2025", "14 January 2025", "Jan 14, 2025", "14.jan.2025", "14Jan2025"],
 )
 def test_49_a_date_with_the_month_as_a_word_is_read(read, table, text):
     rows = [(*GOOD, f'"{text}"')]
-    assert str(read(table((*HEADER, "inspection_date"), rows)).rows[0].inspection_date) == "2025-01-14"
+    assert (
+        str(read(table((*HEADER, "inspection_date"), rows)).rows[0].inspection_date) == "2025-01-14"
+    )
 
 
 @pytest.mark.parametrize("text", ["31 Feb 2025", "14 Jon 2025", "Jan 2025"])
@@ -859,14 +977,17 @@ def test_49_a_day_that_is_not_in_the_calendar_is_refused(read, table, text):
 
 
 @pytest.mark.parametrize(
-    "word", ["Total", "TOTALS:", "Average", "Signed: J. Smith", "end of list", "Checked by", "Subtotal N1"]
+    "word",
+    ["Total", "TOTALS:", "Average", "Signed: J. Smith", "end of list", "Checked by", "Subtotal N1"],
 )
 def test_50_a_row_of_totals_or_a_signature_is_set_aside(read, table, word):
     rows = [GOOD, (word, None, None, None, 0.02, 0.03), ("R2", *GOOD[1:])]
     result = read(table(rows=rows))
     assert [row.source.row for row in result.rows] == [2, 4]
     assert not result.problems
-    assert any(f"1 row is not an inspection, set aside: row 3 {word!r}" in note for note in result.notes)
+    assert any(
+        f"1 row is not an inspection, set aside: row 3 {word!r}" in note for note in result.notes
+    )
 
 
 def test_50_a_row_of_a_gear_is_no_totals_row_however_its_record_is_called(read, table):

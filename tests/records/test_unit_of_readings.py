@@ -38,7 +38,10 @@ def judged(gear: Gear, radial_in, read_in: LengthUnit, declared: LengthUnit, **m
         "tail_no": "N1",
         "side": "LH",
         "clearance_convention": "RADIAL",
-        **{f"clearance_{n}_{declared}": read_in.from_inches(value) for n, value in enumerate(radial_in, 1)},
+        **{
+            f"clearance_{n}_{declared}": read_in.from_inches(value)
+            for n, value in enumerate(radial_in, 1)
+        },
     }
     options = {name: more.pop(name) for name in ("small_readings_true",) if more.get(name) is True}
     return judge_row({**values, **more}, ReadOptions.of(gear, **options))
@@ -74,7 +77,9 @@ def test_the_refusal_says_how_to_confirm_true_readings(gear):
     assert "small_readings_true" in problem.remedy
 
 
-@pytest.mark.parametrize("confirmed", [{"small_readings_true": "yes"}, {"small_readings_true": True}])
+@pytest.mark.parametrize(
+    "confirmed", [{"small_readings_true": "yes"}, {"small_readings_true": True}]
+)
 def test_confirmed_small_readings_are_judged(gear, confirmed):
     row, problems = judged(gear, WORN_IN, LengthUnit.INCH, LengthUnit.MILLIMETRE, **confirmed)
     assert isinstance(row, Inspection)
@@ -96,7 +101,9 @@ def test_an_answer_that_confirms_nothing_leaves_the_row_invalid(gear):
 
 
 def test_a_confirmation_that_cannot_be_read_makes_the_row_invalid(gear):
-    row, (problem,) = judged(gear, NEW_IN, LengthUnit.INCH, LengthUnit.INCH, small_readings_true="perhaps")
+    row, (problem,) = judged(
+        gear, NEW_IN, LengthUnit.INCH, LengthUnit.INCH, small_readings_true="perhaps"
+    )
     assert isinstance(row, InvalidRow)
     assert problem.column == "small_readings_true"
 
@@ -123,7 +130,10 @@ def test_readings_in_thou_are_not_asked_about_as_those_of_a_smaller_unit(gear):
 def test_the_play_of_new_parts_is_stated_in_the_convention_of_the_row(gear):
     diametral = [2 * value for value in (0.0004, 0.0004, 0.0004)]
     row, _ = judged(
-        gear, diametral, *2 * [LengthUnit.MILLIMETRE], clearance_convention=ClearanceConvention.DIAMETRAL.value
+        gear,
+        diametral,
+        *2 * [LengthUnit.MILLIMETRE],
+        clearance_convention=ClearanceConvention.DIAMETRAL.value,
     )
     assert "below the play of new parts (0.0254 mm diametral)" in row.unit_question
 
@@ -149,12 +159,16 @@ def test_readings_that_may_be_of_new_parts_or_of_another_unit_do_not_clear_the_g
 
 
 def test_readings_confirmed_in_python_clear_the_gear(gear):
-    row, _ = judged(gear, ALL_WORN_OUT_IN, LengthUnit.INCH, LengthUnit.MILLIMETRE, small_readings_true="yes")
+    row, _ = judged(
+        gear, ALL_WORN_OUT_IN, LengthUnit.INCH, LengthUnit.MILLIMETRE, small_readings_true="yes"
+    )
     assert check(row, gear).verdict is Verdict.WITHIN_MARGIN
 
 
 def test_one_small_reading_among_others_is_a_warning_that_says_the_same(gear):
-    row, problems = judged(gear, (0.002, 0.002, 0.0001, 0.002, 0.002), LengthUnit.MILLIMETRE, LengthUnit.MILLIMETRE)
+    row, problems = judged(
+        gear, (0.002, 0.002, 0.0001, 0.002, 0.002), LengthUnit.MILLIMETRE, LengthUnit.MILLIMETRE
+    )
     assert not problems
     (warning,) = [text for text in row.warnings if "play of new parts" in text]
     assert "#3" in warning
@@ -163,21 +177,38 @@ def test_one_small_reading_among_others_is_a_warning_that_says_the_same(gear):
 
 
 def test_two_readings_are_too_few_to_refuse_a_row_but_do_not_clear_it(gear):
-    row, _ = judged(gear, (0.013, 0.004, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), LengthUnit.INCH, LengthUnit.THOU)
+    row, _ = judged(
+        gear,
+        (0.013, 0.004, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        LengthUnit.INCH,
+        LengthUnit.THOU,
+    )
     assert check(row, gear).verdict is Verdict.INCOMPLETE
 
 
 def test_a_gear_file_without_the_play_of_new_parts_asks_nothing(gear):
     options = ReadOptions.of(gear)
     values = {f"clearance_{n}_mm": value for n, value in enumerate(WORN_IN, 1)}
-    named = {"record_id": "R", "tail_no": "N", "side": "LH", "clearance_convention": "RADIAL", **values}
+    named = {
+        "record_id": "R",
+        "tail_no": "N",
+        "side": "LH",
+        "clearance_convention": "RADIAL",
+        **values,
+    }
     silent = ReadOptions(joint_numbers=options.joint_numbers, limit_in=options.limit_in)
     assert not judge_row(named, silent)[1]
 
 
 def test_radial_readings_declared_as_total_play_are_asked_about(gear):
     values = {f"clearance_{n}_in": value for n, value in enumerate(NEW_IN, 1)}
-    named = {"record_id": "R", "tail_no": "N", "side": "LH", "clearance_convention": "TOTAL_PLAY", **values}
+    named = {
+        "record_id": "R",
+        "tail_no": "N",
+        "side": "LH",
+        "clearance_convention": "TOTAL_PLAY",
+        **values,
+    }
     row, problems = judge_row(named, ReadOptions.of(gear))
     assert not problems
     assert any("radial clearance (factor 2)" in warning for warning in row.warnings)
@@ -189,7 +220,9 @@ def test_python_asks_about_small_readings_in_inches(gear):
         tail_no="N1",
         side=Side.LH,
         convention=ClearanceConvention.RADIAL,
-        clearance_in={n: LengthUnit.MILLIMETRE.to_inches(value) for n, value in enumerate(WORN_IN, 1)},
+        clearance_in={
+            n: LengthUnit.MILLIMETRE.to_inches(value) for n, value in enumerate(WORN_IN, 1)
+        },
     )
     # In inches no larger unit explains them: they are judged, and asked about.
     assert any("below the play of new parts" in warning for warning in check(small, gear).warnings)
@@ -197,7 +230,9 @@ def test_python_asks_about_small_readings_in_inches(gear):
 
 def test_flags_refuse_small_readings():
     given = [f"--set={n}={value}" for n, value in enumerate(WORN_IN, 1)]
-    run = mlg("check", "--tail", "N1", "--side", "LH", "--convention", "RADIAL", "--unit", "mm", *given)
+    run = mlg(
+        "check", "--tail", "N1", "--side", "LH", "--convention", "RADIAL", "--unit", "mm", *given
+    )
     assert run.code == 2
     assert "were they read in inches, not in millimetres?" in " ".join(run.err.split())
 
@@ -213,7 +248,13 @@ def test_flags_take_small_readings_that_are_confirmed():
 
 def test_a_sheet_of_inches_under_millimetre_headers_ends_with_nothing_judged(tmp_path):
     file = tmp_path / "fleet.csv"
-    header = ["record_id", "tail_no", "side", "clearance_convention", *(f"clearance_{n} [mm]" for n in range(1, 11))]
+    header = [
+        "record_id",
+        "tail_no",
+        "side",
+        "clearance_convention",
+        *(f"clearance_{n} [mm]" for n in range(1, 11)),
+    ]
     rows = [[f"R{k}", f"N{k}", "LH", "RADIAL", *map(str, WORN_IN)] for k in range(30)]
     file.write_text("\n".join(",".join(row) for row in (header, *rows)))
     run = mlg("check", file, "--json")
@@ -225,7 +266,9 @@ def test_a_sheet_of_inches_under_millimetre_headers_ends_with_nothing_judged(tmp
 HALF_ABOVE = (0.0162, 0.0016, 0.0004, 0.0088, 0.0114, 0.0074, 0.0046, 0.0051, 0.0193, 0.0089)
 
 
-def test_inches_of_a_worn_gear_in_millimetres_do_not_clear_it_although_some_are_above_new_parts(gear):
+def test_inches_of_a_worn_gear_in_millimetres_do_not_clear_it_although_some_are_above_new_parts(
+    gear,
+):
     row, _ = judged(gear, HALF_ABOVE, LengthUnit.INCH, LengthUnit.MILLIMETRE)
     assert not isinstance(row, Inspection) or check(row, gear).verdict is Verdict.INCOMPLETE
 
@@ -238,14 +281,18 @@ def test_inches_of_a_worn_gear_in_millimetres_do_not_clear_it_although_some_are_
         ("plunger_displacement_thou", 1.143, "millimetres"),
     ],
 )
-def test_a_plunger_reading_near_zero_that_another_unit_puts_outside_is_asked_about(gear, column, value, unit):
+def test_a_plunger_reading_near_zero_that_another_unit_puts_outside_is_asked_about(
+    gear, column, value, unit
+):
     row, _ = judged(gear, [0.0012] * 10, LengthUnit.INCH, LengthUnit.INCH, **{column: value})
     found = check(row, gear)
     assert found.verdict is Verdict.INCOMPLETE
     assert f"was it read in {unit}" in found.headline
 
 
-@pytest.mark.parametrize(("column", "value"), [("plunger_displacement_mm", 0.25), ("plunger_displacement_in", 0.0018)])
+@pytest.mark.parametrize(
+    ("column", "value"), [("plunger_displacement_mm", 0.25), ("plunger_displacement_in", 0.0018)]
+)
 def test_a_plunger_reading_that_no_other_unit_explains_is_not_asked_about(gear, column, value):
     row, _ = judged(gear, [0.0012] * 10, LengthUnit.INCH, LengthUnit.INCH, **{column: value})
     assert row.unit_question == ""

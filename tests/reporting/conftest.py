@@ -14,7 +14,14 @@ from typing import Any
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Assessment, Rejected
-from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, InvalidRow, Outcome, RowSource, Side
+from mlg_troubleshoot.decision.inspection import (
+    EnteredClearance,
+    Inspection,
+    InvalidRow,
+    Outcome,
+    RowSource,
+    Side,
+)
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.planner import correct
 from mlg_troubleshoot.errors import Problem
@@ -25,7 +32,18 @@ from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from mlg_troubleshoot.workflows import check as task
 
 FAILURE = {3: 0.013, 5: 0.007}
-WORN = {1: 0.0020, 2: 0.0031, 3: 0.0126, 4: 0.0041, 5: 0.0068, 6: 0.0012, 7: 0.0023, 8: 0.0018, 9: 0.0009, 10: 0.0021}
+WORN = {
+    1: 0.0020,
+    2: 0.0031,
+    3: 0.0126,
+    4: 0.0041,
+    5: 0.0068,
+    6: 0.0012,
+    7: 0.0023,
+    8: 0.0018,
+    9: 0.0009,
+    10: 0.0021,
+}
 SOUND = dict.fromkeys(range(1, 11), 0.0012)
 
 Judge = Callable[..., Assessment]
@@ -77,7 +95,14 @@ def provenance(gear: Gear) -> ReportProvenance:
 @pytest.fixture(scope="session")
 def rejected() -> Rejected:
     """A row whose side is missing."""
-    row = InvalidRow("R-9", "N77X", None, ("side",), ("Column 'foo' is not known.",), RowSource("fleet.csv", None, 7))
+    row = InvalidRow(
+        "R-9",
+        "N77X",
+        None,
+        ("side",),
+        ("Column 'foo' is not known.",),
+        RowSource("fleet.csv", None, 7),
+    )
     return Rejected(row, correct(row), ())
 
 
@@ -130,12 +155,16 @@ def readable(html: str) -> str:
 
 
 @pytest.fixture(scope="session")
-def make(gear: Gear, provenance: ReportProvenance, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Made]:
+def make(
+    gear: Gear, provenance: ReportProvenance, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[..., Made]:
     """Write a report and read it back."""
 
     def made(judgement: Assessment | Rejected, **options: Any) -> Made:
         folder = tmp_path_factory.mktemp("report")
-        written = write_inspection_report(judgement, gear, folder, **{"provenance": provenance, **options})
+        written = write_inspection_report(
+            judgement, gear, folder, **{"provenance": provenance, **options}
+        )
         html = written.html.read_text(encoding="utf-8") if written.html else ""
         return Made(html, written.pdf.read_bytes() if written.pdf else b"", folder)
 
@@ -150,9 +179,16 @@ def failure(judge: Judge, make: Callable[..., Made]) -> Made:
 
 @pytest.fixture(scope="session")
 def worn(judge: Judge, make: Callable[..., Made]) -> Made:
-    """Report of a gear with ten joints measured by total play, and a plunger measured beyond its margin."""
+    """Report of a gear with ten joints measured by total play, and a plunger measured beyond its
+    margin.
+    """
     entered = {n: EnteredClearance(f"{2 * v:.4f}", LengthUnit.INCH) for n, v in WORN.items()}
     return make(
-        judge(WORN, convention=ClearanceConvention.TOTAL_PLAY, entered=entered, readings_in=(0.0385, 0.0391)),
+        judge(
+            WORN,
+            convention=ClearanceConvention.TOTAL_PLAY,
+            entered=entered,
+            readings_in=(0.0385, 0.0391),
+        ),
         formats=("html",),
     )

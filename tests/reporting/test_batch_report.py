@@ -51,10 +51,15 @@ def batch(judge: Judge, rejected: Rejected) -> list[Judgement]:
 
 @pytest.fixture(scope="module")
 def summary(
-    batch: list[Judgement], gear: Gear, provenance: ReportProvenance, tmp_path_factory: pytest.TempPathFactory
+    batch: list[Judgement],
+    gear: Gear,
+    provenance: ReportProvenance,
+    tmp_path_factory: pytest.TempPathFactory,
 ) -> tuple[str, bytes]:
     folder = tmp_path_factory.mktemp("batch")
-    written = write_batch_report(batch, [PROBLEM], gear, folder, provenance=provenance, notes=("2 columns unread.",))
+    written = write_batch_report(
+        batch, [PROBLEM], gear, folder, provenance=provenance, notes=("2 columns unread.",)
+    )
     assert written.html is not None
     assert written.pdf is not None
     return written.html.read_text(encoding="utf-8"), written.pdf.read_bytes()
@@ -62,13 +67,16 @@ def summary(
 
 def records(html: str) -> list[str]:
     return re.findall(
-        r'<th scope="row"><bdi>.*?</bdi></th><td class="strong">..?</td><td class="one-line">[-–\d]*</td>'
+        r'<th scope="row"><bdi>.*?</bdi></th><td class="strong">..?</td><td'
+        r' class="one-line">[-–\d]*</td>'
         r"<td>(?:<a[^>]*>)?<bdi>(.*?)</bdi>",
         html,
     )
 
 
-def test_each_verdict_is_counted_once(batch: Sequence[Judgement], summary: tuple[str, bytes]) -> None:
+def test_each_verdict_is_counted_once(
+    batch: Sequence[Judgement], summary: tuple[str, bytes]
+) -> None:
     counts = [int(n) for n in re.findall(r'class="count-number">(\d+)<', summary[0])]
     assert sum(counts) == len(batch)
 
@@ -83,14 +91,20 @@ def test_every_gear_has_one_line(summary: tuple[str, bytes]) -> None:
 
 def test_the_worst_gear_stands_first(summary: tuple[str, bytes]) -> None:
     order = records(summary[0])
-    assert order.index("worn") < order.index("published") < order.index("R-9") < order.index("sound")
+    assert (
+        order.index("worn") < order.index("published") < order.index("R-9") < order.index("sound")
+    )
 
 
-def test_a_gear_measured_beyond_its_margin_stands_before_all_others(summary: tuple[str, bytes]) -> None:
+def test_a_gear_measured_beyond_its_margin_stands_before_all_others(
+    summary: tuple[str, bytes],
+) -> None:
     assert records(summary[0])[0] == "little"
 
 
-def test_of_gears_outside_the_margin_the_one_farther_beyond_its_own_stands_first(judge: Judge) -> None:
+def test_of_gears_outside_the_margin_the_one_farther_beyond_its_own_stands_first(
+    judge: Judge,
+) -> None:
     # The gear that moves the plunger farther is allowed to do so.
     wide, narrow = judge(WORN, margin_in=0.05), judge(FAILURE, tail_no="N2")
     assert wide.predicted_displacement_in > narrow.predicted_displacement_in
@@ -116,7 +130,8 @@ def test_a_long_table_repeats_its_header_on_each_page(
 ) -> None:
     one = judge(SOUND)
     many = [
-        dataclasses.replace(one, inspection=dataclasses.replace(one.inspection, record_id=f"r{i}")) for i in range(120)
+        dataclasses.replace(one, inspection=dataclasses.replace(one.inspection, record_id=f"r{i}"))
+        for i in range(120)
     ]
     written = write_batch_report(many, [], gear, tmp_path, provenance=provenance, formats=("pdf",))
     assert written.pdf is not None
@@ -126,7 +141,9 @@ def test_a_long_table_repeats_its_header_on_each_page(
     assert all("Verdict" in text for text in with_rows)
 
 
-def test_a_batch_gets_its_summary_first_then_a_report_a_row(batch: list[Judgement], gear: Gear, tmp_path: Path) -> None:
+def test_a_batch_gets_its_summary_first_then_a_report_a_row(
+    batch: list[Judgement], gear: Gear, tmp_path: Path
+) -> None:
     written = write_reports(batch, gear, tmp_path)
     assert len(written) == len(batch) + 1
     names = [report.html.name for report in written if report.html]
@@ -153,19 +170,28 @@ def test_a_link_to_a_long_name_leads_there(judge: Judge, gear: Gear, tmp_path: P
 
 @pytest.fixture(scope="module")
 def twice(judge: Judge) -> list[Judgement]:
-    """One gear inspected three times, the latest of them not last in the table, and another one once."""
+    """One gear inspected three times, the latest of them not last in the table, and another one
+    once.
+    """
     days = {"spring": date(2024, 3, 1), "autumn": date(2024, 9, 2), "summer": date(2024, 6, 3)}
-    one = [judge(FAILURE, record_id=name, inspection_date=day, tail_no="N2") for name, day in days.items()]
+    one = [
+        judge(FAILURE, record_id=name, inspection_date=day, tail_no="N2")
+        for name, day in days.items()
+    ]
     return [*one, judge(SOUND, record_id="other", tail_no="N1")]
 
 
 def test_each_gear_has_one_line_with_its_latest_inspection(twice: list[Judgement]) -> None:
     latest, earlier = latest_of_each_gear(twice)
-    named = [[j.inspection.record_id for j in (twice[i] for i in places)] for places in (latest, earlier)]
+    named = [
+        [j.inspection.record_id for j in (twice[i] for i in places)] for places in (latest, earlier)
+    ]
     assert named == [["autumn", "other"], ["spring", "summer"]]
 
 
-def test_an_inspection_without_a_date_is_no_earlier_one(judge: Judge, twice: list[Judgement]) -> None:
+def test_an_inspection_without_a_date_is_no_earlier_one(
+    judge: Judge, twice: list[Judgement]
+) -> None:
     undated = judge(SOUND, record_id="undated", tail_no="N2", inspection_date=None)
     latest, earlier = latest_of_each_gear([*twice, undated])
     assert len(twice) in latest
@@ -175,8 +201,12 @@ def test_an_inspection_without_a_date_is_no_earlier_one(judge: Judge, twice: lis
 def test_a_gear_that_cannot_be_cleared_has_no_probability_that_would_clear_it(
     judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path
 ) -> None:
-    open_joints = [judge({3: 0.001}, outcome=None, record_id=name, tail_no=name) for name in ("one", "two")]
-    written = write_batch_report(open_joints, [], gear, tmp_path, provenance=provenance, formats=("html",))
+    open_joints = [
+        judge({3: 0.001}, outcome=None, record_id=name, tail_no=name) for name in ("one", "two")
+    ]
+    written = write_batch_report(
+        open_joints, [], gear, tmp_path, provenance=provenance, formats=("html",)
+    )
     assert written.html is not None
     text = readable(written.html.read_text(encoding="utf-8"))
     assert "INCOMPLETE" in text
@@ -186,15 +216,21 @@ def test_a_gear_that_cannot_be_cleared_has_no_probability_that_would_clear_it(
 def test_earlier_inspections_have_a_table_of_their_own(
     twice: list[Judgement], gear: Gear, provenance: ReportProvenance, tmp_path: Path
 ) -> None:
-    written = write_batch_report(twice, [], gear, tmp_path, provenance=provenance, formats=("html",))
+    written = write_batch_report(
+        twice, [], gear, tmp_path, provenance=provenance, formats=("html",)
+    )
     assert written.html is not None
     text = readable(written.html.read_text(encoding="utf-8"))
-    first, second = text[text.index("Latest inspection of each gear") :].split("Earlier inspections of the same gears")
+    first, second = text[text.index("Latest inspection of each gear") :].split(
+        "Earlier inspections of the same gears"
+    )
     assert "2024-09-02 autumn" in first
     assert "2024-03-01 spring" in second
 
 
-def test_a_link_in_the_pdf_opens_the_pdf_beside_it(twice: list[Judgement], gear: Gear, tmp_path: Path) -> None:
+def test_a_link_in_the_pdf_opens_the_pdf_beside_it(
+    twice: list[Judgement], gear: Gear, tmp_path: Path
+) -> None:
     written = write_reports(twice, gear, tmp_path, ("pdf",))
     assert written[0].pdf is not None
     actions = [
@@ -207,7 +243,9 @@ def test_a_link_in_the_pdf_opens_the_pdf_beside_it(twice: list[Judgement], gear:
     assert files == {report.pdf.name for report in written[1:] if report.pdf}
 
 
-def test_inspections_of_the_same_identity_do_not_overwrite_each_other(judge: Judge, gear: Gear, tmp_path: Path) -> None:
+def test_inspections_of_the_same_identity_do_not_overwrite_each_other(
+    judge: Judge, gear: Gear, tmp_path: Path
+) -> None:
     twice = [judge(SOUND), judge(FAILURE)]
     written = write_reports(twice, gear, tmp_path)
     assert len({report.html for report in written}) == 3
@@ -236,7 +274,9 @@ def test_reports_written_in_parallel_equal_reports_written_alone(
     assert written("a", 1) == written("b", 3)
 
 
-def test_a_folder_that_cannot_be_written_is_named(batch: list[Assessment], gear: Gear, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_named(
+    batch: list[Assessment], gear: Gear, tmp_path: Path
+) -> None:
     (tmp_path / "taken").write_text("a file", encoding="utf-8")
     with pytest.raises(OutputError, match="taken"):
         write_reports(batch, gear, tmp_path / "taken")

@@ -126,7 +126,9 @@ def arrow_lengths(gear: Gear, judge: Judge, clearance: dict[int, float]) -> list
     """Lengths of the white lines below the arrows."""
     found = "".join(str(svg) for _, svg, _ in schematic(gear, judge(clearance)).panels)
     ends = re.findall(
-        r'<line x1="([\d.]+)" y1="([\d.]+)" x2="([\d.]+)" y2="([\d.]+)" stroke="#ffffff" stroke-width="5.5"', found
+        r'<line x1="([\d.]+)" y1="([\d.]+)" x2="([\d.]+)" y2="([\d.]+)" stroke="#ffffff"'
+        r' stroke-width="5.5"',
+        found,
     )
     return [((float(c) - float(a)) ** 2 + (float(d) - float(b)) ** 2) ** 0.5 for a, b, c, d in ends]
 
@@ -138,13 +140,19 @@ def test_virtual_links_are_drawn_to_one_scale(gear: Gear, judge: Judge) -> None:
 
 def test_virtual_links_are_exaggerated_as_stated(gear: Gear, judge: Judge) -> None:
     drawn = schematic(gear, judge(FAILURE))
-    # Joints 4 and 5 are 4.422 in apart in the reference; their markers tell the scale of the drawing.
+    # Joints 4 and 5 are 4.422 in apart in the reference; their markers tell the scale of the
+    # drawing.
     marks = {
-        number: float(x) for x, number in re.findall(r'<text x="([\d.]+)"[^>]*>(4|5)</text>', str(drawn.panels[0][1]))
+        number: float(x)
+        for x, number in re.findall(
+            r'<text x="([\d.]+)"[^>]*>(4|5)</text>', str(drawn.panels[0][1])
+        )
     }
     scale = (marks["5"] - marks["4"]) / 4.422
     assert drawn.exaggeration is not None
-    assert arrow_lengths(gear, judge, FAILURE)[0] == pytest.approx(0.013 * scale * drawn.exaggeration, rel=0.02)
+    assert arrow_lengths(gear, judge, FAILURE)[0] == pytest.approx(
+        0.013 * scale * drawn.exaggeration, rel=0.02
+    )
 
 
 def test_small_clearances_are_not_blown_up(gear: Gear, judge: Judge) -> None:
@@ -171,7 +179,9 @@ def test_the_plunger_is_drawn_as_its_displacement_from_nominal(gear: Gear, judge
     judged = judge(FAILURE)
     svg = str(plunger_curve(gear, judged))
     over, under = curves(svg)
-    zero = next(float(y) for y in re.findall(r'<line x1="[\d.]+" y1="([\d.]+)"[^>]*stroke-width="1.2"', svg))
+    zero = next(
+        float(y) for y in re.findall(r'<line x1="[\d.]+" y1="([\d.]+)"[^>]*stroke-width="1.2"', svg)
+    )
     assert judged.over_travel_in is not None
     assert judged.under_travel_in is not None
     assert (zero - over[-1][1]) / (zero - under[-1][1]) == pytest.approx(

@@ -31,11 +31,20 @@ def form(gear: Gear, tmp_path_factory: pytest.TempPathFactory) -> str:
 
 def test_the_form_has_a_line_for_each_joint_with_its_place_and_limit(gear: Gear, form: str) -> None:
     for joint in gear.joints:
-        assert f"#{joint.number} {joint.name} {joint.location} {1000 * joint.limit.value:.1f}" in form
+        assert (
+            f"#{joint.number} {joint.name} {joint.location} {1000 * joint.limit.value:.1f}" in form
+        )
 
 
 def test_the_form_asks_for_side_unit_and_convention_and_fills_in_none(form: str) -> None:
-    for words in ("LH", "RH", "in", "thou", "mm", *(f"{c.value}: {c.meaning}" for c in ClearanceConvention)):
+    for words in (
+        "LH",
+        "RH",
+        "in",
+        "thou",
+        "mm",
+        *(f"{c.value}: {c.meaning}" for c in ClearanceConvention),
+    ):
         assert words in form
     assert "(default)" not in form
 

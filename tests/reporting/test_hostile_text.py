@@ -56,7 +56,9 @@ def hostile(judge: Judge, make: Callable[..., Made]) -> Made:
     )
 
 
-@pytest.mark.parametrize("element", ["script", "img", "iframe", "object", "embed", "form", "link", "base"])
+@pytest.mark.parametrize(
+    "element", ["script", "img", "iframe", "object", "embed", "form", "link", "base"]
+)
 def test_no_element_comes_from_a_field(element: str, hostile: Made) -> None:
     assert element not in Elements(hostile.html).names
 
@@ -65,7 +67,9 @@ def test_no_event_handler_comes_from_a_field(hostile: Made) -> None:
     assert Elements(hostile.html).handlers == []
 
 
-@pytest.mark.parametrize("words", [SCRIPT, TEMPLATE, CDATA, "<b>column</b>", "<iframe src=//x></iframe>"])
+@pytest.mark.parametrize(
+    "words", [SCRIPT, TEMPLATE, CDATA, "<b>column</b>", "<iframe src=//x></iframe>"]
+)
 def test_hostile_text_is_shown_as_it_was_entered(words: str, hostile: Made) -> None:
     assert words in readable(hostile.html)
 
@@ -76,7 +80,9 @@ def test_hostile_text_is_text_on_paper_too(hostile: Made) -> None:
 
 def test_the_footer_of_each_page_survives_hostile_text(hostile: Made) -> None:
     pages = opened(hostile.pdf).pages
-    assert all(re.search(rf"page {n} of {len(pages)}", p.extract_text()) for n, p in enumerate(pages, 1))
+    assert all(
+        re.search(rf"page {n} of {len(pages)}", p.extract_text()) for n, p in enumerate(pages, 1)
+    )
 
 
 def test_the_stylesheet_is_not_left_by_a_field(hostile: Made) -> None:
@@ -105,7 +111,8 @@ def test_a_text_on_one_line_has_no_line_end(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["\x1b[31mred", "\x1b]8;;x\x07y", "\x9b2J", "\u2067a\u2069", "\ud800", "a\u2028b", "\u200ea"]
+    "text",
+    ["\x1b[31mred", "\x1b]8;;x\x07y", "\x9b2J", "\u2067a\u2069", "\ud800", "a\u2028b", "\u200ea"],
 )
 def test_what_acts_on_a_reader_is_shown_as_a_code(text: str) -> None:
     assert visible(text).isprintable()
@@ -113,7 +120,10 @@ def test_what_acts_on_a_reader_is_shown_as_a_code(text: str) -> None:
 
 
 def test_markup_of_a_terminal_is_text(judge: Judge, make: Callable[..., Made]) -> None:
-    made = make(judge(FAILURE, record_id="[link=http://x]R[/link]", tail_no="N1\x1b]0;t\x07"), formats=("html",))
+    made = make(
+        judge(FAILURE, record_id="[link=http://x]R[/link]", tail_no="N1\x1b]0;t\x07"),
+        formats=("html",),
+    )
     assert "[link=http://x]R[/link]" in made.text
     assert "N1‹U+001B›]0;t‹U+0007›" in made.text
 
@@ -123,18 +133,26 @@ def test_a_css_string_cannot_be_left() -> None:
     assert not set('";}</\\\n') & set(re.sub(r"\\[0-9a-f]+ ", "", written[1:-1]))
 
 
-def test_long_remarks_do_not_push_the_verdict_off_the_first_page(judge: Judge, make: Callable[..., Made]) -> None:
+def test_long_remarks_do_not_push_the_verdict_off_the_first_page(
+    judge: Judge, make: Callable[..., Made]
+) -> None:
     made = make(judge(FAILURE, carried={"remarks": "many words " * 400}), formats=("html", "pdf"))
     assert "OVER LIMIT" in opened(made.pdf).pages[0].extract_text()
 
 
 def test_long_remarks_stand_in_full(judge: Judge, make: Callable[..., Made]) -> None:
-    made = make(judge(FAILURE, carried={"remarks": "many words " * 400 + "LAST"}), formats=("html",))
+    made = make(
+        judge(FAILURE, carried={"remarks": "many words " * 400 + "LAST"}), formats=("html",)
+    )
     assert "LAST" in made.text
 
 
-def test_a_word_without_end_does_not_shrink_the_page(rejected: Rejected, make: Callable[..., Made]) -> None:
-    problem = Problem("x", "fleet.csv", None, 7, "x" * 300, "C7", "y" * 900, "LH or RH", "Write LH or RH.")
+def test_a_word_without_end_does_not_shrink_the_page(
+    rejected: Rejected, make: Callable[..., Made]
+) -> None:
+    problem = Problem(
+        "x", "fleet.csv", None, 7, "x" * 300, "C7", "y" * 900, "LH or RH", "Write LH or RH."
+    )
     made = make(rejected, formats=("pdf",), problems=(problem,))
     sizes: list[float] = []
 

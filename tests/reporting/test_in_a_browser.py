@@ -1,4 +1,6 @@
-"""The HTML in Chromium: as many printed pages as the PDF, and no accessibility violation that axe can find."""
+"""The HTML in Chromium: as many printed pages as the PDF, and no accessibility violation that axe
+can find.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +49,11 @@ axe.run(document, {{resultTypes: ["violations"]}}).then(result => {{
 
 
 def chromium(profile: Path, *arguments: str) -> str:
-    program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    program = (
+        shutil.which("chromium")
+        or shutil.which("chromium-browser")
+        or shutil.which("google-chrome")
+    )
     assert program, "install the Debian package chromium"
     run = [program, *FLAGS, f"--user-data-dir={profile / 'profile'}", *arguments]
     return subprocess.run(run, capture_output=True, text=True, timeout=120, check=True).stdout
@@ -56,7 +62,9 @@ def chromium(profile: Path, *arguments: str) -> str:
 def axe_core() -> str:
     npm = shutil.which("npm")
     assert npm, "install the Debian package npm"
-    root = subprocess.run([npm, "root", "-g"], capture_output=True, text=True, check=True).stdout.strip()
+    root = subprocess.run(
+        [npm, "root", "-g"], capture_output=True, text=True, check=True
+    ).stdout.strip()
     script = Path(root, "axe-core", "axe.min.js")
     assert script.is_file(), "install axe-core: npm install -g axe-core"
     return script.read_text(encoding="utf-8")
@@ -106,7 +114,9 @@ def test_axe_finds_nothing_in_the_report_of_an_invalid_row(
     assert violations(make(rejected, formats=("html",)).html, tmp_path) == []
 
 
-def test_axe_finds_nothing_in_a_batch_summary(judge: Judge, rejected: Rejected, gear: Gear, tmp_path: Path) -> None:
+def test_axe_finds_nothing_in_a_batch_summary(
+    judge: Judge, rejected: Rejected, gear: Gear, tmp_path: Path
+) -> None:
     written = write_reports([judge(FAILURE), rejected], gear, tmp_path)
     assert written[0].html is not None
     assert violations(written[0].html.read_text(encoding="utf-8"), tmp_path) == []

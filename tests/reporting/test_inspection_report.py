@@ -23,7 +23,11 @@ Make = Callable[..., Made]
 
 
 def test_identity_stands_before_the_verdict(failure: Made) -> None:
-    assert -1 < failure.text.find("N123AB") < failure.text.find("OUTSIDE MARGIN", failure.text.find("R-2024-0117"))
+    assert (
+        -1
+        < failure.text.find("N123AB")
+        < failure.text.find("OUTSIDE MARGIN", failure.text.find("R-2024-0117"))
+    )
 
 
 def test_the_side_stands_alone_in_large_letters(failure: Made) -> None:
@@ -31,7 +35,9 @@ def test_the_side_stands_alone_in_large_letters(failure: Made) -> None:
 
 
 def test_the_side_is_also_said_in_words(judge: Judge, make: Make) -> None:
-    assert "right-hand main landing gear" in make(judge(FAILURE, side=Side.RH), formats=("html",)).text
+    assert (
+        "right-hand main landing gear" in make(judge(FAILURE, side=Side.RH), formats=("html",)).text
+    )
 
 
 def test_the_verdict_is_written_in_words(failure: Made) -> None:
@@ -43,7 +49,10 @@ def test_the_failure_case_shows_the_published_displacement(failure: Made) -> Non
 
 
 def test_the_chance_with_random_directions_stands_beside_the_worst_case(failure: Made) -> None:
-    found = re.search(r"Chance, random directions (\d+) % of leaving the margin", failure.text.replace("\u00a0", " "))
+    found = re.search(
+        r"Chance, random directions (\d+) % of leaving the margin",
+        failure.text.replace("\u00a0", " "),
+    )
     assert found is not None
     assert 20 <= int(found[1]) <= 30
 
@@ -69,7 +78,9 @@ def test_the_convention_of_the_readings_is_named(worn: Made) -> None:
 
 
 def test_unmeasured_joints_are_listed(failure: Made) -> None:
-    assert "8 joints not measured: #1, #2, #4, #6, #7, #8, #9 and #10" in failure.text.replace("\u00a0", " ")
+    assert "8 joints not measured: #1, #2, #4, #6, #7, #8, #9 and #10" in failure.text.replace(
+        "\u00a0", " "
+    )
 
 
 def test_joints_stand_in_the_order_to_inspect_them(judge: Judge, worn: Made) -> None:
@@ -96,7 +107,9 @@ def test_an_unmeasured_joint_has_a_dashed_mark(failure: Made) -> None:
 
 
 def test_the_exaggeration_of_the_virtual_links_is_stated(failure: Made) -> None:
-    assert re.search(r"drawn \d+ times its size, in the worst direction for over-travel", failure.text)
+    assert re.search(
+        r"drawn \d+ times its size, in the worst direction for over-travel", failure.text
+    )
 
 
 def test_every_joint_is_numbered_in_the_schematic(gear: Gear, failure: Made) -> None:
@@ -121,7 +134,10 @@ def test_both_ends_of_one_link_are_named_as_alike(failure: Made) -> None:
 def test_no_repair_table_where_none_was_asked_for(judge: Judge, make: Make) -> None:
     import dataclasses
 
-    assert "Repair sets" not in make(dataclasses.replace(judge(FAILURE), repair_sets=None), formats=("html",)).text
+    assert (
+        "Repair sets"
+        not in make(dataclasses.replace(judge(FAILURE), repair_sets=None), formats=("html",)).text
+    )
 
 
 def test_a_measurement_within_the_margin_comes_after_the_verdict(judge: Judge, make: Make) -> None:
@@ -137,14 +153,18 @@ def test_what_the_source_does_not_state_is_shown_as_not_stated(failure: Made) ->
     assert "Which valve port is affected: not stated" in failure.text
 
 
-def test_the_symptom_of_a_sound_gear_is_the_one_within(gear: Gear, judge: Judge, make: Make) -> None:
+def test_the_symptom_of_a_sound_gear_is_the_one_within(
+    gear: Gear, judge: Judge, make: Make
+) -> None:
     assert gear.cycle is not None
     text = make(judge(SOUND), formats=("html",)).text
     assert gear.cycle.within in text
     assert gear.cycle.beyond not in text
 
 
-@pytest.mark.parametrize("role", ["Measured by", "Independently measured by", "Rectified by", "Inspected by"])
+@pytest.mark.parametrize(
+    "role", ["Measured by", "Independently measured by", "Rectified by", "Inspected by"]
+)
 def test_there_is_a_line_to_sign_for(role: str, failure: Made) -> None:
     assert f'<th scope="row">{role}</th>' in failure.html
 
@@ -190,7 +210,9 @@ def test_warnings_of_the_decision_stand_on_the_report(judge: Judge, failure: Mad
     assert all(warning in failure.text for warning in warnings)
 
 
-def test_many_warnings_are_cut_short_in_front_and_stand_in_full_behind(judge: Judge, make: Make) -> None:
+def test_many_warnings_are_cut_short_in_front_and_stand_in_full_behind(
+    judge: Judge, make: Make
+) -> None:
     many = tuple(f"Remark {i} about this row." for i in range(9))
     text = make(judge(FAILURE, warnings=many), formats=("html",)).text
     assert "more warnings under “Warnings”" in text.replace("\u00a0", " ")
@@ -212,7 +234,9 @@ def test_a_linkage_that_does_not_close_still_gets_its_report(judge: Judge, make:
 
 
 def test_an_invalid_row_says_what_to_correct(rejected: Rejected, make: Make) -> None:
-    problem = Problem("side", "fleet.csv", None, 7, "side", "C7", "LEFT", "LH or RH", "Write LH or RH.")
+    problem = Problem(
+        "side", "fleet.csv", None, 7, "side", "C7", "LEFT", "LH or RH", "Write LH or RH."
+    )
     other = Problem("side", "fleet.csv", None, 8, "side", "C8", "UP", "LH or RH", "Write LH or RH.")
     text = make(rejected, formats=("html",), problems=(problem, other)).text
     assert "INVALID – do not use" in text
@@ -220,7 +244,9 @@ def test_an_invalid_row_says_what_to_correct(rejected: Rejected, make: Make) -> 
     assert "C8" not in text
 
 
-def test_an_invalid_row_without_a_side_shows_a_question_mark(rejected: Rejected, make: Make) -> None:
+def test_an_invalid_row_without_a_side_shows_a_question_mark(
+    rejected: Rejected, make: Make
+) -> None:
     assert '<p class="side" aria-hidden="true">?</p>' in make(rejected, formats=("html",)).html
 
 
@@ -255,7 +281,8 @@ def test_re_rigging_alone_stands_under_the_repairs(failure: Made) -> None:
 def test_no_joint_may_wear_beyond_its_own_limit(judge: Judge, make: Make) -> None:
     text = make(judge(SOUND), formats=("html",)).text
     details = text[text.index("Joints in detail") : text.index("May wear further: this")]
-    # Joints at 0.0012 in: 0.0063 in are left to the limit of 0.0075 in, whatever the margin would allow.
+    # Joints at 0.0012 in: 0.0063 in are left to the limit of 0.0075 in, whatever the margin would
+    # allow.
     assert "0.0063" in details
     assert max(float(v) for v in re.findall(r"\d (0\.0\d{3}) acts", details)) <= 0.0063
 
@@ -288,7 +315,9 @@ def test_repair_sets_stand_with_their_minutes(judge: Judge, worn: Made) -> None:
     assert f"{sets[0].minutes:.0f}" in worn.text[worn.text.index("Minutes") :]
 
 
-def test_an_incomplete_gear_has_no_probability_that_would_clear_it(judge: Judge, make: Make) -> None:
+def test_an_incomplete_gear_has_no_probability_that_would_clear_it(
+    judge: Judge, make: Make
+) -> None:
     judged = judge({3: 0.001}, outcome=None)
     assert judged.verdict == "INCOMPLETE"
     text = make(judged, formats=("html",)).text.replace("\u00a0", " ")
@@ -297,7 +326,9 @@ def test_an_incomplete_gear_has_no_probability_that_would_clear_it(judge: Judge,
 
 
 def test_the_first_page_says_date_and_manual_reference(judge: Judge, make: Make) -> None:
-    text = make(judge(FAILURE, carried={"manual_ref": "32-10-05", "manual_rev": "12"}), formats=("html",)).text
+    text = make(
+        judge(FAILURE, carried={"manual_ref": "32-10-05", "manual_rev": "12"}), formats=("html",)
+    ).text
     front = text[: text.index("Joints, in the order")]
     assert "Inspected on 2024-05-17" in front
     assert "Manual 32-10-05 rev. 12" in front
@@ -309,17 +340,26 @@ def test_the_verdict_stands_beside_the_signatures(failure: Made) -> None:
     assert -1 < signed.find("OUTSIDE MARGIN · N123AB LH") < signed.find("Measured by")
 
 
-@pytest.mark.parametrize(("unit", "shown"), [(LengthUnit.THOU, "47.2 thou"), (LengthUnit.MILLIMETRE, "1.199 mm")])
+@pytest.mark.parametrize(
+    ("unit", "shown"), [(LengthUnit.THOU, "47.2 thou"), (LengthUnit.MILLIMETRE, "1.199 mm")]
+)
 def test_a_report_has_one_unit(unit: LengthUnit, shown: str, judge: Judge, make: Make) -> None:
-    text = make(judge(FAILURE, entered={}), formats=("html",), unit=unit).text.replace("\u00a0", " ")
+    text = make(judge(FAILURE, entered={}), formats=("html",), unit=unit).text.replace(
+        "\u00a0", " "
+    )
     assert shown in text
-    assert re.findall(r"\d\.\d+ in\b(?! radially)", text[: text.index("Assumptions and provenance")]) == []
+    assert (
+        re.findall(r"\d\.\d+ in\b(?! radially)", text[: text.index("Assumptions and provenance")])
+        == []
+    )
 
 
 def test_the_joints_that_explain_a_measured_displacement_have_a_table(
     gear: Gear, table: IndexTable, make: Make
 ) -> None:
-    (partly,) = assess([inspection({2: 0.001, 4: 0.001}, readings_in=(0.028,))], gear, table, advice=True)
+    (partly,) = assess(
+        [inspection({2: 0.001, 4: 0.001}, readings_in=(0.028,))], gear, table, advice=True
+    )
     text = make(partly, formats=("html",)).text
     assert "Which joints explain the measured displacement" in text
     assert re.search(r"#3 and #5 \d[\d.]*\s% #3 0\.0\d+ to 0\.0\d+; #5 ", text)

@@ -22,7 +22,9 @@ def test_hangul_is_missing_from_the_fonts() -> None:
     assert missing_characters("Kim 김민수") == "김민수"
 
 
-@pytest.mark.parametrize("text", ["Zoë ñ ł ő", "Ελληνικά", "Кириллица", "العربية", "עברית", "→ ▶ △ ≤ ± − ½ °"])
+@pytest.mark.parametrize(
+    "text", ["Zoë ñ ł ő", "Ελληνικά", "Кириллица", "العربية", "עברית", "→ ▶ △ ≤ ± − ½ °"]
+)
 def test_the_fonts_have_the_writing_of(text: str) -> None:
     assert missing_characters(text) == ""
 
@@ -48,8 +50,12 @@ def without_other_fonts(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("without_other_fonts")
-def test_a_korean_name_stands_on_paper_by_its_sound(judge: Judge, make: Callable[..., Made]) -> None:
-    assert "‹Gim-Min-Su›" in text_of(make(judge(FAILURE, technician_id="김민수"), formats=("pdf",)).pdf)
+def test_a_korean_name_stands_on_paper_by_its_sound(
+    judge: Judge, make: Callable[..., Made]
+) -> None:
+    assert "‹Gim-Min-Su›" in text_of(
+        make(judge(FAILURE, technician_id="김민수"), formats=("pdf",)).pdf
+    )
 
 
 @pytest.mark.usefixtures("without_other_fonts")
@@ -59,8 +65,12 @@ def test_the_paper_says_what_the_brackets_mean(judge: Judge, make: Callable[...,
 
 
 @pytest.mark.usefixtures("without_other_fonts")
-def test_a_note_names_the_characters(judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path) -> None:
-    written = write_inspection_report(judge(FAILURE, technician_id="김민수"), gear, tmp_path, provenance=provenance)
+def test_a_note_names_the_characters(
+    judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path
+) -> None:
+    written = write_inspection_report(
+        judge(FAILURE, technician_id="김민수"), gear, tmp_path, provenance=provenance
+    )
     assert "김 민 수" in written.notes[0]
 
 
@@ -78,5 +88,9 @@ def test_ordinary_text_has_no_box(failure: Made) -> None:
     assert not check_fonts(opened(failure.pdf))
 
 
-def test_ordinary_text_gives_no_note(judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path) -> None:
-    assert write_inspection_report(judge(FAILURE), gear, tmp_path, provenance=provenance).notes == ()
+def test_ordinary_text_gives_no_note(
+    judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path
+) -> None:
+    assert (
+        write_inspection_report(judge(FAILURE), gear, tmp_path, provenance=provenance).notes == ()
+    )

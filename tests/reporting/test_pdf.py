@@ -1,4 +1,6 @@
-"""The PDF: fonts inside, text to search, bookmarks, the same bytes every time, and no way out of the sandbox."""
+"""The PDF: fonts inside, text to search, bookmarks, the same bytes every time, and no way out of
+the sandbox.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,10 @@ NOW = datetime(2024, 5, 17, 9, 30, tzinfo=UTC)
 
 
 def page_of(body: str) -> str:
-    return f"<html><head><style>{font_faces()} body {{ font-family: 'Report Sans' }}</style></head>{body}</html>"
+    return (
+        f"<html><head><style>{font_faces()} body {{ font-family: 'Report Sans'"
+        f" }}</style></head>{body}</html>"
+    )
 
 
 def opened(made: bytes) -> pypdf.PdfReader:
@@ -60,14 +65,20 @@ def test_the_fonts_are_the_bundled_ones(failure: Made) -> None:
 
 
 def test_a_computer_without_fonts_makes_the_same_pdf(
-    judge: Judge, make: Callable[..., Made], failure: Made, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    judge: Judge,
+    make: Callable[..., Made],
+    failure: Made,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     (tmp_path / "fonts.conf").write_text("<fontconfig></fontconfig>", encoding="utf-8")
     monkeypatch.setenv("FONTCONFIG_FILE", str(tmp_path / "fonts.conf"))
     assert make(judge(FAILURE), formats=("pdf",)).pdf == failure.pdf
 
 
-@pytest.mark.parametrize("words", ["N123AB", "OUTSIDE MARGIN", "short link inner bearing", "0.0130 OVER LIMIT"])
+@pytest.mark.parametrize(
+    "words", ["N123AB", "OUTSIDE MARGIN", "short link inner bearing", "0.0130 OVER LIMIT"]
+)
 def test_text_can_be_searched(words: str, failure: Made) -> None:
     assert words in text_of(failure.pdf)
 
@@ -78,7 +89,15 @@ def test_the_report_has_two_or_three_pages(failure: Made) -> None:
 
 def test_the_first_page_answers_everything_a_technician_needs(failure: Made) -> None:
     first = re.sub(r"\s+", " ", opened(failure.pdf).pages[0].extract_text())
-    for words in ("LH", "OUTSIDE MARGIN", "Next", "0.0472", "Worst case (bound)", "OVER LIMIT", "not measured"):
+    for words in (
+        "LH",
+        "OUTSIDE MARGIN",
+        "Next",
+        "0.0472",
+        "Worst case (bound)",
+        "OVER LIMIT",
+        "not measured",
+    ):
         assert words in first
 
 
@@ -88,7 +107,9 @@ def test_each_page_says_which_of_how_many_it_is(failure: Made) -> None:
         assert f"page {number} of {len(pages)}" in page.extract_text()
 
 
-@pytest.mark.parametrize("words", ["N123AB LH", "R-2024-0117", "mlg 9.8.7", "geometry ", "input 9f2cabab"])
+@pytest.mark.parametrize(
+    "words", ["N123AB LH", "R-2024-0117", "mlg 9.8.7", "geometry ", "input 9f2cabab"]
+)
 def test_each_page_names_the_record_and_the_program(words: str, failure: Made) -> None:
     assert all(words in page.extract_text() for page in opened(failure.pdf).pages)
 
@@ -131,7 +152,9 @@ def test_the_creation_date_is_the_one_that_was_given(failure: Made) -> None:
     assert (metadata.creation_date, metadata.modification_date) == (NOW, NOW)
 
 
-def test_the_same_input_gives_the_same_bytes(judge: Judge, make: Callable[..., Made], failure: Made) -> None:
+def test_the_same_input_gives_the_same_bytes(
+    judge: Judge, make: Callable[..., Made], failure: Made
+) -> None:
     # The engine's own clock has a step of one second.
     time.sleep(1.1)
     assert hashlib.sha256(make(judge(FAILURE)).pdf).digest() == hashlib.sha256(failure.pdf).digest()
@@ -150,7 +173,9 @@ def test_with_the_date_of_the_sources_two_runs_give_the_same_bytes(
     assert "report made 2024-05-17" in made.text
 
 
-def test_a_date_of_the_sources_that_is_none_is_refused(gear: Gear, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_date_of_the_sources_that_is_none_is_refused(
+    gear: Gear, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
     with pytest.raises(UsageError, match="yesterday"):
         provenance_of(gear, {})
@@ -171,7 +196,9 @@ def test_the_paper_is_the_one_asked_for(
     assert (round(box.width), round(box.height)) == (width, height)
 
 
-def test_letter_takes_as_many_pages_as_a4(judge: Judge, make: Callable[..., Made], failure: Made) -> None:
+def test_letter_takes_as_many_pages_as_a4(
+    judge: Judge, make: Callable[..., Made], failure: Made
+) -> None:
     letter = make(judge(FAILURE), page="Letter", formats=("pdf",)).pdf
     assert len(opened(letter).pages) == len(opened(failure.pdf).pages)
 
@@ -199,21 +226,30 @@ def test_nothing_is_fetched_from_the_network() -> None:
         there = f"http://127.0.0.1:{server.server_port}"
         body = f'<p>text</p><img src="{there}/a.png"><link rel="stylesheet" href="{there}/b.css">'
         with closing(PdfEngine()) as engine:
-            engine.convert(page_of(f"{body}<p style='background:url({there}/c.png)'>more</p>"), "A4", NOW)
+            engine.convert(
+                page_of(f"{body}<p style='background:url({there}/c.png)'>more</p>"), "A4", NOW
+            )
         server.shutdown()
     assert asked == []
 
 
 def test_no_file_of_this_computer_is_read(tmp_path: Path) -> None:
-    square = '<svg xmlns="http://www.w3.org/2000/svg" width="10" height="10"><text>SECRET</text></svg>'
+    square = (
+        '<svg xmlns="http://www.w3.org/2000/svg" width="10" height="10"><text>SECRET</text></svg>'
+    )
     (tmp_path / "secret.svg").write_text(square, encoding="utf-8")
     with closing(PdfEngine()) as engine:
-        made = engine.convert(page_of(f'<p>text</p><img src="file://{tmp_path}/secret.svg">'), "A4", NOW)[0]
+        made = engine.convert(
+            page_of(f'<p>text</p><img src="file://{tmp_path}/secret.svg">'), "A4", NOW
+        )[0]
     assert "SECRET" not in text_of(made)
 
 
 def test_a_document_that_takes_too_long_is_stopped() -> None:
-    with closing(PdfEngine(time_limit_s=0.05)) as engine, pytest.raises(PdfError, match=r"longer than 0\.05 s"):
+    with (
+        closing(PdfEngine(time_limit_s=0.05)) as engine,
+        pytest.raises(PdfError, match=r"longer than 0\.05 s"),
+    ):
         engine.convert(page_of("<p>word</p>" * 200_000), "A4", NOW)
 
 
@@ -241,14 +277,20 @@ def test_without_an_engine_the_html_still_comes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(pdf, "engine_is_installed", lambda: False)
-    written = write_inspection_report(judge(FAILURE), gear, tmp_path, provenance=provenance, formats=formats)
+    written = write_inspection_report(
+        judge(FAILURE), gear, tmp_path, provenance=provenance, formats=formats
+    )
     assert written.pdf is None
     assert written.html is not None
     assert written.html.is_file()
 
 
 def test_without_an_engine_a_note_says_how_to_print(
-    judge: Judge, gear: Gear, provenance: ReportProvenance, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    judge: Judge,
+    gear: Gear,
+    provenance: ReportProvenance,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(pdf, "engine_is_installed", lambda: False)
     (note,) = write_inspection_report(judge(FAILURE), gear, tmp_path, provenance=provenance).notes

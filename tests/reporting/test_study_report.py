@@ -11,7 +11,13 @@ import pytest
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.paper.certified import CertifiedBound
 from mlg_troubleshoot.paper.statements import check_statements
-from mlg_troubleshoot.paper.study import Directions, StudyFindings, StudyOptions, compare_designs, run_study
+from mlg_troubleshoot.paper.study import (
+    Directions,
+    StudyFindings,
+    StudyOptions,
+    compare_designs,
+    run_study,
+)
 from mlg_troubleshoot.paper.worst_search import WorstSearch
 from mlg_troubleshoot.reporting import ReportProvenance, publish
 from mlg_troubleshoot.reporting.study_report import study_document
@@ -39,15 +45,21 @@ def findings(gear: Gear) -> StudyFindings:
 
 
 @pytest.fixture(scope="module")
-def report(findings: StudyFindings, provenance: ReportProvenance, tmp_path_factory: pytest.TempPathFactory) -> str:
+def report(
+    findings: StudyFindings, provenance: ReportProvenance, tmp_path_factory: pytest.TempPathFactory
+) -> str:
     """Its report, as a reader of the HTML reads it."""
     return written(findings, provenance, tmp_path_factory)
 
 
-def written(findings: StudyFindings, provenance: ReportProvenance, folders: pytest.TempPathFactory) -> str:
+def written(
+    findings: StudyFindings, provenance: ReportProvenance, folders: pytest.TempPathFactory
+) -> str:
     made = publish(study_document(findings, provenance), folders.mktemp("study"), formats=("html",))
     assert made.html is not None
-    return readable(made.html.read_text(encoding="utf-8")).replace("\u00a0", " ").replace("\u200b", "")
+    return (
+        readable(made.html.read_text(encoding="utf-8")).replace("\u00a0", " ").replace("\u200b", "")
+    )
 
 
 @pytest.mark.parametrize("figure", ["12", "13a", "13b", "13c"])
@@ -57,10 +69,14 @@ def test_every_figure_of_the_paper_has_its_counterpart(figure: str, report: str)
 
 def test_every_joint_has_its_indices(findings: StudyFindings, report: str) -> None:
     for joint, entry in zip(findings.gear.joints, findings.result.table.joints, strict=True):
-        assert re.search(rf"{re.escape(joint.label)} {entry.first_order:.4f} .*?{entry.total_order:.4f}", report)
+        assert re.search(
+            rf"{re.escape(joint.label)} {entry.first_order:.4f} .*?{entry.total_order:.4f}", report
+        )
 
 
-def test_every_statement_has_a_paragraph_with_its_numbers(findings: StudyFindings, report: str) -> None:
+def test_every_statement_has_a_paragraph_with_its_numbers(
+    findings: StudyFindings, report: str
+) -> None:
     assert len(findings.statements) == 10
     for statement in findings.statements:
         assert f"4.3 {statement.claim} " in report
@@ -85,7 +101,9 @@ def test_the_bound_stands_beside_the_rule_and_the_search(report: str) -> None:
     assert "over-travel 0.105323 0.035 % 0.105360 ≤ 0.105360 2e−07 0.6870" in report
 
 
-@pytest.mark.parametrize("words", ["not drawing data", "seed 5", "10 geometries, sha256 ", "Geometry sha256 "])
+@pytest.mark.parametrize(
+    "words", ["not drawing data", "seed 5", "10 geometries, sha256 ", "Geometry sha256 "]
+)
 def test_the_report_says_where_it_comes_from(words: str, report: str) -> None:
     assert words in report
 
@@ -93,9 +111,11 @@ def test_the_report_says_where_it_comes_from(words: str, report: str) -> None:
 def test_a_bound_that_could_not_be_proved_is_not_given_one(
     findings: StudyFindings, provenance: ReportProvenance, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    (first, _) = findings.searches
+    first, _ = findings.searches
     open_ended = replace(first, proved=replace(first.proved, bound_in=np.inf))
-    assert "could not be proved" in written(replace(findings, searches=(open_ended,)), provenance, tmp_path_factory)
+    assert "could not be proved" in written(
+        replace(findings, searches=(open_ended,)), provenance, tmp_path_factory
+    )
 
 
 def test_an_interrupted_study_says_so(

@@ -22,7 +22,11 @@ class Gear:
 
     def __init__(self) -> None:
         table = np.genfromtxt(DATA / "gear-eccentricity.csv", delimiter=",", skip_header=1)
-        self.session, self.set_mm, self.runout_mm = table[:, 0].astype(int), table[:, 1], table[:, 2:]
+        self.session, self.set_mm, self.runout_mm = (
+            table[:, 0].astype(int),
+            table[:, 1],
+            table[:, 2:],
+        )
 
     def predict(self, p: Mapping[str, float]) -> Array:
         # Sleeves of one size turned so that, by drawing, the sum of both vectors is what was set.
@@ -58,7 +62,10 @@ class Plotter:
     suspects = tuple(
         Suspect(f"{name}_{servo}", nominal, trial, unit)
         for servo in (1, 2)
-        for name, nominal, trial, unit in (("slope", 10.0, 0.5, "µs/deg"), ("hysteresis", 0.0, 0.3, "deg"))
+        for name, nominal, trial, unit in (
+            ("slope", 10.0, 0.5, "µs/deg"),
+            ("hysteresis", 0.0, 0.3, "deg"),
+        )
     )
     nuisance = (Suspect("centre_1", 1050.0, 20.0, "µs"), Suspect("centre_2", 600.0, 20.0, "µs"))
 
@@ -72,7 +79,11 @@ class Panda:
 
     def __init__(self, session: int, places: Callable[[str], bool] = lambda _place: True) -> None:
         with (DATA / "panda-sockets.csv").open(encoding="utf-8") as file:
-            rows = [r for r in csv.DictReader(file) if r["session"] == str(session) and places(r["place"])]
+            rows = [
+                r
+                for r in csv.DictReader(file)
+                if r["session"] == str(session) and places(r["place"])
+            ]
         self.angles = np.array([[float(row[f"q{j}_rad"]) for j in range(1, 8)] for row in rows])
         self.place = np.array([row["place"] for row in rows])
         self.socket = np.array([f"{row['place']}/{row['socket']}" for row in rows])
@@ -81,10 +92,15 @@ class Panda:
         self.nuisance = [Suspect(f"tool_{x}", 120.0 if x == "z" else 0.0, 5.0, "mm") for x in "xyz"]
         for name in sorted(set(self.socket)):
             middle = ball[self.socket == name].mean(axis=0)
-            self.nuisance += [Suspect(f"{name}/{x}", float(v), 5.0, "mm") for x, v in zip("xyz", middle, strict=True)]
+            self.nuisance += [
+                Suspect(f"{name}/{x}", float(v), 5.0, "mm")
+                for x, v in zip("xyz", middle, strict=True)
+            ]
 
     def ball(self, p: Mapping[str, float]) -> Array:
-        """Place of the ball by modified Denavit–Hartenberg parameters, changes of them in mm and degrees. [mm]"""
+        """Place of the ball by modified Denavit–Hartenberg parameters, changes of them in mm and
+        degrees. [mm]
+        """
         n = len(self.angles)
         turn, at = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
         for j in range(7):

@@ -58,7 +58,11 @@ def four_bar(n: int, rng: np.random.Generator) -> Rig:
         apart = np.hypot(x, y)
         inner = (p["rocker"] ** 2 + apart**2 - p["coupler"] ** 2) / (2.0 * p["rocker"] * apart)
         angle = np.arctan2(y, x) - np.arccos(np.clip(inner, -1.0, 1.0))
-        return np.degrees(np.unwrap(np.sort(angle))[np.argsort(np.argsort(angle))])[:, None] * p["gain"] + p["zero"]
+        return (
+            np.degrees(np.unwrap(np.sort(angle))[np.argsort(np.argsort(angle))])[:, None]
+            * p["gain"]
+            + p["zero"]
+        )
 
     return Rig(
         predict,
@@ -85,7 +89,10 @@ def two_link(n: int, rng: np.random.Generator) -> Rig:
         y = p["length_1"] * np.sin(first) + p["length_2"] * np.sin(both)
         turn = np.radians(p["frame_turn"])
         return np.column_stack(
-            [x * np.cos(turn) - y * np.sin(turn) + p["frame_x"], x * np.sin(turn) + y * np.cos(turn) + p["frame_y"]]
+            [
+                x * np.cos(turn) - y * np.sin(turn) + p["frame_x"],
+                x * np.sin(turn) + y * np.cos(turn) + p["frame_y"],
+            ]
         )
 
     return Rig(
@@ -132,7 +139,9 @@ def thermal(n: int, rng: np.random.Generator) -> Rig:
     speed, time = rng.uniform(1.0, 10.0, n), rng.uniform(0.1, 6.0, n)
 
     def predict(p: Mapping[str, float]) -> Array:
-        warm = (p["loss"] * speed**1.5 + p["drag"] * speed**2) * (1.0 - np.exp(-time / p["time_constant"]))
+        warm = (p["loss"] * speed**1.5 + p["drag"] * speed**2) * (
+            1.0 - np.exp(-time / p["time_constant"])
+        )
         places = np.array([0.2, 0.5, 1.0])
         return (
             p["expansion"] * warm[:, None] * places * np.exp(-p["decay"] * places)
@@ -156,15 +165,23 @@ def thermal(n: int, rng: np.random.Generator) -> Rig:
 
 def camera(n: int, rng: np.random.Generator) -> Rig:
     """Pixels at which a camera of unknown pose sees targets. [px]"""
-    target = np.column_stack([rng.uniform(-1.0, 1.0, n), rng.uniform(-0.8, 0.8, n), rng.uniform(2.0, 4.0, n)])
+    target = np.column_stack(
+        [rng.uniform(-1.0, 1.0, n), rng.uniform(-0.8, 0.8, n), rng.uniform(2.0, 4.0, n)]
+    )
 
     def predict(p: Mapping[str, float]) -> Array:
         x, y, z = (target + np.array([p["x"], p["y"], p["z"]])).T
-        x, z = x * np.cos(p["yaw"]) + z * np.sin(p["yaw"]), z * np.cos(p["yaw"]) - x * np.sin(p["yaw"])
+        x, z = (
+            x * np.cos(p["yaw"]) + z * np.sin(p["yaw"]),
+            z * np.cos(p["yaw"]) - x * np.sin(p["yaw"]),
+        )
         u, v = x / z, y / z
         bend = 1.0 + p["k1"] * (u**2 + v**2) + p["k2"] * (u**2 + v**2) ** 2
         return np.column_stack(
-            [p["focal"] * bend * u + p["centre_u"] + p["skew"] * v, p["focal"] * p["aspect"] * bend * v + p["centre_v"]]
+            [
+                p["focal"] * bend * u + p["centre_u"] + p["skew"] * v,
+                p["focal"] * p["aspect"] * bend * v + p["centre_v"],
+            ]
         )
 
     return Rig(
@@ -197,9 +214,14 @@ def readings(
     heavy: bool = False,
 ) -> Array:
     """Readings of a rig whose parameters are not nominal, with everything that readings have."""
-    true = {**rig.nominal, **{name: trial * rng.uniform(-1.0, 1.0) + v for name, (v, trial) in rig.nuisance.items()}}
+    true = {
+        **rig.nominal,
+        **{name: trial * rng.uniform(-1.0, 1.0) + v for name, (v, trial) in rig.nuisance.items()},
+    }
     exact = rig.predict({**true, **values})
-    scatter = rng.standard_t(3, exact.shape) / np.sqrt(3.0) if heavy else rng.standard_normal(exact.shape)
+    scatter = (
+        rng.standard_t(3, exact.shape) / np.sqrt(3.0) if heavy else rng.standard_normal(exact.shape)
+    )
     if groups is not None:
         scatter += group_scatter * rng.standard_normal((groups.max() + 1, exact.shape[1]))[groups]
     far = rng.random(exact.shape) < outliers

@@ -45,7 +45,9 @@ def test_classes_and_what_cannot_be_tested_do_not_depend_on_what_was_read() -> N
         assert found.untestable == ("shift",)
 
 
-@pytest.mark.parametrize(("rig_name", "cause", "change"), [("two_link", "offset_2", 6.0), ("thermal", "decay", 0.4)])
+@pytest.mark.parametrize(
+    ("rig_name", "cause", "change"), [("two_link", "offset_2", 6.0), ("thermal", "decay", 0.4)]
+)
 def test_a_large_change_is_fitted_until_it_stands(rig_name: str, cause: str, change: float) -> None:
     rng = np.random.default_rng(3)
     rig = RIGS[rig_name](80, rng)
@@ -73,7 +75,9 @@ def test_nothing_is_named_where_nothing_is_wrong_but_groups_scatter() -> None:
     rig = slider_crank(90, rng)
     groups = np.arange(90) % 9
     read = readings(rig, {}, 0.05, rng, groups, group_scatter=1.0, outliers=0.03, heavy=True)
-    found = diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown, groups, permutations=FEW)
+    found = diagnose_simulation(
+        rig.predict, read, rig.suspected, rig.unknown, groups, permutations=FEW
+    )
     assert found.verdict is Verdict.NONE
     assert found.causes == ()
 
@@ -99,9 +103,15 @@ def test_an_offset_is_not_named_from_scatter_between_many_groups() -> None:
 def test_a_curve_that_no_suspect_has_is_unlisted_and_hides_in_no_suspect() -> None:
     x, rig = line(80)
     rng = np.random.default_rng(7)
-    read = rig.predict(rig.nominal) + 0.2 * np.cos(5.0 * x)[:, None] + 0.02 * rng.standard_normal((80, 1))
+    read = (
+        rig.predict(rig.nominal)
+        + 0.2 * np.cos(5.0 * x)[:, None]
+        + 0.02 * rng.standard_normal((80, 1))
+    )
     suspects = [s for s in rig.suspected if s.name != "bend"]
-    found = diagnose_simulation(rig.predict, read, [*suspects], [*rig.unknown, Suspect("bend", 0.0, 0.1)])
+    found = diagnose_simulation(
+        rig.predict, read, [*suspects], [*rig.unknown, Suspect("bend", 0.0, 0.1)]
+    )
     assert found.verdict is Verdict.UNLISTED
     assert found.causes == ()
     assert found.remainder_p <= 0.002
@@ -116,7 +126,9 @@ def test_a_cause_that_alternates_is_named_beside_an_unlisted_curve() -> None:
         return (p["level"] + p["rate"] * x + p["play"] * way)[:, None]
 
     level = [Suspect("level", 0.0, 0.1), Suspect("rate", 1.0, 0.1)]
-    found = diagnose_simulation(predict, read, [Suspect("play", 0.0, 0.01)], level, permutations=FEW)
+    found = diagnose_simulation(
+        predict, read, [Suspect("play", 0.0, 0.01)], level, permutations=FEW
+    )
     assert found.verdict is Verdict.UNLISTED
     assert [c.name for c in found.causes] == ["play"]
     assert found.causes[0].value == pytest.approx(0.05, abs=0.015)
@@ -132,7 +144,9 @@ def test_the_place_of_a_group_that_is_held_out_is_fitted_there() -> None:
 
     read = places[groups] + 1.5 * x + 0.05 * rng.standard_normal(60)
     own = [Suspect(f"place_{g}", 0.0, 1.0) for g in range(6)]
-    found = diagnose_simulation(predict, read, [Suspect("rate", 1.0, 0.1)], own, groups, permutations=FEW)
+    found = diagnose_simulation(
+        predict, read, [Suspect("rate", 1.0, 0.1)], own, groups, permutations=FEW
+    )
     assert found.gain.held_out_by == "group"
     assert found.gain.rms_before == pytest.approx(0.5 / np.sqrt(3.0), rel=0.3)
     assert found.gain.rms_after == pytest.approx(0.05, rel=0.3)
@@ -143,7 +157,9 @@ def test_what_a_declared_uncertainty_says_decides_which_readings_count() -> None
     rng = np.random.default_rng(10)
     u = np.where(x > 0.0, 0.01, 1.0)[:, None]
     read = rig.predict({**rig.nominal, "rate": 1.05}) + u * rng.standard_normal((60, 1))
-    told = diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown, reading_u=u, permutations=FEW)
+    told = diagnose_simulation(
+        rig.predict, read, rig.suspected, rig.unknown, reading_u=u, permutations=FEW
+    )
     assert {"rate", "scale"} in [{c.name, *c.aliases} for c in told.causes + told.also_possible]
 
 
@@ -152,7 +168,8 @@ def test_the_same_seed_gives_the_same_answer() -> None:
     rig = thermal(40, rng)
     read = readings(rig, {"zero_1": 0.0}, 0.3, rng)
     first, again = (
-        diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown, permutations=99, seed=5) for _ in range(2)
+        diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown, permutations=99, seed=5)
+        for _ in range(2)
     )
     assert first == again
 
@@ -187,7 +204,9 @@ def test_the_interval_of_an_offset_is_as_wide_as_the_scatter_between_groups_make
     groups = np.arange(120) % 12
     read = (6.0 + rng.standard_normal(12))[groups] + 0.1 * rng.standard_normal(120)
     suspects = [Suspect("offset", 0.0, 0.1)]
-    found = diagnose_simulation(lambda p: np.full((120, 1), p["offset"]), read, suspects, groups=groups)
+    found = diagnose_simulation(
+        lambda p: np.full((120, 1), p["offset"]), read, suspects, groups=groups
+    )
     low, high = found.causes[0].interval
     assert high - low > 2.0 / np.sqrt(12.0)
 
@@ -197,7 +216,9 @@ def test_what_is_true_in_one_group_only_helps_no_other_and_is_not_named() -> Non
     groups, x = np.arange(100) % 5, rng.uniform(-1.0, 1.0, 100)
     read = x + np.where(groups == 0, 0.3 * x, 0.0) + 0.05 * rng.standard_normal(100)
     suspects = [Suspect("rate", 1.0, 0.1)]
-    found = diagnose_simulation(lambda p: (p["rate"] * x)[:, None], read, suspects, groups=groups, permutations=FEW)
+    found = diagnose_simulation(
+        lambda p: (p["rate"] * x)[:, None], read, suspects, groups=groups, permutations=FEW
+    )
     assert found.causes == ()
 
 
@@ -207,7 +228,10 @@ def test_a_curve_that_no_suspect_has_is_not_lent_to_the_one_most_like_it() -> No
     read = 0.2 * np.sin(6.0 * x) + 0.02 * rng.standard_normal(90)
     level = [Suspect("level", 0.0, 0.1)]
     found = diagnose_simulation(
-        lambda p: (p["level"] + p["cube"] * x**3 + x)[:, None], read + x, [Suspect("cube", 0.0, 0.1)], level
+        lambda p: (p["level"] + p["cube"] * x**3 + x)[:, None],
+        read + x,
+        [Suspect("cube", 0.0, 0.1)],
+        level,
     )
     assert found.verdict is Verdict.UNLISTED
     assert found.causes == ()
@@ -233,7 +257,9 @@ def test_what_helps_no_other_group_is_not_named_however_clearly_it_stands_out() 
         groups, way = np.arange(100) % 5, rng.choice([-1.0, 1.0], 100)
         read = np.where(groups == 0, 0.2 * way, 0.0) + 0.05 * rng.standard_normal(100)
         play = [Suspect("play", 0.0, 0.1)]
-        found = diagnose_simulation(lambda p, way=way: (p["play"] * way)[:, None], read, play, groups=groups)  # type: ignore[misc]
+        found = diagnose_simulation(
+            lambda p, way=way: (p["play"] * way)[:, None], read, play, groups=groups
+        )  # type: ignore[misc]
         assert found.causes == ()
 
 
@@ -271,7 +297,12 @@ def test_groups_scatter_in_the_unit_of_the_readings_however_exact_some_of_these_
     read = (6.0 + rng.standard_normal(12))[groups][:, None] + u * rng.standard_normal((120, 1))
     offset = [Suspect("offset", 0.0, 0.1)]
     found = diagnose_simulation(
-        lambda p: np.full((120, 1), p["offset"]), read, offset, groups=groups, reading_u=u, permutations=FEW
+        lambda p: np.full((120, 1), p["offset"]),
+        read,
+        offset,
+        groups=groups,
+        reading_u=u,
+        permutations=FEW,
     )
     low, high = found.causes[0].interval
     assert high - low > 2.0 / np.sqrt(12.0)
@@ -283,12 +314,16 @@ def test_readings_far_out_are_no_pattern_although_rows_share_a_nuisance_paramete
         rng = np.random.default_rng([18, seed])
         groups, x = np.repeat(np.arange(3), 40), rng.uniform(-1.0, 1.0, 120)
 
-        def predict(p: Mapping[str, float], groups: np.ndarray = groups, x: np.ndarray = x) -> np.ndarray:
+        def predict(
+            p: Mapping[str, float], groups: np.ndarray = groups, x: np.ndarray = x
+        ) -> np.ndarray:
             return (np.array([p["a"], p["b"], p["c"]])[groups] + p["rate"] * x)[:, None]
 
         read = groups + x + rng.standard_t(2, 120)
         own = [Suspect(name, 0.0, 1.0) for name in "abc"]
-        found = diagnose_simulation(predict, read, [Suspect("rate", 1.0, 0.1)], own, groups, permutations=FEW)
+        found = diagnose_simulation(
+            predict, read, [Suspect("rate", 1.0, 0.1)], own, groups, permutations=FEW
+        )
         alarms += found.verdict is not Verdict.NONE
     assert alarms <= 1
 
@@ -314,10 +349,15 @@ A = Suspect("rate", 1.0, 0.1)
         ({"reading_u": [0.0]}, "not above 0"),
         ({"permutations": 5}, "permutations is 5"),
         ({"predict": lambda _p: np.full((8, 1), np.nan)}, "no number for 8 of 8"),
-        ({"predict": lambda p: np.zeros((8, 1)) * (1.0 if p["rate"] == 1.0 else np.nan)}, "± 0.1 of rate"),
+        (
+            {"predict": lambda p: np.zeros((8, 1)) * (1.0 if p["rate"] == 1.0 else np.nan)},
+            "± 0.1 of rate",
+        ),
     ],
 )
-def test_what_a_caller_gets_wrong_is_refused_with_words(changed: dict[str, object], says: str) -> None:
+def test_what_a_caller_gets_wrong_is_refused_with_words(
+    changed: dict[str, object], says: str
+) -> None:
     x = np.linspace(0.0, 1.0, 8)
     given: dict[str, object] = {
         "predict": lambda p: (p["rate"] * x)[:, None],

@@ -25,7 +25,9 @@ def diagnosed(rate: float, seed: int, trial: float = 0.1) -> SimulationDiagnosis
     read = straight({"level": 0.3, "rate": rate, "bend": 0.0})
     read = read + SCATTER * np.random.default_rng(seed).standard_normal(read.shape)
     suspects = [Suspect("rate", 1.0, trial), Suspect("bend", 0.0, trial)]
-    return diagnose_simulation(straight, read, suspects, [Suspect("level", 0.0, 0.1)], permutations=199)
+    return diagnose_simulation(
+        straight, read, suspects, [Suspect("level", 0.0, 0.1)], permutations=199
+    )
 
 
 def test_intervals_hold_the_true_value_nineteen_times_in_twenty() -> None:
@@ -56,7 +58,9 @@ def test_nor_does_it_decide_the_value_of_a_rival() -> None:
 
 def test_the_smallest_effect_is_found_four_times_in_five() -> None:
     smallest = np.mean([diagnosed(1.0, seed).smallest_detectable_rms for seed in range(5)])
-    said = [diagnosed(1.0 + smallest / np.sqrt(np.mean(X**2)), seed).verdict for seed in range(100, 150)]
+    said = [
+        diagnosed(1.0 + smallest / np.sqrt(np.mean(X**2)), seed).verdict for seed in range(100, 150)
+    ]
     assert 0.68 < np.mean([verdict is not Verdict.NONE for verdict in said]) < 0.92
 
 
@@ -65,7 +69,9 @@ def test_a_rival_falls_behind_by_odds_of_a_hundred() -> None:
 
 
 def test_sensitivities_are_those_in_the_middle_of_a_change() -> None:
-    runner = Runner(lambda p: np.array([[p["size"] ** 2]] * 3), np.ones((3, 1)), [Suspect("size", 1.0, 0.5)])
+    runner = Runner(
+        lambda p: np.array([[p["size"] ** 2]] * 3), np.ones((3, 1)), [Suspect("size", 1.0, 0.5)]
+    )
     found = runner.sensitivities(runner.nominal, np.ones(3), [0])
     assert found == pytest.approx(np.full((3, 1), 2.0 * 0.5))
 

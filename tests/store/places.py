@@ -19,7 +19,11 @@ from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, R
 from mlg_troubleshoot.store import Kind, Record, inspection_record, packed
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
-INSTALLED = sorted(Path("/usr/lib/postgresql").glob("*/bin")) if Path("/usr/lib/postgresql").is_dir() else []
+INSTALLED = (
+    sorted(Path("/usr/lib/postgresql").glob("*/bin"))
+    if Path("/usr/lib/postgresql").is_dir()
+    else []
+)
 
 
 def inspection(number: int = 1, clearance_in: float = 0.002) -> Inspection:
@@ -48,7 +52,9 @@ def records(first: int, last: int) -> list[Record]:
         identity = ("assessment", str(number))
         found += [
             kept,
-            Record(Kind.ASSESSMENT, kept.record_id, kept.tail_no, kept.side, kept.day, body, identity),
+            Record(
+                Kind.ASSESSMENT, kept.record_id, kept.tail_no, kept.side, kept.day, body, identity
+            ),
         ]
     return found
 
@@ -65,7 +71,9 @@ def table(folder: Path, *rows: Mapping[str, str], name: str = "table.csv") -> Pa
 
 @contextmanager
 def server() -> Iterator[str]:
-    """Start PostgreSQL on a free port of loopback; give the URL of its owner. Skipped where it is not installed."""
+    """Start PostgreSQL on a free port of loopback; give the URL of its owner. Skipped where it is
+    not installed.
+    """
     if not INSTALLED:
         pytest.skip("PostgreSQL is not installed (apt-get install postgresql)")
     pytest.importorskip("psycopg")
@@ -80,12 +88,24 @@ def server() -> Iterator[str]:
         shutil.chown(folder, user)
 
     def run(*command: object) -> None:
-        subprocess.run([str(c) for c in command], user=user, cwd=folder, check=True, stdout=subprocess.DEVNULL)
+        subprocess.run(
+            [str(c) for c in command], user=user, cwd=folder, check=True, stdout=subprocess.DEVNULL
+        )
 
     try:
         run(bin_folder / "initdb", "-D", folder / "data", "-U", "mlg", "-A", "trust", "--no-sync")
         options = f"-h 127.0.0.1 -p {port} -k {folder} -F"
-        run(bin_folder / "pg_ctl", "-D", folder / "data", "-w", "-l", folder / "log", "-o", options, "start")
+        run(
+            bin_folder / "pg_ctl",
+            "-D",
+            folder / "data",
+            "-w",
+            "-l",
+            folder / "log",
+            "-o",
+            options,
+            "start",
+        )
         try:
             yield f"postgresql+psycopg://mlg@127.0.0.1:{port}/postgres"
         finally:

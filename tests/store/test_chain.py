@@ -13,7 +13,15 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Outcome, Side
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.store import Kind, Record, Store, StoreError, inspection_from, inspection_record, same_inspection
+from mlg_troubleshoot.store import (
+    Kind,
+    Record,
+    Store,
+    StoreError,
+    inspection_from,
+    inspection_record,
+    same_inspection,
+)
 
 from . import places
 
@@ -66,14 +74,20 @@ def test_while_one_writes_no_other_begins_to(store: Store) -> None:
 
 
 def test_the_same_inspection_from_another_file_is_the_same(store: Store) -> None:
-    moved = replace(places.inspection(2), source=places.RowSource("other.xlsx", "Sheet", 9), warnings=("seen",))
+    moved = replace(
+        places.inspection(2), source=places.RowSource("other.xlsx", "Sheet", 9), warnings=("seen",)
+    )
     assert store.add([inspection_record(moved)], same_inspection).new == 0
 
 
-def test_the_same_identity_with_other_content_is_refused_and_nothing_of_the_call_is_kept(store: Store) -> None:
+def test_the_same_identity_with_other_content_is_refused_and_nothing_of_the_call_is_kept(
+    store: Store,
+) -> None:
     other = [*places.records(20, 22), inspection_record(places.inspection(3, clearance_in=0.009))]
     with pytest.raises(StoreError, match=r"R3 \(N3 LH 2026-01-04\).*nothing of this was kept"):
-        store.add(other, lambda kept, new: new.kind is not Kind.INSPECTION or same_inspection(kept, new))
+        store.add(
+            other, lambda kept, new: new.kind is not Kind.INSPECTION or same_inspection(kept, new)
+        )
     assert len(store.all()) == 10
 
 
@@ -90,7 +104,9 @@ def test_reading_makes_no_file(place: Path) -> None:
 
 
 def test_a_file_that_is_no_store_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "notes.txt").write_text("no store at all, but a long enough text to be read as one" * 30)
+    (tmp_path / "notes.txt").write_text(
+        "no store at all, but a long enough text to be read as one" * 30
+    )
     with pytest.raises(StoreError, match="not a database"):
         Store(tmp_path / "notes.txt").gears()
 
@@ -101,9 +117,16 @@ def test_a_place_that_no_store_can_be_at_is_refused(url: str) -> None:
         Store(url)
 
 
-@pytest.mark.parametrize("change", ["UPDATE mlg_records SET side = 'RH'", "DELETE FROM mlg_records"])
-def test_the_database_itself_refuses_to_change_a_record(store: Store, place: Path, change: str) -> None:
-    with sqlite3.connect(place) as raw, pytest.raises(sqlite3.IntegrityError, match="only ever added"):
+@pytest.mark.parametrize(
+    "change", ["UPDATE mlg_records SET side = 'RH'", "DELETE FROM mlg_records"]
+)
+def test_the_database_itself_refuses_to_change_a_record(
+    store: Store, place: Path, change: str
+) -> None:
+    with (
+        sqlite3.connect(place) as raw,
+        pytest.raises(sqlite3.IntegrityError, match="only ever added"),
+    ):
         raw.execute(change)
 
 
@@ -131,7 +154,9 @@ def forged(place: Path, column: str, seq: int) -> Iterator[object]:
 
 
 @pytest.mark.parametrize("column", COLUMNS)
-def test_a_changed_byte_in_any_field_is_found_and_its_record_named(store: Store, place: Path, column: str) -> None:
+def test_a_changed_byte_in_any_field_is_found_and_its_record_named(
+    store: Store, place: Path, column: str
+) -> None:
     for value in list(forged(place, column, 4)):
         with sqlite3.connect(place) as raw:
             raw.execute("DROP TRIGGER IF EXISTS mlg_no_update")
@@ -197,8 +222,12 @@ def test_a_store_of_a_newer_schema_is_refused(store: Store, place: Path) -> None
         Store(place).gears()
 
 
-@pytest.mark.parametrize("version", sorted(OLD.glob("version-*.sqlite")), ids=lambda path: path.stem)
-def test_a_store_of_each_schema_version_can_be_read_and_added_to(version: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "version", sorted(OLD.glob("version-*.sqlite")), ids=lambda path: path.stem
+)
+def test_a_store_of_each_schema_version_can_be_read_and_added_to(
+    version: Path, tmp_path: Path
+) -> None:
     copied = tmp_path / "store.sqlite"
     copied.write_bytes(version.read_bytes())
     store = Store(copied)
@@ -212,12 +241,16 @@ def test_a_repair_kept_twice_is_one(store: Store) -> None:
     assert [store.add([repair]).new for _ in range(2)] == [1, 0]
 
 
-@pytest.mark.parametrize(("written", "instead"), [('"day":"2026-01-04"', '"day":"2026-01-05"'), ("größer", "kleiner")])
+@pytest.mark.parametrize(
+    ("written", "instead"), [('"day":"2026-01-04"', '"day":"2026-01-05"'), ("größer", "kleiner")]
+)
 def test_an_export_whose_columns_or_content_alone_were_changed_is_refused(
     store: Store, tmp_path: Path, written: str, instead: str
 ) -> None:
     told = [json.dumps(part)[1:-1] if part.isalpha() else part for part in (written, instead)]
-    lines = [line.replace(*told, 1) if line.startswith('{"body"') else line for line in store.export()]
+    lines = [
+        line.replace(*told, 1) if line.startswith('{"body"') else line for line in store.export()
+    ]
     assert lines != list(store.export())
     with pytest.raises(StoreError, match="line"):
         Store(tmp_path / "other.sqlite").restore(lines, "chain")
@@ -234,7 +267,9 @@ def test_an_export_whose_columns_or_content_alone_were_changed_is_refused(
         {"carried": {}},
     ],
 )
-def test_what_was_found_otherwise_is_another_inspection_and_comes_back_so(found: dict[str, Any], place: Path) -> None:
+def test_what_was_found_otherwise_is_another_inspection_and_comes_back_so(
+    found: dict[str, Any], place: Path
+) -> None:
     kept, other = places.inspection(2), replace(places.inspection(2), **found)
     assert not same_inspection(inspection_record(kept), inspection_record(other))
     Store(place).add([inspection_record(other)])

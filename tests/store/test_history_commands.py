@@ -33,10 +33,16 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "store.sqlite"
 
 
-def visit(n: int, worn_in: float, tail: str = "N123", side: str = "LH", **more: str) -> dict[str, str]:
+def visit(
+    n: int, worn_in: float, tail: str = "N123", side: str = "LH", **more: str
+) -> dict[str, str]:
     """The n-th visit of a gear whose joint 3 reads so; 400 landings and 90 days between visits."""
     day = date(2024, 1, 10) + timedelta(days=90 * n)
-    seen = {"inspection_date": day.isoformat(), "gear_landings": str(400 * n), "clearance_3_in": f"{worn_in:.4f}"}
+    seen = {
+        "inspection_date": day.isoformat(),
+        "gear_landings": str(400 * n),
+        "clearance_3_in": f"{worn_in:.4f}",
+    }
     return row(record_id=f"{tail}-{side}-{n}", tail_no=tail, side=side, **seen, **more)
 
 
@@ -50,10 +56,20 @@ def seeded(*visits: tuple[int, float]) -> None:
     for n, worn_in in visits:
         day = date(2024, 1, 10) + timedelta(days=90 * n)
         seen = Inspection(
-            f"N123-LH-{n}", "N123", Side.LH, RADIAL, {3: worn_in}, inspection_date=day, gear_landings=400.0 * n
+            f"N123-LH-{n}",
+            "N123",
+            Side.LH,
+            RADIAL,
+            {3: worn_in},
+            inspection_date=day,
+            gear_landings=400.0 * n,
         )
         verdict, worst_in = "OUTSIDE_MARGIN" if worn_in > 0.006 else "WITHIN_MARGIN", 5.0 * worn_in
-        result = {"verdict": verdict, "joints": [{"joint": 3, "rank": 1}], "predicted_displacement_in": worst_in}
+        result = {
+            "verdict": verdict,
+            "joints": [{"joint": 3, "rank": 1}],
+            "predicted_displacement_in": worst_in,
+        }
         body = {
             "result": {**result, "margin_in": 0.03},
             "program_version": "0",
@@ -61,7 +77,9 @@ def seeded(*visits: tuple[int, float]) -> None:
             "extension": None,
         }
         found.append(inspection_record(seen))
-        found.append(replace(found[-1], kind=Kind.ASSESSMENT, packed=packed(body), identity=(f"{n}",)))
+        found.append(
+            replace(found[-1], kind=Kind.ASSESSMENT, packed=packed(body), identity=(f"{n}",))
+        )
     Store().add(found)
 
 
@@ -95,7 +113,9 @@ def test_keeping_a_file_twice_keeps_it_once(tmp_path: Path, place: Path) -> None
     assert "0 new records, 4 known" in keep(tmp_path, visit(1, 0.001), visit(2, 0.002)).err
 
 
-def test_the_same_identity_with_other_content_is_refused_with_what_to_do(tmp_path: Path, place: Path) -> None:
+def test_the_same_identity_with_other_content_is_refused_with_what_to_do(
+    tmp_path: Path, place: Path
+) -> None:
     keep(tmp_path, visit(1, 0.001))
     run = keep(tmp_path, visit(2, 0.002), visit(1, 0.005))
     assert run.code == 5
@@ -122,7 +142,18 @@ def test_two_aircraft_whose_tails_look_alike_can_be_kept_apart(tmp_path: Path, p
 
 def test_a_repair_starts_the_wear_of_its_joints_again(tmp_path: Path, place: Path) -> None:
     seeded((1, 0.003), (2, 0.006))
-    repair = ("history", "repair", "N123", "LH", "--joint", "3", "--date", "2024-08-01", "--landings", "810")
+    repair = (
+        "history",
+        "repair",
+        "N123",
+        "LH",
+        "--joint",
+        "3",
+        "--date",
+        "2024-08-01",
+        "--landings",
+        "810",
+    )
     assert mlg(*repair).code == 0
     seeded((3, 0.0008))
     told = life()
@@ -134,7 +165,18 @@ def test_a_repair_starts_the_wear_of_its_joints_again(tmp_path: Path, place: Pat
 def test_landings_left_grow_by_a_repair(tmp_path: Path, place: Path) -> None:
     keep(tmp_path, visit(0, 0.0005), visit(1, 0.0025), visit(2, 0.0045))
     before = joint_3(life("--gear", "hawker-800xp"))["landings_to_limit"]
-    mlg("history", "repair", "N123", "LH", "--joint", "3", "--date", "2024-08-01", "--landings", "801")
+    mlg(
+        "history",
+        "repair",
+        "N123",
+        "LH",
+        "--joint",
+        "3",
+        "--date",
+        "2024-08-01",
+        "--landings",
+        "801",
+    )
     after = joint_3(life("--gear", "hawker-800xp"))["landings_to_limit"]
     assert isinstance(before, dict)
     assert isinstance(after, dict)
@@ -160,7 +202,12 @@ def test_a_corrected_inspection_kept_again_is_known(tmp_path: Path, place: Path)
 
 def test_a_correction_of_another_gear_is_refused(tmp_path: Path, place: Path) -> None:
     seeded((1, 0.001))
-    run = mlg("history", "correct", "N123-LH-1", table(tmp_path, visit(1, 0.001, side="RH"), name="right.csv"))
+    run = mlg(
+        "history",
+        "correct",
+        "N123-LH-1",
+        table(tmp_path, visit(1, 0.001, side="RH"), name="right.csv"),
+    )
     assert run.code == 2
     assert "N123 RH" in run.err
 
@@ -179,17 +226,31 @@ def test_outcomes_say_how_often_the_advice_was_right(tmp_path: Path, place: Path
     assert "The advice was right in 1 of 2 outcomes" in mlg("history").out
 
 
-def test_the_hit_rate_of_the_advice_is_in_the_json_with_its_interval(tmp_path: Path, place: Path) -> None:
+def test_the_hit_rate_of_the_advice_is_in_the_json_with_its_interval(
+    tmp_path: Path, place: Path
+) -> None:
     seeded((1, 0.013))
-    assert mlg("history", "--json").json["advice"] == {"right": 0, "outcomes": 0, "p05": None, "p95": None}
+    assert mlg("history", "--json").json["advice"] == {
+        "right": 0,
+        "outcomes": 0,
+        "p05": None,
+        "p95": None,
+    }
     mlg("history", "outcome", "N123-LH-1", "--found", "worn bearing", "--joint", "3")
     # Jeffreys' interval of 1 of 1: the beta distribution of 1.5 and 0.5.
-    expected = {"right": 1, "outcomes": 1, "p05": pytest.approx(scipy.stats.beta(1.5, 0.5).ppf(0.05)), "p95": 1.0}
+    expected = {
+        "right": 1,
+        "outcomes": 1,
+        "p05": pytest.approx(scipy.stats.beta(1.5, 0.5).ppf(0.05)),
+        "p95": 1.0,
+    }
     assert mlg("history", "--json").json["advice"] == expected
     assert life()["advice"] == expected
 
 
-def test_a_life_is_shown_in_the_unit_that_the_user_reads(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_life_is_shown_in_the_unit_that_the_user_reads(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("COLUMNS", "200")
     seeded((1, 0.0100))
     shown = mlg("history", "N123", "LH", "--no-forecast", "--show", "mm").out
@@ -197,9 +258,13 @@ def test_a_life_is_shown_in_the_unit_that_the_user_reads(place: Path, monkeypatc
     assert "worst case 1.270 mm" in shown
 
 
-def test_a_re_rigging_is_an_event_of_a_life_and_the_joints_wear_on(tmp_path: Path, place: Path) -> None:
+def test_a_re_rigging_is_an_event_of_a_life_and_the_joints_wear_on(
+    tmp_path: Path, place: Path
+) -> None:
     seeded((1, 0.001), (3, 0.002))
-    assert mlg("history", "rerig", "N123", "LH", "--date", "2024-07-15", "--landings", "800").code == 0
+    assert (
+        mlg("history", "rerig", "N123", "LH", "--date", "2024-07-15", "--landings", "800").code == 0
+    )
     told = life()
     assert told["events"][-1]["kind"] == "rerig"
     assert joint_3(told)["readings"] == [[400.0, 0.001], [1200.0, 0.002]]
@@ -207,7 +272,9 @@ def test_a_re_rigging_is_an_event_of_a_life_and_the_joints_wear_on(tmp_path: Pat
     assert "re-rigged" in next(tmp_path.glob("mlg-life-*.html")).read_text(encoding="utf-8")
 
 
-def test_the_fleet_page_is_printed_on_the_paper_that_was_asked_for(tmp_path: Path, place: Path) -> None:
+def test_the_fleet_page_is_printed_on_the_paper_that_was_asked_for(
+    tmp_path: Path, place: Path
+) -> None:
     seeded((1, 0.001))
     mlg("fleet", "--no-forecast", "--report", tmp_path, "--page", "Letter")
     page = pypdf.PdfReader(tmp_path / "fleet.pdf").pages[0]
@@ -230,7 +297,9 @@ def test_an_export_is_imported_with_its_chain(tmp_path: Path, place: Path) -> No
     seeded((1, 0.001), (2, 0.002))
     mlg("history", "repair", "N123", "LH", "--joint", "3", "--date", "2024-08-01")
     assert mlg("history", "export", tmp_path / "chain.jsonl").code == 0
-    kinds = [json.loads(line)["kind"] for line in (tmp_path / "chain.jsonl").read_text().splitlines()]
+    kinds = [
+        json.loads(line)["kind"] for line in (tmp_path / "chain.jsonl").read_text().splitlines()
+    ]
     assert kinds == ["inspection", "assessment", "inspection", "assessment", "repair"]
     other = ("--store", tmp_path / "other.sqlite")
     assert mlg("history", "import", tmp_path / "chain.jsonl", *other).code == 0
@@ -261,7 +330,9 @@ def test_an_export_does_not_replace_the_store(tmp_path: Path, place: Path) -> No
         ("history", "import", "not-there.jsonl"),
     ],
 )
-def test_what_cannot_be_meant_is_refused_as_usage(tmp_path: Path, place: Path, command: tuple[str, ...]) -> None:
+def test_what_cannot_be_meant_is_refused_as_usage(
+    tmp_path: Path, place: Path, command: tuple[str, ...]
+) -> None:
     seeded((1, 0.001))
     run = mlg(*command)
     assert run.code == 2
@@ -274,8 +345,16 @@ def test_an_empty_store_says_how_to_keep(place: Path) -> None:
     assert "--keep" in run.out
 
 
-def test_the_fleet_is_the_latest_inspection_of_each_gear_worst_first(tmp_path: Path, place: Path) -> None:
-    keep(tmp_path, visit(1, 0.013), visit(2, 0.001), visit(1, 0.001, side="RH"), visit(2, 0.013, side="RH"))
+def test_the_fleet_is_the_latest_inspection_of_each_gear_worst_first(
+    tmp_path: Path, place: Path
+) -> None:
+    keep(
+        tmp_path,
+        visit(1, 0.013),
+        visit(2, 0.001),
+        visit(1, 0.001, side="RH"),
+        visit(2, 0.013, side="RH"),
+    )
     told = mlg("fleet", "--json", "--no-forecast").json
     assert [(g["tail_no"], g["side"], g["verdict"], g["record_id"]) for g in told["gears"]] == [
         ("N123", "RH", "OUTSIDE_MARGIN", "N123-RH-2"),
@@ -284,7 +363,9 @@ def test_the_fleet_is_the_latest_inspection_of_each_gear_worst_first(tmp_path: P
     assert told["gears"][0]["worst_joint"] == 3
 
 
-def test_a_fleet_without_landings_has_no_forecast_and_says_null(tmp_path: Path, place: Path) -> None:
+def test_a_fleet_without_landings_has_no_forecast_and_says_null(
+    tmp_path: Path, place: Path
+) -> None:
     keep(tmp_path, {k: v for k, v in visit(1, 0.001).items() if k != "gear_landings"})
     (gear,) = mlg("fleet", "--json").json["gears"]
     assert gear["landings_to_limit"] is None
@@ -303,14 +384,22 @@ def test_a_gear_that_wears_faster_is_due_earlier(tmp_path: Path, place: Path) ->
 
 @pytest.mark.slow
 def test_a_joint_read_over_its_limit_has_no_landings_left(tmp_path: Path, place: Path) -> None:
-    keep(tmp_path, visit(1, 0.001), visit(2, 0.001), visit(1, 0.001, side="RH"), visit(2, 0.013, side="RH"))
+    keep(
+        tmp_path,
+        visit(1, 0.001),
+        visit(2, 0.001),
+        visit(1, 0.001, side="RH"),
+        visit(2, 0.013, side="RH"),
+    )
     worst = mlg("fleet", "--json").json["gears"][0]
     assert (worst["landings_to_limit"]["p50"], worst["next_inspection_landings"]) == (0.0, 0.0)
 
 
 @pytest.mark.slow
 def test_a_missed_restoration_is_suggested(tmp_path: Path, place: Path) -> None:
-    others = [visit(n, 0.0005 + 0.001 * n + i * 0.0001, tail=f"N{i}") for i in range(8) for n in range(5)]
+    others = [
+        visit(n, 0.0005 + 0.001 * n + i * 0.0001, tail=f"N{i}") for i in range(8) for n in range(5)
+    ]
     worn = [visit(n, 0.0005 + 0.0014 * n) for n in range(5)]
     keep(tmp_path, *others, *worn, visit(5, 0.0005))
     notes = mlg("fleet").err
@@ -320,11 +409,14 @@ def test_a_missed_restoration_is_suggested(tmp_path: Path, place: Path) -> None:
 
 @pytest.mark.slow
 def test_a_restored_gear_is_not_taken_for_one_of_two_that_were_exchanged(place: Path) -> None:
-    # Of these gears the restored one departs so far from its wear that another one's inspection fits it better.
+    # Of these gears the restored one departs so far from its wear that another one's inspection
+    # fits it better.
     rng = np.random.default_rng(6)
     paces = 1.5e-6 * np.exp(0.4 * rng.standard_normal((12, 10)))
     seen = {
-        (gear, visit): np.round(0.0005 + 400.0 * (visit + 1) * paces[gear] + 0.0002 * rng.standard_normal(10), 4)
+        (gear, visit): np.round(
+            0.0005 + 400.0 * (visit + 1) * paces[gear] + 0.0002 * rng.standard_normal(10), 4
+        )
         for gear in range(12)
         for visit in range(8)
     }
@@ -352,7 +444,9 @@ def test_a_restored_gear_is_not_taken_for_one_of_two_that_were_exchanged(place: 
     assert "N0 LH and" not in notes
 
 
-def test_the_fleet_page_has_a_line_a_gear_that_links_to_its_life(tmp_path: Path, place: Path) -> None:
+def test_the_fleet_page_has_a_line_a_gear_that_links_to_its_life(
+    tmp_path: Path, place: Path
+) -> None:
     seeded((1, 0.001), (2, 0.012))
     assert mlg("fleet", "--no-forecast", "--report", tmp_path / "out").code == 0
     page = (tmp_path / "out" / "fleet.html").read_text(encoding="utf-8")
@@ -361,9 +455,22 @@ def test_the_fleet_page_has_a_line_a_gear_that_links_to_its_life(tmp_path: Path,
     assert "0.0120" in (tmp_path / "out" / linked).read_text(encoding="utf-8")
 
 
-def test_the_page_of_a_life_shows_before_and_after_with_what_was_restored(tmp_path: Path, place: Path) -> None:
+def test_the_page_of_a_life_shows_before_and_after_with_what_was_restored(
+    tmp_path: Path, place: Path
+) -> None:
     seeded((1, 0.0101))
-    mlg("history", "repair", "N123", "LH", "--joint", "3", "--date", "2024-05-01", "--landings", "500")
+    mlg(
+        "history",
+        "repair",
+        "N123",
+        "LH",
+        "--joint",
+        "3",
+        "--date",
+        "2024-05-01",
+        "--landings",
+        "500",
+    )
     seeded((2, 0.0007))
     assert mlg("history", "N123", "LH", "--no-forecast", "--report", tmp_path).code == 0
     (file,) = tmp_path.glob("*life*.html")
@@ -387,7 +494,10 @@ def own_gear(tmp_path: Path) -> Callable[[str], Path]:
 
     def write(outlook: str) -> Path:
         file = tmp_path / "gear" / "hawker-800xp.toml"
-        text, old = file.read_text(encoding="utf-8"), "horizon_landings = 20000\naccepted_chance = 0.05"
+        text, old = (
+            file.read_text(encoding="utf-8"),
+            "horizon_landings = 20000\naccepted_chance = 0.05",
+        )
         assert old in text
         file.write_text(text.replace(old, outlook), encoding="utf-8")
         return file
@@ -395,15 +505,21 @@ def own_gear(tmp_path: Path) -> Callable[[str], Path]:
     return write
 
 
-def test_a_forecast_beyond_the_horizon_of_the_gear_file_is_null(place: Path, own_gear: Callable[[str], Path]) -> None:
+def test_a_forecast_beyond_the_horizon_of_the_gear_file_is_null(
+    place: Path, own_gear: Callable[[str], Path]
+) -> None:
     seeded((1, 0.001), (2, 0.0012), (3, 0.0014))
     far = joint_3(life("--gear", "hawker-800xp"))["landings_to_limit"]
-    near = joint_3(life("--gear", str(own_gear("horizon_landings = 50\naccepted_chance = 0.05"))))["landings_to_limit"]
+    near = joint_3(life("--gear", str(own_gear("horizon_landings = 50\naccepted_chance = 0.05"))))[
+        "landings_to_limit"
+    ]
     assert far["p05"] > 50
     assert near["p95"] is None
 
 
-def test_who_accepts_a_larger_chance_inspects_later(place: Path, own_gear: Callable[[str], Path]) -> None:
+def test_who_accepts_a_larger_chance_inspects_later(
+    place: Path, own_gear: Callable[[str], Path]
+) -> None:
     seeded((1, 0.001), (2, 0.0012), (3, 0.0014))
     (usual,) = mlg("fleet", "--json").json["gears"]
     bold = own_gear("horizon_landings = 20000\naccepted_chance = 0.3")
@@ -412,7 +528,9 @@ def test_who_accepts_a_larger_chance_inspects_later(place: Path, own_gear: Calla
 
 
 def report_of(tmp_path: Path, *rows: Mapping[str, str], name: str) -> str:
-    run = mlg("check", table(tmp_path, *rows), "--keep", "--report", tmp_path / name, "--format", "html")
+    run = mlg(
+        "check", table(tmp_path, *rows), "--keep", "--report", tmp_path / name, "--format", "html"
+    )
     assert run.code in {0, 1}, run.err
     (page,) = (tmp_path / name).glob("*.html")
     return re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", page.read_text(encoding="utf-8")))
@@ -422,7 +540,16 @@ def test_the_report_of_a_gear_seen_before_shows_before_and_after_and_what_was_re
     tmp_path: Path, place: Path
 ) -> None:
     first = report_of(tmp_path, visit(1, 0.013), name="first")
-    mlg("history", "repair", "N123", "LH", "--joint", "3", "--date", visit(1, 0.0)["inspection_date"])
+    mlg(
+        "history",
+        "repair",
+        "N123",
+        "LH",
+        "--joint",
+        "3",
+        "--date",
+        visit(1, 0.0)["inspection_date"],
+    )
     then = report_of(tmp_path, visit(2, 0.001), name="then")
     assert "Before and after" not in first
     assert "Restored since the one before – #3 #1" in then

@@ -16,7 +16,15 @@ from typing import Any
 import pytest
 
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.store import Kind, Record, Store, StoreError, database, inspection_record, packed
+from mlg_troubleshoot.store import (
+    Kind,
+    Record,
+    Store,
+    StoreError,
+    database,
+    inspection_record,
+    packed,
+)
 from mlg_troubleshoot.workflows.kept import KeptGate
 from tests.cli.conftest import Run, mlg, row
 
@@ -55,14 +63,25 @@ WRONG_INSPECTIONS = {
     "an entry without a unit": with_field(entered={"3": ["4"]}),
     "a source that is none": with_field(source=["file"]),
     "remarks that are no texts": with_field(carried={"remarks": 3}),
-    "no tail": {"inspection": {k: v for k, v in SOUND.body["inspection"].items() if k != "tail_no"}},
+    "no tail": {
+        "inspection": {k: v for k, v in SOUND.body["inspection"].items() if k != "tail_no"}
+    },
 }
 OTHERS: dict[str, tuple[Kind, Any]] = {
     "a correction of nothing": (Kind.CORRECTION, with_field()),
     "an assessment without a result": (Kind.ASSESSMENT, {"verdict": "WITHIN_MARGIN"}),
-    "an assessment with a verdict that is none": (Kind.ASSESSMENT, {"result": {**NUMBER, "verdict": "FINE"}}),
-    "an assessment with joints that are none": (Kind.ASSESSMENT, {"result": {**NUMBER, "joints": [3]}}),
-    "an assessment whose advice is a text": (Kind.ASSESSMENT, {"result": {**NUMBER, "next_action": "3"}}),
+    "an assessment with a verdict that is none": (
+        Kind.ASSESSMENT,
+        {"result": {**NUMBER, "verdict": "FINE"}},
+    ),
+    "an assessment with joints that are none": (
+        Kind.ASSESSMENT,
+        {"result": {**NUMBER, "joints": [3]}},
+    ),
+    "an assessment whose advice is a text": (
+        Kind.ASSESSMENT,
+        {"result": {**NUMBER, "next_action": "3"}},
+    ),
     "a repair without joints": (Kind.REPAIR, {"landings": None}),
     "a repair of a joint that is none": (Kind.REPAIR, {"joints": [99], "landings": None}),
     "a repair of a joint that is true": (Kind.REPAIR, {"joints": [True], "landings": None}),
@@ -127,14 +146,19 @@ def test_verify_names_a_record_whose_content_cannot_be_read(place: Path, name: s
 
 
 @pytest.mark.parametrize("name", EVIL)
-def test_a_record_that_cannot_be_read_is_put_aside_by_voiding_it(tmp_path: Path, place: Path, name: str) -> None:
+def test_a_record_that_cannot_be_read_is_put_aside_by_voiding_it(
+    tmp_path: Path, place: Path, name: str
+) -> None:
     Store(place).add([evil(name)])
     digest = Store(place).all()[-1].digest
     assert mlg("history", "void", digest[:10], "--why", "not ours").code == 0
     assert mlg("history", "N1", "LH", "--no-forecast").code == 0
     assert mlg("history", "verify").code == 0
     assert mlg("history", "export", tmp_path / "chain.jsonl").code == 0
-    assert mlg("history", "import", tmp_path / "chain.jsonl", "--store", tmp_path / "new.sqlite").code == 0
+    assert (
+        mlg("history", "import", tmp_path / "chain.jsonl", "--store", tmp_path / "new.sqlite").code
+        == 0
+    )
 
 
 def test_the_record_and_its_column_are_named(place: Path) -> None:
@@ -158,7 +182,9 @@ def test_an_export_of_what_nobody_could_import_is_refused(tmp_path: Path, place:
     assert not (tmp_path / "chain.jsonl").exists()
 
 
-def test_every_kind_of_record_that_the_program_keeps_is_read_again(tmp_path: Path, place: Path) -> None:
+def test_every_kind_of_record_that_the_program_keeps_is_read_again(
+    tmp_path: Path, place: Path
+) -> None:
     table = places.table(
         tmp_path,
         row(
@@ -182,10 +208,23 @@ def test_every_kind_of_record_that_the_program_keeps_is_read_again(tmp_path: Pat
         ),
     )
     assert mlg("check", table, "--keep").code == 0
-    mlg("history", "repair", "N123", "LH", "--joint", "3", "--date", "2025-04-01", "--landings", "805")
+    mlg(
+        "history",
+        "repair",
+        "N123",
+        "LH",
+        "--joint",
+        "3",
+        "--date",
+        "2025-04-01",
+        "--landings",
+        "805",
+    )
     mlg("history", "rerig", "N123", "LH", "--date", "2025-04-02")
     mlg("history", "outcome", "W1", "--found", "race scored", "--joint", "3")
-    mlg("history", "correct", "W1", places.table(tmp_path, row(record_id="W1", gear_landings="810")))
+    mlg(
+        "history", "correct", "W1", places.table(tmp_path, row(record_id="W1", gear_landings="810"))
+    )
     mlg("history", "void", "R2", "--why", "another aircraft")
     assert {record.kind for record in Store(place).all()} == set(Kind)
     assert mlg("history", "verify").code == 0
@@ -236,7 +275,9 @@ def test_a_record_that_cannot_be_read_is_named_with_what_to_do(
 
 
 @pytest.mark.parametrize("change", BROKEN)
-def test_nothing_is_kept_on_a_chain_that_does_not_fit(tmp_path: Path, place: Path, change: str) -> None:
+def test_nothing_is_kept_on_a_chain_that_does_not_fit(
+    tmp_path: Path, place: Path, change: str
+) -> None:
     statement, values = BROKEN[change]
     tampered(place, statement, *values)
     run = mlg("check", places.table(tmp_path, row()), "--keep")
@@ -245,7 +286,9 @@ def test_nothing_is_kept_on_a_chain_that_does_not_fit(tmp_path: Path, place: Pat
 
 
 @pytest.mark.parametrize("change", BROKEN)
-def test_a_chain_that_does_not_fit_is_not_exported(tmp_path: Path, place: Path, change: str) -> None:
+def test_a_chain_that_does_not_fit_is_not_exported(
+    tmp_path: Path, place: Path, change: str
+) -> None:
     statement, values = BROKEN[change]
     tampered(place, statement, *values)
     run = mlg("history", "export", tmp_path / "chain.jsonl")
@@ -285,7 +328,9 @@ def bomb(megabytes: int) -> bytes:
     return press.compress(b'{"x":"') + spaces + press.compress(b'"}') + press.flush()
 
 
-def test_a_record_that_unpacks_to_more_than_a_megabyte_is_refused_before_it_is_unpacked(place: Path) -> None:
+def test_a_record_that_unpacks_to_more_than_a_megabyte_is_refused_before_it_is_unpacked(
+    place: Path,
+) -> None:
     Store(place).add([replace(SOUND, packed=bomb(100), identity=("bomb",))])
     run, _seconds, peak_mb = measured("history", "N1", "LH", "--no-forecast")
     assert run.code == 5
@@ -365,7 +410,9 @@ def deep(path: Path) -> None:
     path.write_text("[" * 3_000_000, encoding="utf-8")
 
 
-@pytest.mark.parametrize("written", [sparse, one_long_line, zeros_of_allowed_size, deep], ids=lambda f: f.__name__)
+@pytest.mark.parametrize(
+    "written", [sparse, one_long_line, zeros_of_allowed_size, deep], ids=lambda f: f.__name__
+)
 def test_what_is_too_large_to_import_is_refused_in_little_time_and_memory(
     tmp_path: Path, written: Callable[[Path], None]
 ) -> None:
@@ -376,7 +423,9 @@ def test_what_is_too_large_to_import_is_refused_in_little_time_and_memory(
     assert peak_mb < 300
 
 
-def test_an_import_of_too_many_records_is_refused(tmp_path: Path, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_import_of_too_many_records_is_refused(
+    tmp_path: Path, place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("mlg_troubleshoot.store.database._MOST_IMPORTED", 5)
     with pytest.raises(StoreError, match="line 6: at most 5 records"):
         Store(tmp_path / "new.sqlite").restore(Store(place).export(), "chain")
@@ -388,7 +437,9 @@ def test_a_refused_import_makes_no_store(tmp_path: Path) -> None:
     assert not (tmp_path / "new.sqlite").exists()
 
 
-def test_a_body_that_a_record_says_and_does_not_hold_is_refused(tmp_path: Path, place: Path) -> None:
+def test_a_body_that_a_record_says_and_does_not_hold_is_refused(
+    tmp_path: Path, place: Path
+) -> None:
     lines = list(Store(place).export())
     first = json.loads(lines[0])
     lines[0] = json.dumps({**first, "seq": 1.0}) + "\n"

@@ -1,4 +1,6 @@
-"""Landings and dates of one gear that disagree, and gears that are due now: what history and fleet say of them."""
+"""Landings and dates of one gear that disagree, and gears that are due now: what history and fleet
+say of them.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,12 @@ from tests.cli.conftest import mlg, row
 
 View = Callable[[], Mapping[str, Any]]
 # Landings and the readings of #3 and #5 at the yearly inspections of one gear. [1, in, in]
-YEARS = ((14, 0.0011, 0.0010), (863, 0.0016, 0.0015), (1672, 0.0022, 0.0021), (2407, 0.0120, 0.0110))
+YEARS = (
+    (14, 0.0011, 0.0010),
+    (863, 0.0016, 0.0015),
+    (1672, 0.0022, 0.0021),
+    (2407, 0.0120, 0.0110),
+)
 SLIP = {3: 240}
 QUANTILES = ("landings_to_limit", "landings_to_margin")
 
@@ -41,13 +48,22 @@ def write(path: Path, rows: Sequence[Mapping[str, str]]) -> Path:
     return path
 
 
-def years(folder: Path, landings: Mapping[int, float], *, only: Sequence[int] = range(4), name: str = "slip") -> Path:
+def years(
+    folder: Path,
+    landings: Mapping[int, float],
+    *,
+    only: Sequence[int] = range(4),
+    name: str = "slip",
+) -> Path:
     """Four yearly inspections of N507 LH, of some years, some with other landings than they had."""
     rows = []
     for n in only:
         stated, third, fifth = YEARS[n]
         read = {"clearance_3_in": f"{third:.4f}", "clearance_5_in": f"{fifth:.4f}"}
-        when = {"inspection_date": f"{2023 + n}-03-01", "gear_landings": f"{landings.get(n, stated)}"}
+        when = {
+            "inspection_date": f"{2023 + n}-03-01",
+            "gear_landings": f"{landings.get(n, stated)}",
+        }
         rows.append(row(record_id=f"S{n + 1}", tail_no="N507", side="LH", **when, **read))
     return write(folder / f"{name}.csv", rows)
 
@@ -74,19 +90,28 @@ def words_of(page: Path) -> str:
 
 def test_a_check_names_row_and_cell_of_landings_that_fall(tmp_path: Path) -> None:
     file = years(tmp_path, SLIP)
-    said = f"240 landings on 2026-03-01 (row 5 of {file}, P5, O5) disagree with 1672 landings on 2025-03-01"
+    said = (
+        f"240 landings on 2026-03-01 (row 5 of {file}, P5, O5) disagree with 1672 landings on"
+        " 2025-03-01"
+    )
     assert said in mlg("check", file).err
 
 
 def test_the_row_whose_landings_fall_carries_the_warning_in_json(tmp_path: Path) -> None:
     rows = mlg("check", years(tmp_path, SLIP), "--json").json["inspections"]
-    assert [any("landings never fall" in text for text in each["warnings"]) for each in rows] == [False] * 3 + [True]
+    assert [any("landings never fall" in text for text in each["warnings"]) for each in rows] == [
+        False
+    ] * 3 + [True]
 
 
 def test_a_date_that_runs_backwards_is_named_as_landings_are(tmp_path: Path) -> None:
     file = years(tmp_path, {})
-    file.write_text(file.read_text(encoding="utf-8").replace("2025-03-01", "2022-03-01"), encoding="utf-8")
-    assert f"1672 landings on 2022-03-01 (row 4 of {file}, P4, O4) disagree" in mlg("check", file).err
+    file.write_text(
+        file.read_text(encoding="utf-8").replace("2025-03-01", "2022-03-01"), encoding="utf-8"
+    )
+    assert (
+        f"1672 landings on 2022-03-01 (row 4 of {file}, P4, O4) disagree" in mlg("check", file).err
+    )
 
 
 def test_a_life_in_order_is_not_warned_of(tmp_path: Path) -> None:
@@ -116,7 +141,9 @@ VIEWS = pytest.mark.parametrize("view", [life, gear_of_the_fleet])
 
 
 @VIEWS
-def test_a_slip_in_the_landings_of_a_worn_gear_leaves_it_due_now(tmp_path: Path, view: View) -> None:
+def test_a_slip_in_the_landings_of_a_worn_gear_leaves_it_due_now(
+    tmp_path: Path, view: View
+) -> None:
     kept(tmp_path, SLIP)
     told = view()
     nothing = dict.fromkeys(("p05", "p50", "p95"), 0.0)
@@ -125,10 +152,14 @@ def test_a_slip_in_the_landings_of_a_worn_gear_leaves_it_due_now(tmp_path: Path,
 
 
 @VIEWS
-def test_a_slip_in_the_landings_of_a_sound_gear_gives_no_forecast(tmp_path: Path, view: View) -> None:
+def test_a_slip_in_the_landings_of_a_sound_gear_gives_no_forecast(
+    tmp_path: Path, view: View
+) -> None:
     assert mlg("check", years(tmp_path, {2: 86}, only=range(3)), "--keep").code in (0, 1)
     told = view()
-    assert [told[name] for name in (*QUANTILES, "next_inspection_landings", "due_date")] == [None] * 4
+    assert [told[name] for name in (*QUANTILES, "next_inspection_landings", "due_date")] == [
+        None
+    ] * 4
 
 
 def test_a_slip_gives_no_joint_a_forecast_but_those_over_their_limit(tmp_path: Path) -> None:
@@ -139,13 +170,21 @@ def test_a_slip_gives_no_joint_a_forecast_but_those_over_their_limit(tmp_path: P
 
 @pytest.mark.parametrize("command", [("history", "N507", "LH"), ("fleet",)])
 @pytest.mark.parametrize("form", ["screen", "json", "report"])
-def test_every_view_names_the_record_and_how_to_correct_it(tmp_path: Path, command: tuple[str, ...], form: str) -> None:
+def test_every_view_names_the_record_and_how_to_correct_it(
+    tmp_path: Path, command: tuple[str, ...], form: str
+) -> None:
     kept(tmp_path, SLIP)
     wrong = next(record.digest[:10] for record in Store().all() if record.record_id == "S4")
     if form == "report":
         mlg(*command, "--no-forecast", "--report", tmp_path / "pages")
         page = "fleet.html" if command == ("fleet",) else "mlg-life-N507-LH.html"
-        text = words_of(next(path for path in (tmp_path / "pages").glob("*.html") if path.name.startswith(page[:8])))
+        text = words_of(
+            next(
+                path
+                for path in (tmp_path / "pages").glob("*.html")
+                if path.name.startswith(page[:8])
+            )
+        )
     elif form == "json":
         (text,) = mlg(*command, "--json").json["warnings"]
     else:
@@ -170,7 +209,18 @@ def test_the_readings_of_a_life_that_contradicts_itself_stand_by_date(tmp_path: 
 
 def test_a_repair_whose_landings_contradict_the_inspections_is_named(tmp_path: Path) -> None:
     kept(tmp_path, {})
-    run = mlg("history", "repair", "N507", "LH", "--joint", "3", "--date", "2025-06-01", "--landings", "81")
+    run = mlg(
+        "history",
+        "repair",
+        "N507",
+        "LH",
+        "--joint",
+        "3",
+        "--date",
+        "2025-06-01",
+        "--landings",
+        "81",
+    )
     assert "81 landings on 2025-06-01 (repair" in run.err
     assert "mlg history void" in run.err
 
@@ -195,7 +245,13 @@ def inspection(n: int, day: str, landings: float | None, worn_in: float = 0.001)
     when = date.fromisoformat(day) if day else None
     read = dict.fromkeys(range(1, 11), worn_in)
     return Inspection(
-        f"R{n}", "N507", Side.LH, ClearanceConvention.RADIAL, read, inspection_date=when, gear_landings=landings
+        f"R{n}",
+        "N507",
+        Side.LH,
+        ClearanceConvention.RADIAL,
+        read,
+        inspection_date=when,
+        gear_landings=landings,
     )
 
 
@@ -209,7 +265,18 @@ def test_an_undated_inspection_is_placed_by_its_landings() -> None:
 def test_an_undated_inspection_between_others_does_not_repeat_what_was_restored_before() -> None:
     seen = [("2024-01-01", 100), ("2025-01-01", 900), ("", 1000), ("2025-06-01", 1200)]
     Store().add([inspection_record(inspection(n, *each)) for n, each in enumerate(seen)])
-    mlg("history", "repair", "N507", "LH", "--joint", "3", "--date", "2024-06-01", "--landings", "500")
+    mlg(
+        "history",
+        "repair",
+        "N507",
+        "LH",
+        "--joint",
+        "3",
+        "--date",
+        "2024-06-01",
+        "--landings",
+        "500",
+    )
     steps = task.side_by_side(task.life_of(Store(), "N507", "LH"))
     assert [step["restored"] for step in steps] == [[], [3], [], []]
 
@@ -232,7 +299,7 @@ def test_the_higher_landings_of_one_date_are_the_later_ones() -> None:
 def test_a_repair_that_states_no_landings_has_those_of_its_day_between_the_inspections() -> None:
     add([[inspection(1, "2024-01-01", 100.0), inspection(2, "2024-01-21", 300.0)]])
     assert mlg("history", "repair", "N507", "LH", "--joint", "3", "--date", "2024-01-06").code == 0
-    (_paths, begun) = task.wear_paths(task.life_of(Store(), "N507", "LH"), [3])[3]
+    _paths, begun = task.wear_paths(task.life_of(Store(), "N507", "LH"), [3])[3]
     assert begun == pytest.approx(150.0)
 
 
@@ -249,8 +316,14 @@ def fleet_of(gears: int, visits: int, seed: int) -> list[list[Inspection]]:
         for visit in range(visits):
             worn = worn + rng.gamma(8.0, 400.0 * pace / 8.0)
             read = {n + 1: float(value) for n, value in enumerate(np.round(worn, 4))}
-            first = inspection(visit, (date(2024, 1, 1) + timedelta(days=60 * visit)).isoformat(), 400.0 * (visit + 1))
-            own.append(replace(first, tail_no=f"N{gear}", record_id=f"{gear}-{visit}", clearance_in=read))
+            first = inspection(
+                visit,
+                (date(2024, 1, 1) + timedelta(days=60 * visit)).isoformat(),
+                400.0 * (visit + 1),
+            )
+            own.append(
+                replace(first, tail_no=f"N{gear}", record_id=f"{gear}-{visit}", clearance_in=read)
+            )
         found.append(own)
     return found
 
@@ -277,7 +350,9 @@ def views(tmp_path_factory: pytest.TempPathFactory) -> Views:
     lives = {tail: mlg("history", tail, "LH", "--json", *place).json for tail in ("N0", "N4")}
     texts = {}
     for command in (("fleet",), ("history", "N4", "LH")):
-        texts[command[0]] = re.sub(r"\s+", " ", mlg(*command, "--report", folder / command[0], *place).out)
+        texts[command[0]] = re.sub(
+            r"\s+", " ", mlg(*command, "--report", folder / command[0], *place).out
+        )
         (page,) = (folder / command[0]).glob("fleet.html" if len(command) == 1 else "*life*.html")
         texts[f"page of {command[0]}"] = words_of(page)
     return Views(lines, lives, texts)
@@ -314,20 +389,20 @@ def test_the_view_says_what_its_quantiles_are_of(views: Views, view: str) -> Non
 
 def test_without_a_date_there_is_no_date_due() -> None:
     add([[replace(each, inspection_date=None) for each in own] for own in fleet_of(2, 3, 1)])
-    (one, _two) = mlg("fleet", "--json").json["gears"]
+    one, _two = mlg("fleet", "--json").json["gears"]
     assert one["next_inspection_landings"] is not None
     assert one["due_date"] is None
 
 
 def test_gears_without_landings_stand_behind_those_that_are_due_some_day() -> None:
-    (first, *others) = fleet_of(3, 4, 1)
+    first, *others = fleet_of(3, 4, 1)
     add([[replace(each, gear_landings=None) for each in first], *others])
     lines = mlg("fleet", "--json").json["gears"]
     assert [line["next_inspection_landings"] is None for line in lines] == [False, False, True]
 
 
 def test_a_joint_that_was_never_read_takes_no_landings_from_those_that_were() -> None:
-    (first, *others) = fleet_of(3, 4, 1)
+    first, *others = fleet_of(3, 4, 1)
     add([[replace(each, clearance_in={3: each.clearance_in[3]}) for each in first], *others])
     told = mlg("history", "N0", "LH", "--json").json
     (of_joint,) = [joint["landings_to_limit"] for joint in told["joints"] if joint["readings"]]
@@ -338,12 +413,14 @@ def test_a_joint_that_was_never_read_takes_no_landings_from_those_that_were() ->
 
 
 def test_landings_are_left_to_the_margin_that_the_last_inspection_states(tmp_path: Path) -> None:
-    (first, *others) = fleet_of(3, 4, 1)
+    first, *others = fleet_of(3, 4, 1)
     left = []
     for margin_in in (None, 0.02):
         place = tmp_path / f"{margin_in}.sqlite"
         add([[replace(each, margin_in=margin_in) for each in first], *others], place)
-        left.append(mlg("history", "N0", "LH", "--json", "--store", place).json["landings_to_margin"]["p05"])
+        left.append(
+            mlg("history", "N0", "LH", "--json", "--store", place).json["landings_to_margin"]["p05"]
+        )
     assert left[1] < 0.8 * left[0]
 
 
@@ -362,7 +439,9 @@ class Steady:
 
 
 def suggested(*gears: tuple[float, float], tails: str = "AA", days: str = "11") -> list[str]:
-    """What is suggested of gears, each of its aircraft, by what joint 3 read at first and on its day of February."""
+    """What is suggested of gears, each of its aircraft, by what joint 3 read at first and on its
+    day of February.
+    """
     own = [
         [
             replace(
@@ -390,15 +469,21 @@ def test_a_reading_five_standard_deviations_tighter_is_taken_for_a_restoration_a
 
 
 @pytest.mark.parametrize(("deviations", "told"), [(2.5, 0), (3.5, 1)])
-def test_two_gears_are_exchanged_where_that_is_e_to_the_8_times_as_likely(deviations: float, told: int) -> None:
+def test_two_gears_are_exchanged_where_that_is_e_to_the_8_times_as_likely(
+    deviations: float, told: int
+) -> None:
     # On both gears together the exchange gains the square of the deviation in the log likelihood.
     apart = 0.001 * deviations
     found = suggested((0.003, 0.003 + apart), (0.003 + apart, 0.003))
     assert len([words for words in found if "were they exchanged?" in words]) == told
 
 
-@pytest.mark.parametrize(("tails", "days", "told"), [("AA", "12", 1), ("AB", "11", 1), ("AB", "12", 0)])
-def test_gears_are_exchanged_on_one_aircraft_or_on_the_sheets_of_one_day(tails: str, days: str, told: int) -> None:
+@pytest.mark.parametrize(
+    ("tails", "days", "told"), [("AA", "12", 1), ("AB", "11", 1), ("AB", "12", 0)]
+)
+def test_gears_are_exchanged_on_one_aircraft_or_on_the_sheets_of_one_day(
+    tails: str, days: str, told: int
+) -> None:
     found = suggested((0.003, 0.0065), (0.0065, 0.003), tails=tails, days=days)
     assert len([words for words in found if "were they exchanged?" in words]) == told
 
@@ -407,16 +492,26 @@ def test_gears_are_exchanged_on_one_aircraft_or_on_the_sheets_of_one_day(tails: 
 
 
 def assessment(of: Record, verdict: str, basis: str = "PREDICTED") -> Record:
-    result = {"verdict": verdict, "basis": basis, "joints": [], "predicted_displacement_in": 0.04, "margin_in": 0.03}
+    result = {
+        "verdict": verdict,
+        "basis": basis,
+        "joints": [],
+        "predicted_displacement_in": 0.04,
+        "margin_in": 0.03,
+    }
     body = {"result": result, "program_version": "0", "geometry_sha256": "0", "extension": None}
-    return replace(of, kind=Kind.ASSESSMENT, packed=packed(body), identity=(of.identity_hash.hex(),))
+    return replace(
+        of, kind=Kind.ASSESSMENT, packed=packed(body), identity=(of.identity_hash.hex(),)
+    )
 
 
 def shown(told: Mapping[str, Any]) -> list[float]:
     """Every number of landings left that a gear's line or life shows."""
     ends = [told[name] or {} for name in QUANTILES]
     ends += [joint["landings_to_limit"] or {} for joint in told.get("joints", ())]
-    return [value or 0.0 for each in ends for value in each.values()] + [told["next_inspection_landings"] or 0.0]
+    return [value or 0.0 for each in ends for value in each.values()] + [
+        told["next_inspection_landings"] or 0.0
+    ]
 
 
 def test_a_gear_that_is_due_now_shows_no_landings_left_in_200_lives() -> None:
@@ -429,7 +524,9 @@ def test_a_gear_that_is_due_now_shows_no_landings_left_in_200_lives() -> None:
         if over:
             clearances[int(rng.integers(1, 11))] = 0.0076 + 0.01 * float(rng.random())
         unknown = rng.random() < 0.2
-        own[-1] = replace(last, clearance_in=clearances, gear_landings=None if unknown else last.gear_landings)
+        own[-1] = replace(
+            last, clearance_in=clearances, gear_landings=None if unknown else last.gear_landings
+        )
         for each in own:
             records.append(inspection_record(each))
             verdict = "OUTSIDE_MARGIN" if outside and each is own[-1] else "WITHIN_MARGIN"
@@ -437,8 +534,13 @@ def test_a_gear_that_is_due_now_shows_no_landings_left_in_200_lives() -> None:
     Store().add(records)
     gear, lives = load_gear(), task.lives(Store())
     model = task.fit_fleet(list(lives.values())[:5], gear)
-    fleet = task.fleet_as_json(list(lives.values()), task.forecast(list(lives.values()), model, gear))["gears"]
-    found = [task.life_as_json(lives[key], task.forecast([lives[key]], model, gear)[key], gear) for key in lives]
+    fleet = task.fleet_as_json(
+        list(lives.values()), task.forecast(list(lives.values()), model, gear)
+    )["gears"]
+    found = [
+        task.life_as_json(lives[key], task.forecast([lives[key]], model, gear)[key], gear)
+        for key in lives
+    ]
     assert len(fleet) == len(found) == 200
     assert max(value for told in (*fleet, *found) for value in shown(told)) == 0.0
     assert {told["next_inspection_landings"] for told in (*fleet, *found)} == {0.0}
@@ -449,7 +551,9 @@ def test_a_joint_that_was_over_its_limit_before_and_is_not_read_again_still_coun
     worn = inspection(1, "2024-01-01", 400, 0.001)
     worn = replace(worn, clearance_in={**worn.clearance_in, 3: 0.012})
     later = inspection(2, "2024-06-01", 800, 0.001)
-    later = replace(later, clearance_in={n: value for n, value in later.clearance_in.items() if n != 3})
+    later = replace(
+        later, clearance_in={n: value for n, value in later.clearance_in.items() if n != 3}
+    )
     add([[worn, later]])
     assert gear_of_the_fleet()["next_inspection_landings"] == 0.0
 
@@ -457,14 +561,28 @@ def test_a_joint_that_was_over_its_limit_before_and_is_not_read_again_still_coun
 def test_a_joint_that_was_restored_is_over_its_limit_no_more() -> None:
     worn = inspection(1, "2024-01-01", 400, 0.001)
     add([[replace(worn, clearance_in={**worn.clearance_in, 3: 0.012})]])
-    mlg("history", "repair", "N507", "LH", "--joint", "3", "--date", "2024-02-01", "--landings", "410")
+    mlg(
+        "history",
+        "repair",
+        "N507",
+        "LH",
+        "--joint",
+        "3",
+        "--date",
+        "2024-02-01",
+        "--landings",
+        "410",
+    )
     assert gear_of_the_fleet()["next_inspection_landings"] > 0.0
 
 
 def test_history_says_in_words_why_a_gear_is_due_now(tmp_path: Path) -> None:
     kept(tmp_path, {})
     said = re.sub(r"\s+", " ", mlg("history", "N507", "LH").out)
-    assert "outside the margin at the last inspection, and #3, #5 over the limit when last read" in said
+    assert (
+        "outside the margin at the last inspection, and #3, #5 over the limit when last read"
+        in said
+    )
     assert "Next inspection due now" in said
 
 
@@ -473,7 +591,13 @@ def test_history_says_in_words_why_a_gear_is_due_now(tmp_path: Path) -> None:
 
 def undated_after_sound_ones(folder: Path, **undated: str) -> None:
     sound = [
-        row(record_id=f"Y{n}", tail_no="N507", side="LH", inspection_date=f"2025-0{n}-10", gear_landings=f"{300 * n}")
+        row(
+            record_id=f"Y{n}",
+            tail_no="N507",
+            side="LH",
+            inspection_date=f"2025-0{n}-10",
+            gear_landings=f"{300 * n}",
+        )
         for n in (1, 2, 3)
     ]
     worn = {f"clearance_{n}_in": "0.006" for n in range(1, 11)}
@@ -484,7 +608,9 @@ def undated_after_sound_ones(folder: Path, **undated: str) -> None:
 
 @VIEWS
 @pytest.mark.parametrize("landings", ["240", "500", "2407000", ""])
-def test_an_undated_inspection_outside_the_margin_leaves_nothing(tmp_path: Path, view: View, landings: str) -> None:
+def test_an_undated_inspection_outside_the_margin_leaves_nothing(
+    tmp_path: Path, view: View, landings: str
+) -> None:
     undated_after_sound_ones(tmp_path, gear_landings=landings)
     told = view()
     assert told["next_inspection_landings"] == 0.0
@@ -495,5 +621,10 @@ def test_a_repair_after_an_undated_inspection_takes_its_place(tmp_path: Path) ->
     said = "inspection Z has no date and may be the last one"
     assert said in " ".join(mlg("history", "N507", "LH").out.split())
     for_all = [f"--joint={n}" for n in range(1, 11)]
-    assert mlg("history", "repair", "N507", "LH", *for_all, "--date", "2025-09-01", "--landings", "950").code == 0
+    assert (
+        mlg(
+            "history", "repair", "N507", "LH", *for_all, "--date", "2025-09-01", "--landings", "950"
+        ).code
+        == 0
+    )
     assert said not in " ".join(mlg("history", "N507", "LH").out.split())

@@ -66,7 +66,9 @@ def test_a_device_or_a_folder_is_not_a_store(tmp_path: Path, where: str) -> None
     assert keep(tmp_path, where).code == 2
 
 
-def test_the_home_folder_is_found_behind_quotes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_home_folder_is_found_behind_quotes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     monkeypatch.chdir(tmp_path)
     assert keep(tmp_path, "~/store.sqlite").code == 0
@@ -108,7 +110,9 @@ def test_a_store_of_before_is_taken_and_marked_by_the_first_that_is_kept(tmp_pat
 
 @pytest.mark.parametrize("command", ["history", "keep", "verify"])
 @pytest.mark.parametrize("marked", [0, 252006674])
-def test_the_database_of_another_program_is_not_taken_as_a_store(tmp_path: Path, command: str, marked: int) -> None:
+def test_the_database_of_another_program_is_not_taken_as_a_store(
+    tmp_path: Path, command: str, marked: int
+) -> None:
     other = tmp_path / "other.sqlite"
     with sqlite3.connect(other) as raw:
         raw.execute("CREATE TABLE accounts (name TEXT)")
@@ -151,7 +155,10 @@ NO_DELETE = "CREATE TRIGGER mlg_no_delete BEFORE DELETE ON mlg_records BEGIN SEL
     ("statements", "named"),
     [
         (("DROP TRIGGER mlg_no_update",), "the trigger mlg_no_update was dropped or changed"),
-        (("DROP TRIGGER mlg_no_delete", NO_DELETE), "the trigger mlg_no_delete was dropped or changed"),
+        (
+            ("DROP TRIGGER mlg_no_delete", NO_DELETE),
+            "the trigger mlg_no_delete was dropped or changed",
+        ),
         (("CREATE TABLE accounts (name TEXT)",), "the table 'accounts' is not one of a store"),
         (("CREATE VIEW seen AS SELECT 1",), "the view 'seen' is not one of a store"),
         (
@@ -160,7 +167,9 @@ NO_DELETE = "CREATE TRIGGER mlg_no_delete BEFORE DELETE ON mlg_records BEGIN SEL
         ),
     ],
 )
-def test_what_a_store_should_have_and_has_not_is_named(place: Path, statements: tuple[str, ...], named: str) -> None:
+def test_what_a_store_should_have_and_has_not_is_named(
+    place: Path, statements: tuple[str, ...], named: str
+) -> None:
     changed(place, *statements)
     run = mlg("history", "verify", "--store", place)
     assert run.code == 1
@@ -168,8 +177,8 @@ def test_what_a_store_should_have_and_has_not_is_named(place: Path, statements: 
 
 
 ENDLESS = (
-    "CREATE VIEW mlg_records AS WITH RECURSIVE n(seq) AS (SELECT 1 UNION ALL SELECT seq + 1 FROM n) "
-    "SELECT n.seq, o.* FROM n, mlg_old AS o"
+    "CREATE VIEW mlg_records AS WITH RECURSIVE n(seq) AS (SELECT 1 UNION ALL SELECT seq + 1 FROM n)"
+    " SELECT n.seq, o.* FROM n, mlg_old AS o"
 )
 
 
@@ -236,7 +245,10 @@ def test_an_older_copy_in_place_of_the_store_is_found_by_the_hash_noted_before(p
 
 
 def test_of_a_store_that_is_gone_the_expected_hash_is_missed(tmp_path: Path) -> None:
-    assert mlg("history", "verify", "--store", tmp_path / "gone.sqlite", "--expect", "0" * 64).code == 1
+    assert (
+        mlg("history", "verify", "--store", tmp_path / "gone.sqlite", "--expect", "0" * 64).code
+        == 1
+    )
 
 
 @pytest.mark.parametrize("noted", ["", "abc", "x" * 64])
@@ -302,7 +314,9 @@ def test_a_server_that_cannot_be_reached_is_not_a_usage_error() -> None:
         Store(f"postgresql+psycopg://anna@{AWAY}", patience_s=1).gears()
 
 
-@pytest.mark.parametrize("given", ["postgresql+psycopg:/a:SECRET9@h/x", "postgresql:a:SECRET9@h/x", "a:SECRET9@h"])
+@pytest.mark.parametrize(
+    "given", ["postgresql+psycopg:/a:SECRET9@h/x", "postgresql:a:SECRET9@h/x", "a:SECRET9@h"]
+)
 def test_a_url_without_its_slashes_is_refused_and_not_shown(given: str, tmp_path: Path) -> None:
     run = mlg("check", FAILURE, "-q", "--keep", "--store", given)
     assert run.code == 2

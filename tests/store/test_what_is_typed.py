@@ -82,10 +82,23 @@ def refused(*more: object, command: tuple[str, ...] = REPAIR) -> Run:
 
 
 @pytest.mark.parametrize(
-    "day", ["20260101", "9999-12-31", "0001-01-01", "1949-12-31", "2026-02-30", "03/04/2026", "n/a", "", "4 Mar 1026"]
+    "day",
+    [
+        "20260101",
+        "9999-12-31",
+        "0001-01-01",
+        "1949-12-31",
+        "2026-02-30",
+        "03/04/2026",
+        "n/a",
+        "",
+        "4 Mar 1026",
+    ],
 )
 @pytest.mark.parametrize("command", [REPAIR, ("history", "rerig", "N1", "LH")])
-def test_a_day_that_cannot_be_meant_is_refused(place: Path, command: tuple[str, ...], day: str) -> None:
+def test_a_day_that_cannot_be_meant_is_refused(
+    place: Path, command: tuple[str, ...], day: str
+) -> None:
     assert f"--date {day!r}" in refused("--date", day, command=command).err
 
 
@@ -97,7 +110,9 @@ def test_work_can_be_dated_until_tomorrow_and_not_later(place: Path) -> None:
 
 @pytest.mark.parametrize("landings", ["inf", "-inf", "nan", "1e400", "1e308", "-1", "many", "1,5"])
 def test_landings_that_cannot_be_meant_are_refused(place: Path, landings: str) -> None:
-    assert f"--landings '{landings}'" in refused("--date", "2026-02-01", f"--landings={landings}").err
+    assert (
+        f"--landings '{landings}'" in refused("--date", "2026-02-01", f"--landings={landings}").err
+    )
 
 
 def test_landings_are_kept_as_a_number(place: Path) -> None:
@@ -136,7 +151,10 @@ def kept(folder: Path, name: str, *rows: dict[str, str]) -> str:
 
 
 ROWS = [row(record_id=f"W{n}", tail_no="N7", inspection_date="2025-03-03") for n in range(3)]
-NAMELESS = [{k: v for k, v in each.items() if k != "record_id"} | {"tail_no": f"N{n}"} for n, each in enumerate(ROWS)]
+NAMELESS = [
+    {k: v for k, v in each.items() if k != "record_id"} | {"tail_no": f"N{n}"}
+    for n, each in enumerate(ROWS)
+]
 
 
 @pytest.mark.parametrize("rows", [ROWS, NAMELESS], ids=["with ids", "with made ids"])
@@ -155,29 +173,41 @@ def test_the_same_inspections_from_two_files_of_one_call_are_kept_once(
     assert "6 new records, 6 known" in mlg("check", *files, "--keep").err
 
 
-def test_the_same_reading_written_in_another_unit_is_the_same_inspection(tmp_path: Path, place: Path) -> None:
+def test_the_same_reading_written_in_another_unit_is_the_same_inspection(
+    tmp_path: Path, place: Path
+) -> None:
     kept(tmp_path, "one.csv", ROWS[0])
     in_thou = {**ROWS[0], "clearance_3_thou": "1"}
     assert in_thou.pop("clearance_3_in") == "0.001"
     assert "0 new records, 2 known" in kept(tmp_path, "other.csv", in_thou)
 
 
-def test_another_inspection_of_the_day_in_a_file_without_ids_is_kept(tmp_path: Path, place: Path) -> None:
+def test_another_inspection_of_the_day_in_a_file_without_ids_is_kept(
+    tmp_path: Path, place: Path
+) -> None:
     kept(tmp_path, "one.csv", NAMELESS[0])
-    assert "2 new records, 0 known" in kept(tmp_path, "other.csv", {**NAMELESS[0], "clearance_3_in": "0.002"})
+    assert "2 new records, 0 known" in kept(
+        tmp_path, "other.csv", {**NAMELESS[0], "clearance_3_in": "0.002"}
+    )
 
 
-def test_the_identity_of_an_assessment_is_that_of_earlier_versions(tmp_path: Path, place: Path) -> None:
+def test_the_identity_of_an_assessment_is_that_of_earlier_versions(
+    tmp_path: Path, place: Path
+) -> None:
     kept(tmp_path, "one.csv", ROWS[0])
     inspection, assessment = Store(place).all()[-2:]
-    by = [str(assessment.body[name]) for name in ("program_version", "geometry_sha256", "extension")]
+    by = [
+        str(assessment.body[name]) for name in ("program_version", "geometry_sha256", "extension")
+    ]
     of = inspection_record(inspection_from(inspection)).identity_hash.hex()
     before = replace(assessment, identity=(of, *by, inspection.packed.hex()))
     assert Store(place).known([before.identity_hash])
 
 
 def test_bodies_and_hashes_of_records_are_those_of_earlier_versions(tmp_path: Path) -> None:
-    (tmp_path / "old.sqlite").write_bytes((Path(__file__).parent / "data" / "version-1.sqlite").read_bytes())
+    (tmp_path / "old.sqlite").write_bytes(
+        (Path(__file__).parent / "data" / "version-1.sqlite").read_bytes()
+    )
     Store(tmp_path / "new.sqlite").add(places.records(1, 4))
     old, new = (list(Store(tmp_path / f"{name}.sqlite").export()) for name in ("old", "new"))
     assert old == new

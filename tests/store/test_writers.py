@@ -25,7 +25,9 @@ def writer(place: object, first: int, last: int, *most: object) -> subprocess.Po
 
 def at_once(place: object, count: int) -> Store:
     """Let writers keep at once, each its own records and all of them the first ten."""
-    running = [writer(place, 100 * n, 100 * n + 50) for n in range(1, count)] + [writer(place, 1, 51)]
+    running = [writer(place, 100 * n, 100 * n + 50) for n in range(1, count)] + [
+        writer(place, 1, 51)
+    ]
     again = writer(place, 1, 51)
     for process in (*running, again):
         said, _ = process.communicate(timeout=500)
@@ -76,7 +78,9 @@ def test_a_writer_killed_at_any_moment_leaves_all_of_its_rows_or_none(tmp_path: 
 
 
 @pytest.mark.slow
-def test_a_server_keeps_what_eight_writers_bring_at_once_and_a_role_may_only_insert_and_read() -> None:
+def test_a_server_keeps_what_eight_writers_bring_at_once_and_a_role_may_only_insert_and_read() -> (
+    None
+):
     with places.server() as url:
         store = at_once(url, 8)
         assert store.verify() == (8 * 100, None)
@@ -92,10 +96,15 @@ def test_a_server_keeps_what_eight_writers_bring_at_once_and_a_role_may_only_ins
         assert mechanic.add(places.records(2000, 2003)).new == 6
         assert mechanic.verify() == (806, None)
         drafts = Drafts(mechanic)
-        assert [drafts.save(Draft("one", "anna", "w", False, text), ("w",)) for text in ("first", "then")] == [True] * 2
+        assert [
+            drafts.save(Draft("one", "anna", "w", False, text), ("w",))
+            for text in ("first", "then")
+        ] == [True] * 2
         assert [draft.content for draft in drafts.newest_first("anna")] == ["then"]
         with (
-            sql.create_engine(url.replace("mlg@", "mechanic@"), poolclass=sql.NullPool).begin() as other,
+            sql.create_engine(
+                url.replace("mlg@", "mechanic@"), poolclass=sql.NullPool
+            ).begin() as other,
             pytest.raises(sql.exc.ProgrammingError, match="permission denied"),
         ):
             other.exec_driver_sql("UPDATE mlg_records SET side = 'RH'")

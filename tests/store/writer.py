@@ -21,7 +21,10 @@ if __name__ == "__main__":
     print("ready", flush=True)
     try:
         store.add(
-            batch, lambda kept, new: kept.kind is new.kind and (kept.kind != "inspection" or same_inspection(kept, new))
+            batch,
+            lambda kept, new: (
+                kept.kind is new.kind and (kept.kind != "inspection" or same_inspection(kept, new))
+            ),
         )
     except StoreError as error:
         print(error.message, flush=True)

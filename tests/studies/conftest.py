@@ -1,4 +1,6 @@
-"""What the study tests share: the response of the shipped study, and functions whose indices are known."""
+"""What the study tests share: the response of the shipped study, and functions whose indices are
+known.
+"""
 
 from __future__ import annotations
 
@@ -50,13 +52,20 @@ def ishigami() -> Oracle:
 
     def function(unit: Array) -> Array:
         x = np.pi * (2.0 * unit - 1.0)
-        return np.asarray(np.sin(x[:, 0]) + 7.0 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0]))
+        return np.asarray(
+            np.sin(x[:, 0]) + 7.0 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
+        )
 
     alone = 0.1 * np.pi**4 / 5 + 0.01 * np.pi**8 / 50 + 0.5
     second = 49.0 / 8
     pair = 0.01 * np.pi**8 * 8 / 225
     whole = alone + second + pair
-    return Oracle(3, function, np.array([alone, second, 0.0]) / whole, np.array([alone + pair, second, pair]) / whole)
+    return Oracle(
+        3,
+        function,
+        np.array([alone, second, 0.0]) / whole,
+        np.array([alone + pair, second, pair]) / whole,
+    )
 
 
 @pytest.fixture(scope="session")

@@ -47,7 +47,9 @@ def test_eq_9_is_the_exact_gradient_where_no_pivot_moves(growth: Amplification) 
 def test_eq_9_is_the_size_of_the_gradient_where_the_output_turns_the_other_way(gear: Gear) -> None:
     linkage = next(model for model in gear.ensemble_models if model.rate < 0.0)
     found = amplification(gear, linkage)
-    assert np.delete(found.local_plunger, [3, 7]) == pytest.approx(np.delete(found.exact, [3, 7]), rel=1e-7)
+    assert np.delete(found.local_plunger, [3, 7]) == pytest.approx(
+        np.delete(found.exact, [3, 7]), rel=1e-7
+    )
 
 
 def test_eq_9_misses_a_moving_pivot_by_less_than_a_twentieth(growth: Amplification) -> None:
@@ -84,7 +86,9 @@ def test_shares_add_up_to_one(gear: Gear, growth: Amplification) -> None:
     assert growth.shares(growth.exact, gear.limits_in).sum() == pytest.approx(1.0)
 
 
-def test_with_largest_indices_joint_2_gets_more_than_its_sensitivity(gear: Gear, growth: Amplification) -> None:
+def test_with_largest_indices_joint_2_gets_more_than_its_sensitivity(
+    gear: Gear, growth: Amplification
+) -> None:
     by_maximum = growth.shares(growth.max_plunger, gear.limits_in)[1]
     exact = growth.shares(growth.exact, gear.limits_in)[1]
     assert by_maximum > exact + 0.05

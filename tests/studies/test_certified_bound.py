@@ -26,7 +26,9 @@ def proved(gear: Gear, model: LinkageModel) -> CertifiedBound:
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
-def test_the_bound_at_the_limits_is_reached_to_1e_6(gear: Gear, model: LinkageModel, sense: float) -> None:
+def test_the_bound_at_the_limits_is_reached_to_1e_6(
+    gear: Gear, model: LinkageModel, sense: float
+) -> None:
     found = certified_bound(model, gear.limits_in, sense)
     assert found.bound_in - found.found_in <= 1e-6
     moved = model.displacement(links_from(gear.limits_in, found.directions), None, found.stroke_in)
@@ -34,7 +36,9 @@ def test_the_bound_at_the_limits_is_reached_to_1e_6(gear: Gear, model: LinkageMo
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
-def test_the_bound_of_the_failure_case_holds_over_the_whole_stroke(gear: Gear, sense: float) -> None:
+def test_the_bound_of_the_failure_case_holds_over_the_whole_stroke(
+    gear: Gear, sense: float
+) -> None:
     found = certified_bound(gear.model, FAILURE, sense)
     assert found.bound_in - found.found_in <= 1e-6
     assert found.stroke_in == gear.model.stroke[1]

@@ -34,12 +34,18 @@ def test_a_design_in_more_joints_than_fractions_are_known_for_is_refused() -> No
 
 def test_every_replicate_has_every_level_once() -> None:
     levels = replicated_levels(3, 4, 20, np.random.default_rng(0))
-    assert np.array_equal(np.sort(levels, axis=1), np.broadcast_to(np.arange(20)[None, :, None], (4, 20, 3)))
+    assert np.array_equal(
+        np.sort(levels, axis=1), np.broadcast_to(np.arange(20)[None, :, None], (4, 20, 3))
+    )
 
 
 @pytest.mark.parametrize(("n2", "with_ccd"), [(50, False), (50, True), (0, True)])
-def test_the_samples_of_a_group_share_one_clearance_and_differ_in_the_others(n2: int, with_ccd: bool) -> None:
-    rows = first_order_design(10, 6, n2, central_composite(10) if with_ccd else None, np.random.default_rng(0))
+def test_the_samples_of_a_group_share_one_clearance_and_differ_in_the_others(
+    n2: int, with_ccd: bool
+) -> None:
+    rows = first_order_design(
+        10, 6, n2, central_composite(10) if with_ccd else None, np.random.default_rng(0)
+    )
     for variable in (0, 7):
         order = np.argsort(rows.places[:, :, variable], axis=1)
         grouped = np.take_along_axis(rows.points, order[:, :, None], axis=1)

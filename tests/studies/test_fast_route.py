@@ -29,7 +29,9 @@ def test_512_solutions_give_every_index_of_the_linkage_to_1e_3(
     assert np.abs(found.total_order - exact.total_order).max() < 1e-3
 
 
-def test_95_percent_intervals_hold_the_exact_index_as_often(on_cube: Response, exact: TensorIndices) -> None:
+def test_95_percent_intervals_hold_the_exact_index_as_often(
+    on_cube: Response, exact: TensorIndices
+) -> None:
     inside = []
     for seed in range(40):
         found, _ = chaos_indices(on_cube, 10, _rng(seed), seed)
@@ -49,7 +51,9 @@ CLIPPED: dict[str, Callable[[Response], Response]] = {
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("kind", list(CLIPPED))
-def test_a_kinked_response_does_not_fool_the_fast_route(on_cube: Response, kind: str, seed: int) -> None:
+def test_a_kinked_response_does_not_fool_the_fast_route(
+    on_cube: Response, kind: str, seed: int
+) -> None:
     found, fit = chaos_indices(CLIPPED[kind](on_cube), 10, _rng(seed), seed)
     assert fit is None
     assert np.all(np.isnan(found.first_order))
@@ -59,12 +63,16 @@ def test_a_kinked_response_does_not_fool_the_fast_route(on_cube: Response, kind:
 def test_a_kink_that_only_the_farthest_corner_shows_is_found(on_cube: Response) -> None:
     inside = on_cube(_rng(5).random((2000, 10)))
     assert inside.max() < 0.1 < float(on_cube(np.ones((1, 10)))[0])
-    _, fit = chaos_indices(lambda u: on_cube(u) + 50.0 * np.maximum(on_cube(u) - 0.1, 0.0), 10, _rng(), 0)
+    _, fit = chaos_indices(
+        lambda u: on_cube(u) + 50.0 * np.maximum(on_cube(u) - 0.1, 0.0), 10, _rng(), 0
+    )
     assert fit is None
 
 
 def test_a_ripple_that_vanishes_at_every_corner_is_found(on_cube: Response) -> None:
-    _, fit = chaos_indices(lambda u: on_cube(u) + 0.0003 * np.sin(14.0 * np.pi * u[:, 0]), 10, _rng(), 0)
+    _, fit = chaos_indices(
+        lambda u: on_cube(u) + 0.0003 * np.sin(14.0 * np.pi * u[:, 0]), 10, _rng(), 0
+    )
     assert fit is None
 
 
@@ -97,7 +105,9 @@ def test_samples_that_fail_are_counted_and_make_the_indices_undefined(on_cube: R
 
 def test_the_polynomials_are_orthonormal() -> None:
     points, weights = np.polynomial.legendre.leggauss(6)
-    grid = np.stack(np.meshgrid((points + 1) / 2, (points + 1) / 2, indexing="ij"), axis=-1).reshape(-1, 2)
+    grid = np.stack(
+        np.meshgrid((points + 1) / 2, (points + 1) / 2, indexing="ij"), axis=-1
+    ).reshape(-1, 2)
     weight = np.outer(weights, weights).ravel() / 4.0
     terms = legendre_terms(grid, total_degree(2, 4))
     assert terms.T @ (weight[:, None] * terms) == pytest.approx(np.eye(terms.shape[1]), abs=1e-12)
@@ -106,7 +116,8 @@ def test_the_polynomials_are_orthonormal() -> None:
 def test_second_order_indices_of_a_product_are_exact() -> None:
     found, _ = chaos_indices(lambda u: u[:, 0] * u[:, 1] + u[:, 2], 3, _rng(), 0)
     assert found.second_order is not None
-    # V = 7/144 for the product, of which 1/144 is its interaction, and 12/144 for the sum's last term.
+    # V = 7/144 for the product, of which 1/144 is its interaction, and 12/144 for the sum's last
+    # term.
     assert found.second_order[0, 1] == pytest.approx(1.0 / 19.0, abs=1e-9)
 
 

@@ -30,7 +30,9 @@ def test_salib_agrees(on_cube: Response, exact: TensorIndices) -> None:
 
     problem = {"num_vars": 10, "names": [f"c{i}" for i in range(10)], "bounds": [[0.0, 1.0]] * 10}
     points = sample.sample(problem, 2**12, calc_second_order=False, seed=0)
-    found = analyze.analyze(problem, on_cube(points), calc_second_order=False, num_resamples=10, seed=0)
+    found = analyze.analyze(
+        problem, on_cube(points), calc_second_order=False, num_resamples=10, seed=0
+    )
     assert found["S1"] == pytest.approx(exact.first_order, abs=1e-3)
     assert found["ST"] == pytest.approx(exact.total_order, abs=1e-3)
 
@@ -40,11 +42,15 @@ def test_salib_agrees(on_cube: Response, exact: TensorIndices) -> None:
 def test_openturns_agrees(on_cube: Response, exact: TensorIndices) -> None:
     ot = pytest.importorskip("openturns")
     inputs = ot.JointDistribution([ot.Uniform(0.0, 1.0)] * 10)
-    basis = ot.OrthogonalProductPolynomialFactory([ot.LegendreFactory()] * 10, ot.LinearEnumerateFunction(10))
+    basis = ot.OrthogonalProductPolynomialFactory(
+        [ot.LegendreFactory()] * 10, ot.LinearEnumerateFunction(10)
+    )
     sample = ot.LHSExperiment(inputs, 512).generate()
     values = ot.Sample(on_cube(np.asarray(sample))[:, None])
     algorithm = ot.LeastSquaresExpansion(sample, values, inputs, basis, 66, "QR")
     algorithm.run()
     found = ot.FunctionalChaosSobolIndices(algorithm.getResult())
     assert [found.getSobolIndex(i) for i in range(10)] == pytest.approx(exact.first_order, abs=1e-3)
-    assert [found.getSobolTotalIndex(i) for i in range(10)] == pytest.approx(exact.total_order, abs=1e-3)
+    assert [found.getSobolTotalIndex(i) for i in range(10)] == pytest.approx(
+        exact.total_order, abs=1e-3
+    )

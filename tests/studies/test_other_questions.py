@@ -43,9 +43,13 @@ def test_the_groups_are_the_links_of_the_linkage(gear: Gear) -> None:
     assert gear.link_groups == ((1,), (2,), (3, 5), (4,), (6, 7), (8,), (9, 10))
 
 
-def test_a_group_of_both_ends_of_a_link_has_the_sum_of_their_shares(gear: Gear, exact: TensorIndices) -> None:
+def test_a_group_of_both_ends_of_a_link_has_the_sum_of_their_shares(
+    gear: Gear, exact: TensorIndices
+) -> None:
     found = {group.joints: group for group in group_indices(gear, exact.closed)}
-    assert found[3, 5].closed == pytest.approx(exact.first_order[2] + exact.first_order[4], abs=1e-4)
+    assert found[3, 5].closed == pytest.approx(
+        exact.first_order[2] + exact.first_order[4], abs=1e-4
+    )
     assert found[3, 5].total >= found[3, 5].closed
 
 
@@ -56,7 +60,9 @@ def test_the_tensor_is_exact_for_ishigami_with_many_points(request: pytest.Fixtu
     assert found.total_order == pytest.approx(oracle.total_order, abs=1e-9)
 
 
-def test_three_gauss_points_are_enough_for_the_linkage(gear: Gear, response: HeldDirections) -> None:
+def test_three_gauss_points_are_enough_for_the_linkage(
+    gear: Gear, response: HeldDirections
+) -> None:
     coarse = tensor_indices(response, gear.limits_in, order=2)
     fine = tensor_indices(response, gear.limits_in, order=3)
     assert fine.first_order == pytest.approx(coarse.first_order, abs=2e-5)
@@ -70,7 +76,9 @@ def test_directions_found_anew_for_every_sample_change_the_displacement_by_less_
     assert np.abs(anew - response(clearance)).max() < 1e-5
 
 
-def test_given_data_find_the_indices_of_many_inspections(gear: Gear, response: HeldDirections) -> None:
+def test_given_data_find_the_indices_of_many_inspections(
+    gear: Gear, response: HeldDirections
+) -> None:
     rng = np.random.default_rng(0)
     clearance = gear.limits_in * rng.random((4000, 10))
     found = given_data_indices(clearance, response(clearance), rng, resamples=200)
@@ -82,7 +90,9 @@ def test_given_data_find_the_indices_of_many_inspections(gear: Gear, response: H
 def test_given_data_give_no_share_to_a_joint_without_effect() -> None:
     rng = np.random.default_rng(1)
     x = rng.random((60, 2))
-    shares = [given_data_indices(rng.random((60, 2)), x[:, 0], rng, 20).first_order for _ in range(40)]
+    shares = [
+        given_data_indices(rng.random((60, 2)), x[:, 0], rng, 20).first_order for _ in range(40)
+    ]
     assert abs(float(np.mean(shares))) < 0.02
 
 

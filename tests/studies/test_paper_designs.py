@@ -8,7 +8,12 @@ import pytest
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.indices.displacement import Response
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
-from mlg_troubleshoot.paper.replicated import PAPER_DESIGNS, PaperDesign, bias_corrected, replicated_first_order
+from mlg_troubleshoot.paper.replicated import (
+    PAPER_DESIGNS,
+    PaperDesign,
+    bias_corrected,
+    replicated_first_order,
+)
 
 from .conftest import Oracle
 
@@ -26,7 +31,9 @@ def test_corrected_indices_are_the_exact_ones_within_their_scatter(
     assert found.corrected == pytest.approx(exact.first_order, abs=0.006)
 
 
-def test_plain_indices_exceed_the_exact_ones_by_their_bias(on_cube: Response, exact: TensorIndices) -> None:
+def test_plain_indices_exceed_the_exact_ones_by_their_bias(
+    on_cube: Response, exact: TensorIndices
+) -> None:
     design = PaperDesign("lhs", 20, 1000, 0)
     found = replicated_first_order(on_cube, 10, design, 0, iterations=10)
     expected = exact.first_order + (1.0 - exact.first_order) / 20
@@ -46,15 +53,23 @@ def test_ishigamis_first_order_is_met(ishigami: Oracle) -> None:
 def test_the_change_from_lhs_to_ccd_is_below_the_scatter_of_the_papers_design(
     on_cube: Response, exact: TensorIndices
 ) -> None:
-    corners = tensor_indices(on_cube, np.ones(10), nodes=(np.array([0.0, 1.0]), np.array([0.5, 0.5])))
-    change = corners.first_order / corners.first_order.sum() - exact.first_order / exact.first_order.sum()
+    corners = tensor_indices(
+        on_cube, np.ones(10), nodes=(np.array([0.0, 1.0]), np.array([0.5, 0.5]))
+    )
+    change = (
+        corners.first_order / corners.first_order.sum()
+        - exact.first_order / exact.first_order.sum()
+    )
     found = replicated_first_order(on_cube, 10, PAPER_DESIGNS["lhs"], 0, iterations=5)
     assert change[:5].sum() > 0.0
     assert np.abs(change).max() < 0.1 * found.scatter[:5].min()
 
 
 def test_a_seed_gives_the_same_bits_again(on_cube: Response) -> None:
-    runs = [replicated_first_order(on_cube, 10, PaperDesign("lhs", 5, 50, 0), s, 2).plain for s in (3, 3, 4)]
+    runs = [
+        replicated_first_order(on_cube, 10, PaperDesign("lhs", 5, 50, 0), s, 2).plain
+        for s in (3, 3, 4)
+    ]
     assert np.array_equal(runs[0], runs[1])
     assert not np.array_equal(runs[0], runs[2])
 

@@ -47,29 +47,43 @@ def test_a_true_number_that_is_added_narrows_what_is_free(
     gear: Gear, targets: tuple[Target, ...], shifted: Reconstruction
 ) -> None:
     known = replace(
-        next(t for t in targets if t.measure == "end_rate"), low=2.0, high=2.1, tolerance="2.05 ± 0.05", search=True
+        next(t for t in targets if t.measure == "end_rate"),
+        low=2.0,
+        high=2.1,
+        tolerance="2.05 ± 0.05",
+        search=True,
     )
-    more = reconstruct(gear, (*targets, known), np.random.default_rng(0), 0, start=shifted.linkage, minutes=10.0)
+    more = reconstruct(
+        gear, (*targets, known), np.random.default_rng(0), 0, start=shifted.linkage, minutes=10.0
+    )
     assert more.meets_all
     assert more.determined > shifted.determined
 
 
-def test_a_linkage_written_as_a_member_reads_back_from_the_ensemble(gear: Gear, tmp_path: Path) -> None:
+def test_a_linkage_written_as_a_member_reads_back_from_the_ensemble(
+    gear: Gear, tmp_path: Path
+) -> None:
     for file in gear.path.parent.glob("hawker-800xp*"):
         (tmp_path / file.name).write_bytes(file.read_bytes())
     ensemble = tmp_path / "hawker-800xp-ensemble.toml"
     ensemble.write_text(
-        ensemble.read_text() + "\n" + tomli_w.dumps({"members": {"K": member_values(gear.ensemble[3])}})
+        ensemble.read_text()
+        + "\n"
+        + tomli_w.dumps({"members": {"K": member_values(gear.ensemble[3])}})
     )
     enlarged = load_gear(tmp_path / "hawker-800xp.toml")
     assert [linkage.name for linkage in enlarged.ensemble][-1] == "K"
     links = [0.001 * (-1) ** i for i in range(20)]
     again = enlarged.ensemble_models[-1].displacement(links)
-    assert float(again) == pytest.approx(float(gear.ensemble_models[3].displacement(links)), abs=1e-12)
+    assert float(again) == pytest.approx(
+        float(gear.ensemble_models[3].displacement(links)), abs=1e-12
+    )
 
 
 @pytest.mark.slow
-def test_targets_that_cannot_be_met_end_with_a_message(gear: Gear, targets: tuple[Target, ...]) -> None:
+def test_targets_that_cannot_be_met_end_with_a_message(
+    gear: Gear, targets: tuple[Target, ...]
+) -> None:
     with pytest.raises(InconclusiveDataError, match="no linkage met"):
         reconstruct(gear, targets, np.random.default_rng(0), 0, minutes=0.01)
 
@@ -77,21 +91,37 @@ def test_targets_that_cannot_be_met_end_with_a_message(gear: Gear, targets: tupl
 @pytest.mark.parametrize("width", ["0.0", "-0.1", "1e-30"])
 def test_a_target_without_a_tolerance_is_refused(gear: Gear, tmp_path: Path, width: str) -> None:
     text = targets_file(gear).read_text(encoding="utf-8")
-    (tmp_path / "t.toml").write_text(re.sub(r"tolerance = \S+", f"tolerance = {width}", text, count=1))
+    (tmp_path / "t.toml").write_text(
+        re.sub(r"tolerance = \S+", f"tolerance = {width}", text, count=1)
+    )
     with pytest.raises(GearFileError, match="tolerance: expected a number above 0"):
         load_targets(tmp_path / "t.toml")
 
 
-def test_a_target_that_moves_with_nothing_determines_nothing(gear: Gear, targets: tuple[Target, ...]) -> None:
+def test_a_target_that_moves_with_nothing_determines_nothing(
+    gear: Gear, targets: tuple[Target, ...]
+) -> None:
     case = next(t for t in targets if t.clearance_in)
-    nothing = replace(case, clearance_in=dict.fromkeys(case.clearance_in, 0.0), low=-0.001, high=0.001, search=True)
-    found = reconstruct(gear, (nothing,), np.random.default_rng(0), 0, start=gear.reference, minutes=0.0)
+    nothing = replace(
+        case,
+        clearance_in=dict.fromkeys(case.clearance_in, 0.0),
+        low=-0.001,
+        high=0.001,
+        search=True,
+    )
+    found = reconstruct(
+        gear, (nothing,), np.random.default_rng(0), 0, start=gear.reference, minutes=0.0
+    )
     assert found.determined == 0
 
 
-def test_a_file_without_numbers_to_search_is_refused(gear: Gear, targets: tuple[Target, ...]) -> None:
+def test_a_file_without_numbers_to_search_is_refused(
+    gear: Gear, targets: tuple[Target, ...]
+) -> None:
     with pytest.raises(UsageError):
-        reconstruct(gear, tuple(replace(t, search=False) for t in targets), np.random.default_rng(0), 0)
+        reconstruct(
+            gear, tuple(replace(t, search=False) for t in targets), np.random.default_rng(0), 0
+        )
 
 
 @pytest.mark.slow

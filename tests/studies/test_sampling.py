@@ -31,7 +31,9 @@ def test_analytic_indices_are_met_within_0_002(
 
 
 @pytest.mark.parametrize(("count", "quantile"), [(2, 12.7062), (5, 2.7764), (10, 2.2622)])
-def test_a_mean_has_as_many_degrees_of_freedom_as_values_but_one(count: int, quantile: float) -> None:
+def test_a_mean_has_as_many_degrees_of_freedom_as_values_but_one(
+    count: int, quantile: float
+) -> None:
     # Table of Student's distribution, 97.5 %.
     assert student_half(np.ones(1), count) == pytest.approx(quantile / np.sqrt(count), rel=1e-4)
 
@@ -50,7 +52,9 @@ def test_a_limit_of_evaluations_is_kept_and_said(on_cube: Response) -> None:
     assert "stopped at" in found.note
 
 
-def test_95_percent_intervals_hold_the_exact_index_about_as_often(on_cube: Response, exact: TensorIndices) -> None:
+def test_95_percent_intervals_hold_the_exact_index_about_as_often(
+    on_cube: Response, exact: TensorIndices
+) -> None:
     inside = total = 0
     for seed in range(12):
         found = saltelli_indices(on_cube, 10, np.random.default_rng(seed), seed, accuracy=0.02)
@@ -60,7 +64,9 @@ def test_95_percent_intervals_hold_the_exact_index_about_as_often(on_cube: Respo
     assert 0.85 <= inside / total <= 1.0
 
 
-def test_intervals_are_no_wider_than_the_errors_warrant(on_cube: Response, exact: TensorIndices) -> None:
+def test_intervals_are_no_wider_than_the_errors_warrant(
+    on_cube: Response, exact: TensorIndices
+) -> None:
     errors, widths = [], []
     for seed in range(8):
         found = saltelli_indices(on_cube, 10, np.random.default_rng(seed), seed, accuracy=0.02)
@@ -71,7 +77,9 @@ def test_intervals_are_no_wider_than_the_errors_warrant(on_cube: Response, exact
 
 def test_with_random_directions_each_joint_counts_with_its_direction(gear: Gear) -> None:
     cube = with_random_directions(gear.model, Inputs(gear.limits_in))
-    found = saltelli_indices(cube, 20, np.random.default_rng(0), 0, accuracy=0.01, groups=joint_groups(10))
+    found = saltelli_indices(
+        cube, 20, np.random.default_rng(0), 0, accuracy=0.01, groups=joint_groups(10)
+    )
     linear = gear.model.plunger_amplification() ** 2
     assert found.first_order == pytest.approx(linear / linear.sum(), abs=0.01)
 
@@ -94,7 +102,12 @@ def test_progress_is_told_and_an_interruption_leaves_what_is_done(on_cube: Respo
         return on_cube(unit)
 
     found = saltelli_indices(
-        interrupted, 10, np.random.default_rng(0), 0, 1e-9, progress=lambda done, width: calls.append((done, width))
+        interrupted,
+        10,
+        np.random.default_rng(0),
+        0,
+        1e-9,
+        progress=lambda done, width: calls.append((done, width)),
     )
     assert "interrupted" in found.note
     assert np.all(np.isfinite(found.first_order))

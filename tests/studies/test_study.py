@@ -11,14 +11,18 @@ from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.paper.study import Design, Directions, StudyOptions, run_study
 
 
-def test_the_fast_study_agrees_with_the_shipped_table_on_every_joint(gear: Gear, table: IndexTable) -> None:
+def test_the_fast_study_agrees_with_the_shipped_table_on_every_joint(
+    gear: Gear, table: IndexTable
+) -> None:
     found = run_study(gear, StudyOptions())
     assert found.table.first_order == pytest.approx(table.first_order, abs=1e-3)
     assert found.table.total_order == pytest.approx(table.total_order, abs=1e-3)
 
 
 def test_a_seed_gives_the_same_table_again(gear: Gear) -> None:
-    assert run_study(gear, StudyOptions(seed=3)).table == run_study(gear, StudyOptions(seed=3)).table
+    assert (
+        run_study(gear, StudyOptions(seed=3)).table == run_study(gear, StudyOptions(seed=3)).table
+    )
     first, other = (run_study(gear, StudyOptions(seed=seed)).table.first_order for seed in (3, 0))
     assert not np.array_equal(first, other)
 

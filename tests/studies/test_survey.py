@@ -20,8 +20,12 @@ FOUR_BAR = Path(__file__).parents[1] / "geometry" / "data" / "four-bar.toml"
 CRANK, COUPLER, ROCKER, GROUND, TURN, LATER = 2.1, 7.15, 9.1, 6.05, np.radians(12.0), 0.4
 
 
-def four_bar_distances(lengths: Sequence[float], turn: float) -> dict[tuple[str, str, float | None], float]:
-    """Pin distances of a four-bar linkage by complex numbers: the ground lies at -turn from the crank."""
+def four_bar_distances(
+    lengths: Sequence[float], turn: float
+) -> dict[tuple[str, str, float | None], float]:
+    """Pin distances of a four-bar linkage by complex numbers: the ground lies at -turn from the
+    crank.
+    """
     crank, coupler, rocker, ground = lengths
     found: dict[tuple[str, str, float | None], float] = {}
     for extension in (None, LATER):
@@ -30,15 +34,20 @@ def four_bar_distances(lengths: Sequence[float], turn: float) -> dict[tuple[str,
         along = (coupler**2 - rocker**2 + apart**2) / (2 * apart)
         b = a + (o4 - a) / apart * (along + 1j * np.sqrt(coupler**2 - along**2))
         for (p, one), (q, other) in (
-            (("O2", 0), ("A", a)), (("A", a), ("B", b)), (("O4", o4), ("B", b)),
-            (("O2", 0), ("O4", o4)), (("O4", o4), ("A", a)), (("O2", 0), ("B", b)),
-        ):  # fmt: skip
+            (("O2", 0), ("A", a)),
+            (("A", a), ("B", b)),
+            (("O4", o4), ("B", b)),
+            (("O2", 0), ("O4", o4)),
+            (("O4", o4), ("A", a)),
+            (("O2", 0), ("B", b)),
+        ):
             found[p, q, extension] = abs(one - other)
     return found
 
 
 def index_of(numbers: Sequence[float] | np.ndarray) -> float:
-    """The rocker's turn by the coupler's stretch, 30 degrees of crank on, where the stroke of the gear file ends.
+    """The rocker's turn by the coupler's stretch, 30 degrees of crank on, where the stroke of the
+    gear file ends.
 
     It is one over rocker length times the sine of the transmission angle.
     """
@@ -51,11 +60,18 @@ def index_of(numbers: Sequence[float] | np.ndarray) -> float:
 def readings_of(places: Sequence[tuple[str, str, float | None]], u: float) -> tuple[Reading, ...]:
     values = four_bar_distances((CRANK, COUPLER, ROCKER, GROUND), TURN)
     return tuple(
-        Reading(Kind.DISTANCE, *place[:2], values[place], u, place[2], row) for row, place in enumerate(places, start=2)
+        Reading(Kind.DISTANCE, *place[:2], values[place], u, place[2], row)
+        for row, place in enumerate(places, start=2)
     )
 
 
-LENGTHS = (("O2", "A", None), ("A", "B", None), ("O4", "B", None), ("O2", "O4", None), ("O4", "A", None))
+LENGTHS = (
+    ("O2", "A", None),
+    ("A", "B", None),
+    ("O4", "B", None),
+    ("O2", "O4", None),
+    ("O4", "A", None),
+)
 BRACED = (*LENGTHS, ("O2", "B", None), ("O4", "A", LATER))
 
 
@@ -69,14 +85,20 @@ def braced(four_bar: Gear) -> Survey:
     return fit(four_bar, readings_of(BRACED, 2e-3), np.random.default_rng(0))
 
 
-def test_the_four_bar_has_the_amplification_that_its_measured_lengths_give_in_closed_form(braced: Survey) -> None:
+def test_the_four_bar_has_the_amplification_that_its_measured_lengths_give_in_closed_form(
+    braced: Survey,
+) -> None:
     amplification = braced.linkage.amplification(braced.modes[0].vector[None])[0]
-    assert amplification[1:3] == pytest.approx(index_of((CRANK, COUPLER, ROCKER, GROUND, TURN)), rel=1e-4)
+    assert amplification[1:3] == pytest.approx(
+        index_of((CRANK, COUPLER, ROCKER, GROUND, TURN)), rel=1e-4
+    )
     assert braced.misfits == ()
     assert len({m.sides for m in braced.modes}) == 1
 
 
-def test_the_posterior_of_the_four_bar_is_the_closed_forms_propagated_uncertainty(braced: Survey) -> None:
+def test_the_posterior_of_the_four_bar_is_the_closed_forms_propagated_uncertainty(
+    braced: Survey,
+) -> None:
     numbers = np.array([CRANK, COUPLER, ROCKER, GROUND, TURN])
 
     def readings(x: np.ndarray) -> np.ndarray:
@@ -84,15 +106,24 @@ def test_the_posterior_of_the_four_bar_is_the_closed_forms_propagated_uncertaint
         return np.array([values[place] for place in BRACED])
 
     steps = 1e-6 * np.eye(5)
-    slopes = np.array([(readings(numbers + h) - readings(numbers - h)) / 2e-6 for h in steps]).T / 2e-3
+    slopes = (
+        np.array([(readings(numbers + h) - readings(numbers - h)) / 2e-6 for h in steps]).T / 2e-3
+    )
     wanted = np.array([(index_of(numbers + h) - index_of(numbers - h)) / 2e-6 for h in steps])
     expected = float(np.sqrt(wanted @ np.linalg.inv(slopes.T @ slopes) @ wanted))
-    assert float(np.std(braced.linkage.amplification(braced.draws)[:, 1])) == pytest.approx(expected, rel=0.15)
+    assert float(np.std(braced.linkage.amplification(braced.draws)[:, 1])) == pytest.approx(
+        expected, rel=0.15
+    )
 
 
 def test_a_fit_tells_how_far_it_is(four_bar: Gear) -> None:
     told: list[tuple[int, int]] = []
-    fit(four_bar, readings_of(LENGTHS, 2e-3), np.random.default_rng(0), lambda *done: told.append(done))
+    fit(
+        four_bar,
+        readings_of(LENGTHS, 2e-3),
+        np.random.default_rng(0),
+        lambda *done: told.append(done),
+    )
     assert told == sorted(told)
     assert told[0][0] == 0
     assert told[-1][0] == told[-1][1]
@@ -100,14 +131,19 @@ def test_a_fit_tells_how_far_it_is(four_bar: Gear) -> None:
 
 def test_lengths_alone_leave_both_sides_of_a_joint_and_of_the_crank(four_bar: Gear) -> None:
     found = fit(four_bar, readings_of(LENGTHS, 2e-3), np.random.default_rng(0))
-    shares = {s: sum(m.weight for m in found.modes if m.sides == s) for s in {m.sides for m in found.modes}}
+    shares = {
+        s: sum(m.weight for m in found.modes if m.sides == s)
+        for s in {m.sides for m in found.modes}
+    }
     assert set(shares) == {(1, 1), (1, -1), (-1, 1), (-1, -1)}
     assert min(shares.values()) > 0.1
 
 
 def test_two_readings_of_one_distance_that_differ_are_named_together(four_bar: Gear) -> None:
     readings = readings_of(LENGTHS, 0.01)
-    found = fit(four_bar, (*readings, replace(readings[1], value=7.5, row=7)), np.random.default_rng(0))
+    found = fit(
+        four_bar, (*readings, replace(readings[1], value=7.5, row=7)), np.random.default_rng(0)
+    )
     assert found.contradicts
     assert {m.reading.row for m in found.misfits} == {3, 7}
     assert {m.group for m in found.misfits} == {(3, 7)}
@@ -128,7 +164,8 @@ def test_swapped_readings_are_named_as_swapped_and_do_not_bend_the_linkage(four_
 
 def test_distances_that_no_triangle_has_are_named_together(four_bar: Gear) -> None:
     readings = list(readings_of(LENGTHS, 0.01))
-    # Ground less crank is 3.95 in: no two of the three readings say which is a tenth too long or too short.
+    # Ground less crank is 3.95 in: no two of the three readings say which is a tenth too long or
+    # too short.
     readings[4] = replace(readings[4], value=3.8)
     found = fit(four_bar, tuple(readings), np.random.default_rng(0))
     assert found.contradicts
@@ -136,16 +173,24 @@ def test_distances_that_no_triangle_has_are_named_together(four_bar: Gear) -> No
 
 
 SLIDER_CRANK = FOUR_BAR.with_name("slider-crank.toml")
-# Crank, rod, offset of the slider's axis below the crank's pivot, turn of the crank from that axis at the reference.
+# Crank, rod, offset of the slider's axis below the crank's pivot, turn of the crank from that axis
+# at the reference.
 SLIDER = (2.1, 5.2, 1.1, 0.05)
 
 
-def slider_readings(numbers: Sequence[float] | np.ndarray) -> dict[tuple[Kind, str, str, float | None], float]:
-    """Distances, and positions of the slider from its place at the reference, by the textbook formula."""
+def slider_readings(
+    numbers: Sequence[float] | np.ndarray,
+) -> dict[tuple[Kind, str, str, float | None], float]:
+    """Distances, and positions of the slider from its place at the reference, by the textbook
+    formula.
+    """
     crank, rod, offset, turn = numbers
 
     def place(angle: float) -> float:
-        return float(crank * np.cos(turn + angle) + np.sqrt(rod**2 - (crank * np.sin(turn + angle) + offset) ** 2))
+        return float(
+            crank * np.cos(turn + angle)
+            + np.sqrt(rod**2 - (crank * np.sin(turn + angle) + offset) ** 2)
+        )
 
     found: dict[tuple[Kind, str, str, float | None], float] = {
         (Kind.DISTANCE, "O2", "A", None): float(crank),
@@ -158,7 +203,9 @@ def slider_readings(numbers: Sequence[float] | np.ndarray) -> dict[tuple[Kind, s
 
 
 def secant(numbers: Sequence[float] | np.ndarray) -> float:
-    """Amplification of a slider-crank at the end of its stroke, one radian: secant of the rod to the axis."""
+    """Amplification of a slider-crank at the end of its stroke, one radian: secant of the rod to
+    the axis.
+    """
     crank, rod, offset, turn = numbers
     return float(1.0 / np.sqrt(1.0 - ((crank * np.sin(turn + 1.0) + offset) / rod) ** 2))
 
@@ -174,7 +221,9 @@ def test_the_slider_crank_has_the_amplification_and_the_uncertainty_of_its_close
     index = found.linkage.amplification(found.draws)[:, 0]
     best = found.linkage.amplification(found.modes[0].vector[None])[0]
     steps = 1e-6 * np.eye(4)
-    ends = [[np.array(list(slider_readings(SLIDER + s * h).values())) for s in (1, -1)] for h in steps]
+    ends = [
+        [np.array(list(slider_readings(SLIDER + s * h).values())) for s in (1, -1)] for h in steps
+    ]
     slopes = np.array([(a - b) / 2e-6 for a, b in ends]).T / [[u[key[0]]] for key in values]
     wanted = np.array([(secant(SLIDER + h) - secant(SLIDER - h)) / 2e-6 for h in steps])
     assert found.misfits == ()
@@ -203,16 +252,27 @@ def truth(gear: Gear) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def read(gear: Gear, truth: np.ndarray, plan: tuple[tuple[Reading, bool], ...]) -> tuple[Reading, ...]:
+def read(
+    gear: Gear, truth: np.ndarray, plan: tuple[tuple[Reading, bool], ...]
+) -> tuple[Reading, ...]:
     """A full survey of a linkage, with the noise that it states."""
     linkage, rng = SurveyedLinkage(gear), np.random.default_rng(3)
     reach = truth[linkage.names.index("extension")] / gear.reference.stroke[1]
-    rows = tuple(replace(r, extension=None if r.extension is None else r.extension * reach) for r, _ in plan)
-    values = linkage.predicted(rows, truth[None])[0] + rng.standard_normal(len(rows)) * [r.u for r in rows]
-    return tuple(replace(r, value=float(v), row=i) for i, (r, v) in enumerate(zip(rows, values, strict=True), start=2))
+    rows = tuple(
+        replace(r, extension=None if r.extension is None else r.extension * reach) for r, _ in plan
+    )
+    values = linkage.predicted(rows, truth[None])[0] + rng.standard_normal(len(rows)) * [
+        r.u for r in rows
+    ]
+    return tuple(
+        replace(r, value=float(v), row=i)
+        for i, (r, v) in enumerate(zip(rows, values, strict=True), start=2)
+    )
 
 
-def test_a_fit_that_is_held_up_is_freed_by_fitting_again_from_around_it(gear: Gear, read: tuple[Reading, ...]) -> None:
+def test_a_fit_that_is_held_up_is_freed_by_fitting_again_from_around_it(
+    gear: Gear, read: tuple[Reading, ...]
+) -> None:
     linkage = SurveyedLinkage(gear)
     prior = Prior(linkage)
     fitting = Fitting(linkage, prior, read)
@@ -224,7 +284,9 @@ def test_a_fit_that_is_held_up_is_freed_by_fitting_again_from_around_it(gear: Ge
 
 
 @pytest.fixture(scope="module")
-def slipped(gear: Gear, read: tuple[Reading, ...], plan: tuple[tuple[Reading, bool], ...]) -> tuple[Survey, int]:
+def slipped(
+    gear: Gear, read: tuple[Reading, ...], plan: tuple[tuple[Reading, bool], ...]
+) -> tuple[Survey, int]:
     """A full survey in which one distance was read in millimetres and entered as inches."""
     place = next(i for i, (r, checked) in enumerate(plan) if checked and r.kind is Kind.DISTANCE)
     slip = replace(read[place], value=read[place].value * 25.4)
@@ -269,7 +331,9 @@ def test_a_swapped_pair_in_a_full_survey_is_named_and_nothing_else(
     }
 
 
-def test_the_intervals_hold_the_true_indices_and_are_narrow(slipped: tuple[Survey, int], truth: np.ndarray) -> None:
+def test_the_intervals_hold_the_true_indices_and_are_narrow(
+    slipped: tuple[Survey, int], truth: np.ndarray
+) -> None:
     found, _ = slipped
     low, high = np.quantile(found.linkage.amplification(found.draws), [0.05, 0.95], axis=0)
     true = found.linkage.amplification(truth[None])[0]
@@ -283,7 +347,9 @@ def test_every_draw_moves_over_the_whole_stroke(slipped: tuple[Survey, int]) -> 
     assert found.linkage.closes(found.draws).all()
 
 
-def test_a_few_readings_leave_many_linkages_all_of_which_move(gear: Gear, read: tuple[Reading, ...]) -> None:
+def test_a_few_readings_leave_many_linkages_all_of_which_move(
+    gear: Gear, read: tuple[Reading, ...]
+) -> None:
     found = fit(gear, read[:7], np.random.default_rng(1))
     assert found.misfits == ()
     assert len(found.draws) > 60
@@ -314,7 +380,12 @@ def test_the_template_reads_what_narrows_the_indices_and_says_what_nothing_check
     plan: tuple[tuple[Reading, bool], ...],
 ) -> None:
     kinds = [r.kind for r, _ in plan]
-    assert [kinds.count(k) for k in (Kind.DISTANCE, Kind.ANGLE, Kind.EXTENSION, Kind.PLUNGER)] == [24, 3, 1, 9]
+    assert [kinds.count(k) for k in (Kind.DISTANCE, Kind.ANGLE, Kind.EXTENSION, Kind.PLUNGER)] == [
+        24,
+        3,
+        1,
+        9,
+    ]
     assert len({r.what for r, _ in plan}) == len(plan)
     assert {checked for _, checked in plan} == {True, False}
 
@@ -322,7 +393,9 @@ def test_the_template_reads_what_narrows_the_indices_and_says_what_nothing_check
 def test_the_next_reading_is_the_one_that_tells_most(four_bar: Gear) -> None:
     linkage = SurveyedLinkage(four_bar)
     rng = np.random.default_rng(0)
-    drawn = linkage.vector(four_bar.reference) + 0.1 * rng.standard_normal((300, len(linkage.names)))
+    drawn = linkage.vector(four_bar.reference) + 0.1 * rng.standard_normal(
+        (300, len(linkage.names))
+    )
     length = linkage.predicted((Reading(Kind.DISTANCE, "A", "B"),), drawn)
     found = suggested(linkage, drawn, length, ())
     assert found is not None
@@ -337,10 +410,16 @@ def test_following_the_next_reading_from_an_empty_survey_tells_more_than_the_tem
     root = Prior(linkage).root
 
     def left_open(readings: tuple[Reading, ...]) -> float:
-        """Variances of the logarithms of the indices, added, by the linear estimate at the true linkage."""
-        slopes = linkage.slopes(readings, truth[None])[1][0] / np.array([[r.u] for r in readings]) @ root
+        """Variances of the logarithms of the indices, added, by the linear estimate at the true
+        linkage.
+        """
+        slopes = (
+            linkage.slopes(readings, truth[None])[1][0] / np.array([[r.u] for r in readings]) @ root
+        )
         wanted = linkage.log_slopes(truth[None])[0] @ root
-        return float(np.trace(wanted @ np.linalg.inv(np.eye(len(root)) + slopes.T @ slopes) @ wanted.T))
+        return float(
+            np.trace(wanted @ np.linalg.inv(np.eye(len(root)) + slopes.T @ slopes) @ wanted.T)
+        )
 
     asked: tuple[Reading, ...] = ()
     while len(asked) < 12:

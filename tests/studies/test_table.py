@@ -11,7 +11,13 @@ import pytest
 
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.index_table import IndexTable, load_index_table, rank_ranges, ranks, write_index_table
+from mlg_troubleshoot.indices.index_table import (
+    IndexTable,
+    load_index_table,
+    rank_ranges,
+    ranks,
+    write_index_table,
+)
 from mlg_troubleshoot.paper.study import Design, StudyOptions, run_study
 
 

@@ -21,12 +21,16 @@ def study(gear: Gear, response: HeldDirections) -> BlockStudy:
     return BlockStudy(response, Inputs(gear.limits_in), gear.geometry_sha256, 5, 8, 120, 2)
 
 
-def test_the_papers_study_has_a_thousand_million_solutions(gear: Gear, response: HeldDirections) -> None:
+def test_the_papers_study_has_a_thousand_million_solutions(
+    gear: Gear, response: HeldDirections
+) -> None:
     paper = BlockStudy(response, Inputs(gear.limits_in), gear.geometry_sha256, 0)
     assert paper.evaluations == 10 * 100 * 1000 * (100 * 10 + 1)
 
 
-def test_total_order_indices_are_the_exact_ones(gear: Gear, response: HeldDirections, exact: TensorIndices) -> None:
+def test_total_order_indices_are_the_exact_ones(
+    gear: Gear, response: HeldDirections, exact: TensorIndices
+) -> None:
     study = BlockStudy(response, Inputs(gear.limits_in), gear.geometry_sha256, 0, 20, 300, 3)
     found = total_order_study(study)
     assert found.total_order == pytest.approx(exact.total_order, abs=0.01)
@@ -53,11 +57,15 @@ def test_a_resumed_study_does_not_compute_finished_blocks_again(
 ) -> None:
     state = tmp_path / "state.jsonl"
     total_order_study(study, state=state)
-    monkeypatch.setattr("mlg_troubleshoot.paper.blocks.compute_block", lambda *_: pytest.fail("computed again"))
+    monkeypatch.setattr(
+        "mlg_troubleshoot.paper.blocks.compute_block", lambda *_: pytest.fail("computed again")
+    )
     assert total_order_study(study, state=state).iterations == study.iterations
 
 
-def test_a_line_cut_off_by_an_interruption_costs_its_block_only(study: BlockStudy, tmp_path: Path) -> None:
+def test_a_line_cut_off_by_an_interruption_costs_its_block_only(
+    study: BlockStudy, tmp_path: Path
+) -> None:
     state = tmp_path / "state.jsonl"
     whole = total_order_study(study, state=state)
     state.write_text(state.read_text()[:-40])
@@ -77,7 +85,9 @@ def test_a_state_file_of_another_study_is_refused(
 
 
 def test_two_workers_give_the_same_bits_as_one(study: BlockStudy) -> None:
-    assert np.array_equal(total_order_study(study, workers=2).total_order, total_order_study(study).total_order)
+    assert np.array_equal(
+        total_order_study(study, workers=2).total_order, total_order_study(study).total_order
+    )
 
 
 def test_solutions_that_do_not_close_are_counted(gear: Gear, response: HeldDirections) -> None:
@@ -98,7 +108,9 @@ def test_a_block_depends_on_nothing_but_its_study_and_number(study: BlockStudy) 
 def test_a_dask_cluster_of_two_processes_gives_the_same_bits(study: BlockStudy) -> None:
     distributed = pytest.importorskip("distributed")
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as cluster,
         distributed.Client(cluster.scheduler_address) as client,
     ):
         assert len(client.scheduler_info()["workers"]) == 2

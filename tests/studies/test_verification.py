@@ -38,7 +38,9 @@ def test_the_failure_case_gives_the_printed_displacement(rows: tuple[Computed, .
     assert rows[0].status == "fitted"
 
 
-def test_the_size_of_the_interactions_is_reported_as_not_reproduced(rows: tuple[Computed, ...]) -> None:
+def test_the_size_of_the_interactions_is_reported_as_not_reproduced(
+    rows: tuple[Computed, ...],
+) -> None:
     assert rows[-1].status == "not reproduced"
     assert rows[-1].computed < 1e-3
 

@@ -13,7 +13,9 @@ Array = NDArray[np.float64]
 
 
 def series(name: str, unit: str, usage: str, value: str) -> dict[str, Array]:
-    """Readings (usage, value) by unit; the test that asks is skipped where the file is not there."""
+    """Readings (usage, value) by unit; the test that asks is skipped where the file is not
+    there.
+    """
     beside = [parent / "shared" / "real" / name for parent in Path(__file__).resolve().parents]
     found = next((path for path in beside if path.is_file()), None)
     if found is None:

@@ -31,11 +31,14 @@ def parameters(**changed: float) -> Draws:
         "power": 1.3,
         "kept": 0.6,
     }
-    return Draws(np.array([[False]]), **{name: np.array([[v]]) for name, v in (values | changed).items()})
+    return Draws(
+        np.array([[False]]), **{name: np.array([[v]]) for name, v in (values | changed).items()}
+    )
 
 
 def dense(increment_sd: float, wander_sd: float) -> float:
-    """Log density of the readings written down as one normal vector, both paths of the unit together.
+    """Log density of the readings written down as one normal vector, both paths of the unit
+    together.
 
     To the error of a reading the filter adds a thousandth of the whole rise.
     """
@@ -48,12 +51,16 @@ def dense(increment_sd: float, wander_sd: float) -> float:
     return float(stats.multivariate_normal(0.1 + 0.9 * c, cov).logpdf(READ))
 
 
-@pytest.mark.parametrize(("increment_sd", "wander_sd"), [(0.4, 0.0), (0.0, 0.7)], ids=["wiener", "integrated"])
+@pytest.mark.parametrize(
+    ("increment_sd", "wander_sd"), [(0.4, 0.0), (0.0, 0.7)], ids=["wiener", "integrated"]
+)
 def test_the_filter_gives_the_density_of_the_readings_as_one_normal_vector(
     increment_sd: float, wander_sd: float
 ) -> None:
     paths = [WearPath("a", FIRST, READ[:3]), WearPath("a", SECOND, READ[3:])]
-    found, _state = follow(lay_out([paths], AS_IT_IS), parameters(increment_sd=increment_sd, wander_sd=wander_sd))
+    found, _state = follow(
+        lay_out([paths], AS_IT_IS), parameters(increment_sd=increment_sd, wander_sd=wander_sd)
+    )
     assert found[0, 0] == pytest.approx(dense(increment_sd, wander_sd), abs=1e-9)
 
 
@@ -61,7 +68,9 @@ def test_a_longer_unit_beside_it_changes_nothing_for_a_unit() -> None:
     short, long = [WearPath("a", [0.5], [0.6])], [WearPath("b", FIRST, READ[:3])]
     draws = parameters(increment_sd=0.4)
     alone = follow(lay_out([short], AS_IT_IS), draws)[0][0, 0]
-    assert follow(lay_out([short, long], AS_IT_IS), draws)[0][0, 0] == pytest.approx(alone, abs=1e-12)
+    assert follow(lay_out([short, long], AS_IT_IS), draws)[0][0, 0] == pytest.approx(
+        alone, abs=1e-12
+    )
 
 
 def test_a_wiener_path_passes_when_the_inverse_gaussian_distribution_says() -> None:
@@ -96,14 +105,19 @@ def test_a_wandering_drift_passes_when_fine_simulated_steps_do() -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "step"), [([0.9, 0.95, 1.3, 2.0], 0.05), ([0.1, 0.1, 0.2], 0.0), ([0.1234567, 0.98, 2.0 / 3.0], 0.0)]
+    ("values", "step"),
+    [([0.9, 0.95, 1.3, 2.0], 0.05), ([0.1, 0.1, 0.2], 0.0), ([0.1234567, 0.98, 2.0 / 3.0], 0.0)],
 )
-def test_the_resolution_is_the_step_of_the_grid_that_readings_lie_on(values: list[float], step: float) -> None:
+def test_the_resolution_is_the_step_of_the_grid_that_readings_lie_on(
+    values: list[float], step: float
+) -> None:
     assert grid_step(np.array(values)) == pytest.approx(step)
 
 
 def test_gamma_increments_scatter_as_simulated_ones_whose_drift_is_not_known() -> None:
-    draws = replace(parameters(start_sd=0.0, increment_sd=0.6, power=1.0, kept=1.0), gamma=np.array([[True]]))
+    draws = replace(
+        parameters(start_sd=0.0, increment_sd=0.6, power=1.0, kept=1.0), gamma=np.array([[True]])
+    )
     steps = lay_out([[WearPath("a", [0.0, 2.0], [0.1, 0.0])]], AS_IT_IS)
     _likely, state = follow(steps, replace(draws, reading_sd=1e6 * draws.reading_sd))
     rng = np.random.default_rng(2)
@@ -116,7 +130,9 @@ def test_level_and_drift_are_sampled_together() -> None:
     one = np.ones((1, 1))
     state = State(one, one, one, 0.8 * one, one)
     ends = _Ends.drawn(parameters(), state, 200_000, np.random.default_rng(1))
-    assert np.cov(ends.level.ravel(), ends.drift.ravel()) == pytest.approx(np.array([[1.0, 0.8], [0.8, 1.0]]), abs=0.02)
+    assert np.cov(ends.level.ravel(), ends.drift.ravel()) == pytest.approx(
+        np.array([[1.0, 0.8], [0.8, 1.0]]), abs=0.02
+    )
 
 
 def test_beyond_what_any_unit_has_reached_the_pace_is_a_quarter_uncertain() -> None:
@@ -124,7 +140,9 @@ def test_beyond_what_any_unit_has_reached_the_pace_is_a_quarter_uncertain() -> N
     sharp = parameters(increment_sd=0.0, power=1.0)
     ends = _Ends.drawn(sharp, State(one, one, zero, zero, zero), 50_000, np.random.default_rng(1))
     rng = np.random.default_rng(2)
-    found = ends.follow(np.array([[1.0, 3.0]]), np.array([0.5]), np.array([0.0]), rng, reading=False)
+    found = ends.follow(
+        np.array([[1.0, 3.0]]), np.array([0.5]), np.array([0.0]), rng, reading=False
+    )
     assert np.std(found[0, 0], axis=0) == pytest.approx([0.0, 0.25 * 2.0], abs=0.01)
 
 
@@ -148,14 +166,20 @@ def test_a_path_is_followed_with_the_variance_of_its_increments_and_of_its_wande
         np.array([[2.5]]), np.array([0.5]), np.array([0.0]), np.random.default_rng(1), reading=False
     )
     assert np.mean(found) == pytest.approx(0.3 + 0.8 * 2.0, abs=0.02)
-    assert np.var(found) == pytest.approx(increment_sd**2 * 2.0 + wander_sd**2 * 2.0**3 / 3.0, rel=0.02)
+    assert np.var(found) == pytest.approx(
+        increment_sd**2 * 2.0 + wander_sd**2 * 2.0**3 / 3.0, rel=0.02
+    )
 
 
-def test_a_gamma_path_is_followed_with_the_moments_of_its_increments_and_a_reading_with_its_error() -> None:
+def test_a_gamma_path_follows_the_moments_of_its_increments_and_the_error_of_a_reading() -> None:
     draws = replace(parameters(increment_sd=0.6, power=1.0), gamma=np.array([[True]]))
     wear, read = (
         ends(0.3, 0.8, draws, 200_000).follow(
-            np.array([[2.5]]), np.array([0.5]), np.array([0.5**2]), np.random.default_rng(1), reading=reading
+            np.array([[2.5]]),
+            np.array([0.5]),
+            np.array([0.5**2]),
+            np.random.default_rng(1),
+            reading=reading,
         )
         for reading in (False, True)
     )
@@ -173,7 +197,9 @@ def test_what_never_goes_back_has_crossed_its_limit_where_it_stands_above_it() -
     wear = paths.follow(usage, last, np.array([0.0]), np.random.default_rng(1), reading=False)
     crossed = paths.crossing(np.array([1.2]), last, np.random.default_rng(2))
     for k in range(3):
-        assert np.mean(crossed <= usage[0, k]) == pytest.approx(np.mean(wear[..., k] >= 1.2), abs=0.015)
+        assert np.mean(crossed <= usage[0, k]) == pytest.approx(
+            np.mean(wear[..., k] >= 1.2), abs=0.015
+        )
 
 
 def test_no_reading_is_better_than_the_rounding_to_its_resolution() -> None:
@@ -186,4 +212,6 @@ def test_no_reading_is_better_than_the_rounding_to_its_resolution() -> None:
 def test_quantiles_of_samples_are_those_of_numpy() -> None:
     samples = np.random.default_rng(1).standard_normal((3, 40))
     chances = [0.0, 0.05, 0.5, 0.77, 1.0]
-    assert Samples(samples).quantile(chances) == pytest.approx(np.quantile(samples, chances, axis=1).T)
+    assert Samples(samples).quantile(chances) == pytest.approx(
+        np.quantile(samples, chances, axis=1).T
+    )

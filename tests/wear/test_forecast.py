@@ -17,8 +17,12 @@ def small_fleet() -> list[WearPath]:
     rng = np.random.default_rng(4)
     lives = worlds.fleet("wiener", rng, parts=9, visits=4)
     paths = [WearPath(life.unit, life.usage, life.read) for part in lives for life in part]
-    return [*paths, WearPath("read once", [0.4], [0.7]), WearPath("renewed", [0.3, 0.6], [1.0, 1.7]),
-            WearPath("renewed", [], [])]  # fmt: skip
+    return [
+        *paths,
+        WearPath("read once", [0.4], [0.7]),
+        WearPath("renewed", [0.3, 0.6], [1.0, 1.7]),
+        WearPath("renewed", [], []),
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +42,11 @@ def test_quantiles_come_one_row_a_usage(model: WearModel) -> None:
 
 def test_many_units_come_one_row_a_unit(model: WearModel) -> None:
     units = ["part 1", "part 2", "read once"]
-    assert model.forecast(units, [[1.6, 1.8], [1.7, 1.9], [2.0, 2.2]]).quantile(ENDS).shape == (3, 2, 3)
+    assert model.forecast(units, [[1.6, 1.8], [1.7, 1.9], [2.0, 2.2]]).quantile(ENDS).shape == (
+        3,
+        2,
+        3,
+    )
     assert model.usage_to_limit(units, [2.0, 2.5, 3.0]).quantile(ENDS).shape == (3, 3)
 
 
@@ -53,20 +61,29 @@ def test_usages_in_any_order_give_each_its_own_forecast(model: WearModel) -> Non
     assert model.forecast("part 1", [2.4, 1.6]).quantile(0.5) == pytest.approx(ahead[::-1])
 
 
-def test_a_unit_read_often_is_known_better_than_one_read_once_and_that_better_than_a_new_one(model: WearModel) -> None:
-    often, once, new = (width(model.forecast(unit, [1.0])) for unit in ("part 1", "read once", "nobody knows it"))
+def test_a_unit_read_often_is_known_better_than_one_read_once_and_that_better_than_a_new_one(
+    model: WearModel,
+) -> None:
+    often, once, new = (
+        width(model.forecast(unit, [1.0])) for unit in ("part 1", "read once", "nobody knows it")
+    )
     assert often < once < new
 
 
 def test_a_restored_part_starts_again_and_is_known_better_than_a_new_one(model: WearModel) -> None:
-    restored, new = model.forecast("renewed", [0.0, 1.0]), model.forecast("nobody knows it", [0.0, 1.0])
+    restored, new = (
+        model.forecast("renewed", [0.0, 1.0]),
+        model.forecast("nobody knows it", [0.0, 1.0]),
+    )
     assert restored.quantile(0.5)[0] == pytest.approx(new.quantile(0.5)[0], abs=0.06)
     # It wore fast before.
     assert restored.quantile(0.5)[1] > new.quantile(0.5)[1]
 
 
 def test_a_reading_scatters_more_than_the_wear_itself(model: WearModel) -> None:
-    assert width(model.forecast("part 1", [1.5])) > width(model.forecast("part 1", [1.5], reading=False))
+    assert width(model.forecast("part 1", [1.5])) > width(
+        model.forecast("part 1", [1.5], reading=False)
+    )
 
 
 def test_a_limit_passed_already_is_passed_at_the_last_reading(model: WearModel) -> None:
@@ -75,26 +92,37 @@ def test_a_limit_passed_already_is_passed_at_the_last_reading(model: WearModel) 
     assert model.usage_to_limit("part 1", 0.01).quantile(ENDS) == pytest.approx(last)
 
 
-def test_the_chance_of_having_crossed_is_that_of_being_above_where_wear_hardly_goes_back(model: WearModel) -> None:
+def test_the_chance_of_having_crossed_is_that_of_being_above_where_wear_hardly_goes_back(
+    model: WearModel,
+) -> None:
     crossed = np.mean(model.usage_to_limit("part 2", 2.2).samples <= 2.0)
     above = np.mean(model.forecast("part 2", [2.0], reading=False).samples[0] > 2.2)
     assert crossed == pytest.approx(above, abs=0.1)
 
 
 def test_quantiles_among_crossings_that_never_come_are_infinite_and_never_nan() -> None:
-    crossing = Samples(np.array([1.0, 2.0, np.inf, np.inf, np.inf])).quantile([0.0, 0.1, 0.25, 0.4, 0.6, 1.0])
+    crossing = Samples(np.array([1.0, 2.0, np.inf, np.inf, np.inf])).quantile(
+        [0.0, 0.1, 0.25, 0.4, 0.6, 1.0]
+    )
     assert crossing.tolist() == pytest.approx([1.0, 1.4, 2.0, np.inf, np.inf, np.inf])
 
 
 def test_the_same_seed_gives_the_same_forecast() -> None:
-    one, two = (fit_wear([WearPath("a", [1.0, 2.0], [1.0, 2.2])], seed=3).forecast("a", [3.0]) for _ in range(2))
+    one, two = (
+        fit_wear([WearPath("a", [1.0, 2.0], [1.0, 2.2])], seed=3).forecast("a", [3.0])
+        for _ in range(2)
+    )
     assert np.array_equal(one.samples, two.samples)
 
 
-def test_another_seed_tells_the_kinds_alike_where_all_parts_begin_at_exactly_the_same_number() -> None:
+def test_another_seed_tells_the_kinds_alike_where_all_parts_begin_at_exactly_the_same_number() -> (
+    None
+):
     rng = np.random.default_rng(3)
     usage = np.linspace(0.0, 1.0, 8)
-    worn = 0.9 + np.cumsum(rng.lognormal(-2.0, 0.3, (20, 1)) * rng.gamma(9.0, 1.0 / 9.0, (20, 7)), axis=1)
+    worn = 0.9 + np.cumsum(
+        rng.lognormal(-2.0, 0.3, (20, 1)) * rng.gamma(9.0, 1.0 / 9.0, (20, 7)), axis=1
+    )
     paths = [WearPath(str(k), usage, np.r_[0.9, each]) for k, each in enumerate(worn)]
     one, other = (fit_wear(paths, seed=seed).kinds for seed in (0, 1))
     assert max(abs(one[kind] - other[kind]) for kind in one) < 0.05
@@ -102,14 +130,19 @@ def test_another_seed_tells_the_kinds_alike_where_all_parts_begin_at_exactly_the
 
 def test_other_units_of_measurement_give_the_same_forecast(model: WearModel) -> None:
     other = fit_wear(
-        [WearPath(p.unit, np.asarray(p.usage) * 1000.0, np.asarray(p.value) * 0.0254) for p in small_fleet()]
+        [
+            WearPath(p.unit, np.asarray(p.usage) * 1000.0, np.asarray(p.value) * 0.0254)
+            for p in small_fleet()
+        ]
     )
     forecast = other.forecast("part 1", [1600.0]).quantile(ENDS) / 0.0254
     assert forecast == pytest.approx(model.forecast("part 1", [1.6]).quantile(ENDS), rel=0.02)
 
 
 def test_what_falls_is_forecast_as_what_grows_seen_in_a_mirror(model: WearModel) -> None:
-    mirrored = fit_wear([WearPath(p.unit, p.usage, 9.0 - np.asarray(p.value)) for p in small_fleet()])
+    mirrored = fit_wear(
+        [WearPath(p.unit, p.usage, 9.0 - np.asarray(p.value)) for p in small_fleet()]
+    )
     assert 9.0 - mirrored.forecast("part 1", [1.6]).quantile(0.5) == pytest.approx(
         model.forecast("part 1", [1.6]).quantile(0.5), rel=0.03
     )
@@ -119,7 +152,10 @@ def test_what_falls_is_forecast_as_what_grows_seen_in_a_mirror(model: WearModel)
 
 
 def test_a_declared_error_of_reading_is_taken_as_it_is() -> None:
-    paths = [WearPath(f"{i}", [0.1, 0.5, 0.9], [0.1, 0.5 + i / 100, 0.9 + i / 50], reading_u=0.3) for i in range(6)]
+    paths = [
+        WearPath(f"{i}", [0.1, 0.5, 0.9], [0.1, 0.5 + i / 100, 0.9 + i / 50], reading_u=0.3)
+        for i in range(6)
+    ]
     model = fit_wear(paths)
     samples = model.forecast("2", [1.0]).samples - model.forecast("2", [1.0], reading=False).samples
     assert np.std(model.forecast("2", [1.0]).samples) > 0.3
@@ -153,8 +189,15 @@ def test_nothing_read_at_all_is_refused() -> None:
 @pytest.mark.slow
 def test_nine_in_ten_last_visits_of_the_liners_are_held() -> None:
     data = real.liners()
-    model = fit_wear([WearPath(u, h[: max(len(h) - 1, 1), 0], h[: max(len(h) - 1, 1), 1]) for u, h in data.items()])
-    ends = {u: model.forecast(u, h[-1:, 0]).quantile(ENDS)[0] for u, h in data.items() if len(h) > 1}
+    model = fit_wear(
+        [
+            WearPath(u, h[: max(len(h) - 1, 1), 0], h[: max(len(h) - 1, 1), 1])
+            for u, h in data.items()
+        ]
+    )
+    ends = {
+        u: model.forecast(u, h[-1:, 0]).quantile(ENDS)[0] for u, h in data.items() if len(h) > 1
+    }
     assert sum(low <= data[u][-1, 1] <= high for u, (low, _middle, high) in ends.items()) >= 14
 
 

@@ -1,4 +1,6 @@
-"""Fleets whose parts wear as a known process says, from a generator that shares no code with the product."""
+"""Fleets whose parts wear as a known process says, from a generator that shares no code with the
+product.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +11,16 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 KINDS = ("wiener", "integrated", "gamma", "power")
-# Worlds that no kind of the model is: a curve that grows on itself, one that settles, a line read with much error.
+# Worlds that no kind of the model is: a curve that grows on itself, one that settles, a line read
+# with much error.
 FOREIGN = ("exponential", "saturating", "noisy line", "two phases")
 
 
 @dataclass(frozen=True, slots=True)
 class Life:
-    """One stretch of a part's life between restorations: true wear on a fine grid, and what was read of it."""
+    """One stretch of a part's life between restorations: true wear on a fine grid, and what was
+    read of it.
+    """
 
     unit: str
     grid: Array
@@ -24,7 +29,9 @@ class Life:
     read: Array
 
     def crossing(self, limit: float) -> float:
-        """Usage at which the true wear first reaches a limit, infinite if it does not within the grid."""
+        """Usage at which the true wear first reaches a limit, infinite if it does not within the
+        grid.
+        """
         over = np.flatnonzero(self.true >= limit)
         if not len(over):
             return float("inf")
@@ -36,14 +43,18 @@ class Life:
 
 
 def _wear(kind: str, pace: float, grid: Array, rng: np.random.Generator) -> Array:
-    """Wear above the start along a grid of usage in [0, 3], about 1 at usage 1 for a part of mean pace."""
+    """Wear above the start along a grid of usage in [0, 3], about 1 at usage 1 for a part of mean
+    pace.
+    """
     step = np.diff(grid)
     if kind == "power":
         step = np.diff(grid**1.35)
     if kind in {"wiener", "power"}:
         rise = pace * step + 0.12 * np.sqrt(step) * rng.standard_normal(len(step))
     elif kind == "integrated":
-        drift = pace + 0.35 * np.concatenate([[0.0], np.cumsum(np.sqrt(step) * rng.standard_normal(len(step)))[:-1]])
+        drift = pace + 0.35 * np.concatenate(
+            [[0.0], np.cumsum(np.sqrt(step) * rng.standard_normal(len(step)))[:-1]]
+        )
         rise = drift * step
     elif kind == "gamma":
         rise = rng.gamma(step * 40.0, pace / 40.0)
@@ -69,7 +80,9 @@ def fleet(
     restored: float = 0.35,
     start: float = 0.3,
 ) -> list[list[Life]]:
-    """Lives of many parts; a share of them was restored once. Usage runs to about 1.5, the grid to 3."""
+    """Lives of many parts; a share of them was restored once. Usage runs to about 1.5, the grid to
+    3.
+    """
     parts_lives = []
     for number in range(parts):
         pace = float(np.exp(0.3 * rng.standard_normal()))
@@ -79,6 +92,8 @@ def fleet(
             true = start + 0.05 * rng.standard_normal() + _wear(kind, pace, grid, rng)
             usage = np.sort(rng.uniform(0.02, 1.5, visits))
             read = np.interp(usage, grid, true) + noise * rng.standard_normal(visits)
-            lives.append(Life(f"part {number}", grid, true, usage, np.round(read / resolution) * resolution))
+            lives.append(
+                Life(f"part {number}", grid, true, usage, np.round(read / resolution) * resolution)
+            )
         parts_lives.append(lives)
     return parts_lives

@@ -11,9 +11,16 @@ from mlg_troubleshoot.cli.prompts.lines import Line, Tone, line
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.units import MINUS, ClearanceConvention, LengthUnit, WrittenLength, parse_length
+from mlg_troubleshoot.units import (
+    MINUS,
+    ClearanceConvention,
+    LengthUnit,
+    WrittenLength,
+    parse_length,
+)
 
-# Columns that an entry may have in addition to its heading and its clearances, in the order in which they are shown.
+# Columns that an entry may have in addition to its heading and its clearances, in the order in
+# which they are shown.
 LENGTHS = ("plunger_displacement", "margin")
 SIGN_OFF = ("technician_id", "work_order", "gauge_id", "inspection_date")
 MORE = ("outcome", *LENGTHS, *SIGN_OFF, "small_readings_true")
@@ -21,7 +28,9 @@ MORE = ("outcome", *LENGTHS, *SIGN_OFF, "small_readings_true")
 
 @dataclass(frozen=True, slots=True)
 class JointAnswer:
-    """The answer for one joint; `written` is None where it was not measured, `confirmed` that it was asked again."""
+    """The answer for one joint; `written` is None where it was not measured, `confirmed` that it
+    was asked again.
+    """
 
     written: WrittenLength | None
     confirmed: bool = False
@@ -32,7 +41,9 @@ NOT_MEASURED = JointAnswer(None)
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """All answers of one inspection; None or a missing joint is still to be asked, `more` is optional, by column."""
+    """All answers of one inspection; None or a missing joint is still to be asked, `more` is
+    optional, by column.
+    """
 
     tail_no: str | None = None
     side: Side | None = None
@@ -46,19 +57,27 @@ class Answers:
         return replace(self, joints=MappingProxyType({**self.joints, number: answer}))
 
     def with_each(self, change: Callable[[JointAnswer], JointAnswer]) -> Answers:
-        return replace(self, joints=MappingProxyType({n: change(answer) for n, answer in self.joints.items()}))
+        return replace(
+            self, joints=MappingProxyType({n: change(answer) for n, answer in self.joints.items()})
+        )
 
     @property
-    def heading(self) -> tuple[str | None, Side | None, LengthUnit | None, ClearanceConvention | None]:
+    def heading(
+        self,
+    ) -> tuple[str | None, Side | None, LengthUnit | None, ClearanceConvention | None]:
         return self.tail_no, self.side, self.unit, self.convention
 
     def with_more(self, **columns: str | None) -> Answers:
         """Return the answers with optional columns set, or taken away where they are None."""
         merged: dict[str, str | None] = {**self.more, **columns}
-        return replace(self, more=MappingProxyType({name: text for name in MORE if (text := merged.get(name))}))
+        return replace(
+            self, more=MappingProxyType({name: text for name in MORE if (text := merged.get(name))})
+        )
 
     def beside(self, given: Answers) -> Answers:
-        """Return the answers with what is missing filled from flags; only the record id is taken from these first."""
+        """Return the answers with what is missing filled from flags; only the record id is taken
+        from these first.
+        """
         return replace(
             self,
             tail_no=self.tail_no or given.tail_no,
@@ -69,7 +88,9 @@ class Answers:
         ).with_more(**{**given.more, **self.more})
 
     def read(self, written: WrittenLength | None) -> Reading | None:
-        """Return a clearance as read; None if it was not measured, or its unit or convention is still to be asked."""
+        """Return a clearance as read; None if it was not measured, or its unit or convention is
+        still to be asked.
+        """
         unit = None if written is None else written.unit or self.unit
         if written is None or unit is None or self.convention is None:
             return None
@@ -81,7 +102,11 @@ class Answers:
     @property
     def radial_in(self) -> dict[int, float]:
         """Radial clearance of each measured joint. [in]"""
-        return {number: reading.radial_in for number in sorted(self.joints) if (reading := self.reading(number))}
+        return {
+            number: reading.radial_in
+            for number in sorted(self.joints)
+            if (reading := self.reading(number))
+        }
 
     def inspection(self, gear: Gear, record_id: str) -> Inspection:
         from mlg_troubleshoot.records import ReadOptions, admit
@@ -136,21 +161,29 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """What the gate says of a reading, empty if nothing, and the number it takes; what it said is to be confirmed."""
+    """What the gate says of a reading, empty if nothing, and the number it takes; what it said is
+    to be confirmed.
+    """
 
     said: str = ""
     written: WrittenLength | None = None
     refused: bool = False
 
 
-def judge(typed: str, number: int, unit: LengthUnit, convention: ClearanceConvention, gear: Gear) -> Judged:
-    """Let the gate that judges the cells of tables say whether a reading is taken, asked again or refused."""
+def judge(
+    typed: str, number: int, unit: LengthUnit, convention: ClearanceConvention, gear: Gear
+) -> Judged:
+    """Let the gate that judges the cells of tables say whether a reading is taken, asked again or
+    refused.
+    """
     from mlg_troubleshoot.records import ReadOptions, judge_length
 
     options = ReadOptions.of(gear, unit=unit, convention=convention, asks=True)
     read, problems = judge_length(f"clearance_{number}", typed, options)
     if problems or not isinstance(read, Inspection):
-        return Judged(" ".join(f"expected {p.expected}. {p.remedy}" for p in problems), refused=True)
+        return Judged(
+            " ".join(f"expected {p.expected}. {p.remedy}" for p in problems), refused=True
+        )
     if number not in read.entered:
         return Judged()
     return Judged(" ".join(read.warnings), parse_length(read.entered[number].text))
@@ -160,10 +193,14 @@ def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> 
     """Let the gate judge one optional answer; `UsageError` if it is refused."""
     from mlg_troubleshoot.records import ReadOptions, judge_length
 
-    options = ReadOptions.of(gear, unit=unit or LengthUnit.INCH, convention=ClearanceConvention.RADIAL)
+    options = ReadOptions.of(
+        gear, unit=unit or LengthUnit.INCH, convention=ClearanceConvention.RADIAL
+    )
     read, problems = judge_length(column, typed, options)
     if problems or not isinstance(read, Inspection):
-        raise UsageError(f"{typed!r} is not taken: expected {problems[0].expected}", problems[0].remedy)
+        raise UsageError(
+            f"{typed!r} is not taken: expected {problems[0].expected}", problems[0].remedy
+        )
     return read
 
 
@@ -180,14 +217,17 @@ _ITEM = re.compile(
 
 
 def read_more(answers: Answers, typed: str, gear: Gear) -> tuple[Answers, tuple[Line, ...]]:
-    """Read the optional answers; each is kept as it was typed, with the unit that it was typed in."""
+    """Read the optional answers; each is kept as it was typed, with the unit that it was typed
+    in.
+    """
     told: list[Line] = []
     at = 0
     while at < len(typed):
         item = _ITEM.match(typed, at)
         if item is None:
             raise UsageError(
-                f"{typed[at:].strip()!r} is not understood", "Type f, r, p .041 or m .028, or Enter alone."
+                f"{typed[at:].strip()!r} is not understood",
+                "Type f, r, p .041 or m .028, or Enter alone.",
             )
         at = item.end()
         if item["outcome"] is None:
@@ -201,11 +241,17 @@ def read_more(answers: Answers, typed: str, gear: Gear) -> tuple[Answers, tuple[
             answers = answers.with_more(outcome=None, **dict.fromkeys(LENGTHS))
             told.append(line(("– outcome, plunger, margin: none", Tone.GOOD)))
         else:
-            answers = answers.with_more(outcome="FAILED" if item["outcome"][0].lower() == "f" else "RETRACTED")
+            answers = answers.with_more(
+                outcome="FAILED" if item["outcome"][0].lower() == "f" else "RETRACTED"
+            )
             told.append(line((f"✓ outcome {answers.more['outcome']}", Tone.GOOD)))
     return answers, tuple(told)
 
 
 def plunger_in(answers: Answers, gear: Gear) -> float | None:
     typed = answers.more.get("plunger_displacement")
-    return None if typed is None else judge_more("plunger_displacement", typed, answers.unit, gear).readings_in[0]
+    return (
+        None
+        if typed is None
+        else judge_more("plunger_displacement", typed, answers.unit, gear).readings_in[0]
+    )

@@ -18,7 +18,9 @@ from mlg_troubleshoot.gear.gear import Gear
 
 
 class EntryInterruptedError(KeyboardInterrupt):
-    """The user stopped (exit code 130); the answers are saved as `session_id`, or nothing could be."""
+    """The user stopped (exit code 130); the answers are saved as `session_id`, or nothing could
+    be.
+    """
 
     def __init__(self, session_id: str | None) -> None:
         super().__init__("the entry was interrupted")
@@ -27,7 +29,9 @@ class EntryInterruptedError(KeyboardInterrupt):
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A finished entry; it is kept as unfinished, and can be corrected, until its result was shown."""
+    """A finished entry; it is kept as unfinished, and can be corrected, until its result was
+    shown.
+    """
 
     inspection: Inspection
     session: Session
@@ -36,7 +40,9 @@ class Entry:
 class _Saver:
     """Keeps the session in the store in step with the answers; says once if it cannot."""
 
-    def __init__(self, gear: Gear, terminal: RichTerminal, store: SessionStore, session: Session) -> None:
+    def __init__(
+        self, gear: Gear, terminal: RichTerminal, store: SessionStore, session: Session
+    ) -> None:
         self._gear = gear
         self._terminal = terminal
         self._store = store
@@ -86,7 +92,11 @@ class _Saver:
 
     def find_saved(self, tail_no: str, side: Side) -> Session | None:
         gear = (tail_no.casefold(), side)
-        found = (s for s in self.unfinished() if ((s.answers.tail_no or "").casefold(), s.answers.side) == gear)
+        found = (
+            s
+            for s in self.unfinished()
+            if ((s.answers.tail_no or "").casefold(), s.answers.side) == gear
+        )
         return next(found, None)
 
     def _say_once(self, message: str) -> None:
@@ -106,10 +116,16 @@ def ask_inspection(
     advice: Advice | None = None,
     now: Callable[[], datetime] = datetime.now,
 ) -> Entry:
-    """Ask for one inspection, joint by joint; a saved one is gone on with, or corrected from its review."""
+    """Ask for one inspection, joint by joint; a saved one is gone on with, or corrected from its
+    review.
+    """
     if given.tail_no is not None and not (given.tail_no.strip() and given.tail_no.isprintable()):
-        raise UsageError(f"{given.tail_no!r} is not a tail number", "Give for example --tail N123AB.")
-    session = new_session(gear.id, now(), Answers()) if saved is None else replace(saved, complete=False)
+        raise UsageError(
+            f"{given.tail_no!r} is not a tail number", "Give for example --tail N123AB."
+        )
+    session = (
+        new_session(gear.id, now(), Answers()) if saved is None else replace(saved, complete=False)
+    )
     saver = _Saver(gear, terminal, store, session)
     flow = Flow(gear, saver.find_saved, advice, now().date())
     try:
@@ -129,7 +145,10 @@ def _converse(flow: Flow, turn: Turn, terminal: RichTerminal, saver: _Saver) -> 
     while True:
         if turn.effect is Effect.COMPUTE:
             try:
-                return Entry(turn.state.answers.inspection(flow.gear, _record_id(saver.session)), saver.session)
+                return Entry(
+                    turn.state.answers.inspection(flow.gear, _record_id(saver.session)),
+                    saver.session,
+                )
             except UsageError as error:
                 turn = Turn(turn.state, (line((f"{error.message}. {error.remedy}", Tone.BAD)),))
         saver.save(turn.state.answers)
@@ -153,7 +172,11 @@ def _stopped(terminal: RichTerminal, saver: _Saver) -> EntryInterruptedError:
         said = line(("Saved. ", Tone.GOOD), "Go on later with:  ", ("mlg check --resume", Tone.KEY))
         terminal.say((BLANK, said))
         return EntryInterruptedError(saver.session.id)
-    lost = "The answers could not be saved." if saver.session.answers.radial_in else "Nothing was saved."
+    lost = (
+        "The answers could not be saved."
+        if saver.session.answers.radial_in
+        else "Nothing was saved."
+    )
     terminal.say((BLANK, line((lost, Tone.WARN), " Begin again with:  ", ("mlg check", Tone.KEY))))
     return EntryInterruptedError(None)
 

@@ -1,4 +1,6 @@
-"""The course of the questions as a state machine: an answer in, the next question out. No terminal, no disk."""
+"""The course of the questions as a state machine: an answer in, the next question out. No terminal,
+no disk.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,8 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, WrittenLength
 
 _T = TypeVar("_T")
-# Radial clearances by joint [in] and the joints still to be asked, to a sentence and the joint that it names.
+# Radial clearances by joint [in] and the joints still to be asked, to a sentence and the joint that
+# it names.
 Advice = Callable[[Mapping[int, float], tuple[int, ...]], tuple[str, int | None] | None]
 FindSaved = Callable[[str, Side], Session | None]
 
@@ -63,8 +66,9 @@ Place = tuple[Ask, int | str | None]
 class State:
     """Where the conversation stands.
 
-    `at` is the joint or the column that is asked for, `pending` what waits for a confirmation, `saved` an unfinished
-    inspection that is offered, `suggested` the joint that Enter takes, and `trail` where one came from.
+    `at` is the joint or the column that is asked for, `pending` what waits for a confirmation,
+    `saved` an unfinished inspection that is offered, `suggested` the joint that Enter takes, and
+    `trail` where one came from.
     """
 
     ask: Ask
@@ -96,7 +100,9 @@ class Effect(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """What follows from an answer: the next question, what to say before it, and what else to do."""
+    """What follows from an answer: the next question, what to say before it, and what else to
+    do.
+    """
 
     state: State
     lines: tuple[Line, ...] = ()
@@ -112,7 +118,9 @@ _CONVENTIONS = {c.value[0].lower(): c for c in ClearanceConvention}
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """The course of one inspection; `find_saved` looks for an unfinished one, `advice` names the most useful joint."""
+    """The course of one inspection; `find_saved` looks for an unfinished one, `advice` names the
+    most useful joint.
+    """
 
     gear: Gear
     find_saved: FindSaved | None = None
@@ -138,7 +146,8 @@ class Flow:
         against = _contradictions(answers, given)
         if against:
             raise UsageError(
-                f"the saved inspection has {against}", "Resume without that flag, or begin a new inspection."
+                f"the saved inspection has {against}",
+                "Resume without that flag, or begin a new inspection.",
             )
         answers = answers.beside(given)
         return self._go_on(answers, told=self._resumed(answers))
@@ -149,7 +158,9 @@ class Flow:
     def answer(self, state: State, text: str) -> Turn:
         typed = text.strip()
         if not typed.isprintable() or "\ufffd" in typed:
-            return _again(state, "A key that does nothing here, perhaps an arrow. Type the line again.")
+            return _again(
+                state, "A key that does nothing here, perhaps an arrow. Type the line again."
+            )
         word = _WORDS.get(typed.lower())
         if word == "q":
             return Turn(state, effect=Effect.STOP)
@@ -157,17 +168,25 @@ class Flow:
             return self._back(state)
         if word == "?":
             of_joint = state.ask in (Ask.JOINT, Ask.CONFIRM)
-            own = pages.joint_help(self.gear, state.answers, state.joint) if of_joint else _QUESTIONS[state.ask].help
+            own = (
+                pages.joint_help(self.gear, state.answers, state.joint)
+                if of_joint
+                else _QUESTIONS[state.ask].help
+            )
             return Turn(state, own)
         turn = _QUESTIONS[state.ask].take(self, state, typed)
         here, passing = (state.ask, state.at), (Ask.OFFER, Ask.REREAD, *_CONFIRMS)
         moved = (turn.state.ask, turn.state.at) != here and state.ask not in passing
-        return replace(turn, state=replace(turn.state, trail=(*state.trail, here) if moved else state.trail))
+        return replace(
+            turn, state=replace(turn.state, trail=(*state.trail, here) if moved else state.trail)
+        )
 
     def _tail(self, state: State, typed: str) -> Turn:
         answers = state.answers
         if not typed and answers.tail_no is None:
-            return _again(state, "Enter alone enters nothing. Type the tail number, for example N123AB.")
+            return _again(
+                state, "Enter alone enters nothing. Type the tail number, for example N123AB."
+            )
         return self.begin(replace(answers, tail_no=typed or answers.tail_no), state.from_review)
 
     def _side(self, state: State, typed: str) -> Turn:
@@ -180,11 +199,17 @@ class Flow:
         answers = state.answers
         unit = _chosen(typed, _UNITS, LengthUnit.parse, answers.unit)
         if unit is None:
-            return _again(state, _not_taken(typed, "Type i for inch, t for thou or m for millimetre."))
+            return _again(
+                state, _not_taken(typed, "Type i for inch, t for thou or m for millimetre.")
+            )
         changed = replace(answers, unit=unit)
-        bare = any(a.written is not None and a.written.unit is None for a in answers.joints.values())
+        bare = any(
+            a.written is not None and a.written.unit is None for a in answers.joints.values()
+        )
         if answers.unit not in (None, unit) and bare:
-            return Turn(State(Ask.REREAD, changed, old_unit=answers.unit, from_review=state.from_review))
+            return Turn(
+                State(Ask.REREAD, changed, old_unit=answers.unit, from_review=state.from_review)
+            )
         return self._go_on(changed, state.from_review)
 
     def _reread(self, state: State, typed: str) -> Turn:
@@ -192,7 +217,11 @@ class Flow:
 
         def in_old(answer: JointAnswer) -> JointAnswer:
             written = answer.written
-            return answer if written is None else replace(answer, written=replace(written, unit=written.unit or old))
+            return (
+                answer
+                if written is None
+                else replace(answer, written=replace(written, unit=written.unit or old))
+            )
 
         if typed.lower() not in (*_YES, *_NO):
             return _again(state, _not_taken(typed, "Type y or n."))
@@ -216,7 +245,9 @@ class Flow:
     def _offer(self, state: State, typed: str) -> Turn:
         saved = _known(state.saved)
         if typed.lower() in _YES:
-            turn = self._go_on(saved.answers.beside(state.answers), told=self._resumed(saved.answers))
+            turn = self._go_on(
+                saved.answers.beside(state.answers), told=self._resumed(saved.answers)
+            )
             return replace(turn, effect=Effect.RESUME, session=saved)
         if typed.lower() in _NO:
             return replace(self._go_on(state.answers), effect=Effect.PUT_AWAY, session=saved)
@@ -229,11 +260,20 @@ class Flow:
         jump = re.fullmatch(r"#\s*(\d{1,4})", typed)
         if jump is not None:
             return self._jump(state, int(jump[1]))
-        here = NOT_MEASURED if typed.lower() in ("s", "skip") else None if typed else answers.joints.get(number)
+        here = (
+            NOT_MEASURED
+            if typed.lower() in ("s", "skip")
+            else None
+            if typed
+            else answers.joints.get(number)
+        )
         if here is not None:
             return self._answered(state, number, here)
         if not typed:
-            return _again(state, "Enter alone enters nothing. Type the clearance, or s if it was not measured.")
+            return _again(
+                state,
+                "Enter alone enters nothing. Type the clearance, or s if it was not measured.",
+            )
         if typed.lower() == "done":
             return self._done(state)
         return self._value(state, number, typed)
@@ -242,7 +282,9 @@ class Flow:
         if not typed:
             return _again(state, "Enter alone does not confirm it. Type y, or the value again.")
         if typed.lower() in _YES:
-            return self._answered(state, state.joint, JointAnswer(self._pending(state).written, confirmed=True))
+            return self._answered(
+                state, state.joint, JointAnswer(self._pending(state).written, confirmed=True)
+            )
         if typed.lower() in _NO:
             return self._back(state)
         return self._joint(state, typed)
@@ -278,14 +320,19 @@ class Flow:
     def _done(self, state: State) -> Turn:
         answers = state.answers
         rest = self.open_joints(answers)
-        answers = replace(answers, joints=MappingProxyType({**answers.joints, **dict.fromkeys(rest, NOT_MEASURED)}))
+        answers = replace(
+            answers,
+            joints=MappingProxyType({**answers.joints, **dict.fromkeys(rest, NOT_MEASURED)}),
+        )
         names = ", ".join(f"#{number}" for number in rest)
         told = (line((f"– {names}  not measured", Tone.WARN)),) if rest else ()
         return self._go_on(answers, state.from_review, told)
 
     def _jump(self, state: State, number: int) -> Turn:
         if number not in self.gear.joint_numbers:
-            return _again(state, f"There is no joint #{number}. The joints are {self._joint_names()}.")
+            return _again(
+                state, f"There is no joint #{number}. The joints are {self._joint_names()}."
+            )
         return Turn(State(Ask.JOINT, state.answers, number, from_review=state.from_review))
 
     def _more(self, state: State, typed: str) -> Turn:
@@ -296,7 +343,9 @@ class Flow:
         except UsageError as error:
             return _again(state, f"{error.message}. {error.remedy}")
         stands = plunger_in(answers, self.gear)
-        new = answers.more.get("plunger_displacement") != state.answers.more.get("plunger_displacement")
+        new = answers.more.get("plunger_displacement") != state.answers.more.get(
+            "plunger_displacement"
+        )
         if new and stands is not None and abs(stands) > self._most_in:
             return Turn(replace(state, ask=Ask.CONFIRM_MORE, pending=answers), told)
         return Turn(replace(state, ask=Ask.MORE, answers=answers, pending=None), told)
@@ -307,17 +356,27 @@ class Flow:
         if typed.lower() in _NO:
             return self._back(state)
         if not typed:
-            return _again(state, "Enter alone does not confirm it. Type y, n, or p with the displacement again.")
+            return _again(
+                state,
+                "Enter alone does not confirm it. Type y, n, or p with the displacement again.",
+            )
         return self._more(state, typed)
 
     @property
     def _most_in(self) -> float:
-        """How far all joints at their limits could push the plunger: what is farther is asked again. [in]"""
+        """How far all joints at their limits could push the plunger: what is farther is asked
+        again. [in]
+        """
         return float(worst_case(self.gear.model, self.gear.limits_in[None]).magnitude_in[0])
 
     def _detail(self, state: State, typed: str) -> Turn:
         column, answers = str(state.at), state.answers
-        if not typed and column == "inspection_date" and column not in answers.more and self.today is not None:
+        if (
+            not typed
+            and column == "inspection_date"
+            and column not in answers.more
+            and self.today is not None
+        ):
             typed = self.today.isoformat()
         if typed.lower() == "x":
             answers = answers.with_more(**{column: None})
@@ -343,18 +402,27 @@ class Flow:
         number = re.fullmatch(r"#?\s*(\d{1,4})", typed)
         if number is not None:
             return self._jump(replace(state, from_review=True), int(number[1]))
-        return _again(state, _not_taken(typed, f"Type a joint number ({self._joint_names()}), or Enter alone."))
+        return _again(
+            state,
+            _not_taken(typed, f"Type a joint number ({self._joint_names()}), or Enter alone."),
+        )
 
     def _compute(self, state: State) -> Turn:
         if not state.answers.radial_in:
-            return _again(state, "No joint has a clearance, so there is nothing to compute. Type a joint number.")
+            return _again(
+                state,
+                "No joint has a clearance, so there is nothing to compute. Type a joint number.",
+            )
         if state.answers.unit_question(self.gear):
             return Turn(replace(state, ask=Ask.CONFIRM_UNIT))
         return Turn(state, effect=Effect.COMPUTE)
 
     def _confirm_unit(self, state: State, typed: str) -> Turn:
         if typed.lower() in _YES:
-            return Turn(State(Ask.REVIEW, state.answers.with_more(small_readings_true="yes")), effect=Effect.COMPUTE)
+            return Turn(
+                State(Ask.REVIEW, state.answers.with_more(small_readings_true="yes")),
+                effect=Effect.COMPUTE,
+            )
         if typed.lower() in _NO:
             return self._back(state)
         return _again(state, _not_taken(typed, "Type y if the unit is right, or n to correct it."))
@@ -365,19 +433,29 @@ class Flow:
         An unfinished inspection is offered as soon as tail and side are known.
         """
         begun = bool(answers.joints) or from_review
-        if self.find_saved is not None and answers.tail_no and answers.side is not None and not begun:
+        if (
+            self.find_saved is not None
+            and answers.tail_no
+            and answers.side is not None
+            and not begun
+        ):
             saved = self.find_saved(answers.tail_no, answers.side)
             if saved is not None and not _contradictions(saved.answers, answers):
                 return Turn(State(Ask.OFFER, answers, saved=saved))
             if saved is not None:
-                told = line(("An unfinished inspection is not offered: ", Tone.WARN), self._heading(saved.answers))
+                told = line(
+                    ("An unfinished inspection is not offered: ", Tone.WARN),
+                    self._heading(saved.answers),
+                )
                 return self._go_on(answers, told=(told,))
         return self._go_on(answers, from_review)
 
     def _resumed(self, answers: Answers) -> tuple[Line, ...]:
         return (line((f"Resumed: {pages.identity(answers)}, ", Tone.GOOD), self._heading(answers)),)
 
-    def _go_on(self, answers: Answers, from_review: bool = False, told: tuple[Line, ...] = ()) -> Turn:
+    def _go_on(
+        self, answers: Answers, from_review: bool = False, told: tuple[Line, ...] = ()
+    ) -> Turn:
         """Go to the first open question; readings that have become impossible are open again."""
         # What was confirmed of the readings holds for these readings only.
         answers, settled = self._settled(answers.with_more(small_readings_true=None))
@@ -398,7 +476,9 @@ class Flow:
                 judge_more(column, text, answers.unit, self.gear)
             except UsageError as error:
                 answers = answers.with_more(**{column: None})
-                told.append(line((f"{column.replace('_', ' ')}: {error.message}: left out.", Tone.WARN)))
+                told.append(
+                    line((f"{column.replace('_', ' ')}: {error.message}: left out.", Tone.WARN))
+                )
         for number, answer in answers.joints.items():
             reading = answers.reading(number)
             if reading is None:
@@ -411,7 +491,14 @@ class Flow:
                 continue
             if judged.refused:
                 told.extend(pages.refusal_lines(typed, number, judged.said))
-            told.append(line((f"#{number}  {typed} is {reading.radial_in:.4g} in radial: asked again.", Tone.WARN)))
+            told.append(
+                line(
+                    (
+                        f"#{number}  {typed} is {reading.radial_in:.4g} in radial: asked again.",
+                        Tone.WARN,
+                    )
+                )
+            )
         return replace(answers, joints=MappingProxyType(kept)), tuple(told)
 
     def _back(self, state: State) -> Turn:
@@ -428,7 +515,11 @@ class Flow:
             return Turn(State(ask, state.answers, at, from_review=inside, trail=state.trail[:-1]))
         course: list[Place] = [(ask, None) for ask in _HEADING]
         course += [(Ask.JOINT, number) for number in self.order]
-        course += [(Ask.MORE, None), *((Ask.DETAIL, column) for column in SIGN_OFF), (Ask.REVIEW, None)]
+        course += [
+            (Ask.MORE, None),
+            *((Ask.DETAIL, column) for column in SIGN_OFF),
+            (Ask.REVIEW, None),
+        ]
         place = course.index((state.ask, state.at))
         if place == 0:
             return _again(state, "This is the first question.")
@@ -474,7 +565,9 @@ def _again(state: State, message: str) -> Turn:
     return Turn(state, (line((message, Tone.WARN), indent=3),))
 
 
-def _chosen(typed: str, short: Mapping[str, _T], parse: Callable[[str], _T], before: _T | None) -> _T | None:
+def _chosen(
+    typed: str, short: Mapping[str, _T], parse: Callable[[str], _T], before: _T | None
+) -> _T | None:
     """Take a choice by its letter or its name, Enter for the one before; None if it is neither."""
     if not typed:
         return before
@@ -485,7 +578,11 @@ def _chosen(typed: str, short: Mapping[str, _T], parse: Callable[[str], _T], bef
 
 
 def _not_taken(typed: str, remedy: str) -> str:
-    return f"{typed!r} is not an answer here. {remedy}" if typed else f"Enter alone enters nothing. {remedy}"
+    return (
+        f"{typed!r} is not an answer here. {remedy}"
+        if typed
+        else f"Enter alone enters nothing. {remedy}"
+    )
 
 
 def _unconfirmed(answer: JointAnswer) -> JointAnswer:
@@ -494,7 +591,9 @@ def _unconfirmed(answer: JointAnswer) -> JointAnswer:
 
 @dataclass(frozen=True, slots=True)
 class _Question:
-    """What takes the answer to a question, how it is shown, and its help; that of a joint is the joint's own."""
+    """What takes the answer to a question, how it is shown, and its help; that of a joint is the
+    joint's own.
+    """
 
     take: Callable[[Flow, State, str], Turn]
     page: Callable[[Flow, State, int], Page]
@@ -508,19 +607,29 @@ _QUESTIONS: dict[Ask, _Question] = {
     Ask.CONVENTION: _Question(
         Flow._convention, lambda _, s, __: pages.convention_page(s.answers), pages.CONVENTION_HELP
     ),
-    Ask.OFFER: _Question(Flow._offer, lambda f, s, _: pages.offer_page(_known(s.saved), f.gear), pages.OFFER_HELP),
+    Ask.OFFER: _Question(
+        Flow._offer, lambda f, s, _: pages.offer_page(_known(s.saved), f.gear), pages.OFFER_HELP
+    ),
     Ask.REREAD: _Question(
-        Flow._reread, lambda _, s, __: pages.reread_page(s.answers, _known(s.old_unit)), pages.REREAD_HELP
+        Flow._reread,
+        lambda _, s, __: pages.reread_page(s.answers, _known(s.old_unit)),
+        pages.REREAD_HELP,
     ),
     Ask.JOINT: _Question(
-        Flow._joint, lambda f, s, w: pages.joint_page(f.gear, s.answers, f.order, s.joint, w, s.suggested)
+        Flow._joint,
+        lambda f, s, w: pages.joint_page(f.gear, s.answers, f.order, s.joint, w, s.suggested),
     ),
     Ask.CONFIRM: _Question(
-        Flow._confirm, lambda f, s, _: pages.confirm_page(f.gear, f._pending(s), s.joint, s.answers.unit)
+        Flow._confirm,
+        lambda f, s, _: pages.confirm_page(f.gear, f._pending(s), s.joint, s.answers.unit),
     ),
-    Ask.MORE: _Question(Flow._more, lambda f, s, w: pages.more_page(s.answers, f.gear, w), pages.MORE_HELP),
+    Ask.MORE: _Question(
+        Flow._more, lambda f, s, w: pages.more_page(s.answers, f.gear, w), pages.MORE_HELP
+    ),
     Ask.CONFIRM_MORE: _Question(
-        Flow._confirm_more, lambda f, s, _: pages.confirm_more_page(f._most_in, s.answers.unit), pages.MORE_HELP
+        Flow._confirm_more,
+        lambda f, s, _: pages.confirm_more_page(f._most_in, s.answers.unit),
+        pages.MORE_HELP,
     ),
     Ask.CONFIRM_UNIT: _Question(
         Flow._confirm_unit,
@@ -528,7 +637,11 @@ _QUESTIONS: dict[Ask, _Question] = {
         pages.CONFIRM_UNIT_HELP,
     ),
     Ask.DETAIL: _Question(
-        Flow._detail, lambda f, s, _: pages.detail_page(s.answers, str(s.at), f.today), pages.DETAIL_HELP
+        Flow._detail,
+        lambda f, s, _: pages.detail_page(s.answers, str(s.at), f.today),
+        pages.DETAIL_HELP,
     ),
-    Ask.REVIEW: _Question(Flow._review, lambda f, s, w: pages.review_page(f.gear, s.answers, w), pages.REVIEW_HELP),
+    Ask.REVIEW: _Question(
+        Flow._review, lambda f, s, w: pages.review_page(f.gear, s.answers, w), pages.REVIEW_HELP
+    ),
 }

@@ -1,4 +1,6 @@
-"""Lines of text for a terminal, without knowing the terminal: parts with a tone, never a colour alone."""
+"""Lines of text for a terminal, without knowing the terminal: parts with a tone, never a colour
+alone.
+"""
 
 from __future__ import annotations
 

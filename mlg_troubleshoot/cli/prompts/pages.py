@@ -12,31 +12,45 @@ from mlg_troubleshoot.cli.prompts.store import Session
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, in_unit
 
-CONVENTION_NAMES = {convention: convention.lower().replace("_", " ") for convention in ClearanceConvention}
+CONVENTION_NAMES = {
+    convention: convention.lower().replace("_", " ") for convention in ClearanceConvention
+}
 _EXAMPLES = {LengthUnit.INCH: ".013", LengthUnit.THOU: "13", LengthUnit.MILLIMETRE: "0.33"}
 _HOW = {
-    ClearanceConvention.RADIAL: "how far the pin centre can leave the hole centre: half of a dial reading "
-    "from limit to limit, or half of hole minus pin.",
-    ClearanceConvention.DIAMETRAL: "measure the hole with a bore gauge where it is worn most and the "
-    "pin with a micrometer; type hole minus pin.",
-    ClearanceConvention.TOTAL_PLAY: "set a dial indicator on the part beside the pin, move the joint "
-    "by hand from one stop to the other, across the pin; type the whole reading.",
+    ClearanceConvention.RADIAL: (
+        "how far the pin centre can leave the hole centre: half of a dial reading "
+        "from limit to limit, or half of hole minus pin."
+    ),
+    ClearanceConvention.DIAMETRAL: (
+        "measure the hole with a bore gauge where it is worn most and the "
+        "pin with a micrometer; type hole minus pin."
+    ),
+    ClearanceConvention.TOTAL_PLAY: (
+        "set a dial indicator on the part beside the pin, move the joint "
+        "by hand from one stop to the other, across the pin; type the whole reading."
+    ),
 }
-JOINT_KEYS = keys(("b", "back"), ("s", "not measured"), ("done", "no more"), ("?", "help"), ("q", "save and stop"))
+JOINT_KEYS = keys(
+    ("b", "back"), ("s", "not measured"), ("done", "no more"), ("?", "help"), ("q", "save and stop")
+)
 FACTOR_TWO = line(
     ("DIAMETRAL and TOTAL PLAY are twice RADIAL. ", Tone.WARN),
     "The wrong one is wrong by a factor of 2 and can turn the verdict around.",
 )
 
 
-TAIL_HELP = (line("The tail number as painted, for example N123AB. It names the report.", indent=3),)
+TAIL_HELP = (
+    line("The tail number as painted, for example N123AB. It names the report.", indent=3),
+)
 SIDE_HELP = (line("LH is the left gear as the pilot sees it, RH the right one.", indent=3),)
 UNIT_HELP = (
     line("The unit of a number typed alone; 1 thou is 0.001 in.", indent=3),
     line("One reading may carry another unit: 13 thou, 0.33 mm.", indent=3),
 )
 OFFER_HELP = (line("y goes on where you stopped. n begins with empty joints.", indent=3),)
-REREAD_HELP = (line("Readings with their own unit, such as 13 thou, stay as they are either way.", indent=3),)
+REREAD_HELP = (
+    line("Readings with their own unit, such as 13 thou, stay as they are either way.", indent=3),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +72,9 @@ def choice(key: str, meaning: str) -> Line:
 
 def rule(title: str, width: int) -> Line:
     rest = max(width - len(title) - 6, 0)
-    return line(("── ", Tone.QUIET), (title, Tone.STRONG), (f" {'─' * rest}", Tone.QUIET), rigid=True)
+    return line(
+        ("── ", Tone.QUIET), (title, Tone.STRONG), (f" {'─' * rest}", Tone.QUIET), rigid=True
+    )
 
 
 def identity(answers: Answers) -> str:
@@ -75,7 +91,10 @@ def welcome(gear: Gear, width: int, unfinished: tuple[Session, ...]) -> tuple[Li
     ]
     if unfinished:
         last = unfinished[0]
-        told = f"Unfinished: {identity(last.answers)}, begun {last.started:%Y-%m-%d %H:%M}. Go on with it:  "
+        told = (
+            f"Unfinished: {identity(last.answers)}, begun {last.started:%Y-%m-%d %H:%M}. Go on with"
+            " it:  "
+        )
         shown.append(line((told, Tone.WARN), ("mlg check --resume", Tone.KEY)))
     return tuple(shown)
 
@@ -95,12 +114,16 @@ def side_page(answers: Answers) -> Page:
 
 def unit_page(answers: Answers) -> Page:
     names = {unit.name.lower(): example for unit, example in _EXAMPLES.items()}
-    choices = (choice(name[0], f"{name:<13} for example {example}") for name, example in names.items())
+    choices = (
+        choice(name[0], f"{name:<13} for example {example}") for name, example in names.items()
+    )
     return _heading_page("Unit", answers.unit, line("Unit of your readings?"), *choices)
 
 
 def convention_page(answers: Answers) -> Page:
-    choices = (choice(c[0].lower(), f"{c.replace('_', ' '):<13} {c.meaning}") for c in ClearanceConvention)
+    choices = (
+        choice(c[0].lower(), f"{c.replace('_', ' '):<13} {c.meaning}") for c in ClearanceConvention
+    )
     kept = None if answers.convention is None else CONVENTION_NAMES[answers.convention]
     return _heading_page("Reading is", kept, line("What is your reading?"), *choices, FACTOR_TWO)
 
@@ -123,8 +146,8 @@ def offer_page(saved: Session, gear: Gear) -> Page:
         BLANK,
         line(
             (f"An inspection of {identity(saved.answers)} is unfinished: ", Tone.WARN),
-            f"begun {saved.started:%Y-%m-%d %H:%M}, {len(saved.answers.radial_in)} of {len(gear.joints)} joints "
-            "measured.",
+            f"begun {saved.started:%Y-%m-%d %H:%M}, {len(saved.answers.radial_in)} of"
+            f" {len(gear.joints)} joints measured.",
         ),
         choice("y", "go on with it"),
         choice("n", "begin a new one and put the old one away"),
@@ -133,13 +156,21 @@ def offer_page(saved: Session, gear: Gear) -> Page:
 
 
 def joint_page(
-    gear: Gear, answers: Answers, order: tuple[int, ...], number: int, width: int, suggested: int | None = None
+    gear: Gear,
+    answers: Answers,
+    order: tuple[int, ...],
+    number: int,
+    width: int,
+    suggested: int | None = None,
 ) -> Page:
     joint = gear.joint(number)
     place = order.index(number) + 1
     shown = (
         BLANK,
-        rule(f"{identity(answers)} · joint {place} of {len(order)} · {_progress(answers, order)}", width),
+        rule(
+            f"{identity(answers)} · joint {place} of {len(order)} · {_progress(answers, order)}",
+            width,
+        ),
         line((f" #{number}  {joint.name.upper()} ", Tone.CURRENT)),
         line(joint.location),
         BLANK,
@@ -151,7 +182,9 @@ def joint_page(
     unit = "in" if answers.unit is None else answers.unit.value
     kind = "" if answers.convention is None else f" {CONVENTION_NAMES[answers.convention]}"
     reading = answers.reading(number)
-    enter = _keeps(_as_typed(reading) if reading else "not measured" if number in answers.joints else None)
+    enter = _keeps(
+        _as_typed(reading) if reading else "not measured" if number in answers.joints else None
+    )
     if not enter and suggested not in (None, number):
         enter = f" (Enter goes to #{suggested})"
     return Page(shown, f" #{number}{kind}, {unit}{enter} > ")
@@ -166,7 +199,11 @@ def confirm_page(gear: Gear, reading: Reading, number: int, unit: LengthUnit | N
     shown = (
         line((f"#{number}  {length(reading.radial_in, unit)} radial {what}.", Tone.WARN)),
         line(in_unit(f"{said[:1].upper()}{said[1:]}", reading.unit), indent=3),
-        choice("y", f"yes, it is really {length(reading.as_read_in, unit)} {CONVENTION_NAMES[reading.convention]}"),
+        choice(
+            "y",
+            f"yes, it is really {length(reading.as_read_in, unit)}"
+            f" {CONVENTION_NAMES[reading.convention]}",
+        ),
         line(("or type the value again", Tone.QUIET), indent=3),
     )
     return Page(shown, f" #{number} y, or the value again > ")
@@ -181,7 +218,9 @@ def echo_lines(gear: Gear, answers: Answers, number: int) -> tuple[Line, ...]:
     if reading is None:
         joint = gear.joint(number)
         tail = ": the gear cannot be cleared without it" if joint.critical else ""
-        return (line((f"– #{number}  not measured{tail}", Tone.WARN if joint.critical else Tone.QUIET)),)
+        return (
+            line((f"– #{number}  not measured{tail}", Tone.WARN if joint.critical else Tone.QUIET)),
+        )
     kind = CONVENTION_NAMES[reading.convention]
     unit = answers.unit
     radial = reading.convention is ClearanceConvention.RADIAL
@@ -189,7 +228,12 @@ def echo_lines(gear: Gear, answers: Answers, number: int) -> tuple[Line, ...]:
     shown = [line((f"✓ #{number}  {length(reading.as_read_in, unit)} {kind}", Tone.GOOD), then)]
     if gear.joint(number).is_over_limit(reading.radial_in):
         limit = length(gear.joint(number).limit.value, unit).partition(" = ")[0]
-        shown.append(line((f"OVER THE LIMIT of {limit} radial: the manual rejects this joint.", Tone.BAD), indent=5))
+        shown.append(
+            line(
+                (f"OVER THE LIMIT of {limit} radial: the manual rejects this joint.", Tone.BAD),
+                indent=5,
+            )
+        )
     return tuple(shown)
 
 
@@ -209,12 +253,22 @@ def joint_help(gear: Gear, answers: Answers, number: int) -> tuple[Line, ...]:
     alike = gear.alike.get(number, ())
     if alike:
         names = " and ".join(f"#{other}" for other in alike)
-        shown.append(line(f"Moves the plunger like {names}: the other end of the same link.", indent=3))
+        shown.append(
+            line(f"Moves the plunger like {names}: the other end of the same link.", indent=3)
+        )
     shown += [
         line("Make the gear safe as the maintenance manual says before you reach in.", indent=3),
         line("Sketch: ═ lever  ─ link  △ fixed pivot  [n] this joint.", indent=3),
-        line(("Type", Tone.STRONG), f"  {example}   0.013 in   13 thou   0.33 mm   0 (measured, no play)"),
-        keys(("Enter", "keeps what is there"), ("s", "not measured"), ("b", "back"), ("#7", "go to joint 7")),
+        line(
+            ("Type", Tone.STRONG),
+            f"  {example}   0.013 in   13 thou   0.33 mm   0 (measured, no play)",
+        ),
+        keys(
+            ("Enter", "keeps what is there"),
+            ("s", "not measured"),
+            ("b", "back"),
+            ("#7", "go to joint 7"),
+        ),
         keys(("done", "measure no more"), ("q", "save and stop")),
     ]
     return tuple(shown)
@@ -241,8 +295,18 @@ def more_page(answers: Answers, gear: Gear, width: int) -> Page:
         rule(f"{identity(answers)} · if you know it · numbers in {unit.words}", width),
         row("f", "", "the gear FAILED to retract", outcome if outcome == "FAILED" else None),
         row("r", "", "the gear RETRACTED", outcome if outcome == "RETRACTED" else None),
-        row("p", plunger, "plunger off mid-position, + over-travel", answers.more.get("plunger_displacement")),
-        row("m", margin, f"this gear's own margin, else {length(gear.margin.value, unit)}", answers.more.get("margin")),
+        row(
+            "p",
+            plunger,
+            "plunger off mid-position, + over-travel",
+            answers.more.get("plunger_displacement"),
+        ),
+        row(
+            "m",
+            margin,
+            f"this gear's own margin, else {length(gear.margin.value, unit)}",
+            answers.more.get("margin"),
+        ),
     )
     return Page(shown, " f, r, p, m, or Enter to go on > ")
 
@@ -250,15 +314,26 @@ def more_page(answers: Answers, gear: Gear, width: int) -> Page:
 def confirm_more_page(most_in: float, unit: LengthUnit | None) -> Page:
     most = length(most_in, unit)
     shown = (
-        line((f"That is farther than all joints at their limits could push the plunger ({most}).", Tone.WARN)),
+        line(
+            (
+                f"That is farther than all joints at their limits could push the plunger ({most}).",
+                Tone.WARN,
+            )
+        ),
         line(("y", Tone.KEY), " yes, it was read so   ", ("n", Tone.KEY), " no", indent=3),
     )
     return Page(shown, " y, n, or p with the displacement again > ")
 
 
 CONFIRM_UNIT_HELP = (
-    line("A pin hardly has less play than in new parts. The unit of the numbers may be another one.", indent=3),
-    line("n goes back to the table: type unit there to change the unit, or a joint's number.", indent=3),
+    line(
+        "A pin hardly has less play than in new parts. The unit of the numbers may be another one.",
+        indent=3,
+    ),
+    line(
+        "n goes back to the table: type unit there to change the unit, or a joint's number.",
+        indent=3,
+    ),
 )
 
 
@@ -273,7 +348,12 @@ def confirm_unit_page(answers: Answers, question: str) -> Page:
 
 
 # What stands on the sign-off page: the word that leads back to it from the review, and its column.
-DETAILS = {"name": "technician_id", "order": "work_order", "gauge": "gauge_id", "date": "inspection_date"}
+DETAILS = {
+    "name": "technician_id",
+    "order": "work_order",
+    "gauge": "gauge_id",
+    "date": "inspection_date",
+}
 _DETAIL_PROMPTS = {
     "technician_id": "Measured by",
     "work_order": "Work order",
@@ -281,7 +361,10 @@ _DETAIL_PROMPTS = {
     "inspection_date": "Date of the inspection",
 }
 DETAIL_HELP = (
-    line("Printed on the sign-off page of the report. Enter leaves it empty; x takes it away.", indent=3),
+    line(
+        "Printed on the sign-off page of the report. Enter leaves it empty; x takes it away.",
+        indent=3,
+    ),
     line("A date as 2026-03-04 or 4-Mar-2026.", indent=3),
 )
 
@@ -295,8 +378,14 @@ def detail_page(answers: Answers, column: str, today: date | None) -> Page:
 
 
 MORE_HELP = (
-    line("f or r: what the gear did. If clearances do not explain a failure, the result says so.", indent=3),
-    line("p: plunger position minus mid-position with the Down Lock released; − is under-travel.", indent=3),
+    line(
+        "f or r: what the gear did. If clearances do not explain a failure, the result says so.",
+        indent=3,
+    ),
+    line(
+        "p: plunger position minus mid-position with the Down Lock released; − is under-travel.",
+        indent=3,
+    ),
     line("m: the displacement that this gear allows, as found at rigging.", indent=3),
     line("All on one line is fine: f p .041 m .028. x takes all of them away.", indent=3),
 )
@@ -311,10 +400,19 @@ def review_page(gear: Gear, answers: Answers, width: int) -> Page:
     name_width = max(min(longest, width - len(numbers) - 22), 0)
     head = f"{'#':>3}  {'joint':<{name_width}}{'typed':>11}{numbers}"
     across = 9 * len(units)
-    above = " " * (name_width + 16) + f"{kind:>{across}}" + (f"{'radial':>{across}}" if twice else "")
-    rows = [_review_row(gear, answers, number, name_width, twice=twice) for number in gear.joint_numbers]
-    extras = [f"{column.replace('_id', '').replace('_', ' ')} {text}" for column, text in answers.more.items()]
-    missing = [n for n in gear.joint_numbers if gear.joint(n).critical and answers.reading(n) is None]
+    above = (
+        " " * (name_width + 16) + f"{kind:>{across}}" + (f"{'radial':>{across}}" if twice else "")
+    )
+    rows = [
+        _review_row(gear, answers, number, name_width, twice=twice) for number in gear.joint_numbers
+    ]
+    extras = [
+        f"{column.replace('_id', '').replace('_', ' ')} {text}"
+        for column, text in answers.more.items()
+    ]
+    missing = [
+        n for n in gear.joint_numbers if gear.joint(n).critical and answers.reading(n) is None
+    ]
     shown = [
         BLANK,
         rule(f"{identity(answers)} · check before computing", width),
@@ -327,8 +425,12 @@ def review_page(gear: Gear, answers: Answers, width: int) -> Page:
     if missing:
         names = ", ".join(f"#{n}" for n in missing)
         them = "it" if len(missing) == 1 else "them"
-        shown.append(line((f"Not measured: {names}. The gear cannot be cleared without {them}.", Tone.WARN)))
-    shown.append(keys(("1", "change joint 1"), ("b", "back"), ("?", "other changes"), ("q", "save and stop")))
+        shown.append(
+            line((f"Not measured: {names}. The gear cannot be cleared without {them}.", Tone.WARN))
+        )
+    shown.append(
+        keys(("1", "change joint 1"), ("b", "back"), ("?", "other changes"), ("q", "save and stop"))
+    )
     return Page(tuple(shown), " Enter computes > ")
 
 
@@ -338,25 +440,42 @@ def _review_row(gear: Gear, answers: Answers, number: int, name_width: int, *, t
     reading = answers.reading(number)
     if reading is None:
         return line(
-            start, (f"{'–':>11}  not measured", Tone.WARN if joint.critical else Tone.QUIET), indent=0, rigid=True
+            start,
+            (f"{'–':>11}  not measured", Tone.WARN if joint.critical else Tone.QUIET),
+            indent=0,
+            rigid=True,
         )
     values = f"{_as_typed(reading)[:10]:>11}"
     for each in (reading.as_read_in, reading.radial_in)[: 1 + twice]:
         values += "".join(f"{unit.shown(each):>9}" for unit in _units_shown(answers.unit))
-    flag = ("  OVER", Tone.BAD) if gear.joint(number).is_over_limit(reading.radial_in) else ("", Tone.PLAIN)
+    flag = (
+        ("  OVER", Tone.BAD)
+        if gear.joint(number).is_over_limit(reading.radial_in)
+        else ("", Tone.PLAIN)
+    )
     return line(start, values, flag, indent=0, rigid=True)
 
 
 REVIEW_HELP = (
-    line("A joint number changes that joint. OVER: beyond its limit. Nothing is computed before Enter.", indent=3),
+    line(
+        "A joint number changes that joint. OVER: beyond its limit. Nothing is computed before"
+        " Enter.",
+        indent=3,
+    ),
     keys(("tail", "tail number"), ("side", "LH or RH"), ("unit", "in, thou or mm")),
     keys(("reading", "radial, diametral, total play"), ("b", "back, to outcome, plunger, margin")),
-    keys(*((word, column.replace("_id", "").replace("_", " ")) for word, column in DETAILS.items())),
+    keys(
+        *((word, column.replace("_id", "").replace("_", " ")) for word, column in DETAILS.items())
+    ),
 )
 
 
 def _units_shown(unit: LengthUnit | None) -> tuple[LengthUnit, ...]:
-    return (LengthUnit.INCH, LengthUnit.MILLIMETRE) if unit in (None, LengthUnit.INCH) else (unit or LengthUnit.INCH,)
+    return (
+        (LengthUnit.INCH, LengthUnit.MILLIMETRE)
+        if unit in (None, LengthUnit.INCH)
+        else (unit or LengthUnit.INCH,)
+    )
 
 
 def _as_typed(reading: Reading) -> str:
@@ -371,11 +490,15 @@ def _keeps(value: str | None) -> str:
 def _limit(gear: Gear, answers: Answers, number: int) -> str:
     limit_in = gear.joint(number).limit.value
     convention = answers.convention or ClearanceConvention.RADIAL
-    read = f"{length(limit_in * convention.per_radial, answers.unit)} {CONVENTION_NAMES[convention]}"
+    read = (
+        f"{length(limit_in * convention.per_radial, answers.unit)} {CONVENTION_NAMES[convention]}"
+    )
     shown = length(limit_in, answers.unit).partition(" = ")[0]
     return read if convention is ClearanceConvention.RADIAL else f"{read} ({shown} radial)"
 
 
 def _progress(answers: Answers, order: tuple[int, ...]) -> str:
-    marks = {number: "–" if answer.written is None else "■" for number, answer in answers.joints.items()}
+    marks = {
+        number: "–" if answer.written is None else "■" for number, answer in answers.joints.items()
+    }
     return "".join(marks.get(number, "□") for number in order)

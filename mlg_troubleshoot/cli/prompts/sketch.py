@@ -35,12 +35,15 @@ _Mark = tuple[int, str, Tone]
 def sketch(gear: Gear, current: int, width: int) -> tuple[Line, ...]:
     """Draw the linkage from the input to the output with one joint marked.
 
-    Levers are double bars with their pivot below, links are single bars. A mechanism that is not a simple
-    chain, or a narrow terminal, gets a row of joint numbers.
+    Levers are double bars with their pivot below, links are single bars. A mechanism that is not a
+    simple chain, or a narrow terminal, gets a row of joint numbers.
     """
     numbers = {joint.point: joint.number for joint in gear.joints}
     chain = _chain(gear.reference.mechanism.steps)
-    whole = chain is not None and set(numbers) <= {*chain.points, *(bar.pivot for bar in chain.bars)}
+    whole = chain is not None and set(numbers) <= {
+        *chain.points,
+        *(bar.pivot for bar in chain.bars),
+    }
     drawn = _draw(gear, chain, current, width - 3) if chain is not None and whole else ()
     row = _Chain(tuple(numbers), (_Bar("·", None),) * (len(numbers) - 1), False)
     return drawn or _draw(gear, row, current, width - 3)

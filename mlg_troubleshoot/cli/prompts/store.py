@@ -1,4 +1,6 @@
-"""Sessions in the store: every answer is saved at once, and an interrupted inspection can be resumed."""
+"""Sessions in the store: every answer is saved at once, and an interrupted inspection can be
+resumed.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,8 @@ class SessionTakenError(TroubleshootError):
 class Session:
     """One inspection as it stands in the store.
 
-    A complete one was shown or put away and is not offered again; `writer` tells which run wrote it last.
+    A complete one was shown or put away and is not offered again; `writer` tells which run wrote it
+    last.
     """
 
     id: str
@@ -59,14 +62,17 @@ def new_session(gear_id: str, started: datetime, answers: Answers) -> Session:
 
 @dataclass(slots=True)
 class SessionStore:
-    """The sessions of a user in the store where finished inspections are kept; made with the first answer.
+    """The sessions of a user in the store where finished inspections are kept; made with the first
+    answer.
 
     While a server cannot be reached a file of this user takes them, and `away` says so.
     """
 
     place: str | Path | None = None
     run: str = field(default_factory=lambda: secrets.token_hex(4))
-    owner: str = field(default_factory=lambda: os.environ.get("USER") or os.environ.get("USERNAME") or "")
+    owner: str = field(
+        default_factory=lambda: os.environ.get("USER") or os.environ.get("USERNAME") or ""
+    )
     away: str = ""
 
     _kept: Drafts = field(init=False)
@@ -78,16 +84,21 @@ class SessionStore:
         self._waiting = (Drafts(Store(own_file())),) if "://" in self._kept.store.place else ()
 
     def save(self, session: Session) -> Session:
-        """Write a session whole or not at all; `SessionTakenError` if another run has written it meanwhile."""
+        """Write a session whole or not at all; `SessionTakenError` if another run has written it
+        meanwhile.
+        """
         ours = replace(session, writer=self.run)
-        draft = Draft(session.id, self.owner, self.run, session.complete, json.dumps(_as_json(ours)))
+        draft = Draft(
+            session.id, self.owner, self.run, session.complete, json.dumps(_as_json(ours))
+        )
         try:
             saved = self._save(draft, (session.writer, self.run))
         except OutputError as error:
             raise OutputError(f"answers cannot be saved: {error.message}", error.remedy) from error
         if not saved:
             raise SessionTakenError(
-                f"another window has gone on with {session.id}", "This entry goes on as one of its own."
+                f"another window has gone on with {session.id}",
+                "This entry goes on as one of its own.",
             )
         return ours
 
@@ -99,7 +110,10 @@ class SessionStore:
                 raise
             (own,) = self._waiting
             saved = own.save(draft, writers)
-            self.away = f"the server cannot be reached; until it can, answers are saved here: {own.store.place}"
+            self.away = (
+                "the server cannot be reached; until it can, answers are saved here:"
+                f" {own.store.place}"
+            )
             return saved
         for own in self._waiting if saved else ():
             own.discard(draft.id)
@@ -121,7 +135,9 @@ class SessionStore:
         return next(map(self._readable, open_ones), None)
 
     def unfinished(self, gear_id: str) -> tuple[tuple[Session, ...], tuple[str, ...]]:
-        """Return the unfinished sessions of a gear, the last one first, and what could not be read on the way."""
+        """Return the unfinished sessions of a gear, the last one first, and what could not be read
+        on the way.
+        """
         found, damaged = [], []
         try:
             for draft in self._newest_first():
@@ -171,7 +187,8 @@ def read_session(draft: Draft) -> Session:
         raise SessionFileError(
             f"{draft.id}: this inspection was saved by mlg {program}, which this version "
             f"({version('mlg-troubleshoot')}) cannot read.",
-            f"It is kept: go on with it in mlg {program} or later, or begin a new one with mlg check.",
+            f"It is kept: go on with it in mlg {program} or later, or begin a new one with mlg"
+            " check.",
         )
     try:
         session = replace(_from_json(raw), writer=draft.writer, complete=draft.complete)
@@ -205,23 +222,34 @@ def _as_json(session: Session) -> dict[str, Any]:
 
 def _joint_as_json(answer: JointAnswer) -> dict[str, Any] | None:
     written = answer.written
-    return None if written is None else {"text": written.text, "unit": written.unit, "confirmed": answer.confirmed}
+    return (
+        None
+        if written is None
+        else {"text": written.text, "unit": written.unit, "confirmed": answer.confirmed}
+    )
 
 
 def _from_json(raw: Any) -> Session:
     if raw["schema_version"] == 1:
         lengths = {"plunger_displacement": raw["plunger_in"], "margin": raw["margin_in"]}
-        more = {"outcome": raw["outcome"], **{n: f"{float(v)!r} in" for n, v in lengths.items() if v is not None}}
+        more = {
+            "outcome": raw["outcome"],
+            **{n: f"{float(v)!r} in" for n, v in lengths.items() if v is not None},
+        }
     elif raw["schema_version"] == _SCHEMA:
         more = dict(raw["more"])
     else:
         raise ValueError(f"schema_version {_SCHEMA} was expected")
     if not set(more) <= set(MORE):
         raise ValueError(f"{sorted(set(more) - set(MORE))[0]!r} is not a column of an entry")
-    heading: dict[str, Any] = {n: None if raw[n] is None else read(raw[n]) for n, read in _HEADING.items()}
+    heading: dict[str, Any] = {
+        n: None if raw[n] is None else read(raw[n]) for n, read in _HEADING.items()
+    }
     answers = Answers(
         **heading,
-        joints=MappingProxyType({int(n): _joint_from_json(answer) for n, answer in dict(raw["joints"]).items()}),
+        joints=MappingProxyType(
+            {int(n): _joint_from_json(answer) for n, answer in dict(raw["joints"]).items()}
+        ),
     ).with_more(**{name: _text(text) for name, text in more.items()})
     started = datetime.fromisoformat(raw["started"])
     return Session(_text(raw["id"]) or "", _text(raw["gear"]) or "", started, answers)

@@ -68,13 +68,20 @@ class RichTerminal:
 
 
 def _line_editing() -> bool:
-    """Switch on editing of the typed line; nothing that is typed is kept as a history or changed."""
+    """Switch on editing of the typed line; nothing that is typed is kept as a history or
+    changed.
+    """
     try:
         import readline
     except ImportError:
         return False
     readline.set_auto_history(False)
-    for setting in ("enable-bracketed-paste off", "input-meta on", "output-meta on", "convert-meta off"):
+    for setting in (
+        "enable-bracketed-paste off",
+        "input-meta on",
+        "output-meta on",
+        "convert-meta off",
+    ):
         readline.parse_and_bind(f"set {setting}")
     readline.parse_and_bind("tab: self-insert")
     return True

@@ -36,13 +36,21 @@ def show_problems(problems: Sequence[Problem]) -> None:
             _show_problem(console, problem)
     rest = len(problems) - len(shown)
     if rest:
-        more = f"… and {rest} more; --json lists all of them, --annotate marks them in your workbook."
+        more = (
+            f"… and {rest} more; --json lists all of them, --annotate marks them in your workbook."
+        )
         _message(console, more, indent=2)
 
 
 def _show_problem(console: Console, problem: Problem) -> None:
     about_all = problem.row is None and problem.column is None
-    found = "" if problem.value is None else f"{problem.value}; " if about_all else f"found {problem.value!r}; "
+    found = (
+        ""
+        if problem.value is None
+        else f"{problem.value}; "
+        if about_all
+        else f"found {problem.value!r}; "
+    )
     _message(console, f"{problem.place()}: {found}expected {problem.expected}.", indent=2)
     _message(console, f"What to do: {problem.remedy}", indent=4)
 
@@ -57,7 +65,11 @@ def _show_problem_tables(console: Console, problems: Sequence[Problem]) -> None:
                 _show_problem(console, problem)
         if not placed:
             continue
-        place = ", ".join(part for part in (file, None if sheet is None else f"sheet {sheet!r}") if part is not None)
+        place = ", ".join(
+            part
+            for part in (file, None if sheet is None else f"sheet {sheet!r}")
+            if part is not None
+        )
         table = output.plain_table(console)
         table.title, table.title_justify, table.title_style = output.text(place), "left", ""
         for heading in ("cell", "column", "found"):

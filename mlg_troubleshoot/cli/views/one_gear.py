@@ -9,9 +9,20 @@ from rich.table import Table
 from rich.text import Text
 
 from mlg_troubleshoot.cli.output import WIDE, DataConsole, plain_table, text, word
-from mlg_troubleshoot.cli.views.tables import MARKS, STYLES, measured_outside, next_words, what_follows
+from mlg_troubleshoot.cli.views.tables import (
+    MARKS,
+    STYLES,
+    measured_outside,
+    next_words,
+    what_follows,
+)
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement
-from mlg_troubleshoot.decision.sentences import chance_wrong_sentence, confidence_words, percent, rigging_sentence
+from mlg_troubleshoot.decision.sentences import (
+    chance_wrong_sentence,
+    confidence_words,
+    percent,
+    rigging_sentence,
+)
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import in_unit
 
@@ -42,7 +53,10 @@ def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool)
         screen.sentence(f"* {note}")
     if not detail:
         more = len(judgement.warnings) - len(notes)
-        screen.print(f"{more} more notes; " * (more > 0) + "--detail: all joints, repairs, uncertainty", style="dim")
+        screen.print(
+            f"{more} more notes; " * (more > 0) + "--detail: all joints, repairs, uncertainty",
+            style="dim",
+        )
     screen.print(_DISCLAIMER, style="dim")
 
 
@@ -51,7 +65,9 @@ def _body(judgement: Judgement, screen: DataConsole, *, detail: bool) -> Text:
     lines: list[tuple[str, str]] = []
     if isinstance(judgement, Assessment):
         lines.append((judgement.headline, "bold" if measured_outside(judgement) else ""))
-        lines += [(judgement.measured_statement, "")] if judgement.measured_statement is not None else []
+        lines += (
+            [(judgement.measured_statement, "")] if judgement.measured_statement is not None else []
+        )
         lines += [(said, "") for said in _numbers(judgement)] if detail else []
     lines.append((next_words(judgement), "bold"))
     if isinstance(judgement, Assessment):
@@ -69,32 +85,50 @@ def _numbers(a: Assessment) -> Iterator[str]:
     if a.geometry_spread_in is not None and a.probability_within_margin is not None:
         low, high = a.geometry_spread_in
         yield (
-            f"Probability that {'the plunger' if a.as_loaded else 'the worst case'} is within the margin: "
-            f"{percent(a.probability_within_margin)}"
-            f"{confidence_words(a.confidence)}. "
-            f"The ensemble of reconstructed linkages gives {low:.4f} to {high:.4f} in."
+            f"Probability that {'the plunger' if a.as_loaded else 'the worst case'} is within the"
+            f" margin: {percent(a.probability_within_margin)}{confidence_words(a.confidence)}. The"
+            f" ensemble of reconstructed linkages gives {low:.4f} to {high:.4f} in."
         )
     if any(f.clearance_in is None for f in a.joints):
-        upper = "the linkage does not close" if a.predicted_upper_in is None else f"{a.predicted_upper_in:.4f} in"
-        yield f"Unmeasured joints count as tight in these numbers; with them at their limit the worst case is: {upper}."
+        upper = (
+            "the linkage does not close"
+            if a.predicted_upper_in is None
+            else f"{a.predicted_upper_in:.4f} in"
+        )
+        yield (
+            "Unmeasured joints count as tight in these numbers; with them at their limit the worst"
+            f" case is: {upper}."
+        )
 
 
 def _short_table(a: Assessment, screen: DataConsole) -> Table:
     table = plain_table(screen)
-    for heading in ("", "inspect in this order", f"clearance {screen.unit}", f"limit {screen.unit}", "contributes"):
-        table.add_column(heading, justify="left" if heading.startswith("inspect") else "right", no_wrap=True)
+    for heading in (
+        "",
+        "inspect in this order",
+        f"clearance {screen.unit}",
+        f"limit {screen.unit}",
+        "contributes",
+    ):
+        table.add_column(
+            heading, justify="left" if heading.startswith("inspect") else "right", no_wrap=True
+        )
     for f in a.ranked[:_JOINTS]:
         table.add_row(*_joint_cells(f, screen)[:5], style="bold" if f.over_limit else "")
     return table
 
 
 def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
-    """Everything that is known: all joints with their indices, repairs, re-rigging, the uncertainty budget."""
+    """Everything that is known: all joints with their indices, repairs, re-rigging, the uncertainty
+    budget.
+    """
     screen.print(_joint_table(a, screen))
     alike = sorted({tuple(sorted((f.joint, *f.alike))) for f in a.joints if f.alike})
     if alike:
         pairs = ", ".join("#" + " = #".join(str(n) for n in group) for group in alike)
-        screen.print(f"Both ends of one link act alike ({pairs}): the plunger cannot tell which end is worn.")
+        screen.print(
+            f"Both ends of one link act alike ({pairs}): the plunger cannot tell which end is worn."
+        )
     if a.repair_sets:
         screen.print(_repair_table(a, screen))
         parts = sorted({gear.joint(n).new_part.value for s in a.repair_sets for n in s.joints})
@@ -103,28 +137,50 @@ def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
     if a.rigging is not None:
         screen.sentence(rigging_sentence(a.rigging))
     if a.budget is not None:
-        shares = ", ".join(f"{name} {u:.4f} in ({percent(share)})" for name, u, share in a.budget.lines)
-        screen.sentence(f"Standard uncertainty, with shares: {shares}. Model: {a.budget.model_source}.")
+        shares = ", ".join(
+            f"{name} {u:.4f} in ({percent(share)})" for name, u, share in a.budget.lines
+        )
+        screen.sentence(
+            f"Standard uncertainty, with shares: {shares}. Model: {a.budget.model_source}."
+        )
     wrong = chance_wrong_sentence(a)
     if wrong is not None:
         screen.print(wrong)
-    what = "As loaded is an expectation, the worst case a bound." if a.as_loaded else "The worst case is a bound."
+    what = (
+        "As loaded is an expectation, the worst case a bound."
+        if a.as_loaded
+        else "The worst case is a bound."
+    )
     screen.print(f"Model: {gear.name}, geometry {gear.provenance}. {what}", style="dim")
 
 
 def _joint_table(a: Assessment, screen: DataConsole) -> Table:
     table = plain_table(screen)
-    # Two-line headings: with them every column, and first of all the joint, has its place in 80 columns.
+    # Two-line headings: with them every column, and first of all the joint, has its place in 80
+    # columns.
     limit = f"limit\n{screen.unit}"
     headings = (
-        *("rank", "joint", f"clearance\n{screen.unit}", limit, f"contri-\nbutes {screen.unit}", "S\nfirst", "S\ntotal"),
+        *(
+            "rank",
+            "joint",
+            f"clearance\n{screen.unit}",
+            limit,
+            f"contri-\nbutes {screen.unit}",
+            "S\nfirst",
+            "S\ntotal",
+        ),
         *("ampli-\nfication", "rank\nrange"),
     )
     # A narrow terminal leaves the limit to the short view, for the sake of the names.
     shown = [heading for heading in headings if heading != limit or screen.width >= WIDE]
     for heading in shown:
         name = heading == "joint"
-        table.add_column(heading, justify="left" if name else "right", no_wrap=not name, min_width=19 if name else None)
+        table.add_column(
+            heading,
+            justify="left" if name else "right",
+            no_wrap=not name,
+            min_width=19 if name else None,
+        )
     for f in a.ranked:
         cells = dict(zip(headings, _joint_cells(f, screen), strict=True))
         table.add_row(*(cells[heading] for heading in shown), style="bold" if f.over_limit else "")

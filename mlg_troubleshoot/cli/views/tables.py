@@ -45,7 +45,9 @@ def next_words(judgement: Judgement) -> str:
 
 
 def few_words(judgement: Judgement) -> str:
-    """Say the next action in a few words: the whole sentence stands in the view of one gear and in --csv."""
+    """Say the next action in a few words: the whole sentence stands in the view of one gear and in
+    --csv.
+    """
     step = judgement.next_action
     if step.action is Action.CORRECT:
         return step.text.removeprefix("Do not use. ").rstrip(".").lower()
@@ -53,10 +55,15 @@ def few_words(judgement: Judgement) -> str:
 
 
 def what_follows(a: Assessment) -> str | None:
-    """Say what the plan expects after its first step, and where it ends; None if nothing follows."""
+    """Say what the plan expects after its first step, and where it ends; None if nothing
+    follows.
+    """
     if len(a.plan.steps) < 2:
         return None
-    rest = [step.words + f" ({step.minutes:.0f} min)" * bool(step.minutes) for step in a.plan.steps[1:-1]]
+    rest = [
+        step.words + f" ({step.minutes:.0f} min)" * bool(step.minutes)
+        for step in a.plan.steps[1:-1]
+    ]
     return f"Then, as expected: {', '.join(rest)}{'. ' if rest else ''}{a.plan.steps[-1].text}"
 
 
@@ -66,8 +73,12 @@ def measured_outside(judgement: Judgement) -> bool:
 
 
 def lines_of(headings: Sequence[str], rows: Sequence[Sequence[Cell]], right: str) -> Iterator[Text]:
-    """Set rows in columns of which only the last one gives way to a narrow screen; `right` names right-aligned ones."""
-    cells = [[word(each) if isinstance(each, str) else each for each in row] for row in (headings, *rows)]
+    """Set rows in columns of which only the last one gives way to a narrow screen; `right` names
+    right-aligned ones.
+    """
+    cells = [
+        [word(each) if isinstance(each, str) else each for each in row] for row in (headings, *rows)
+    ]
     widths = [max(row[k].cell_len for row in cells) for k in range(len(headings) - 1)]
     for number, row in enumerate(cells):
         line = Text(style="bold" if number == 0 else "", no_wrap=True, overflow="ellipsis")

@@ -83,19 +83,27 @@ def load_causes(file: Path) -> tuple[Cause, ...]:
     """
     spec = importlib.util.spec_from_file_location(f"mlg_own_causes_{file.stem}", file)
     if spec is None or spec.loader is None or not file.is_file():
-        raise UsageError(f"{file} is not a Python file with causes", "Give a .py file that derives from Cause.")
+        raise UsageError(
+            f"{file} is not a Python file with causes", "Give a .py file that derives from Cause."
+        )
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
     except _BROKEN as error:
-        raise UsageError(f"{file} cannot be loaded: {error}", "Correct the file and run again.") from error
+        raise UsageError(
+            f"{file} cannot be loaded: {error}", "Correct the file and run again."
+        ) from error
     found = [
         value()
         for value in vars(module).values()
-        if isinstance(value, type) and issubclass(value, Cause) and value.__module__ == module.__name__
+        if isinstance(value, type)
+        and issubclass(value, Cause)
+        and value.__module__ == module.__name__
     ]
     if not found:
-        raise UsageError(f"{file} defines no cause", "Derive a class from mlg_troubleshoot.diagnosis.Cause.")
+        raise UsageError(
+            f"{file} defines no cause", "Derive a class from mlg_troubleshoot.diagnosis.Cause."
+        )
     return tuple(found)
 
 

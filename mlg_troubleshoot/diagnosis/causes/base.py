@@ -62,8 +62,8 @@ class Scene:
         return bool(np.isfinite(self.table.clearance_in[:, self.place(joint)]).any())
 
 
-# Where joints that were not read are more than this share of what all could move the plunger by, their wear may be the
-# effect. [1]
+# Where joints that were not read are more than this share of what all could move the plunger by,
+# their wear may be the effect. [1]
 MOST_UNREAD = 0.15
 
 
@@ -80,8 +80,8 @@ class Candidate:
     setting : mapping
         What else is fixed, for example the day from which it acts.
     stands_in : bool
-        True if it can be a rival, never a name: its column is missing and something else stands for it, or joints that
-        nobody read may be the cause as well.
+        True if it can be a rival, never a name: its column is missing and something else stands for
+        it, or joints that nobody read may be the cause as well.
     """
 
     cause: Cause
@@ -107,8 +107,8 @@ class Candidate:
 class Cause(ABC):
     """A physical cause of misfit, as a change inside the geometric model.
 
-    A user adds a cause by deriving from this class in a file of his own. The change must be proportional to
-    the parameter to first order; the engine fits the parameter.
+    A user adds a cause by deriving from this class in a file of his own. The change must be
+    proportional to the parameter to first order; the engine fits the parameter.
     """
 
     name: ClassVar[str]
@@ -130,7 +130,9 @@ class Cause(ABC):
     acts_in: ClassVar[str | None] = None
     """Column of the group of rows that it acts on: what it leaves there must look like noise."""
     extends: ClassVar[bool] = True
-    """False if it is about what was written and not about the model: it is taken out of the analysis only."""
+    """False if it is about what was written and not about the model: it is taken out of the
+    analysis only.
+    """
     sentence: ClassVar[str]
     """What it is, for a technician."""
     inspect: ClassVar[str]
@@ -145,14 +147,16 @@ class Cause(ABC):
     def stand_ins(self, scene: Scene) -> Iterator[Candidate]:
         """Yield what the cause would look like although a column that it needs is missing.
 
-        Such a candidate is never named, but keeps a cause that looks like it from being named alone; none unless
-        something else in the table moves as the missing column would.
+        Such a candidate is never named, but keeps a cause that looks like it from being named
+        alone; none unless something else in the table moves as the missing column would.
         """
         yield from ()
 
     @abstractmethod
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
-        """Return what differs from the plain model, row by row, at a value of the parameter. [unit of `parameter`]"""
+        """Return what differs from the plain model, row by row, at a value of the parameter. [unit
+        of `parameter`]
+        """
 
     def family(self, target: str | None) -> str | None:
         """Return the target under which variants of one name are gathered."""
@@ -163,7 +167,9 @@ class Cause(ABC):
         return self.sentence.format(target=target or "")
 
     def shown(self, value: float) -> dict[str, float]:
-        """Return the parameters of a fitted value as a person reads them: by name, the unit as the last word."""
+        """Return the parameters of a fitted value as a person reads them: by name, the unit as the
+        last word.
+        """
         return {self.parameter: value}
 
 
@@ -178,7 +184,9 @@ def offset(scene: Scene, where: ArrayLike, value: float) -> Adjustment:
 
 
 def share_never_read(scene: Scene, rows: Mask | slice = slice(None)) -> float:
-    """Share of joints that none of these rows has in what all joints could move the plunger by. [1]"""
+    """Share of joints that none of these rows has in what all joints could move the plunger by.
+    [1]
+    """
     never = ~np.isfinite(scene.table.clearance_in[rows]).any(axis=0)
     moved = np.abs(scene.model.plunger_amplification())
     return float(moved[never].sum() / moved.sum())

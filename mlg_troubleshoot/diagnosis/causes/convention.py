@@ -1,4 +1,6 @@
-"""Clearances that one technician, gauge or aircraft has in the other convention: twice or half of what was meant."""
+"""Clearances that one technician, gauge or aircraft has in the other convention: twice or half of
+what was meant.
+"""
 
 from __future__ import annotations
 
@@ -16,14 +18,17 @@ from mlg_troubleshoot.gear.adjustment import Adjustment
 
 # Rows from which a group can show a convention of its own.
 _LEAST_ROWS = 6
-# Measured over predicted in the rows of a group, over that of the fleet, from which its convention is in doubt. Read
-# clearances are drawn to what wear makes expect: a slip of a factor 2 shows as 1.4 to 2, and scatter stays below. [1]
+# Measured over predicted in the rows of a group, over that of the fleet, from which its convention
+# is in doubt. Read clearances are drawn to what wear makes expect: a slip of a factor 2 shows as
+# 1.4 to 2, and scatter stays below. [1]
 _DOUBT = 1.25
 _LABELS = {"technician_id": "technician", "gauge_id": "gauge", "tail_no": "tail"}
 
 
 class ConventionSlip(Cause):
-    """Diametral or total play written as radial in the rows of one technician, gauge or aircraft, or the reverse."""
+    """Diametral or total play written as radial in the rows of one technician, gauge or aircraft,
+    or the reverse.
+    """
 
     name: ClassVar[str] = "convention_slip"
     parameter: ClassVar[str] = "share_of_slip"
@@ -32,7 +37,8 @@ class ConventionSlip(Cause):
     exact: ClassVar[float | None] = 1.0
     extends: ClassVar[bool] = False
     sentence: ClassVar[str] = (
-        "The clearances of {target} stand in another convention than they say (radial against diametral or total play)"
+        "The clearances of {target} stand in another convention than they say (radial against"
+        " diametral or total play)"
     )
     inspect: ClassVar[str] = "How those clearances were read and written; the file is left as it is"
     separates: ClassVar[str] = "one joint measured again by another technician with another gauge"
@@ -54,16 +60,24 @@ class ConventionSlip(Cause):
                     yield Candidate(self, f"{label} {value}", setting)
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
-        """Take the group's clearances as they were meant, and what wear makes expect of all rows with them."""
+        """Take the group's clearances as they were meant, and what wear makes expect of all rows
+        with them.
+        """
         meant = as_meant(scene.table, candidate.setting)
         likely = likely_clearances(meant).likely_in
         read = np.where(np.isfinite(meant.clearance_in), meant.clearance_in, likely)
         right = read + scene.drawn_share * (likely - read)
-        return Adjustment(np.maximum(scene.clearance_in + value * (right - scene.clearance_in), 0.0))
+        return Adjustment(
+            np.maximum(scene.clearance_in + value * (right - scene.clearance_in), 0.0)
+        )
 
 
 def as_meant(table: DiagnosisTable, setting: Any) -> DiagnosisTable:
     """The table with the clearances of the group as they were meant."""
     rows = table.factors[setting["column"]] == setting["value"]
     factor: Array = np.where(rows, 1.0 / setting["written_factor"], 1.0)
-    return replace(table, clearance_in=table.clearance_in * factor[:, None], gauge_u_in=table.gauge_u_in * factor)
+    return replace(
+        table,
+        clearance_in=table.clearance_in * factor[:, None],
+        gauge_u_in=table.gauge_u_in * factor,
+    )

@@ -42,9 +42,13 @@ class DirectionNotWorstCase(_JointShare):
     name: ClassVar[str] = "direction_not_worst_case"
     trial: ClassVar[float] = -0.1
     sign: ClassVar[int] = -1
-    sentence: ClassVar[str] = "The clearance of {target} is not taken up in the worst direction: it contributes less"
+    sentence: ClassVar[str] = (
+        "The clearance of {target} is not taken up in the worst direction: it contributes less"
+    )
     inspect: ClassVar[str] = "Which way the pin of that joint rests under load"
-    separates: ClassVar[str] = "the pin's resting side in that joint under pressure, by feeler or dial"
+    separates: ClassVar[str] = (
+        "the pin's resting side in that joint under pressure, by feeler or dial"
+    )
 
 
 class OvalWear(_JointShare):
@@ -63,8 +67,8 @@ class OvalWear(_JointShare):
 class JointContact(Cause):
     """Two adjacent joints cannot take up both clearances.
 
-    Three forms: a share of the smaller contribution is lost, or of the smaller clearance, or the two together
-    have room for so much only.
+    Three forms: a share of the smaller contribution is lost, or of the smaller clearance, or the
+    two together have room for so much only.
     """
 
     name: ClassVar[str] = "joint_contact"
@@ -79,22 +83,39 @@ class JointContact(Cause):
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield candidates of both forms for each pair of neighbours that the gear names."""
         for first, second in scene.where.contact:
-            a, b = scene.clearance_in[:, scene.place(first)], scene.clearance_in[:, scene.place(second)]
-            if not (scene.is_read(first) and scene.is_read(second) and np.any(np.minimum(a, b) > 0.0)):
+            a, b = (
+                scene.clearance_in[:, scene.place(first)],
+                scene.clearance_in[:, scene.place(second)],
+            )
+            if not (
+                scene.is_read(first) and scene.is_read(second) and np.any(np.minimum(a, b) > 0.0)
+            ):
                 continue
             label = f"joints {first},{second}"
             yield Candidate(self, label, {"pair": (first, second), "room_in": None})
-            yield Candidate(self, label, {"pair": (first, second), "room_in": None, "smaller": "clearance"})
+            yield Candidate(
+                self, label, {"pair": (first, second), "room_in": None, "smaller": "clearance"}
+            )
             for share in _ROOM_QUANTILES:
-                yield Candidate(self, label, {"pair": (first, second), "room_in": float(np.quantile(a + b, share))})
+                yield Candidate(
+                    self,
+                    label,
+                    {"pair": (first, second), "room_in": float(np.quantile(a + b, share))},
+                )
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
-        """Take clearance from the two: from the one that contributes less, or what is beyond the room from both."""
+        """Take clearance from the two: from the one that contributes less, or what is beyond the
+        room from both.
+        """
         a, b = (scene.place(joint) for joint in candidate.setting["pair"])
         clearance = scene.clearance_in.copy()
         room = candidate.setting.get("room_in")
         if room is None:
-            size = scene.clearance_in if candidate.setting.get("smaller") == "clearance" else scene.contribution_in
+            size = (
+                scene.clearance_in
+                if candidate.setting.get("smaller") == "clearance"
+                else scene.contribution_in
+            )
             first_is_less = size[:, a] <= size[:, b]
             keep = max(1.0 - value, 0.0)
             clearance[:, a] *= np.where(first_is_less, keep, 1.0)

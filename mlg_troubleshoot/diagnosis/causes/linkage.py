@@ -7,7 +7,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from mlg_troubleshoot.diagnosis.causes.base import MOST_UNREAD, Candidate, Cause, Scene, filled, share_never_read
+from mlg_troubleshoot.diagnosis.causes.base import (
+    MOST_UNREAD,
+    Candidate,
+    Cause,
+    Scene,
+    filled,
+    share_never_read,
+)
 from mlg_troubleshoot.gear.adjustment import Adjustment
 
 REFERENCE_TEMPERATURE_C = 20.0
@@ -17,7 +24,9 @@ _WEAR_EXPONENTS = (0.85, 1.0, 1.2)
 
 
 class OutOfPlaneTilt(Cause):
-    """Axial float over the bearing span tilts links; their projected lengths shrink with the cosine."""
+    """Axial float over the bearing span tilts links; their projected lengths shrink with the
+    cosine.
+    """
 
     name: ClassVar[str] = "out_of_plane_tilt"
     needs: ClassVar[tuple[str, ...]] = ("axial_float",)
@@ -25,7 +34,9 @@ class OutOfPlaneTilt(Cause):
     trial: ClassVar[float] = 1.0 / 1.5**2
     sign: ClassVar[int] = 1
     sentence: ClassVar[str] = "End float lets links tilt out of their plane, which shortens them"
-    inspect: ClassVar[str] = "End float and thrust washers of the short link, the locking lever and the link assembly"
+    inspect: ClassVar[str] = (
+        "End float and thrust washers of the short link, the locking lever and the link assembly"
+    )
     separates: ClassVar[str] = (
         "end float of joints 3, 4 and 5, and one plunger reading with the float taken up by shims"
     )
@@ -36,7 +47,9 @@ class OutOfPlaneTilt(Cause):
             yield Candidate(self)
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
-        """Shrink each link by the cosine of its tilt: root sum of squares of its floats over the span."""
+        """Shrink each link by the cosine of its tilt: root sum of squares of its floats over the
+        span.
+        """
         floats = scene.table.axial_float_in
         if floats is None:
             return Adjustment(scene.clearance_in)
@@ -60,11 +73,17 @@ class ElasticCompliance(Cause):
     parameter: ClassVar[str] = "stretch_in_per_psi"
     trial: ClassVar[float] = 1e-6
     sentence: ClassVar[str] = "Actuator and short link stretch with hydraulic pressure"
-    inspect: ClassVar[str] = "Hydraulic pressure at the reading; actuator rod and short link for cracks and bending"
-    separates: ClassVar[str] = "two plunger readings of one gear, at full pressure and at hand-pump pressure"
+    inspect: ClassVar[str] = (
+        "Hydraulic pressure at the reading; actuator rod and short link for cracks and bending"
+    )
+    separates: ClassVar[str] = (
+        "two plunger readings of one gear, at full pressure and at hand-pump pressure"
+    )
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
-        """Yield one candidate for each length that stretches; the sign of a stretch is not known."""
+        """Yield one candidate for each length that stretches; the sign of a stretch is not
+        known.
+        """
         for length in scene.where.elastic:
             yield Candidate(self, None, {"length": length})
 
@@ -82,8 +101,12 @@ class ThermalGrowth(Cause):
     needs: ClassVar[tuple[str, ...]] = ("temperature_c",)
     parameter: ClassVar[str] = "expansion_difference_per_c"
     trial: ClassVar[float] = 1e-5
-    sentence: ClassVar[str] = "Aluminium airframe pivots and steel links grow differently with temperature"
-    inspect: ClassVar[str] = "Temperature of the structure at the reading; rig and measure at about 20 °C"
+    sentence: ClassVar[str] = (
+        "Aluminium airframe pivots and steel links grow differently with temperature"
+    )
+    inspect: ClassVar[str] = (
+        "Temperature of the structure at the reading; rig and measure at about 20 °C"
+    )
     separates: ClassVar[str] = "two plunger readings of one gear, cold and warm"
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
@@ -101,26 +124,33 @@ class ThermalGrowth(Cause):
 
 
 class UnlistedWear(Cause):
-    """A part outside the joints, such as the lock roller or its cam, wears with landings and shifts the lever."""
+    """A part outside the joints, such as the lock roller or its cam, wears with landings and shifts
+    the lever.
+    """
 
     name: ClassVar[str] = "unlisted_wear"
     needs: ClassVar[tuple[str, ...]] = ("gear_landings",)
     parameter: ClassVar[str] = "lever_shift_per_1000_landings"
     trial: ClassVar[float] = 1e-3
-    sentence: ClassVar[str] = "A part outside the listed joints wears with landings and shifts the lever"
+    sentence: ClassVar[str] = (
+        "A part outside the listed joints wears with landings and shifts the lever"
+    )
     inspect: ClassVar[str] = "Lock roller and cam of the locking lever"
     separates: ClassVar[str] = "one plunger reading after a new lock roller, clearances unchanged"
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield a few exponents of wear where the gear says which number it shifts."""
         if scene.where.wear_shift:
-            # Joints that nobody reads wear with landings likewise: given them it is a rival, never a name.
+            # Joints that nobody reads wear with landings likewise: given them it is a rival, never
+            # a name.
             rival = share_never_read(scene) > MOST_UNREAD
             for exponent in _WEAR_EXPONENTS:
                 yield Candidate(self, None, {"wear_exponent": exponent}, stands_in=rival)
 
     def stand_ins(self, scene: Scene) -> Iterator[Candidate]:
-        """Yield one candidate in which the wear of the joints stands for the landings that nobody recorded."""
+        """Yield one candidate in which the wear of the joints stands for the landings that nobody
+        recorded.
+        """
         if scene.where.wear_shift and scene.clearance_in.any():
             yield Candidate(self, stands_in=True)
 
@@ -128,7 +158,9 @@ class UnlistedWear(Cause):
         """Shift the lever in proportion to a power of the landings."""
         if "wear_exponent" not in candidate.setting:
             worn = scene.clearance_in.mean(axis=0) > 0.0
-            landings = 1000.0 * np.mean(scene.clearance_in[:, worn] / scene.clearance_in[:, worn].mean(axis=0), axis=1)
+            landings = 1000.0 * np.mean(
+                scene.clearance_in[:, worn] / scene.clearance_in[:, worn].mean(axis=0), axis=1
+            )
         else:
             landings = np.maximum(filled(scene.table.quantities["gear_landings"], 0.0), 0.0)
         exponent = candidate.setting.get("wear_exponent", 1.0)
@@ -145,8 +177,12 @@ class CalibrationRate(Cause):
     parameter: ClassVar[str] = "rate_change"
     trial: ClassVar[float] = 0.01
     sentence: ClassVar[str] = "The calibration rate of the model is off: every prediction is scaled"
-    inspect: ClassVar[str] = "Plunger travel from Down Lock to mid-position (technical order: 0.45 in)"
-    separates: ClassVar[str] = "the plunger's travel over the release, measured on two gears without wear"
+    inspect: ClassVar[str] = (
+        "Plunger travel from Down Lock to mid-position (technical order: 0.45 in)"
+    )
+    separates: ClassVar[str] = (
+        "the plunger's travel over the release, measured on two gears without wear"
+    )
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Scale the calibration rate."""

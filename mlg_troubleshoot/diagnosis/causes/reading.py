@@ -26,11 +26,17 @@ _LEAST_ROWS = 3
 
 def _date(scene: Scene, day: float) -> str | None:
     first = scene.table.first_day
-    return None if first is None else (date.fromisoformat(first) + timedelta(days=float(day))).isoformat()
+    return (
+        None
+        if first is None
+        else (date.fromisoformat(first) + timedelta(days=float(day))).isoformat()
+    )
 
 
 def _from_day_on(scene: Scene, setting: Mapping[str, Any]) -> NDArray[np.bool_]:
-    """Rows from the setting's day on; all rows if it has none. The day is found by its date in any table."""
+    """Rows from the setting's day on; all rows if it has none. The day is found by its date in any
+    table.
+    """
     if setting.get("day") is None:
         return np.ones(len(scene.table), bool)
     days = scene.table.quantities.get("day")
@@ -38,14 +44,20 @@ def _from_day_on(scene: Scene, setting: Mapping[str, Any]) -> NDArray[np.bool_]:
         return np.zeros(len(scene.table), bool)
     start = setting["day"]
     if setting.get("since") is not None and scene.table.first_day is not None:
-        start = (date.fromisoformat(setting["since"]) - date.fromisoformat(scene.table.first_day)).days
+        start = (
+            date.fromisoformat(setting["since"]) - date.fromisoformat(scene.table.first_day)
+        ).days
     return np.asarray(days >= start)
 
 
 def _change_days(days: Array, least: int, most: int) -> list[float]:
     """Days between which a change may lie, so that enough rows stand on both sides."""
     known = np.sort(days[np.isfinite(days)])
-    places = [i for i in range(least, len(known) - least + 1) if i < len(known) and known[i] > known[i - 1]]
+    places = [
+        i
+        for i in range(least, len(known) - least + 1)
+        if i < len(known) and known[i] > known[i - 1]
+    ]
     if len(places) > most:
         places = [places[k] for k in np.linspace(0, len(places) - 1, most).round().astype(int)]
     return [float(known[i]) for i in places]
@@ -76,7 +88,9 @@ class GaugeBias(_Level):
     acts_in: ClassVar[str | None] = "gauge_id"
     sentence: ClassVar[str] = "Readings with {target} are shifted"
     inspect: ClassVar[str] = "Calibration of that gauge"
-    separates: ClassVar[str] = "one gear measured with this gauge and with another by the same technician on one day"
+    separates: ClassVar[str] = (
+        "one gear measured with this gauge and with another by the same technician on one day"
+    )
 
 
 class TechnicianBias(_Level):
@@ -87,7 +101,9 @@ class TechnicianBias(_Level):
     acts_in: ClassVar[str | None] = "technician_id"
     sentence: ClassVar[str] = "Readings by {target} are shifted"
     inspect: ClassVar[str] = "How that technician seats and zeroes the gauge"
-    separates: ClassVar[str] = "one gear measured by this technician and by another with the same gauge on one day"
+    separates: ClassVar[str] = (
+        "one gear measured by this technician and by another with the same gauge on one day"
+    )
 
 
 class _Contrast(Cause):
@@ -115,7 +131,11 @@ class SideDifference(_Contrast):
     name: ClassVar[str] = "side_difference"
     needs: ClassVar[tuple[str, ...]] = ("side",)
     parameter: ClassVar[str] = "rh_minus_lh_in"
-    shares: ClassVar[tuple[dict[str, float], ...]] = ({"RH": 1.0}, {"LH": -1.0}, {"RH": 0.5, "LH": -0.5})
+    shares: ClassVar[tuple[dict[str, float], ...]] = (
+        {"RH": 1.0},
+        {"LH": -1.0},
+        {"RH": 0.5, "LH": -0.5},
+    )
     sentence: ClassVar[str] = "Right-hand and left-hand gears differ"
     inspect: ClassVar[str] = "Rigging of one right-hand gear against its left-hand neighbour"
     separates: ClassVar[str] = "both gears of one aircraft, same technician, same gauge, same day"
@@ -171,10 +191,14 @@ class RiggingOffset(Cause):
     trial: ClassVar[float] = 0.001
     sentence: ClassVar[str] = "The plunger rod of {target} was re-rigged"
     inspect: ClassVar[str] = "Plunger rod length and rigging record of that gear"
-    separates: ClassVar[str] = "rigging check of that gear: plunger at Down Lock and at mid-position"
+    separates: ClassVar[str] = (
+        "rigging check of that gear: plunger at Down Lock and at mid-position"
+    )
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
-        """Yield each aircraft and each single gear, over all its rows and from each possible day on."""
+        """Yield each aircraft and each single gear, over all its rows and from each possible day
+        on.
+        """
         table = scene.table
         days = table.quantities.get("day", np.full(len(table), np.nan))
         tails = table.factors["tail_no"]
@@ -184,7 +208,10 @@ class RiggingOffset(Cause):
             groups += [
                 (
                     f"tail {v}",
-                    {"tail": str(tails[gears == v][0]), "side": str(table.factors["side"][gears == v][0])},
+                    {
+                        "tail": str(tails[gears == v][0]),
+                        "side": str(table.factors["side"][gears == v][0]),
+                    },
                     gears == v,
                 )
                 for v in levels(gears)
@@ -193,7 +220,10 @@ class RiggingOffset(Cause):
         for label, setting, rows in groups:
             for day in (None, *_change_days(days[rows], 1, 12)):
                 # What was not read in any of its rows may be worn instead.
-                if share_never_read(scene, rows if day is None else rows & (days >= day)) <= MOST_UNREAD:
+                if (
+                    share_never_read(scene, rows if day is None else rows & (days >= day))
+                    <= MOST_UNREAD
+                ):
                     since = None if day is None else _date(scene, day)
                     yield Candidate(self, label, {**setting, "day": day, "since": since})
 

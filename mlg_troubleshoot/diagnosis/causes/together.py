@@ -1,9 +1,10 @@
-"""Causes that change what every joint contributes: where loads rest the pins, and another linkage than the drawn one.
+"""Causes that change what every joint contributes: where loads rest the pins, and another linkage
+than the drawn one.
 
-Ten factors cannot be estimated separately from 200 rows. A prior with a covariance shrinks them as far as the data
-leave them open. The marginal likelihood then says whether all ten are worth it compared with one cause, or one scale
-for all. The prior of directions is skewed, as directions are: of joints near their worst direction, which lose little,
-and far from it.
+Ten factors cannot be estimated separately from 200 rows. A prior with a covariance shrinks them as
+far as the data leave them open. The marginal likelihood then says whether all ten are worth it
+compared with one cause, or one scale for all. The prior of directions is skewed, as directions are:
+of joints near their worst direction, which lose little, and far from it.
 """
 
 from __future__ import annotations
@@ -25,20 +26,26 @@ from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.model import LinkageModel
 
-# Standard deviations of the angle between a pin's resting place and the worst direction that are tried; the last one
-# stands for evenly all around. Fleets with 40°, 90° and all around lie within a factor 1.6 of one of them. [deg]
+# Standard deviations of the angle between a pin's resting place and the worst direction that are
+# tried; the last one stands for evenly all around. Fleets with 40°, 90° and all around lie within a
+# factor 1.6 of one of them. [deg]
 SPREADS_DEG = (25.0, 45.0, 70.0, 180.0)
-# Spread of the true linkage about the drawn one over that of the ensemble, and of what it changes in all joints alike:
-# another member, one half as far, and one that nobody has calibrated on the published failure, as the ensemble is:
-# halfway to another member, linkages move the plunger up to 1.8 times as far. [1]
+# Spread of the true linkage about the drawn one over that of the ensemble, and of what it changes
+# in all joints alike: another member, one half as far, and one that nobody has calibrated on the
+# published failure, as the ensemble is: halfway to another member, linkages move the plunger up to
+# 1.8 times as far. [1]
 LINKAGES = ((1.0, 0.0), (0.5, 0.0), (1.0, 0.5))
-# Difference of a true linkage in addition to the ensemble's spread, each joint alone: an eighth of the largest. [1]
+# Difference of a true linkage in addition to the ensemble's spread, each joint alone: an eighth of
+# the largest. [1]
 ALONE = 0.03
-# And in addition to the way from the drawn one to a member of the ensemble, supposed: a third of that. [1]
+# And in addition to the way from the drawn one to a member of the ensemble, supposed: a third of
+# that. [1]
 NEAR = 0.01
-# Changes of one joint that stand for all; rounds that settle the evidence to 0.02, but of a spread far behind another.
+# Changes of one joint that stand for all; rounds that settle the evidence to 0.02, but of a spread
+# far behind another.
 _LIKELY, _ROUNDS = 1000, 8
-# Degree of the polynomials in the extension that stand for the curves of linkages between those of the ensemble.
+# Degree of the polynomials in the extension that stand for the curves of linkages between those of
+# the ensemble.
 _DEGREE = 6
 
 
@@ -46,15 +53,14 @@ _DEGREE = 6
 class Block:
     """All-joint effects with what is known of them beforehand.
 
-    cause: `LoadDirections` or `OtherGeometry`.
-    joints: joints that were read.
-    columns, shape (n, k): what each of them contributes: the effect of a change of its factor by one; then further
+    cause: `LoadDirections` or `OtherGeometry`. joints: joints that were read. columns, shape (n,
+    k): what each of them contributes: the effect of a change of its factor by one; then further
         effects. [in]
-    covariance, shape (k, k): covariance of the changes of the factors about none. [1]
-    penalty: logarithm of the number of blocks of the same cause that are tried. [1]
-    uncalibrated: True if all joints may also count more or less alike.
-    changes, shape (m,): equally likely changes of a joint, skewed: most lose little, a few lose much. [1]
-    model: the linkage that they are the way to, if they are the way to a certain one.
+    covariance, shape (k, k): covariance of the changes of the factors about none. [1] penalty:
+    logarithm of the number of blocks of the same cause that are tried. [1] uncalibrated: True if
+    all joints may also count more or less alike. changes, shape (m,): equally likely changes of a
+    joint, skewed: most lose little, a few lose much. [1] model: the linkage that they are the way
+    to, if they are the way to a certain one.
     """
 
     cause: JointFactors
@@ -67,11 +73,15 @@ class Block:
     model: LinkageModel | None = None
 
     def skew(self, along: Array, square: Array) -> float:
-        """Log-likelihood by which the skewed prior beats the normal one, for exp(aᵀx − xᵀQx/2) of changes x."""
+        """Log-likelihood by which the skewed prior beats the normal one, for exp(aᵀx − xᵀQx/2) of
+        changes x.
+        """
         if self.changes is None or not len(along):
             return 0.0
         inner = np.eye(len(along)) + self.covariance @ square
-        normal = along @ np.linalg.solve(inner, self.covariance @ along) - np.linalg.slogdet(inner)[1]
+        normal = (
+            along @ np.linalg.solve(inner, self.covariance @ along) - np.linalg.slogdet(inner)[1]
+        )
         return _evidence(along, square, self.changes) - 0.5 * float(normal)
 
     @property
@@ -80,7 +90,9 @@ class Block:
         return self.columns @ np.linalg.cholesky(self.covariance)
 
     def candidate(self, change: Array, covariance: Array) -> Candidate:
-        """The cause with fitted factors, their 95 % intervals, and the joints that only count together."""
+        """The cause with fitted factors, their 95 % intervals, and the joints that only count
+        together.
+        """
         count = len(self.joints)
         change, covariance = change[:count], covariance[:count, :count]
         error = np.sqrt(np.diag(covariance))
@@ -93,7 +105,10 @@ class Block:
             return dict(zip(named, np.clip(1.0 + values, low, high).tolist(), strict=True))
 
         tied = zip(self.joints, np.min(together, axis=1, initial=0.0), strict=True)
-        setting = {"factors": by_joint(change), "together": tuple(joint for joint, most in tied if most < _TOGETHER)}
+        setting = {
+            "factors": by_joint(change),
+            "together": tuple(joint for joint, most in tied if most < _TOGETHER),
+        }
         sides = {"low": by_joint(change - 1.96 * error), "high": by_joint(change + 1.96 * error)}
         return Candidate(self.cause, None, {**setting, **sides})
 
@@ -103,7 +118,9 @@ _TOGETHER = -0.7
 
 
 class JointFactors(Cause):
-    """Every joint contributes its own share of what the worst direction of the drawn linkage gives."""
+    """Every joint contributes its own share of what the worst direction of the drawn linkage
+    gives.
+    """
 
     parameter: ClassVar[str] = "share_of_change"
     trial: ClassVar[float] = 1.0
@@ -121,17 +138,26 @@ class JointFactors(Cause):
 
     @abstractmethod
     def covariances(self, model: LinkageModel, ensemble: Sequence[LinkageModel]) -> list[Array]:
-        """Covariances of the changes of the joints' factors that are tried, each (n_joints, n_joints). [1]"""
+        """Covariances of the changes of the joints' factors that are tried, each (n_joints,
+        n_joints). [1]
+        """
 
     def blocks(self, scene: Scene, ensemble: Sequence[LinkageModel]) -> list[Block]:
         """The cause for the joints of a table that were read and are worn."""
-        used = [j for j, n in enumerate(scene.joints) if scene.is_read(n) and np.any(scene.contribution_in[:, j])]
+        used = [
+            j
+            for j, n in enumerate(scene.joints)
+            if scene.is_read(n) and np.any(scene.contribution_in[:, j])
+        ]
         joints = tuple(scene.joints[j] for j in used)
         found = self.covariances(scene.model, ensemble)
         penalty = float(np.log(max(len(found), 1)))
-        # What each adds is taken so that together they are the displacement: with all at nothing nothing moves.
+        # What each adds is taken so that together they are the displacement: with all at nothing
+        # nothing moves.
         total, at_mid = np.sum(scene.contribution_in, axis=1), ~scene.table.along
-        whole = np.divide(scene.over_in, total, out=np.ones_like(total), where=at_mid & (total > 0.0))
+        whole = np.divide(
+            scene.over_in, total, out=np.ones_like(total), where=at_mid & (total > 0.0)
+        )
         columns = scene.contribution_in[:, used] * whole[:, None]
         return [Block(self, joints, columns, k[np.ix_(used, used)], penalty) for k in found]
 
@@ -142,15 +168,22 @@ class JointFactors(Cause):
 
 
 class LoadDirections(JointFactors):
-    """Load rests each pin beside its worst direction, by an angle of its own that is the same in all gears."""
+    """Load rests each pin beside its worst direction, by an angle of its own that is the same in
+    all gears.
+    """
 
     name: ClassVar[str] = "load_directions"
     bounds: ClassVar[tuple[float, float]] = (-1.0, 1.0)
     sentence: ClassVar[str] = (
-        "Load rests the pins beside their worst directions: readings are smaller than the bound, joint by joint"
+        "Load rests the pins beside their worst directions: readings are smaller than the bound,"
+        " joint by joint"
     )
-    inspect: ClassVar[str] = "Which way the pins rest under load; the prediction is now the displacement as loaded"
-    separates: ClassVar[str] = "one gear's plunger over the whole stroke, or read again with one pin pushed by hand"
+    inspect: ClassVar[str] = (
+        "Which way the pins rest under load; the prediction is now the displacement as loaded"
+    )
+    separates: ClassVar[str] = (
+        "one gear's plunger over the whole stroke, or read again with one pin pushed by hand"
+    )
 
     def covariances(self, model: LinkageModel, ensemble: Sequence[LinkageModel]) -> list[Array]:
         """Second moments of what normal angles change, about none."""
@@ -159,24 +192,37 @@ class LoadDirections(JointFactors):
 
     def blocks(self, scene: Scene, ensemble: Sequence[LinkageModel]) -> list[Block]:
         """The same with the changes of normal angles, which are skewed."""
-        return [replace(b, changes=c) for b, c in zip(super().blocks(scene, ensemble), _changes(), strict=True)]
+        return [
+            replace(b, changes=c)
+            for b, c in zip(super().blocks(scene, ensemble), _changes(), strict=True)
+        ]
 
     def adjust(self, scene: Scene, candidate: Candidate, value: float) -> Adjustment:
         """Let each clearance act by its factor along its worst direction."""
-        return Adjustment(scene.clearance_in, direction_factors=self.factors(scene.joints, candidate, value))
+        return Adjustment(
+            scene.clearance_in, direction_factors=self.factors(scene.joints, candidate, value)
+        )
 
 
 class OtherGeometry(JointFactors):
-    """The linkage has other dimensions than the reconstructed one: its joints count more or less."""
+    """The linkage has other dimensions than the reconstructed one: its joints count more or
+    less.
+    """
 
     name: ClassVar[str] = "geometry"
     bounds: ClassVar[tuple[float, float]] = (0.0, 3.0)
-    sentence: ClassVar[str] = "The linkage has other dimensions than the drawn one: its joints count more or less"
-    inspect: ClassVar[str] = "Distances between the pivots of one gear (mlg gear survey says which one first)"
+    sentence: ClassVar[str] = (
+        "The linkage has other dimensions than the drawn one: its joints count more or less"
+    )
+    inspect: ClassVar[str] = (
+        "Distances between the pivots of one gear (mlg gear survey says which one first)"
+    )
     separates: ClassVar[str] = "the next distance that the survey of one gear asks for"
 
     def covariances(self, model: LinkageModel, ensemble: Sequence[LinkageModel]) -> list[Array]:
-        """Second moments of what the linkages of the ensemble make of each joint, about the drawn one."""
+        """Second moments of what the linkages of the ensemble make of each joint, about the drawn
+        one.
+        """
         if not ensemble:
             return []
         apart = _apart(model, ensemble)
@@ -184,16 +230,28 @@ class OtherGeometry(JointFactors):
         return [share**2 * spread + alike**2 for share, alike in LINKAGES]
 
     def blocks(self, scene: Scene, ensemble: Sequence[LinkageModel]) -> list[Block]:
-        """Any mixture of the ensemble's linkages, with how each bends the displacement; and the way to each of them."""
+        """Any mixture of the ensemble's linkages, with how each bends the displacement; and the way
+        to each of them.
+        """
         found = super().blocks(scene, ensemble)
         if not found:
             return []
-        apart = _apart(scene.model, ensemble)[:, [scene.joints.index(joint) for joint in found[0].joints]]
-        moved = [predicted(other, scene.table, scene.clearance_in)[0] - scene.over_in for other in ensemble]
+        apart = _apart(scene.model, ensemble)[
+            :, [scene.joints.index(joint) for joint in found[0].joints]
+        ]
+        moved = [
+            predicted(other, scene.table, scene.clearance_in)[0] - scene.over_in
+            for other in ensemble
+        ]
         bent = np.array(moved) - apart @ found[0].columns.T
-        # A linkage that does not close with clearances that were read is not the one that they were read in.
+        # A linkage that does not close with clearances that were read is not the one that they were
+        # read in.
         closes = np.isfinite(bent).all(axis=1)
-        bent, apart, closing = bent[closes], apart[closes], [ensemble[k] for k in np.flatnonzero(closes).tolist()]
+        bent, apart, closing = (
+            bent[closes],
+            apart[closes],
+            [ensemble[k] for k in np.flatnonzero(closes).tolist()],
+        )
         curves = _curves(scene, ensemble)
         columns = np.column_stack([found[0].columns, *bent, curves])
         even = block_diag(np.eye(len(bent)) / max(len(bent), 1), np.eye(curves.shape[1]))
@@ -210,7 +268,8 @@ class OtherGeometry(JointFactors):
             replace(
                 found[0],
                 columns=np.column_stack([found[0].columns, bend]),
-                covariance=np.outer([*own, 1.0], [*own, 1.0]) + np.diag([NEAR**2] * len(own) + [1e-9]),
+                covariance=np.outer([*own, 1.0], [*own, 1.0])
+                + np.diag([NEAR**2] * len(own) + [1e-9]),
                 penalty=float(np.log(len(bent))),
                 model=other,
             )
@@ -224,19 +283,27 @@ class OtherGeometry(JointFactors):
 
 
 def _changes() -> list[Array]:
-    """Equally likely changes cos φ − 1 of a joint for normal angles φ of each spread, and for ones all around. [1]"""
+    """Equally likely changes cos φ − 1 of a joint for normal angles φ of each spread, and for ones
+    all around. [1]
+    """
     half = (np.arange(_LIKELY) + 0.5) / _LIKELY
     spreads = np.radians(SPREADS_DEG)
-    return [np.cos(np.pi * half if s >= np.pi else s * norm.ppf(0.5 + 0.5 * half)) - 1.0 for s in spreads]
+    return [
+        np.cos(np.pi * half if s >= np.pi else s * norm.ppf(0.5 + 0.5 * half)) - 1.0
+        for s in spreads
+    ]
 
 
 def _evidence(along: Array, square: Array, changes: Array) -> float:
     """Logarithm of the mean of exp(aᵀx − xᵀQx/2), each of x one of some equally likely changes.
 
-    By expectation propagation (T. P. Minka, "Expectation Propagation for approximate Bayesian inference", 2001): each
-    joint's changes are taken as normal, with the moments that they have where the other joints are as they are.
+    By expectation propagation (T. P. Minka, "Expectation Propagation for approximate Bayesian
+    inference", 2001): each joint's changes are taken as normal, with the moments that they have
+    where the other joints are as they are.
     """
-    precise, pull = (np.full(len(along), size / np.var(changes)) for size in (1.0, np.mean(changes)))
+    precise, pull = (
+        np.full(len(along), size / np.var(changes)) for size in (1.0, np.mean(changes))
+    )
     for _ in range(_ROUNDS):
         inner = square + np.diag(precise)
         spread = np.linalg.inv(inner)
@@ -249,7 +316,12 @@ def _evidence(along: Array, square: Array, changes: Array) -> float:
         variance = np.maximum(chance @ changes**2 - at**2, 1e-8)
         both = others + precise
         level = float(
-            np.sum(size[:, 0] - np.log(len(changes)) + 0.5 * np.log(both) - (push + pull) ** 2 / (2.0 * both))
+            np.sum(
+                size[:, 0]
+                - np.log(len(changes))
+                + 0.5 * np.log(both)
+                - (push + pull) ** 2 / (2.0 * both)
+            )
         )
         level += 0.5 * float((along + pull) @ mean - np.linalg.slogdet(inner)[1])
         precise = 0.3 * precise + 0.7 * np.maximum(1.0 / variance - others, 1e-4)
@@ -258,13 +330,17 @@ def _evidence(along: Array, square: Array, changes: Array) -> float:
 
 
 def _apart(model: LinkageModel, ensemble: Sequence[LinkageModel]) -> Array:
-    """Change of each joint's amplification by each linkage of an ensemble, shape (n_linkages, n_joints). [1]"""
+    """Change of each joint's amplification by each linkage of an ensemble, shape (n_linkages,
+    n_joints). [1]
+    """
     drawn = model.plunger_amplification()
     return np.array([other.plunger_amplification() / drawn - 1.0 for other in ensemble])
 
 
 def _curves(scene: Scene, ensemble: Sequence[LinkageModel]) -> Array:
-    """Smooth curves along the stroke that differ as those of an ensemble do, each at one standard deviation. [in]"""
+    """Smooth curves along the stroke that differ as those of an ensemble do, each at one standard
+    deviation. [in]
+    """
     if not scene.table.along.any():
         return np.empty((len(scene.table), 0))
     most = float(np.nanmax(scene.table.extension_in))
@@ -273,6 +349,8 @@ def _curves(scene: Scene, ensemble: Sequence[LinkageModel]) -> Array:
     curves = curves[np.isfinite(curves).all(axis=1)]
     if not len(curves):
         return np.empty((len(scene.table), 0))
-    size = np.sqrt(np.mean(legendre.legfit(2.0 * stroke / most - 1.0, curves.T, _DEGREE) ** 2, axis=1))
+    size = np.sqrt(
+        np.mean(legendre.legfit(2.0 * stroke / most - 1.0, curves.T, _DEGREE) ** 2, axis=1)
+    )
     at = 2.0 * np.nan_to_num(scene.table.extension_in) / most - 1.0
     return np.asarray(scene.table.along[:, None] * legendre.legvander(at, _DEGREE) * size)

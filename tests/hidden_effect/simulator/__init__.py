@@ -1,4 +1,5 @@
-"""An independent simulator of inspected landing gears: draws a fleet, hides effects in it, keeps the label.
+"""An independent simulator of inspected landing gears: draws a fleet, hides effects in it, keeps
+the label.
 
 It shares nothing with the program that it tests but the coordinates of the joints.
 """

@@ -1,7 +1,9 @@
-"""Physical causes: each changes the state of the gears before the linkage is closed, or the reading after it.
+"""Physical causes: each changes the state of the gears before the linkage is closed, or the reading
+after it.
 
-Every cause has one physical parameter, the knob, that sets its size. The other parameters are drawn. Nothing
-here knows how large the effect on the plunger will be: that is what the closed linkage says.
+Every cause has one physical parameter, the knob, that sets its size. The other parameters are
+drawn. Nothing here knows how large the effect on the plunger will be: that is what the closed
+linkage says.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ Parameters = dict[str, Any]
 ADJACENT = ((1, 2), (2, 3), (3, 5), (4, 5), (5, 6), (6, 7), (7, 8), (7, 9), (9, 10))
 #: Clearance at which the ovality is given [in].
 REFERENCE_CLEARANCE_IN = 0.004
-#: Rigid part to which each distance of ``linkage.LENGTHS`` belongs: crank, actuator, release lever, locking
+#: Rigid part to which each distance of ``linkage.LENGTHS`` belongs: crank, actuator, release lever,
+#: locking
 #: lever, short link, link 6-7, bellcrank, plunger link.
 _PART = (0, 0, 1, 2, 3, 3, 4, 5, 6, 6, 7)
 #: Piston area of the actuator [in2].
@@ -129,7 +132,9 @@ def pick(rng: np.random.Generator, values: NDArray[np.object_], fewest: int = 1)
 
 def _draw_tilt(rng: np.random.Generator, design: Design) -> Draft:
     floats = tuple(f"axial_float_{joint}_in" for joint in (3, 4, 5, 6, 7, 9, 10))
-    return Draft(None, None, "bearing_span_in", {"bearing_span_in": float(rng.uniform(1.0, 2.2))}, floats)
+    return Draft(
+        None, None, "bearing_span_in", {"bearing_span_in": float(rng.uniform(1.0, 2.2))}, floats
+    )
 
 
 def _apply_tilt(design: Design, state: State, draft: Draft) -> None:
@@ -173,7 +178,9 @@ def _apply_thermal(design: Design, state: State, draft: Draft) -> None:
     warmer = design.temperature - physics.RIGGING_TEMPERATURE_C
     mismatch = draft.parameters["mismatch_factor"] * (physics.ALUMINIUM_PER_C - physics.STEEL_PER_C)
     state.airframe += mismatch * warmer
-    state.parts += mismatch * warmer[:, None] * np.array(draft.parameters["part_spread"])[list(_PART)]
+    state.parts += (
+        mismatch * warmer[:, None] * np.array(draft.parameters["part_spread"])[list(_PART)]
+    )
 
 
 def _joint_columns(*joints: int) -> tuple[str, ...]:
@@ -193,7 +200,9 @@ def _draw_direction(rng: np.random.Generator, design: Design) -> Draft:
 def _apply_direction(design: Design, state: State, draft: Draft) -> None:
     column = draft.where - 1
     if draft.knob == "rest_angle_deg":
-        state.turned[:, column] += draft.parameters["turn_sign"] * np.radians(draft.parameters[draft.knob])
+        state.turned[:, column] += draft.parameters["turn_sign"] * np.radians(
+            draft.parameters[draft.knob]
+        )
     else:
         state.clearance[:, column] *= 1.0 - draft.parameters[draft.knob]
 
@@ -207,7 +216,9 @@ def _draw_oval(rng: np.random.Generator, design: Design) -> Draft:
 
 def _apply_oval(design: Design, state: State, draft: Draft) -> None:
     column = draft.where - 1
-    worn = (design.clearance[:, column] / REFERENCE_CLEARANCE_IN) ** draft.parameters["wear_exponent"]
+    worn = (design.clearance[:, column] / REFERENCE_CLEARANCE_IN) ** draft.parameters[
+        "wear_exponent"
+    ]
     state.oval[:, column] += draft.parameters["ovality_in"] * worn
 
 
@@ -242,13 +253,19 @@ def _draw_rigging(rng: np.random.Generator, design: Design) -> Draft:
     start = None
     if rng.random() < 0.7 and days.size >= 3:
         start = date_text(days[int(rng.integers(1, max(2, days.size // 2 + 1)))])
-    parameters = {"rod_change_in": float(rng.uniform(0.004, 0.02)), "sign": _sign(rng), "from_date": start}
+    parameters = {
+        "rod_change_in": float(rng.uniform(0.004, 0.02)),
+        "sign": _sign(rng),
+        "from_date": start,
+    }
     target = f"tail {tail}" if side is None else f"tail {tail} {side}"
     return Draft(target, (tail, side), "rod_change_in", parameters, ("tail_no", "inspection_date"))
 
 
 def _apply_rigging(design: Design, state: State, draft: Draft) -> None:
-    state.rod[rigged_rows(design, draft)] += draft.parameters["sign"] * draft.parameters["rod_change_in"]
+    state.rod[rigged_rows(design, draft)] += (
+        draft.parameters["sign"] * draft.parameters["rod_change_in"]
+    )
 
 
 def rigged_rows(design: Design, draft: Draft) -> NDArray[np.bool_]:
@@ -280,7 +297,11 @@ def _draw_date_step(rng: np.random.Generator, design: Design) -> Draft:
     if not np.isfinite(day):
         day = float(np.quantile(design.day, rng.uniform(0.25, 0.75)))
     knob = "reading_shift_in" if rng.random() < 0.6 else "stop_shift_in"
-    parameters = {knob: float(rng.uniform(0.002, 0.006)), "sign": _sign(rng), "from_date": date_text(day)}
+    parameters = {
+        knob: float(rng.uniform(0.002, 0.006)),
+        "sign": _sign(rng),
+        "from_date": date_text(day),
+    }
     return Draft(None, None, knob, parameters, ("inspection_date",))
 
 
@@ -352,7 +373,9 @@ def _draw_hysteresis(rng: np.random.Generator, design: Design) -> Draft:
 
 def _apply_hysteresis(design: Design, state: State, draft: Draft) -> None:
     p = draft.parameters
-    state.offset += p["sign"] * p["lost_motion_in"] * ((design.approach == "RETRACTING") - p["calibrated_at"])
+    state.offset += (
+        p["sign"] * p["lost_motion_in"] * ((design.approach == "RETRACTING") - p["calibrated_at"])
+    )
 
 
 def _draw_contact(rng: np.random.Generator, design: Design) -> Draft:
@@ -405,7 +428,9 @@ def off_list(
     draw: Callable[[np.random.Generator, Design], Parameters],
     shape: Callable[[Design, Parameters], Array],
 ) -> Cause:
-    """A cause that is on nobody's list: a shape in the table's columns, in inches at the plunger."""
+    """A cause that is on nobody's list: a shape in the table's columns, in inches at the
+    plunger.
+    """
 
     def drawn(rng: np.random.Generator, design: Design) -> Draft:
         size = {"amplitude_in": float(rng.uniform(0.002, 0.006)), "sign": _sign(rng)}
@@ -428,8 +453,13 @@ def _season(design: Design, p: Parameters) -> Array:
 def _kink(_: np.random.Generator, design: Design) -> Parameters:
     """The kink at which the bent line has least of a straight one in it."""
     kinks = np.quantile(design.pressure, np.linspace(0.1, 0.9, 33))
-    straight = [abs(np.corrcoef(np.abs(design.pressure - kink), design.pressure)[0, 1]) for kink in kinks]
-    return {"kink_psi": float(kinks[int(np.argmin(straight))]), "width_psi": float(design.pressure.std())}
+    straight = [
+        abs(np.corrcoef(np.abs(design.pressure - kink), design.pressure)[0, 1]) for kink in kinks
+    ]
+    return {
+        "kink_psi": float(kinks[int(np.argmin(straight))]),
+        "width_psi": float(design.pressure.std()),
+    }
 
 
 def _far_pair(rng: np.random.Generator, design: Design) -> Parameters:
@@ -486,7 +516,9 @@ OFF_CATALOGUE: dict[str, Cause] = {
             "wear_of_one_side",
             ("gear_landings", "side"),
             lambda _, d: {"from_landings": float(np.median(d.landings))},
-            lambda d, p: np.where(d.side == "RH", 1.0, -1.0) * (d.landings - p["from_landings"]) / 1000.0,
+            lambda d, p: (
+                np.where(d.side == "RH", 1.0, -1.0) * (d.landings - p["from_landings"]) / 1000.0
+            ),
         ),
         off_list(
             "pressure_kink",
@@ -502,14 +534,24 @@ OFF_CATALOGUE: dict[str, Cause] = {
                 "middle_psi": float(d.pressure.mean()),
                 "width_psi": float(d.pressure.std()),
             },
-            lambda d, p: (d.temperature - p["middle_c"]) / 12.0 * (d.pressure - p["middle_psi"]) / p["width_psi"],
+            lambda d, p: (
+                (d.temperature - p["middle_c"])
+                / 12.0
+                * (d.pressure - p["middle_psi"])
+                / p["width_psi"]
+            ),
         ),
         off_list(
             "lost_motion_under_load",
             ("approach", "hydraulic_pressure_psi"),
-            lambda _, d: {"middle_psi": float(d.pressure.mean()), "width_psi": float(d.pressure.std())},
+            lambda _, d: {
+                "middle_psi": float(d.pressure.mean()),
+                "width_psi": float(d.pressure.std()),
+            },
             lambda d, p: (
-                np.where(d.approach == "RETRACTING", 1.0, -1.0) * (d.pressure - p["middle_psi"]) / p["width_psi"]
+                np.where(d.approach == "RETRACTING", 1.0, -1.0)
+                * (d.pressure - p["middle_psi"])
+                / p["width_psi"]
             ),
         ),
         off_list(
@@ -534,7 +576,9 @@ OFF_CATALOGUE: dict[str, Cause] = {
             "approach_of_one_technician",
             ("technician_id", "approach"),
             lambda rng, d: {"technician": pick(rng, d.technician, 20)},
-            lambda d, p: (d.technician == p["technician"]) * np.where(d.approach == "RETRACTING", 1.0, -1.0),
+            lambda d, p: (
+                (d.technician == p["technician"]) * np.where(d.approach == "RETRACTING", 1.0, -1.0)
+            ),
         ),
     )
 }

@@ -1,6 +1,8 @@
-"""What a real fleet departs in first: where loads rest the pins, how clearances are written down, one group alone.
+"""What a real fleet departs in first: where loads rest the pins, how clearances are written down,
+one group alone.
 
-They stand beside the catalogue and not in it, so that the fleets of the catalogue's rows stay as they are.
+They stand beside the catalogue and not in it, so that the fleets of the catalogue's rows stay as
+they are.
 """
 
 from __future__ import annotations
@@ -11,7 +13,8 @@ from .causes import CATALOGUE, OFF_CATALOGUE, Cause, Draft, off_list, pick
 from .fleet import Design
 from .physics import State
 
-#: Standard deviations of the angles between where loads rest the pins and the worst directions; the last one stands
+#: Standard deviations of the angles between where loads rest the pins and the worst directions; the
+#: last one stands
 #: for evenly all around [deg].
 ALL_AROUND_DEG = 180.0
 SPREADS_DEG = (40.0, 90.0, ALL_AROUND_DEG)
@@ -33,7 +36,9 @@ def _draw_loads(rng: np.random.Generator, design: Design) -> Draft:
 def _apply_loads(design: Design, state: State, draft: Draft) -> None:
     p = draft.parameters
     around = p["spread_deg"] >= ALL_AROUND_DEG
-    state.turned += np.radians(180.0 * np.array(p["turn"]) if around else p["spread_deg"] * np.array(p["normal"]))
+    state.turned += np.radians(
+        180.0 * np.array(p["turn"]) if around else p["spread_deg"] * np.array(p["normal"])
+    )
 
 
 def _draw_convention(rng: np.random.Generator, design: Design) -> Draft:
@@ -44,7 +49,9 @@ def _draw_convention(rng: np.random.Generator, design: Design) -> Draft:
     )[int(rng.integers(3))]
     name = pick(rng, column, _FEWEST)
     factor = 2.0 if rng.random() < 0.5 else 0.5
-    return Draft(f"{word} {name}", (word, name), "written_factor", {"written_factor": factor}, _JOINTS)
+    return Draft(
+        f"{word} {name}", (word, name), "written_factor", {"written_factor": factor}, _JOINTS
+    )
 
 
 def _apply_convention(design: Design, state: State, draft: Draft) -> None:
@@ -58,8 +65,15 @@ def _within(word: str, column: str, field: str) -> Cause:
     return off_list(
         f"{field}_of_one_{word}",
         (column, {"pressure": "hydraulic_pressure_psi", "temperature": "temperature_c"}[field]),
-        lambda rng, d: {"name": pick(rng, getattr(d, word), _FEWEST), "from": float(np.median(getattr(d, field)))},
-        lambda d, p: (getattr(d, word) == p["name"]) * (getattr(d, field) - p["from"]) / getattr(d, field).std(),
+        lambda rng, d: {
+            "name": pick(rng, getattr(d, word), _FEWEST),
+            "from": float(np.median(getattr(d, field))),
+        },
+        lambda d, p: (
+            (getattr(d, word) == p["name"])
+            * (getattr(d, field) - p["from"])
+            / getattr(d, field).std()
+        ),
     )
 
 
@@ -70,7 +84,11 @@ DEPARTURES: dict[str, Cause] = {
         Cause("convention_slip", _draw_convention, _apply_convention),
         *(
             _within(word, column, field)
-            for word, column in (("tail", "tail_no"), ("gauge", "gauge_id"), ("technician", "technician_id"))
+            for word, column in (
+                ("tail", "tail_no"),
+                ("gauge", "gauge_id"),
+                ("technician", "technician_id"),
+            )
             for field in ("pressure", "temperature")
         ),
     )

@@ -1,7 +1,8 @@
 """Who was inspected when, where, by whom and with what: the fleet before anything is measured.
 
-Rows come in visits of one tail to one base, both gears of the tail on the same day more often than not. Wear
-follows the landings of each gear with an exponent of its own for each joint: clearances are correlated.
+Rows come in visits of one tail to one base, both gears of the tail on the same day more often than
+not. Wear follows the landings of each gear with an exponent of its own for each joint: clearances
+are correlated.
 """
 
 from __future__ import annotations
@@ -146,7 +147,9 @@ def draw_design(
     season = -np.cos(2.0 * np.pi * (day - 15.0) / 365.25)
     days, position = np.unique(day, return_inverse=True)
     local = rng.normal(0.0, 6.0, days.size)[position]
-    temperature = np.clip(climate[base] + 12.0 * season + local + rng.normal(0.0, 1.5, rows), -30.0, 45.0)
+    temperature = np.clip(
+        climate[base] + 12.0 * season + local + rng.normal(0.0, 1.5, rows), -30.0, 45.0
+    )
     pressure = rng.uniform(2600.0, 3100.0, rows) + rng.uniform(-40.0, 40.0, 3)[base]
     if hand_pump:
         share = 0.45 if arrangement != "confounded" else np.array([0.15, 0.45, 0.75])[base]
@@ -156,7 +159,9 @@ def draw_design(
     landings, worn = _landings(rng, gear, base, day, arrangement)
     clearance, floats = _wear(rng, gear, landings, worn)
     margins = {key: round(float(rng.uniform(0.025, 0.040)), 3) for key in sorted(set(gear))}
-    approach = np.where(rng.random(rows) < rng.uniform(0.45, 0.65), "EXTENDING", "RETRACTING").astype(object)
+    approach = np.where(
+        rng.random(rows) < rng.uniform(0.45, 0.65), "EXTENDING", "RETRACTING"
+    ).astype(object)
     return Design(
         tail=tail,
         side=side,
@@ -185,13 +190,16 @@ def _homes(rng: np.random.Generator, count: int) -> NDArray[np.intp]:
 
 
 def _identities(rng: np.random.Generator, rows: int, arrangement: str) -> dict[str, Any]:
-    tails = _names(rng, "N" if rng.random() < 0.8 else "", int(rng.integers(12, 21) + rows // 100 - 2), 3)
+    tails = _names(
+        rng, "N" if rng.random() < 0.8 else "", int(rng.integers(12, 21) + rows // 100 - 2), 3
+    )
     gauges = _names(rng, "G-", int(rng.integers(4, 7)), 2)
     technicians = _names(rng, "T-", int(rng.integers(4, 7)), 2)
     tail_home = _homes(rng, len(tails))
     gauge_home, technician_home = _homes(rng, len(gauges)), _homes(rng, len(technicians))
     if arrangement == "confounded":
-        # A base with one gauge and one technician would make the two inseparable: give it a second gauge.
+        # A base with one gauge and one technician would make the two inseparable: give it a second
+        # gauge.
         technician_home = _homes(rng, len(technicians))
         for home in range(3):
             if (gauge_home == home).sum() == 1 and (technician_home == home).sum() == 1:
@@ -213,11 +221,14 @@ def _identities(rng: np.random.Generator, rows: int, arrangement: str) -> dict[s
         technician = _assign(rng, technicians, technician_home, home, arrangement)
         sides = ["LH", "RH"] if rng.random() < 0.9 else [str(rng.choice(["LH", "RH"]))]
         for side in sides[: rows - len(columns["tail"])]:
-            for key, value in zip(columns, (tails[tail], side, gauge, technician, home, day), strict=True):
+            for key, value in zip(
+                columns, (tails[tail], side, gauge, technician, home, day), strict=True
+            ):
                 columns[key].append(value)
     order = np.argsort(np.array(columns["day"]), kind="stable")
     fleet: dict[str, Any] = {
-        key: np.array(columns[key], dtype=object)[order] for key in ("tail", "side", "gauge", "technician")
+        key: np.array(columns[key], dtype=object)[order]
+        for key in ("tail", "side", "gauge", "technician")
     }
     fleet["base"] = np.array(columns["base"])[order]
     fleet["day"] = np.array(columns["day"], dtype=float)[order]
@@ -225,7 +236,9 @@ def _identities(rng: np.random.Generator, rows: int, arrangement: str) -> dict[s
     return fleet
 
 
-def _assign(rng: np.random.Generator, names: list[str], homes: NDArray[np.intp], home: int, arrangement: str) -> str:
+def _assign(
+    rng: np.random.Generator, names: list[str], homes: NDArray[np.intp], home: int, arrangement: str
+) -> str:
     local = [name for name, at in zip(names, homes, strict=True) if at == home]
     away = 0.0 if arrangement == "confounded" else 0.18
     if arrangement == "iid" or rng.random() < away:
@@ -247,7 +260,9 @@ def _tie(rng: np.random.Generator, alias: str, fleet: dict[str, Any]) -> dict[st
         other = str(people[np.argmax(shared)])
         together = gauge == one
         elsewhere = (technician == other) & ~together
-        technician[elsewhere] = rng.choice([t for t in fleet["technicians"] if t != other], elsewhere.sum())
+        technician[elsewhere] = rng.choice(
+            [t for t in fleet["technicians"] if t != other], elsewhere.sum()
+        )
         technician[together] = other
         result["alias_names"] = (one, other)
     elif alias in ("tail_gauge", "tail_technician"):
@@ -289,7 +304,9 @@ def _landings(
     return np.rint(landings), np.array([hard[g] for g in gear])
 
 
-def _wear(rng: np.random.Generator, gear: Texts, landings: Array, hard: Array) -> tuple[Array, Array]:
+def _wear(
+    rng: np.random.Generator, gear: Texts, landings: Array, hard: Array
+) -> tuple[Array, Array]:
     """True clearances and end floats."""
     rows = len(gear)
     exponent = rng.uniform(0.85, 1.2, 10)
@@ -298,9 +315,9 @@ def _wear(rng: np.random.Generator, gear: Texts, landings: Array, hard: Array) -
     play = {key: rng.uniform(0.15, 1.0, 10) for key in own}
     single = np.array([own[key] for key in gear])
     rate = rng.uniform(0.0009, 0.0021, 10)
-    clearance = rng.uniform(0.0003, 0.0011, (rows, 10)) + rate * hard[:, None] * single * kilo**exponent * (
-        rng.lognormal(0.0, 0.35, (rows, 10))
-    )
+    clearance = rng.uniform(0.0003, 0.0011, (rows, 10)) + rate * hard[
+        :, None
+    ] * single * kilo**exponent * (rng.lognormal(0.0, 0.35, (rows, 10)))
     used = 0.35 + 0.65 * kilo / 3.0
     ends = np.array([play[key] for key in gear]) * used * rng.lognormal(-0.1, 0.3, (rows, 10))
     floats = 0.003 + 0.055 * ends

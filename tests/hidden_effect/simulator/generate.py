@@ -1,7 +1,7 @@
 """Draw a fleet, hide effects in it, write its table, and keep the label.
 
-Every part of the randomness has a stream of its own, so that the same seed gives the same fleet, the same
-pins and the same errors whatever is hidden in them.
+Every part of the randomness has a stream of its own, so that the same seed gives the same fleet,
+the same pins and the same errors whatever is hidden in them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,16 @@ Array = NDArray[np.float64]
 #: Kinds of nothing-wrong fleets.
 NULLS = ("iid", "heavy_tails", "tail_scatter", "confounded", "growing_noise", "n500")
 #: Kinds of fleets; ``mix`` draws one of the others.
-KINDS = ("null", "single", "double", "off_catalogue", "aliased", "missing_column", "confounded", "triple")
+KINDS = (
+    "null",
+    "single",
+    "double",
+    "off_catalogue",
+    "aliased",
+    "missing_column",
+    "confounded",
+    "triple",
+)
 _MIX = (0.22, 0.24, 0.12, 0.22, 0.05, 0.11, 0.04, 0.0)
 _ALIAS_CAUSES = {
     "gauge_technician": ("gauge_bias", "technician_bias"),
@@ -59,7 +68,8 @@ class EffectSpec:
     target : str, optional
         Target in words, for example ``joint 4``; drawn if None.
     strength : float, optional
-        Requested S = effect rms / noise rms x sqrt(rows); if None the physical parameter stays as drawn [-].
+        Requested S = effect rms / noise rms x sqrt(rows); if None the physical parameter stays as
+        drawn [-].
     parameters : dict
         Physical parameters that are not to be drawn.
     """
@@ -179,7 +189,8 @@ class Label:
     effects : tuple of Effect
         The same with sizes and parameters.
     aliases : tuple
-        (cause, target) of the causes that touch exactly the same rows as the hidden one, itself included.
+        (cause, target) of the causes that touch exactly the same rows as the hidden one, itself
+        included.
     complements : tuple
         Those that touch exactly the other rows.
     effect_rms_in : float
@@ -187,7 +198,8 @@ class Label:
     effect_sd_in : float
         The same about its mean [in].
     noise_rms_in : float
-        Root mean square of mean reading minus worst case at the recorded clearances with nothing wrong [in].
+        Root mean square of mean reading minus worst case at the recorded clearances with nothing
+        wrong [in].
     noise_sd_in : float
         The same about its mean [in].
     repeatability_in : float
@@ -201,10 +213,11 @@ class Label:
     faults : tuple of Fault
         Slips in the table.
     truth_term : Array
-        All effects together on every row, before rounding: what has to be added to a prediction from the
-        recorded clearances, (n,) [in].
+        All effects together on every row, before rounding: what has to be added to a prediction
+        from the recorded clearances, (n,) [in].
     noise_term : Array
-        Mean reading minus worst case of every row with nothing wrong, NaN without readings, (n,) [in].
+        Mean reading minus worst case of every row with nothing wrong, NaN without readings, (n,)
+        [in].
     seed : int
         Seed of the fleet.
     """
@@ -293,12 +306,15 @@ class _Effects:
         self._rigid: Array | None = None
 
     def shift(self, drafts: Sequence[tuple[str, Draft]]) -> tuple[Array, Array, Array]:
-        """Effect on reading minus prediction, on the reading alone, and on the recorded clearances."""
+        """Effect on reading minus prediction, on the reading alone, and on the recorded
+        clearances.
+        """
         state = self.gears.sound()
         for name, draft in drafts:
             departures.find(name).apply(self.gears.design, state, draft)
         only_reading = not state.recorded.any() and all(
-            (name not in causes.CATALOGUE and draft.knob == "amplitude_in") or draft.knob == "reading_shift_in"
+            (name not in causes.CATALOGUE and draft.knob == "amplitude_in")
+            or draft.knob == "reading_shift_in"
             for name, draft in drafts
         )
         reading = state.offset if only_reading else self.gears.read(state) - self.base
@@ -312,7 +328,9 @@ class _Effects:
         return total, reading, state.recorded
 
     def sized(self, name: str, draft: Draft, target_rms: float) -> tuple[Draft, float]:
-        """Set the physical parameter so that the effect has the wanted rms; also what it came to."""
+        """Set the physical parameter so that the effect has the wanted rms; also what it came
+        to.
+        """
         knob = causes.KNOBS[draft.knob]
         value, exponent = float(draft.parameters[draft.knob]), knob.exponent
         best = (draft, 0.0)
@@ -411,7 +429,9 @@ def _touched(design: Design, cause: str, draft: Draft) -> NDArray[np.bool_] | No
 def _same_rows(
     design: Design, drafts: Sequence[tuple[str, Draft]]
 ) -> tuple[list[tuple[str, str | None]], list[tuple[str, str | None]]]:
-    """Causes that touch exactly the rows of the only hidden one, and those that touch exactly the others."""
+    """Causes that touch exactly the rows of the only hidden one, and those that touch exactly the
+    others.
+    """
     if len(drafts) != 1:
         return [], []
     name, draft = drafts[0]
@@ -430,7 +450,9 @@ def _same_rows(
         rivals[("date_step", None)] = design.day >= design.alias_day
     rivals[(name, draft.target)] = rows
     same = [key for key, value in rivals.items() if np.array_equal(value, rows)]
-    other = [key for key, value in rivals.items() if np.array_equal(~np.asarray(value, dtype=bool), rows)]
+    other = [
+        key for key, value in rivals.items() if np.array_equal(~np.asarray(value, dtype=bool), rows)
+    ]
     return same, other
 
 
@@ -450,11 +472,18 @@ def simulate_fleet(spec: FleetSpec, seed: int) -> Fleet:
         Table and label.
     """
     geometry = linkage.load(spec.geometry)
-    design = draw_design(_stream(seed, "design"), spec.rows, spec.arrangement, spec.alias, spec.hand_pump)
-    scatter = _stream(seed, "scatter").normal(size=(spec.rows, 10)) * physics.scatter_size(design)[:, None]
+    design = draw_design(
+        _stream(seed, "design"), spec.rows, spec.arrangement, spec.alias, spec.hand_pump
+    )
+    scatter = (
+        _stream(seed, "scatter").normal(size=(spec.rows, 10))
+        * physics.scatter_size(design)[:, None]
+    )
     effects = _Effects(Gears(geometry, design, scatter))
     rng = _stream(seed, "errors")
-    single = spec.reading_noise if spec.reading_noise is not None else float(rng.uniform(0.0015, 0.0020))
+    single = (
+        spec.reading_noise if spec.reading_noise is not None else float(rng.uniform(0.0015, 0.0020))
+    )
     repeats = spec.repeats if spec.repeats is not None else int(rng.integers(2, 4))
     set_up = 1.0 if spec.heavy else 0.35
     noise = records.Noise(
@@ -470,7 +499,9 @@ def simulate_fleet(spec: FleetSpec, seed: int) -> Fleet:
     blank = records.draw_blanks(_stream(seed, "blanks"), spec.rows, spec.blank_share, whole)
     if spec.unread_share:
         unread = _stream(seed, "unread").random((10, spec.rows)) < spec.unread_share
-        blank |= {name: blank[name] | own for name, own in zip(records.CLEARANCES, unread, strict=True)}
+        blank |= {
+            name: blank[name] | own for name, own in zip(records.CLEARANCES, unread, strict=True)
+        }
     noise_term = _noise_term(effects, errors, blank)
     noise_rms = float(np.sqrt(np.nanmean(noise_term**2)))
 
@@ -479,7 +510,12 @@ def simulate_fleet(spec: FleetSpec, seed: int) -> Fleet:
     for wanted in spec.effects:
         aimed = _alias_target(spec, design, wanted) if spec.alias is not None else wanted
         taken = {(name, draft.target) for name, draft in drafts}
-        drafts.append((wanted.cause, _draw_effect(rng, effects, aimed, noise_rms, alias=spec.alias, taken=taken)))
+        drafts.append(
+            (
+                wanted.cause,
+                _draw_effect(rng, effects, aimed, noise_rms, alias=spec.alias, taken=taken),
+            )
+        )
     total, on_reading, on_record = effects.shift(drafts)
 
     clearance = records.recorded_clearances(design, errors, on_record)
@@ -487,9 +523,9 @@ def simulate_fleet(spec: FleetSpec, seed: int) -> Fleet:
     table = records.write_table(design, noise, clearance, readings, errors, blank=blank)
     for column in spec.drop_columns:
         table.pop(column, None)
-    gain = linkage.plunger_gradient(linkage.Build.nominal(geometry, 1), np.zeros((1, 10, 2)), geometry.start[None, :])[
-        0
-    ]
+    gain = linkage.plunger_gradient(
+        linkage.Build.nominal(geometry, 1), np.zeros((1, 10, 2)), geometry.start[None, :]
+    )[0]
     weights = np.hypot(gain[:, 0], gain[:, 1])
     faults = records.add_faults(_stream(seed, "faults"), table, spec.faults, weights, noise_rms)
 
@@ -520,7 +556,9 @@ def simulate_fleet(spec: FleetSpec, seed: int) -> Fleet:
     return Fleet(table, label, spec, world)
 
 
-def _noise_term(effects: _Effects, errors: records.Errors, blank: dict[str, NDArray[np.bool_]]) -> Array:
+def _noise_term(
+    effects: _Effects, errors: records.Errors, blank: dict[str, NDArray[np.bool_]]
+) -> Array:
     """Mean reading minus worst case at the recorded clearances with nothing wrong, (n,) [in]."""
     design = effects.gears.design
     clearance = records.recorded_clearances(design, errors)
@@ -582,7 +620,8 @@ def draw_spec(
     kind : str
         One of ``KINDS``, or ``mix``.
     strength : float, optional
-        Requested S of every effect; drawn from 5, 7, 10, 15 and 25 if None (10 and more for several causes) [-].
+        Requested S of every effect; drawn from 5, 7, 10, 15 and 25 if None (10 and more for several
+        causes) [-].
     cause : str, optional
         Name of the (first) cause; drawn if None.
     target : str, optional
@@ -639,7 +678,9 @@ def draw_spec(
     if kind in ("double", "triple"):
         second = str(rng.choice([other for other in names if other != name]))
         size = strength if strength is not None else float(rng.choice([10.0, 15.0, 25.0]))
-        spec = replace(spec, effects=(EffectSpec(name, target, size), EffectSpec(second, None, size)))
+        spec = replace(
+            spec, effects=(EffectSpec(name, target, size), EffectSpec(second, None, size))
+        )
     if kind == "triple":
         third = str(rng.choice([other for other in names if other not in (name, second)]))
         spec = replace(spec, effects=(*spec.effects, EffectSpec(third, None, size)))
@@ -650,7 +691,12 @@ def draw_spec(
 
 def _with_pump(spec: FleetSpec, cause: str) -> FleetSpec:
     """A cause that lives on the pressure needs a fleet in which the pressure differs."""
-    needs = cause in ("elastic_compliance", "pressure_kink", "cold_oil_under_load", "lost_motion_under_load")
+    needs = cause in (
+        "elastic_compliance",
+        "pressure_kink",
+        "cold_oil_under_load",
+        "lost_motion_under_load",
+    )
     return replace(spec, hand_pump=True) if needs else spec
 
 
@@ -743,8 +789,9 @@ def follow_up(fleet: Fleet, readings: Sequence[dict[str, Any]], seed: int) -> Fl
     fleet : Fleet
         The fleet.
     readings : sequence of dict
-        One further inspection each: the columns that are chosen (dates as proleptic ordinals); the rest comes
-        from a row of the fleet that agrees with the chosen tail and side where there is one.
+        One further inspection each: the columns that are chosen (dates as proleptic ordinals); the
+        rest comes from a row of the fleet that agrees with the chosen tail and side where there is
+        one.
     seed : int
         Seed of the further inspections.
 
@@ -759,11 +806,16 @@ def follow_up(fleet: Fleet, readings: Sequence[dict[str, Any]], seed: int) -> Fl
     for chosen in readings:
         fits = np.ones(old.rows, dtype=bool)
         for column in ("tail_no", "side"):
-            if column in chosen and (getattr(old, _OVERRIDES[column])[fits] == chosen[column]).any():
+            if (
+                column in chosen
+                and (getattr(old, _OVERRIDES[column])[fits] == chosen[column]).any()
+            ):
                 fits &= getattr(old, _OVERRIDES[column]) == chosen[column]
         index.append(int(rng.choice(np.flatnonzero(fits))))
     design = old.take(np.array(index, dtype=np.intp))
-    design.clearance[:] = np.minimum(design.clearance * rng.lognormal(0.0, 0.15, design.clearance.shape), 0.0145)
+    design.clearance[:] = np.minimum(
+        design.clearance * rng.lognormal(0.0, 0.15, design.clearance.shape), 0.0145
+    )
     for row, chosen in enumerate(readings):
         for column, value in chosen.items():
             if column in records.CLEARANCES:

@@ -1,9 +1,10 @@
-"""The down-lock release linkage as a closed 3-D chain, solved by Newton's method on its constraint equations.
+"""The down-lock release linkage as a closed 3-D chain, solved by Newton's method on its constraint
+equations.
 
 Fifteen unknowns (seven joints in their planes and the plunger's travel) against fifteen constraints
 (eleven distances between points in space and the angles of four levers). Every distance, every
-fixed pivot and every out-of-plane offset may differ from row to row, so that stretched, heated and tilted
-parts enter where they are, not as a correction to the result.
+fixed pivot and every out-of-plane offset may differ from row to row, so that stretched, heated and
+tilted parts enter where they are, not as a correction to the result.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: Distances in the order of the constraint equations; the angles of the four levers come after them.
+#: Distances in the order of the constraint equations; the angles of the four levers come after
+#: them.
 LENGTHS = ("E1", "E2", "F1", "Q3", "45", "46", "35", "67", "87", "89", "910")
 _LENGTH_INDEX = {name: index for index, name in enumerate(LENGTHS)}
 _ANGLES = len(LENGTHS)
@@ -49,7 +51,8 @@ class Geometry:
     lengths : Array
         Nominal distances in the order of ``LENGTHS``, (11,) [in].
     arm_angles : Array
-        Angle from the first to the last arm of crank, slotted lever, locking lever and bellcrank, (4,) [rad].
+        Angle from the first to the last arm of crank, slotted lever, locking lever and bellcrank,
+        (4,) [rad].
     arms : Array
         Nominal length of the first arm of each, (4,) [in].
     along, across : Array
@@ -97,7 +100,8 @@ class Build:
     spread : Array
         Strain of the airframe between the fixed points, about joint 4, (n,) [-].
     link_offset : Array
-        Offset of one end of links 3-5, 6-7 and 9-10 square to the line between their pins, (n, 3) [in].
+        Offset of one end of links 3-5, 6-7 and 9-10 square to the line between their pins, (n, 3)
+        [in].
     lever_tilt : Array
         Tangent of the locking lever's tilt, (n,) [-].
     twist : Array
@@ -165,8 +169,8 @@ def _turn(vectors: Array, angle: Array) -> Array:
 class _Equations:
     """Residuals and derivatives of the closure for one batch of builds and clearances.
 
-    A rigid lever is held by two lengths and the angle between its arms; three lengths would leave it loose to
-    first order where its arms are in line.
+    A rigid lever is held by two lengths and the angle between its arms; three lengths would leave
+    it loose to first order where its arms are in line.
     """
 
     def __init__(self, build: Build, clearances: Array) -> None:
@@ -183,7 +187,12 @@ class _Equations:
         direction = geometry.tilt_direction
         self.lever = np.eye(2) + lean * np.outer(direction, direction)
         self.angles = geometry.arm_angles[None, :] + np.stack(
-            [np.zeros_like(build.twist), np.zeros_like(build.twist), build.twist, np.zeros_like(build.twist)],
+            [
+                np.zeros_like(build.twist),
+                np.zeros_like(build.twist),
+                build.twist,
+                np.zeros_like(build.twist),
+            ],
             axis=1,
         )
 
@@ -217,11 +226,18 @@ class _Equations:
         return d
 
     def arms(self, unknown: Array, vectors: Array) -> tuple[Array, Array]:
-        """Arms of crank, slotted lever, locking lever and bellcrank in their planes, each (n, 4, 2) [in]."""
+        """Arms of crank, slotted lever, locking lever and bellcrank in their planes, each (n, 4, 2)
+        [in].
+        """
         pin = unknown[:, 2:4] + self.clearance[:, 1] - self.at["Q"][:, :2]
         eight = self.geometry.eight + self.clearance[:, 7]
-        first = np.stack([vectors[:, 0, :2], pin, vectors[:, 4, :2], unknown[:, 10:12] - eight], axis=1)
-        last = np.stack([vectors[:, 1, :2], vectors[:, 3, :2], vectors[:, 5, :2], unknown[:, 12:14] - eight], axis=1)
+        first = np.stack(
+            [vectors[:, 0, :2], pin, vectors[:, 4, :2], unknown[:, 10:12] - eight], axis=1
+        )
+        last = np.stack(
+            [vectors[:, 1, :2], vectors[:, 3, :2], vectors[:, 5, :2], unknown[:, 12:14] - eight],
+            axis=1,
+        )
         return _turn(first, self.angles), last
 
     def residual(self, unknown: Array, vectors: Array) -> Array:
@@ -268,13 +284,17 @@ class _Equations:
         j[:, 9, nine] = plane[:, 9]
         j[:, 10, nine] = -plane[:, 10]
         j[:, 10, _PLUNGER] = unit[:, 10] @ self.geometry.axis
-        for lever, (first, last) in enumerate(((one, two), (two, three), (five, six), (seven, nine))):
+        for lever, (first, last) in enumerate(
+            ((one, two), (two, three), (five, six), (seven, nine))
+        ):
             j[:, _ANGLES + lever, first] = by_first[:, lever]
             j[:, _ANGLES + lever, last] = by_last[:, lever]
         return j
 
     def solve(self, start: Array) -> Array:
-        """Close every row by Newton's method, (n, 15) [in]; NaN where the linkage does not close."""
+        """Close every row by Newton's method, (n, 15) [in]; NaN where the linkage does not
+        close.
+        """
         unknown = start.copy()
         with np.errstate(all="ignore"):
             for _ in range(_MAX_ITERATIONS):
@@ -294,7 +314,9 @@ class _Equations:
         vectors = self.vectors(unknown)
         selected = np.zeros((unknown.shape[0], _UNKNOWNS, 1))
         selected[:, _PLUNGER] = 1.0
-        weight = np.linalg.solve(self.jacobian(unknown, vectors).transpose(0, 2, 1), selected)[:, :, 0]
+        weight = np.linalg.solve(self.jacobian(unknown, vectors).transpose(0, 2, 1), selected)[
+            :, :, 0
+        ]
         unit, by_first, by_last = self.slopes(unknown, vectors)
         unit *= weight[:, :_ANGLES, None]
         by_first *= weight[:, _ANGLES:, None]
@@ -414,9 +436,9 @@ def plunger_gradient(build: Build, clearances: Array, unknown: Array) -> Array:
 def worst_directions(build: Build, sizes: Array, rounds: int = 2) -> tuple[Array, Array]:
     """Directions of the virtual links that push the plunger furthest into over-travel.
 
-    At the maximum every virtual link points along the plunger's derivative by that link. The directions are
-    laid along it, the linkage is closed again, and so on; each round shrinks the error by a factor of the
-    order of clearance over link length.
+    At the maximum every virtual link points along the plunger's derivative by that link. The
+    directions are laid along it, the linkage is closed again, and so on; each round shrinks the
+    error by a factor of the order of clearance over link length.
 
     Parameters
     ----------
@@ -478,7 +500,9 @@ def _travel_rate(geometry: Geometry) -> float:
     sign = 1.0 if values[-1] < 0.0 else -1.0
     lowest = int(np.argmin(sign * values))
     near = slice(max(lowest - 2, 0), lowest + 3)
-    fit = np.polynomial.Polynomial.fit(strokes[near], sign * values[near], min(4, len(values[near]) - 1))
+    fit = np.polynomial.Polynomial.fit(
+        strokes[near], sign * values[near], min(4, len(values[near]) - 1)
+    )
     fine = fit(np.linspace(strokes[near][0], strokes[near][-1], 4001))
     return float(sign * 0.45 / -fine.min())
 
@@ -503,7 +527,9 @@ def _stored() -> dict[str, dict[str, Any]]:
 
 def _between(one: Any, other: Any, share: float) -> Any:
     if isinstance(one, dict):
-        return {key: _between(value, other[key], share) for key, value in one.items() if key in other}
+        return {
+            key: _between(value, other[key], share) for key, value in one.items() if key in other
+        }
     if isinstance(one, list):
         return [_between(a, b, share) for a, b in zip(one, other, strict=True)]
     return one + share * (other - one) if isinstance(one, float) else one
@@ -534,7 +560,9 @@ def load(name: str = "A") -> Geometry:
     """
     data = _drawing(name)
     mid = data["mid_position_in"]
-    tau, delta, beta = (np.radians(data[k]) for k in ("tau_deg", "dihedral_deg", "plunger_axis_deg"))
+    tau, delta, beta = (
+        np.radians(data[k]) for k in ("tau_deg", "dihedral_deg", "plunger_axis_deg")
+    )
     along = np.array([np.cos(tau), np.sin(tau), 0.0])
     across = np.array([-np.cos(delta) * np.sin(tau), np.cos(delta) * np.cos(tau), np.sin(delta)])
     plane = np.stack([along, across])
@@ -566,7 +594,11 @@ def load(name: str = "A") -> Geometry:
     build = Build.nominal(draft, 1)
     gradient = rate * plunger_gradient(build, np.zeros((1, 10, 2)), start[None, :])[0]
     return Geometry(
-        **{field: getattr(draft, field) for field in draft.__slots__ if field not in ("rate", "angles")},
+        **{
+            field: getattr(draft, field)
+            for field in draft.__slots__
+            if field not in ("rate", "angles")
+        },
         rate=rate,
         angles=np.arctan2(gradient[:, 1], gradient[:, 0]),
     )

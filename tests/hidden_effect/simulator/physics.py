@@ -1,4 +1,6 @@
-"""State of every gear at the moment of its reading, and the reading that the closed linkage gives."""
+"""State of every gear at the moment of its reading, and the reading that the closed linkage
+gives.
+"""
 
 from __future__ import annotations
 
@@ -183,7 +185,8 @@ class Gears:
         return build
 
     def clearances(self, state: State) -> Array:
-        """Virtual links in a state: the pin lies against an ellipse whose long axis is the loaded direction.
+        """Virtual links in a state: the pin lies against an ellipse whose long axis is the loaded
+        direction.
 
         Parameters
         ----------
@@ -219,12 +222,15 @@ class Gears:
         unknown = linkage.close(build, self.clearances(state), self._start)
         if not np.isfinite(unknown).all():
             rows = np.flatnonzero(~np.isfinite(unknown).all(axis=1))
-            raise linkage.ClosureError(f"{rows.size} rows do not close, the first is row {rows[0]}.")
+            raise linkage.ClosureError(
+                f"{rows.size} rows do not close, the first is row {rows[0]}."
+            )
         return linkage.reading(build, unknown) * (1.0 + state.rate_error) + state.offset
 
 
 def worst_case(geometry: linkage.Geometry, clearance: Array) -> Array:
-    """Over-travel of a rigid, flat, cold linkage with the given clearances in their worst directions.
+    """Over-travel of a rigid, flat, cold linkage with the given clearances in their worst
+    directions.
 
     Parameters
     ----------

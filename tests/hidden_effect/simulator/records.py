@@ -19,7 +19,11 @@ RESOLUTION_IN = 0.0005
 JOINTS = range(1, 11)
 CLEARANCES = tuple(f"clearance_{joint}_in" for joint in JOINTS)
 FLOATS = tuple(f"axial_float_{joint}_in" for joint in JOINTS)
-DISPLACEMENTS = ("plunger_displacement_in", "plunger_displacement_2_in", "plunger_displacement_3_in")
+DISPLACEMENTS = (
+    "plunger_displacement_in",
+    "plunger_displacement_2_in",
+    "plunger_displacement_3_in",
+)
 #: Every column that a table may have, in its order.
 COLUMNS = (
     "record_id",
@@ -171,7 +175,9 @@ def draw_errors(
 
     names = sorted(set(design.tail))
     offsets = dict(zip(names, (rng.normal(size=len(names)) * noise.tail).tolist(), strict=True))
-    plunger = noise.set_up * draw((design.rows, 1)) + noise.reading * rng.normal(size=(design.rows, repeats))
+    plunger = noise.set_up * draw((design.rows, 1)) + noise.reading * rng.normal(
+        size=(design.rows, repeats)
+    )
     if noise.growing:
         plunger *= (np.abs(displacement) / np.sqrt(np.mean(displacement**2)))[:, None]
     return Errors(
@@ -311,7 +317,9 @@ def write_table(
     values |= {DISPLACEMENTS[i]: readings[:, i].tolist() for i in range(readings.shape[1])}
     for column, hidden in blank.items():
         if column in values:
-            values[column] = [None if out else v for v, out in zip(values[column], hidden, strict=True)]
+            values[column] = [
+                None if out else v for v, out in zip(values[column], hidden, strict=True)
+            ]
     return {column: values[column] for column in COLUMNS if column in values}
 
 
@@ -357,12 +365,16 @@ def add_faults(
     return faults
 
 
-def _slip(rng: np.random.Generator, table: Table, kind: str, free: list[int]) -> list[tuple[int, str, Any]]:
+def _slip(
+    rng: np.random.Generator, table: Table, kind: str, free: list[int]
+) -> list[tuple[int, str, Any]]:
     """A slip within single cells of one row."""
     present = [name for name in DISPLACEMENTS if name in table]
     rng.shuffle(free)
     for row in free:
-        sizes = {name: table[name][row] for name in CLEARANCES if table.get(name) and table[name][row]}
+        sizes = {
+            name: table[name][row] for name in CLEARANCES if table.get(name) and table[name][row]
+        }
         shown = {name: table[name][row] for name in present if table[name][row] is not None}
         large = [name for name, size in sizes.items() if size >= 0.0025]
         if len(shown) == 0 or len(large) == 0 or min(abs(v) for v in shown.values()) < 0.015:
@@ -383,8 +395,14 @@ def _slip(rng: np.random.Generator, table: Table, kind: str, free: list[int]) ->
     return []
 
 
-def _swap_side(rng: np.random.Generator, table: Table, free: list[int]) -> list[tuple[int, str, Any]]:
-    days = list(zip(table["tail_no"], table.get("inspection_date", [None] * len(table["side"])), strict=True))
+def _swap_side(
+    rng: np.random.Generator, table: Table, free: list[int]
+) -> list[tuple[int, str, Any]]:
+    days = list(
+        zip(
+            table["tail_no"], table.get("inspection_date", [None] * len(table["side"])), strict=True
+        )
+    )
     twins = [row for row in free if days[row][1] is not None and days.count(days[row]) == 2]
     twins = [row for row in twins if _other_side_present(table, days, row)]
     if not twins:
@@ -402,7 +420,9 @@ def _swap_joints(
 ) -> list[tuple[int, str, Any]]:
     if any(name not in table for name in CLEARANCES):
         return []
-    cells = np.array([[np.nan if v is None else v for v in table[name]] for name in CLEARANCES], dtype=float)
+    cells = np.array(
+        [[np.nan if v is None else v for v in table[name]] for name in CLEARANCES], dtype=float
+    )
     first, second = np.triu_indices(10, 1)
     shift = (weights[first] - weights[second])[:, None] * (cells[second] - cells[first])
     shift[:, [row for row in range(cells.shape[1]) if row not in set(free)]] = np.nan
@@ -410,7 +430,11 @@ def _swap_joints(
     if rows.size == 0:
         return []
     chosen = int(rng.integers(rows.size))
-    row, one, two = int(rows[chosen]), CLEARANCES[first[pairs[chosen]]], CLEARANCES[second[pairs[chosen]]]
+    row, one, two = (
+        int(rows[chosen]),
+        CLEARANCES[first[pairs[chosen]]],
+        CLEARANCES[second[pairs[chosen]]],
+    )
     return [(row, one, table[two][row]), (row, two, table[one][row])]
 
 

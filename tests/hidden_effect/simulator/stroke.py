@@ -1,4 +1,6 @@
-"""Readings along the stroke: gears read at other actuator extensions than mid-position, a dial on the plunger."""
+"""Readings along the stroke: gears read at other actuator extensions than mid-position, a dial on
+the plunger.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +54,8 @@ class CurveSpec:
 
 
 def positions(gears: Gears, state: State, extension: Array) -> Array:
-    """Plunger position of every row at an actuator extension from Down Lock; pins rest as at mid-position.
+    """Plunger position of every row at an actuator extension from Down Lock; pins rest as at
+    mid-position.
 
     Parameters
     ----------
@@ -80,7 +83,9 @@ def _cold(state: State) -> State:
 
 
 def _moved(gears: Gears, state: State, links: Array, extension: Array) -> Array:
-    """Calibrated reading at an extension: the linkage is followed back from mid-position in small steps."""
+    """Calibrated reading at an extension: the linkage is followed back from mid-position in small
+    steps.
+    """
     back = extension - gears.geometry.stroke
     unknown = None
     for share in np.linspace(0.0, 1.0, 2 + int(np.max(np.abs(back)) / _LONGEST_STEP_IN)):
@@ -113,7 +118,9 @@ def curve_table(spec: CurveSpec, seed: int) -> tuple[dict[str, list[Any]], Mappi
     drawn = draw_design(rng, max(6 * spec.gears, 40))
     names = np.array([f"{t} {s}" for t, s in zip(drawn.tail, drawn.side, strict=True)])
     index = [
-        rng.choice(np.flatnonzero(names == name), spec.rows if spec.fleet else 1).repeat(1 if spec.fleet else spec.rows)
+        rng.choice(np.flatnonzero(names == name), spec.rows if spec.fleet else 1).repeat(
+            1 if spec.fleet else spec.rows
+        )
         for name in np.unique(names)[: spec.gears]
     ]
     design = drawn.take(np.concatenate(index))
@@ -142,5 +149,7 @@ def curve_table(spec: CurveSpec, seed: int) -> tuple[dict[str, list[Any]], Mappi
         "plunger_position_in": position.round(6).tolist(),
     }
     if spec.fleet:
-        table["plunger_displacement_in"] = (gears.read(state) + rng.normal(0.0, spec.noise_in, n)).round(6).tolist()
+        table["plunger_displacement_in"] = (
+            (gears.read(state) + rng.normal(0.0, spec.noise_in, n)).round(6).tolist()
+        )
     return table, hidden
