@@ -151,7 +151,7 @@ def gained(predicted: Array, misfit: Array, column: Array, tails: np.ndarray) ->
     table = DiagnosisTable(
         none[:, None], none[:, None], names, np.arange(n), none + 0.03, none, {}, {"tail_no": tail}
     )
-    return measure_gain(noise, column[:, None], misfit, predicted, table, np.random.default_rng(1))
+    return measure_gain(noise, column[:, None], misfit, predicted, table)
 
 
 def test_decisions_after_are_those_of_the_extended_prediction_in_both_senses() -> None:

@@ -121,7 +121,6 @@ def run(task: tuple[str, int, int]) -> Record:
             table,
             gear.discrepancies,
             ensemble=gear.ensemble_models[1:],
-            permutations=study.PERMUTATIONS,
         )
     except InconclusiveDataError as error:
         return {

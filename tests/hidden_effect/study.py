@@ -31,7 +31,6 @@ from tests.hidden_effect import simulator
 from tests.hidden_effect.as_table import as_table
 
 FIRST_SEED = 1_000_000
-PERMUTATIONS = 199
 RESULT = Path(__file__).with_name("study_result.json")
 
 # Strengths at which the part of an effect that differs from row to row is looked at on its own.
@@ -95,7 +94,6 @@ def run(task: Task) -> Record:
             table,
             gear.discrepancies,
             ensemble=gear.ensemble_models[1:],
-            permutations=PERMUTATIONS,
         )
     except InconclusiveDataError:
         found = None
@@ -351,7 +349,6 @@ def study(
     return {
         "fleets": len(records),
         "first_seed": first_seed,
-        "permutations": PERMUTATIONS,
         "plan": plan,
         **summarise(records),
     }

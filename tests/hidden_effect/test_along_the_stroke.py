@@ -50,7 +50,7 @@ def found(name: str, seed: int, without: tuple[str, ...] = ()) -> Diagnosis:
     """Hide, write, read, diagnose: once for all tests of a worker."""
     with TemporaryDirectory() as folder:
         file = write(Path(folder) / "curve.csv", globals()[name], seed, without)
-        return diagnose_files([file], DiagnoseOptions(permutations=99)).diagnosis
+        return diagnose_files([file], DiagnoseOptions()).diagnosis
 
 
 def named(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
@@ -126,9 +126,7 @@ def test_one_rig_without_clearances_shows_another_linkage() -> None:
 
 def test_what_one_rig_cannot_say_stands_beside_its_verdict(tmp_path: Path) -> None:
     file = write(tmp_path / "rig.csv", RIG, 1, CLEARANCES)
-    out = CliRunner().invoke(
-        app, ["diagnose", str(file), "--json", "--permutations", "99", "--quiet"]
-    )
+    out = CliRunner().invoke(app, ["diagnose", str(file), "--json", "--quiet"])
     said = json.loads(out.stdout)["cannot_say"]
     assert [out.exit_code, len(said)] == [0, 1]
     assert "whether other gears do the same" in said[0]

@@ -6,11 +6,11 @@ import json
 from functools import cache
 
 import pytest
+from mlg_troubleshoot.diagnosis.inference import RULED_OUT
 from scipy.stats import norm
 from typer.testing import CliRunner
 
 from mlg_troubleshoot.cli.app import app
-from mlg_troubleshoot.diagnosis.inference import RULED_OUT
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.workflows.separable import _APART, CausePlanned, separable
 
