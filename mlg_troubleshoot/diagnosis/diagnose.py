@@ -37,7 +37,7 @@ from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.explanation import Key
-from mlg_troubleshoot.misfit.screen import shrunk
+from mlg_troubleshoot.misfit.fitting import shrunk
 from mlg_troubleshoot.misfit.verdict import Verdict
 from mlg_troubleshoot.units import MM_PER_IN
 

@@ -239,7 +239,7 @@ def _said(problem: Problem, found: Posterior, noise: NoiseModel) -> Finding:
     alike = _alike(problem, found, said)
     said = [n for n in said if n not in alike]
     verdict = Verdict.NAMED if said else Verdict.AMBIGUOUS
-    if found.nothing > 1.0 - beliefs.sure:
+    if found.nothing >= 0.5:
         verdict = Verdict.NONE
     elif found.unlisted >= 0.5 or not listed:
         verdict = Verdict.UNLISTED

@@ -203,7 +203,7 @@ class _Plan:
         if key in self.blocks:
             rival = next(other for other in self.blocks if other != key)
             lead = partial(_divergence, true=self.blocks[key], other=self.blocks[rival])
-            return rival[0], _size_of(lead, _BELIEFS.odds)
+            return rival[0], _size_of(lead, 0.5 * _APART**2)
         best, name = 0.0, None
         for other, places in self.keys.items():
             if other != key:

@@ -35,6 +35,8 @@ RESULT = Path(__file__).with_name("study_result.json")
 
 # Strengths at which the part of an effect that differs from row to row is looked at on its own.
 VARYING = (10.0, 7.0, 5.0)
+# Probability below which what is said of a cause is not kept.
+_TRACE = 0.01
 
 Task = dict[str, Any]
 Record = dict[str, Any]
@@ -106,6 +108,16 @@ def run(task: Task) -> Record:
     }
 
 
+def stated(found: Diagnosis) -> Record:
+    """How likely each cause was said to be, and nothing, and something on no list."""
+    return {
+        "probabilities": [(*key, p) for key, p in found.probabilities.items() if p > _TRACE],
+        "p_nothing": found.p_nothing,
+        "p_unlisted": found.p_unlisted,
+        "written": bool(found.terms),
+    }
+
+
 def _same(name: tuple[str, str | None], truth: tuple[str, str | None]) -> bool:
     """A tail may be named for one of its gears, and a gear by its tail."""
     if name[0] != truth[0] or name[1] == truth[1]:
@@ -146,6 +158,9 @@ def _compare(fleet: simulator.Fleet, found: Diagnosis | None) -> Record:
         (c.candidate.cause.name, c.candidate.target) for c in (*found.also_possible, *found.beside)
     ]
     record["named"] = names
+    record["truth"] = truth
+    record["also"] = also
+    record |= stated(found)
     if listed and truth:
         told = not found.beside and len(names) == len(truth)
         record["right"] = told and all(any(_same(n, t) for n in names) for t in truth)

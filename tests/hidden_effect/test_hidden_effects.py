@@ -130,7 +130,7 @@ def test_a_check_of_later_inspections_is_better_with_the_extension(cause: str) -
 
 @pytest.mark.parametrize("cause", CAUSES)
 def test_what_is_left_looks_like_noise(cause: str) -> None:
-    assert case(cause).diagnosis.remainder_p > 0.001
+    assert case(cause).diagnosis.remainder_is_noise
 
 
 @pytest.mark.parametrize("null", NULLS)
