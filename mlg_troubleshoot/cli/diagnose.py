@@ -116,10 +116,7 @@ def diagnose(
 
 def _unwritten(diagnosis: Diagnosis) -> str:
     if diagnosis.gain is not None and not diagnosis.gain.likelier:
-        return (
-            "No extension written: aircraft that it is not fitted to are no likelier with it than"
-            " without."
-        )
+        return "No extension written: held-out aircraft are not likelier with it than without."
     return (
         f"No extension written: the verdict is {diagnosis.verdict}, no cause of the model is named"
         " alone."

@@ -146,8 +146,8 @@ class Finding:
     from a sure all-joint effect. best: the explanation that is reported. variables: what an
     unlisted effect moves with. unlisted_rms_in: its root mean square. [in] ruled_out: names
     that would explain something alone, but hardly act, likeliest first. noise: the noise under
-    which all are compared. smallest_rms_in: root mean square of the smallest effect that would
-    be seen four times in five. [in] left: probability that something else acts beside what is
+    which all are compared. smallest_rms_in: root mean square of the smallest effect that is
+    detected with 80 % power. [in] left: probability that something else acts beside what is
     sure.
     """
 
@@ -330,7 +330,7 @@ def _unlisted(found: Posterior, verdict: Verdict) -> tuple[tuple[str, ...], floa
 
 
 def _smallest(problem: Problem, found: Posterior, noise: NoiseModel) -> float:
-    """Root mean square of an effect that is likelier than nothing four times in five. [in]"""
+    """Root mean square of an effect that is likelier than nothing with 80 % power. [in]"""
     n, prior = len(problem.misfit), found.effects.log_prior[found.effects.listed]
     often = float(np.exp(np.median(prior))) if len(prior) else problem.beliefs.expected
     return problem.beliefs.seen_from(often, n) * noise.scale_in / float(np.sqrt(n))

@@ -21,7 +21,7 @@ class Beliefs:
     unlisted : float
         Share of what goes wrong that no list has. [1]
     slips : float
-        Slips of the pen in a table that the screening for data faults leaves. [1]
+        Entry errors in a table that the screening for data faults leaves. [1]
     slip_size : float
         How far such a row lies off, over the scatter of a row. [1]
     shape_size : float
@@ -61,7 +61,7 @@ class Beliefs:
 
     def seen_from(self, often: float, n: int) -> float:
         """Size of an effect over the error of its mean, from which n rows make it likelier than
-        nothing four times in five, if it is expected so often in a table. [1]
+        nothing with 80 % power, if it is expected so often in a table. [1]
         """
         bar = np.log1p(n * self.shape_size**2) - 2.0 * np.log(often)
         return float(np.sqrt(max(bar, 0.0)) + _SHORT)

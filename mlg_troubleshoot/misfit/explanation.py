@@ -18,7 +18,7 @@ class Effects:
     """Effects that may act, several variants under one name; each has a size that is not known.
 
     columns, shape (n, p): effect of each per unit of its size. names: what each is a variant of,
-    None where it is a slip of the pen, nothing that anybody has to mend. listed, shape (p,): True
+    None where it is an entry error, nothing that anybody has to correct. listed, shape (p,): True
     if it stands on the list of causes. log_prior, shape (p,): logarithm of how often each is
     expected in a set of data. size, shape (p,): standard deviation of its size. scales, shape (p,):
     True where that is one of several. least, shape (p,): what is smaller does not matter. sign,

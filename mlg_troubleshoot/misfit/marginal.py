@@ -63,7 +63,7 @@ class Products:
 
 @dataclass(frozen=True)
 class _Given:
-    """What is left for all effects once some of them are integrated out; levels are sizes by tails.
+    """Products of all effects once some of them are integrated out; levels are sizes by tails.
 
     square, along: of each effect with itself and with the data, (levels, p). rest: of the data,
     (levels,). log: logarithm of the covariance's determinant, and of the chances of signs,

@@ -106,8 +106,6 @@ def test_an_extension_of_another_geometry_is_refused(extension: Path, diagnosed:
 def test_an_extension_that_cannot_be_written_exits_5(measured: Path) -> None:
     occupied = measured.with_name("occupied")
     occupied.touch()
-    found = mlg(
-        "diagnose", measured, "--quiet", "--write-extension", occupied / "e.toml"
-    )
+    found = mlg("diagnose", measured, "--quiet", "--write-extension", occupied / "e.toml")
     assert found.code == 5
     assert "What to do:" in found.err

@@ -259,7 +259,7 @@ def test_no_gain_is_shown_where_the_model_was_not_extended(nothing: Made) -> Non
 def test_nothing_found_says_what_would_have_been_found(nothing: Made) -> None:
     shown = nothing.text.replace("\u00a0", " ")
     assert (
-        f"An effect of {nothing.diagnosis.smallest_rms_in:.5f} in rms would be seen 4 times in 5"
+        f"The test had 80 % power for an effect of {nothing.diagnosis.smallest_rms_in:.5f} in rms"
         in shown
     )
 

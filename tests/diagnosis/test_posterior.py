@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import re
+from dataclasses import fields, replace
 from itertools import combinations, product
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from mlg_troubleshoot.diagnosis import CATALOGUE, Cause
+from mlg_troubleshoot.diagnosis.causes.together import JointFactors
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.explanation import Context, Effects, Key
 from mlg_troubleshoot.misfit.marginal import Marginal, Products
 from mlg_troubleshoot.misfit.posterior import Posterior, posterior
 
+PAGE = Path(__file__).parents[2] / "docs/explanation/diagnosis.md"
 Array = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
 N, P = 40, 6
@@ -198,3 +203,20 @@ def test_twice_as_much_searching_says_the_same(monkeypatch: pytest.MonkeyPatch) 
 
 def test_what_a_probability_is_said_from_is_odds_of_nine_to_one() -> None:
     assert np.exp(Beliefs().odds) == pytest.approx(9.0)
+
+
+@pytest.mark.parametrize("name", [field.name for field in fields(Beliefs)])
+def test_the_page_of_the_diagnosis_states_what_is_believed(name: str) -> None:
+    row = re.search(rf"^\| `{name}` \| ([^|]+) \|", PAGE.read_text(encoding="utf-8"), re.M)
+    value = getattr(Beliefs(), name)
+    assert row is not None
+    if isinstance(value, float):
+        assert float(row[1]) == pytest.approx(value, abs=5e-4)
+
+
+@pytest.mark.parametrize("cause", CATALOGUE, ids=lambda cause: cause.name)
+def test_the_page_of_the_diagnosis_states_how_large_each_cause_plausibly_is(cause: Cause) -> None:
+    said = PAGE.read_text(encoding="utf-8").split("What counts as noise")[0]
+    assert (f"`{cause.name}`" in said) == (
+        cause.plausible is not None or isinstance(cause, JointFactors)
+    )
