@@ -174,6 +174,11 @@ def word(data: str | None, style: str = "") -> Text:
     return Text("?" if data is None else visible(data, one_line=True), style=style)
 
 
+def joint(number: int | None) -> str:
+    """Return a joint for a cell: ``#3``, and a dash where there is none."""
+    return "-" if number is None else f"#{number}"
+
+
 def say(message: str) -> None:
     print(visible(message), file=sys.stderr, flush=True)
 

@@ -19,6 +19,7 @@ from mlg_troubleshoot.decision.sentences import (
 )
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.life.looking_back import PastInspection
 from mlg_troubleshoot.reporting import inspection_figures as drawn
 from mlg_troubleshoot.reporting.common import Facts, head
 from mlg_troubleshoot.reporting.formats import Lengths, short
@@ -41,7 +42,7 @@ def inspection_document(
     provenance: ReportProvenance,
     problems: Iterable[Problem] = (),
     unit: LengthUnit = LengthUnit.INCH,
-    steps: Sequence[Mapping[str, Any]] = (),
+    steps: Sequence[PastInspection] = (),
 ) -> Document:
     """Make the document of one inspection; `steps` are the gear's inspections up to this one, side
     by side.

@@ -26,6 +26,7 @@ from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:
+    from mlg_troubleshoot.life.looking_back import PastInspection
     from mlg_troubleshoot.records import ReadResult
     from mlg_troubleshoot.reporting import WrittenReport
 
@@ -271,7 +272,7 @@ def write_reports(
     on_written: Callable[[int, int], None] | None = None,
     *,
     unit: LengthUnit = LengthUnit.INCH,
-    before: Sequence[Sequence[Mapping[str, Any]]] = (),
+    before: Sequence[Sequence[PastInspection]] = (),
 ) -> tuple[WrittenReport, ...]:
     """Write a report for each inspection and, for a batch, its summary.
 
@@ -292,7 +293,7 @@ def write_reports(
     unit : LengthUnit
         The unit that its readers use.
     before : sequence, optional
-        What each gear was like before, as `history.seen_before` says it.
+        What each gear was like before, as `looking_back.seen_before` says it.
 
     Returns
     -------
