@@ -295,14 +295,16 @@ def repair(
 ) -> None:
     """Record joints that were restored: their wear starts again."""
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.store import Kind
+    from mlg_troubleshoot.store import RecordKind
     from mlg_troubleshoot.workflows import history
 
     known = load_gear(gear)
     _refuse_unknown(joints, known)
     restored = sorted(set(joints))
     place = kept_in(store, gear)
-    record = history.work(place, Kind.REPAIR, (tail, side), day, work_order, landings, restored)
+    record = history.work(
+        place, RecordKind.REPAIR, (tail, side), day, work_order, landings, restored
+    )
     listed = ", ".join(f"#{joint}" for joint in restored)
     _say_added(place, f"repair of {record.tail_no} {record.side}, {listed}", record)
 
@@ -317,11 +319,11 @@ def rerig(
     gear: options.Gear = options.DEFAULT_GEAR,
 ) -> None:
     """Record that the reversing valve was re-rigged; the wear of the joints goes on."""
-    from mlg_troubleshoot.store import Kind
+    from mlg_troubleshoot.store import RecordKind
     from mlg_troubleshoot.workflows import history
 
     place = kept_in(store, gear)
-    record = history.work(place, Kind.RERIG, (tail, side), day, work_order, landings)
+    record = history.work(place, RecordKind.RERIG, (tail, side), day, work_order, landings)
     _say_added(place, f"re-rigging of {record.tail_no} {record.side}", record)
 
 

@@ -31,7 +31,7 @@ def report_format(text: str) -> ReportFormat:
         raise UsageError(f"a report cannot be written as {text!r}", remedy) from None
 
 
-class Page(StrEnum):
+class PaperSize(StrEnum):
     A4 = "A4"
     LETTER = "Letter"
 
@@ -113,7 +113,7 @@ Report = Annotated[
     typer.Option("--report", metavar="DIR", help="Write printable reports to this folder."),
 ]
 Paper = Annotated[
-    Page | None, typer.Option("--page", help="Paper of the report; A4 unless remembered.")
+    PaperSize | None, typer.Option("--page", help="Paper of the report; A4 unless remembered.")
 ]
 Show = Annotated[
     str | None,

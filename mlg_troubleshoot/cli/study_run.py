@@ -22,8 +22,8 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.paper.study import (
-    Design,
     Directions,
+    StudyDesign,
     StudyFindings,
     StudyOptions,
     StudyResult,
@@ -33,7 +33,7 @@ from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import study as task
 
 _BAR = 16
-_Choice = TypeVar("_Choice", Design, Directions)
+_Choice = TypeVar("_Choice", StudyDesign, Directions)
 
 
 @contextmanager
@@ -55,7 +55,7 @@ def asked(flags: StudyFlags) -> Iterator[tuple[Gear, StudyOptions]]:
         if hasattr(flags, each.name)
     }
     read = {
-        "design": _choice(Design, flags.design, "design"),
+        "design": _choice(StudyDesign, flags.design, "design"),
         "directions": (
             _choice(Directions, flags.directions, "directions")
             if fixed is None
@@ -147,7 +147,7 @@ def _show(findings: StudyFindings, unit: LengthUnit) -> None:
         else "plunger displacement at mid-position"
     )
     console.print(f"{gear.name}: sensitivity of {what}", style="bold")
-    console.print(f"Geometry: {gear.provenance}. Design: {table.design}, seed {table.seed}.")
+    console.print(f"Geometry: {gear.provenance}. StudyDesign: {table.design}, seed {table.seed}.")
     failed = f"{table.failed} did not close" if table.failed else "none failed"
     console.print(
         f"{table.evaluations} solutions of the linkage over {len(gear.ensemble)} linkages,"

@@ -11,7 +11,7 @@ from typing import Any
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.life.chronology import Moment, contradictions, in_order
-from mlg_troubleshoot.store import Kind, Record, Store, StoreError, inspection_from
+from mlg_troubleshoot.store import Record, RecordKind, Store, StoreError, inspection_from
 
 GearKey = tuple[str, str]
 # Letters of a hash by which a record may be named. [1]
@@ -131,7 +131,7 @@ def find(store: Store, record_id: str) -> Record:
         for life in lives(store).values()
         for record in (*(s.record for s in life.inspections), *life.repairs, *life.outcomes)
     ]
-    inspections = (Kind.INSPECTION, Kind.CORRECTION)
+    inspections = (RecordKind.INSPECTION, RecordKind.CORRECTION)
     found = [r for r in live if r.record_id == record_id and r.kind in inspections]
     if not found and len(record_id) >= LEAST_OF_A_HASH:
         found = [r for r in live if r.digest.startswith(record_id.lower())]
@@ -163,25 +163,25 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
     others: dict[str, Record] = {}
     records = _readable_or_not_void(records)
     for record in records:
-        if record.kind is Kind.INSPECTION:
+        if record.kind is RecordKind.INSPECTION:
             kept[record.digest] = KeptInspection(record)
-        elif record.kind is Kind.CORRECTION:
+        elif record.kind is RecordKind.CORRECTION:
             wrong = record.body["supersedes"]
             first = next((k for k, s in kept.items() if wrong in (k, s.record.digest)), None)
             if first is not None:
                 kept[first] = KeptInspection(record)
-        elif record.kind is Kind.VOID:
+        elif record.kind is RecordKind.VOID:
             gone = record.body["voids"]
             kept = {k: s for k, s in kept.items() if gone not in (k, s.record.digest)}
             others.pop(gone, None)
-        elif record.kind is Kind.ASSESSMENT:
+        elif record.kind is RecordKind.ASSESSMENT:
             assessed = (record.record_id, record.day)
             same = [k for k, s in kept.items() if (s.record.record_id, s.record.day) == assessed]
             if same:
                 kept[same[-1]] = replace(kept[same[-1]], assessed=record)
         else:
             others[record.digest] = record
-    repairs = [r for r in others.values() if r.kind in (Kind.REPAIR, Kind.RERIG)]
+    repairs = [r for r in others.values() if r.kind in (RecordKind.REPAIR, RecordKind.RERIG)]
     events: list[KeptInspection | Record] = [*kept.values(), *repairs]
     events.sort(key=lambda event: _record_of(event).seq)
     moments = [_moment(event) for event in events]
@@ -189,7 +189,7 @@ def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
         key,
         tuple(records),
         tuple(events[place] for place in in_order(moments)),
-        tuple(r for r in others.values() if r.kind is Kind.OUTCOME),
+        tuple(r for r in others.values() if r.kind is RecordKind.OUTCOME),
         _disagreements(key, events, moments),
     )
 
@@ -202,7 +202,7 @@ def _readable_or_not_void(records: Sequence[Record]) -> list[Record]:
     for record in reversed(records):
         if record.digest not in void or is_readable(record):
             kept.append(record)
-            if record.kind is Kind.VOID:
+            if record.kind is RecordKind.VOID:
                 void.add(record.body["voids"])
     return kept[::-1]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
 from mlg_troubleshoot.life.folding import GearLife, life_of
-from mlg_troubleshoot.store import Kind, Store
+from mlg_troubleshoot.store import RecordKind, Store
 
 # Inspections that stand side by side on a page.
 _SIDE_BY_SIDE = 4
@@ -103,7 +103,7 @@ def side_by_side(life: GearLife, now: Assessment | None = None) -> list[PastInsp
                 inspection.gear_landings,
                 inspection.clearance_in,
                 restored=tuple(sorted({n for r in since for n in r.body.get("joints", ())})),
-                rerigged=any(r.kind is Kind.RERIG for r in since),
+                rerigged=any(r.kind is RecordKind.RERIG for r in since),
                 worst_in=worst_in,
                 verdict=verdict,
             )

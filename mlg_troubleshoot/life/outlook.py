@@ -21,7 +21,7 @@ Quantiles = Mapping[str, float | None]
 
 
 @dataclass(frozen=True, slots=True)
-class Outlook:
+class LandingsLeft:
     """The landings that a gear has left from its last inspection: null beyond the horizon."""
 
     landings_to_limit: Quantiles | None
@@ -31,7 +31,7 @@ class Outlook:
     due_date: str | None
 
     @classmethod
-    def of(cls, life: GearLife, ahead: Forecast) -> Outlook:
+    def of(cls, life: GearLife, ahead: Forecast) -> LandingsLeft:
         return cls(
             quantiles(ahead.limit),
             ahead.limit_joint,
@@ -47,7 +47,7 @@ class FleetLine:
 
     life: GearLife
     latest: KeptInspection
-    outlook: Outlook
+    outlook: LandingsLeft
 
     @property
     def verdict(self) -> str | None:
@@ -67,7 +67,7 @@ def fleet_lines(
 ) -> list[FleetLine]:
     """One line per gear, worst first."""
     lines = [
-        FleetLine(life, life.latest, Outlook.of(life, forecasts.get(life.key, Forecast())))
+        FleetLine(life, life.latest, LandingsLeft.of(life, forecasts.get(life.key, Forecast())))
         for life in lives
         if life.latest is not None
     ]
@@ -108,7 +108,7 @@ def outlook_sentence(life: GearLife, ahead: Forecast, gear: Gear) -> str:
         return "No forecast: the last inspection does not state its landings (gear_landings)."
     if ahead.limit is None:
         return ""
-    outlook = Outlook.of(life, ahead)
+    outlook = LandingsLeft.of(life, ahead)
     joint = (
         ""
         if ahead.limit_joint is None

@@ -9,7 +9,7 @@ from datetime import date
 import numpy as np
 
 from mlg_troubleshoot.life.folding import GearKey, GearLife, KeptInspection
-from mlg_troubleshoot.store import Kind, Record
+from mlg_troubleshoot.store import Record, RecordKind
 from mlg_troubleshoot.wear import WearPath
 
 
@@ -37,7 +37,7 @@ def stretches(life: GearLife, joints: Sequence[int]) -> dict[int, list[Stretch]]
             for joint in found.keys() & read.clearance_in.keys():
                 reading = (read.gear_landings, read.clearance_in[joint], read.gauge_u_of(joint))
                 found[joint][-1].readings.append(reading)
-        elif event.kind is Kind.REPAIR:
+        elif event.kind is RecordKind.REPAIR:
             at = _landings_of(event, life)
             for joint in found.keys() & set(event.body["joints"]):
                 found[joint].append(Stretch(found[joint][-1].begun if at is None else at, []))

@@ -10,10 +10,10 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.looking_back import Advice
-from mlg_troubleshoot.life.outlook import FleetLine, Outlook, fleet_lines, quantiles
+from mlg_troubleshoot.life.outlook import FleetLine, LandingsLeft, fleet_lines, quantiles
 from mlg_troubleshoot.life.wear_paths import stretches
 from mlg_troubleshoot.schemas import SCHEMA_VERSION
-from mlg_troubleshoot.store import Kind, Record
+from mlg_troubleshoot.store import Record, RecordKind
 
 
 def fleet_as_json(
@@ -62,7 +62,7 @@ def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
         "side": life.key[1],
         "events": [_event(record, counts=record.digest in counting) for record in life.records],
         "joints": joints,
-        **asdict(Outlook.of(life, ahead)),
+        **asdict(LandingsLeft.of(life, ahead)),
         "advice": _advice([life]),
         "warnings": list(life.warnings),
     }
@@ -78,12 +78,12 @@ def _event(record: Record, *, counts: bool) -> dict[str, Any]:
         "gear_landings": body.get("landings", inspection.get("gear_landings")),
         "hash": record.digest,
     }
-    if record.kind is Kind.ASSESSMENT:
+    if record.kind is RecordKind.ASSESSMENT:
         result, by = body["result"], ("program_version", "geometry_sha256", "extension")
         for name in ("verdict", "predicted_displacement_in", "margin_in"):
             event[name] = result.get(name)
         return event | {name: body.get(name) for name in by}
-    if record.kind in (Kind.INSPECTION, Kind.CORRECTION):
+    if record.kind in (RecordKind.INSPECTION, RecordKind.CORRECTION):
         event |= {"counts": counts, "supersedes": body.get("supersedes")}
         return event | {"clearance_in": inspection.get("clearance_in", {})}
     return event | {name: value for name, value in body.items() if name != "landings"}

@@ -13,10 +13,10 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.surveying.readings import (
     DEFAULT_U,
     MINUTES,
-    Kind,
     Quantity,
-    Reading,
+    ReadingKind,
     SurveyedLinkage,
+    SurveyReading,
 )
 from mlg_troubleshoot.surveying.survey import Prior
 
@@ -37,11 +37,11 @@ _LEAST_NARROWING, _OPEN = 0.01, 0.05
 class Suggested:
     """A reading worth taking: the share by which it is expected to narrow what is unknown. [1]"""
 
-    reading: Reading
+    reading: SurveyReading
     narrowing: float
 
 
-def planned(gear: Gear, distances: int = 24) -> tuple[tuple[Reading, bool], ...]:
+def planned(gear: Gear, distances: int = 24) -> tuple[tuple[SurveyReading, bool], ...]:
     """The rows of a template, each with whether the others check it.
 
     The extension, the plunger over the stroke, the angles, and distances at the reference position:
@@ -66,7 +66,7 @@ class _Design:
     def __init__(
         self,
         linkage: SurveyedLinkage,
-        taken: tuple[Reading, ...] = (),
+        taken: tuple[SurveyReading, ...] = (),
         quantity: Quantity | None = None,
     ) -> None:
         prior = Prior(linkage)
@@ -86,11 +86,13 @@ class _Design:
             wanted = linkage.log_slopes(points, quantity) @ prior.root
         sound = np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(wanted).all(axis=(1, 2))
         self.slopes, self.wanted = slopes[sound], wanted[sound]
-        self.given = [i for i, r in enumerate(self.pool) if r.kind is not Kind.DISTANCE]
-        self.free = [i for i, r in enumerate(self.pool) if r.kind is Kind.DISTANCE]
+        self.given = [i for i, r in enumerate(self.pool) if r.kind is not ReadingKind.DISTANCE]
+        self.free = [i for i, r in enumerate(self.pool) if r.kind is ReadingKind.DISTANCE]
         self.known = np.eye(slopes.shape[2])
         if linkage.travel is not None:
-            self.known = self.known + np.outer(*2 * [prior.root[-1] / DEFAULT_U[Kind.TRAVEL]])
+            self.known = self.known + np.outer(
+                *2 * [prior.root[-1] / DEFAULT_U[ReadingKind.TRAVEL]]
+            )
 
     def covariance(self, rows: list[int]) -> Array:
         """Covariance of each linkage's variables after these readings."""
@@ -147,7 +149,7 @@ class _Design:
 
 
 def suggested_early(
-    linkage: SurveyedLinkage, taken: tuple[Reading, ...], quantity: Quantity
+    linkage: SurveyedLinkage, taken: tuple[SurveyReading, ...], quantity: Quantity
 ) -> Suggested | None:
     """The reading that narrows the wanted quantities most per minute while little is known.
 
@@ -168,7 +170,7 @@ def suggested_early(
     return _worth_most(tuple(design.pool[j] for j in others), narrowing)
 
 
-def _worth_most(candidates: tuple[Reading, ...], narrowing: Array) -> Suggested | None:
+def _worth_most(candidates: tuple[SurveyReading, ...], narrowing: Array) -> Suggested | None:
     """The reading that narrows most per minute, None if it hardly does."""
     best = int(np.argmax(narrowing / np.array([MINUTES[c.kind] for c in candidates])))
     return (
@@ -179,7 +181,7 @@ def _worth_most(candidates: tuple[Reading, ...], narrowing: Array) -> Suggested 
 
 
 def suggested(
-    linkage: SurveyedLinkage, draws: Array, wanted: Array, taken: tuple[Reading, ...]
+    linkage: SurveyedLinkage, draws: Array, wanted: Array, taken: tuple[SurveyReading, ...]
 ) -> Suggested | None:
     """The reading that narrows the wanted quantities most per minute, None if none of them matters.
 

@@ -23,7 +23,12 @@ from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Slider
-from mlg_troubleshoot.surveying.readings import DEFAULT_U, Kind, Reading, SurveyedLinkage
+from mlg_troubleshoot.surveying.readings import (
+    DEFAULT_U,
+    ReadingKind,
+    SurveyedLinkage,
+    SurveyReading,
+)
 from mlg_troubleshoot.units import MM_PER_IN, SLIPS, Slip
 
 # The share of the ensemble's covariances that is believed.
@@ -88,7 +93,7 @@ class Misfit:
     one alone it is the slip.
     """
 
-    reading: Reading
+    reading: SurveyReading
     expected: float
     spread: float
     suggestion: str
@@ -133,13 +138,13 @@ class Survey:
     """
 
     linkage: SurveyedLinkage
-    readings: tuple[Reading, ...]
+    readings: tuple[SurveyReading, ...]
     misfits: tuple[Misfit, ...]
     modes: tuple[Mode, ...]
     draws: Array
 
     @property
-    def read(self) -> tuple[Reading, ...]:
+    def read(self) -> tuple[SurveyReading, ...]:
         """The readings of the table."""
         return tuple(r for r in self.readings if r.row is not None)
 
@@ -194,7 +199,7 @@ class Prior:
             covariance = _BELIEVED * around + (1.0 - _BELIEVED) * np.diag(np.diag(around))
         self.mean = members.mean(axis=0)
         order = float(np.log(linkage.amplification(members)).mean())
-        self.order = Reading(Kind.ORDER, value=order, u=DEFAULT_U[Kind.ORDER])
+        self.order = SurveyReading(ReadingKind.ORDER, value=order, u=DEFAULT_U[ReadingKind.ORDER])
         self.root = np.linalg.cholesky(covariance + np.diag(least**2))
         self.whiten = np.linalg.inv(self.root)
 
@@ -202,12 +207,16 @@ class Prior:
         """Draws of it, whether they close or not."""
         return np.asarray(self.mean + rng.standard_normal((n, len(self.mean))) @ self.root.T)
 
-    def closing(self, n: int, rng: Generator, readings: tuple[Reading, ...] = ()) -> Array:
+    def closing(self, n: int, rng: Generator, readings: tuple[SurveyReading, ...] = ()) -> Array:
         """Draws of it that close, about so many, as the readings have it that speak of one variable
         each.
         """
         found = self.drawn(_DRAWN_FOR_ONE * n, rng)
-        own = tuple(r for r in readings if r.kind in (Kind.ANGLE, Kind.EXTENSION, Kind.TRAVEL))
+        own = tuple(
+            r
+            for r in readings
+            if r.kind in (ReadingKind.ANGLE, ReadingKind.EXTENSION, ReadingKind.TRAVEL)
+        )
         if own:
             slopes = self.linkage.slopes(own, self.mean[None])[1][0] @ self.root
             gain = (
@@ -226,7 +235,7 @@ class Fitting:
     """The readings of one survey against one prior."""
 
     def __init__(
-        self, linkage: SurveyedLinkage, prior: Prior, readings: tuple[Reading, ...]
+        self, linkage: SurveyedLinkage, prior: Prior, readings: tuple[SurveyReading, ...]
     ) -> None:
         self.linkage, self.prior, self.readings = linkage, prior, readings
         self.value = np.array([r.value for r in readings])
@@ -235,7 +244,7 @@ class Fitting:
     @property
     def still(self) -> list[int]:
         """Which of them are read at the reference position, and so need no motion."""
-        moves = (Kind.PLUNGER, Kind.ORDER)
+        moves = (ReadingKind.PLUNGER, ReadingKind.ORDER)
         return [
             i for i, r in enumerate(self.readings) if r.extension is None and r.kind not in moves
         ]
@@ -362,7 +371,9 @@ class Fitting:
         still = self.still
         part = Fitting(self.linkage, self.prior, tuple(self.readings[i] for i in still))
         pairs = list(
-            combinations([i for i, r in enumerate(part.readings) if r.kind is Kind.DISTANCE], 2)
+            combinations(
+                [i for i, r in enumerate(part.readings) if r.kind is ReadingKind.DISTANCE], 2
+            )
         )
         kept = np.concatenate(
             [~np.eye(len(still), dtype=bool), np.ones((len(pairs), len(still)), dtype=bool)]
@@ -646,10 +657,10 @@ class Fitting:
                             f"{right}: the value is {slip.factor:g} times too {size}, {words}",
                             True,
                         )
-        if reading.kind is Kind.DISTANCE:
+        if reading.kind is ReadingKind.DISTANCE:
             names = [p.name for p in self.linkage.space.mechanism.points]
             others = [
-                Reading(Kind.DISTANCE, a, b, extension=reading.extension)
+                SurveyReading(ReadingKind.DISTANCE, a, b, extension=reading.extension)
                 for a, b in [(reading.start, n) for n in names] + [(n, reading.end) for n in names]
                 if a != b and {a, b} != {reading.start, reading.end}
             ]
@@ -741,7 +752,7 @@ def _robust(r: Array) -> tuple[Array, Array]:
 
 def fit(
     gear: Gear,
-    readings: tuple[Reading, ...],
+    readings: tuple[SurveyReading, ...],
     rng: Generator,
     told: Callable[[int, int], None] = lambda *_: None,
 ) -> Survey:
@@ -753,7 +764,12 @@ def fit(
     linkage = SurveyedLinkage(gear)
     prior = Prior(linkage)
     if linkage.travel is not None:
-        readings = (*readings, Reading(Kind.TRAVEL, value=linkage.travel, u=DEFAULT_U[Kind.TRAVEL]))
+        readings = (
+            *readings,
+            SurveyReading(
+                ReadingKind.TRAVEL, value=linkage.travel, u=DEFAULT_U[ReadingKind.TRAVEL]
+            ),
+        )
     if len(readings) < FEW * len(linkage.names):
         readings = (*readings, prior.order)
     fitting = Fitting(linkage, prior, readings)

@@ -26,7 +26,7 @@ from mlg_troubleshoot.life.folding import (
 )
 from mlg_troubleshoot.records import ReadOptions, admit
 from mlg_troubleshoot.records.gate import judge_text
-from mlg_troubleshoot.store import Added, Broken, Kind, Record, Store, StoreError, packed
+from mlg_troubleshoot.store import Added, Broken, Record, RecordKind, Store, StoreError, packed
 from mlg_troubleshoot.units import LengthUnit
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def key_of(tail: str, side: str) -> GearKey:
 
 def work(
     store: Store,
-    kind: Kind,
+    kind: RecordKind,
     gear: GearKey,
     day: date | str,
     work_order: str | None,
@@ -154,7 +154,7 @@ def void(store: Store, record_id: str, why: str) -> Record:
     judge_text("--why", why, "Say why the record does not count.")
     wrong = _unreadable(store, record_id) or find(store, record_id)
     body = {"voids": wrong.digest, "why": why}
-    return _added(store, replace(wrong, kind=Kind.VOID, packed=packed(body), identity=()))
+    return _added(store, replace(wrong, kind=RecordKind.VOID, packed=packed(body), identity=()))
 
 
 def _unreadable(store: Store, digest: str) -> Record | None:
@@ -169,12 +169,12 @@ def outcome(store: Store, record_id: str, found: str, joint: int | None) -> Reco
     """Record what was found after the advice."""
     judge_text("--found", found, "Say what was found.")
     of = find(store, record_id)
-    if of.kind not in (Kind.INSPECTION, Kind.CORRECTION):
+    if of.kind not in (RecordKind.INSPECTION, RecordKind.CORRECTION):
         raise UsageError(
             f"{record_id!r} is a {of.kind}", "Give the record of the inspection that advised."
         )
     body = {"of": of.digest, "found": found, "joint": joint}
-    return _added(store, replace(of, kind=Kind.OUTCOME, packed=packed(body), identity=()))
+    return _added(store, replace(of, kind=RecordKind.OUTCOME, packed=packed(body), identity=()))
 
 
 def _added(store: Store, record: Record) -> Record:
@@ -241,7 +241,7 @@ def verify(store: Store, expect: str | None = None) -> Verified:
         last = record.digest
         expected = record.seq if last == expect else expected
         try:
-            if record.body and record.kind is Kind.VOID:
+            if record.body and record.kind is RecordKind.VOID:
                 wrong.pop(record.body["voids"], None)
         except StoreError as error:
             wrong[last] = error.message

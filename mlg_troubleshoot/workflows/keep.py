@@ -13,8 +13,8 @@ from mlg_troubleshoot.life.folding import GearKey, find, warnings_of, without_da
 from mlg_troubleshoot.records.rows import place_in_file
 from mlg_troubleshoot.store import (
     Added,
-    Kind,
     Record,
+    RecordKind,
     Store,
     StoreError,
     inspection_record,
@@ -56,7 +56,8 @@ def keep(
         first = known.setdefault(record.identity_hash, record)
         records += [record, assessment_record(result.gear, options, assessment, record, first)]
     added = store.add(
-        records, lambda kept, new: new.kind is not Kind.INSPECTION or _agrees(store, kept, new)
+        records,
+        lambda kept, new: new.kind is not RecordKind.INSPECTION or _agrees(store, kept, new),
     )
     gears = {(record.tail_no, record.side) for record in records}
     return Kept(added.new, added.known, tuple(warnings_of(store, gears)))
@@ -79,7 +80,7 @@ def correct(store: Store, record_id: str, result: CheckResult, options: CheckOpt
             f" {wrong.side}",
             "Void the record (mlg history void) and keep the right one: mlg check FILE --keep",
         )
-    record = inspection_record(right, Kind.CORRECTION, supersedes=wrong.digest)
+    record = inspection_record(right, RecordKind.CORRECTION, supersedes=wrong.digest)
     store.add([record, assessment_record(result.gear, options, judged[0], record, record)])
     return record
 
@@ -98,7 +99,7 @@ def assessment_record(
     }
     return replace(
         of,
-        kind=Kind.ASSESSMENT,
+        kind=RecordKind.ASSESSMENT,
         packed=packed({**by, "result": kept_as_json(assessment)}),
         identity=(of.identity_hash.hex(), *map(str, by.values()), first.packed.hex()),
     )
@@ -118,7 +119,7 @@ def _under_first_ids(inspections: Sequence[Inspection], store: Store) -> list[In
         if key not in gears:
             gears.add(key)
             for kept in store.of_gear(*key):
-                if kept.kind is Kind.INSPECTION:
+                if kept.kind is RecordKind.INSPECTION:
                     first.setdefault((*key, kept.day, place_in_file(kept.record_id)), kept)
         record = inspection_record(inspection)
         kept = first.setdefault((*key, record.day, row), record)
@@ -131,7 +132,7 @@ def _under_first_ids(inspections: Sequence[Inspection], store: Store) -> list[In
 def _agrees(store: Store, kept: Record, new: Record) -> bool:
     """The same as kept, or as what the kept one was corrected to."""
     return same_inspection(kept, new) or any(
-        record.kind is Kind.CORRECTION
+        record.kind is RecordKind.CORRECTION
         and record.body["supersedes"] == kept.digest
         and same_inspection(record, new)
         for record in store.of_gear(kept.tail_no, kept.side)

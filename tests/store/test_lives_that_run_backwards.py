@@ -23,7 +23,7 @@ from mlg_troubleshoot.life.looking_back import side_by_side
 from mlg_troubleshoot.life.unrecorded_work import suggestions
 from mlg_troubleshoot.life.wear_paths import wear_paths
 from mlg_troubleshoot.reporting.life_json import fleet_as_json, life_as_json
-from mlg_troubleshoot.store import Kind, Record, Store, inspection_record, packed
+from mlg_troubleshoot.store import Record, RecordKind, Store, inspection_record, packed
 from mlg_troubleshoot.units import ClearanceConvention
 from mlg_troubleshoot.wear import Samples, WearModel, WearPath
 from tests.cli.conftest import mlg, row
@@ -506,7 +506,7 @@ def assessment(of: Record, verdict: str, basis: str = "PREDICTED") -> Record:
     }
     body = {"result": result, "program_version": "0", "geometry_sha256": "0", "extension": None}
     return replace(
-        of, kind=Kind.ASSESSMENT, packed=packed(body), identity=(of.identity_hash.hex(),)
+        of, kind=RecordKind.ASSESSMENT, packed=packed(body), identity=(of.identity_hash.hex(),)
     )
 
 
