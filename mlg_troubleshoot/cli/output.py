@@ -23,7 +23,7 @@ from mlg_troubleshoot.units import LengthUnit, in_unit
 from mlg_troubleshoot.visible import visible
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.reporting import WrittenReport
+    from mlg_troubleshoot.reporting.publish import WrittenReport
 
 _WIDTH_ELSEWHERE = 80
 WIDE, WIDEST = 100, 120

@@ -16,9 +16,17 @@ import numpy as np
 
 from mlg_troubleshoot.datafile import DataTable, read_toml
 from mlg_troubleshoot.errors import GearFileError, UsageError
-from mlg_troubleshoot.gear.cycle import RetractionCycle, Stage, ValveState
-from mlg_troubleshoot.gear.gear import Area, Discrepancies, Gear, Linkage, TiltedLink
-from mlg_troubleshoot.gear.joints import JointSpec
+from mlg_troubleshoot.gear.gear import (
+    Area,
+    Discrepancies,
+    Gear,
+    JointSpec,
+    Linkage,
+    RetractionCycle,
+    Stage,
+    TiltedLink,
+    ValveState,
+)
 from mlg_troubleshoot.gear.model import Calibration
 from mlg_troubleshoot.gear.sources import Source, Sourced, SourceKind
 from mlg_troubleshoot.geometry.mechanism import (

@@ -17,5 +17,13 @@ __all__ = [
     "Suspect",
     "SuspectFound",
     "Verdict",
+    "chance",
+    "covariance",
     "diagnose_simulation",
+    "held_out",
+    "one_by_one",
+    "rivals",
+    "screen",
+    "search",
+    "verdict",
 ]

@@ -13,12 +13,11 @@ from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.looking_back import Advice, side_by_side
 from mlg_troubleshoot.life.outlook import FleetLine, fleet_lines, outlook_sentence
-from mlg_troubleshoot.reporting.common import head
 from mlg_troubleshoot.reporting.figures import ACCENT, INK, SOFT, Canvas
 from mlg_troubleshoot.reporting.formats import ABSENT, Lengths, landings
 from mlg_troubleshoot.reporting.html import Document
 from mlg_troubleshoot.reporting.life_json import fleet_line_as_json, life_as_json
-from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.reporting.provenance import ReportProvenance, head
 from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.units import LengthUnit
 

@@ -17,11 +17,10 @@ from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.paper.statements import ClaimOutcome
 from mlg_troubleshoot.paper.study import Directions, StudyFindings
 from mlg_troubleshoot.reporting import study_figures as drawn
-from mlg_troubleshoot.reporting.common import head
 from mlg_troubleshoot.reporting.figures import Style
 from mlg_troubleshoot.reporting.formats import ABSENT, MINUS, Lengths, joint_list
 from mlg_troubleshoot.reporting.html import Document
-from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.reporting.provenance import ReportProvenance, head
 from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.reporting.study_figures import BarSeries
 from mlg_troubleshoot.units import LengthUnit

@@ -11,11 +11,10 @@ import numpy as np
 from markupsafe import Markup
 
 from mlg_troubleshoot.gear.gear import Linkage
-from mlg_troubleshoot.reporting.common import head
 from mlg_troubleshoot.reporting.figures import INK, RULE, SOFT, Canvas
 from mlg_troubleshoot.reporting.formats import Lengths, number
 from mlg_troubleshoot.reporting.html import Document
-from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.reporting.provenance import ReportProvenance, head
 from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.surveying.result import SurveyResult
 from mlg_troubleshoot.surveying.survey import Survey

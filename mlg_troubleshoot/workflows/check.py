@@ -28,7 +28,7 @@ from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 if TYPE_CHECKING:
     from mlg_troubleshoot.life.looking_back import PastInspection
     from mlg_troubleshoot.records import ReadResult
-    from mlg_troubleshoot.reporting import WrittenReport
+    from mlg_troubleshoot.reporting.publish import WrittenReport
 
 ALL_JUDGED, NOT_ALL_WITHIN, NOTHING_JUDGED = 0, 1, 3
 
@@ -309,13 +309,9 @@ def write_reports(
         raise OutputError(
             f"{directory} is a file, not a folder", "Give a folder that you may write to."
         )
-    from mlg_troubleshoot.reporting import (
-        batch_document,
-        inspection_document,
-        provenance_of,
-        publish,
-        publish_all,
-    )
+    from mlg_troubleshoot.reporting.inspection_report import batch_document, inspection_document
+    from mlg_troubleshoot.reporting.provenance import provenance_of
+    from mlg_troubleshoot.reporting.publish import publish, publish_all
 
     gear, judgements, problems = result.gear, result.judgements, result.problems
     extension = None if options.extension is None else options.extension.describe()

@@ -17,7 +17,7 @@ from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 if TYPE_CHECKING:
     from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension
     from mlg_troubleshoot.diagnosis.faults import DataFault
-    from mlg_troubleshoot.reporting import WrittenReport
+    from mlg_troubleshoot.reporting.publish import WrittenReport
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -203,8 +203,9 @@ def write_diagnosis_report(
     *,
     unit: LengthUnit = LengthUnit.INCH,
 ) -> WrittenReport:
-    from mlg_troubleshoot.reporting import provenance_of, publish
     from mlg_troubleshoot.reporting.diagnosis_report import diagnosis_document
+    from mlg_troubleshoot.reporting.provenance import provenance_of
+    from mlg_troubleshoot.reporting.publish import publish
 
     made = provenance_of(
         result.gear, result.inputs_sha256, seed=options.seed, remembered=options.remembered

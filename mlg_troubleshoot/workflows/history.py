@@ -31,7 +31,7 @@ from mlg_troubleshoot.units import LengthUnit
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.life.forecast import Forecast
-    from mlg_troubleshoot.reporting import WrittenReport
+    from mlg_troubleshoot.reporting.publish import WrittenReport
     from mlg_troubleshoot.wear import WearModel
 
 # An exported chain, which is judged in 5 s, and its longest line. [bytes, characters]
@@ -92,7 +92,9 @@ def write_pages(
     remembered: str | None = None,
 ) -> list[WrittenReport]:
     """Write the page of each gear's life and, for a fleet, the page that links them."""
-    from mlg_troubleshoot.reporting import fleet_report, provenance_of, publish
+    from mlg_troubleshoot.reporting import fleet_report
+    from mlg_troubleshoot.reporting.provenance import provenance_of
+    from mlg_troubleshoot.reporting.publish import publish
 
     records = (record for life in shown.lives for record in life.records)
     last = max(records, key=lambda record: record.seq, default=None)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.indices.given_data import GivenDataIndices
     from mlg_troubleshoot.paper.study import StudyFindings, StudyOptions
     from mlg_troubleshoot.paper.worst_search import WorstSearch
-    from mlg_troubleshoot.reporting import WrittenReport
+    from mlg_troubleshoot.reporting.publish import WrittenReport
 
 from mlg_troubleshoot.units import LengthUnit
 
@@ -168,7 +168,8 @@ def write_study_report(
     unit: LengthUnit = LengthUnit.INCH,
     remembered: str | None = None,
 ) -> WrittenReport:
-    from mlg_troubleshoot.reporting import provenance_of, publish
+    from mlg_troubleshoot.reporting.provenance import provenance_of
+    from mlg_troubleshoot.reporting.publish import publish
     from mlg_troubleshoot.reporting.study_report import study_document
 
     targets = targets_file(findings.gear)

@@ -24,7 +24,7 @@ from mlg_troubleshoot.schemas import SCHEMA_VERSION
 from mlg_troubleshoot.units import LengthUnit
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.reporting import WrittenReport
+    from mlg_troubleshoot.reporting.publish import WrittenReport
     from mlg_troubleshoot.surveying.result import SurveyResult
     from mlg_troubleshoot.surveying.survey import Survey
 
@@ -375,7 +375,8 @@ def write_survey_report(
     remembered: str | None = None,
 ) -> WrittenReport | None:
     """Write the report of a survey; None if nothing follows from the table."""
-    from mlg_troubleshoot.reporting import provenance_of, publish
+    from mlg_troubleshoot.reporting.provenance import provenance_of
+    from mlg_troubleshoot.reporting.publish import publish
     from mlg_troubleshoot.reporting.survey_report import survey_document
 
     if result.survey is None:
