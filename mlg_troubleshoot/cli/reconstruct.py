@@ -75,7 +75,9 @@ def reconstruct(
             progress=advance,
         )
     if as_json:
-        output.write_json(task.reconstruction_values(found, text))
+        from mlg_troubleshoot.reporting.model_json import reconstruction_as_json
+
+        output.write_json(reconstruction_as_json(found, text))
     else:
         _show(found, text, show_member=out is None)
     if out is not None:

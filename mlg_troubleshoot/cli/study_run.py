@@ -89,7 +89,9 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
     )
     shown = replace(findings, statements=said, searches=searched)
     if flags.as_json:
-        output.write_json(task.study_values(shown, given))
+        from mlg_troubleshoot.reporting.model_json import study_as_json
+
+        output.write_json(study_as_json(shown, given))
     else:
         _show(shown, settings.show)
         if given is not None:
@@ -220,7 +222,7 @@ def _joints(gear: Gear, result: StudyResult) -> Table:
     return shown
 
 
-def _show_given(gear: Gear, given: task.GivenDataResult) -> None:
+def _show_given(gear: Gear, given: GivenDataResult) -> None:
     found = given.indices
     each = ", ".join(
         f"#{number} {_number(first)} ({_number(ends[0])} to {_number(ends[1])})"

@@ -104,7 +104,9 @@ def survey(
             told=partial(bar, "Fitting"),
         )
     if as_json:
-        output.write_json(task.survey_values(result))
+        from mlg_troubleshoot.reporting.model_json import survey_as_json
+
+        output.write_json(survey_as_json(result))
     else:
         _show(result, output.console(unit=shown.show))
     written = None

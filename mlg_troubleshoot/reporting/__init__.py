@@ -8,6 +8,7 @@ __all__ = [
     "inspection_report",
     "json_form",
     "life_json",
+    "model_json",
     "provenance",
     "publish",
     "study_report",
