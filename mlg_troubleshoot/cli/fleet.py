@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mlg_troubleshoot.cli import history, options, output
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
@@ -17,7 +18,7 @@ _LINES = 60
 
 def fleet(
     store: history.Place = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
     no_forecast: history.NoForecast = False,
     report: options.Report = None,
     page: options.Paper = None,

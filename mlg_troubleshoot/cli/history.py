@@ -12,6 +12,7 @@ from typer.core import TyperGroup
 
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.units import LengthUnit, in_unit
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ def show(
         str | None, typer.Argument(metavar="[LH|RH]", help="Which gear; without it both.")
     ] = None,
     store: Place = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
     no_forecast: NoForecast = False,
     report: options.Report = None,
     page: options.Paper = None,
@@ -253,13 +254,15 @@ def _show_joints(
 
 
 def _what(event: dict[str, Any], unit: LengthUnit) -> str:
+    from mlg_troubleshoot.decision.sentences import joint_list
+
     match event["kind"]:
         case "assessment":
             found = event["predicted_displacement_in"]
             worst = "" if found is None else in_unit(f", worst case {found:.4f} in", unit)
             return f"assessed {event['verdict']}{worst}"
         case "repair":
-            return "restored " + ", ".join(f"#{joint}" for joint in event["joints"])
+            return f"restored {joint_list(event['joints'])}"
         case "void":
             return f"void: {event['why']}"
         case "outcome":
@@ -291,21 +294,22 @@ def repair(
     landings: Landings = None,
     work_order: WorkOrder = None,
     store: Place = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
 ) -> None:
     """Record joints that were restored: their wear starts again."""
+    from mlg_troubleshoot.decision.sentences import joint_list
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.store import RecordKind
     from mlg_troubleshoot.workflows import history
 
     known = load_gear(gear)
-    _refuse_unknown(joints, known)
+    known.require_joints(joints, "--joint")
     restored = sorted(set(joints))
     place = kept_in(store, gear)
     record = history.work(
         place, RecordKind.REPAIR, (tail, side), day, work_order, landings, restored
     )
-    listed = ", ".join(f"#{joint}" for joint in restored)
+    listed = joint_list(restored)
     _say_added(place, f"repair of {record.tail_no} {record.side}, {listed}", record)
 
 
@@ -316,7 +320,7 @@ def rerig(
     landings: Landings = None,
     work_order: WorkOrder = None,
     store: Place = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
 ) -> None:
     """Record that the reversing valve was re-rigged; the wear of the joints goes on."""
     from mlg_troubleshoot.store import RecordKind
@@ -327,22 +331,13 @@ def rerig(
     _say_added(place, f"re-rigging of {record.tail_no} {record.side}", record)
 
 
-def _refuse_unknown(joints: Sequence[int], gear: Gear) -> None:
-    unknown = [joint for joint in joints if joint not in gear.joint_numbers]
-    if unknown:
-        raise UsageError(
-            f"--joint {unknown[0]}: {gear.name} has no joint {unknown[0]}",
-            f"Its joints are {', '.join(map(str, gear.joint_numbers))}.",
-        )
-
-
 def correct(
     record: RecordId,
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="A table with the one right inspection.")
     ],
     store: Place = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
     unit: options.Unit = None,
     convention: options.Convention = None,
     sheet: options.Sheet = None,
@@ -366,7 +361,7 @@ def void(
         str, typer.Option("--why", metavar="TEXT", help="Why the record does not count.")
     ],
     store: Place = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
 ) -> None:
     """Append that a record does not count; it stays in the chain."""
     from mlg_troubleshoot.workflows import history
@@ -382,14 +377,14 @@ def outcome(
         int | None, typer.Option("--joint", metavar="N", help="The joint that it was.")
     ] = None,
     store: Place = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
 ) -> None:
     """Record what was found after the advice; mlg history then says how often it was right."""
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.workflows import history
 
     if joint is not None:
-        _refuse_unknown([joint], load_gear(gear))
+        load_gear(gear).require_joints([joint], "--joint")
     added = history.outcome(kept_in(store, gear), record, found, joint)
     output.say(f"Kept: outcome of {record} ({added.tail_no} {added.side}).")
 
@@ -404,7 +399,7 @@ def verify(
             help="A last hash noted earlier; it must still be in the chain.",
         ),
     ] = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
 ) -> None:
     """Walk the chain; the first record that does not fit is named (exit code 1). It does not prove
     who wrote a record.
@@ -461,7 +456,7 @@ def _expected(found: Verified) -> str:
 def export(
     file: Chain,
     store: Place = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
     force: options.Force = False,
 ) -> None:
     """Write the whole chain as JSON Lines."""
@@ -476,9 +471,7 @@ def export(
     output.say(f"Written: {file}, {len(lines)} records.")
 
 
-def import_chain(
-    file: Chain, store: Place = None, gear: options.Gear = options.DEFAULT_GEAR
-) -> None:
+def import_chain(file: Chain, store: Place = None, gear: options.Gear = DEFAULT_GEAR) -> None:
     """Read an exported chain into an empty store, or the rest of it into a store that holds its
     beginning.
     """

@@ -13,9 +13,8 @@ from typing import Annotated, Any, get_type_hints
 import typer
 
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
-
-DEFAULT_GEAR = "hawker-800xp"
 
 
 class ReportFormat(StrEnum):

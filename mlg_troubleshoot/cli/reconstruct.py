@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mlg_troubleshoot.cli import options, output
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.paper.reconstruct import Reconstruction
@@ -61,7 +62,7 @@ def reconstruct(
     from mlg_troubleshoot.outputs import OutputFile
     from mlg_troubleshoot.workflows import reconstruct as task
 
-    gear = context.obj or options.DEFAULT_GEAR
+    gear = context.obj or DEFAULT_GEAR
     claim(gear, [targets], [OutputFile("--out", out, task.LINKAGE)], force=force)
     with stages(quiet=quiet) as advance:
         found, text = task.reconstruct_linkage(

@@ -21,6 +21,7 @@ from mlg_troubleshoot.cli.remembered import Settings
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.indices.given_data import GivenDataResult
 from mlg_troubleshoot.paper.study import (
     Directions,
     StudyDesign,

@@ -1,6 +1,7 @@
 """One gear type: its file, joints and limits, and how far worn joints move the plunger."""
 
 __all__ = [
+    "DEFAULT_GEAR",
     "adjustment",
     "design",
     "directions",
@@ -9,3 +10,5 @@ __all__ = [
     "model",
     "sources",
 ]
+
+DEFAULT_GEAR = "hawker-800xp"

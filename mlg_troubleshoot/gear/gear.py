@@ -4,6 +4,7 @@ well.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.model import Calibration, LinkageModel
 from mlg_troubleshoot.gear.sources import Sourced
 from mlg_troubleshoot.geometry.mechanism import Mechanism
@@ -281,6 +283,16 @@ class Gear:
             for group in self.link_groups
             for n in group
         }
+
+    def require_joints(self, numbers: Iterable[int], what: str = "") -> None:
+        """Refuse numbers of joints that this gear does not have; `what` names the option."""
+        unknown = sorted(set(numbers) - set(self.joint_numbers))
+        if unknown:
+            given = f"{what} {unknown[0]}: " if what else ""
+            raise UsageError(
+                f"{given}{self.name} has no joint {unknown[0]}",
+                f"Its joints are {', '.join(map(str, self.joint_numbers))}.",
+            )
 
     def joint(self, number: int) -> JointSpec:
         """Return the joint of that number; `KeyError` if the gear has none."""

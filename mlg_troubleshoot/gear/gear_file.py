@@ -16,6 +16,7 @@ import numpy as np
 
 from mlg_troubleshoot.datafile import DataTable, read_toml
 from mlg_troubleshoot.errors import GearFileError, UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import (
     Area,
     Discrepancies,
@@ -43,7 +44,6 @@ from mlg_troubleshoot.geometry.mechanism import (
 )
 from mlg_troubleshoot.geometry.program import write_program
 
-DEFAULT_GEAR = "hawker-800xp"
 _DATA = Path(str(files("mlg_troubleshoot.gear"))) / "data"
 # Nothing of a landing gear is longer, and no angle needs more than two turns; far beyond, formulas
 # overflow.
@@ -65,13 +65,13 @@ def shipped_gears() -> tuple[str, ...]:
     return tuple(sorted(n for n in names if not n.endswith(("-ensemble", "-targets"))))
 
 
-def load_gear(name_or_path: str | Path = DEFAULT_GEAR) -> Gear:
+def load_gear(name_or_path: str | Path | Gear = DEFAULT_GEAR) -> Gear:
     """Load a gear by its shipped name or from a gear file; a file is read anew each time.
 
     Parameters
     ----------
-    name_or_path : str or Path
-        ``hawker-800xp``, or the path of a TOML file.
+    name_or_path : str, Path or Gear
+        ``hawker-800xp``, or the path of a TOML file; a gear is returned as it is.
 
     Returns
     -------
@@ -87,6 +87,8 @@ def load_gear(name_or_path: str | Path = DEFAULT_GEAR) -> Gear:
     MechanismError
         If the linkage cannot be assembled.
     """
+    if isinstance(name_or_path, Gear):
+        return name_or_path
     text = str(name_or_path)
     if text in shipped_gears():
         return _shipped(text)

@@ -11,6 +11,7 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.assessment import Verdict
+from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
@@ -114,7 +115,7 @@ def _due_now(life: GearLife, gear: Gear) -> Forecast | None:
                 f"inspection {kept.record.record_id} has no date and may be the last one"
             )
     if over:
-        reasons.append(f"{', '.join(f'#{n}' for n in over)} over the limit when last read")
+        reasons.append(f"{joint_list(list(over))} over the limit when last read")
     if not reasons:
         return None
     nothing = Samples(np.zeros(1))

@@ -11,6 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearLife
 from mlg_troubleshoot.life.wear_paths import wear_paths
@@ -53,7 +54,7 @@ def suggestions(lives: Sequence[GearLife], model: WearModel | None, gear: Gear) 
     for i, life in enumerate(known):
         dropped = [n for n, z in zip(gear.joint_numbers, scores[i], strict=True) if z <= -_DROP]
         if dropped and i not in explained:
-            listed = ", ".join(f"#{number}" for number in dropped)
+            listed = joint_list(dropped)
             sentences.append(
                 f"{life.name}: {listed} read much tighter than before. Restored without a"
                 f" record? mlg history repair {life.name} --joint {dropped[0]} --date D"

@@ -16,7 +16,7 @@ from time import monotonic
 import numpy as np
 from numpy.random import Generator
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import STEP, Array
 from mlg_troubleshoot.errors import InconclusiveDataError, MechanismError, UsageError
 from mlg_troubleshoot.gear.design import DesignSpace
 from mlg_troubleshoot.gear.gear import Gear, Linkage
@@ -194,7 +194,7 @@ class _Search:
                 break
         return vector
 
-    def _slopes(self, vector: Array, value: Array, step: float = 1e-5) -> Array:
+    def _slopes(self, vector: Array, value: Array, step: float = STEP) -> Array:
         columns = [
             (self.residuals(vector + moved) - value) / step for moved in step * np.eye(len(vector))
         ]

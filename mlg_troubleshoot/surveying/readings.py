@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.arrays import STEP, Array, Mask, central_slopes, central_steps
 from mlg_troubleshoot.gear.design import DesignSpace
 from mlg_troubleshoot.gear.gear import Gear, Linkage
 from mlg_troubleshoot.geometry.kernel import Kernel
@@ -21,7 +21,6 @@ from mlg_troubleshoot.geometry.program import write_program
 
 # Positive quantities of a batch of linkages, shape (n_vectors, n_quantities).
 Quantity = Callable[[Array], Array]
-_STEP = 1e-5
 # Positions over the stroke among which the plunger's least displacement is sought, and plunger
 # positions to read.
 _POSITIONS, _PLUNGER_READINGS = 25, 9
@@ -259,12 +258,11 @@ class SurveyedLinkage:
         n_variables).
         """
         count, n = vectors.shape
-        steps = np.concatenate([np.zeros((1, n)), np.eye(n), -np.eye(n)]) * _STEP
+        steps = np.vstack([np.zeros((1, n)), central_steps(n)])
         found = self.predicted(readings, (vectors[:, None, :] + steps).reshape(-1, n)).reshape(
             count, 2 * n + 1, -1
         )
-        slopes: Array = ((found[:, 1 : n + 1] - found[:, n + 1 :]) / (2 * _STEP)).swapaxes(1, 2)
-        return found[:, 0], slopes
+        return found[:, 0], central_slopes(found[:, 1:], axis=1).swapaxes(1, 2)
 
     def _gradient(self, vectors: Array) -> tuple[Array, Array, list[Any], Any]:
         """Derivatives of the displacement by the virtual links, with what a further solution
@@ -273,12 +271,10 @@ class SurveyedLinkage:
         mechanism, reference = self._assembled(vectors)
         numbers = self._numbers(mechanism, len(vectors))
         n = len(self.kernel.no_clearance())
-        links = np.concatenate([np.eye(n), -np.eye(n)]) * _STEP
+        links = central_steps(n)
         rate = self._rate(vectors, numbers, reference)
-        moved = self.kernel.output(
-            reference + self._beyond, [links[:, i] for i in range(n)], numbers
-        )
-        return (moved[:, :n] - moved[:, n:]) / (2 * _STEP) * rate, reference, numbers, rate
+        moved = self.kernel.output(reference + self._beyond, list(links.T), numbers)
+        return central_slopes(moved, axis=1) * rate, reference, numbers, rate
 
     def amplification(self, vectors: Array) -> Array:
         """Plunger amplification index A_iP of each joint (Eq. 8) for a batch, shape (n_vectors,
@@ -313,10 +309,12 @@ class SurveyedLinkage:
         Returns, shape (n_vectors, n_quantities, n_variables). [1/in, 1/rad]
         """
         count, n = vectors.shape
-        steps = np.concatenate([np.eye(n), -np.eye(n)]) * _STEP * 10.0
+        # A quantity may itself be a derivative: a longer step.
+        step = 10.0 * STEP
+        steps = central_steps(n, step)
         values = (quantity or self.amplification)((vectors[:, None, :] + steps).reshape(-1, n))
         found = np.log(np.maximum(values, 1e-9)).reshape(count, 2 * n, -1)
-        return np.asarray(((found[:, :n] - found[:, n:]) / (20.0 * _STEP)).swapaxes(1, 2))
+        return central_slopes(found, step, axis=1).swapaxes(1, 2)
 
     def closes(self, vectors: Array) -> Mask:
         """Tell which vectors make a linkage that moves over its stroke and moves its plunger as

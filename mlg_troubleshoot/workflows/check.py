@@ -16,10 +16,11 @@ from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.next_joint import advise
 from mlg_troubleshoot.decision.prediction import Extension
-from mlg_troubleshoot.errors import OutputError, UsageError
+from mlg_troubleshoot.errors import NOTHING_JUDGED, OutputError, UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import load_index_table
 from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
 from mlg_troubleshoot.records.model import TableOptions, TableResult
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.records import ReadResult
     from mlg_troubleshoot.reporting.publish import WrittenReport
 
-ALL_JUDGED, NOT_ALL_WITHIN, NOTHING_JUDGED = 0, 1, 3
+ALL_JUDGED, NOT_ALL_WITHIN = 0, 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,7 +180,7 @@ def check(
     """
     from mlg_troubleshoot.records import ReadOptions, judge_again
 
-    known = gear if isinstance(gear, Gear) else load_gear(gear)
+    known = load_gear(gear)
     row = judge_again(inspection, ReadOptions.of(known))
     (judged,) = assess([row], known, load_index_table(known), advice=advice, extension=extension)
     if not isinstance(judged, Assessment):
@@ -211,15 +212,10 @@ def predict(
     UsageError
         If the gear has no such joint, or a clearance is negative or not a number.
     """
-    known = gear if isinstance(gear, Gear) else load_gear(gear)
+    known = load_gear(gear)
     numbers = known.joint_numbers
     if isinstance(clearance_in, Mapping):
-        unknown = sorted(set(clearance_in) - set(numbers))
-        if unknown:
-            raise UsageError(
-                f"{known.name} has no joint {unknown[0]}",
-                f"Its joints are {', '.join(map(str, numbers))}.",
-            )
+        known.require_joints(clearance_in)
         clearance_in = [clearance_in.get(number, 0.0) for number in numbers]
     rows = np.atleast_2d(np.asarray(clearance_in, float))
     if rows.ndim != 2 or rows.shape[1] != len(numbers):

@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.errors import InconclusiveDataError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
@@ -188,7 +190,7 @@ def _evidence_notes(inspections: Sequence[Inspection], again: int, gear: Gear) -
     if len(unread) == len(gear.joint_numbers):
         yield "no clearance was read in any row: what wear adds is left open"
     elif unread:
-        listed = ", ".join(f"#{n}" for n in unread)
+        listed = joint_list(unread)
         yield (
             f"not measured in any row: {listed}; counted as worn like the others of their gear, and"
             " not testable"

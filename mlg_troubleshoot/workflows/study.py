@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import write_index_table
 from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
 from mlg_troubleshoot.paper.targets import targets_file
@@ -73,7 +74,7 @@ def run_study(
     from mlg_troubleshoot.paper import study
     from mlg_troubleshoot.paper.statements import check_statements
 
-    known = gear if isinstance(gear, Gear) else load_gear(gear)
+    known = load_gear(gear)
     wanted = options or study.StudyOptions()
     told = progress or (lambda _stage, _done, _total: None)
     if statements and not targets_file(known).exists():

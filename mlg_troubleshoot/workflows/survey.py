@@ -13,8 +13,9 @@ import tomli_w
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.datafile import LONGEST_NAME, is_name, read_toml
 from mlg_troubleshoot.errors import GearFileError, MechanismError, UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import INDEX_TABLE, write_index_table
 from mlg_troubleshoot.outputs import OutputFile, OutputKind, claim_outputs, write_text
 from mlg_troubleshoot.paper.targets import targets_file
@@ -72,7 +73,7 @@ def survey_gear(
     from mlg_troubleshoot.surveying.result import InspectedGear, SurveyResult
     from mlg_troubleshoot.surveying.survey import FEW, Prior, fit
 
-    known = gear if isinstance(gear, Gear) else load_gear(gear)
+    known = load_gear(gear)
     if write is not None:
         claim_outputs(known.files, written_with(write), force=True)
     linkage, rng = SurveyedLinkage(known), np.random.default_rng(seed)
