@@ -17,6 +17,7 @@ import numpy as np
 from mlg_troubleshoot.arrays import STEP, Array
 from mlg_troubleshoot.gear.model import LinkageModel
 
+# Directions around a joint among which the worst one is bracketed. [rad]
 _ANGLES = 2.0 * np.pi * np.arange(8) / 8
 _ROOT_HALF = np.sqrt(0.5)
 # A joint without clearance still has a direction in which it would act: found with this length.

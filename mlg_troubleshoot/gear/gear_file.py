@@ -46,10 +46,10 @@ from mlg_troubleshoot.geometry.program import write_program
 
 _DATA = Path(str(files("mlg_troubleshoot.gear"))) / "data"
 # Nothing of a landing gear is longer, and no angle needs more than two turns; far beyond, formulas
-# overflow.
-_LENGTH, _ANGLE = {"least": -1e4, "most": 1e4}, {"least": -720.0, "most": 720.0}
-_LARGEST = {"in": 1e4, "min": 1e5, "landings": 1e6, "1": 0.5}
-# What a gear file need not state, and what stands for it.
+# overflow. [in, degrees]
+_LENGTH, _ANGLE = {"least": -10_000, "most": 10_000}, {"least": -720, "most": 720}
+_LARGEST = {"in": 10_000, "min": 100_000, "landings": 1_000_000, "1": 0.5}
+# What a gear file need not state, and what stands for it, assumed.
 _UNSTATED = {
     "restore_min": 120.0,
     "read_min": 12.0,

@@ -21,7 +21,8 @@ from mlg_troubleshoot.reporting.provenance import ReportProvenance, head
 from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.units import LengthUnit
 
-_BAR, _SPARK, _HIGH = 150.0, 90.0, 18.0
+# Length of the bar of landings left, of the line of worst cases, and height of both. [px]
+_BAR, _SPARK, _HIGH = 150, 90, 18
 
 
 def interval_bar(ends: Mapping[str, float | None] | None, horizon: float) -> Markup:

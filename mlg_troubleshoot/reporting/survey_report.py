@@ -20,7 +20,8 @@ from mlg_troubleshoot.surveying.result import SurveyResult
 from mlg_troubleshoot.surveying.survey import Survey
 from mlg_troubleshoot.units import LengthUnit
 
-_WIDTH, _EDGE = 330.0, 26.0
+# Width of a panel, and the room around what it shows. [px]
+_WIDTH, _EDGE = 330, 26
 
 
 def survey_document(

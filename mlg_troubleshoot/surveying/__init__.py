@@ -6,4 +6,5 @@ __all__ = [
     "readings",
     "result",
     "survey",
+    "tuned",
 ]

@@ -41,8 +41,8 @@ class ReadingKind(StrEnum):
     ORDER = "ORDER"
 
 
-# Standard uncertainties where a reading states none: in, in, rad, in; for the travel, in, and the
-# order of the indices.
+# Standard uncertainties where a reading states none, assumed; the last two of the travel, and of the
+# logarithm of the order of the indices. [in, in, rad, in, in, 1]
 DEFAULT_U = {
     ReadingKind.DISTANCE: 0.01,
     ReadingKind.PLUNGER: 0.0015,
@@ -63,10 +63,10 @@ def default_u(kind: ReadingKind, *, is_angle: bool) -> float:
 # Minutes that a reading takes at the gear, assumed: two hands and a caliper; the dial stands once
 # for all positions.
 MINUTES = {
-    ReadingKind.DISTANCE: 3.0,
-    ReadingKind.PLUNGER: 2.0,
-    ReadingKind.ANGLE: 6.0,
-    ReadingKind.EXTENSION: 2.0,
+    ReadingKind.DISTANCE: 3,
+    ReadingKind.PLUNGER: 2,
+    ReadingKind.ANGLE: 6,
+    ReadingKind.EXTENSION: 2,
 }
 
 

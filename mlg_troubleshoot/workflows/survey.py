@@ -71,7 +71,8 @@ def survey_gear(
     from mlg_troubleshoot.surveying.plan import suggested, suggested_early
     from mlg_troubleshoot.surveying.readings import SurveyedLinkage
     from mlg_troubleshoot.surveying.result import InspectedGear, SurveyResult
-    from mlg_troubleshoot.surveying.survey import FEW, Prior, fit
+    from mlg_troubleshoot.surveying.survey import Prior, fit
+    from mlg_troubleshoot.surveying.tuned import FEW
 
     known = load_gear(gear)
     if write is not None:
