@@ -41,8 +41,8 @@ class ReadingKind(StrEnum):
     ORDER = "ORDER"
 
 
-# Standard uncertainties where a reading states none, assumed; the last two of the travel, and of the
-# logarithm of the order of the indices. [in, in, rad, in, in, 1]
+# Standard uncertainties where a reading states none, assumed; the last two are those of the travel
+# and of the logarithm of the order of the indices. [in, in, rad, in, in, 1]
 DEFAULT_U = {
     ReadingKind.DISTANCE: 0.01,
     ReadingKind.PLUNGER: 0.0015,
