@@ -17,8 +17,10 @@ from mlg_troubleshoot.misfit import (
     SimulationDiagnosis,
     Suspect,
     SuspectFound,
-    Verdict,
     diagnose_simulation,
+)
+from mlg_troubleshoot.misfit import (
+    MisfitVerdict as Verdict,
 )
 
 __all__ = [

@@ -9,14 +9,14 @@ from mlg_troubleshoot.misfit.simulation_result import (
     Suspect,
     SuspectFound,
 )
-from mlg_troubleshoot.misfit.verdict import Verdict
+from mlg_troubleshoot.misfit.verdict import MisfitVerdict
 
 __all__ = [
     "HeldOutGain",
+    "MisfitVerdict",
     "SimulationDiagnosis",
     "Suspect",
     "SuspectFound",
-    "Verdict",
     "chance",
     "covariance",
     "diagnose_simulation",
