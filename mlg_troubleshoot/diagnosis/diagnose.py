@@ -20,7 +20,7 @@ from mlg_troubleshoot.diagnosis.causes import CATALOGUE
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
-from mlg_troubleshoot.diagnosis.explain import Finding, Problem, explain
+from mlg_troubleshoot.diagnosis.explain import Finding, MisfitProblem, explain
 from mlg_troubleshoot.diagnosis.extension import Term
 from mlg_troubleshoot.diagnosis.faults import LEAST_ALONG, DataFault, screen_faults
 from mlg_troubleshoot.diagnosis.gain import LEAST_TAILS, Gain, measure_gain
@@ -38,7 +38,7 @@ from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.explanation import Key
 from mlg_troubleshoot.misfit.fitting import shrunk
-from mlg_troubleshoot.misfit.verdict import Verdict
+from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 from mlg_troubleshoot.units import MM_PER_IN
 
 LEAST_ROWS = 20
@@ -300,7 +300,7 @@ def diagnose(
 class _Case:
     """Candidates with their effects, the misfit and what the inference makes of it."""
 
-    problem: Problem
+    problem: MisfitProblem
     finding: Finding
     scene: Scene
     chosen: tuple[int, ...]
@@ -378,7 +378,7 @@ def _explained(
         changed = scene_at(other, table, scene.where, scene.clearance_in, scene.drawn_share)
         return np.nan_to_num(effect_columns(changed, candidates))
 
-    problem = Problem(
+    problem = MisfitProblem(
         table.measured_in - scene.over_in,
         rows,
         candidates,

@@ -23,8 +23,8 @@ from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.explanation import Context, Effects, Explanation, Key
-from mlg_troubleshoot.misfit.posterior import Posterior, posterior
-from mlg_troubleshoot.misfit.verdict import Verdict
+from mlg_troubleshoot.misfit.posterior import MisfitPosterior, posterior
+from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 
 # The noise is estimated again from what is left as long as that changes the likeliest explanation,
 # so often at most.
@@ -35,7 +35,7 @@ _BY = " × "
 
 
 @dataclass(frozen=True)
-class Problem:
+class MisfitProblem:
     """The data of one table with all that may explain them.
 
     misfit, shape (n,): measured less predicted. [in] columns, shape (n, n_candidates): effects of
@@ -58,7 +58,7 @@ class Problem:
         """Misfit less what pins scatter. [in]"""
         return self.misfit - EXPECTED_SLOPE * self.rows.predicted_in
 
-    def candidate(self, key: Key, found: Posterior | None = None) -> Candidate:
+    def candidate(self, key: Key, found: MisfitPosterior | None = None) -> Candidate:
         """The likeliest candidate of a name, or all-joint effects."""
         own = [k for k, c in enumerate(self.candidates) if c.key == key]
         if not own:
@@ -152,7 +152,7 @@ class Finding:
     """
 
     verdict: Verdict
-    posterior: Posterior
+    posterior: MisfitPosterior
     noise: NoiseModel
     best: Explanation
     said: tuple[Key, ...]
@@ -191,7 +191,7 @@ class Finding:
         return {rival: with_first / whole}
 
 
-def explain(problem: Problem) -> Finding:
+def explain(problem: MisfitProblem) -> Finding:
     """Say how likely each explanation of a table is, and what follows."""
     data, rows = problem.expected, problem.rows
     noise, contexts = build_noise(data, rows), problem.contexts()
@@ -208,13 +208,13 @@ def explain(problem: Problem) -> Finding:
     return _said(problem, found, noise)
 
 
-def _same(one: Posterior, other: Posterior) -> bool:
+def _same(one: MisfitPosterior, other: MisfitPosterior) -> bool:
     """Tell whether two posteriors have one likeliest explanation."""
     first, second = one.likeliest[0], other.likeliest[0]
     return (first.context, set(first.members)) == (second.context, set(second.members))
 
 
-def _noise_beside(problem: Problem, explained: Array) -> NoiseModel:
+def _noise_beside(problem: MisfitProblem, explained: Array) -> NoiseModel:
     """Noise when what is expected to act is taken out; how its form may be wrong is part of it."""
     noise = build_noise(problem.expected, problem.rows, explained)
     smooth = problem.bank.smooth
@@ -224,7 +224,7 @@ def _noise_beside(problem: Problem, explained: Array) -> NoiseModel:
     return noise.beside(problem.beliefs.form * bent / np.sqrt(len(smooth)))
 
 
-def _said(problem: Problem, found: Posterior, noise: NoiseModel) -> Finding:
+def _said(problem: MisfitProblem, found: MisfitPosterior, noise: NoiseModel) -> Finding:
     """What is sure, what is open, and what is ruled out."""
     beliefs, chance = problem.beliefs, found.names
     rivals_only = {c.key for c in problem.candidates if c.stands_in}
@@ -277,12 +277,12 @@ def _said(problem: Problem, found: Posterior, noise: NoiseModel) -> Finding:
     )
 
 
-def _any(found: Posterior, names: set[Key]) -> float:
+def _any(found: MisfitPosterior, names: set[Key]) -> float:
     """Probability that something of these names acts."""
     return float(sum(p for own, p in found.together.items() if own & names))
 
 
-def _alike(problem: Problem, found: Posterior, said: Sequence[Key]) -> set[Key]:
+def _alike(problem: MisfitProblem, found: MisfitPosterior, said: Sequence[Key]) -> set[Key]:
     """Names that these rows cannot tell from each other, one of which is sure: what is believed of
     them beforehand must not decide.
     """
@@ -304,7 +304,7 @@ def _alike(problem: Problem, found: Posterior, said: Sequence[Key]) -> set[Key]:
     return alike
 
 
-def _reported(found: Posterior, said: set[Key], verdict: Verdict) -> Explanation:
+def _reported(found: MisfitPosterior, said: set[Key], verdict: Verdict) -> Explanation:
     """The likeliest explanation with all that is sure, or with something."""
     for explanation in found.likeliest:
         names = found.names_of(explanation)
@@ -314,7 +314,7 @@ def _reported(found: Posterior, said: set[Key], verdict: Verdict) -> Explanation
     return found.likeliest[0]
 
 
-def _unlisted(found: Posterior, verdict: Verdict) -> tuple[tuple[str, ...], float]:
+def _unlisted(found: MisfitPosterior, verdict: Verdict) -> tuple[tuple[str, ...], float]:
     """Variables of an effect that is on no list, and its root mean square. [in]"""
     if verdict is not Verdict.UNLISTED:
         return (), 0.0
@@ -329,7 +329,7 @@ def _unlisted(found: Posterior, verdict: Verdict) -> tuple[tuple[str, ...], floa
     return variables, 0.0
 
 
-def _smallest(problem: Problem, found: Posterior, noise: NoiseModel) -> float:
+def _smallest(problem: MisfitProblem, found: MisfitPosterior, noise: NoiseModel) -> float:
     """Root mean square of an effect that is likelier than nothing with 80 % power. [in]"""
     n, prior = len(problem.misfit), found.effects.log_prior[found.effects.listed]
     often = float(np.exp(np.median(prior))) if len(prior) else problem.beliefs.expected

@@ -22,7 +22,7 @@ _LEADING, _TRACE = 6, 1e-7
 
 
 @dataclass(frozen=True)
-class Posterior:
+class MisfitPosterior:
     """How likely explanations of one set of data are.
 
     likeliest: explanations that were looked at as a whole, likeliest first, with their
@@ -59,7 +59,7 @@ def posterior(
     contexts: Sequence[Context],
     beliefs: Beliefs,
     start: Sequence[Explanation] = (),
-) -> Posterior:
+) -> MisfitPosterior:
     """Search the likeliest sets of effects in all contexts, and sum the probability of all near
     them.
     """
@@ -217,7 +217,7 @@ class _Search:
             counted.setdefault(context, []).append(members)
             yield context, members, at
 
-    def summed(self) -> Posterior:
+    def summed(self) -> MisfitPosterior:
         """Probabilities of everything, from all sets that were looked at."""
         alone = self.extended[0, frozenset[int]()]
         over_nothing = alone.further - alone.own.log_posterior
@@ -264,7 +264,7 @@ class _Search:
         nothing = together.get(frozenset(), 0.0)
         unlisted = sum(p for own, p in together.items() if own - listed - context_names)
         order = sorted((at.own for *_k, at in parts), key=lambda e: -e.log_posterior)
-        return Posterior(
+        return MisfitPosterior(
             self.effects,
             self.contexts,
             tuple(e.with_posterior(e.log_posterior - whole) for e in order),

@@ -17,7 +17,7 @@ from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.explanation import Context, Effects, Key
 from mlg_troubleshoot.misfit.marginal import Marginal, Products
-from mlg_troubleshoot.misfit.posterior import Posterior, posterior
+from mlg_troubleshoot.misfit.posterior import MisfitPosterior, posterior
 
 PAGE = Path(__file__).parents[2] / "docs/explanation/diagnosis.md"
 Array = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
@@ -126,7 +126,9 @@ def test_a_sign_that_an_effect_has_makes_it_twice_as_likely_and_the_other_imposs
     assert alone((1,), 0, wrong) < bare - 4.0
 
 
-def search(given: Effects | None = None, contexts: tuple[Context, ...] = CONTEXTS) -> Posterior:
+def search(
+    given: Effects | None = None, contexts: tuple[Context, ...] = CONTEXTS
+) -> MisfitPosterior:
     return posterior(NOISE, DATA, given or FREE, contexts, BELIEFS)
 
 
