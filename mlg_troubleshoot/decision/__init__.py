@@ -6,8 +6,8 @@ __all__ = [
     "inspection",
     "judge_rows",
     "next_joint",
-    "order",
     "plan",
     "prediction",
+    "ranking",
     "sentences",
 ]

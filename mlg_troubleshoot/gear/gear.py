@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 
@@ -14,11 +15,41 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.model import Calibration, LinkageModel
-from mlg_troubleshoot.gear.sources import Sourced
 from mlg_troubleshoot.geometry.mechanism import Mechanism
 
 # 0.1905 mm is 0.0075000000000000006 in to a computer: no gauge reads a difference of 1e-9 in.
 ROUNDING_IN = 1e-9
+
+
+class SourceKind(StrEnum):
+    """How much a number is worth."""
+
+    TECHNICAL_ORDER = "technical order"
+    STATED = "stated in the paper"
+    RECONSTRUCTED = "reconstructed"
+    MEASURED = "measured"
+    ASSUMED = "assumed"
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A source in words, which numbers of a gear file refer to by name: document, section, how it
+    was obtained.
+    """
+
+    name: str
+    kind: SourceKind
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Sourced:
+    """A number with its unit and its source in words."""
+
+    value: float
+    unit: str
+    kind: SourceKind
+    source: str
 
 
 @dataclass(frozen=True, slots=True)

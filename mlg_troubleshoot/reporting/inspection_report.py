@@ -11,7 +11,7 @@ from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Outcome, RowSource, Side
-from mlg_troubleshoot.decision.order import WORST_FIRST, latest_of_each_gear
+from mlg_troubleshoot.decision.ranking import WORST_FIRST, latest_of_each_gear
 from mlg_troubleshoot.decision.sentences import (
     chance_wrong_sentence,
     no_repair_set,
