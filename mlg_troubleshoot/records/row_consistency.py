@@ -27,17 +27,17 @@ _SCALES: tuple[tuple[float, str], ...] = tuple(
     for factor, words in ((slip.factor, slip.too_large), (1.0 / slip.factor, slip.too_small))
 )
 
-Gear = tuple[str, Side]
+GearKey = tuple[str, Side]
 Clearances = Mapping[int, float]
 
 
 def history_warnings(rows: Sequence[Inspection | InvalidRow]) -> dict[int, tuple[str, ...]]:
     """Suggest slips for rows that do not fit the gear's other inspections."""
-    gears: dict[Gear, list[int]] = {}
+    gears: dict[GearKey, list[int]] = {}
     for place, row in enumerate(rows):
         if isinstance(row, Inspection) and row.clearance_in:
             gears.setdefault((row.tail_no, row.side), []).append(place)
-    usual: dict[Gear, Clearances] = {}
+    usual: dict[GearKey, Clearances] = {}
     found: dict[int, tuple[str, ...]] = {}
     for gear, places in gears.items():
         if len(places) <= _FEWEST:
@@ -71,7 +71,7 @@ def order_warnings(
     """Name the rows of one gear whose landings run backwards as its dates go on, each with its
     cell.
     """
-    gears: dict[Gear, list[tuple[int, Inspection]]] = {}
+    gears: dict[GearKey, list[tuple[int, Inspection]]] = {}
     for place, row in enumerate(rows):
         if isinstance(row, Inspection):
             gears.setdefault((row.tail_no, row.side), []).append((place, row))
