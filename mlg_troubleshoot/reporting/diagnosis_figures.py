@@ -22,6 +22,7 @@ Texts = NDArray[np.str_]
 
 # Width and height of one plot of two side by side. [canvas units]
 _PLOT = (335, 236)
+_BAR, _BAR_HIGH = 150, 10
 _BINS = 8
 _FEWEST_IN_A_BIN = 5
 MOST_TAILS = 36
@@ -333,4 +334,12 @@ def measured_against_predicted(residuals: Residuals) -> Markup:
             x = plot.area[0] + 6 + 62 * k
             _point(canvas, x, 10, after=is_after)
             canvas.text(x + 7, 13.5, label, size=10)
+    return canvas.svg()
+
+
+def probability_bar(chance: float) -> Markup:
+    """Draw a probability as a bar that fills its frame at certainty."""
+    canvas = Canvas(_BAR + 2, _BAR_HIGH + 2, f"probability {chance:.1%}")
+    canvas.rectangle(1, 1, _BAR, _BAR_HIGH, fill=PAPER, colour=SOFT, width=1)
+    canvas.rectangle(1, 1, _BAR * min(max(chance, 0.0), 1.0), _BAR_HIGH, fill=INK)
     return canvas.svg()

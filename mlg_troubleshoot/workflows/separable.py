@@ -16,8 +16,6 @@ from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate
 from mlg_troubleshoot.diagnosis.causes.together import JointFactors
 from mlg_troubleshoot.diagnosis.extension import MOST_IN
-from mlg_troubleshoot.diagnosis.inference import RULED_OUT
-from mlg_troubleshoot.diagnosis.model_choice import CLASS_APART
 from mlg_troubleshoot.diagnosis.noise import TAIL_RATIOS
 from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
 from mlg_troubleshoot.diagnosis.table import ALONG, DiagnosisTable
@@ -25,6 +23,7 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.search import ALIKE, beside
 from mlg_troubleshoot.records.columns import Kind
 from mlg_troubleshoot.records.headers import parse_canonical
@@ -34,11 +33,9 @@ from mlg_troubleshoot.records.headers import parse_canonical
 # pins add).
 TAILS, VISITS, ROW_IN = 20, 5, 0.0025
 # Expected distance in log-likelihood at which two are distinguished with 80 % power: d²/2 − 0.84 d
-# = RULED_OUT.
-_APART = 0.84 + float(np.sqrt(0.84**2 + 2.0 * RULED_OUT))
-# Effect over the error of its mean (S) from which some hundred candidates let one stand out with 80
-# % power.
-_FOUND = 5.0
+# is the odds from which something is said.
+_BELIEFS = Beliefs()
+_APART = 0.84 + float(np.sqrt(0.84**2 + 2.0 * _BELIEFS.odds))
 # Columns in addition to clearances, cheapest first: written down anyway, read off, to be measured.
 FURTHER = {
     "side": Kind.SIDE,
@@ -179,6 +176,8 @@ class _Plan:
         for k in np.flatnonzero(seen):
             self.keys.setdefault(_key(found[k]), []).append(int(k))
         self.stand_ins = {_key(c) for c in found if c.stands_in}
+        often = _BELIEFS.expected / (len({name for name, _target in self.keys}) + 1.0)
+        self.found = _BELIEFS.seen_from(often / 2.0, len(table))
         self.row_in = ROW_IN / float(np.sqrt(len(table)))
         causes = [c for c in CATALOGUE if isinstance(c, JointFactors)]
         tried = {(c.name, None): c.blocks(scene, gear.ensemble_models[1:]) for c in causes}
@@ -205,7 +204,7 @@ class _Plan:
         if key in self.blocks:
             rival = next(other for other in self.blocks if other != key)
             lead = partial(_divergence, true=self.blocks[key], other=self.blocks[rival])
-            return rival[0], _size_of(lead, CLASS_APART)
+            return rival[0], _size_of(lead, 0.5 * _APART**2)
         best, name = 0.0, None
         for other, places in self.keys.items():
             if other != key:
@@ -227,8 +226,8 @@ class _Plan:
             lead = partial(
                 _divergence, true=self.blocks[key], other=np.zeros_like(self.blocks[key])
             )
-            return _size_of(lead, 0.5 * _FOUND**2)
-        return _FOUND * self._row(key)
+            return _size_of(lead, 0.5 * self.found**2)
+        return self.found * self._row(key)
 
     def _row(self, key: Key) -> float:
         return self.row_in * float(np.min(self.hidden[self.keys[key]]))
