@@ -8,6 +8,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from mlg_troubleshoot.cli.flags import Flags
+from mlg_troubleshoot.decision.columns import CLEARANCE
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
@@ -51,7 +52,7 @@ def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
             raise UsageError(
                 f"--set {text!r} is not JOINT=VALUE", "Write for example --set 3=0.013in."
             )
-        column = f"clearance_{int(number)}"
+        column = CLEARANCE.header(int(number))
         if column in values:
             raise UsageError(f"--set gives joint {int(number)} twice", "Give each joint once.")
         values[column], labels[column] = written, f"--set {text!r}"

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import date
 
-from mlg_troubleshoot.cli.prompts.answers import Answers, Reading, judge
+from mlg_troubleshoot.cli.prompts.answers import SIGN_OFF, Answers, Reading, judge
 from mlg_troubleshoot.cli.prompts.lines import BLANK, Line, Tone, keys, line
 from mlg_troubleshoot.cli.prompts.sketch import sketch
 from mlg_troubleshoot.cli.prompts.store import Session
+from mlg_troubleshoot.decision.columns import BY_NAME, DATE, MARGIN, PLUNGER_DISPLACEMENT
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, in_unit
 
@@ -299,13 +300,13 @@ def more_page(answers: Answers, gear: Gear, width: int) -> Page:
             "p",
             plunger,
             "plunger off mid-position, + over-travel",
-            answers.more.get("plunger_displacement"),
+            answers.more.get(PLUNGER_DISPLACEMENT.name),
         ),
         row(
             "m",
             margin,
             f"this gear's own margin, else {length(gear.margin.value, unit)}",
-            answers.more.get("margin"),
+            answers.more.get(MARGIN.name),
         ),
     )
     return Page(shown, " f, r, p, m, or Enter to go on > ")
@@ -348,18 +349,7 @@ def confirm_unit_page(answers: Answers, question: str) -> Page:
 
 
 # What stands on the sign-off page: the word that leads back to it from the review, and its column.
-DETAILS = {
-    "name": "technician_id",
-    "order": "work_order",
-    "gauge": "gauge_id",
-    "date": "inspection_date",
-}
-_DETAIL_PROMPTS = {
-    "technician_id": "Measured by",
-    "work_order": "Work order",
-    "gauge_id": "Gauge",
-    "inspection_date": "Date of the inspection",
-}
+DETAILS = {BY_NAME[name].prompt_word: name for name in SIGN_OFF}
 DETAIL_HELP = (
     line(
         "Printed on the sign-off page of the report. Enter leaves it empty; x takes it away.",
@@ -372,9 +362,9 @@ DETAIL_HELP = (
 def detail_page(answers: Answers, column: str, today: date | None) -> Page:
     kept = answers.more.get(column)
     enter = _keeps(kept) or " (Enter: not stated)"
-    if kept is None and column == "inspection_date" and today is not None:
+    if kept is None and column == DATE.name and today is not None:
         enter = f" (Enter: {today.isoformat()})"
-    return Page((), f" {_DETAIL_PROMPTS[column]}{enter} > ")
+    return Page((), f" {BY_NAME[column].prompt}{enter} > ")
 
 
 MORE_HELP = (
