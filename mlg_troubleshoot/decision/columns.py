@@ -142,6 +142,8 @@ class Column:
         """What a refusal of a cell that is not a length asks for."""
         words = tuple(self.words_taken)
         usual = _joined(words) if words else f"{self.plain} ({self.holds})"
+        if self.carried:
+            usual = "text"
         if self.holds is Holds.NUMBER:
             usual = f"{self.plain} from {{low:g}} to {{high:g}} {self.unit}".rstrip()
         return (self.expected or usual).format(low=self.low, high=self.high)

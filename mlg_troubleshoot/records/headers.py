@@ -258,7 +258,9 @@ def _by_alias(
 def _resembles_plunger(words: list[str], has_unit: bool) -> Recognition:
     """Doubt a length of the plunger that none of its columns names."""
     if has_unit and "plunger" in words and not set(words) & _OTHER_MATTER:
-        return _doubt("it may be the measured displacement of the plunger", "plunger_displacement")
+        return _doubt(
+            "it may be the measured displacement of the plunger", PLUNGER_DISPLACEMENT.name
+        )
     return UNKNOWN
 
 

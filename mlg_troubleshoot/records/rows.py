@@ -20,6 +20,7 @@ from mlg_troubleshoot.decision.columns import (
     DATE,
     GAUGE_U,
     IDENTITY,
+    JOINT,
     OUTCOME,
     PLUNGER_DISPLACEMENT,
     RECORD_ID,
@@ -160,7 +161,7 @@ class RowReader:
         self._others = [
             (index, field.column)
             for index, field in good
-            if not field.column.is_length and field.column not in (CONVENTION, UNIT)
+            if not field.column.is_length and field.column not in (CONVENTION, UNIT, JOINT)
         ]
         # The readings of a fleet repeat: what was understood once is not taken apart again.
         self._length_of = lru_cache(_REMEMBERED)(self._one_length)

@@ -12,7 +12,18 @@ from functools import partial
 from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Verdict
-from mlg_troubleshoot.decision.columns import COLUMNS, CONVENTION, IDENTITY, Column, Holds
+from mlg_troubleshoot.decision.columns import (
+    COLUMNS,
+    CONVENTION,
+    DATE,
+    IDENTITY,
+    LANDINGS,
+    RECORD_ID,
+    SIDE,
+    TAIL_NO,
+    Column,
+    Holds,
+)
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records import ReadOptions
@@ -92,10 +103,10 @@ class KeptGate:
                 raise _WrongError("content", body, "a table of names and values")
             # Whatever stands there can be voided under the names that it has.
             if record.kind is not RecordKind.VOID:
-                self._fields["side"]("side", record.side)
-                _text("tail_no", record.tail_no)
+                self._fields[SIDE.filled](SIDE.name, record.side)
+                _text(TAIL_NO.name, record.tail_no)
                 if record.day:
-                    self._fields["inspection_date"]("day", record.day)
+                    self._fields[DATE.filled]("day", record.day)
             self._of_kind[record.kind](record, body)
         except _WrongError as wrong:
             return str(wrong)
@@ -103,15 +114,21 @@ class KeptGate:
 
     def _inspection(self, record: Record, body: Mapping[str, Any]) -> None:
         found = _taken(body, "inspection", dict)
-        for name in ("record_id", "tail_no", "side", "convention"):
-            _taken(found, name, str)
+        for column in (*IDENTITY, CONVENTION):
+            _taken(found, column.filled, str)
         for name, value in found.items():
             check = self._fields.get(name)
             if check is None:
                 raise _WrongError(name, value, "a column of an inspection")
             check(name, value)
-        beside = {"record_id": record.record_id, "tail_no": record.tail_no, "side": record.side}
-        for name, value in (*beside.items(), ("inspection_date", record.day or None)):
+        filed = {
+            RECORD_ID: record.record_id,
+            TAIL_NO: record.tail_no,
+            SIDE: record.side,
+            DATE: record.day or None,
+        }
+        for column, value in filed.items():
+            name = column.filled
             if found.get(name) != value:
                 raise _WrongError(
                     name, found.get(name), f"what the record is filed under ({value!r})"
@@ -141,7 +158,7 @@ class KeptGate:
 
     def _work(self, _record: Record, body: Mapping[str, Any]) -> None:
         if body.get("landings") is not None:
-            self._fields["gear_landings"]("landings", body["landings"])
+            self._fields[LANDINGS.filled]("landings", body["landings"])
         if body.get("work_order") is not None:
             _text("work_order", body["work_order"])
 
