@@ -102,20 +102,20 @@ class Column:
         """Whether zero is not a value; the gauge of a single joint is never without uncertainty."""
         return self.above_zero or (self is GAUGE_U and number is not None)
 
-    @property
+    @cached_property
     def is_length(self) -> bool:
         return self.holds is Holds.LENGTH
 
-    @property
+    @cached_property
     def is_numbered(self) -> bool:
         """Whether its header may hold a number, of a joint or of a repeat reading."""
         return bool(self.joint_fills) or self.copies > 1
 
-    @property
+    @cached_property
     def signed(self) -> bool:
         return self.low < 0.0
 
-    @property
+    @cached_property
     def plain(self) -> str:
         """The name in words, as it stands in messages."""
         return self.name.replace("_", " ")
@@ -125,7 +125,7 @@ class Column:
         """Name of its value in an inspection, in a kept record and in Python."""
         return self.fills or (f"{self.name}_in" if self.is_length else self.name)
 
-    @property
+    @cached_property
     def variable(self) -> str:
         """Name of the covariate in a diagnosis."""
         if self.holds is Holds.DATE:

@@ -113,19 +113,11 @@ class _LengthKind(NamedTuple):
     unit: LengthUnit | None
     above_zero: bool
 
-    @classmethod
-    def of(cls, field: Field) -> _LengthKind:
-        return cls(field.column, field.unit, field.column.is_above_zero(field.number))
-
 
 class _LengthColumn(NamedTuple):
     at: int
     field: Field
     kind: _LengthKind
-
-    def place(self) -> tuple[bool, int]:
-        is_clearance = self.field.column is CLEARANCE
-        return not is_clearance, (self.field.number or 0) if is_clearance else 0
 
 
 @dataclass(slots=True)
@@ -152,12 +144,20 @@ class RowReader:
         self._at = {field.column: index for index, field in reversed(good)}
         self._makes_ids = all(p.field is None or p.field.column is not RECORD_ID for p in placed)
         lengths = [
-            _LengthColumn(index, field, _LengthKind.of(field))
+            _LengthColumn(
+                index,
+                field,
+                _LengthKind(field.column, field.unit, field.column.is_above_zero(field.number)),
+            )
             for index, field in good
             if field.column.is_length
         ]
+        clearances = [each for each in lengths if each.field.column is CLEARANCE]
         # Clearances stand first, in the order of the joints, whatever the order of their columns.
-        self._lengths = sorted(lengths, key=_LengthColumn.place)
+        self._lengths = [
+            *sorted(clearances, key=lambda each: each.field.number or 0),
+            *(each for each in lengths if each not in clearances),
+        ]
         self._others = [
             (index, field.column)
             for index, field in good
