@@ -53,7 +53,7 @@ from mlg_troubleshoot.records.values import (
     read_value,
     says_failed,
 )
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from mlg_troubleshoot.units import ClearanceConvention, Length, LengthUnit, Sentence
 
 _EPS_IN = 1e-9
 _REMEMBERED = 20_000
@@ -532,10 +532,15 @@ class RowReader:
         self, joint: int, radial_in: float, text: EnteredClearance, scale: ClearanceConvention
     ) -> str:
         slip = scale_slip(radial_in, text.unit, scale, self._options.clearance_confirm_above_in)
-        return (
-            f"joint {joint}: {text.text} {text.unit.value} is {radial_in:.4g} in radial, above "
-            f"{self._options.clearance_confirm_above_in:g} in: check the reading. {slip}"
-        ).rstrip()
+        return Sentence.of(
+            "joint {}: {} {} is {} radial, above {}: check the reading.{}",
+            joint,
+            text.text,
+            text.unit,
+            Length.brief(radial_in),
+            Length.brief(self._options.clearance_confirm_above_in),
+            f" {slip}" if slip else "",
+        )
 
     def _fault(self, index: int, fault: CellFaultError) -> None:
         """Note a fault; where the cell bears the verdict, the row cannot be judged then."""
@@ -630,7 +635,7 @@ class RowReader:
         warnings += asked
         if fit.scale in (UnitFit.DOUBTFUL, UnitFit.TOO_SMALL):
             asked.insert(0, fit.question)
-        return " ".join(asked)
+        return Sentence.joined(asked)
 
     def _correct(self) -> tuple[str, ...]:
         """Return the columns to correct, in the order of the table; missing columns stand last."""

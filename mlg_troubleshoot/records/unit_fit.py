@@ -12,7 +12,7 @@ from enum import StrEnum
 
 from mlg_troubleshoot.decision.inspection import EnteredClearance
 from mlg_troubleshoot.records.model import ReadOptions
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from mlg_troubleshoot.units import ClearanceConvention, Length, LengthUnit, Sentence
 
 # Below this ratio to new parts a reading is clearly too small. Inches taken for millimetres stay
 # below it unless the joints are worn beyond their limits on average (0.6 x 25.4 x 0.0005 in =
@@ -105,9 +105,13 @@ def plunger_question(displacement_in: float, stated: LengthUnit, options: ReadOp
         return ""
     confirm = "" if options.asks else f" {CONFIRM_SMALL}"
     read = f"read in {' or '.join(others)}, not in {stated.words}"
-    return (
-        f"the plunger reading of {number:g} {stated} is {displacement_in:.4f} in: was it"
-        f" {read}?{confirm}"
+    return Sentence.of(
+        "the plunger reading of {} {} is {}: was it {}?{}",
+        f"{number:g}",
+        stated,
+        Length(displacement_in),
+        read,
+        confirm,
     )
 
 

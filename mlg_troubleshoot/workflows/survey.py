@@ -21,7 +21,7 @@ from mlg_troubleshoot.indices.index_table import INDEX_TABLE, write_index_table
 from mlg_troubleshoot.outputs import OutputFile, OutputKind, claim_outputs, write_text
 from mlg_troubleshoot.paper.targets import targets_file
 from mlg_troubleshoot.schemas import SCHEMA_VERSION
-from mlg_troubleshoot.units import LengthUnit
+from mlg_troubleshoot.units import Length, LengthUnit, Sentence
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.reporting import WrittenReport
@@ -185,15 +185,20 @@ def _assemblies(found: Survey) -> tuple[str, ...]:
             name = found.linkage.names[int(np.argmax(moved))].split(".")[0]
             parts = [
                 (
-                    f"one with point {name} elsewhere by {moved.max():.4f} in"
+                    Sentence.of(
+                        "one with point {} elsewhere by {}", name, Length(float(moved.max()))
+                    )
                     if moved.any()
                     else "as written"
                 )
             ]
-        text = ", ".join(parts)
+        text = Sentence.joined(parts, ", ")
         shares[text] = shares.get(text, 0.0) + mode.weight
-    texts = "; ".join(f"{text} ({100 * share:.0f} %)" for text, share in shares.items())
-    return (f"the survey allows {len(shares)} assemblies: {texts}",) if len(shares) > 1 else ()
+    if len(shares) < 2:
+        return ()
+    each = (Sentence.of("{} ({} %)", text, f"{100 * share:.0f}") for text, share in shares.items())
+    texts = Sentence.joined(each, "; ")
+    return (Sentence.of("the survey allows {} assemblies: {}", len(shares), texts),)
 
 
 def _left_targets(before: Gear, path: Path) -> tuple[str, ...]:

@@ -27,6 +27,7 @@ from mlg_troubleshoot.units import (
     MINUS,
     ClearanceConvention,
     LengthUnit,
+    Sentence,
     WrittenLength,
     parse_length,
 )
@@ -199,7 +200,7 @@ def judge(
         )
     if number not in read.entered:
         return Judged()
-    return Judged(" ".join(read.warnings), parse_length(read.entered[number].text))
+    return Judged(Sentence.joined(read.warnings), parse_length(read.entered[number].text))
 
 
 def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> Inspection:

@@ -11,7 +11,7 @@ from mlg_troubleshoot.cli.prompts.sketch import sketch
 from mlg_troubleshoot.cli.prompts.store import Session
 from mlg_troubleshoot.decision.columns import BY_NAME, DATE, MARGIN, PLUNGER_DISPLACEMENT
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, in_unit
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, said_in
 
 CONVENTION_NAMES = {
     convention: convention.lower().replace("_", " ") for convention in ClearanceConvention
@@ -196,10 +196,11 @@ def confirm_page(gear: Gear, reading: Reading, number: int, unit: LengthUnit | N
     above = f"is far beyond the limit of {length(joint.limit.value, unit)}"
     below = f"is less than new parts have ({length(joint.new_part.value, unit)})"
     what = above if joint.is_over_limit(reading.radial_in) else below
-    said = judge(reading.written.text, number, reading.unit, reading.convention, gear).said
+    judged = judge(reading.written.text, number, reading.unit, reading.convention, gear)
+    said = said_in(judged.said, reading.unit)
     shown = (
         line((f"#{number}  {length(reading.radial_in, unit)} radial {what}.", Tone.WARN)),
-        line(in_unit(f"{said[:1].upper()}{said[1:]}", reading.unit), indent=3),
+        line(f"{said[:1].upper()}{said[1:]}", indent=3),
         choice(
             "y",
             f"yes, it is really {length(reading.as_read_in, unit)}"
