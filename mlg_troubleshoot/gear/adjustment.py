@@ -7,11 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Places
+from mlg_troubleshoot.arrays import STEP, Array, Places
 from mlg_troubleshoot.gear.directions import IN_CACHE, WorstCase, worst_case
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
-
-_STEP_IN = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +90,7 @@ def adjusted_slopes(model: LinkageModel, adjustment: Adjustment, worst: WorstCas
     """
     clearance, joints = adjustment.clearance_in, adjustment.clearance_in.shape[1]
     directions, changed = worst.governing_directions, adjustment.numbers(model)
-    steps = _STEP_IN * np.concatenate([np.eye(joints), -np.eye(joints)])[:, None, :]
+    steps = STEP * np.concatenate([np.eye(joints), -np.eye(joints)])[:, None, :]
     factors = 1.0 if adjustment.direction_factors is None else adjustment.direction_factors
     slopes = np.empty_like(clearance)
     at_once = max(IN_CACHE // len(steps), 1)
@@ -100,6 +98,6 @@ def adjusted_slopes(model: LinkageModel, adjustment: Adjustment, worst: WorstCas
         rows = slice(start, start + at_once)
         links = links_from((clearance[rows] + steps) * factors, directions[rows])
         moved = model.displacement(links, {name: each[rows] for name, each in changed.items()})
-        slopes[rows] = (moved[:joints] - moved[joints:]).T / (2 * _STEP_IN)
+        slopes[rows] = (moved[:joints] - moved[joints:]).T / (2 * STEP)
     rate = 1.0 if adjustment.rate_factor is None else adjustment.rate_factor[:, None]
     return np.asarray(rate * slopes)

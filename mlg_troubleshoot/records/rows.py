@@ -41,8 +41,12 @@ from mlg_troubleshoot.records.dates import DateOrder, readings
 from mlg_troubleshoot.records.headers import Field
 from mlg_troubleshoot.records.model import TableInHand
 from mlg_troubleshoot.records.refusals import FileRefusedError
-from mlg_troubleshoot.records.slips import scale_slip
-from mlg_troubleshoot.records.unit_fit import UnitFit, judge_unit, plunger_question
+from mlg_troubleshoot.records.unit_fit import (
+    UnitFit,
+    judge_unit,
+    plunger_question,
+    scale_slip,
+)
 from mlg_troubleshoot.records.values import (
     NOT_MEASURED,
     AmbiguousDateError,

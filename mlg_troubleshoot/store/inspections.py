@@ -10,7 +10,7 @@ from typing import Any
 
 from mlg_troubleshoot.decision.columns import COLUMNS, Holds
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, RowSource
-from mlg_troubleshoot.store.database import Kind, Record, packed
+from mlg_troubleshoot.store.database import Record, RecordKind, packed
 from mlg_troubleshoot.units import LengthUnit
 
 # What says where and how an inspection was entered, not what was found.
@@ -38,7 +38,9 @@ def _plain(value: Any) -> Any:
     return [_plain(each) for each in value] if isinstance(value, tuple) else value
 
 
-def inspection_record(inspection: Inspection, kind: Kind = Kind.INSPECTION, **more: Any) -> Record:
+def inspection_record(
+    inspection: Inspection, kind: RecordKind = RecordKind.INSPECTION, **more: Any
+) -> Record:
     """Return an inspection as a record; what is at its default is left out."""
     day = inspection.inspection_date.isoformat() if inspection.inspection_date else ""
     body = {}
@@ -55,7 +57,7 @@ def inspection_record(inspection: Inspection, kind: Kind = Kind.INSPECTION, **mo
         inspection.side.value,
         day,
         packed({"inspection": body, **more}),
-        identity if kind is Kind.INSPECTION else (),
+        identity if kind is RecordKind.INSPECTION else (),
     )
 
 

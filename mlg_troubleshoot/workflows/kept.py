@@ -28,8 +28,7 @@ from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.records.values import CellFaultError, read_date, read_text, read_value
-from mlg_troubleshoot.store import Kind as RecordKind
-from mlg_troubleshoot.store import Record
+from mlg_troubleshoot.store import Record, RecordKind
 from mlg_troubleshoot.units import LengthUnit
 
 _Check = Callable[[str, Any], None]
