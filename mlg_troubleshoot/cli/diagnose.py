@@ -125,9 +125,8 @@ def _unwritten(diagnosis: Diagnosis) -> str:
 
 def _show(diagnosis: Diagnosis, unit: LengthUnit) -> None:
     from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
-    from mlg_troubleshoot.units import in_unit
 
     console = output.console(unit=unit)
     for line in seven_lines(diagnosis):
-        said = output.text(in_unit(line.text, unit), "not bold")
+        said = output.text(line.text, "not bold")
         console.print(output.text(f"{line.number} {line.word:<7}", "bold").append_text(said))

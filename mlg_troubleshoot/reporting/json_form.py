@@ -20,8 +20,9 @@ from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension, NamedCause
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.schemas import SCHEMA_VERSION
+from mlg_troubleshoot.units import Sentence
 
-_AS_THEY_ARE = frozenset((str, int, bool, type(None)))
+_AS_THEY_ARE = frozenset((str, Sentence, int, bool, type(None)))
 _SINGLE = (Enum, np.generic)
 _NUMBERS = (
     *(
