@@ -58,7 +58,7 @@ app = typer.Typer(
 gear_app = typer.Typer(
     name="gear",
     help=(
-        "Which model is in use: joints, coordinates, provenance; [b]mlg gear verify[/b] checks it."
+        "Show the model in use: joints, coordinates, provenance; [b]mlg gear verify[/b] checks it."
     ),
     invoke_without_command=True,
 )

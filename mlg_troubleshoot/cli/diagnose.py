@@ -33,7 +33,9 @@ def diagnose(
     ],
     write_extension: Annotated[
         Path | None,
-        typer.Option("--write-extension", metavar="EXT.toml", help="Keep the extended model."),
+        typer.Option(
+            "--write-extension", metavar="EXT.toml", help="Write the extended model to this file."
+        ),
     ] = None,
     report: options.Report = None,
     page: options.Paper = None,
@@ -41,7 +43,7 @@ def diagnose(
     permutations: Annotated[
         int, typer.Option("--permutations", min=99, max=99999, help="Number of null simulations.")
     ] = 999,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all randomness.")] = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all random draws.")] = 0,
     tables: options.Tables,
     force: options.Force = False,
     show: options.Show = None,
@@ -52,8 +54,7 @@ def diagnose(
 ) -> None:
     """Compare measured with predicted: what is wrong, the cause by name, the extension, the gain.
 
-    Exit codes: 0 nothing found · 1 something found · 3 cannot be concluded from this table · 2
-    usage.
+    Exit codes: 0 nothing found · 1 something found · 3 this table allows no conclusion · 2 usage.
     """
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.progress import stages

@@ -20,7 +20,7 @@ def show(
     as_json: options.Json = False,
     _version: options.Version = False,
 ) -> None:
-    """Show which model is in use: identity, provenance, joints, coordinates, retraction cycle."""
+    """Show the model in use: identity, provenance, joints, coordinates, retraction cycle."""
     from mlg_troubleshoot.gear.gear_file import load_gear
 
     context.obj = gear

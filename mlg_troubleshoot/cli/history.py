@@ -31,7 +31,7 @@ Place = Annotated[
     typer.Option(
         "--store",
         metavar="PATH|URL",
-        help="Where it is kept; else MLG_STORE, else a file of your own.",
+        help="Store of the records; else MLG_STORE, else a file of your own.",
     ),
 ]
 Tail = Annotated[str, typer.Argument(metavar="TAIL", help="Tail number.")]
@@ -310,7 +310,7 @@ def rerig(
     store: Place = None,
     gear: options.Gear = options.DEFAULT_GEAR,
 ) -> None:
-    """Record that the reversing valve was re-rigged; the wear of the joints goes on."""
+    """Record that the reversing valve was re-rigged; the wear of the joints continues."""
     from mlg_troubleshoot.store import Kind
     from mlg_troubleshoot.workflows import history as task
 
@@ -332,7 +332,7 @@ def _refuse_unknown(joints: Sequence[int], gear: Gear) -> None:
 def correct(
     record: RecordId,
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A table with the one right inspection.")
+        Path, typer.Argument(metavar="FILE", help="A table with the one corrected inspection.")
     ],
     store: Place = None,
     gear: options.Gear = options.DEFAULT_GEAR,
@@ -340,7 +340,7 @@ def correct(
     convention: options.Convention = None,
     sheet: options.Sheet = None,
 ) -> None:
-    """Append the right inspection for a wrong one; both stay in the chain, the right one counts."""
+    """Append a corrected inspection. The wrong one stays in the chain but no longer counts."""
     from mlg_troubleshoot.cli.views import notes
     from mlg_troubleshoot.workflows import history as task
     from mlg_troubleshoot.workflows.check import CheckOptions, check_files
@@ -362,7 +362,7 @@ def void(
     store: Place = None,
     gear: options.Gear = options.DEFAULT_GEAR,
 ) -> None:
-    """Append that a record does not count; it stays in the chain."""
+    """Void a record: it stays in the chain but does not count."""
     from mlg_troubleshoot.workflows import history as task
 
     added = task.void(kept_in(store, gear), record, why)
@@ -373,12 +373,12 @@ def outcome(
     record: RecordId,
     found: Annotated[str, typer.Option("--found", metavar="TEXT", help="What was found.")],
     joint: Annotated[
-        int | None, typer.Option("--joint", metavar="N", help="The joint that it was.")
+        int | None, typer.Option("--joint", metavar="N", help="The joint that was the cause.")
     ] = None,
     store: Place = None,
     gear: options.Gear = options.DEFAULT_GEAR,
 ) -> None:
-    """Record what was found after the advice; mlg history then says how often it was right."""
+    """Record what was found after the advice; mlg history then shows how often it was right."""
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.workflows import history as task
 
@@ -400,11 +400,11 @@ def verify(
     ] = None,
     gear: options.Gear = options.DEFAULT_GEAR,
 ) -> None:
-    """Walk the chain; the first record that does not fit is named (exit code 1). It does not prove
+    """Check the chain and name the first record that does not fit (exit code 1). It does not prove
     who wrote a record.
 
-    The last hash is printed: noted elsewhere and given to --expect, it shows that no record was
-    taken away since.
+    The last hash is printed. Note it elsewhere and pass it to --expect later: this shows whether
+    records were removed.
     """
     from mlg_troubleshoot.workflows import history as task
 
@@ -473,7 +473,7 @@ def export(
 def import_chain(
     file: Chain, store: Place = None, gear: options.Gear = options.DEFAULT_GEAR
 ) -> None:
-    """Read an exported chain into an empty store, or the rest of it into a store that holds its
+    """Read an exported chain into an empty store, or the rest of it into a store that contains its
     beginning.
     """
     from mlg_troubleshoot.workflows import history as task
@@ -493,8 +493,8 @@ def history_app() -> typer.Typer:
         name="history",
         cls=HistoryGroup,
         help=(
-            "Records of each gear: [b]mlg history[/b] · [b]mlg history TAIL LH[/b], and what is"
-            " added later."
+            "Show the records of each gear ([b]mlg history[/b], [b]mlg history TAIL LH[/b]) and add"
+            " repairs, corrections and outcomes."
         ),
         epilog=EPILOG,
     )

@@ -25,7 +25,9 @@ def reconstruct(
     targets: Annotated[
         Path | None,
         typer.Option(
-            "--targets", metavar="TOML", help="Numbers to meet, else those printed in the paper."
+            "--targets",
+            metavar="TOML",
+            help="Numbers to meet; those printed in the paper if not given.",
         ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random linkages.")] = 0,
@@ -34,12 +36,12 @@ def reconstruct(
         typer.Option(
             "--start",
             metavar="NAME",
-            help="Polish this linkage of the gear (A, B, …), else from scratch.",
+            help="Start from this linkage of the gear (A, B, …); if not given, from random ones.",
         ),
     ] = None,
     name: Annotated[str, typer.Option("--name", help="Name of the new linkage.")] = "N",
     minutes: Annotated[
-        float, typer.Option("--minutes", min=0.01, help="Time to give up after.")
+        float, typer.Option("--minutes", min=0.01, help="Minutes after which to give up.")
     ] = 15.0,
     out: Annotated[
         Path | None,
@@ -52,9 +54,9 @@ def reconstruct(
     quiet: options.Quiet = False,
     _version: options.Version = False,
 ) -> None:
-    """Search a linkage that meets printed numbers: where the coordinates come from.
+    """Search for a linkage that meets printed numbers: the origin of the coordinates.
 
-    Exit codes: 0 found · 1 polished, but not everything is met · 3 nothing found in time.
+    Exit codes: 0 found · 1 improved, but not every number is met · 3 nothing found in time.
     """
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.progress import stages

@@ -47,7 +47,7 @@ def asked(flags: StudyFlags) -> Iterator[tuple[Gear, StudyOptions]]:
         except ValueError:
             raise UsageError(
                 f"directions {flags.fixed!r}",
-                "Give degrees with commas between, one for each joint.",
+                "Give degrees separated by commas, one per joint.",
             ) from None
     plain = {
         each.name: getattr(flags, each.name)
@@ -230,8 +230,8 @@ def _show_given(gear: Gear, given: task.GivenDataResult) -> None:
     )
     output.console().print(
         f"Without a model, from {given.rows_used} measured of {given.rows_read} inspections in"
-        f" {given.file}, first order with 95 % intervals: {each}. Where joints wear together each"
-        " also explains what the others do, and these add to more than 1."
+        f" {given.file}, first order with 95 % intervals: {each}. Where joints wear together, each"
+        " index includes part of the others, and their sum exceeds 1."
     )
 
 

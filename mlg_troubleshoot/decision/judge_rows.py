@@ -187,8 +187,8 @@ def _assessment(
 
 
 _PROVISIONAL = (
-    f"provisional: the larger of {PROVISIONAL_U_IN:g} in and {100 * PROVISIONAL_U_SHARE:.0f} % of"
-    " the prediction, because one published failure gives none"
+    f"provisional, the larger of {PROVISIONAL_U_IN:g} in and {100 * PROVISIONAL_U_SHARE:.0f} % of"
+    " the prediction; a single published failure is too little to estimate it"
 )
 
 
@@ -282,7 +282,7 @@ def _warnings(
     if lacking:
         warnings.append(
             f"The extension of the model needs {', '.join(lacking)}, which this inspection lacks:"
-            " predicted without."
+            " predicted without it."
         )
     warnings += [
         f"Joint #{finding.joint} {finding.name}: {finding.clearance_in:.4f} in radial is above its"

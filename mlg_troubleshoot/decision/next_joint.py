@@ -222,14 +222,14 @@ def _text(one: Cases, ahead: Outlook) -> str:
         return (
             "If the unmeasured joints are worn like the measured ones, measuring them will hardly"
             f" settle it: too close to the margin (chance {percent(ahead.too_close)}).{plunger} The"
-            f" joint that tells most is {name} ({minutes})."
+            f" most informative joint is {name} ({minutes})."
         )
     if ahead.enough is None:
         if best.risk_drop > 0.0:
             return f"Most useful next reading: {name} ({minutes})."
         return (
-            f"Next: {name} ({minutes}); no single reading decides, it removes most of the"
-            " uncertainty per minute."
+            f"Next: {name} ({minutes}); no single reading is decisive, but this one removes"
+            " the most uncertainty per minute."
         )
     likely = within > 0.5
     chance = percent(within if likely else 1.0 - within)

@@ -190,7 +190,7 @@ def run_study(gear: Gear, options: StudyOptions, progress: Progress | None = Non
     if len(inputs.limits_in) != len(gear.joints):
         raise UsageError(
             f"{len(inputs.limits_in)} limits for {len(gear.joints)} joints",
-            "Give one for each joint.",
+            "Give one per joint.",
         )
 
     def told(name: str) -> Callable[[int, int | None], None]:
@@ -238,7 +238,7 @@ def _response(
 def _held(model: LinkageModel, inputs: Inputs, options: StudyOptions) -> HeldDirections:
     if options.directions is Directions.FIXED:
         if options.fixed_rad is None or len(options.fixed_rad) != len(inputs.limits_in):
-            raise UsageError("directions fixed by load", "Give one direction for each joint.")
+            raise UsageError("directions fixed by load", "Give one direction per joint.")
         return HeldDirections(model, np.asarray(options.fixed_rad, float))
     if options.directions is Directions.WORST:
         return worst_directions(model, inputs.limits_in)
@@ -304,7 +304,7 @@ def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _
     if options.directions is Directions.RANDOM:
         raise UsageError(
             f"design {options.design} with random directions",
-            "The paper's designs hold directions; use sampled.",
+            "The paper's designs keep directions fixed; use sampled.",
         )
     cube, n = _response(gear, gear.model, inputs, options)
     design = _sized(PAPER_DESIGNS[str(options.design)], n, options)

@@ -34,7 +34,7 @@ _DIRECTIONS = {
     ),
     Directions.OVER: "in the directions of the largest over-travel",
     Directions.UNDER: "in the directions of the largest under-travel",
-    Directions.RANDOM: "in random directions, every direction alike",
+    Directions.RANDOM: "in random directions, all equally likely",
     Directions.FIXED: "in directions set by a load",
 }
 

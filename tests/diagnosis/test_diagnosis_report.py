@@ -295,7 +295,7 @@ def test_a_fault_stands_with_what_was_written_and_what_was_used(gear: Gear, make
         "mlg-troubleshoot 9.8.7",
         "sha256 " + "ab" * 32,
         "f.csv, sha256 " + "cd" * 32,
-        "199, drawn with seed 4",
+        "199, seed 4",
     ],
 )
 def test_the_report_says_what_it_rests_on(words: str, named: Made) -> None:

@@ -133,7 +133,9 @@ def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
         screen.print(_repair_table(a, screen))
         parts = sorted({gear.joint(n).new_part.value for s in a.repair_sets for n in s.joints})
         listed = " to ".join(f"{value:.4f}" for value in dict.fromkeys((parts[0], parts[-1])))
-        screen.sentence(f"A restored joint counts with the {listed} in radial of a new part.")
+        screen.sentence(
+            f"A restored joint counts with the radial clearance of a new part, {listed} in."
+        )
     if a.rigging is not None:
         screen.sentence(rigging_sentence(a.rigging))
     if a.budget is not None:
@@ -147,7 +149,7 @@ def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
     if wrong is not None:
         screen.print(wrong)
     what = (
-        "As loaded is an expectation, the worst case a bound."
+        "The displacement as loaded is an expectation; the worst case is a bound."
         if a.as_loaded
         else "The worst case is a bound."
     )
