@@ -218,6 +218,22 @@ def test_a_number_that_matters_stands_in_the_section_it_links_to(row: list[str])
     assert [n for n in re.findall(r"\d+(?:\.\d+)?", value) if n not in details] == []
 
 
+NAMED_PATHS = re.findall(
+    r"`((?:mlg_troubleshoot|docs|tests|templates)/[\w./-]*)`",
+    (ROOT / "docs/contributing.md").read_text(encoding="utf-8"),
+)
+
+
+@pytest.mark.parametrize("path", NAMED_PATHS)
+def test_a_place_that_contributors_are_sent_to_exists(path: str) -> None:
+    assert (ROOT / path).exists()
+
+
+def test_contributors_are_sent_to_every_room_that_holds_a_rule() -> None:
+    rooms = {path.split("/")[1] for path in NAMED_PATHS if path.startswith("mlg_troubleshoot/")}
+    assert {"cli", "decision", "diagnosis", "gear", "misfit", "records", "store"} <= rooms
+
+
 def test_the_readme_is_no_book() -> None:
     assert len(TEXT.splitlines()) <= 200
 
