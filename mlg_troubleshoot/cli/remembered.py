@@ -114,7 +114,7 @@ def _read(file: Path, gear: str) -> Settings:
 
 
 def _judged(file: Path, raw: Mapping[str, object], gear: str) -> Settings:
-    """Check every key and value: what is remembered is data, and nothing in it may turn a
+    """Check every key and value: what is remembered is data, and nothing in it may change a
     verdict.
     """
     unknown = [key for key in raw if key not in _KEYS]

@@ -125,7 +125,7 @@ class _Course:
         return self._to_repair() if f.complaint[i] else self._to_verdict()
 
     def _to_repair(self) -> Plan:
-        """A gear with a complaint: read until a repair is sure to hold, restore, end."""
+        """A gear with a complaint: read until a repair is certain, restore, end."""
         f, i = self.facts, self.row
         unread = not self.cases.measured[i].all()
         if self.sets and not f.read_first[i]:

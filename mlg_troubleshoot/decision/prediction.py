@@ -45,7 +45,7 @@ class Extension(Protocol):
 def model_uncertainty(displacement_in: Array, residual_u_in: float | None) -> Array:
     """Standard uncertainty of the model itself.
 
-    Provisional without a diagnosis: one published failure gives none. [in]
+    Provisional without a diagnosis: one published failure is too little to estimate it. [in]
     """
     if residual_u_in is not None:
         return np.full(np.shape(displacement_in), residual_u_in)

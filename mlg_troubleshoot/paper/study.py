@@ -71,7 +71,7 @@ class StudyOptions:
     accuracy : float
         Wanted error of every index, where the design can be told. [1]
     seed : int
-        Seed of everything random.
+        Seed of all random draws.
     distribution : str
         Distribution of the clearances.
     limits_in : ndarray, shape (n_joints,), or None

@@ -36,7 +36,7 @@ class DiagnoseOptions(TableOptions):
     permutations : int
         Number of null simulations.
     seed : int
-        Seed of all randomness.
+        Seed of all random draws.
     """
 
     gear: str = DEFAULT_GEAR

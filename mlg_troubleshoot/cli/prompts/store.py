@@ -37,7 +37,7 @@ class DamagedSessionError(SessionFileError):
 
 
 class SessionTakenError(TroubleshootError):
-    """A session that another run has gone on with since this one read or wrote it."""
+    """A session that another run has continued since this one read or wrote it."""
 
 
 @dataclass(frozen=True, slots=True)
