@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mlg_troubleshoot.cli import options, output
-from mlg_troubleshoot.errors import InconclusiveDataError
+from mlg_troubleshoot.errors import ExitCode, InconclusiveDataError
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.diagnosis import Diagnosis
     from mlg_troubleshoot.units import LengthUnit
 
-NOTHING_FOUND, SOMETHING_FOUND = 0, 1
 EPILOG = (
     "Example: [b]mlg diagnose fleet.csv --write-extension EXT.toml[/b], then [b]mlg check FILE"
     " --extension EXT.toml[/b]"
@@ -111,7 +110,7 @@ def diagnose(
         made = task.write_diagnosis_report(result, asked, report, str(shown.page), unit=shown.show)
         output.say_written([made], quiet=quiet)
     nothing = result.diagnosis.verdict == "NONE" and not result.diagnosis.faults
-    raise typer.Exit(NOTHING_FOUND if nothing else SOMETHING_FOUND)
+    raise typer.Exit(ExitCode.FINE if nothing else ExitCode.ATTENTION)
 
 
 def _show(diagnosis: Diagnosis, unit: LengthUnit) -> None:

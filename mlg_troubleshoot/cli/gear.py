@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from mlg_troubleshoot.cli import options, output
+from mlg_troubleshoot.errors import ExitCode
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
@@ -111,7 +112,7 @@ def verify(
     failed = [n for n in numbers if n.target.expected and not n.holds]
     if as_json:
         output.write_json({"gear": gear.id, "numbers": [_number(n) for n in numbers]})
-        raise typer.Exit(1 if failed else 0)
+        raise typer.Exit(ExitCode.ATTENTION if failed else ExitCode.FINE)
     console = output.console()
     console.print(f"{gear.name}: geometry {gear.provenance}", style="bold")
     table = output.plain_table(None)
@@ -135,7 +136,7 @@ def verify(
         else f"required values that do not hold: {len(failed)}"
     )
     console.print(f"{len(numbers)} numbers: {verdict}.")
-    raise typer.Exit(1 if failed else 0)
+    raise typer.Exit(ExitCode.ATTENTION if failed else ExitCode.FINE)
 
 
 def _number(n: Computed) -> dict[str, object]:

@@ -11,7 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 from mlg_troubleshoot.cli import options, output
-from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.errors import ExitCode, UsageError
 from mlg_troubleshoot.units import LengthUnit, in_unit
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ EPILOG = (
     " 2026-05-04[/b] · [b]mlg history verify[/b]"
 )
 _SHOW = "show"
-BROKEN = 1
 
 Place = Annotated[
     str | None,
@@ -435,7 +434,7 @@ def verify(
             " Otherwise export the chain, and import it into a new store."
         )
     if found.broken is not None or found.wrong or (noted is not None and found.expected is None):
-        raise typer.Exit(BROKEN)
+        raise typer.Exit(ExitCode.ATTENTION)
 
 
 def _expected(found: Verified) -> str:

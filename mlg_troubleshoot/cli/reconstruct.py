@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mlg_troubleshoot.cli import options, output
+from mlg_troubleshoot.errors import ExitCode
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.paper.reconstruct import Reconstruction
@@ -82,7 +83,7 @@ def reconstruct(
         _show(found, text, show_member=out is None)
     if out is not None:
         output.say(f"Linkage written: {out}")
-    raise typer.Exit(0 if found.meets_all else 1)
+    raise typer.Exit(ExitCode.FINE if found.meets_all else ExitCode.ATTENTION)
 
 
 def _show(found: Reconstruction, text: str, *, show_member: bool) -> None:

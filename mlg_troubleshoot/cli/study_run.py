@@ -14,11 +14,10 @@ import typer
 from rich.table import Table
 
 from mlg_troubleshoot.cli import output
-from mlg_troubleshoot.cli.boundary import INTERRUPTED
 from mlg_troubleshoot.cli.flags import StudyFlags
 from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.remembered import Settings
-from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.errors import ExitCode, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.paper.study import (
@@ -109,7 +108,7 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
         output.say(f"Table written: {task.write_study_table(findings)}")
     if not findings.result.finished:
         output.say("Interrupted: these are partial results.")
-        raise typer.Exit(INTERRUPTED)
+        raise typer.Exit(ExitCode.INTERRUPTED)
 
 
 def _choice(kind: type[_Choice], text: str, what: str) -> _Choice:

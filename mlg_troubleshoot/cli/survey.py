@@ -102,7 +102,7 @@ def survey(
             write=write,
             inspections=inspections,
             seed=seed,
-            told=partial(bar, "Fitting"),
+            on_progress=partial(bar, "Fitting"),
         )
     if as_json:
         output.write_json(task.survey_values(result))

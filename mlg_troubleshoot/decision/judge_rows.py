@@ -39,6 +39,7 @@ from mlg_troubleshoot.decision.verdict_rule import verdict
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 
+# Rows judged at once: bounds the memory. [1]
 _CHUNK = 1024
 
 
@@ -135,7 +136,7 @@ def _assessment(
     # unknown.
     known = closes and bool(np.isfinite(judged.u_in[i]))
 
-    def told(value: Any, when: bool = closes) -> float | None:
+    def number_or_none(value: Any, when: bool = closes) -> float | None:
         return float(value) if when and np.isfinite(value) else None
 
     worst = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
@@ -146,15 +147,15 @@ def _assessment(
         inspection=inspection,
         verdict=found,
         # Adding zero turns a minus zero into zero.
-        predicted_displacement_in=told(lower.displacement_in[i] + 0.0),
-        over_travel_in=told(worst[0]),
-        under_travel_in=told(worst[1]),
-        predicted_upper_in=told(judged.batch.upper.displacement_in[i], True),
+        predicted_displacement_in=number_or_none(lower.displacement_in[i] + 0.0),
+        over_travel_in=number_or_none(worst[0]),
+        under_travel_in=number_or_none(worst[1]),
+        predicted_upper_in=number_or_none(judged.batch.upper.displacement_in[i], True),
         margin_in=margin,
-        remaining_in=told(margin - lower.displacement_in[i]),
-        standard_uncertainty_in=told(judged.u_in[i]),
+        remaining_in=number_or_none(margin - lower.displacement_in[i]),
+        standard_uncertainty_in=number_or_none(judged.u_in[i]),
         probability_within_margin=float(judged.p_within[i]),
-        probability_exceed_random_directions=told(judged.batch.chance_random[i]),
+        probability_exceed_random_directions=number_or_none(judged.batch.chance_random[i]),
         geometry_spread_in=(
             (
                 float(lower.spread_low_in[i]) + 0.0,
@@ -169,9 +170,9 @@ def _assessment(
         joints=findings,
         plan=plan,
         basis=Basis.MEASURED if beyond else Basis.PREDICTED,
-        bound_in=told(lower.bound_in[i] + 0.0, True),
-        explained_at_most_in=told(plunger.explained_at_most_in[i]),
-        unexplained_in=told(plunger.unexplained_in[i]),
+        bound_in=number_or_none(lower.bound_in[i] + 0.0, True),
+        explained_at_most_in=number_or_none(plunger.explained_at_most_in[i]),
+        unexplained_in=number_or_none(plunger.unexplained_in[i]),
         headline=_headline(cases, judged, i),
         measured_statement=(
             None

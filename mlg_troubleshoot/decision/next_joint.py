@@ -28,6 +28,7 @@ from mlg_troubleshoot.decision.wear_levels import (
 COST_OF_WRONG_WITHIN = CONFORMANCE / (1.0 - CONFORMANCE)
 # A drop in risk below this is rounding: the reading has no value of its own.
 _NO_VALUE = 1e-6
+# Clearances that a reading may show, at evenly spaced probabilities. [1]
 _QUANTILES = 12
 # An expectation is enough where being wrong costs at most this share of what a just conforming
 # OUTSIDE does. [1]

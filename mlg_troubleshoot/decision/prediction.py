@@ -17,11 +17,14 @@ from mlg_troubleshoot.gear.directions import WorstCase
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 
+# Sets of random directions behind the chance of exceeding the margin. [1]
 DIRECTION_SETS = 4096
+# Standard uncertainty of a plunger reading that states none. [in]
 DEFAULT_PLUNGER_U_IN = 0.0005
 # The model's standard uncertainty until a diagnosis gives it: the larger of a length and a share of
 # the prediction.
 PROVISIONAL_U_IN, PROVISIONAL_U_SHARE = 0.003, 0.10
+# Step of central differences. [in]
 _STEP_IN = 1e-5
 
 

@@ -21,8 +21,8 @@ from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.decision.wear_levels import normal_cdf
 from mlg_troubleshoot.gear.gear import Gear
 
-_SHOWN = 5
-_ROWS = 256
+# Repair sets that are shown, and gears searched at once. [1]
+_SHOWN, _ROWS = 5, 256
 # Standard score of the conformance probability. [1]
 SCORE = NormalDist().inv_cdf(CONFORMANCE)
 # Within this of the conformance limit a subset counts as about sufficient: how far the expansion
@@ -136,7 +136,7 @@ def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
         # What bends the ensemble is found with everything restored, and goes with the square of the
         # fall.
         falls = [(gone * linkage.slopes(some)) @ table.weights.T for linkage in linkages]
-        after = worst_in[part, None] - falls[0] + _bend(linkages[0], table, some, gone)
+        after = worst_in[part, None] - falls[0] + _curvature_change(linkages[0], table, some, gone)
         square = (falls[0] / np.maximum(falls[0][:, -1:], 1e-12)) ** 2
         after += _third_order(cases, some - gone, after[:, -1])[:, None] * square
         members = []
@@ -145,7 +145,7 @@ def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
             members.append(whole[:, None] - fall + (least - whole + fall[:, -1])[:, None] * square)
         geometry = _variance(members)
         model = model_uncertainty(after, cases.residual_u_in)
-        gauges = u_clearances_in[part, None] ** 2 - _calmer(
+        gauges = u_clearances_in[part, None] ** 2 - _variance_drop(
             linkages[0], table, some, gone, readings[part]
         )
         u = np.sqrt(
@@ -155,7 +155,9 @@ def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
     return Search(table, np.where(barred | ~np.isfinite(slack), -np.inf, slack))
 
 
-def _bend(linkage: Response, table: Subsets, clearance_in: Array, less_in: Array) -> Array:
+def _curvature_change(
+    linkage: Response, table: Subsets, clearance_in: Array, less_in: Array
+) -> Array:
     """What the curvature adds to the worst case with each subset restored. [in]"""
     first, second = np.triu_indices(less_in.shape[1])
     curved = linkage.worst_curvature[first, second] * np.where(first == second, 0.5, 1.0)
@@ -175,7 +177,7 @@ def _third_order(cases: Cases, least_in: Array, expanded_in: Array) -> Array:
     return np.where(np.isfinite(missed), missed, 0.0)
 
 
-def _calmer(
+def _variance_drop(
     linkage: Response, table: Subsets, clearance_in: Array, less_in: Array, variance_in2: Array
 ) -> Array:
     """What restoring each subset takes from the variance that the readings cause, to first order.
@@ -230,7 +232,7 @@ def repair_sets(cases: Cases, found: Search, wanted: Mask) -> list[tuple[RepairS
     by the exact worst case.
     """
     table = subsets_of(cases.gear)
-    chosen = _least(table, found.slack_in[wanted])
+    chosen = _quickest_sets(table, found.slack_in[wanted])
     rows, sets = (
         np.repeat(np.flatnonzero(wanted), [len(c) for c in chosen]),
         np.concatenate([*chosen, [0]])[:-1],
@@ -250,7 +252,7 @@ def repair_sets(cases: Cases, found: Search, wanted: Mask) -> list[tuple[RepairS
     return [tuple(sets) for sets in result]
 
 
-def _least(table: Subsets, slack_in: Array) -> Sequence[Places]:
+def _quickest_sets(table: Subsets, slack_in: Array) -> Sequence[Places]:
     """Places of the quickest sufficient subsets of each gear, none within another; none where none
     is needed.
     """

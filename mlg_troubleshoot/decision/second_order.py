@@ -18,6 +18,7 @@ from mlg_troubleshoot.gear.directions import random_directions
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
 
+# Step of the second differences: large against rounding, small against a clearance. [in]
 _STEP_IN = 1e-3
 
 

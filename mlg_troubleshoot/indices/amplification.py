@@ -32,7 +32,9 @@ from mlg_troubleshoot.geometry.mechanism import (
     needs,
 )
 
+# Positions of the release at which stage indices are computed. [1]
 STROKES = 2001
+# Step of central differences. [in]
 _STEP_IN = 1e-5
 
 

@@ -24,13 +24,17 @@ from mlg_troubleshoot.geometry.mechanism import Dyad
 from mlg_troubleshoot.paper.targets import INSIDE, Computed, Target
 from mlg_troubleshoot.paper.verification import Facts
 
-Told = Callable[[str, int, int | None], None]
+Progress = Callable[[str, int, int | None], None]
 
+# Miss of a target that cannot be computed, in units of its tolerance. [1]
 _FAR = 50.0
+# Decimals of a coordinate that is found. [in]
 _DECIMALS = 4
-_WAVE = 150
-_POLISHED = 4
+# Random linkages of one wave, and how many of the best are improved. [1]
+_WAVE, _POLISHED = 150, 4
+# Dampings tried in one step. [1]
 _DAMPINGS = 12
+# Distances between points outside this range count as misses. [in]
 _SMALL_LENGTH_IN, _LARGE_IN = 0.4, 22.0
 
 
@@ -64,7 +68,7 @@ def reconstruct(
     seed: int,
     start: Linkage | None = None,
     minutes: float = 15.0,
-    told: Told | None = None,
+    on_progress: Progress | None = None,
 ) -> Reconstruction:
     """Search a linkage of the gear's topology that meets targets."""
     wanted = tuple(target for target in targets if target.search)
@@ -72,7 +76,7 @@ def reconstruct(
         raise UsageError(
             "no target has search = true", "Mark the numbers that a linkage must meet."
         )
-    search = _Search(gear, wanted, monotonic() + 60.0 * minutes, told)
+    search = _Search(gear, wanted, monotonic() + 60.0 * minutes, on_progress)
     if start is not None:
         return search.report(search.polished(search.space.vector(start), 60), seed)
     while monotonic() < search.until:
@@ -118,20 +122,20 @@ class _Search:
     """Residuals of candidate linkages, with a count and a deadline."""
 
     def __init__(
-        self, gear: Gear, targets: tuple[Target, ...], until: float, told: Told | None
+        self, gear: Gear, targets: tuple[Target, ...], until: float, on_progress: Progress | None
     ) -> None:
         self.gear = gear
         self.targets = targets
         self.space = DesignSpace(gear.reference)
         self.until = until
-        self.told = told
+        self.on_progress = on_progress
         self.tried = 0
 
     def residuals(self, vector: Array) -> Array:
         """Misses of all targets in units of their tolerances, and of plain mechanical sense."""
         self.tried += 1
-        if self.told is not None and self.tried % 20 == 0:
-            self.told("linkages tried", self.tried, None)
+        if self.on_progress is not None and self.tried % 20 == 0:
+            self.on_progress("linkages tried", self.tried, None)
         sense = self._sense(vector)
         try:
             with np.errstate(all="ignore"):

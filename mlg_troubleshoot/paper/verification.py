@@ -18,8 +18,8 @@ from mlg_troubleshoot.indices.displacement import HeldDirections, worst_directio
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
 from mlg_troubleshoot.paper.targets import Computed, Target, load_targets, targets_file
 
-_CURVE = 401
-_QUICK_CURVE = 61
+# Points of a curve over the stroke, in a verification and in a search. [1]
+_CURVE, _QUICK_CURVE = 401, 61
 _CORNERS = (np.array([0.0, 1.0]), np.array([0.5, 0.5]))
 
 

@@ -20,17 +20,23 @@ from mlg_troubleshoot.surveying.readings import (
 )
 from mlg_troubleshoot.surveying.survey import Prior
 
-# Between each two members of the ensemble a template is planned for so many linkages, where they
-# close. An index known to two percent needs no better reading.
-_BETWEEN, _WELL_KNOWN = (0.25, 0.5, 0.75), 0.02
-# A reading counts as checked by the others if they predict it to three times its own uncertainty.
-_CHECKED, _SWEEPS = 0.1, 8
-# What a check by the others is worth compared with a well-known index.
-_BRACING, _LOOSE = 0.2, 0.02
-
-# A reading that narrows less than this is not worth taking; one that so many of the draws cannot
-# reach is not possible.
-_LEAST_NARROWING, _OPEN = 0.01, 0.05
+# A template is also planned for the linkages at these shares of the way between each two members of
+# the ensemble, where they close. [1]
+_BETWEEN = (0.25, 0.5, 0.75)
+# An index known to this relative uncertainty needs no better reading. [1]
+_WELL_KNOWN = 0.02
+# A reading counts as checked by the others if they predict it to three times its own standard
+# uncertainty: then they carry this share of its weight. [1]
+_CHECKED = 0.1
+# Sweeps in which each reading of a template may be exchanged for a better one. [1]
+_SWEEPS = 8
+# Weight of the check of a reading by the others, compared with that of a well-known index, and the
+# share of a check below which it counts for nothing. [1]
+_CHECK_WEIGHT, _CHECK_FLOOR = 0.2, 0.02
+# A reading that narrows less than this share is not worth taking. [1]
+_LEAST_NARROWING = 0.01
+# A reading that more than this share of the draws cannot reach is not possible. [1]
+_OUT_OF_REACH = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,10 +133,10 @@ class _Design:
         held = (
             1.0 - (known @ covariance * known).sum(axis=2)[:, :, None] + (known @ moved) ** 2 / size
         )
-        checks = np.log(np.maximum(np.concatenate([held, 1.0 / size], axis=1), 0.0) + _LOOSE).sum(
-            axis=1
-        )
-        cost = np.log(np.maximum(wanted, 0.0) + _WELL_KNOWN**2).sum(axis=1) - _BRACING * checks
+        checks = np.log(
+            np.maximum(np.concatenate([held, 1.0 / size], axis=1), 0.0) + _CHECK_FLOOR
+        ).sum(axis=1)
+        cost = np.log(np.maximum(wanted, 0.0) + _WELL_KNOWN**2).sum(axis=1) - _CHECK_WEIGHT * checks
         return others[int(np.argmin(cost.mean(axis=0)))]
 
     def exchanged(self, taken: list[int], count: int) -> list[int]:
@@ -165,10 +171,10 @@ def suggested_early(
     after = np.maximum(design.after(rows, others)[0].sum(axis=1), 0.0)
     left = np.divide(after, before, out=np.ones_like(after), where=before > 0.0)
     narrowing = 1.0 - np.sqrt(left).mean(axis=0)
-    return _worth_most(tuple(design.pool[j] for j in others), narrowing)
+    return _most_useful(tuple(design.pool[j] for j in others), narrowing)
 
 
-def _worth_most(candidates: tuple[Reading, ...], narrowing: Array) -> Suggested | None:
+def _most_useful(candidates: tuple[Reading, ...], narrowing: Array) -> Suggested | None:
     """The reading that narrows most per minute, None if it hardly does."""
     best = int(np.argmax(narrowing / np.array([MINUTES[c.kind] for c in candidates])))
     return (
@@ -193,7 +199,7 @@ def suggested(
         return None
     with np.errstate(all="ignore"):
         y = linkage.predicted(candidates, draws)
-    reached = np.isfinite(y).mean(axis=0) >= 1.0 - _OPEN
+    reached = np.isfinite(y).mean(axis=0) >= 1.0 - _OUT_OF_REACH
     candidates, y = tuple(c for c, r in zip(candidates, reached, strict=True) if r), y[:, reached]
     sound = np.isfinite(y).all(axis=1) & np.isfinite(wanted).all(axis=1)
     y, q = y[sound] - y[sound].mean(axis=0), wanted[sound] - wanted[sound].mean(axis=0)
@@ -204,4 +210,4 @@ def suggested(
     explained = ((q.T @ y) ** 2).sum(axis=0) / ((y * y).sum(axis=0) + len(y) * u * u) / total
     # What chance alone would explain with so many draws.
     narrowing = 1.0 - np.sqrt(1.0 - np.clip(explained - 1.0 / len(y), 0.0, 1.0))
-    return _worth_most(candidates, narrowing)
+    return _most_useful(candidates, narrowing)

@@ -21,10 +21,12 @@ from mlg_troubleshoot.geometry.program import write_program
 
 # Positive quantities of a batch of linkages, shape (n_vectors, n_quantities).
 Quantity = Callable[[Array], Array]
+# Step of central differences. [in or rad]
 _STEP = 1e-5
-# Positions over the stroke among which the plunger's least displacement is sought, and plunger
-# positions to read.
-_POSITIONS, _PLUNGER_READINGS = 25, 9
+# Positions over the stroke among which the plunger's least displacement is sought. [1]
+_POSITIONS = 25
+# Plunger positions that a template asks for. [1]
+_PLUNGER_READINGS = 9
 
 
 class Kind(StrEnum):

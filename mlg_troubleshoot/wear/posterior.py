@@ -34,8 +34,10 @@ _PRIOR = {
     "kept": (1.0, 1.5),
 }
 _KINDS = ("wiener", "integrated", "gamma")
-_SAMPLES = 800
-_FREEDOM = 6.0
+# Importance samples of each kind, and the degrees of freedom of the Student distribution that they
+# are drawn from: its heavy tails keep the weights finite. [1]
+_SAMPLES, _FREEDOM = 800, 6.0
+# Parameter vectors times units that are filtered at once: bounds the memory. [1]
 _CHUNK = 40_000
 
 

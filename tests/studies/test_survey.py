@@ -278,7 +278,7 @@ def test_a_fit_that_is_held_up_is_freed_by_fitting_again_from_around_it(
     fitting = Fitting(linkage, prior, read)
     everything = np.ones((1, len(read)), dtype=bool)
     held_up, before = fitting.descend(prior.members[7:8], everything, 1.0, 25, robust=True)
-    _, after = fitting.reheated(held_up, np.random.default_rng(0))
+    _, after = fitting.refit_around(held_up, np.random.default_rng(0))
     assert before[0] > 100.0
     assert after[0] < 30.0
 
