@@ -339,7 +339,7 @@ def allowances(cases: Cases, lower: Prediction) -> Array:
     sense = np.where(lower.worst.over_in >= -lower.worst.under_in, 1.0, -1.0)[:, None]
     left = (cases.margin_in - worst)[:, None]
     room = np.maximum(gear.limits_in - start, 0.0)
-    # Root of slope·t + ½·bend·t² = left, in the form that stays good where the curvature is zero.
+    # Root of slope·t + ½·bend·t² = left, in the form that is stable where the curvature is zero.
     root = np.sqrt(np.maximum(slopes**2 + 2.0 * sense * bend * left, 0.0))
     wear = np.minimum(2.0 * left / np.maximum(slopes + root, 1e-9), room)
     if cases.extension is None:

@@ -146,7 +146,7 @@ def _text(
         f"{' or '.join(f'#{n}' for n in chance.joints)} ({percent(chance.probability)})"
         for chance in likely
     )
-    # Another chance than those of the joints: both can be so at once.
+    # Not one minus the chances of the joints: both can be true at once.
     also = f" Chance that something else also moved the plunger: {percent(not_clearance)}."
     if not_clearance > 0.8:
         return (

@@ -178,7 +178,7 @@ def advise(one: Cases) -> MeasuringAdvice:
     """
     ends = np.vstack([one.filled(0.0), one.filled(one.gear.limits_in)])
     four = one.take(np.zeros(4, np.intp))
-    # As it is, and as if both ends had been read.
+    # Unread joints at 0 and at their limit: as unread, then as if those were readings.
     read = np.vstack([one.measured, one.measured, np.ones_like(ends, bool)])
     prediction = four.predict(np.vstack([ends, ends]), read)
     p = prediction.probability_within(four.margin_in, four.margin_u_in)

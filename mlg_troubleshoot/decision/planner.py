@@ -38,8 +38,8 @@ from mlg_troubleshoot.gear.gear import Gear
 BETTER_GAUGES_IN = (0.0004, 0.0003)
 # Readings of one round are read together until the verdict is settled with this chance. [1]
 _SETTLED = 0.35
-# Chance with random directions from which a failure is expected to be one of clearance: what else
-# may fail is as rare.
+# Chance with random directions from which a failure is attributed to clearance: as large as the
+# assumed chance of another cause. [1]
 _OTHER_CAUSE = 0.05
 # Standard scores of 10, 25, 37.5, 50, 62.5, 75 and 90 %: what a round of readings may show. [1]
 _POINTS = np.array([-1.2816, -0.6745, -0.3186, 0.0, 0.3186, 0.6745, 1.2816])
@@ -256,7 +256,7 @@ class _UnreadJoints:
         settle the verdict.
         """
         reach = self.slopes * self.gear.limits_in / self.gear.access_minutes
-        # Rounded: both ends of one link tell alike, and rounding noise must not order them.
+        # Rounded: both ends of one link are worth the same, and rounding noise must not order them.
         order = np.argsort(np.where(candidates, -np.round(reach, 9), np.inf), axis=1, kind="stable")
         chosen, done = np.zeros_like(candidates), ~candidates.any(axis=1)
         rows = np.arange(len(candidates))

@@ -28,8 +28,7 @@ SCORE = NormalDist().inv_cdf(CONFORMANCE)
 # Within this of the conformance limit a subset counts as about sufficient: how far the expansion
 # may be off. [in]
 _ABOUT_IN = 5e-4
-# A reading this far above a new part is one of a part to restore; below, restoring gains nothing.
-# [in]
+# A reading less than this above a new part: restoring the joint gains nothing. [in]
 _AS_NEW_IN = 1e-4
 
 
@@ -122,19 +121,18 @@ def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
     worn, now = removable(cases), cases.filled(cases.gear.limits_in)
     less = np.where(worn, now - cases.gear.new_parts_in, 0.0)
     over = cases.over_limit
-    # A subset may hold no joint that gains nothing and must hold every joint over its limit.
+    # A subset must contain every joint over its limit, and no joint that gains nothing.
     barred = (~worn).astype(float) @ table.weights.T + over.astype(float) @ (
         1.0 - table.weights.T
     ) > 0.0
-    # Slopes fall with the clearances that are restored, and with them what the errors of the
-    # readings do.
+    # Restoring a clearance also lowers the slopes, and so the uncertainty from the other readings.
     readings = (cases.gauge_u_in * cases.measured) ** 2
     slack = np.empty(barred.shape)
     for start in range(0, len(cases), _ROWS):
         part = slice(start, start + _ROWS)
         some, gone = now[part], less[part]
-        # What bends the ensemble is found with everything restored, and goes with the square of the
-        # fall.
+        # Curvature of the other linkages: exact with everything restored, scaled to a subset by the
+        # square of its drop.
         falls = [(gone * linkage.slopes(some)) @ table.weights.T for linkage in linkages]
         after = worst_in[part, None] - falls[0] + _curvature_change(linkages[0], table, some, gone)
         square = (falls[0] / np.maximum(falls[0][:, -1:], 1e-12)) ** 2
@@ -263,7 +261,7 @@ def _quickest_sets(table: Subsets, slack_in: Array) -> Sequence[Places]:
         best = _surest(table, slack_in, open_sets)
         for row in np.flatnonzero(best > 0):
             chosen[row].append(int(best[row]))
-        # Whatever holds the set just chosen is longer: it holds as many of its joints as it has.
+        # Drop the sets that contain the set just chosen.
         open_sets &= members[best] @ members.T < members[best].sum(axis=1, keepdims=True)
     return [np.array(places, dtype=np.intp) for places in chosen]
 

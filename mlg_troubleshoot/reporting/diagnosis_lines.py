@@ -36,7 +36,7 @@ _COLUMNS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class DiagnosisLine:
     """One of the seven lines: its number, what it is about in one word, and what it says."""
 
     number: int
@@ -79,12 +79,13 @@ def cause_words(cause: NamedCause) -> str:
     )
 
 
-def seven_lines(d: Diagnosis, unit: LengthUnit = LengthUnit.THOU) -> tuple[Line, ...]:
+def seven_lines(d: Diagnosis, unit: LengthUnit = LengthUnit.THOU) -> tuple[DiagnosisLine, ...]:
     """Say what a diagnosis found: data, misfit, cause, model, gain, residual, what to do."""
     # Blanks of every kind break a line of the terminal, and long words where they must.
     texts = [" ".join(text.split()) for text in _said(d, unit, *_WORDS)]
     return tuple(
-        Line(k, word, text) for k, (word, text) in enumerate(zip(_WORDS, texts, strict=True), 1)
+        DiagnosisLine(k, word, text)
+        for k, (word, text) in enumerate(zip(_WORDS, texts, strict=True), 1)
     )
 
 

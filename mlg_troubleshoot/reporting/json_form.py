@@ -53,7 +53,7 @@ _JOINT = (
     *("plunger_amplification", "rank", "rank_range", "allowance_in"),
 )
 _OF_JOINT = attrgetter(*_JOINT)
-# What the geometry says of a joint of every gear, and so is not kept with each assessment.
+# Fields of a joint that follow from the geometry alone: not kept with each assessment.
 _KEPT = tuple(
     name
     for name in _JOINT

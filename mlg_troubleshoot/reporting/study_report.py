@@ -14,7 +14,7 @@ import numpy as np
 from markupsafe import Markup
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.paper.statements import Outcome
+from mlg_troubleshoot.paper.statements import StatementOutcome
 from mlg_troubleshoot.paper.study import Directions, StudyFindings
 from mlg_troubleshoot.reporting import study_figures as drawn
 from mlg_troubleshoot.reporting.common import head
@@ -26,7 +26,7 @@ from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.reporting.study_figures import BarSeries
 from mlg_troubleshoot.units import LengthUnit
 
-# A reason that explains less than a third of an excess is not its reason.
+# A possible reason is ruled out if the excess is more than this many times what it explains. [1]
 _CLEARLY = 3.0
 _DIRECTIONS = {
     Directions.WORST: (
@@ -68,7 +68,7 @@ def _context(f: StudyFindings, provenance: ReportProvenance, lengths: Lengths) -
         "top": _span(e.joint for e in order[:5]),
         "top_share": sum(e.first_order for e in order[:5]),
         "half": float(np.ptp([e.first_order_interval for e in table.joints], axis=1).max()) / 2.0,
-        "counts": [sum(s.outcome is outcome for s in f.statements) for outcome in Outcome],
+        "counts": [sum(s.outcome is outcome for s in f.statements) for outcome in StatementOutcome],
         "rows": list(
             zip(f.gear.joints, table.joints, f.result.growth.local_stage.tolist(), strict=True)
         ),

@@ -56,7 +56,7 @@ def planned(gear: Gear, distances: int = 24) -> tuple[tuple[Reading, bool], ...]
     From the rigid pairs each is exchanged for a better one until none is better: other choices to
     begin with end worse.
     """
-    design = _Design(SurveyedLinkage(gear))
+    design = _TemplateSearch(SurveyedLinkage(gear))
     count = min(distances, len(design.free))
     rows = [
         *design.given,
@@ -66,7 +66,7 @@ def planned(gear: Gear, distances: int = 24) -> tuple[tuple[Reading, bool], ...]
     return tuple((design.pool[i], bool(h > _CHECKED)) for i, h in zip(rows, held, strict=True))
 
 
-class _Design:
+class _TemplateSearch:
     """Slopes of everything that can be read, in variables in which the prior is the unit sphere."""
 
     def __init__(
@@ -161,7 +161,7 @@ def suggested_early(
     the next: this is the linear estimate on average over the linkages of the ensemble and between
     them, as for a template.
     """
-    design, known = _Design(linkage, taken, quantity), {r.what for r in taken}
+    design, known = _TemplateSearch(linkage, taken, quantity), {r.what for r in taken}
     first = len(design.pool) - len(taken)
     others = [j for j in range(first) if design.pool[j].what not in known]
     rows = list(range(first, len(design.pool)))

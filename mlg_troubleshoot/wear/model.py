@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.wear.filtering import Draws, State, clock, follow
+from mlg_troubleshoot.wear.filtering import Draws, FilterState, clock, follow
 from mlg_troubleshoot.wear.paths import Scale, WearPath, lay_out, scale_of
 from mlg_troubleshoot.wear.posterior import members, posterior
 
@@ -188,7 +188,9 @@ class _Ends:
     pace: Array
 
     @classmethod
-    def drawn(cls, draws: Draws, state: State, repeats: int, rng: np.random.Generator) -> _Ends:
+    def drawn(
+        cls, draws: Draws, state: FilterState, repeats: int, rng: np.random.Generator
+    ) -> _Ends:
         """Sample levels and drifts jointly."""
         shape = (*state.level.shape[:2], repeats)
         level, drift, level_var, cov, drift_var = (

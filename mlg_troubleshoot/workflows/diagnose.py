@@ -62,7 +62,7 @@ class DiagnoseResult(TableResult):
     extension: ModelExtension | None
 
 
-# A length that cannot be is refused by a check; here it is a row whose slip is to be found.
+# A check refuses an impossible length; a diagnosis keeps the row and looks for the entry error.
 _ANY_LENGTH_IN = 10.0
 
 

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from mlg_troubleshoot.wear import Samples, WearPath
-from mlg_troubleshoot.wear.filtering import Draws, State, follow
+from mlg_troubleshoot.wear.filtering import Draws, FilterState, follow
 from mlg_troubleshoot.wear.model import _Ends, _gamma_passage, _integrated_passage, _wiener_passage
 from mlg_troubleshoot.wear.paths import Scale, grid_step, lay_out
 from mlg_troubleshoot.wear.posterior import members
@@ -128,7 +128,7 @@ def test_gamma_increments_scatter_as_simulated_ones_whose_drift_is_not_known() -
 
 def test_level_and_drift_are_sampled_together() -> None:
     one = np.ones((1, 1))
-    state = State(one, one, one, 0.8 * one, one)
+    state = FilterState(one, one, one, 0.8 * one, one)
     ends = _Ends.drawn(parameters(), state, 200_000, np.random.default_rng(1))
     assert np.cov(ends.level.ravel(), ends.drift.ravel()) == pytest.approx(
         np.array([[1.0, 0.8], [0.8, 1.0]]), abs=0.02
@@ -138,7 +138,9 @@ def test_level_and_drift_are_sampled_together() -> None:
 def test_beyond_what_any_unit_has_reached_the_pace_is_a_quarter_uncertain() -> None:
     zero, one = np.zeros((1, 1)), np.ones((1, 1))
     sharp = parameters(increment_sd=0.0, power=1.0)
-    ends = _Ends.drawn(sharp, State(one, one, zero, zero, zero), 50_000, np.random.default_rng(1))
+    ends = _Ends.drawn(
+        sharp, FilterState(one, one, zero, zero, zero), 50_000, np.random.default_rng(1)
+    )
     rng = np.random.default_rng(2)
     found = ends.follow(
         np.array([[1.0, 3.0]]), np.array([0.5]), np.array([0.0]), rng, reading=False
