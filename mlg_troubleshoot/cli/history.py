@@ -239,7 +239,7 @@ def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) ->
     console.print(joints)
     if unread:
         console.print(
-            f"Not read since new or restored: {', '.join(unread)}; never read counts as 0 above."
+            f"Not read since new or restored: {', '.join(unread)}; unread joints count as 0 above."
         )
     advice = task.advice([life])
     if advice.asked:

@@ -114,7 +114,7 @@ def outlook(one: Cases, anchor: tuple[float, float] | None = None) -> Outlook:
 class _Belief:
     """One gear with its unmeasured joints distributed, level of wear by level of wear.
 
-    At each level the worst case is taken as normal: a sum over several joints, of which none
+    At each level the worst case is taken as normal: a sum over several joints, where none
     dominates. The unmeasured joints are at their mean there, and the worst case is linearised.
     """
 

@@ -86,7 +86,7 @@ def _context(f: StudyFindings, provenance: ReportProvenance, lengths: Lengths) -
 
 
 def _tiny(value: float) -> str:
-    """Write a number of which only the order of magnitude matters."""
+    """Write a number where only the order of magnitude matters."""
     return f"{value:.0e}".replace("-", MINUS) if math.isfinite(value) else ABSENT
 
 
