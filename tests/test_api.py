@@ -172,7 +172,10 @@ ENTRIES = {
 
 @pytest.mark.parametrize("module", ["mlg_troubleshoot", *map("mlg_troubleshoot.{}".format, ROOMS)])
 def test_the_page_of_the_api_has_exactly_the_public_names(module: str) -> None:
-    assert set(ENTRIES[module]) | ALSO_ABOVE[module] == set(importlib.import_module(module).__all__)
+    room = importlib.import_module(module)
+    # Modules behind the door of a room are for the other rooms.
+    public = {name for name in room.__all__ if not inspect.ismodule(getattr(room, name))}
+    assert set(ENTRIES[module]) | ALSO_ABOVE[module] == public
 
 
 def test_the_page_of_the_api_has_no_other_module() -> None:

@@ -27,7 +27,7 @@ from mlg_troubleshoot.cli.boundary import Boundary
 from mlg_troubleshoot.errors import ExitCode
 
 
-class CommandLine(TyperGroup):
+class CommandGroup(TyperGroup):
     """All commands behind one boundary; without a command the help is shown."""
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **named: Any) -> Any:
@@ -46,7 +46,7 @@ class CommandLine(TyperGroup):
 
 app = typer.Typer(
     name="mlg",
-    cls=CommandLine,
+    cls=CommandGroup,
     help=(
         "Do worn joints push the reversing-valve plunger of a main landing gear outside its margin?"
         " Which joint next? Where is the model wrong?\n\nTroubleshooting aid, not maintenance data:"

@@ -72,6 +72,7 @@ class Judged:
 def plans(
     cases: Cases, judged: Judged, found: Search, sets: Sequence[tuple[RepairSet, ...]]
 ) -> list[Plan]:
+    """The expected course of each gear, step by step to its end."""
     facts = _BatchContext(cases, judged, found)
     return [_PlanBuilder(facts, i, sets[i]).plan() for i in range(len(cases))]
 

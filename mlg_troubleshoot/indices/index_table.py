@@ -19,7 +19,7 @@ from mlg_troubleshoot.outputs import OutputKind, write_text
 
 SCHEMA_VERSION = 1
 # A sampled index may lie a little outside 0 to 1, its interval further.
-_INDEX = {"least": -2.0, "most": 3.0}
+_INDEX = {"least": -2, "most": 3}
 # First-order indices closer than this are one rank: both ends of a link differ by less.
 _SAME_RANK = 1e-4
 

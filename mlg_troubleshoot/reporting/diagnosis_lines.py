@@ -11,6 +11,7 @@ from mlg_troubleshoot.reporting.formats import Lengths
 from mlg_troubleshoot.reporting.html import environment
 from mlg_troubleshoot.units import LengthUnit
 
+# p-value above which a remainder is called noise: the usual 5 %. [1]
 NOISE_ABOVE = 0.05
 _WORDS = ("DATA", "MISFIT", "CAUSE", "MODEL", "GAIN", "LEFT", "DO")
 _KINDS = {

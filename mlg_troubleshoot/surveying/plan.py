@@ -10,44 +10,27 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.surveying import tuned
 from mlg_troubleshoot.surveying.readings import (
     DEFAULT_U,
     MINUTES,
-    Kind,
     Quantity,
-    Reading,
+    ReadingKind,
     SurveyedLinkage,
+    SurveyReading,
 )
 from mlg_troubleshoot.surveying.survey import Prior
-
-# A template is also planned for the linkages at these shares of the way between each two members of
-# the ensemble, where they close. [1]
-_BETWEEN = (0.25, 0.5, 0.75)
-# An index known to this relative uncertainty needs no better reading. [1]
-_WELL_KNOWN = 0.02
-# A reading counts as checked by the others if they predict it to three times its own standard
-# uncertainty: then they carry this share of its weight. [1]
-_CHECKED = 0.1
-# Sweeps in which each reading of a template may be exchanged for a better one. [1]
-_SWEEPS = 8
-# Weight of the check of a reading by the others, compared with that of a well-known index, and the
-# share of a check below which it counts for nothing. [1]
-_CHECK_WEIGHT, _CHECK_FLOOR = 0.2, 0.02
-# A reading that narrows less than this share is not worth taking. [1]
-_LEAST_NARROWING = 0.01
-# A reading that more than this share of the draws cannot reach is not possible. [1]
-_OUT_OF_REACH = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class Suggested:
     """A reading worth taking: the share by which it is expected to narrow what is unknown. [1]"""
 
-    reading: Reading
+    reading: SurveyReading
     narrowing: float
 
 
-def planned(gear: Gear, distances: int = 24) -> tuple[tuple[Reading, bool], ...]:
+def planned(gear: Gear, distances: int = 24) -> tuple[tuple[SurveyReading, bool], ...]:
     """The rows of a template, each with whether the others check it.
 
     The extension, the plunger over the stroke, the angles, and distances at the reference position:
@@ -56,23 +39,23 @@ def planned(gear: Gear, distances: int = 24) -> tuple[tuple[Reading, bool], ...]
     From the rigid pairs each is exchanged for a better one until none is better: other choices to
     begin with end worse.
     """
-    design = _TemplateSearch(SurveyedLinkage(gear))
+    design = _Design(SurveyedLinkage(gear))
     count = min(distances, len(design.free))
     rows = [
         *design.given,
         *sorted(design.exchanged(design.free[: min(count, len(design.linkage.rigid))], count)),
     ]
     held = np.median(design.held(rows), axis=0)
-    return tuple((design.pool[i], bool(h > _CHECKED)) for i, h in zip(rows, held, strict=True))
+    return tuple((design.pool[i], bool(h > tuned.CHECKED)) for i, h in zip(rows, held, strict=True))
 
 
-class _TemplateSearch:
+class _Design:
     """Slopes of everything that can be read, in variables in which the prior is the unit sphere."""
 
     def __init__(
         self,
         linkage: SurveyedLinkage,
-        taken: tuple[Reading, ...] = (),
+        taken: tuple[SurveyReading, ...] = (),
         quantity: Quantity | None = None,
     ) -> None:
         prior = Prior(linkage)
@@ -81,7 +64,7 @@ class _TemplateSearch:
             (1 - t) * a + t * b
             for i, a in enumerate(members)
             for b in members[:i]
-            for t in _BETWEEN
+            for t in tuned.BETWEEN
         ]
         points = np.array([*members, *between])
         points = points[linkage.closes(points)]
@@ -92,11 +75,13 @@ class _TemplateSearch:
             wanted = linkage.log_slopes(points, quantity) @ prior.root
         sound = np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(wanted).all(axis=(1, 2))
         self.slopes, self.wanted = slopes[sound], wanted[sound]
-        self.given = [i for i, r in enumerate(self.pool) if r.kind is not Kind.DISTANCE]
-        self.free = [i for i, r in enumerate(self.pool) if r.kind is Kind.DISTANCE]
+        self.given = [i for i, r in enumerate(self.pool) if r.kind is not ReadingKind.DISTANCE]
+        self.free = [i for i, r in enumerate(self.pool) if r.kind is ReadingKind.DISTANCE]
         self.known = np.eye(slopes.shape[2])
         if linkage.travel is not None:
-            self.known = self.known + np.outer(*2 * [prior.root[-1] / DEFAULT_U[Kind.TRAVEL]])
+            self.known = self.known + np.outer(
+                *2 * [prior.root[-1] / DEFAULT_U[ReadingKind.TRAVEL]]
+            )
 
     def covariance(self, rows: list[int]) -> Array:
         """Covariance of each linkage's variables after these readings."""
@@ -134,16 +119,19 @@ class _TemplateSearch:
             1.0 - (known @ covariance * known).sum(axis=2)[:, :, None] + (known @ moved) ** 2 / size
         )
         checks = np.log(
-            np.maximum(np.concatenate([held, 1.0 / size], axis=1), 0.0) + _CHECK_FLOOR
+            np.maximum(np.concatenate([held, 1.0 / size], axis=1), 0.0) + tuned.LOOSE
         ).sum(axis=1)
-        cost = np.log(np.maximum(wanted, 0.0) + _WELL_KNOWN**2).sum(axis=1) - _CHECK_WEIGHT * checks
+        cost = (
+            np.log(np.maximum(wanted, 0.0) + tuned.WELL_KNOWN**2).sum(axis=1)
+            - tuned.BRACING * checks
+        )
         return others[int(np.argmin(cost.mean(axis=0)))]
 
     def exchanged(self, taken: list[int], count: int) -> list[int]:
         """Fill up a choice and exchange its distances stepwise."""
         while len(taken) < count:
             taken = [*taken, self.best(taken)]
-        for _ in range(_SWEEPS if count < len(self.free) else 0):
+        for _ in range(tuned.SWEEPS if count < len(self.free) else 0):
             before = set(taken)
             for _ in range(count):
                 taken = [*taken[1:], self.best(taken[1:])]
@@ -153,7 +141,7 @@ class _TemplateSearch:
 
 
 def suggested_early(
-    linkage: SurveyedLinkage, taken: tuple[Reading, ...], quantity: Quantity
+    linkage: SurveyedLinkage, taken: tuple[SurveyReading, ...], quantity: Quantity
 ) -> Suggested | None:
     """The reading that narrows the wanted quantities most per minute while little is known.
 
@@ -161,7 +149,7 @@ def suggested_early(
     the next: this is the linear estimate on average over the linkages of the ensemble and between
     them, as for a template.
     """
-    design, known = _TemplateSearch(linkage, taken, quantity), {r.what for r in taken}
+    design, known = _Design(linkage, taken, quantity), {r.what for r in taken}
     first = len(design.pool) - len(taken)
     others = [j for j in range(first) if design.pool[j].what not in known]
     rows = list(range(first, len(design.pool)))
@@ -171,21 +159,21 @@ def suggested_early(
     after = np.maximum(design.after(rows, others)[0].sum(axis=1), 0.0)
     left = np.divide(after, before, out=np.ones_like(after), where=before > 0.0)
     narrowing = 1.0 - np.sqrt(left).mean(axis=0)
-    return _most_useful(tuple(design.pool[j] for j in others), narrowing)
+    return _worth_most(tuple(design.pool[j] for j in others), narrowing)
 
 
-def _most_useful(candidates: tuple[Reading, ...], narrowing: Array) -> Suggested | None:
+def _worth_most(candidates: tuple[SurveyReading, ...], narrowing: Array) -> Suggested | None:
     """The reading that narrows most per minute, None if it hardly does."""
     best = int(np.argmax(narrowing / np.array([MINUTES[c.kind] for c in candidates])))
     return (
         Suggested(candidates[best], float(narrowing[best]))
-        if narrowing[best] >= _LEAST_NARROWING
+        if narrowing[best] >= tuned.LEAST_NARROWING
         else None
     )
 
 
 def suggested(
-    linkage: SurveyedLinkage, draws: Array, wanted: Array, taken: tuple[Reading, ...]
+    linkage: SurveyedLinkage, draws: Array, wanted: Array, taken: tuple[SurveyReading, ...]
 ) -> Suggested | None:
     """The reading that narrows the wanted quantities most per minute, None if none of them matters.
 
@@ -199,7 +187,7 @@ def suggested(
         return None
     with np.errstate(all="ignore"):
         y = linkage.predicted(candidates, draws)
-    reached = np.isfinite(y).mean(axis=0) >= 1.0 - _OUT_OF_REACH
+    reached = np.isfinite(y).mean(axis=0) >= 1.0 - tuned.MOST_OPEN
     candidates, y = tuple(c for c, r in zip(candidates, reached, strict=True) if r), y[:, reached]
     sound = np.isfinite(y).all(axis=1) & np.isfinite(wanted).all(axis=1)
     y, q = y[sound] - y[sound].mean(axis=0), wanted[sound] - wanted[sound].mean(axis=0)
@@ -210,4 +198,4 @@ def suggested(
     explained = ((q.T @ y) ** 2).sum(axis=0) / ((y * y).sum(axis=0) + len(y) * u * u) / total
     # What chance alone would explain with so many draws.
     narrowing = 1.0 - np.sqrt(1.0 - np.clip(explained - 1.0 / len(y), 0.0, 1.0))
-    return _most_useful(candidates, narrowing)
+    return _worth_most(candidates, narrowing)

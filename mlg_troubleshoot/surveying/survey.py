@@ -23,111 +23,12 @@ from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Slider
-from mlg_troubleshoot.surveying.readings import DEFAULT_U, Kind, Reading, SurveyedLinkage
-from mlg_troubleshoot.units import MM_PER_IN, SLIPS, Slip
-
-# Chosen numbers. Set: "prior" is an assumption in terms of the problem, "rate" by the rate that the
-# line states, "work" trades time for the chance to find what is there, "hand" has no other record.
-# "Width" is that of the intervals of the indices; tests/benchmarks/bench_survey.py measures what
-# moves.
-#
-# name                 unit   meaning                                        set    if it changes
-# -------------------  -----  ---------------------------------------------  -----  ---------------
-# _CORRELATION_SHARE   1      share of the ensemble's covariances kept       hand   width
-# _LONE_LENGTH_SHARE   1      prior of a gear without an ensemble: standard  prior  width
-#                             deviation of a length over the linkage's size
-# _LONE_ANGLE          rad    the same of an angle                           prior  width
-# _LEAST_PRIOR_SHARE   1      least standard deviation of the prior, as a    prior  width
-#                             share of the two above
-# _WIDENING            1      robust fit: uncertainties times these in turn  hand   missed modes
-# _STEPS_PER_WIDENING  steps  iterations at each of them                     work   missed modes
-# _BEST_STARTS         1      starts that remain                             work   missed modes
-# _PRIOR_STARTS        1      starts in addition to the ensemble             work   missed modes
-# _OPEN_LOSS           1      loss of a reading where the linkage is open    hand   missed modes
-# _FINAL_STEPS         steps  iterations of the last fit                     work   accuracy
-# _DAMPING_TRIALS      1      dampings tried in one step                     work   time
-# _REHEATING           1      fit from around each best point: uncertainties hand   missed modes
-#                             times these
-# _REHEAT_POINTS       1      points around each where readings are left out work   missed modes
-# _REHEAT_BEST         1      of them fitted; tried where none is left out   work   missed modes
-# _REHEAT_STEPS        steps  iterations of that fit                         work   missed modes
-# _SAME_POINT          1      two points are one if no variable differs by   work   time
-#                             this many standard deviations of the prior
-# _ERROR_LOSS          1      an entry error: one reading in a hundred, any- prior  errors found
-#                             where within 20 in; −2 log of its density
-#                             over that at no error. It bounds the loss.
-# _STUDENT_FREEDOM     1      degrees of freedom of the robust loss          prior  errors found
-# _TRUSTED_RESIDUAL    1      a reading with a smaller residual is fitted    hand   errors found
-# _STAGES              1      stages of a fit for the progress bar           -      nothing
-# _MOST_RESIDUALS      1      search for an entry error: residuals at once   work   errors found
-# _ERROR_STEPS         steps  its iterations at each widening                work   errors found
-# _LEAST_POINTS        1      its points that remain at least                work   errors found
-# MISFIT               1      a reading misfits from this many standard      rate   false misfits
-#                             deviations: the greatest of forty clean ones
-#                             exceeds it in 0.4 % of surveys, in about 1 %
-#                             where the fit is curved
-# _EQUAL_FIT           1      readings contradict each other if leaving out  hand   contradictions
-#                             either changes chi-squared by less
-# _MOST_MISFITS        1      with a greater share no gear file is written   prior  contradictions
-# _SAME_INDEX          1      two modes are one if no index differs by more  prior  assemblies named
-# _LEAST_WEIGHT        1      least share of the posterior of a mode         prior  assemblies named
-# _EXCHANGE_LOSS       1      one reading in a hundred is exchanged with any prior  swaps found
-#                             of twenty others
-# _MIRROR_SPREAD       1      a joint is mirrored if its spread is below     hand   assemblies named
-#                             this share of its distance from the mirror
-# FEW                  1      with fewer readings per number of the linkage  hand   width
-#                             the modes say little: draws begin at the prior
-# _DRAWS               1      draws from the posterior                       work   noise
-# _DRAW_STEPS          steps  iterations of a draw in one round              work   draws lost
-# _DRAW_ROUNDS         1      rounds; a late draw begins again in the next   work   draws lost
-# _STEP_SHARES         1      a draw begins at the best of these shares of   work   draws lost
-#                             its linear step
-# _ARRIVAL_SCORE       1      standard deviations of chi-squared within      prior  draws lost
-#                             which a draw has arrived
-# _DRAWS_PER_CLOSING   1      draws of the prior for one that closes         work   time
-# _MISREAD_IN          in     usual errors in reading a rule or a caliper    prior  words
-_CORRELATION_SHARE = 0.5
-_LONE_LENGTH_SHARE = 0.5
-_LONE_ANGLE = float(np.radians(30.0))
-_LEAST_PRIOR_SHARE = 0.01
-_WIDENING = (300.0, 100.0, 30.0, 10.0, 3.0, 1.0)
-_STEPS_PER_WIDENING = 6
-_BEST_STARTS = 6
-_PRIOR_STARTS = 80
-_OPEN_LOSS = 100.0
-_FINAL_STEPS = 25
-_DAMPING_TRIALS = 8
-_REHEATING = (10.0, 3.0)
-_REHEAT_POINTS = 100
-_REHEAT_BEST = 12
-_REHEAT_STEPS = 4
-_SAME_POINT = 0.03
-_ERROR_LOSS = 23.0
-_STUDENT_FREEDOM = 4.0
-_TRUSTED_RESIDUAL = 6.0
-_STAGES = 5
-_MOST_RESIDUALS = 175_000
-_ERROR_STEPS = 3
-_LEAST_POINTS = 60
-MISFIT = 3.9
-_EQUAL_FIT = 9.0
-_MOST_MISFITS = 0.1
-_SAME_INDEX = 0.01
-_LEAST_WEIGHT = 1e-3
-_EXCHANGE_LOSS = 16.0
-_MIRROR_SPREAD = 0.2
-FEW = 0.6
-_DRAWS = 150
-_DRAW_STEPS = 8
-_DRAW_ROUNDS = 3
-_STEP_SHARES = (0.0, 0.1, 0.3, 1.0)
-_ARRIVAL_SCORE = 6.0
-_DRAWS_PER_CLOSING = 5
-_MISREAD_IN = (1.0, 0.5, 0.25, 0.125, 0.1)
-_UNIT_ERRORS = (
-    SLIPS["unit"],
-    Slip(MM_PER_IN / 10.0, "centimetres read as inches", "inches read as centimetres"),
-    SLIPS["point"],
+from mlg_troubleshoot.surveying import tuned
+from mlg_troubleshoot.surveying.readings import (
+    DEFAULT_U,
+    ReadingKind,
+    SurveyedLinkage,
+    SurveyReading,
 )
 
 
@@ -137,10 +38,10 @@ class Misfit:
 
     expected, spread: what the others predict for it, and with what standard uncertainty. [in or
     rad] suggestion: what would fit. group: rows that contradict each other, this one among them; of
-    one reading alone: the entry error.
+    one alone it is the slip.
     """
 
-    reading: Reading
+    reading: SurveyReading
     expected: float
     spread: float
     suggestion: str
@@ -185,13 +86,13 @@ class Survey:
     """
 
     linkage: SurveyedLinkage
-    readings: tuple[Reading, ...]
+    readings: tuple[SurveyReading, ...]
     misfits: tuple[Misfit, ...]
     modes: tuple[Mode, ...]
     draws: Array
 
     @property
-    def read(self) -> tuple[Reading, ...]:
+    def read(self) -> tuple[SurveyReading, ...]:
         """The readings of the table."""
         return tuple(r for r in self.readings if r.row is not None)
 
@@ -212,7 +113,7 @@ class Survey:
         """True if readings contradict each other so that nobody can tell which of them is wrong, or
         too many do.
         """
-        most = max(2, _MOST_MISFITS * len(self.read))
+        most = max(2, tuned.MOST_MISFITS * len(self.read))
         return len(self.misfits) > most or any(len(m.group) > 1 for m in self.misfits)
 
 
@@ -234,34 +135,38 @@ class Prior:
         )
         self.members, self.linkage = members, linkage
         size = float(np.std([c for p in gear.reference.mechanism.points for c in (p.x, p.y)]))
-        lone_spread = np.where(angles, _LONE_ANGLE, _LONE_LENGTH_SHARE * size)
-        least = _LEAST_PRIOR_SHARE * lone_spread
+        alone = np.where(angles, np.radians(tuned.ALONE_ANGLE), tuned.ALONE_SIZE * size)
+        least = tuned.LEAST_SPREAD * alone
         if linkage.travel is not None:
             # What the technical order prescribes is not a number of the ensemble: wide here, a
             # reading elsewhere.
             least[-1] = 0.1 * linkage.travel
-        covariance = np.diag(lone_spread**2)
+        covariance = np.diag(alone**2)
         if len(members) > 2:
             around = np.cov(members.T)
-            covariance = _CORRELATION_SHARE * around + (1.0 - _CORRELATION_SHARE) * np.diag(
+            covariance = tuned.COVARIANCE_SHARE * around + (1.0 - tuned.COVARIANCE_SHARE) * np.diag(
                 np.diag(around)
             )
         self.mean = members.mean(axis=0)
         order = float(np.log(linkage.amplification(members)).mean())
-        self.order = Reading(Kind.ORDER, value=order, u=DEFAULT_U[Kind.ORDER])
+        self.order = SurveyReading(ReadingKind.ORDER, value=order, u=DEFAULT_U[ReadingKind.ORDER])
         self.root = np.linalg.cholesky(covariance + np.diag(least**2))
         self.whiten = np.linalg.inv(self.root)
 
-    def draw(self, n: int, rng: Generator) -> Array:
+    def drawn(self, n: int, rng: Generator) -> Array:
         """Draws of it, whether they close or not."""
         return np.asarray(self.mean + rng.standard_normal((n, len(self.mean))) @ self.root.T)
 
-    def draw_closing(self, n: int, rng: Generator, readings: tuple[Reading, ...] = ()) -> Array:
+    def closing(self, n: int, rng: Generator, readings: tuple[SurveyReading, ...] = ()) -> Array:
         """Draws of it that close, about so many, as the readings have it that speak of one variable
         each.
         """
-        found = self.draw(_DRAWS_PER_CLOSING * n, rng)
-        own = tuple(r for r in readings if r.kind in (Kind.ANGLE, Kind.EXTENSION, Kind.TRAVEL))
+        found = self.drawn(tuned.DRAWN_FOR_ONE * n, rng)
+        own = tuple(
+            r
+            for r in readings
+            if r.kind in (ReadingKind.ANGLE, ReadingKind.EXTENSION, ReadingKind.TRAVEL)
+        )
         if own:
             slopes = self.linkage.slopes(own, self.mean[None])[1][0] @ self.root
             gain = (
@@ -280,7 +185,7 @@ class Fitting:
     """The readings of one survey against one prior."""
 
     def __init__(
-        self, linkage: SurveyedLinkage, prior: Prior, readings: tuple[Reading, ...]
+        self, linkage: SurveyedLinkage, prior: Prior, readings: tuple[SurveyReading, ...]
     ) -> None:
         self.linkage, self.prior, self.readings = linkage, prior, readings
         self.value = np.array([r.value for r in readings])
@@ -289,7 +194,7 @@ class Fitting:
     @property
     def still(self) -> list[int]:
         """Which of them are read at the reference position, and so need no motion."""
-        moves = (Kind.PLUNGER, Kind.ORDER)
+        moves = (ReadingKind.PLUNGER, ReadingKind.ORDER)
         return [
             i for i, r in enumerate(self.readings) if r.extension is None and r.kind not in moves
         ]
@@ -308,9 +213,9 @@ class Fitting:
         noise: Any = 0.0,
     ) -> Array:
         r = np.where(kept, (self.residuals(points) - noise) / widened, 0.0)
-        unclosed = ~np.isfinite(r)
-        r = np.where(unclosed, 0.0, r)
-        data = np.where(unclosed, _OPEN_LOSS, _robust(r)[0] if robust else r * r)
+        open_ = ~np.isfinite(r)
+        r = np.where(open_, 0.0, r)
+        data = np.where(open_, tuned.OPEN_LOSS, _robust(r)[0] if robust else r * r)
         z = (points - means) @ self.prior.whiten.T
         return np.asarray(data.sum(axis=1) + (z * z).sum(axis=1))
 
@@ -355,7 +260,7 @@ class Fitting:
                 np.einsum("smi,sm->si", g, weight * r) + (x - means[moving]) @ self.prior.whiten.T
             )
             left = np.arange(len(moving))
-            for _ in range(4 if robust else _DAMPING_TRIALS):
+            for _ in range(4 if robust else tuned.DAMPINGS):
                 at = moving[left]
                 step = np.linalg.solve(
                     gram[left] + damping[at, None, None] * np.eye(n), down[left][..., None]
@@ -387,26 +292,24 @@ class Fitting:
         starts = points
         if len(still) > 2:
             standing = Fitting(self.linkage, self.prior, tuple(self.readings[i] for i in still))
-            for widened in _WIDENING:
+            for widened in tuned.WIDENED:
                 points, _ = standing.descend(
-                    points, everything[: len(still)], widened, _STEPS_PER_WIDENING, True, starts
+                    points, everything[: len(still)], widened, tuned.STEPS_EACH, True, starts
                 )
             # Of the linkages that stand right, those that also move are the ones to go on with.
-            order = np.argsort(self.loss(points, starts, _WIDENING[2], everything, robust=True))[
-                : 3 * _BEST_STARTS
-            ]
+            order = np.argsort(
+                self.loss(points, starts, tuned.WIDENED[2], everything, robust=True)
+            )[: 3 * tuned.MOST_MODES]
             points, starts = points[order], starts[order]
-        for k, widened in enumerate(_WIDENING[1:] if len(still) > 2 else _WIDENING):
-            points, loss = self.descend(
-                points, everything, widened, _STEPS_PER_WIDENING, True, starts
-            )
+        for k, widened in enumerate(tuned.WIDENED[1:] if len(still) > 2 else tuned.WIDENED):
+            points, loss = self.descend(points, everything, widened, tuned.STEPS_EACH, True, starts)
             if k >= 1:
-                order = np.argsort(loss)[: max(_BEST_STARTS, len(points) // 2)]
+                order = np.argsort(loss)[: max(tuned.MOST_MODES, len(points) // 2)]
                 points, starts = points[order], starts[order]
-        points, loss = self.descend(points, everything, 1.0, _FINAL_STEPS, robust=True)
-        return points[np.argsort(loss)][:_BEST_STARTS]
+        points, loss = self.descend(points, everything, 1.0, tuned.LAST_STEPS, robust=True)
+        return points[np.argsort(loss)][: tuned.MOST_MODES]
 
-    def without_each_reading(self, starts: Array) -> tuple[Array, Mask, Array]:
+    def suspected(self, starts: Array) -> tuple[Array, Mask, Array]:
         """Fit what stands still without each reading in turn, and with each two distances
         exchanged.
 
@@ -416,40 +319,42 @@ class Fitting:
         and how far it takes each reading to be off in the reading's uncertainty.
         """
         still = self.still
-        static = Fitting(self.linkage, self.prior, tuple(self.readings[i] for i in still))
+        part = Fitting(self.linkage, self.prior, tuple(self.readings[i] for i in still))
         pairs = list(
-            combinations([i for i, r in enumerate(static.readings) if r.kind is Kind.DISTANCE], 2)
+            combinations(
+                [i for i, r in enumerate(part.readings) if r.kind is ReadingKind.DISTANCE], 2
+            )
         )
         kept = np.concatenate(
             [~np.eye(len(still), dtype=bool), np.ones((len(pairs), len(still)), dtype=bool)]
         )
-        noise, starts = np.zeros(kept.shape), starts[: max(1, _MOST_RESIDUALS // kept.size)]
+        noise, starts = np.zeros(kept.shape), starts[: max(1, tuned.MOST_RESIDUALS // kept.size)]
         for row, (i, j) in zip(noise[len(still) :], pairs, strict=True):
-            row[[i, j]] = (
-                np.array([1.0, -1.0]) * (static.value[j] - static.value[i]) / static.u[[i, j]]
-            )
+            row[[i, j]] = np.array([1.0, -1.0]) * (part.value[j] - part.value[i]) / part.u[[i, j]]
         points = means = np.tile(starts, (len(kept), 1))
         which = np.repeat(np.arange(len(kept)), len(starts))
-        for widened in _WIDENING:
-            points, loss = static.descend(
-                points, kept[which], widened, _ERROR_STEPS, False, means, noise[which]
+        for widened in tuned.WIDENED:
+            points, loss = part.descend(
+                points, kept[which], widened, tuned.STEPS_LEFT_OUT, False, means, noise[which]
             )
-            better = np.argsort(loss)[: max(_LEAST_POINTS, len(loss) // 3)]
+            better = np.argsort(loss)[: max(tuned.FEWEST_STARTS, len(loss) // 3)]
             points, means, which = points[better], means[better], which[better]
-        likely = np.isin(which, list(dict.fromkeys(which))[:_BEST_STARTS])
+        likely = np.isin(which, list(dict.fromkeys(which))[: tuned.MOST_MODES])
         points, means, which = points[likely], means[likely], which[likely]
         held, off = (
             np.ones((len(points), len(self.readings)), dtype=bool),
             np.zeros((len(points), len(self.readings))),
         )
         held[:, still], off[:, still] = kept[which], noise[which]
-        for widened in _WIDENING[1:]:
-            points, loss = self.descend(points, held, widened, _ERROR_STEPS, False, means, off)
+        for widened in tuned.WIDENED[1:]:
+            points, loss = self.descend(
+                points, held, widened, tuned.STEPS_LEFT_OUT, False, means, off
+            )
         each = [np.flatnonzero(which == k) for k in dict.fromkeys(which)]
-        best = np.concatenate([of[self._distinct(points[of], loss[of], 2)] for of in each])
+        best = np.concatenate([of[self._apart(points[of], loss[of], 2)] for of in each])
         return points[best], held[best], off[best]
 
-    def refit_around(
+    def reheated(
         self, points: Array, rng: Generator, kept: Any = True, noise: Any = 0.0
     ) -> tuple[Array, Array]:
         """Fit once more from around each point, as far as wider uncertainties would let it go; the
@@ -473,10 +378,10 @@ class Fitting:
         around, which, tried = (
             [points],
             np.arange(len(points)),
-            _REHEAT_BEST if (kept & (noise == 0.0)).all() else _REHEAT_POINTS,
+            tuned.FITTED_AGAIN if (kept & (noise == 0.0)).all() else tuned.TRIED_AROUND,
         )
         held, off = (np.repeat(each, tried, axis=0) for each in (kept, noise))
-        for widened in _REHEATING:
+        for widened in tuned.REHEATED:
             z = rng.standard_normal((len(points), tried, points.shape[1]))
             z /= np.sqrt(1.0 + np.maximum(values, 0.0) / widened**2)[:, None]
             trial = points[:, None] + np.einsum("pij,pkj->pki", turned, z) @ self.prior.root.T
@@ -487,37 +392,40 @@ class Fitting:
                 len(points), -1
             )
             best = (
-                np.argsort(loss, axis=1)[:, :_REHEAT_BEST] + tried * np.arange(len(points))[:, None]
+                np.argsort(loss, axis=1)[:, : tuned.FITTED_AGAIN]
+                + tried * np.arange(len(points))[:, None]
             ).ravel()
             found, _ = self.descend(
-                trial[best], held[best], widened, _REHEAT_STEPS, robust=True, noise=off[best]
+                trial[best], held[best], widened, tuned.REHEAT_STEPS, robust=True, noise=off[best]
             )
             around.append(found)
-        which = np.concatenate([which, *len(_REHEATING) * [np.repeat(which, _REHEAT_BEST)]])
+        which = np.concatenate(
+            [which, *len(tuned.REHEATED) * [np.repeat(which, tuned.FITTED_AGAIN)]]
+        )
         points, everything = np.concatenate(around), np.ones(len(self.readings), dtype=bool)
         for steps, most in (
-            (_STEPS_PER_WIDENING, 3 * _BEST_STARTS),
-            (_FINAL_STEPS, 2 * _BEST_STARTS),
+            (tuned.STEPS_EACH, 3 * tuned.MOST_MODES),
+            (tuned.LAST_STEPS, 2 * tuned.MOST_MODES),
         ):
             points, loss = self.descend(
                 points, everything, 1.0, steps, robust=True, noise=noise[which]
             )
             # A few readings may be fitted by what does not move over its stroke.
-            loss = np.where(self.linkage.closes(points), loss, np.inf) + _EXCHANGE_LOSS * noise[
-                which
-            ].any(axis=1)
-            apart = self._distinct(points, loss, most)
+            loss = np.where(
+                self.linkage.closes(points), loss, np.inf
+            ) + tuned.EXCHANGE_LOSS * noise[which].any(axis=1)
+            apart = self._apart(points, loss, most)
             points, loss, which = points[apart], loss[apart], which[apart]
         return points, loss
 
-    def _distinct(self, points: Array, loss: Array, most: int) -> list[int]:
+    def _apart(self, points: Array, loss: Array, most: int) -> list[int]:
         """The best points that are not near a better one."""
         found: list[int] = []
         whitened = points @ self.prior.whiten.T
         for k in map(int, np.argsort(loss)):
             if (
                 len(found) < most
-                and (np.abs(whitened[found] - whitened[k]).max(axis=1) > _SAME_POINT).all()
+                and (np.abs(whitened[found] - whitened[k]).max(axis=1) > tuned.POINTS_APART).all()
             ):
                 found.append(k)
         return found
@@ -526,7 +434,7 @@ class Fitting:
         """Least squares on the readings kept, from every point; each mode with its Laplace
         posterior and evidence.
         """
-        points, loss = self.descend(points, kept, 1.0, _FINAL_STEPS, robust=False, means=means)
+        points, loss = self.descend(points, kept, 1.0, tuned.LAST_STEPS, robust=False, means=means)
         with np.errstate(all="ignore"):
             found, slopes = self.linkage.slopes(self.readings, points)
         closes, index = self.linkage.closes(points), self.linkage.amplification(points)
@@ -544,7 +452,7 @@ class Fitting:
             # A valley along which no index changes, as where all of a driving part may turn about
             # its pivot, is one.
             if any(
-                m.sides == sides and np.abs(np.log(a / index[k])).max() < _SAME_INDEX
+                m.sides == sides and np.abs(np.log(a / index[k])).max() < tuned.SAME_INDEX
                 for m, a in zip(modes, own, strict=True)
             ):
                 continue
@@ -559,7 +467,7 @@ class Fitting:
             return ()
         share = np.exp(np.array(evidence) - max(evidence))
         share /= share.sum()
-        order = [int(k) for k in np.argsort(-share) if share[k] > _LEAST_WEIGHT]
+        order = [int(k) for k in np.argsort(-share) if share[k] > tuned.LEAST_WEIGHT]
         return tuple(replace(modes[k], weight=float(share[k])) for k in order)
 
     def _sides(self, point: Array) -> tuple[int, ...]:
@@ -599,7 +507,7 @@ class Fitting:
             far = float(arm @ across)
             if np.sqrt(
                 across @ best.covariance[i : i + 2, i : i + 2] @ across
-            ) > _MIRROR_SPREAD * abs(far):
+            ) > tuned.PLACED * abs(far):
                 continue
             moved = np.zeros(len(names))
             moved[i : i + 2] = -2.0 * far * across
@@ -621,9 +529,9 @@ class Fitting:
         kept, back = kept.copy(), np.zeros_like(kept)
         for _ in range(len(self.readings)):
             mode = (self.modes(mode.vector[None], mode.mean[None], kept) or (mode,))[0]
-            gap, spread = self._leave_one_out(mode, kept)
+            gap, spread = self._left_out(mode, kept)
             size = np.nan_to_num(np.abs(gap) / spread, nan=np.inf)
-            again = ~kept & (size < MISFIT)
+            again = ~kept & (size < tuned.MISFIT)
             if again.any():
                 # Never the same reading out and in: one that was taken back stays.
                 i = int(np.argmin(np.where(again, size, np.inf)))
@@ -631,15 +539,13 @@ class Fitting:
                 continue
             size = np.where(kept & ~back, size, 0.0)
             worst = int(np.argmax(size))
-            if size[worst] < MISFIT:
+            if size[worst] < tuned.MISFIT:
                 break
             kept[worst] = False
         found: dict[int | None, Misfit] = {}
         for i in map(int, np.flatnonzero(~kept)):
             words, sure = self._suggestion(mode, i, gap, spread, ~kept)
-            group = (
-                (i,) if sure else self._interchangeable(mode, kept, i, float(gap[i] / spread[i]))
-            )
+            group = (i,) if sure else self._alike(mode, kept, i, float(gap[i] / spread[i]))
             rows = tuple(
                 sorted(r.row for r in (self.readings[j] for j in group) if r.row is not None)
             )
@@ -654,7 +560,7 @@ class Fitting:
                 found.setdefault(other.row, also)
         return tuple(m for row, m in found.items() if row is not None), kept
 
-    def _leave_one_out(self, mode: Mode, kept: Mask) -> tuple[Array, Array]:
+    def _left_out(self, mode: Mode, kept: Mask) -> tuple[Array, Array]:
         """How far each reading is from what the others predict, and the standard uncertainty of
         that.
         """
@@ -668,7 +574,7 @@ class Fitting:
             kept, 1.0 / np.sqrt(held), np.sqrt(1.0 + known)
         )
 
-    def _interchangeable(self, mode: Mode, kept: Mask, i: int, size: float) -> tuple[int, ...]:
+    def _alike(self, mode: Mode, kept: Mask, i: int, size: float) -> tuple[int, ...]:
         """Readings one of which is wrong without anybody telling which: leaving out any of them
         fits alike.
         """
@@ -679,7 +585,9 @@ class Fitting:
         residual = np.eye(len(rows)) - slopes[rows] @ covariance @ slopes[rows].T
         at = int(np.flatnonzero(rows == i)[0])
         alike = residual[at] ** 2 / np.clip(residual[at, at] * np.diag(residual), 1e-12, None)
-        return tuple(int(j) for j in rows[(1.0 - np.minimum(alike, 1.0)) * size**2 < _EQUAL_FIT])
+        return tuple(
+            int(j) for j in rows[(1.0 - np.minimum(alike, 1.0)) * size**2 < tuned.ALIKE_LOSS]
+        )
 
     def _suggestion(
         self, mode: Mode, i: int, gap: Array, spread: Array, out: Mask
@@ -698,7 +606,7 @@ class Fitting:
                 ):
                     return f"swapped with row {other.row}: {other.words}", True
         if not reading.is_angle:
-            for slip in _UNIT_ERRORS:
+            for slip in tuned.SURVEY_SLIPS:
                 for size, factor, words in (
                     ("large", 1 / slip.factor, slip.too_large),
                     ("small", slip.factor, slip.too_small),
@@ -709,10 +617,10 @@ class Fitting:
                             f"{right}: the value is {slip.factor:g} times too {size}, {words}",
                             True,
                         )
-        if reading.kind is Kind.DISTANCE:
+        if reading.kind is ReadingKind.DISTANCE:
             names = [p.name for p in self.linkage.space.mechanism.points]
             others = [
-                Reading(Kind.DISTANCE, a, b, extension=reading.extension)
+                SurveyReading(ReadingKind.DISTANCE, a, b, extension=reading.extension)
                 for a, b in [(reading.start, n) for n in names] + [(n, reading.end) for n in names]
                 if a != b and {a, b} != {reading.start, reading.end}
             ]
@@ -727,7 +635,7 @@ class Fitting:
                     True,
                 )
         if not reading.is_angle:
-            for inches in _MISREAD_IN:
+            for inches in tuned.MISREAD_IN:
                 if near < 0.4 * inches and abs(abs(gap[i]) - inches) < near:
                     return (
                         f"misread by {reading.shown(inches)}: {reading.shown(expected)} would fit",
@@ -746,32 +654,32 @@ class Fitting:
         prior, n = self.prior, len(self.prior.mean)
         begun = []
         for mode in modes:
-            count = max(1, round(_DRAWS * mode.weight))
+            count = max(1, round(tuned.DRAWS * mode.weight))
             means = mode.mean + rng.standard_normal((count, n)) @ prior.root.T
             noise = rng.standard_normal((count, len(self.readings)))
             g = self.linkage.slopes(self.readings, mode.vector[None])[1][0] / self.u[:, None]
             g = np.where(kept[:, None], g, 0.0)
             pulled = (means - mode.mean) @ prior.whiten.T @ prior.whiten + noise @ g
             # A valley is curved: each draw begins as far along its linear step as that helps.
-            steps = [mode.vector + t * pulled @ mode.covariance for t in _STEP_SHARES]
-            if mode.parameters < FEW * n:
+            steps = [mode.vector + t * pulled @ mode.covariance for t in tuned.ALONG_PULL]
+            if mode.parameters < tuned.FEW * n:
                 # So little is known that the modes say little: each draw begins at its own draw of
                 # the prior.
-                means = steps[0] = np.concatenate([prior.draw_closing(count, rng), means])[:count]
+                means = steps[0] = np.concatenate([prior.closing(count, rng), means])[:count]
                 del steps[1:]
             losses = [self.loss(x, means, 1.0, kept, False, noise) for x in steps]
             begun.append((np.choose(np.argmin(losses, axis=0)[:, None], steps), means, noise))
         points, means, noise = (np.concatenate(parts) for parts in zip(*begun, strict=True))
         # The remaining loss of a draw that arrived is chi-squared, with as many degrees as
         # readings.
-        enough = kept.sum() + _ARRIVAL_SCORE * np.sqrt(2.0 * kept.sum())
+        enough = kept.sum() + tuned.FAR * np.sqrt(2.0 * kept.sum())
         loss, late = np.full(len(points), np.inf), np.arange(len(points))
-        for _ in range(_DRAW_ROUNDS):
+        for _ in range(tuned.DRAW_ROUNDS):
             points[late], loss[late] = self.descend(
                 points[late],
                 kept,
                 1.0,
-                _DRAW_STEPS,
+                tuned.DRAW_STEPS,
                 robust=False,
                 means=means[late],
                 noise=noise[late],
@@ -797,44 +705,49 @@ def _robust(r: Array) -> tuple[Array, Array]:
     """Loss of residuals and their weights: Student's t, or a slip, which costs the same however
     large it is.
     """
-    loss = (_STUDENT_FREEDOM + 1.0) * np.log1p(r * r / _STUDENT_FREEDOM)
-    sound = 1.0 / (1.0 + np.exp((loss - _ERROR_LOSS) / 2.0))
-    return loss + 2.0 * np.log(sound), sound * (_STUDENT_FREEDOM + 1.0) / (_STUDENT_FREEDOM + r * r)
+    loss = (tuned.FREEDOM + 1.0) * np.log1p(r * r / tuned.FREEDOM)
+    sound = 1.0 / (1.0 + np.exp((loss - tuned.SLIP_LOSS) / 2.0))
+    return loss + 2.0 * np.log(sound), sound * (tuned.FREEDOM + 1.0) / (tuned.FREEDOM + r * r)
 
 
 def fit(
     gear: Gear,
-    readings: tuple[Reading, ...],
+    readings: tuple[SurveyReading, ...],
     rng: Generator,
-    on_progress: Callable[[int, int], None] = lambda *_: None,
+    told: Callable[[int, int], None] = lambda *_: None,
 ) -> Survey:
     """Find the linkages that fit the readings, what does not fit, and draws from the posterior.
 
-    on_progress: called with the stages that are done and how many there are.
+    told: called with the stages that are done and how many there are.
     """
-    on_progress(0, _STAGES)
+    told(0, tuned.STAGES)
     linkage = SurveyedLinkage(gear)
     prior = Prior(linkage)
     if linkage.travel is not None:
-        readings = (*readings, Reading(Kind.TRAVEL, value=linkage.travel, u=DEFAULT_U[Kind.TRAVEL]))
-    if len(readings) < FEW * len(linkage.names):
+        readings = (
+            *readings,
+            SurveyReading(
+                ReadingKind.TRAVEL, value=linkage.travel, u=DEFAULT_U[ReadingKind.TRAVEL]
+            ),
+        )
+    if len(readings) < tuned.FEW * len(linkage.names):
         readings = (*readings, prior.order)
     fitting = Fitting(linkage, prior, readings)
-    starts = np.concatenate([prior.members, prior.draw_closing(_PRIOR_STARTS, rng, readings)])
-    points, loss = fitting.refit_around(fitting.robust(starts), rng)
-    on_progress(1, _STAGES)
-    kept = np.abs(fitting.residuals(points[:1])[0]) < _TRUSTED_RESIDUAL
+    starts = np.concatenate([prior.members, prior.closing(tuned.STARTS, rng, readings)])
+    points, loss = fitting.reheated(fitting.robust(starts), rng)
+    told(1, tuned.STAGES)
+    kept = np.abs(fitting.residuals(points[:1])[0]) < tuned.TRUSTED
     if not kept.all() and fitting.still:
         # What does not fit is a slip or another valley.
-        points, (without, held, off) = points[:_BEST_STARTS], fitting.without_each_reading(starts)
+        points, (without, held, off) = points[: tuned.MOST_MODES], fitting.suspected(starts)
         nothing = np.zeros((len(points), len(readings)))
         held, off = np.concatenate([nothing == 0.0, held]), np.concatenate([nothing, off])
-        points, loss = fitting.refit_around(np.concatenate([points, without]), rng, held, off)
-        kept = np.abs(fitting.residuals(points[:1])[0]) < _TRUSTED_RESIDUAL
+        points, loss = fitting.reheated(np.concatenate([points, without]), rng, held, off)
+        kept = np.abs(fitting.residuals(points[:1])[0]) < tuned.TRUSTED
     # What is that much less likely, each slip counted, is not a mode: without what was exchanged it
     # might seem one.
-    points = points[loss <= loss[0] - 2.0 * np.log(_LEAST_WEIGHT)]
-    on_progress(2, _STAGES)
+    points = points[loss <= loss[0] - 2.0 * np.log(tuned.LEAST_WEIGHT)]
+    told(2, tuned.STAGES)
     modes = fitting.modes(points, np.broadcast_to(prior.mean, points.shape), kept)
     if not modes:
         raise InconclusiveDataError(
@@ -842,12 +755,12 @@ def fit(
             " them",
             "Check the units and the points of the readings.",
         )
-    on_progress(_STAGES - 2, _STAGES)
+    told(tuned.STAGES - 2, tuned.STAGES)
     misfits, kept = fitting.misfits(modes[0], kept)
-    vectors, means = (np.array([getattr(m, name) for m in modes]) for name in ("vector", "mean"))
+    vectors, means = (np.array([getattr(m, part) for m in modes]) for part in ("vector", "mean"))
     modes = fitting.modes(vectors, means, kept) or modes
     modes = fitting.with_mirrored(modes, kept)
-    on_progress(_STAGES - 1, _STAGES)
+    told(tuned.STAGES - 1, tuned.STAGES)
     draws = fitting.draws(modes, kept, rng)
-    on_progress(_STAGES, _STAGES)
+    told(tuned.STAGES, tuned.STAGES)
     return Survey(linkage, readings, misfits, modes, draws)

@@ -34,10 +34,10 @@ _PRIOR = {
     "kept": (1.0, 1.5),
 }
 _KINDS = ("wiener", "integrated", "gamma")
-# Importance samples of each kind, and the degrees of freedom of the Student distribution that they
-# are drawn from: its heavy tails keep the weights finite. [1]
-_SAMPLES, _FREEDOM = 800, 6.0
-# Parameter vectors times units that are filtered at once: bounds the memory. [1]
+# Importance samples of each kind of increments, and the degrees of freedom of the Student
+# distribution that they are drawn from: wider tails than the posterior's. [1]
+_SAMPLES, _FREEDOM = 800, 6
+# Readings times samples that are worked out at once: as many stay in the cache. [1]
 _CHUNK = 40_000
 
 
