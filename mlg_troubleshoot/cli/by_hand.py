@@ -178,7 +178,7 @@ def _advice(
         if joint is None:
             return None
         if advice.expected is not None and joint == advice.joint:
-            return f"{advice.text} Or done.", joint
+            return f"{advice.text} Or type done.", joint
         return f"Most useful next reading: {gear.joint(joint).label}.", joint
 
     return advise

@@ -14,11 +14,10 @@ import typer
 from rich.table import Table
 
 from mlg_troubleshoot.cli import output
-from mlg_troubleshoot.cli.boundary import INTERRUPTED
 from mlg_troubleshoot.cli.flags import StudyFlags
 from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.remembered import Settings
-from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.errors import ExitCode, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.given_data import GivenDataResult
@@ -48,7 +47,7 @@ def asked(flags: StudyFlags) -> Iterator[tuple[Gear, StudyOptions]]:
         except ValueError:
             raise UsageError(
                 f"directions {flags.fixed!r}",
-                "Give degrees with commas between, one for each joint.",
+                "Give degrees separated by commas, one per joint.",
             ) from None
     plain = {
         each.name: getattr(flags, each.name)
@@ -112,7 +111,7 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
         output.say(f"Table written: {task.write_study_table(findings)}")
     if not findings.result.finished:
         output.say("Interrupted: these are partial results.")
-        raise typer.Exit(INTERRUPTED)
+        raise typer.Exit(ExitCode.INTERRUPTED)
 
 
 def _choice(kind: type[_Choice], text: str, what: str) -> _Choice:
@@ -239,8 +238,8 @@ def _show_given(gear: Gear, given: GivenDataResult) -> None:
     )
     output.console().print(
         f"Without a model, from {given.rows_used} measured of {given.rows_read} inspections in"
-        f" {given.file}, first order with 95 % intervals: {each}. Where joints wear together each"
-        " also explains what the others do, and these add to more than 1."
+        f" {given.file}, first order with 95 % intervals: {each}. Where joints wear together, each"
+        " index includes part of the others, and their sum exceeds 1."
     )
 
 

@@ -29,7 +29,8 @@ def survey(
     file: Annotated[
         str,
         typer.Argument(
-            metavar="FILE|template|ask", help="Filled-in survey, or the word template or ask."
+            metavar="FILE|template|ask",
+            help="Filled-in survey, or one of the words template and ask.",
         ),
     ],
     template: Annotated[
@@ -50,7 +51,7 @@ def survey(
         typer.Option(
             "--for",
             metavar="INSPECTIONS",
-            help="Narrow the displacement of these, not the indices.",
+            help="Inspections whose displacement to narrow, instead of the indices.",
         ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the starts and draws.")] = 0,
@@ -103,7 +104,7 @@ def survey(
             write=write,
             inspections=inspections,
             seed=seed,
-            told=partial(bar, "Fitting"),
+            on_progress=partial(bar, "Fitting"),
         )
     if as_json:
         from mlg_troubleshoot.reporting.model_json import survey_as_json

@@ -92,7 +92,7 @@ class Cases:
 
     @property
     def critical_missing(self) -> Mask:
-        """True for a gear of which a critical joint was not measured."""
+        """True for a gear with a critical joint that was not measured."""
         return np.asarray((~self.measured & self.gear.critical).any(axis=1))
 
     @property
@@ -131,7 +131,7 @@ class Cases:
 
 
 def _disagreement(inspection: Inspection, margin_in: float) -> str:
-    """Plunger readings of which one is outside the margin and the mean is not."""
+    """Plunger readings with one outside the margin although their mean is not."""
     mean, one_u = inspection.measured_displacement_in, inspection.plunger_gauge_u_in
     beyond = margin_in + 2.0 * (DEFAULT_PLUNGER_U_IN if one_u is None else one_u)
     far = [reading for reading in inspection.readings_in if abs(reading) > beyond]

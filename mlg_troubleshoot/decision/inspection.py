@@ -14,6 +14,7 @@ from typing import Any
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
+# Standard uncertainty of a clearance reading that states none. [in]
 DEFAULT_GAUGE_U_IN = 0.0005
 
 

@@ -40,6 +40,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.units import Length, Sentence
 
+# Rows judged at once: bounds the memory. [1]
 _CHUNK = 1024
 
 
@@ -136,7 +137,7 @@ def _assessment(
     # unknown.
     known = closes and bool(np.isfinite(judged.u_in[i]))
 
-    def told(value: Any, when: bool = closes) -> float | None:
+    def number_or_none(value: Any, when: bool = closes) -> float | None:
         return float(value) if when and np.isfinite(value) else None
 
     worst = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
@@ -147,15 +148,15 @@ def _assessment(
         inspection=inspection,
         verdict=found,
         # Adding zero turns a minus zero into zero.
-        predicted_displacement_in=told(lower.displacement_in[i] + 0.0),
-        over_travel_in=told(worst[0]),
-        under_travel_in=told(worst[1]),
-        predicted_upper_in=told(judged.batch.upper.displacement_in[i], True),
+        predicted_displacement_in=number_or_none(lower.displacement_in[i] + 0.0),
+        over_travel_in=number_or_none(worst[0]),
+        under_travel_in=number_or_none(worst[1]),
+        predicted_upper_in=number_or_none(judged.batch.upper.displacement_in[i], True),
         margin_in=margin,
-        remaining_in=told(margin - lower.displacement_in[i]),
-        standard_uncertainty_in=told(judged.u_in[i]),
+        remaining_in=number_or_none(margin - lower.displacement_in[i]),
+        standard_uncertainty_in=number_or_none(judged.u_in[i]),
         probability_within_margin=float(judged.p_within[i]),
-        probability_exceed_random_directions=told(judged.batch.chance_random[i]),
+        probability_exceed_random_directions=number_or_none(judged.batch.chance_random[i]),
         geometry_spread_in=(
             (
                 float(lower.spread_low_in[i]) + 0.0,
@@ -170,9 +171,9 @@ def _assessment(
         joints=findings,
         plan=plan,
         basis=Basis.MEASURED if beyond else Basis.PREDICTED,
-        bound_in=told(lower.bound_in[i] + 0.0, True),
-        explained_at_most_in=told(plunger.explained_at_most_in[i]),
-        unexplained_in=told(plunger.unexplained_in[i]),
+        bound_in=number_or_none(lower.bound_in[i] + 0.0, True),
+        explained_at_most_in=number_or_none(plunger.explained_at_most_in[i]),
+        unexplained_in=number_or_none(plunger.unexplained_in[i]),
         headline=_headline(cases, judged, i),
         measured_statement=(
             None
@@ -188,8 +189,8 @@ def _assessment(
 
 
 _PROVISIONAL = Sentence.of(
-    "provisional: the larger of {} and {} % of the prediction, because one published failure gives"
-    " none",
+    "provisional, the larger of {} and {} % of the prediction; a single published failure is too"
+    " little to estimate it",
     Length.brief(PROVISIONAL_U_IN),
     f"{100 * PROVISIONAL_U_SHARE:.0f}",
 )
@@ -289,7 +290,7 @@ def _warnings(
     if lacking:
         warnings.append(
             f"The extension of the model needs {', '.join(lacking)}, which this inspection lacks:"
-            " predicted without."
+            " predicted without it."
         )
     warnings += [
         Sentence.of(
@@ -356,7 +357,7 @@ def allowances(cases: Cases, lower: Prediction) -> Array:
     sense = np.where(lower.worst.over_in >= -lower.worst.under_in, 1.0, -1.0)[:, None]
     left = (cases.margin_in - worst)[:, None]
     room = np.maximum(gear.limits_in - start, 0.0)
-    # Root of slope·t + ½·bend·t² = left, in the form that stays good where the curvature is zero.
+    # Root of slope·t + ½·bend·t² = left, in the form that is stable where the curvature is zero.
     root = np.sqrt(np.maximum(slopes**2 + 2.0 * sense * bend * left, 0.0))
     wear = np.minimum(2.0 * left / np.maximum(slopes + root, 1e-9), room)
     if cases.extension is None:

@@ -16,7 +16,9 @@ from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_slopes, adjust
 from mlg_troubleshoot.gear.directions import WorstCase
 from mlg_troubleshoot.gear.gear import Gear
 
+# Sets of random directions behind the chance of exceeding the margin. [1]
 DIRECTION_SETS = 4096
+# Standard uncertainty of a plunger reading that states none. [in]
 DEFAULT_PLUNGER_U_IN = 0.0005
 # The model's standard uncertainty until a diagnosis gives it: the larger of a length and a share of
 # the prediction.
@@ -43,7 +45,7 @@ class Extension(Protocol):
 def model_uncertainty(displacement_in: Array, residual_u_in: float | None) -> Array:
     """Standard uncertainty of the model itself.
 
-    Provisional without a diagnosis: one published failure gives none. [in]
+    Provisional without a diagnosis: one published failure is too little to estimate it. [in]
     """
     if residual_u_in is not None:
         return np.full(np.shape(displacement_in), residual_u_in)

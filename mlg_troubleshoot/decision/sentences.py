@@ -40,6 +40,7 @@ GO_ON = {
 }
 
 
+ALL_WITHIN_LIMITS = "Every joint was measured and is within its limit."
 JOINTS_DONE = (
     "Joints are within limits. No further action on the joints; this is not a release to service."
 )
@@ -131,7 +132,7 @@ def explained(explained_in: float, unexplained_in: float) -> Sentence:
 def within(margin_in: float, said: Predicted, *, failed: bool, joints_done: bool) -> Sentence:
     """Headline of WITHIN_MARGIN."""
     then = FAILED_BUT_WITHIN if failed else "Continue fault isolation; not a release."
-    then = JOINTS_DONE if joints_done else then
+    then = ALL_WITHIN_LIMITS if joints_done else then
     if not said.loaded:
         return Sentence.of(
             "Even the worst case stays within the margin of {} ({}). {}",
@@ -256,8 +257,8 @@ def chance_wrong_sentence(a: Assessment) -> str | None:
         else ""
     )
     return (
-        f"Called {a.verdict.words.lower()}, the {what} of this gear lies on the other side of the"
-        f" margin with a chance of {percent(a.chance_wrong)}{unread}."
+        f"This gear is called {a.verdict.words.lower()}. The chance that its {what} lies on the"
+        f" other side of the margin is {percent(a.chance_wrong)}{unread}."
     )
 
 
@@ -270,8 +271,8 @@ def no_repair_set(a: Assessment) -> str:
     if unread:
         are = "is" if len(unread) == 1 else "are"
         return (
-            f"No set is sure to hold while {joint_list(unread)} {are} not measured: they count at"
-            " their limit here."
+            f"No repair set is certain while {joint_list(unread)} {are} not measured: unmeasured"
+            " joints count at their limit here."
         )
     return f"No {_SET_THAT_HOLDS}"
 

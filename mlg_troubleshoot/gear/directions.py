@@ -24,8 +24,7 @@ _ROOT_HALF = np.sqrt(0.5)
 # A joint without clearance still has a direction in which it would act: found with this length.
 _PROBE_IN = STEP
 _ROWS = 512
-# Positions solved at once: twice as many no longer stay in the cache and take half as long again,
-# each.
+# Positions solved at once. Twice as many do not fit the cache: each then takes 1.5 times as long.
 IN_CACHE = 4096
 
 

@@ -104,7 +104,7 @@ class JointSpec:
 
     limit, new_part: radial clearance that the manual allows at most, and that a restored joint has.
     [in] access, restore: time to measure it, and to restore it, once its area is open. [min]
-    critical: true for a joint without whose measurement nothing can be cleared (joints 1 to 5 of
+    critical: true if no gear can be cleared before this joint is measured (joints 1 to 5 of
     the paper).
     """
 

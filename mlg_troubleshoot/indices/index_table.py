@@ -81,13 +81,13 @@ class IndexTable:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the table as plain values, in the order of the JSON contract of ``mlg study``."""
-        told = asdict(self)
+        values = asdict(self)
         names = {
             "gear_id": "id",
             **{n: n for n in ("geometry_sha256", "ensemble_sha256", "provenance")},
         }
-        gear = {shown: told.pop(name) for name, shown in names.items()}
-        return {"schema_version": SCHEMA_VERSION, "gear": gear, **told}
+        gear = {shown: values.pop(name) for name, shown in names.items()}
+        return {"schema_version": SCHEMA_VERSION, "gear": gear, **values}
 
 
 def ranks(first_order: Array) -> Wholes:

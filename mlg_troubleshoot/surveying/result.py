@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.errors import NOTHING_JUDGED, Problem
+from mlg_troubleshoot.errors import ExitCode, Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.surveying.plan import Suggested
 from mlg_troubleshoot.surveying.survey import Survey
@@ -65,8 +65,8 @@ class SurveyResult:
     seed: int
 
     @property
-    def exit_code(self) -> int:
-        """0 if everything fits, 1 if something does not, 3 if nothing follows."""
+    def exit_code(self) -> ExitCode:
+        """NO_CONCLUSION without a usable reading, ATTENTION if something does not fit."""
         if self.survey is None:
-            return NOTHING_JUDGED
-        return 1 if self.survey.misfits or self.problems else 0
+            return ExitCode.NO_CONCLUSION
+        return ExitCode.ATTENTION if self.survey.misfits or self.problems else ExitCode.FINE

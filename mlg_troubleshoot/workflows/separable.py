@@ -357,7 +357,7 @@ def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
     )
     if ALONG not in recorded:
         return planned
-    # Beside each reading at mid-position one along the stroke.
+    # One reading along the stroke in addition to each at mid-position.
     both = planned.take(np.tile(np.arange(n), 2))
     stroke = np.r_[
         np.full(n, np.nan), rng.permutation(np.linspace(0.0, gear.reference.stroke[1], n))

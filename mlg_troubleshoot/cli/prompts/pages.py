@@ -36,7 +36,7 @@ JOINT_KEYS = keys(
 )
 FACTOR_TWO = line(
     ("DIAMETRAL and TOTAL PLAY are twice RADIAL. ", Tone.WARN),
-    "The wrong one is wrong by a factor of 2 and can turn the verdict around.",
+    "The wrong one is off by a factor of 2 and can reverse the verdict.",
 )
 
 
@@ -314,14 +314,14 @@ def confirm_more_page(most_in: float, unit: LengthUnit | None) -> Page:
                 Tone.WARN,
             )
         ),
-        line(("y", Tone.KEY), " yes, it was read so   ", ("n", Tone.KEY), " no", indent=3),
+        line(("y", Tone.KEY), " yes, that is the reading   ", ("n", Tone.KEY), " no", indent=3),
     )
     return Page(shown, " y, n, or p with the displacement again > ")
 
 
 CONFIRM_UNIT_HELP = (
     line(
-        "A pin hardly has less play than in new parts. The unit of the numbers may be another one.",
+        "Even new parts have more play than this. The unit of the numbers may be another one.",
         indent=3,
     ),
     line(
@@ -345,7 +345,7 @@ def confirm_unit_page(answers: Answers, question: str) -> Page:
 DETAILS = {BY_NAME[name].prompt_word: name for name in SIGN_OFF}
 DETAIL_HELP = (
     line(
-        "Printed on the sign-off page of the report. Enter leaves it empty; x takes it away.",
+        "Printed on the sign-off page of the report. Enter leaves it empty; x removes it.",
         indent=3,
     ),
     line("A date as 2026-03-04 or 4-Mar-2026.", indent=3),
@@ -370,7 +370,7 @@ MORE_HELP = (
         indent=3,
     ),
     line("m: the displacement that this gear allows, as found at rigging.", indent=3),
-    line("All on one line is fine: f p .041 m .028. x takes all of them away.", indent=3),
+    line("All on one line is fine: f p .041 m .028. x removes them all.", indent=3),
 )
 
 

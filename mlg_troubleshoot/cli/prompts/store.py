@@ -38,7 +38,7 @@ class DamagedSessionError(SessionFileError):
 
 
 class SessionTakenError(TroubleshootError):
-    """A session that another run has gone on with since this one read or wrote it."""
+    """A session that another run has continued since this one read or wrote it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,8 +98,8 @@ class SessionStore:
             raise OutputError(f"answers cannot be saved: {error.message}", error.remedy) from error
         if not saved:
             raise SessionTakenError(
-                f"another window has gone on with {session.id}",
-                "This entry goes on as one of its own.",
+                f"another window has continued {session.id}",
+                "This entry continues as a separate one.",
             )
         return ours
 
@@ -194,7 +194,7 @@ def read_session(draft: Draft) -> Session:
     try:
         session = replace(_from_json(raw), writer=draft.writer, complete=draft.complete)
         if session.id != draft.id:
-            raise ValueError(f"it holds the session {session.id!r}")
+            raise ValueError(f"it contains the session {session.id!r}")
     except (KeyError, TypeError, ValueError, OverflowError, AttributeError, UsageError) as error:
         raise _damaged(draft.id, f"{type(error).__name__}: {error}") from error
     return session

@@ -137,7 +137,8 @@ def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
         parts = sorted({gear.joint(n).new_part.value for s in a.repair_sets for n in s.joints})
         listed = " to ".join(screen.length(each) for each in dict.fromkeys((parts[0], parts[-1])))
         screen.print(
-            f"A restored joint counts with the {listed} {screen.unit} radial of a new part."
+            f"A restored joint counts with the radial clearance of a new part, {listed}"
+            f" {screen.unit}."
         )
     if a.rigging is not None:
         screen.sentence(rigging_sentence(a.rigging))
@@ -155,7 +156,7 @@ def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
     if wrong is not None:
         screen.print(wrong)
     what = (
-        "As loaded is an expectation, the worst case a bound."
+        "The displacement as loaded is an expectation; the worst case is a bound."
         if a.as_loaded
         else "The worst case is a bound."
     )
