@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mlg_troubleshoot.cli import options, output
-from mlg_troubleshoot.errors import InconclusiveDataError
+from mlg_troubleshoot.errors import ExitCode, InconclusiveDataError
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.diagnosis import Diagnosis
     from mlg_troubleshoot.units import LengthUnit
 
-NOTHING_FOUND, SOMETHING_FOUND = 0, 1
 EPILOG = (
     "Example: [b]mlg diagnose fleet.csv --write-extension EXT.toml[/b], then [b]mlg check FILE"
     " --extension EXT.toml[/b]"
@@ -33,7 +32,9 @@ def diagnose(
     ],
     write_extension: Annotated[
         Path | None,
-        typer.Option("--write-extension", metavar="EXT.toml", help="Keep the extended model."),
+        typer.Option(
+            "--write-extension", metavar="EXT.toml", help="Write the extended model to this file."
+        ),
     ] = None,
     report: options.Report = None,
     page: options.Paper = None,
@@ -57,8 +58,7 @@ def diagnose(
 ) -> None:
     """Compare measured with predicted: what is wrong, the cause by name, the extension, the gain.
 
-    Exit codes: 0 nothing found · 1 something found · 3 cannot be concluded from this table · 2
-    usage.
+    Exit codes: 0 nothing found · 1 something found · 3 this table allows no conclusion · 2 usage.
     """
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.progress import stages
@@ -111,7 +111,7 @@ def diagnose(
         made = task.write_diagnosis_report(result, asked, report, str(shown.page), unit=shown.show)
         output.say_written([made], quiet=quiet)
     nothing = result.diagnosis.verdict == "NONE" and not result.diagnosis.faults
-    raise typer.Exit(NOTHING_FOUND if nothing else SOMETHING_FOUND)
+    raise typer.Exit(ExitCode.FINE if nothing else ExitCode.ATTENTION)
 
 
 def _unwritten(diagnosis: Diagnosis) -> str:
@@ -125,9 +125,8 @@ def _unwritten(diagnosis: Diagnosis) -> str:
 
 def _show(diagnosis: Diagnosis, unit: LengthUnit) -> None:
     from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
-    from mlg_troubleshoot.units import in_unit
 
     console = output.console(unit=unit)
     for line in seven_lines(diagnosis):
-        said = output.text(in_unit(line.text, unit), "not bold")
+        said = output.text(line.text, "not bold")
         console.print(output.text(f"{line.number} {line.word:<7}", "bold").append_text(said))

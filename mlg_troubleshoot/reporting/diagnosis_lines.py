@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from mlg_troubleshoot.decision.columns import AXIAL_FLOAT, BY_NAME, CLEARANCE, COVARIATES
 from mlg_troubleshoot.diagnosis import Diagnosis, NamedCause
 from mlg_troubleshoot.diagnosis.faults import DataFault
 from mlg_troubleshoot.reporting.formats import Lengths
@@ -20,18 +21,7 @@ _KINDS = {
     "implausible": "implausible",
     "other_convention": "the other convention",
 }
-_COLUMNS = {
-    "temperature_c": "temperature",
-    "hydraulic_pressure_psi": "hydraulic pressure",
-    "gear_landings": "landings since overhaul",
-    "actuator_extension_in": "actuator extension",
-    "predicted": "predicted displacement",
-    "day": "date",
-    "tail_no": "tail",
-    "gauge_id": "gauge",
-    "technician_id": "technician",
-    "axial_float": "end float",
-}
+_VARIABLES = {c.variable: c.said for c in (*COVARIATES, AXIAL_FLOAT)}
 
 
 # What is less likely than this is not worth a word, and more than so many are not read.
@@ -53,9 +43,11 @@ def kind_words(kind: str) -> str:
 
 def column_words(name: str) -> str:
     kind, _, joint = name.rpartition("_")
-    if joint.isdigit() and kind in {"clearance", "axial_float"}:
-        return f"{'clearance' if kind == 'clearance' else 'end float'} of joint {joint}"
-    return _COLUMNS.get(name, name.replace("_", " "))
+    if joint.isdigit() and kind in (CLEARANCE.name, AXIAL_FLOAT.name):
+        return f"{BY_NAME[kind].said} of joint {joint}"
+    if name == "predicted":
+        return "predicted displacement"
+    return _VARIABLES.get(name, name.replace("_", " "))
 
 
 def chance_words(chance: float) -> str:

@@ -20,8 +20,9 @@ from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension, NamedCause
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.schemas import SCHEMA_VERSION
+from mlg_troubleshoot.units import Sentence
 
-_AS_THEY_ARE = frozenset((str, int, bool, type(None)))
+_AS_THEY_ARE = frozenset((str, Sentence, int, bool, type(None)))
 _SINGLE = (Enum, np.generic)
 _NUMBERS = (
     *(
@@ -53,7 +54,7 @@ _JOINT = (
     *("plunger_amplification", "rank", "rank_range", "allowance_in"),
 )
 _OF_JOINT = attrgetter(*_JOINT)
-# What the geometry says of a joint of every gear, and so is not kept with each assessment.
+# Fields of a joint that follow from the geometry alone: not kept with each assessment.
 _KEPT = tuple(
     name
     for name in _JOINT
@@ -160,7 +161,7 @@ def _inspection(judgement: Judgement, gear: Gear) -> dict[str, Any]:
         **dict.fromkeys((*_NUMBERS, "measured_displacement_in")),
         "joints": [{"joint": joint.number, "name": joint.name, **unknown} for joint in gear.joints],
         "basis": None,
-        **_course(judgement),
+        **_plan(judgement),
         **dict.fromkeys(_PARTS),
         "warnings": list(judgement.warnings),
     }
@@ -174,7 +175,7 @@ def _assessment(a: Assessment, joints: list[dict[str, Any]]) -> dict[str, Any]:
         "measured_displacement_in": a.inspection.measured_displacement_in,
         "joints": joints,
         "basis": a.basis.value,
-        **_course(a),
+        **_plan(a),
         **chosen(a, *_PARTS),
         "warnings": [*said, *a.warnings],
     }
@@ -195,7 +196,7 @@ def _joint(finding: JointFinding) -> dict[str, Any]:
     }
 
 
-def _course(judgement: Judgement) -> dict[str, Any]:
+def _plan(judgement: Judgement) -> dict[str, Any]:
     steps = plain(judgement.plan.steps)
     return {"next_action": steps[0], "plan": steps, "end": judgement.end.value}
 

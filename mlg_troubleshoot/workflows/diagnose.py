@@ -61,7 +61,7 @@ class DiagnoseResult(TableResult):
     extension: ModelExtension | None
 
 
-# A length that cannot be is refused by a check; here it is a row whose slip is to be found.
+# A check refuses an impossible length; a diagnosis keeps the row and looks for the entry error.
 _ANY_LENGTH_IN = 10.0
 
 
@@ -178,14 +178,14 @@ def _as_written(fault: DataFault, inspection: Inspection) -> DataFault:
 def _evidence_notes(inspections: Sequence[Inspection], again: int, gear: Gear) -> Iterator[str]:
     """What a diagnosis cannot use: inspections that stand twice, joints that nobody measured."""
     if again:
-        yield f"duplicate inspections count once: rows left out: {again}"
+        yield f"duplicate inspections count once; rows left out: {again}"
     unread = [
         n
         for n in gear.model.joint_numbers
         if all(i.clearance_in.get(n) is None for i in inspections)
     ]
     if len(unread) == len(gear.joint_numbers):
-        yield "no clearance was read in any row: what wear adds is left open"
+        yield "no clearance was read in any row: wear is assumed, not measured"
     elif unread:
         listed = joint_list(unread)
         yield (

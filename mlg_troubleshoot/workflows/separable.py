@@ -12,6 +12,21 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.decision.columns import (
+    APPROACH,
+    AXIAL_FLOAT,
+    CLEARANCE,
+    COLUMNS,
+    DATE,
+    GAUGE_ID,
+    LANDINGS,
+    PLUNGER_POSITION,
+    PRESSURE,
+    SIDE,
+    TAIL_NO,
+    TECHNICIAN_ID,
+    TEMPERATURE,
+)
 from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate
 from mlg_troubleshoot.diagnosis.causes.together import JointFactors
@@ -25,8 +40,8 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.search import ALIKE, beside
-from mlg_troubleshoot.records.columns import Kind
 from mlg_troubleshoot.records.headers import parse_canonical
+from mlg_troubleshoot.units import LengthUnit
 
 # The planned fleet: two years of twenty aircraft (assumed), and what one row scatters, tail by tail
 # [in] (docs/explanation/diagnosis.md: a gauge that repeats to 1.5 thou, and what clearances and
@@ -38,23 +53,15 @@ _BELIEFS = Beliefs()
 _APART = 0.84 + float(np.sqrt(0.84**2 + 2.0 * _BELIEFS.odds))
 # Columns in addition to clearances, cheapest first: written down anyway, read off, to be measured.
 FURTHER = {
-    "side": Kind.SIDE,
-    "tail_no": Kind.TAIL_NO,
-    "day": Kind.DATE,
-    "technician_id": Kind.TECHNICIAN_ID,
-    "gauge_id": Kind.GAUGE_ID,
-    "approach": Kind.APPROACH,
-    "temperature_c": Kind.TEMPERATURE,
-    "hydraulic_pressure_psi": Kind.PRESSURE,
-    "gear_landings": Kind.LANDINGS,
-    ALONG: Kind.ACTUATOR_EXTENSION,
-    "axial_float": Kind.AXIAL_FLOAT,
+    column.variable: column
+    for column in sorted(COLUMNS, key=lambda column: column.effort)
+    if column.effort
 }
 # Of what is tried for all-joint effects, the middle one: directions spread by 45°, linkages half as
 # far apart.
 _MIDDLE = 1
 _JOINT = re.compile(r"clearance_(\d+)_in")
-_NAMES = {kind: name for name, kind in FURTHER.items()} | {Kind.PLUNGER_POSITION: ALONG}
+_NAMES = {column: name for name, column in FURTHER.items()} | {PLUNGER_POSITION: ALONG}
 Key = tuple[str, str | None]
 
 
@@ -101,14 +108,14 @@ def separable(
 
     access = sorted((j.access.value, j.number) for j in model.joints if j.number not in joints)
     further = [name for name in FURTHER if name not in {*recorded, ALONG}]
-    further += [f"clearance_{number}_in" for _min, number in access] + [ALONG] * (
+    further += [CLEARANCE.header(number, LengthUnit.INCH) for _min, number in access] + [ALONG] * (
         ALONG not in recorded
     )
     with threadpool_limits(1, "blas"):
         keys = [*(key for key in here.keys if key not in here.stand_ins), *here.blocks]
         judged = tuple(_judged(here, beside_it, further, key) for key in keys)
     return judged + tuple(
-        CausePlanned(c.name, None, None, FURTHER[lacks].value, None, None, None, c.separates)
+        CausePlanned(c.name, None, None, FURTHER[lacks].name, None, None, None, c.separates)
         for c in CATALOGUE
         if (lacks := next((n for n in c.needs if n not in recorded), None)) is not None
     )
@@ -125,9 +132,9 @@ def _planned(columns: Sequence[str] | None, gear: Gear) -> tuple[set[str], set[i
             raise UsageError(
                 f"{name} is not a column of an inspection table", "see docs/reference/columns.md"
             )
-        if field.kind in _NAMES:
-            recorded.add(_NAMES[field.kind])
-        elif field.kind is Kind.CLEARANCE and field.number in gear.joint_numbers:
+        if field.column in _NAMES:
+            recorded.add(_NAMES[field.column])
+        elif field.column is CLEARANCE and field.number in gear.joint_numbers:
             joints.add(int(field.number))
     return recorded, joints or set(gear.joint_numbers)
 
@@ -291,7 +298,7 @@ def _judged(
             if beside_it(c).tests(key) and beside_it(c).nearest(key)[1] < 0.5 * apart
         )
         found = next(better, None)
-        split = FURTHER[found].value if found in FURTHER else found
+        split = FURTHER[found].name if found in FURTHER else found
     told = max(apart, here.found_from(key)) if np.isfinite(apart) else None
     return CausePlanned(*key, here.found_from(key), None, name, told, split, here.separates(key))
 
@@ -316,25 +323,27 @@ def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
     clearance = np.abs(wear + DEFAULT_GAUGE_U_IN * rng.standard_normal(wear.shape))
     clearance[:, [joint not in joints for joint in gear.joint_numbers]] = np.nan
     quantities = {
-        "day": day,
-        "gear_landings": landings,
-        "temperature_c": (
+        DATE.variable: day,
+        LANDINGS.variable: landings,
+        TEMPERATURE.variable: (
             12.0 - 14.0 * np.cos(2.0 * np.pi * day / 365.25) + 6.0 * rng.standard_normal(n)
         ),
-        "hydraulic_pressure_psi": rng.choice([1500.0, 2200.0, 2900.0, 3000.0, 3050.0], n),
+        PRESSURE.variable: rng.choice([1500.0, 2200.0, 2900.0, 3000.0, 3050.0], n),
     }
     if ALONG in recorded:
         quantities[ALONG] = np.full(n, np.nan)
     factors = {
-        "tail_no": np.array([f"T{k:02d}" for k in tail]),
-        "side": np.where(gears % 2 == 0, "LH", "RH"),
-        "approach": rng.choice(["EXTENDING", "RETRACTING"], n),
-        "gauge_id": np.where(rng.random(n) < 0.7, tail % 4, rng.integers(0, 4, n)).astype(str),
-        "technician_id": np.array(
+        TAIL_NO.variable: np.array([f"T{k:02d}" for k in tail]),
+        SIDE.variable: np.where(gears % 2 == 0, "LH", "RH"),
+        APPROACH.variable: rng.choice(["EXTENDING", "RETRACTING"], n),
+        GAUGE_ID.variable: np.where(rng.random(n) < 0.7, tail % 4, rng.integers(0, 4, n)).astype(
+            str
+        ),
+        TECHNICIAN_ID.variable: np.array(
             [f"W{k}" for k in np.where(rng.random(n) < 0.7, tail % 5, rng.integers(0, 5, n))]
         ),
     }
-    floats = rng.uniform(0.0, 0.02, clearance.shape) if "axial_float" in recorded else None
+    floats = rng.uniform(0.0, 0.02, clearance.shape) if AXIAL_FLOAT.variable in recorded else None
     planned = DiagnosisTable(
         clearance_in=clearance,
         readings_in=np.full((n, 1), np.nan),
@@ -348,7 +357,7 @@ def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
     )
     if ALONG not in recorded:
         return planned
-    # Beside each reading at mid-position one along the stroke.
+    # One reading along the stroke in addition to each at mid-position.
     both = planned.take(np.tile(np.arange(n), 2))
     stroke = np.r_[
         np.full(n, np.nan), rng.permutation(np.linspace(0.0, gear.reference.stroke[1], n))
