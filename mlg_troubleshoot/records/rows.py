@@ -29,6 +29,7 @@ from mlg_troubleshoot.records.cells import (
     column_letters,
     quote,
     show,
+    stored,
     writable,
 )
 from mlg_troubleshoot.records.columns import (
@@ -93,12 +94,18 @@ _NEVER_BLANK = frozenset(
     Kind.TECHNICIAN_ID,
     Kind.SMALL_READINGS_TRUE,
 }
+_MEASURED = LENGTHS | {Kind.LANDINGS, Kind.TEMPERATURE, Kind.PRESSURE}
 _SIGNED = frozenset({Kind.PLUNGER_DOWN_LOCK, Kind.PLUNGER_POSITION, Kind.PLUNGER_DISPLACEMENT})
 # What else a row may say, read cell by cell; the flag says whether a comma is the decimal mark, the
 # text is the header.
 LOOSE_CELLS: dict[Kind, Callable[[bool, str, str | float | OddCell], object]] = {
     Kind.LANDINGS: lambda comma, _, cell: read_number(
-        cell, 0.0, 1e6, decimal_comma=comma, expected="landings since overhaul, 0 or more"
+        cell,
+        0.0,
+        1e6,
+        decimal_comma=comma,
+        expected="landings since overhaul, 0 or more",
+        units=("landings",),
     ),
     Kind.TEMPERATURE: lambda comma, _, cell: read_number(
         cell,
@@ -106,7 +113,7 @@ LOOSE_CELLS: dict[Kind, Callable[[bool, str, str | float | OddCell], object]] = 
         60.0,
         decimal_comma=comma,
         expected="a temperature from -60 to 60 degrees Celsius",
-        suffix="C",
+        units=("c",),
     ),
     Kind.PRESSURE: lambda comma, _, cell: read_number(
         cell,
@@ -114,7 +121,7 @@ LOOSE_CELLS: dict[Kind, Callable[[bool, str, str | float | OddCell], object]] = 
         4000.0,
         decimal_comma=comma,
         expected="a pressure from 0 to 4000 psi",
-        suffix="psi",
+        units=("psi",),
     ),
     Kind.APPROACH: lambda _, __, cell: read_choice(
         cell, Approach, "approach_unknown", _APPROACH_HINTS
@@ -238,6 +245,8 @@ class RowReader:
             for p in placed
             if p.field is None and not (p.refused or p.is_mapped or re.search(r"\d", p.header))
         ]
+        # What a number format adds counts where a unit does.
+        self._plain = [p.index for p in placed if p.field is None or p.field.kind not in _MEASURED]
         # In these cells a word says that nothing was measured; a margin or an identity is never
         # left out by a word.
         self._blankable = [index for index, field in good if field.kind not in _NEVER_BLANK]
@@ -378,6 +387,8 @@ class RowReader:
         measured.
         """
         cells = [*cells, *[None] * (self._width - len(cells))]
+        for index in self._plain:
+            cells[index] = stored(cells[index])
         for index in self._blankable:
             cell = cells[index]
             if cell.__class__ is str and cell.strip().casefold() in NOT_MEASURED:
