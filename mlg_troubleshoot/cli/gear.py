@@ -144,7 +144,8 @@ def _number(n: Computed) -> dict[str, object]:
     return {
         **chosen(n.target, "quantity", "section", "printed"),
         **chosen(n, "computed"),
-        **chosen(n.target, "unit", "tolerance"),
+        "unit": n.target.unit,
+        "tolerance": n.target.accepted,
         **chosen(n, "status", "holds"),
         "should_hold": n.target.expected,
     }

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from mlg_troubleshoot.datafile import Table
 
 
-@dataclass(frozen=True, slots=True)
-class Stage:
+class Stage(Table):
     """One of the four stages of the cycle, with the position of the plunger in it: in, mid or
     out.
     """
@@ -16,8 +15,7 @@ class Stage:
     plunger: str
 
 
-@dataclass(frozen=True, slots=True)
-class ValveState:
+class ValveState(Table):
     """What follows from a position of the plunger and a direction of the oil flow; it may be "not
     stated".
     """
@@ -28,8 +26,7 @@ class ValveState:
     result: str
 
 
-@dataclass(frozen=True, slots=True)
-class RetractionCycle:
+class RetractionCycle(Table):
     """Steps of the release, order of doors and gear, valve combinations, and what a misplaced
     plunger means.
     """

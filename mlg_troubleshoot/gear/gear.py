@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.datafile import Table, Whole
 from mlg_troubleshoot.gear.cycle import RetractionCycle
 from mlg_troubleshoot.gear.joints import ROUNDING_IN, JointSpec
 from mlg_troubleshoot.gear.model import Calibration, LinkageModel
@@ -38,18 +39,16 @@ class Area:
     access: Sourced
 
 
-@dataclass(frozen=True, slots=True)
-class TiltedLink:
+class TiltedLink(Table):
     """A link whose projected length shrinks when end float of its joints (of a lever: of its pivot)
     lets it tilt.
     """
 
     length: str
-    floats: tuple[int, ...]
+    floats: tuple[Whole, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Discrepancies:
+class Discrepancies(Table):
     """Where inside the linkage physical causes outside the plain model act.
 
     elastic: lengths that hydraulic load stretches.
@@ -60,7 +59,7 @@ class Discrepancies:
 
     elastic: tuple[str, ...] = ()
     wear_shift: str | None = None
-    contact: tuple[tuple[int, int], ...] = ()
+    contact: tuple[tuple[Whole, Whole], ...] = ()
     tilt: tuple[TiltedLink, ...] = ()
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+from mlg_troubleshoot.datafile import Table
+
 
 class SourceKind(StrEnum):
     """How much a number is worth."""
@@ -16,13 +18,11 @@ class SourceKind(StrEnum):
     ASSUMED = "assumed"
 
 
-@dataclass(frozen=True, slots=True)
-class Source:
+class Source(Table):
     """A source in words, which numbers of a gear file refer to by name: document, section, how it
     was obtained.
     """
 
-    name: str
     kind: SourceKind
     text: str
 

@@ -94,7 +94,7 @@ def check_statements(
 
 
 def _evidence(t: Target, values: tuple[float, ...]) -> Evidence:
-    return Evidence(t.quantity, t.tolerance, t.unit, values, tuple(map(t.holds, values)), t.why)
+    return Evidence(t.quantity, t.accepted, t.unit, values, tuple(map(t.holds, values)), t.why)
 
 
 def _outcome(evidence: tuple[Evidence, ...], *, by_reading: bool) -> Outcome:

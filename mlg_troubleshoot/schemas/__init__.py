@@ -6,13 +6,13 @@ from __future__ import annotations
 
 import json
 from importlib.resources import files
-from typing import Any
+from typing import Any, Literal
 
 from mlg_troubleshoot.errors import UsageError
 
 NAMES = ("check", "diagnose", "study")
 # Of every JSON output: raised when a name or a meaning changes.
-SCHEMA_VERSION = 1
+SCHEMA_VERSION: Literal[1] = 1
 
 
 def schema(name: str) -> dict[str, Any]:

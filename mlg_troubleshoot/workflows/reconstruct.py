@@ -72,7 +72,7 @@ def reconstruction_values(found: Reconstruction, text: str) -> dict[str, object]
         "targets": [
             {
                 **chosen(each.target, "quantity", "printed", "unit"),
-                "accepted": each.target.tolerance,
+                "accepted": each.target.accepted,
                 **chosen(each, "computed", "holds", "binds"),
             }
             for each in found.met

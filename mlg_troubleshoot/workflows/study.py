@@ -13,6 +13,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import msgspec
 import numpy as np
 
 from mlg_troubleshoot.errors import UsageError
@@ -184,7 +185,7 @@ def study_values(findings: StudyFindings, given: GivenDataResult | None = None) 
     result, options = findings.result, findings.options
     growth = result.growth
     values = {
-        **result.table.as_dict(),
+        **msgspec.to_builtins(result.table),
         "directions": str(options.directions),
         "distribution": options.distribution,
         "of": "exceeding the margin" if options.beyond_margin else "displacement",

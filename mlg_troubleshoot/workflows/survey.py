@@ -16,7 +16,7 @@ from mlg_troubleshoot.datafile import LONGEST_NAME, is_name, read_toml
 from mlg_troubleshoot.errors import GearFileError, MechanismError, UsageError
 from mlg_troubleshoot.gear.design import member_values
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, GearFile, load_gear
 from mlg_troubleshoot.indices.index_table import INDEX_TABLE, write_index_table
 from mlg_troubleshoot.outputs import OutputFile, OutputKind, claim_outputs, write_text
 from mlg_troubleshoot.paper.targets import targets_file
@@ -223,7 +223,7 @@ def _write_gear(gear: Gear, found: Survey, path: Path, source: str) -> Path:
         f"S{k}": member_values(linkage.linkage(np.round(v, _DECIMALS), f"S{k}"))
         for k, v in enumerate(found.draws[:_MEMBERS], start=1)
     }
-    values = deepcopy(read_toml(gear.path).values)
+    values = deepcopy(read_toml(gear.path, GearFile).values)
     values.update(id=path.stem, ensemble=ensemble.name, indices=indices.name)
     values["provenance"] = f"surveyed ({len(found.read)} readings, {source})"
     _put(values, found, source)

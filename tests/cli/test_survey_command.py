@@ -126,7 +126,7 @@ def test_the_gear_file_is_a_gear_with_its_table_and_says_that_it_was_surveyed(
     gear = load_gear(surveyed[0])
     assert "surveyed" in gear.provenance
     assert len(gear.ensemble) == 12
-    assert load_index_table(gear).gear_id == "mine"
+    assert load_index_table(gear).gear.id == "mine"
     lengths = {frozenset(p[:2]): p[2] for p in GOOD if p[3] == ""}
     m = gear.reference.mechanism
     for pair, length in lengths.items():
