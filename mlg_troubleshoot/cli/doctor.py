@@ -7,7 +7,7 @@ from dataclasses import asdict
 import typer
 
 from mlg_troubleshoot.cli import options, output
-from mlg_troubleshoot.schemas import SCHEMA_VERSION
+from mlg_troubleshoot.outputs import SCHEMA_VERSION
 
 
 def doctor(

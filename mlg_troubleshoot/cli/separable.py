@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from mlg_troubleshoot.cli import options, output
-from mlg_troubleshoot.schemas import SCHEMA_VERSION
+from mlg_troubleshoot.outputs import SCHEMA_VERSION
 
 EPILOG = (
     "Example: [b]mlg gear separable --columns"

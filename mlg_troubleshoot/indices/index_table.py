@@ -24,8 +24,7 @@ from mlg_troubleshoot.datafile import (
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
-from mlg_troubleshoot.outputs import OutputKind, write_text
-from mlg_troubleshoot.schemas import SCHEMA_VERSION
+from mlg_troubleshoot.outputs import SCHEMA_VERSION, OutputKind, write_text
 
 # A sampled index may lie a little outside 0 to 1, its interval further.
 Index = Annotated[float, Meta(ge=-2, le=3)]

@@ -39,7 +39,7 @@ from mlg_troubleshoot.indices.inputs import (
 )
 from mlg_troubleshoot.indices.saltelli import fast_indices, saltelli_indices
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
-from mlg_troubleshoot.schemas import SCHEMA_VERSION
+from mlg_troubleshoot.outputs import SCHEMA_VERSION
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.paper.replicated import PaperDesign, ReplicatedIndices

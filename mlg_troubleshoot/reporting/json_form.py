@@ -19,11 +19,11 @@ from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judge
 from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension, NamedCause
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.schemas import SCHEMA_VERSION
+from mlg_troubleshoot.outputs import SCHEMA_VERSION
 
 _AS_THEY_ARE = frozenset((str, int, bool, type(None)))
 _SINGLE = (Enum, np.generic)
-_NUMBERS = (
+NUMBERS = (
     *(
         "predicted_displacement_in",
         "over_travel_in",
@@ -157,7 +157,7 @@ def _inspection(judgement: Judgement, gear: Gear) -> dict[str, Any]:
     unknown: dict[str, None] = dict.fromkeys((*_JOINT[2:], "acts_like"))
     return {
         **_identity(judgement.row, judgement, judgement.next_action.text),
-        **dict.fromkeys((*_NUMBERS, "measured_displacement_in")),
+        **dict.fromkeys((*NUMBERS, "measured_displacement_in")),
         "joints": [{"joint": joint.number, "name": joint.name, **unknown} for joint in gear.joints],
         "basis": None,
         **_course(judgement),
@@ -170,7 +170,7 @@ def _assessment(a: Assessment, joints: list[dict[str, Any]]) -> dict[str, Any]:
     said = [a.measured_statement] if a.measured_statement else []
     return {
         **_identity(a.inspection, a, a.headline),
-        **chosen(a, *_NUMBERS),
+        **chosen(a, *NUMBERS),
         "measured_displacement_in": a.inspection.measured_displacement_in,
         "joints": joints,
         "basis": a.basis.value,

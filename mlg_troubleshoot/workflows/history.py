@@ -24,10 +24,10 @@ from mlg_troubleshoot.decision.order import WORST_FIRST
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.outputs import SCHEMA_VERSION
 from mlg_troubleshoot.records import ReadOptions, admit
 from mlg_troubleshoot.records.gate import judge_text
 from mlg_troubleshoot.records.rows import place_in_file
-from mlg_troubleshoot.schemas import SCHEMA_VERSION
 from mlg_troubleshoot.store import (
     Added,
     Broken,

@@ -14,9 +14,8 @@ import tomli_w
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.design import member_values
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.outputs import OutputKind, write_text
+from mlg_troubleshoot.outputs import SCHEMA_VERSION, OutputKind, write_text
 from mlg_troubleshoot.paper.targets import load_targets, targets_file
-from mlg_troubleshoot.schemas import SCHEMA_VERSION
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.paper.reconstruct import Reconstruction

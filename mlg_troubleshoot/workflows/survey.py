@@ -18,9 +18,14 @@ from mlg_troubleshoot.gear.design import member_values
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, GearFile, load_gear
 from mlg_troubleshoot.indices.index_table import INDEX_TABLE, write_index_table
-from mlg_troubleshoot.outputs import OutputFile, OutputKind, claim_outputs, write_text
+from mlg_troubleshoot.outputs import (
+    SCHEMA_VERSION,
+    OutputFile,
+    OutputKind,
+    claim_outputs,
+    write_text,
+)
 from mlg_troubleshoot.paper.targets import targets_file
-from mlg_troubleshoot.schemas import SCHEMA_VERSION
 from mlg_troubleshoot.units import LengthUnit
 
 if TYPE_CHECKING:
