@@ -56,7 +56,8 @@ def schema(name: str) -> dict[str, Any]:
     for part in parts.values():
         _close(part)
     if name == "check":
-        parts["CheckedInspection"].update(_of_an_invalid_row())
+        row, joint = parts["CheckedInspection"], parts["CheckedJoint"]
+        row.update(_of_an_invalid_row(row, joint))
     if name == "diagnose":
         parts["DiagnoseOutput"]["allOf"] = _by_verdict()
     return {
@@ -68,7 +69,7 @@ def schema(name: str) -> dict[str, Any]:
 
 
 def _kinds(name: str) -> list[Any]:
-    from mlg_troubleshoot.schemas import outputs
+    from mlg_troubleshoot import output_types as outputs
 
     if name in FILES:
         from mlg_troubleshoot.cli.remembered import SettingsFile
@@ -95,29 +96,22 @@ def _close(part: dict[str, Any]) -> None:
     part["required"] = [*part["required"], *written]
 
 
-def _of_an_invalid_row() -> dict[str, Any]:
+def _of_an_invalid_row(row: dict[str, Any], joint: dict[str, Any]) -> dict[str, Any]:
     """Say which values of a row are null, and which are not, by its verdict."""
-    from mlg_troubleshoot.reporting.json_form import NUMBERS
-
-    null, known = {"type": "null"}, {"not": {"type": "null"}}
-    of_joint = dict.fromkeys(
-        ("over_limit", "first_order", "total_order", "plunger_amplification", "rank", "acts_like"),
-        known,
-    )
-    judged = ("record_id", "tail_no", "side", "margin_in", "basis")
+    null = {"type": "null"}
+    identity = ("record_id", "tail_no", "side")
+    of_row = {n: null for n, of in row["properties"].items() if null in of.get("anyOf", ())}
+    measured = {"clearance_in", "contribution_in", "allowance_in"}
+    of_joint = {n: {"not": null} for n in joint["properties"] if n not in measured}
     return {
         "if": {"properties": {"verdict": {"const": "INVALID"}}},
         "then": {
-            "properties": {
-                **dict.fromkeys(
-                    (*NUMBERS, "measured_displacement_in", "repair_sets", "basis"), null
-                ),
-                "end": {"const": "CORRECT"},
-            }
+            "properties": {n: null for n in of_row if n not in identity}
+            | {"end": {"const": "CORRECT"}}
         },
         "else": {
             "properties": {
-                **dict.fromkeys(judged, known),
+                **{n: {"not": null} for n in (*identity, "margin_in", "basis")},
                 "joints": {"items": {"properties": of_joint}},
             }
         },

@@ -59,22 +59,26 @@ def reconstruct_linkage(
 
 
 def reconstruction_values(found: Reconstruction, text: str) -> dict[str, object]:
-    from mlg_troubleshoot.reporting.json_form import chosen
+    from mlg_troubleshoot.output_types import MetTarget, ReconstructOutput
+    from mlg_troubleshoot.reporting.json_form import written
 
-    return {
-        "schema_version": SCHEMA_VERSION,
-        "seed": found.seed,
-        "linkages_tried": found.evaluations,
-        **chosen(found, "meets_all", "numbers", "determined"),
-        "free": found.numbers - found.determined,
-        "loosest": [{"number": name, "free_part": part} for name, part in found.loosest],
-        "targets": [
-            {
-                **chosen(each.target, "quantity", "printed", "unit"),
-                "accepted": each.target.accepted,
-                **chosen(each, "computed", "holds", "binds"),
-            }
+    return written(
+        ReconstructOutput,
+        found,
+        schema_version=SCHEMA_VERSION,
+        linkages_tried=found.evaluations,
+        free=found.numbers - found.determined,
+        loosest=[{"number": name, "free_part": part} for name, part in found.loosest],
+        targets=[
+            written(
+                MetTarget,
+                each,
+                quantity=each.target.quantity,
+                printed=each.target.printed,
+                unit=each.target.unit,
+                accepted=each.target.accepted,
+            )
             for each in found.met
         ],
-        "member_toml": text,
-    }
+        member_toml=text,
+    )

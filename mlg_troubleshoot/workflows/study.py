@@ -180,7 +180,8 @@ def write_study_report(
 
 def study_values(findings: StudyFindings, given: GivenDataResult | None = None) -> dict[str, Any]:
     """Return the study as plain values, as the JSON contract has it; what is not known is null."""
-    from mlg_troubleshoot.reporting.json_form import chosen, plain
+    from mlg_troubleshoot.output_types import StudiedAmplification, StudiedBound, StudiedStatement
+    from mlg_troubleshoot.reporting.json_form import plain, written
 
     result, options = findings.result, findings.options
     growth = result.growth
@@ -198,21 +199,17 @@ def study_values(findings: StudyFindings, given: GivenDataResult | None = None) 
         "second_order": result.indices.second_order,
         "groups": result.groups,
         "ensemble": [linkage.name for linkage in findings.gear.ensemble],
-        "amplification": {
-            **chosen(growth, "local_stage", "max_stage", "local_plunger", "max_plunger"),
-            "exact_plunger": growth.exact,
-        },
-        "statements": [
-            {**plain(statement), "paragraph": statement.paragraph}
-            for statement in findings.statements
-        ],
+        "amplification": written(StudiedAmplification, growth, exact_plunger=growth.exact),
+        "statements": [written(StudiedStatement, statement) for statement in findings.statements],
         "bounds": [
-            {
-                "sense": "over-travel" if found.sense > 0 else "under-travel",
-                **chosen(found, "sequential_in", "searched_in"),
-                **chosen(found.proved, "found_in", "bound_in", "stroke_in"),
-                "directions_rad": found.proved.directions,
-            }
+            written(
+                StudiedBound,
+                found.proved,
+                sense="over-travel" if found.sense > 0 else "under-travel",
+                sequential_in=found.sequential_in,
+                searched_in=found.searched_in,
+                directions_rad=found.proved.directions,
+            )
             for found in findings.searches
         ],
     }
@@ -220,7 +217,9 @@ def study_values(findings: StudyFindings, given: GivenDataResult | None = None) 
         found = given.indices
         lists = (found.first_order.tolist(), found.interval.tolist(), found.rows.tolist())
         values["given_data"] = {
-            **chosen(given, "file", "rows_read", "rows_used"),
+            "file": given.file,
+            "rows_read": given.rows_read,
+            "rows_used": given.rows_used,
             "joints": [
                 {"joint": number, "first_order": first, "first_order_interval": ends, "rows": rows}
                 for number, first, ends, rows in zip(

@@ -22,12 +22,6 @@ from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.decision.plan import Basis, End, Step
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.sources import Sourced
-from mlg_troubleshoot.indices.estimators import GroupIndices
-from mlg_troubleshoot.paper.statements import Evidence, Outcome
-from mlg_troubleshoot.store import Kind as RecordKind
-from mlg_troubleshoot.surveying.readings import Kind as ReadingKind
-from mlg_troubleshoot.workflows.doctor import Ability
-from mlg_troubleshoot.workflows.separable import CausePlanned
 
 Version = Literal[1]
 Probability = Annotated[float, Meta(ge=0, le=1)]
@@ -145,7 +139,7 @@ class RowCounts(TypedDict):
     set_aside: Count
 
 
-class DataFault(TypedDict):
+class SuspectCell(TypedDict):
     """A cell that is likely wrong; suggested is used in the analysis only."""
 
     row: JointNumber
@@ -212,7 +206,7 @@ class FittedExtension(TypedDict):
     terms: Annotated[list[FittedTerm], Meta(min_length=1)]
 
 
-class HeldOutGain(TypedDict):
+class ExtensionGain(TypedDict):
     """What the extension is worth on held-out rows; without one, after is as before."""
 
     held_out_rms_before_in: Size
@@ -246,7 +240,7 @@ class DiagnoseOutput(TypedDict):
 
     schema_version: Version
     rows: RowCounts
-    data_faults: list[DataFault]
+    data_faults: list[SuspectCell]
     misfit: MisfitSize
     verdict: Literal["NONE", "NAMED", "AMBIGUOUS", "UNLISTED"]
     causes: list[NamedCauseOutput]
@@ -258,7 +252,7 @@ class DiagnoseOutput(TypedDict):
     ruled_out: list[TargetedCause]
     smallest_detectable_rms_in: Size | None
     extension: FittedExtension | None
-    gain: HeldOutGain
+    gain: ExtensionGain
     remainder: Remainder
     seed: Count
     permutations: Count
@@ -316,14 +310,35 @@ class StudiedAmplification(TypedDict):
     exact_plunger: list[float]
 
 
+class StudiedGroup(TypedDict):
+    """Both ends of one link taken as one joint."""
+
+    joints: list[JointNumber]
+    closed: float | None
+    total: float | None
+
+
+class StudiedEvidence(TypedDict):
+    """A number that bears on a statement, on every linkage."""
+
+    quantity: str
+    accepted: str
+    unit: str
+    values: list[float | None]
+    holds: list[bool]
+    why: str
+
+
 class StudiedStatement(TypedDict):
     """A statement of the paper and what the linkages say to it."""
 
     claim: str
     section: str
-    outcome: Outcome
+    outcome: Literal[
+        "holds", "holds only under a reading", "holds on some linkages", "does not hold"
+    ]
     linkages: list[str]
-    evidence: list[Evidence]
+    evidence: list[StudiedEvidence]
     paragraph: str
 
 
@@ -380,7 +395,7 @@ class StudyOutput(TypedDict):
     variance: NotRequired[float | None]
     first_order_plain: NotRequired[list[float | None] | None]
     second_order: NotRequired[list[list[float | None]] | None]
-    groups: NotRequired[list[GroupIndices]]
+    groups: NotRequired[list[StudiedGroup]]
     ensemble: NotRequired[list[str]]
     amplification: NotRequired[StudiedAmplification]
     statements: NotRequired[list[StudiedStatement]]
@@ -435,7 +450,7 @@ class FleetOutput(TypedDict):
 class LifeEvent(TypedDict):
     """One record of a gear, in the order of the chain; further keys by its kind."""
 
-    kind: RecordKind
+    kind: Literal["inspection", "assessment", "repair", "rerig", "correction", "void", "outcome"]
     record_id: str | None
     date: str | None
     gear_landings: float | None
@@ -555,7 +570,7 @@ class SurveyedJoint(TypedDict):
 NextReading = TypedDict(
     "NextReading",
     {
-        "kind": ReadingKind,
+        "kind": Literal["DISTANCE", "PLUNGER", "ANGLE", "EXTENSION"],
         "from": str | None,
         "to": str | None,
         "extension_in": float,
@@ -599,12 +614,25 @@ class SurveyOutput(TypedDict):
     inspections: NotRequired[list[SurveyedInspection]]
 
 
+class SeparableCause(TypedDict):
+    """What the planned columns could say about one cause; a size that is never reached is null."""
+
+    cause: str
+    target: str | None
+    found_from_in: float | None
+    missing_column: str | None
+    nearest: str | None
+    told_apart_from_in: float | None
+    further_column: str | None
+    separating_reading: str
+
+
 class SeparableOutput(TypedDict):
     """Output of mlg gear separable --json."""
 
     schema_version: Version
     columns: list[str] | None
-    causes: list[CausePlanned]
+    causes: list[SeparableCause]
 
 
 class LoosePart(TypedDict):
@@ -641,8 +669,18 @@ class ReconstructOutput(TypedDict):
     member_toml: str
 
 
+class CheckedAbility(TypedDict):
+    """One thing that an installation can do, or cannot."""
+
+    ability: str
+    detail: str
+    works: bool
+    needed: bool
+    remedy: str
+
+
 class DoctorOutput(TypedDict):
     """Output of mlg doctor --json."""
 
     schema_version: Version
-    abilities: list[Ability]
+    abilities: list[CheckedAbility]
