@@ -101,7 +101,7 @@ def read_json(path: Path, kind: type[T], missing: str) -> DataFile[T]:
 
 
 def decode(path: Path, values: dict[str, Any], kind: type[T]) -> T:
-    """Return the values of a file as a kind of table; `GearFileError` if they are none."""
+    """Return the values of a file as a kind of table; `GearFileError` if they do not fit it."""
     try:
         return msgspec.convert(values, kind, str_keys=True)
     except (msgspec.ValidationError, OverflowError):
@@ -248,8 +248,8 @@ def _structs(kind: Any) -> list[Any]:
 
 
 def _fields(value: Any, kind: Any) -> dict[str, tuple[Any, bool]]:
-    """Return the keys of a table, their kinds, and whether they must be there; none if it is no
-    such table.
+    """Return the keys of a table, their kinds, and whether they must be there; nothing for a
+    value of another kind.
     """
     structs = _structs(kind)
     if not structs or not isinstance(value, dict):

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 
+# Exit code where no row could be judged or concluded from.
+NOTHING_JUDGED = 3
+
 
 class TroubleshootError(Exception):
     """Base of every error that this package raises on purpose; its text is meant for the user.

@@ -26,7 +26,7 @@ from mlg_troubleshoot.cli import (
 from mlg_troubleshoot.cli.boundary import USAGE, Boundary
 
 
-class Program(TyperGroup):
+class CommandGroup(TyperGroup):
     """All commands behind one boundary; without a command the help is shown."""
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **named: Any) -> Any:
@@ -45,7 +45,7 @@ class Program(TyperGroup):
 
 app = typer.Typer(
     name="mlg",
-    cls=Program,
+    cls=CommandGroup,
     help=(
         "Do worn joints push the reversing-valve plunger of a main landing gear outside its margin?"
         " Which joint next? Where is the model wrong?\n\nTroubleshooting aid, not maintenance data:"

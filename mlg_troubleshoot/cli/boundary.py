@@ -11,9 +11,14 @@ from types import TracebackType
 import typer
 
 from mlg_troubleshoot.cli.output import abandon_stdout, say
-from mlg_troubleshoot.errors import InconclusiveDataError, OutputError, TroubleshootError
+from mlg_troubleshoot.errors import (
+    NOTHING_JUDGED,
+    InconclusiveDataError,
+    OutputError,
+    TroubleshootError,
+)
 
-USAGE, NOTHING_JUDGED, OUTPUT, INTERNAL, INTERRUPTED = 2, 3, 5, 70, 130
+USAGE, OUTPUT, INTERNAL, INTERRUPTED = 2, 5, 70, 130
 _CANNOT_WRITE = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
 # Some releases of typer carry their own click: what it says about usage is found through a name
 # that typer exports.

@@ -7,11 +7,12 @@ from dataclasses import asdict
 import typer
 
 from mlg_troubleshoot.cli import options, output
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.outputs import SCHEMA_VERSION
 
 
 def doctor(
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
     as_json: options.Json = False,
     _version: options.Version = False,
 ) -> None:

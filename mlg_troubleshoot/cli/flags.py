@@ -10,6 +10,7 @@ import typer
 
 from mlg_troubleshoot.cli import history, options
 from mlg_troubleshoot.cli.options import ReportFormat
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +120,7 @@ class Wanted:
 class StudyFlags:
     """What ``mlg study`` computes, shows and writes."""
 
-    gear: options.Gear = options.DEFAULT_GEAR
+    gear: options.Gear = DEFAULT_GEAR
     design: Annotated[
         str,
         typer.Option(

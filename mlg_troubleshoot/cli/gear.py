@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from mlg_troubleshoot.cli import options, output
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 def show(
     context: typer.Context,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
     as_json: options.Json = False,
     _version: options.Version = False,
 ) -> None:
@@ -33,6 +34,8 @@ def show(
 
 
 def _show(gear: Gear) -> None:
+    from mlg_troubleshoot.decision.sentences import joint_list
+
     console = output.console()
     console.print(f"{gear.name} ({gear.id})", style="bold")
     console.print(
@@ -51,7 +54,7 @@ def _show(gear: Gear) -> None:
     joints = output.plain_table(None, *headings, right=("#", "limit in"))
     for joint in gear.joints:
         point = gear.reference.mechanism.point(joint.point)
-        alike = ", ".join(f"#{n}" for n in gear.alike[joint.number]) or "-"
+        alike = joint_list(gear.alike[joint.number]) or "-"
         joints.add_row(
             str(joint.number),
             joint.name,

@@ -13,9 +13,8 @@ from typing import Annotated, Any, get_type_hints
 import typer
 
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
-
-DEFAULT_GEAR = "hawker-800xp"
 
 
 class ReportFormat(StrEnum):
@@ -31,7 +30,7 @@ def report_format(text: str) -> ReportFormat:
         raise UsageError(f"a report cannot be written as {text!r}", remedy) from None
 
 
-class Page(StrEnum):
+class PaperSize(StrEnum):
     A4 = "A4"
     LETTER = "Letter"
 
@@ -113,7 +112,7 @@ Report = Annotated[
     typer.Option("--report", metavar="DIR", help="Write printable reports to this folder."),
 ]
 Paper = Annotated[
-    Page | None, typer.Option("--page", help="Paper of the report; A4 unless remembered.")
+    PaperSize | None, typer.Option("--page", help="Paper of the report; A4 unless remembered.")
 ]
 Show = Annotated[
     str | None,

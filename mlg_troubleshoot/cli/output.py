@@ -23,7 +23,7 @@ from mlg_troubleshoot.units import LengthUnit, in_unit
 from mlg_troubleshoot.visible import visible
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.reporting import WrittenReport
+    from mlg_troubleshoot.reporting.publish import WrittenReport
 
 _WIDTH_ELSEWHERE = 80
 WIDE, WIDEST = 100, 120
@@ -172,6 +172,11 @@ def word(data: str | None, style: str = "") -> Text:
     none.
     """
     return Text("?" if data is None else visible(data, one_line=True), style=style)
+
+
+def joint(number: int | None) -> str:
+    """Return a joint for a cell: ``#3``, and a dash where there is none."""
+    return "-" if number is None else f"#{number}"
 
 
 def say(message: str) -> None:

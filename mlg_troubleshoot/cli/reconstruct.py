@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mlg_troubleshoot.cli import options, output
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.paper.reconstruct import Reconstruction
@@ -61,7 +62,7 @@ def reconstruct(
     from mlg_troubleshoot.outputs import OutputFile
     from mlg_troubleshoot.workflows import reconstruct as task
 
-    gear = context.obj or options.DEFAULT_GEAR
+    gear = context.obj or DEFAULT_GEAR
     claim(gear, [targets], [OutputFile("--out", out, task.LINKAGE)], force=force)
     with stages(quiet=quiet) as advance:
         found, text = task.reconstruct_linkage(
@@ -75,7 +76,9 @@ def reconstruct(
             progress=advance,
         )
     if as_json:
-        output.write_json(task.reconstruction_values(found, text))
+        from mlg_troubleshoot.reporting.model_json import reconstruction_as_json
+
+        output.write_json(reconstruction_as_json(found, text))
     else:
         _show(found, text, show_member=out is None)
     if out is not None:

@@ -17,7 +17,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from mlg_troubleshoot.cli.options import Page
+from mlg_troubleshoot.cli.options import PaperSize
 from mlg_troubleshoot.cli.output import say
 from mlg_troubleshoot.datafile import Table, decode, read_toml
 from mlg_troubleshoot.errors import GearFileError, UsageError
@@ -32,7 +32,7 @@ class SettingsFile(Table):
     """What may stand in ``mlg.toml``."""
 
     show: LengthUnit = LengthUnit.INCH
-    page: Page = Page.A4
+    page: PaperSize = PaperSize.A4
     headers: dict[HeaderText, HeaderText] = msgspec.field(default_factory=dict)
 
 
@@ -41,7 +41,7 @@ class Settings:
     """What a run shows and how it reads headers, from flags or else from what is remembered."""
 
     show: LengthUnit = LengthUnit.INCH
-    page: Page = Page.A4
+    page: PaperSize = PaperSize.A4
     headers: Mapping[str, str] = field(default_factory=dict)
     note: str = ""
 
@@ -49,7 +49,7 @@ class Settings:
 def settings(
     gear: str,
     show: str | None,
-    page: Page | None,
+    page: PaperSize | None,
     headers: Mapping[str, str] = MappingProxyType({}),
     *,
     keep: bool = False,
@@ -75,14 +75,14 @@ def files() -> tuple[Path, Path]:
     return Path(NAME), user_config_path("mlg-troubleshoot", appauthor=False) / NAME
 
 
-def _recall(gear: str, show: str | None, page: Page | None) -> Settings:
+def _recall(gear: str, show: str | None, page: PaperSize | None) -> Settings:
     """A flag wins over the working folder, that over the user's configuration."""
     file = next((file for file in files() if file.exists()), None)
     if file is None:
-        return Settings(LengthUnit.parse(show or "in"), page or Page.A4)
+        return Settings(LengthUnit.parse(show or "in"), page or PaperSize.A4)
     known = _read(file, gear)
     used = [f"lengths shown in {known.show}"] * (show is None and known.show is not LengthUnit.INCH)
-    used += [f"page {known.page}"] * (page is None and known.page is not Page.A4)
+    used += [f"page {known.page}"] * (page is None and known.page is not PaperSize.A4)
     used += [f"header {header!r} read as {column}" for header, column in known.headers.items()]
     return Settings(
         LengthUnit.parse(show) if show else known.show,
@@ -92,7 +92,9 @@ def _recall(gear: str, show: str | None, page: Page | None) -> Settings:
     )
 
 
-def _remember(gear: str, show: str | None, page: Page | None, headers: Mapping[str, str]) -> Path:
+def _remember(
+    gear: str, show: str | None, page: PaperSize | None, headers: Mapping[str, str]
+) -> Path:
     """Keep what flags said in the working folder, with what is already kept there."""
     import tomli_w
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from mlg_troubleshoot.cli import options, output
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.outputs import SCHEMA_VERSION
 
 EPILOG = (
@@ -37,7 +38,7 @@ def separable(
     names = (
         None if columns is None else [name.strip() for name in columns.split(",") if name.strip()]
     )
-    gear = context.obj or options.DEFAULT_GEAR
+    gear = context.obj or DEFAULT_GEAR
     causes = planned(gear, names)
     if as_json:
         output.write_json(

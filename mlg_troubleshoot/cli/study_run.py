@@ -21,9 +21,10 @@ from mlg_troubleshoot.cli.remembered import Settings
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.indices.given_data import GivenDataResult
 from mlg_troubleshoot.paper.study import (
-    Design,
     Directions,
+    StudyDesign,
     StudyFindings,
     StudyOptions,
     StudyResult,
@@ -33,7 +34,7 @@ from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import study as task
 
 _BAR = 16
-_Choice = TypeVar("_Choice", Design, Directions)
+_Choice = TypeVar("_Choice", StudyDesign, Directions)
 
 
 @contextmanager
@@ -55,7 +56,7 @@ def asked(flags: StudyFlags) -> Iterator[tuple[Gear, StudyOptions]]:
         if hasattr(flags, each.name)
     }
     read = {
-        "design": _choice(Design, flags.design, "design"),
+        "design": _choice(StudyDesign, flags.design, "design"),
         "directions": (
             _choice(Directions, flags.directions, "directions")
             if fixed is None
@@ -89,7 +90,9 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
     )
     shown = replace(findings, statements=said, searches=searched)
     if flags.as_json:
-        output.write_json(task.study_values(shown, given))
+        from mlg_troubleshoot.reporting.model_json import study_as_json
+
+        output.write_json(study_as_json(shown, given))
     else:
         _show(shown, settings.show)
         if given is not None:
@@ -147,7 +150,7 @@ def _show(findings: StudyFindings, unit: LengthUnit) -> None:
         else "plunger displacement at mid-position"
     )
     console.print(f"{gear.name}: sensitivity of {what}", style="bold")
-    console.print(f"Geometry: {gear.provenance}. Design: {table.design}, seed {table.seed}.")
+    console.print(f"Geometry: {gear.provenance}. StudyDesign: {table.design}, seed {table.seed}.")
     failed = f"{table.failed} did not close" if table.failed else "none failed"
     console.print(
         f"{table.evaluations} solutions of the linkage over {len(gear.ensemble)} linkages,"
@@ -220,7 +223,7 @@ def _joints(gear: Gear, result: StudyResult) -> Table:
     return shown
 
 
-def _show_given(gear: Gear, given: task.GivenDataResult) -> None:
+def _show_given(gear: Gear, given: GivenDataResult) -> None:
     found = given.indices
     each = ", ".join(
         f"#{number} {_number(first)} ({_number(ends[0])} to {_number(ends[1])})"

@@ -10,6 +10,7 @@ import typer
 
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.surveying.result import SurveyResult
@@ -70,7 +71,7 @@ def survey(
     from mlg_troubleshoot.outputs import TO_FILL_IN, OutputFile
     from mlg_troubleshoot.workflows import survey as task
 
-    gear = context.obj or options.DEFAULT_GEAR
+    gear = context.obj or DEFAULT_GEAR
     shown = settings(gear, show, page)
     if file in ("template", "ask") and template is None and not Path(file).exists():
         raise UsageError(
@@ -104,7 +105,9 @@ def survey(
             told=partial(bar, "Fitting"),
         )
     if as_json:
-        output.write_json(task.survey_values(result))
+        from mlg_troubleshoot.reporting.model_json import survey_as_json
+
+        output.write_json(survey_as_json(result))
     else:
         _show(result, output.console(unit=shown.show))
     written = None

@@ -71,6 +71,7 @@ class Judged:
 def plans(
     cases: Cases, judged: Judged, found: Search, sets: Sequence[tuple[RepairSet, ...]]
 ) -> list[Plan]:
+    """The expected course of each gear, step by step to its end."""
     facts = _Facts(cases, judged, found)
     return [_Course(facts, i, sets[i]).plan() for i in range(len(cases))]
 

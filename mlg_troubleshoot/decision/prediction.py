@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Mask, Places
+from mlg_troubleshoot.arrays import STEP, Array, Mask, Places
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.wear_levels import normal_cdf
@@ -22,7 +22,6 @@ DEFAULT_PLUNGER_U_IN = 0.0005
 # The model's standard uncertainty until a diagnosis gives it: the larger of a length and a share of
 # the prediction.
 PROVISIONAL_U_IN, PROVISIONAL_U_SHARE = 0.003, 0.10
-_STEP_IN = 1e-5
 
 
 class Extension(Protocol):
@@ -162,12 +161,12 @@ def _slopes(model: LinkageModel, adjustment: Adjustment, worst: WorstCase) -> Ar
     slopes = np.empty_like(adjustment.clearance_in)
     for j in range(slopes.shape[1]):
         sides = []
-        for step in (_STEP_IN, -_STEP_IN):
+        for step in (STEP, -STEP):
             moved = adjustment.clearance_in.copy()
             moved[:, j] += step
             acting = replace(adjustment, clearance_in=moved).acting_in
             sides.append(model.displacement(links_from(acting, directions), changed))
-        slopes[:, j] = factor * (sides[0] - sides[1]) / (2 * _STEP_IN)
+        slopes[:, j] = factor * (sides[0] - sides[1]) / (2 * STEP)
     return slopes
 
 

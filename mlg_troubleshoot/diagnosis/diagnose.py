@@ -36,7 +36,7 @@ from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.misfit.screen import shrunk
-from mlg_troubleshoot.misfit.verdict import Verdict
+from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 from mlg_troubleshoot.units import MM_PER_IN
 
 LEAST_ROWS = 20

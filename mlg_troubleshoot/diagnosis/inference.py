@@ -28,7 +28,8 @@ from mlg_troubleshoot.misfit.held_out import held_out_part, likelier
 from mlg_troubleshoot.misfit.one_by_one import one_by_one
 from mlg_troubleshoot.misfit.rivals import near_and_behind
 from mlg_troubleshoot.misfit.screen import Fit, Screen, fit
-from mlg_troubleshoot.misfit.verdict import ALARM, NAME, REMAINS, Verdict, refutes, verdict_of
+from mlg_troubleshoot.misfit.verdict import ALARM, NAME, REMAINS, refutes, verdict_of
+from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 
 Key = tuple[str, str | None]
 

@@ -20,7 +20,8 @@ from mlg_troubleshoot.misfit.chance import Chance
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.held_out import held_out_part, likelier
 from mlg_troubleshoot.misfit.screen import Screen, fit
-from mlg_troubleshoot.misfit.verdict import NAME, Verdict, verdict_of
+from mlg_troubleshoot.misfit.verdict import NAME, verdict_of
+from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 
 # Thresholds, in log-likelihood if not said otherwise: set in 2026 on departures' fleets of other
 # seeds than those that judge them; not re-tuned.

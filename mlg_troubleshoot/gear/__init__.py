@@ -1,0 +1,14 @@
+"""One gear type: its file, joints and limits, and how far worn joints move the plunger."""
+
+__all__ = [
+    "DEFAULT_GEAR",
+    "adjustment",
+    "design",
+    "directions",
+    "gear",
+    "gear_file",
+    "model",
+    "sources",
+]
+
+DEFAULT_GEAR = "hawker-800xp"

@@ -14,13 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import STEP, Array
 from mlg_troubleshoot.gear.model import LinkageModel
 
+# Directions around a joint among which the worst one is bracketed. [rad]
 _ANGLES = 2.0 * np.pi * np.arange(8) / 8
 _ROOT_HALF = np.sqrt(0.5)
 # A joint without clearance still has a direction in which it would act: found with this length.
-_PROBE_IN = 1e-5
+_PROBE_IN = STEP
 _ROWS = 512
 # Positions solved at once: twice as many no longer stay in the cache and take half as long again,
 # each.

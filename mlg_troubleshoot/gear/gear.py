@@ -4,6 +4,7 @@ well.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,11 +13,13 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.datafile import Table, Whole
-from mlg_troubleshoot.gear.cycle import RetractionCycle
-from mlg_troubleshoot.gear.joints import ROUNDING_IN, JointSpec
+from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.model import Calibration, LinkageModel
 from mlg_troubleshoot.gear.sources import Sourced
 from mlg_troubleshoot.geometry.mechanism import Mechanism
+
+# 0.1905 mm is 0.0075000000000000006 in to a computer: no gauge reads a difference of 1e-9 in.
+ROUNDING_IN = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +64,82 @@ class Discrepancies(Table):
     wear_shift: str | None = None
     contact: tuple[tuple[Whole, Whole], ...] = ()
     tilt: tuple[TiltedLink, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class JointSpec:
+    """A joint as the gear file describes it; its number is also that of its virtual link.
+
+    limit, new_part: radial clearance that the manual allows at most, and that a restored joint has.
+    [in] access, restore: time to measure it, and to restore it, once its area is open. [min]
+    critical: true for a joint without whose measurement nothing can be cleared (joints 1 to 5 of
+    the paper).
+    """
+
+    number: int
+    point: str
+    name: str
+    location: str
+    limit: Sourced
+    new_part: Sourced
+    access: Sourced
+    restore: Sourced
+    area: str
+    critical: bool
+
+    def is_over_limit(self, clearance_in: float) -> bool:
+        """Tell whether a clearance is above the limit, beyond the rounding of a conversion from
+        another unit.
+        """
+        return clearance_in > self.limit.value + ROUNDING_IN
+
+    @property
+    def label(self) -> str:
+        """Number and name: ``#3 short link inner bearing``."""
+        return f"#{self.number} {self.name}"
+
+
+class Stage(Table):
+    """One of the four stages of the cycle, with the position of the plunger in it: in, mid or
+    out.
+    """
+
+    name: str
+    meaning: str
+    plunger: str
+
+
+class ValveState(Table):
+    """What follows from a position of the plunger and a direction of the oil flow; it may be "not
+    stated".
+    """
+
+    plunger: str
+    flow: str
+    stage: str
+    result: str
+
+
+class RetractionCycle(Table):
+    """Steps of the release, order of doors and gear, valve combinations, and what a misplaced
+    plunger means.
+    """
+
+    stages: tuple[Stage, ...]
+    release: tuple[str, ...]
+    retraction_order: tuple[str, ...]
+    extension_order: tuple[str, ...]
+    valve: tuple[ValveState, ...]
+    beyond: str
+    short: str
+    within: str
+    source: str
+
+    def symptom(self, displacement_in: float, margin_in: float) -> str:
+        """Say what a plunger at this displacement means, in the source's terms."""
+        if abs(displacement_in) <= margin_in:
+            return self.within
+        return self.beyond if displacement_in > 0 else self.short
 
 
 @dataclass(frozen=True)
@@ -200,6 +279,16 @@ class Gear:
             for group in self.link_groups
             for n in group
         }
+
+    def require_joints(self, numbers: Iterable[int], what: str = "") -> None:
+        """Refuse numbers of joints that this gear does not have; `what` names the option."""
+        unknown = sorted(set(numbers) - set(self.joint_numbers))
+        if unknown:
+            given = f"{what} {unknown[0]}: " if what else ""
+            raise UsageError(
+                f"{given}{self.name} has no joint {unknown[0]}",
+                f"Its joints are {', '.join(map(str, self.joint_numbers))}.",
+            )
 
     def joint(self, number: int) -> JointSpec:
         """Return the joint of that number; `KeyError` if the gear has none."""

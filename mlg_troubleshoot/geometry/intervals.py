@@ -20,8 +20,12 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, Mask
 
 Pair = tuple[Array, Array]
+# Rounds in which both boxes of a dyad narrow each other. [1]
 _ROUNDS = 2
-_GUESSES = (4.0, 2.0, 1.4, 1.15)
+# A box is guessed as so many times the first-order one, the widest first, and proved or not by
+# interval Newton; a guess that is not proved costs time only. [1]
+_GUESSES = (4, 2, 1.4, 1.15)
+# What a guess leaves for curvature, as a share of the swing. [1]
 _BULGE = 0.15
 
 

@@ -31,6 +31,18 @@ class GivenDataIndices:
     rows: Wholes
 
 
+@dataclass(frozen=True, slots=True)
+class GivenDataResult:
+    """First-order indices of measured inspections; used are valid rows that have a measured
+    displacement.
+    """
+
+    file: str
+    rows_read: int
+    rows_used: int
+    indices: GivenDataIndices
+
+
 def given_data_indices(
     clearance_in: Array, displacement_in: Array, rng: Generator, resamples: int = 500
 ) -> GivenDataIndices:

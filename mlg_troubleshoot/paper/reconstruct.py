@@ -16,7 +16,7 @@ from time import monotonic
 import numpy as np
 from numpy.random import Generator
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import STEP, Array
 from mlg_troubleshoot.errors import InconclusiveDataError, MechanismError, UsageError
 from mlg_troubleshoot.gear.design import DesignSpace
 from mlg_troubleshoot.gear.gear import Gear, Linkage
@@ -26,12 +26,14 @@ from mlg_troubleshoot.paper.verification import Facts
 
 Told = Callable[[str, int, int | None], None]
 
-_FAR = 50.0
+# Stands for the miss of a target that a linkage has no value for, in its tolerances. [1]
+_FAR = 50
+# Decimals of a coordinate, as the paper prints them. [1]
 _DECIMALS = 4
-_WAVE = 150
-_POLISHED = 4
-_DAMPINGS = 12
-_SMALL_LENGTH_IN, _LARGE_IN = 0.4, 22.0
+# Linkages drawn at a time, how many of them are polished, and dampings tried in a step. [1]
+_WAVE, _POLISHED, _DAMPINGS = 150, 4, 12
+# Links outside these lengths are not of a landing gear of this size, assumed. [in]
+_SMALL_LENGTH_IN, _LARGE_IN = 0.4, 22
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,7 +196,7 @@ class _Search:
                 break
         return vector
 
-    def _slopes(self, vector: Array, value: Array, step: float = 1e-5) -> Array:
+    def _slopes(self, vector: Array, value: Array, step: float = STEP) -> Array:
         columns = [
             (self.residuals(vector + moved) - value) / step for moved in step * np.eye(len(vector))
         ]

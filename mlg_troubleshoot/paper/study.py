@@ -50,7 +50,7 @@ Progress = Callable[[str, int, int | None], None]
 Stages = Callable[[str], Callable[[int, int | None], None]]
 
 
-class Design(StrEnum):
+class StudyDesign(StrEnum):
     FAST = "fast"
     SAMPLED = "sampled"
     TENSOR = "tensor"
@@ -73,7 +73,7 @@ class StudyOptions:
 
     Parameters
     ----------
-    design : Design
+    design : StudyDesign
         How the points are chosen.
     accuracy : float
         Wanted error of every index, where the design can be told. [1]
@@ -101,7 +101,7 @@ class StudyOptions:
         Dask client to compute it with.
     """
 
-    design: Design = Design.FAST
+    design: StudyDesign = StudyDesign.FAST
     accuracy: float = 1e-3
     seed: int = 0
     distribution: str = "uniform"
@@ -121,7 +121,7 @@ class StudyOptions:
     def is_standard(self) -> bool:
         """True if the result is the table that goes with a gear."""
         return (
-            self.design in (Design.FAST, Design.SAMPLED, Design.TENSOR)
+            self.design in (StudyDesign.FAST, StudyDesign.SAMPLED, StudyDesign.TENSOR)
             and self.distribution == "uniform"
             and self.limits_in is None
             and self.directions is Directions.WORST
@@ -203,7 +203,7 @@ def run_study(gear: Gear, options: StudyOptions, progress: Progress | None = Non
     def told(name: str) -> Callable[[int, int | None], None]:
         return lambda done, total: None if progress is None else progress(name, done, total)
 
-    if options.design in (Design.LHS, Design.LHS_CCD, Design.CCD):
+    if options.design in (StudyDesign.LHS, StudyDesign.LHS_CCD, StudyDesign.CCD):
         run = _paper(gear, inputs, options, told)
     else:
         run = _on_linkage(gear, inputs, options, 0, told("samples"))
@@ -273,13 +273,13 @@ def _on_linkage(
             accuracy, most = max(accuracy, 3e-3), 1 << 20
         sets = joint_groups(len(inputs.limits_in))
         return _Run(saltelli_indices(cube, n, stream, options.seed, accuracy, most, sets, advance))
-    if options.design is Design.TENSOR:
+    if options.design is StudyDesign.TENSOR:
         tensor = tensor_indices(cube, np.ones(n))
         coarse = None if k else tensor_indices(cube, np.ones(n), order=2)
         return _Run(
             _of_tensor(tensor, coarse, options.seed), groups=group_indices(gear, tensor.closed)
         )
-    if options.design is Design.SAMPLED and not k:
+    if options.design is StudyDesign.SAMPLED and not k:
         return _Run(saltelli_indices(cube, n, stream, options.seed, accuracy, most, None, advance))
     if k and options.beyond_margin:
         most = 1 << 18
@@ -322,7 +322,7 @@ def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _
     total, spread = np.full(n, np.nan), np.full(n, np.nan)
     evaluations, failed, finished = found.evaluations, found.failed, found.iterations == iterations
     note = f"first order corrected for the bias (1 - S)/{n1}"
-    if options.design is Design.LHS and finished and not options.beyond_margin:
+    if options.design is StudyDesign.LHS and finished and not options.beyond_margin:
         response = _held(gear.model, inputs, options)
         study = BlockStudy(response, inputs, gear.geometry_sha256, options.seed, n1, n2, iterations)
         totals = total_order_study(

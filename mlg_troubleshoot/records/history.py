@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from statistics import median
 
-from mlg_troubleshoot.decision.chronology import Moment, contradictions
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Side
+from mlg_troubleshoot.life.chronology import Moment, contradictions
 from mlg_troubleshoot.records.columns import Kind
 from mlg_troubleshoot.records.duplicates import cell_of, where
 from mlg_troubleshoot.records.model import SheetLayout

@@ -25,7 +25,12 @@ from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.source import NumberedRow
 from mlg_troubleshoot.records.template import write_book
 from mlg_troubleshoot.records.values import CellFaultError, read_choice, read_number, read_text
-from mlg_troubleshoot.surveying.readings import Kind, Reading, SurveyedLinkage, default_u
+from mlg_troubleshoot.surveying.readings import (
+    ReadingKind,
+    SurveyedLinkage,
+    SurveyReading,
+    default_u,
+)
 from mlg_troubleshoot.units import LengthUnit
 
 _UNITS = ("in", "mm", "deg")
@@ -39,19 +44,19 @@ COLUMNS = (
     "how",
 )
 _HEADER_WITHIN = 30
-_KINDS = {kind: kind for kind in Kind if kind not in (Kind.TRAVEL, Kind.ORDER)}
+_KINDS = {kind: kind for kind in ReadingKind if kind not in (ReadingKind.TRAVEL, ReadingKind.ORDER)}
 # No linkage of a landing gear is longer than this; angles are read within one turn.
 _LONGEST_IN, _WIDEST_DEG = 500.0, 360.0
 _DEGREES = ("°", "deg", "degrees")
 _HOW = {
-    Kind.DISTANCE: (
+    ReadingKind.DISTANCE: (
         "Pin centre to pin centre: over the outside of both pins, less half of each diameter."
     ),
-    Kind.PLUNGER: (
+    ReadingKind.PLUNGER: (
         "Dial on the plunger, zero at the reference extension; actuator at the extension given."
     ),
-    Kind.EXTENSION: "Travel of the actuator from Down Lock to the reference position.",
-    Kind.ANGLE: (
+    ReadingKind.EXTENSION: "Travel of the actuator from Down Lock to the reference position.",
+    ReadingKind.ANGLE: (
         "In the gear file's axes, with an inclinometer or from a photograph square to the plane."
     ),
 }
@@ -60,7 +65,7 @@ _HOW = {
 def write_survey_template(
     path: Path,
     linkage: SurveyedLinkage,
-    planned: Iterable[tuple[Reading, bool]],
+    planned: Iterable[tuple[SurveyReading, bool]],
     unit: LengthUnit = LengthUnit.INCH,
 ) -> None:
     """Write the rows that are worth reading on this gear, as CSV or as a workbook with a sketch; in
@@ -150,7 +155,7 @@ def _sketch(sheet: Worksheet, linkage: SurveyedLinkage) -> None:
 
 def read_survey(
     path: Path, linkage: SurveyedLinkage
-) -> tuple[tuple[Reading, ...], tuple[Problem, ...], str]:
+) -> tuple[tuple[SurveyReading, ...], tuple[Problem, ...], str]:
     """Read the rows that have a value, the cells that are wrong, and the file's SHA-256."""
     label = str(path)
     try:
@@ -219,7 +224,7 @@ class _Rows:
                     "Remove one of the columns.",
                 )
 
-    def read(self, numbered: NumberedRow) -> Reading | None:
+    def read(self, numbered: NumberedRow) -> SurveyReading | None:
         """Read one row; None if it has no value, or a cell that is wrong."""
         number, cells = numbered
         row = {
@@ -232,9 +237,9 @@ class _Rows:
             return None
         self.column = "kind"
         try:
-            kind = read_choice(row.get("kind", ""), Kind, "kind_unknown", {})
+            kind = read_choice(row.get("kind", ""), ReadingKind, "kind_unknown", {})
             turns = self.linkage.space.mechanism.output.kind == "angle"
-            is_angle = kind is Kind.ANGLE or (kind is Kind.PLUNGER and turns)
+            is_angle = kind is ReadingKind.ANGLE or (kind is ReadingKind.PLUNGER and turns)
             self._require(
                 kind in _KINDS,
                 "kind",
@@ -250,7 +255,9 @@ class _Rows:
             self._require(
                 one, given[-1], expected, "Leave the other columns blank.", "value_columns"
             )
-            value = self._quantity(row, given[0], signed=kind in (Kind.PLUNGER, Kind.ANGLE))
+            value = self._quantity(
+                row, given[0], signed=kind in (ReadingKind.PLUNGER, ReadingKind.ANGLE)
+            )
             u = default_u(kind, is_angle=is_angle)
             for unit in _UNITS:
                 column, expected = f"u_{unit}", "an uncertainty in the unit of the value"
@@ -270,7 +277,7 @@ class _Rows:
                 number, self.column, row.get(self.column), fault.code, fault.expected, fault.remedy
             )
             return None
-        return Reading(
+        return SurveyReading(
             kind, start, end, value, u, extension, number, is_angle, self.linkage.driven_in
         )
 
@@ -331,7 +338,7 @@ class _Rows:
             units=units,
         )
 
-    def _ends(self, kind: Kind, row: Mapping[str, Cell]) -> tuple[str, str]:
+    def _ends(self, kind: ReadingKind, row: Mapping[str, Cell]) -> tuple[str, str]:
         texts = []
         for column in ("from", "to"):
             cell = stored(row.get(column))
@@ -342,12 +349,12 @@ class _Rows:
             )
         start, end = texts
         space = self.linkage.space
-        if kind is Kind.DISTANCE:
+        if kind is ReadingKind.DISTANCE:
             points = f"one of the points {', '.join(self.points)}"
             for column, name in (("from", start), ("to", end)):
                 self._require(name in self.points, column, points, "Correct the name.")
             self._require(start != end, "to", "another point than in from", "Name both pins.")
-        elif kind is Kind.ANGLE:
+        elif kind is ReadingKind.ANGLE:
             known = {
                 **dict.fromkeys(space.planes, ("hinge", "dihedral")),
                 **dict.fromkeys(space.sliders, ("axis",)),
@@ -368,7 +375,9 @@ class _Rows:
             )
         expected = "DISTANCE, PLUNGER or ANGLE"
         remedy = "The reference position of this gear is its Down Lock."
-        self._require(kind is not Kind.EXTENSION or space.moves_reference, "kind", expected, remedy)
+        self._require(
+            kind is not ReadingKind.EXTENSION or space.moves_reference, "kind", expected, remedy
+        )
         return start, end
 
     def _require(

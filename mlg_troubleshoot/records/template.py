@@ -15,8 +15,7 @@ from openpyxl.worksheet.properties import PageSetupProperties
 from openpyxl.worksheet.worksheet import Worksheet
 
 from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN
-from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.joints import JointSpec
+from mlg_troubleshoot.gear.gear import Gear, JointSpec
 from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.records.cells import column_letters
 from mlg_troubleshoot.records.columns import CARRIED, LENGTHS, PER_JOINT, Field, Kind

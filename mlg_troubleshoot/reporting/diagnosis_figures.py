@@ -21,7 +21,7 @@ from mlg_troubleshoot.units import LengthUnit
 Texts = NDArray[np.str_]
 
 # Width and height of one plot of two side by side. [canvas units]
-_PLOT = (335.0, 236.0)
+_PLOT = (335, 236)
 _BINS = 8
 _FEWEST_IN_A_BIN = 5
 MOST_TAILS = 36

@@ -11,6 +11,7 @@ from mlg_troubleshoot.reporting.formats import Lengths
 from mlg_troubleshoot.reporting.html import environment
 from mlg_troubleshoot.units import LengthUnit
 
+# p-value above which a remainder is called noise: the usual 5 %. [1]
 NOISE_ABOVE = 0.05
 _WORDS = ("DATA", "MISFIT", "CAUSE", "MODEL", "GAIN", "LEFT", "DO")
 _KINDS = {
@@ -36,7 +37,7 @@ _COLUMNS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class DiagnosisLine:
     """One of the seven lines: its number, what it is about in one word, and what it says."""
 
     number: int
@@ -79,12 +80,13 @@ def cause_words(cause: NamedCause) -> str:
     )
 
 
-def seven_lines(d: Diagnosis, unit: LengthUnit = LengthUnit.THOU) -> tuple[Line, ...]:
+def seven_lines(d: Diagnosis, unit: LengthUnit = LengthUnit.THOU) -> tuple[DiagnosisLine, ...]:
     """Say what a diagnosis found: data, misfit, cause, model, gain, residual, what to do."""
     # Blanks of every kind break a line of the terminal, and long words where they must.
     texts = [" ".join(text.split()) for text in _said(d, unit, *_WORDS)]
     return tuple(
-        Line(k, word, text) for k, (word, text) in enumerate(zip(_WORDS, texts, strict=True), 1)
+        DiagnosisLine(k, word, text)
+        for k, (word, text) in enumerate(zip(_WORDS, texts, strict=True), 1)
     )
 
 

@@ -14,14 +14,13 @@ import numpy as np
 from markupsafe import Markup
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.paper.statements import Outcome
+from mlg_troubleshoot.paper.statements import ClaimOutcome
 from mlg_troubleshoot.paper.study import Directions, StudyFindings
 from mlg_troubleshoot.reporting import study_figures as drawn
-from mlg_troubleshoot.reporting.common import head
 from mlg_troubleshoot.reporting.figures import Style
 from mlg_troubleshoot.reporting.formats import ABSENT, MINUS, Lengths, joint_list
 from mlg_troubleshoot.reporting.html import Document
-from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.reporting.provenance import ReportProvenance, head
 from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.reporting.study_figures import BarSeries
 from mlg_troubleshoot.units import LengthUnit
@@ -68,7 +67,7 @@ def _context(f: StudyFindings, provenance: ReportProvenance, lengths: Lengths) -
         "top": _span(e.joint for e in order[:5]),
         "top_share": sum(e.first_order for e in order[:5]),
         "half": float(np.ptp([e.first_order_interval for e in table.joints], axis=1).max()) / 2.0,
-        "counts": [sum(s.outcome is outcome for s in f.statements) for outcome in Outcome],
+        "counts": [sum(s.outcome is outcome for s in f.statements) for outcome in ClaimOutcome],
         "rows": list(
             zip(f.gear.joints, table.joints, f.result.growth.local_stage.tolist(), strict=True)
         ),

@@ -16,7 +16,7 @@ from mlg_troubleshoot.decision.inspection import (
     RowSource,
     Side,
 )
-from mlg_troubleshoot.store.database import Kind, Record, packed
+from mlg_troubleshoot.store.database import Record, RecordKind, packed
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 # What says where and how an inspection was entered, not what was found.
@@ -42,7 +42,9 @@ def _plain(value: Any) -> Any:
     return [_plain(each) for each in value] if isinstance(value, tuple) else value
 
 
-def inspection_record(inspection: Inspection, kind: Kind = Kind.INSPECTION, **more: Any) -> Record:
+def inspection_record(
+    inspection: Inspection, kind: RecordKind = RecordKind.INSPECTION, **more: Any
+) -> Record:
     """Return an inspection as a record; what is at its default is left out."""
     day = inspection.inspection_date.isoformat() if inspection.inspection_date else ""
     body = {}
@@ -58,7 +60,7 @@ def inspection_record(inspection: Inspection, kind: Kind = Kind.INSPECTION, **mo
         inspection.side.value,
         day,
         packed({"inspection": body, **more}),
-        identity if kind is Kind.INSPECTION else (),
+        identity if kind is RecordKind.INSPECTION else (),
     )
 
 

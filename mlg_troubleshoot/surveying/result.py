@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.errors import NOTHING_JUDGED, Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.surveying.plan import Suggested
 from mlg_troubleshoot.surveying.survey import Survey
@@ -64,5 +64,5 @@ class SurveyResult:
     def exit_code(self) -> int:
         """0 if everything fits, 1 if something does not, 3 if nothing follows."""
         if self.survey is None:
-            return 3
+            return NOTHING_JUDGED
         return 1 if self.survey.misfits or self.problems else 0

@@ -53,7 +53,7 @@ class Draws:
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class FilterState:
     """Mean and covariance of level and drift at the last step, arrays (draws, units)."""
 
     level: Array
@@ -68,7 +68,7 @@ def clock(usage: Array, power: Array) -> Array:
     return np.where(power == 1.0, usage, np.maximum(usage, 0.0) ** power)
 
 
-def follow(steps: Steps, draws: Draws) -> tuple[Array, State]:
+def follow(steps: Steps, draws: Draws) -> tuple[Array, FilterState]:
     """Filter the readings of every unit; return log likelihood (draws, units) and the state at the
     end.
     """
@@ -104,4 +104,4 @@ def follow(steps: Steps, draws: Draws) -> tuple[Array, State]:
         x, b, unit = x + g * pxx * off, b + g * pxb * off, unit + g * pxu * off
         pbb, pbu, puu = pbb - g * pxb * pxb, pbu - g * pxb * pxu, puu - g * pxu * pxu
         pxb, pxu, pxx = pxb - g * pxx * pxb, pxu - g * pxx * pxu, pxx - g * pxx * pxx
-    return total, State(x, b, pxx, pxb, pbb)
+    return total, FilterState(x, b, pxx, pxb, pbb)

@@ -8,16 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.errors import InconclusiveDataError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension
     from mlg_troubleshoot.diagnosis.faults import DataFault
-    from mlg_troubleshoot.reporting import WrittenReport
+    from mlg_troubleshoot.reporting.publish import WrittenReport
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -188,7 +190,7 @@ def _evidence_notes(inspections: Sequence[Inspection], again: int, gear: Gear) -
     if len(unread) == len(gear.joint_numbers):
         yield "no clearance was read in any row: what wear adds is left open"
     elif unread:
-        listed = ", ".join(f"#{n}" for n in unread)
+        listed = joint_list(unread)
         yield (
             f"not measured in any row: {listed}; counted as worn like the others of their gear, and"
             " not testable"
@@ -203,8 +205,9 @@ def write_diagnosis_report(
     *,
     unit: LengthUnit = LengthUnit.INCH,
 ) -> WrittenReport:
-    from mlg_troubleshoot.reporting import provenance_of, publish
     from mlg_troubleshoot.reporting.diagnosis_report import diagnosis_document
+    from mlg_troubleshoot.reporting.provenance import provenance_of
+    from mlg_troubleshoot.reporting.publish import publish
 
     made = provenance_of(
         result.gear, result.inputs_sha256, seed=options.seed, remembered=options.remembered

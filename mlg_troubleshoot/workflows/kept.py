@@ -16,8 +16,7 @@ from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.records.columns import LENGTH_RANGE_IN, Kind
 from mlg_troubleshoot.records.rows import LOOSE_CELLS
 from mlg_troubleshoot.records.values import CellFaultError, read_date, read_text
-from mlg_troubleshoot.store import Kind as RecordKind
-from mlg_troubleshoot.store import Record
+from mlg_troubleshoot.store import Record, RecordKind
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 _Check = Callable[[str, Any], None]

@@ -14,7 +14,7 @@ import tomli_w
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.design import member_values
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.outputs import SCHEMA_VERSION, OutputKind, write_text
+from mlg_troubleshoot.outputs import OutputKind, write_text
 from mlg_troubleshoot.paper.targets import load_targets, targets_file
 
 if TYPE_CHECKING:
@@ -56,29 +56,3 @@ def reconstruct_linkage(
     if out is not None:
         write_text(out, _HEADING + text)
     return found, text
-
-
-def reconstruction_values(found: Reconstruction, text: str) -> dict[str, object]:
-    from mlg_troubleshoot.output_types import MetTarget, ReconstructOutput
-    from mlg_troubleshoot.reporting.json_form import written
-
-    return written(
-        ReconstructOutput,
-        found,
-        schema_version=SCHEMA_VERSION,
-        linkages_tried=found.evaluations,
-        free=found.numbers - found.determined,
-        loosest=[{"number": name, "free_part": part} for name, part in found.loosest],
-        targets=[
-            written(
-                MetTarget,
-                each,
-                quantity=each.target.quantity,
-                printed=each.target.printed,
-                unit=each.target.unit,
-                accepted=each.target.accepted,
-            )
-            for each in found.met
-        ],
-        member_toml=text,
-    )

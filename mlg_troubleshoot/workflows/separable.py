@@ -22,8 +22,9 @@ from mlg_troubleshoot.diagnosis.noise import TAIL_RATIOS
 from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
 from mlg_troubleshoot.diagnosis.table import ALONG, DiagnosisTable
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.misfit.search import ALIKE, beside
 from mlg_troubleshoot.records.columns import Kind
 from mlg_troubleshoot.records.headers import parse_canonical

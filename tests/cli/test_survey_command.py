@@ -14,9 +14,10 @@ import pytest
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import load_index_table
 from mlg_troubleshoot.records.survey_table import read_survey, write_survey_template
-from mlg_troubleshoot.surveying.readings import Kind, Reading, SurveyedLinkage
+from mlg_troubleshoot.reporting.model_json import survey_as_json
+from mlg_troubleshoot.surveying.readings import ReadingKind, SurveyedLinkage, SurveyReading
 from mlg_troubleshoot.units import LengthUnit
-from mlg_troubleshoot.workflows.survey import survey_gear, survey_values
+from mlg_troubleshoot.workflows.survey import survey_gear
 
 from .conftest import FAILURE, mlg
 
@@ -148,7 +149,7 @@ def test_the_same_seed_gives_the_same_gear(
 ) -> None:
     again = survey_gear(surveyed[0].with_name("s.csv"), FOUR_BAR, write=tmp_path / "mine.toml")
     assert (tmp_path / "mine.toml").read_bytes() == surveyed[0].read_bytes()
-    assert survey_values(again)["joints"] == surveyed[1]["joints"]
+    assert survey_as_json(again)["joints"] == surveyed[1]["joints"]
 
 
 def test_millimetres_and_inches_give_one_gear(tmp_path: Path) -> None:
@@ -318,8 +319,8 @@ def test_the_unit_of_a_survey_is_remembered(
 def test_a_template_in_millimetres_means_the_same_as_one_in_inches(tmp_path: Path) -> None:
     linkage = SurveyedLinkage(load_gear())
     plan = [
-        (Reading(Kind.PLUNGER, u=0.0015, extension=0.5), True),
-        (Reading(Kind.DISTANCE, "F", "1", u=0.01), True),
+        (SurveyReading(ReadingKind.PLUNGER, u=0.0015, extension=0.5), True),
+        (SurveyReading(ReadingKind.DISTANCE, "F", "1", u=0.01), True),
     ]
     readings = []
     for unit, factor in ((LengthUnit.INCH, 1.0), (LengthUnit.MILLIMETRE, 25.4)):

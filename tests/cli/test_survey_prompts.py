@@ -15,16 +15,16 @@ from mlg_troubleshoot.cli.survey_prompts import ask_survey
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records.survey_table import read_survey, write_survey_template
-from mlg_troubleshoot.surveying.readings import Kind, Reading, SurveyedLinkage
+from mlg_troubleshoot.surveying.readings import ReadingKind, SurveyedLinkage, SurveyReading
 from tests.cli.conftest import ROOT, mlg
 from tests.keys import interrupt
 
 pexpect = pytest.importorskip("pexpect")
 FOUR_BAR = ROOT / "tests" / "geometry" / "data" / "four-bar.toml"
 PLAN = [
-    Reading(Kind.DISTANCE, "O2", "A"),
-    Reading(Kind.DISTANCE, "A", "B"),
-    Reading(Kind.PLUNGER, u=0.02, extension=0.4, is_angle=True, driven_in="rad"),
+    SurveyReading(ReadingKind.DISTANCE, "O2", "A"),
+    SurveyReading(ReadingKind.DISTANCE, "A", "B"),
+    SurveyReading(ReadingKind.PLUNGER, u=0.02, extension=0.4, is_angle=True, driven_in="rad"),
 ]
 
 
@@ -76,7 +76,13 @@ def test_what_is_no_such_reading_is_asked_again_and_not_kept(file: Path, answer:
     terminal, _, values = typed(file, answer, "done")
     assert "expected" in terminal.said
     assert values == {}
-    assert terminal.said.count("1 of 3") == 2
+    assert terminal.said.count(" in > ") == 2
+
+
+def test_a_question_mark_says_what_can_be_typed(file: Path) -> None:
+    terminal, _, values = typed(file, "?", "done")
+    assert "A number, as 7.15 or 181.6 mm, in in where it has no unit." in terminal.said
+    assert values == {}
 
 
 def test_a_later_run_goes_on_at_the_first_reading_that_lacks(file: Path) -> None:

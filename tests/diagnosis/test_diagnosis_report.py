@@ -14,9 +14,10 @@ import pytest
 
 from mlg_troubleshoot.diagnosis import CATALOGUE, Diagnosis, ModelExtension, diagnose
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting import ReportProvenance, publish
 from mlg_troubleshoot.reporting.diagnosis_lines import cause_words, seven_lines
 from mlg_troubleshoot.reporting.diagnosis_report import diagnosis_document
+from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.reporting.publish import publish
 from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions, diagnose_files
 from mlg_troubleshoot.workflows.diagnose import write_diagnosis_report as report_of
 

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.errors import GearFileError, MechanismError, UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear, shipped_gears
+from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
 from mlg_troubleshoot.gear.sources import SourceKind
 
 Edit = Callable[[str, str], Path]

@@ -160,7 +160,7 @@ class Reading:
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class JudgedReading:
     """What the gate says of a reading, empty if nothing, and the number it takes; what it said is
     to be confirmed.
     """
@@ -172,7 +172,7 @@ class Judged:
 
 def judge(
     typed: str, number: int, unit: LengthUnit, convention: ClearanceConvention, gear: Gear
-) -> Judged:
+) -> JudgedReading:
     """Let the gate that judges the cells of tables say whether a reading is taken, asked again or
     refused.
     """
@@ -181,12 +181,12 @@ def judge(
     options = ReadOptions.of(gear, unit=unit, convention=convention, asks=True)
     read, problems = judge_length(f"clearance_{number}", typed, options)
     if problems or not isinstance(read, Inspection):
-        return Judged(
+        return JudgedReading(
             " ".join(f"expected {p.expected}. {p.remedy}" for p in problems), refused=True
         )
     if number not in read.entered:
-        return Judged()
-    return Judged(" ".join(read.warnings), parse_length(read.entered[number].text))
+        return JudgedReading()
+    return JudgedReading(" ".join(read.warnings), parse_length(read.entered[number].text))
 
 
 def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> Inspection:

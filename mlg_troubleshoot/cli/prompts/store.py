@@ -236,9 +236,6 @@ class EntryDraft(msgspec.Struct, frozen=True):
     more: dict[str, str | None]
 
 
-_HEADING = ("record_id", "tail_no", "side", "unit", "convention")
-
-
 def _as_json(session: Session) -> dict[str, Any]:
     answers = session.answers
     joints: dict[int, JointDraft | None] = {}
@@ -251,7 +248,11 @@ def _as_json(session: Session) -> dict[str, Any]:
         session.id,
         session.gear_id,
         session.started.replace(microsecond=0),
-        *(getattr(answers, name) for name in _HEADING),
+        answers.record_id,
+        answers.tail_no,
+        answers.side,
+        answers.unit,
+        answers.convention,
         joints,
         dict(answers.more),
     )
@@ -273,9 +274,15 @@ def _from_json(raw: Any) -> Session:
     draft = msgspec.convert(raw, EntryDraft, str_keys=True)
     if not set(draft.more) <= set(MORE):
         raise ValueError(f"{sorted(set(draft.more) - set(MORE))[0]!r} is not a column of an entry")
-    heading: dict[str, Any] = {name: getattr(draft, name) for name in _HEADING}
     joints = MappingProxyType({n: _answer(joint) for n, joint in draft.joints.items()})
-    answers = Answers(**heading, joints=joints).with_more(**draft.more)
+    answers = Answers(
+        record_id=draft.record_id,
+        tail_no=draft.tail_no,
+        side=draft.side,
+        unit=draft.unit,
+        convention=draft.convention,
+        joints=joints,
+    ).with_more(**draft.more)
     return Session(draft.id, draft.gear, draft.started, answers)
 
 

@@ -20,6 +20,7 @@ from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judge
 from mlg_troubleshoot.decision.sentences import (
     chance_wrong_sentence,
     confidence_words,
+    joint_list,
     percent,
     rigging_sentence,
 )
@@ -208,7 +209,7 @@ def _repair_table(a: Assessment, screen: DataConsole) -> Table:
     table = plain_table(None, "restore", *numbers, right=numbers, title=title)
     for s in a.repair_sets or ():
         table.add_row(
-            ", ".join(f"#{n}" for n in s.joints),
+            joint_list(s.joints),
             f"{s.minutes:.0f}",
             screen.length(s.predicted_displacement_in),
             percent(s.probability_within_margin),
