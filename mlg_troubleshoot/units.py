@@ -42,6 +42,11 @@ class LengthUnit(StrEnum):
         """Decimals that show a length to about 0.0001 in."""
         return {"in": 4, "thou": 1, "mm": 3}[self.value]
 
+    @property
+    def spellings(self) -> tuple[str, ...]:
+        """How people write this unit, in lower case."""
+        return tuple(word for word, unit in UNIT_SPELLINGS.items() if unit is self)
+
     def to_inches(self, value: float) -> float:
         """A length in this unit, in inches. [in]"""
         return value / self.per_inch
