@@ -288,6 +288,7 @@ LANDINGS = Column(
     holds=Holds.NUMBER,
     meaning="Landings since overhaul, 0 or more.",
     high=1e6,
+    unit="landings",
     expected="landings since overhaul, {low:g} or more",
     spellings=(
         "ldgs|landings since o h|landings|landings since overhaul|gear landings since overhaul"
