@@ -1,8 +1,8 @@
 """What is remembered from run to run in ``mlg.toml``: the unit to show, the paper, how headers are
 read.
 
-Never what could turn a verdict: unit of entry, convention, side or margin, nor another meaning for
-a header that is understood by itself. The file is data: it is checked strictly.
+Never what could change a verdict: unit of entry, convention, side or margin, nor another meaning
+for a header that is understood by itself. The file is data: it is checked strictly.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def _remember(
 def _read(file: Path, gear: str) -> Settings:
     if not file.is_file() or file.stat().st_size > _MOST_BYTES:
         raise UsageError(
-            f"{file} is not a file of at most {_MOST_BYTES} bytes", "Delete it, or write it anew."
+            f"{file} is not a file of at most {_MOST_BYTES} bytes", "Delete it or write a new one."
         )
     try:
         raw = tomllib.loads(file.read_text(encoding="utf-8"))
@@ -116,7 +116,7 @@ def _read(file: Path, gear: str) -> Settings:
 
 
 def _judged(file: Path, raw: Mapping[str, object], gear: str) -> Settings:
-    """Check every key and value: what is remembered is data, and nothing in it may turn a
+    """Check every key and value: what is remembered is data, and nothing in it may change a
     verdict.
     """
     unknown = [key for key in raw if key not in _KEYS]
@@ -174,7 +174,7 @@ def _refuse_understood(file: Path, headers: Mapping[str, str], gear: str) -> Non
         if why:
             raise UsageError(
                 f"{file}: headers: {header!r} = {column!r} is never remembered: by itself"
-                f" {header!r} {why}, and another meaning could turn a verdict",
+                f" {header!r} {why}, and another meaning could change a verdict",
                 f'Delete the line from {file}; give --map "{header}={column}" with each run that'
                 " needs it.",
             )

@@ -3,6 +3,7 @@
 __all__ = [
     "assessment",
     "case",
+    "columns",
     "inspection",
     "judge_rows",
     "next_joint",

@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from statistics import median
 
+from mlg_troubleshoot.decision.columns import DATE, LANDINGS
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Side
 from mlg_troubleshoot.life.chronology import Moment, contradictions
-from mlg_troubleshoot.records.columns import Kind
 from mlg_troubleshoot.records.duplicates import cell_of, where
 from mlg_troubleshoot.records.model import SheetLayout
 from mlg_troubleshoot.units import SLIPS
@@ -81,9 +81,7 @@ def order_warnings(
         def name(n: int, seen: list[tuple[int, Inspection]] = seen) -> str:
             source = seen[n][1].source
             cells = [
-                cell
-                for kind in (Kind.LANDINGS, Kind.DATE)
-                if (cell := cell_of(source, layouts, kind)[1])
+                cell for column in (LANDINGS, DATE) if (cell := cell_of(source, layouts, column)[1])
             ]
             return ", ".join([where(source), *cells])
 

@@ -189,7 +189,7 @@ def _sequence(gear: Gear, a: Assessment, lengths: Lengths) -> Facts:
     for name, value in places:
         sentence = gear.cycle.symptom(value, a.margin_in)
         said.setdefault(sentence, []).append(f"{name} {lengths.full(value, True)}")
-    return [(" and ".join(names), lengths.said(sentence)) for sentence, names in said.items()]
+    return [(" and ".join(names), sentence) for sentence, names in said.items()]
 
 
 def batch_document(

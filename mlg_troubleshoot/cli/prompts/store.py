@@ -17,6 +17,7 @@ from types import MappingProxyType
 from typing import Any
 
 from mlg_troubleshoot.cli.prompts.answers import MORE, NOT_MEASURED, Answers, JointAnswer
+from mlg_troubleshoot.decision.columns import MARGIN, PLUNGER_DISPLACEMENT
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
 from mlg_troubleshoot.store import Draft, Drafts, Store, own_file
@@ -37,7 +38,7 @@ class DamagedSessionError(SessionFileError):
 
 
 class SessionTakenError(TroubleshootError):
-    """A session that another run has gone on with since this one read or wrote it."""
+    """A session that another run has continued since this one read or wrote it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,8 +98,8 @@ class SessionStore:
             raise OutputError(f"answers cannot be saved: {error.message}", error.remedy) from error
         if not saved:
             raise SessionTakenError(
-                f"another window has gone on with {session.id}",
-                "This entry goes on as one of its own.",
+                f"another window has continued {session.id}",
+                "This entry continues as a separate one.",
             )
         return ours
 
@@ -193,7 +194,7 @@ def read_session(draft: Draft) -> Session:
     try:
         session = replace(_from_json(raw), writer=draft.writer, complete=draft.complete)
         if session.id != draft.id:
-            raise ValueError(f"it holds the session {session.id!r}")
+            raise ValueError(f"it contains the session {session.id!r}")
     except (KeyError, TypeError, ValueError, OverflowError, AttributeError, UsageError) as error:
         raise _damaged(draft.id, f"{type(error).__name__}: {error}") from error
     return session
@@ -231,7 +232,7 @@ def _joint_as_json(answer: JointAnswer) -> dict[str, Any] | None:
 
 def _from_json(raw: Any) -> Session:
     if raw["schema_version"] == 1:
-        lengths = {"plunger_displacement": raw["plunger_in"], "margin": raw["margin_in"]}
+        lengths = {PLUNGER_DISPLACEMENT.name: raw["plunger_in"], MARGIN.name: raw["margin_in"]}
         more = {
             "outcome": raw["outcome"],
             **{n: f"{float(v)!r} in" for n, v in lengths.items() if v is not None},
