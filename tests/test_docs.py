@@ -13,8 +13,8 @@ from urllib.parse import unquote
 import pytest
 from pytest_examples import CodeExample, EvalExample, find_examples
 
+from mlg_troubleshoot.decision.columns import COLUMNS, Column
 from mlg_troubleshoot.diagnosis import CATALOGUE
-from mlg_troubleshoot.records.columns import Kind
 from tests import docs_examples
 from tests.docs_examples import PAGES, PICTURES, README, ROOT
 
@@ -182,10 +182,10 @@ def test_every_cause_has_a_page_that_says_what_it_needs(cause: str) -> None:
     assert "| needs |" in page
 
 
-@pytest.mark.parametrize("kind", list(Kind))
-def test_every_column_is_described(kind: Kind) -> None:
+@pytest.mark.parametrize("column", COLUMNS, ids=lambda column: column.name)
+def test_every_column_is_described(column: Column) -> None:
     page = (ROOT / "docs/reference/columns.md").read_text(encoding="utf-8")
-    assert f"`{kind}" in page
+    assert f"`{column.name}" in page
 
 
 SUMMARY = [

@@ -13,7 +13,7 @@ from typer.core import TyperGroup
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import ExitCode, UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
-from mlg_troubleshoot.units import LengthUnit, in_unit
+from mlg_troubleshoot.units import Length, LengthUnit
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.cli.remembered import Settings
@@ -258,7 +258,7 @@ def _what(event: dict[str, Any], unit: LengthUnit) -> str:
     match event["kind"]:
         case "assessment":
             found = event["predicted_displacement_in"]
-            worst = "" if found is None else in_unit(f", worst case {found:.4f} in", unit)
+            worst = "" if found is None else f", worst case {Length(found).said_in(unit)}"
             return f"assessed {event['verdict']}{worst}"
         case "repair":
             return f"restored {joint_list(event['joints'])}"

@@ -29,7 +29,7 @@ from mlg_troubleshoot.paper.study import (
     StudyResult,
 )
 from mlg_troubleshoot.paper.targets import targets_file
-from mlg_troubleshoot.units import LengthUnit
+from mlg_troubleshoot.units import Length, LengthUnit, Sentence
 from mlg_troubleshoot.workflows import study as task
 
 _BAR = 16
@@ -178,16 +178,22 @@ def _show(findings: StudyFindings, unit: LengthUnit) -> None:
         gap = (
             "could not be proved"
             if math.isinf(proved.bound_in)
-            else f"proved ≤ {proved.bound_in:.6f} in"
+            else Sentence.of("proved ≤ {}", Length(proved.bound_in, 6))
         )
         console.sentence(
-            f"Worst {sense} with every clearance at its limit: {proved.found_in:.6f} in, {gap} over"
-            f" all directions and the whole stroke (sequential rule {found.sequential_in:.6f} in,"
-            f" global search {found.searched_in:.6f} in)."
+            Sentence.of(
+                "Worst {} with every clearance at its limit: {}, {} over all directions and the"
+                " whole stroke (sequential rule {}, global search {}).",
+                sense,
+                Length(proved.found_in, 6),
+                gap,
+                Length(found.sequential_in, 6),
+                Length(found.searched_in, 6),
+            )
         )
     for statement in findings.statements:
         console.print()
-        console.sentence(statement.paragraph)
+        console.print(statement.paragraph)
 
 
 def _joints(gear: Gear, result: StudyResult) -> Table:

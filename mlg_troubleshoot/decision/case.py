@@ -25,6 +25,7 @@ from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.directions import chance_beyond
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.units import Length, Sentence
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,9 +137,12 @@ def _disagreement(inspection: Inspection, margin_in: float) -> str:
     far = [reading for reading in inspection.readings_in if abs(reading) > beyond]
     if mean is None or not far or abs(mean) > margin_in:
         return ""
-    return (
-        f"the plunger readings disagree: {far[0]:.4f} in is outside the margin of {margin_in:.4f}"
-        f" in, their mean of {mean:.4f} in is not. Read the plunger again."
+    return Sentence.of(
+        "the plunger readings disagree: {} is outside the margin of {}, their mean of {} is not."
+        " Read the plunger again.",
+        Length(far[0]),
+        Length(margin_in),
+        Length(mean),
     )
 
 

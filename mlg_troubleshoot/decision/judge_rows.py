@@ -38,6 +38,7 @@ from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import verdict
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
+from mlg_troubleshoot.units import Length, Sentence
 
 # Rows judged at once: bounds the memory. [1]
 _CHUNK = 1024
@@ -187,9 +188,11 @@ def _assessment(
     )
 
 
-_PROVISIONAL = (
-    f"provisional, the larger of {PROVISIONAL_U_IN:g} in and {100 * PROVISIONAL_U_SHARE:.0f} % of"
-    " the prediction; a single published failure is too little to estimate it"
+_PROVISIONAL = Sentence.of(
+    "provisional, the larger of {} and {} % of the prediction; a single published failure is too"
+    " little to estimate it",
+    Length.brief(PROVISIONAL_U_IN),
+    f"{100 * PROVISIONAL_U_SHARE:.0f}",
 )
 
 
@@ -246,8 +249,12 @@ def _headline(cases: Cases, judged: Judged, i: int) -> str:
         explained = sentences.explained(
             float(plunger.explained_at_most_in[i]), float(plunger.unexplained_in[i])
         )
-        then = f"{explained} Predicted: {said}." if closes else sentences.NO_CLOSURE
-        return f"{sentences.measured(mean, margin, 'outside')} {then}"
+        then = (
+            Sentence.of("{} Predicted: {}.", explained, said.words)
+            if closes
+            else sentences.NO_CLOSURE
+        )
+        return Sentence.joined([sentences.measured(mean, margin, "outside"), then])
     if not closes:
         return sentences.NO_CLOSURE
     if found is Verdict.INCOMPLETE:
@@ -286,9 +293,14 @@ def _warnings(
             " predicted without it."
         )
     warnings += [
-        f"Joint #{finding.joint} {finding.name}: {finding.clearance_in:.4f} in radial is above its"
-        f" limit of {finding.limit_in:.4f} in ({gear.joint(finding.joint).limit.kind}): reject to"
-        " the manual."
+        Sentence.of(
+            "Joint #{} {}: {} radial is above its limit of {} ({}): reject to the manual.",
+            finding.joint,
+            finding.name,
+            Length(finding.clearance_in),
+            Length(finding.limit_in),
+            gear.joint(finding.joint).limit.kind,
+        )
         for finding in findings
         if finding.over_limit and finding.clearance_in is not None
     ]
@@ -296,8 +308,12 @@ def _warnings(
     low, high = gear.down_lock_range
     if down_lock is not None and not low <= down_lock <= high:
         warnings.append(
-            f"Plunger at Down Lock {down_lock:.4f} in is outside {low:.2f} to {high:.2f} in: check"
-            " the rigging first."
+            Sentence.of(
+                "Plunger at Down Lock {} is outside {} to {}: check the rigging first.",
+                Length(down_lock),
+                Length(low, 2, named=False),
+                Length(high, 2),
+            )
         )
     if not np.all(np.isfinite(worst_in)):
         warnings.append(
@@ -315,8 +331,10 @@ def _warnings(
             warnings.append(differs)
     if inspection.gauge_u_is_default:
         warnings.append(
-            f"Standard uncertainty of the gauge not stated: {inspection.gauge_u_in:.5f} in radial"
-            " taken as the default."
+            Sentence.of(
+                "Standard uncertainty of the gauge not stated: {} radial taken as the default.",
+                Length(inspection.gauge_u_in, 5),
+            )
         )
     if inspection.outcome is Outcome.FAILED and inspection.measured_displacement_in is None:
         warnings.append(

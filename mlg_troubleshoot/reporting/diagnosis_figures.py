@@ -11,6 +11,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.decision.columns import AXIAL_FLOAT, CLEARANCE, COVARIATES
 from mlg_troubleshoot.diagnosis import Candidate, Diagnosis
 from mlg_troubleshoot.diagnosis.table import ALONG
 from mlg_troubleshoot.reporting.diagnosis_lines import column_words
@@ -22,10 +23,11 @@ Texts = NDArray[np.str_]
 
 # Width and height of one plot of two side by side. [canvas units]
 _PLOT = (335, 236)
+_BAR, _BAR_HIGH = 150, 10
 _BINS = 8
 _FEWEST_IN_A_BIN = 5
 MOST_TAILS = 36
-_UNITS = {"temperature_c": "°C", "hydraulic_pressure_psi": "psi", ALONG: "in"}
+_UNITS = {c.variable: "in" if c.is_length else c.unit for c in COVARIATES}
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ def against_cause(residuals: Residuals, candidate: Candidate, effect_in: Array) 
             marked_label=candidate.target or "",
         )
     for need in candidate.cause.needs:
-        if need == "axial_float" and table.axial_float_in is not None:
+        if need == AXIAL_FLOAT.variable and table.axial_float_in is not None:
             return _most_correlated_float(residuals, table.axial_float_in, effect_in)
         if need in table.quantities or need in table.factors:
             return against_column(residuals, need)
@@ -127,11 +129,11 @@ def against_column(residuals: Residuals, name: str) -> ResidualAxis:
         return ResidualAxis(column_words(name), groups=table.factors[name])
     kind, _, joint = name.rpartition("_")
     if joint.isdigit() and int(joint) in residuals.joints:
-        if kind == "clearance":
+        if kind == CLEARANCE.name:
             return ResidualAxis(
                 f"{column_words(name)}, {unit}", residuals.drawn(residuals.clearance(int(joint)))
             )
-        if kind == "axial_float" and table.axial_float_in is not None:
+        if kind == AXIAL_FLOAT.name and table.axial_float_in is not None:
             values = table.axial_float_in[:, residuals.joints.index(int(joint))]
             return ResidualAxis(f"{column_words(name)}, {unit}", residuals.drawn(values))
     return ResidualAxis(
@@ -335,4 +337,12 @@ def measured_against_predicted(residuals: Residuals) -> Markup:
             x = plot.area[0] + 6 + 62 * k
             _point(canvas, x, 10, after=is_after)
             canvas.text(x + 7, 13.5, label, size=10)
+    return canvas.svg()
+
+
+def probability_bar(chance: float) -> Markup:
+    """Draw a probability as a bar that fills its frame at certainty."""
+    canvas = Canvas(_BAR + 2, _BAR_HIGH + 2, f"probability {chance:.1%}")
+    canvas.rectangle(1, 1, _BAR, _BAR_HIGH, fill=PAPER, colour=SOFT, width=1)
+    canvas.rectangle(1, 1, _BAR * min(max(chance, 0.0), 1.0), _BAR_HIGH, fill=INK)
     return canvas.svg()

@@ -20,8 +20,9 @@ from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension, NamedCause
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.schemas import SCHEMA_VERSION
+from mlg_troubleshoot.units import Sentence
 
-_AS_THEY_ARE = frozenset((str, int, bool, type(None)))
+_AS_THEY_ARE = frozenset((str, Sentence, int, bool, type(None)))
 _SINGLE = (Enum, np.generic)
 _NUMBERS = (
     *(
@@ -213,9 +214,16 @@ def diagnosis_as_json(
         "misfit": chosen(d, "mean_in", "rms_in", "repeatability_in", "repeatability_source"),
         "verdict": d.verdict,
         "causes": [_cause(c) for c in d.causes],
-        "also_possible": [_possible(c.candidate) for c in d.also_possible],
-        "beside": [_possible(c.candidate) for c in d.beside],
+        "also_possible": [_rival(c) for c in d.also_possible],
+        "beside": [_rival(c) for c in d.beside],
+        **chosen(d, "p_nothing", "p_unlisted"),
+        "sure": plain(d.beliefs.sure),
+        "if_ten_times_likelier": [
+            {"cause": cause, "target": target, "probability_of_first": plain(chance)}
+            for (cause, target), chance in d.ten_times.items()
+        ],
         "unlisted_variables": list(d.unlisted_variables),
+        "unlisted_rms_in": plain(d.unlisted_rms_in),
         "not_testable": [
             {"cause": cause, "missing_column": column} for cause, column in d.not_testable
         ],
@@ -225,12 +233,11 @@ def diagnosis_as_json(
         "extension": None if extension is None else _extension(extension),
         "gain": _gain(d),
         "remainder": {
-            "p_value": plain(d.remainder_p),
+            "p_something_else": plain(d.p_left),
             "looks_like_noise": plain(d.remainder_is_noise),
             "rms_in": plain(d.residual_u_in),
             "expected_from_gauges_in": plain(d.expected_scatter_in),
         },
-        **chosen(d, "seed", "permutations"),
         "warnings": list(warnings),
     }
 
@@ -243,10 +250,14 @@ def _possible(candidate: Any) -> dict[str, Any]:
     return {**_named(candidate), "separating_reading": candidate.separates}
 
 
+def _rival(c: NamedCause) -> dict[str, Any]:
+    return {**_possible(c.candidate), "probability": plain(c.probability)}
+
+
 def _cause(c: NamedCause) -> dict[str, Any]:
     return {
         **_named(c.candidate),
-        **chosen(c, "effect_rms_in", "p_value", "parameters"),
+        **chosen(c, "effect_rms_in", "probability", "parameters"),
         "interval_95": plain(c.interval_shown),
         "aliases": [_possible(candidate) for candidate in c.aliases],
     }

@@ -12,8 +12,7 @@ from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.sentences import rigging_sentence
 from mlg_troubleshoot.errors import Problem
-from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.sources import SourceKind
+from mlg_troubleshoot.gear.gear import Gear, SourceKind
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.units import LengthUnit
 

@@ -17,6 +17,7 @@ from types import MappingProxyType
 from typing import Any
 
 from mlg_troubleshoot.cli.prompts.answers import MORE, NOT_MEASURED, Answers, JointAnswer
+from mlg_troubleshoot.decision.columns import MARGIN, PLUNGER_DISPLACEMENT
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
 from mlg_troubleshoot.store import Draft, Drafts, Store, own_file
@@ -231,7 +232,7 @@ def _joint_as_json(answer: JointAnswer) -> dict[str, Any] | None:
 
 def _from_json(raw: Any) -> Session:
     if raw["schema_version"] == 1:
-        lengths = {"plunger_displacement": raw["plunger_in"], "margin": raw["margin_in"]}
+        lengths = {PLUNGER_DISPLACEMENT.name: raw["plunger_in"], MARGIN.name: raw["margin_in"]}
         more = {
             "outcome": raw["outcome"],
             **{n: f"{float(v)!r} in" for n, v in lengths.items() if v is not None},
