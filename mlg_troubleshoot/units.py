@@ -42,6 +42,11 @@ class LengthUnit(StrEnum):
         """Decimals that show a length to about 0.0001 in."""
         return {"in": 4, "thou": 1, "mm": 3}[self.value]
 
+    @property
+    def spellings(self) -> tuple[str, ...]:
+        """How people write this unit, in lower case."""
+        return tuple(word for word, unit in UNIT_SPELLINGS.items() if unit is self)
+
     def to_inches(self, value: float) -> float:
         """A length in this unit, in inches. [in]"""
         return value / self.per_inch
@@ -223,7 +228,7 @@ class Sentence(str):
     be said in the unit of its reader.
     """
 
-    _template = "{}"
+    _template = ""
     _facts: tuple[object, ...] = ()
 
     @classmethod
@@ -239,9 +244,10 @@ class Sentence(str):
         return cls.of(between.join("{}" for _ in parts), *parts)
 
     def said_in(self, unit: LengthUnit) -> str:
-        facts = self._facts if self._facts else (str(self),)
-        template = self._template if self._facts else "{}"
-        return template.format(*(said_in(fact, unit) for fact in facts))
+        """Say it again, its lengths in another unit."""
+        if not self._facts:
+            return str(self)
+        return self._template.format(*(said_in(fact, unit) for fact in self._facts))
 
 
 def said_in(fact: object, unit: LengthUnit) -> str:

@@ -66,9 +66,8 @@ def diagnose(
     from mlg_troubleshoot.cli.views.notes import show_notes, show_problems
     from mlg_troubleshoot.diagnosis import EXTENSION
     from mlg_troubleshoot.diagnosis import write_extension as keep_extension
-    from mlg_troubleshoot.outputs import OutputFile
+    from mlg_troubleshoot.outputs import SCHEMA_VERSION, OutputFile
     from mlg_troubleshoot.reporting.json_form import diagnosis_as_json
-    from mlg_troubleshoot.schemas import SCHEMA_VERSION
     from mlg_troubleshoot.workflows import diagnose as task
 
     written = OutputFile("--write-extension", write_extension, EXTENSION)

@@ -9,7 +9,7 @@ import typer
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import ExitCode
 from mlg_troubleshoot.gear import DEFAULT_GEAR
-from mlg_troubleshoot.schemas import SCHEMA_VERSION
+from mlg_troubleshoot.outputs import SCHEMA_VERSION
 
 
 def doctor(

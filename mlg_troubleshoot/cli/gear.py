@@ -76,29 +76,24 @@ def _show(gear: Gear) -> None:
 
 
 def _as_json(gear: Gear) -> dict[str, object]:
-    from mlg_troubleshoot.reporting.json_form import chosen, plain
+    from mlg_troubleshoot.output_types import GearOutput, ShownJoint
+    from mlg_troubleshoot.reporting.json_form import written
 
-    told = ("name", "location", "limit", "new_part", "access", "area", "critical")
-    return {
-        **chosen(gear, "id", "name", "provenance", "geometry_sha256"),
-        "ensemble": [linkage.name for linkage in gear.ensemble],
-        "calibration_rate": gear.model.rate,
-        "margin": plain(gear.margin),
-        "release_stroke_in": gear.reference.stroke[1],
-        "joints": [
-            {
-                "joint": joint.number,
-                **chosen(joint, *told),
-                "acts_like": list(gear.alike[joint.number]),
-            }
+    return written(
+        GearOutput,
+        gear,
+        ensemble=[linkage.name for linkage in gear.ensemble],
+        calibration_rate=gear.model.rate,
+        release_stroke_in=gear.reference.stroke[1],
+        joints=[
+            written(ShownJoint, joint, joint=joint.number, acts_like=gear.alike[joint.number])
             for joint in gear.joints
         ],
-        "points": {
+        points={
             point.name: {"plane": point.plane, "at_in": [point.x, point.y], "fixed": point.fixed}
             for point in gear.reference.mechanism.points
         },
-        "numbers": plain(gear.numbers),
-    }
+    )
 
 
 def verify(
@@ -143,12 +138,9 @@ def verify(
 
 
 def _number(n: Computed) -> dict[str, object]:
-    from mlg_troubleshoot.reporting.json_form import chosen
+    from mlg_troubleshoot.output_types import VerifiedNumber
+    from mlg_troubleshoot.reporting.json_form import written
 
-    return {
-        **chosen(n.target, "quantity", "section", "printed"),
-        **chosen(n, "computed"),
-        **chosen(n.target, "unit", "tolerance"),
-        **chosen(n, "status", "holds"),
-        "should_hold": n.target.expected,
-    }
+    own = {"computed": n.computed, "status": n.status, "holds": n.holds}
+    said = {"tolerance": n.target.accepted, "should_hold": n.target.expected}
+    return written(VerifiedNumber, n.target, **own, **said)

@@ -99,7 +99,7 @@ def _show(found: Reconstruction, text: str, *, show_member: bool) -> None:
             each.target.quantity,
             each.target.printed,
             f"{each.computed:.5g} {each.target.unit}".strip(),
-            each.target.tolerance,
+            each.target.accepted,
             "met" if each.holds else "NOT MET",
             "binds" if each.binds else "slack",
         )

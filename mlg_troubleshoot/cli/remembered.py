@@ -8,21 +8,32 @@ for a header that is understood by itself. The file is data: it is checked stric
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
 
 from mlg_troubleshoot.cli.options import PaperSize
 from mlg_troubleshoot.cli.output import say
-from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.datafile import Table, decode, read_toml
+from mlg_troubleshoot.errors import GearFileError, UsageError
 from mlg_troubleshoot.units import LengthUnit
 
 NAME = "mlg.toml"
-_KEYS = ("show", "page", "headers")
-_MOST_BYTES, _MOST_HEADERS, _MOST_CHARACTERS = 65_536, 200, 200
+HeaderText = Annotated[str, Meta(max_length=200)]
 _TURNS_A_VERDICT = re.compile(r"unit|convention|side|margin|_(in|thou|mm)$", re.IGNORECASE)
+
+
+class SettingsFile(Table):
+    """What may stand in ``mlg.toml``."""
+
+    show: LengthUnit = LengthUnit.INCH
+    page: PaperSize = PaperSize.A4
+    headers: dict[HeaderText, HeaderText] = msgspec.field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,49 +107,26 @@ def _remember(
         "page": (page or known.page).value,
         "headers": {**known.headers, **headers},
     }
-    _judged(file, kept, gear)
+    _judged(file, decode(file, kept, SettingsFile), gear)
     write_text(file, tomli_w.dumps(kept))
     return file
 
 
 def _read(file: Path, gear: str) -> Settings:
-    if not file.is_file() or file.stat().st_size > _MOST_BYTES:
-        raise UsageError(
-            f"{file} is not a file of at most {_MOST_BYTES} bytes", "Delete it or write a new one."
-        )
     try:
-        raw = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
+        found = read_toml(file, SettingsFile).content
+    except GearFileError as error:
         raise UsageError(
-            f"{file} cannot be read as TOML: {str(error)[:200]}", "Correct or delete it."
+            error.message,
+            "Correct or delete it. Only show, page and headers are remembered; give the rest with"
+            " each run.",
         ) from error
-    return _judged(file, raw, gear)
+    return _judged(file, found, gear)
 
 
-def _judged(file: Path, raw: Mapping[str, object], gear: str) -> Settings:
-    """Check every key and value: what is remembered is data, and nothing in it may change a
-    verdict.
-    """
-    unknown = [key for key in raw if key not in _KEYS]
-    if unknown:
-        raise UsageError(
-            f"{file}: {unknown[0]!r} is never remembered",
-            f"Only {', '.join(_KEYS)} are; give the rest with each run.",
-        )
-    headers = raw.get("headers", {})
-    if not isinstance(headers, dict) or len(headers) > _MOST_HEADERS:
-        raise UsageError(
-            f"{file}: headers is not a table of at most {_MOST_HEADERS} entries",
-            "Correct or delete it.",
-        )
-    for header, column in headers.items():
-        texts = (header, column)
-        if not all(
-            isinstance(t, str) and len(t) <= _MOST_CHARACTERS and t.isprintable() for t in texts
-        ):
-            raise UsageError(
-                f"{file}: headers: {header!r} = {column!r} is not a text", "Correct or delete it."
-            )
+def _judged(file: Path, found: SettingsFile, gear: str) -> Settings:
+    """Nothing that is remembered may turn a verdict."""
+    for header, column in found.headers.items():
         if _TURNS_A_VERDICT.search(column):
             raise UsageError(
                 f"{file}: headers: {header!r} = {column!r} states a unit, convention, side or"
@@ -146,17 +134,8 @@ def _judged(file: Path, raw: Mapping[str, object], gear: str) -> Settings:
                 "Remember the column without its unit, as clearance_3, and give --unit with each"
                 " run.",
             )
-    _refuse_understood(file, headers, gear)
-    try:
-        return Settings(
-            LengthUnit(str(raw.get("show", "in"))),
-            PaperSize(str(raw.get("page", "A4"))),
-            dict(headers),
-        )
-    except ValueError as error:
-        raise UsageError(
-            f"{file}: {error}", "show is in, thou or mm; page is A4 or Letter."
-        ) from None
+    _refuse_understood(file, found.headers, gear)
+    return Settings(found.show, found.page, found.headers)
 
 
 def _refuse_understood(file: Path, headers: Mapping[str, str], gear: str) -> None:

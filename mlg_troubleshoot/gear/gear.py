@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, frozen
+from mlg_troubleshoot.datafile import Table, Whole
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.model import Calibration, LinkageModel
 from mlg_troubleshoot.geometry.mechanism import Mechanism
@@ -31,13 +32,11 @@ class SourceKind(StrEnum):
     ASSUMED = "assumed"
 
 
-@dataclass(frozen=True, slots=True)
-class Source:
+class Source(Table):
     """A source in words, which numbers of a gear file refer to by name: document, section, how it
     was obtained.
     """
 
-    name: str
     kind: SourceKind
     text: str
 
@@ -72,18 +71,16 @@ class Area:
     access: Sourced
 
 
-@dataclass(frozen=True, slots=True)
-class TiltedLink:
+class TiltedLink(Table):
     """A link whose projected length shrinks when end float of its joints (of a lever: of its pivot)
     lets it tilt.
     """
 
     length: str
-    floats: tuple[int, ...]
+    floats: tuple[Whole, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Discrepancies:
+class Discrepancies(Table):
     """Where inside the linkage physical causes outside the plain model act.
 
     elastic: lengths that hydraulic load stretches.
@@ -94,7 +91,7 @@ class Discrepancies:
 
     elastic: tuple[str, ...] = ()
     wear_shift: str | None = None
-    contact: tuple[tuple[int, int], ...] = ()
+    contact: tuple[tuple[Whole, Whole], ...] = ()
     tilt: tuple[TiltedLink, ...] = ()
 
 
@@ -131,8 +128,7 @@ class JointSpec:
         return f"#{self.number} {self.name}"
 
 
-@dataclass(frozen=True, slots=True)
-class Stage:
+class Stage(Table):
     """One of the four stages of the cycle, with the position of the plunger in it: in, mid or
     out.
     """
@@ -142,8 +138,7 @@ class Stage:
     plunger: str
 
 
-@dataclass(frozen=True, slots=True)
-class ValveState:
+class ValveState(Table):
     """What follows from a position of the plunger and a direction of the oil flow; it may be "not
     stated".
     """
@@ -154,8 +149,7 @@ class ValveState:
     result: str
 
 
-@dataclass(frozen=True, slots=True)
-class RetractionCycle:
+class RetractionCycle(Table):
     """Steps of the release, order of doors and gear, valve combinations, and what a misplaced
     plunger means.
     """

@@ -94,9 +94,7 @@ def check_statements(
 
 
 def _evidence(t: Target, values: tuple[float, ...]) -> ClaimEvidence:
-    return ClaimEvidence(
-        t.quantity, t.tolerance, t.unit, values, tuple(map(t.holds, values)), t.why
-    )
+    return ClaimEvidence(t.quantity, t.accepted, t.unit, values, tuple(map(t.holds, values)), t.why)
 
 
 def _outcome(evidence: tuple[ClaimEvidence, ...], *, by_reading: bool) -> ClaimOutcome:

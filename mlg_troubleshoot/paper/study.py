@@ -24,7 +24,13 @@ from mlg_troubleshoot.indices.displacement import (
     worst_sense,
 )
 from mlg_troubleshoot.indices.estimators import GroupIndices, Indices, group_indices, student_half
-from mlg_troubleshoot.indices.index_table import IndexTable, JointIndices, rank_ranges, ranks
+from mlg_troubleshoot.indices.index_table import (
+    IndexTable,
+    JointIndices,
+    TableGear,
+    rank_ranges,
+    ranks,
+)
 from mlg_troubleshoot.indices.inputs import (
     Inputs,
     beyond_margin,
@@ -33,6 +39,7 @@ from mlg_troubleshoot.indices.inputs import (
 )
 from mlg_troubleshoot.indices.saltelli import fast_indices, saltelli_indices
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
+from mlg_troubleshoot.outputs import SCHEMA_VERSION
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.paper.replicated import PaperDesign, ReplicatedIndices
@@ -407,10 +414,8 @@ def _table(
         for i, joint in enumerate(gear.joints)
     )
     return IndexTable(
-        gear_id=gear.id,
-        geometry_sha256=gear.geometry_sha256,
-        ensemble_sha256=gear.ensemble_sha256,
-        provenance=gear.provenance,
+        schema_version=SCHEMA_VERSION,
+        gear=TableGear(gear.id, gear.geometry_sha256, gear.ensemble_sha256, gear.provenance),
         seed=options.seed,
         design=reference.design,
         evaluations=sum(each.evaluations for each in found),

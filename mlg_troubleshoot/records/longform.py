@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from mlg_troubleshoot.decision.columns import JOINT, RECORD_ID, Column
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
-from mlg_troubleshoot.records.cells import Cell, OddCell, column_letters, quote, show
+from mlg_troubleshoot.records.cells import Cell, OddCell, column_letters, quote, show, stored
 from mlg_troubleshoot.records.headers import tidy
 from mlg_troubleshoot.records.model import TableInHand
 from mlg_troubleshoot.records.rows import PlacedField, RowReader
@@ -130,6 +130,7 @@ class LongReader:
                 self._fault(group, (p, row, reading), "joint_twice", expected, remedy)
 
     def _joint_number(self, cell: Cell) -> int | None:
+        cell = stored(cell)
         if cell is None or isinstance(cell, OddCell):
             return None
         if isinstance(cell, float):

@@ -28,6 +28,7 @@ from mlg_troubleshoot.decision.columns import (
     STROKE,
     UNIT,
     Column,
+    Holds,
 )
 from mlg_troubleshoot.decision.inspection import (
     DEFAULT_GAUGE_U_IN,
@@ -36,7 +37,15 @@ from mlg_troubleshoot.decision.inspection import (
     InvalidRow,
     RowSource,
 )
-from mlg_troubleshoot.records.cells import Cell, OddCell, column_letters, quote, show, writable
+from mlg_troubleshoot.records.cells import (
+    Cell,
+    OddCell,
+    column_letters,
+    quote,
+    show,
+    stored,
+    writable,
+)
 from mlg_troubleshoot.records.dates import DateOrder, readings
 from mlg_troubleshoot.records.headers import Field
 from mlg_troubleshoot.records.model import TableInHand
@@ -175,6 +184,12 @@ class RowReader:
             p
             for p in placed
             if p.field is None and not (p.refused or p.is_mapped or re.search(r"\d", p.header))
+        ]
+        # What a number format adds counts where a unit does.
+        self._plain = [
+            p.index
+            for p in placed
+            if p.field is None or p.field.column.holds not in (Holds.LENGTH, Holds.NUMBER)
         ]
         self._blankable = [index for index, field in good if field.column.blank_by_word]
         self.not_measured: Counter[str] = Counter()
@@ -401,6 +416,8 @@ class RowReader:
         measured.
         """
         cells = [*cells, *[None] * (self._width - len(cells))]
+        for index in self._plain:
+            cells[index] = stored(cells[index])
         for index in self._blankable:
             cell = cells[index]
             if cell.__class__ is str and cell.strip().casefold() in NOT_MEASURED:

@@ -19,7 +19,7 @@ from openpyxl.worksheet.worksheet import Worksheet
 from mlg_troubleshoot.decision.columns import Column, Holds
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.outputs import write_csv
-from mlg_troubleshoot.records.cells import Cell, column_letters, quote
+from mlg_troubleshoot.records.cells import Cell, column_letters, quote, stored
 from mlg_troubleshoot.records.model import ReadOptions
 from mlg_troubleshoot.records.read import load_bytes, open_book
 from mlg_troubleshoot.records.refusals import FileRefusedError
@@ -49,6 +49,7 @@ _HEADER_WITHIN = 30
 _KINDS = {kind: kind for kind in ReadingKind if kind not in (ReadingKind.TRAVEL, ReadingKind.ORDER)}
 # No linkage of a landing gear is longer than this; angles are read within one turn.
 _LONGEST_IN, _WIDEST_DEG = 500.0, 360.0
+_DEGREES = ("°", "deg", "degrees")
 _HOW = {
     ReadingKind.DISTANCE: (
         "Pin centre to pin centre: over the outside of both pins, less half of each diameter."
@@ -288,13 +289,17 @@ class _Rows:
         if unit == "deg":
             low, most = (-_WIDEST_DEG, _WIDEST_DEG) if signed else (0.0, _WIDEST_DEG)
             expected = f"an angle from {low:g} to {most:g} degrees"
-            value = float(np.radians(self._number(cell, low, most, expected)))
+            value = float(np.radians(self._number(cell, low, most, expected, _DEGREES)))
         else:
             length = LengthUnit.parse(unit)
             most = length.from_inches(_LONGEST_IN)
             value = length.to_inches(
                 self._number(
-                    cell, -most if signed else 0.0, most, f"a length up to {most:g} {unit}"
+                    cell,
+                    -most if signed else 0.0,
+                    most,
+                    f"a length up to {most:g} {unit}",
+                    length.spellings,
                 )
             )
         remedy = "Read it again, or leave it blank."
@@ -313,20 +318,32 @@ class _Rows:
                 expected = "one extension, in the unit of the input"
                 self._require(one, self.column, expected, "Leave one.", "extension_columns")
                 read = self._number(
-                    row[self.column], 0.0, most, f"an extension from 0 to {most:.4g}"
+                    row[self.column],
+                    0.0,
+                    most,
+                    f"an extension from 0 to {most:.4g}",
+                    unit.spellings,
                 )
                 extension = unit.to_inches(read)
         return extension
 
-    def _number(self, cell: Cell, low: float, most: float, expected: str) -> float:
+    def _number(
+        self, cell: Cell, low: float, most: float, expected: str, units: tuple[str, ...]
+    ) -> float:
+        """Read a number, which may be followed by the unit of its column."""
         return read_number(
-            "" if cell is None else cell, low, most, decimal_comma=self.comma, expected=expected
+            "" if cell is None else cell,
+            low,
+            most,
+            decimal_comma=self.comma,
+            expected=expected,
+            units=units,
         )
 
     def _ends(self, kind: ReadingKind, row: Mapping[str, Cell]) -> tuple[str, str]:
         texts = []
         for column in ("from", "to"):
-            cell = row.get(column)
+            cell = stored(row.get(column))
             self.column = column
             # A spreadsheet takes the point 4 for a number.
             texts.append(

@@ -131,7 +131,7 @@ def odd_cell_fault(cell: OddCell, expected: str) -> CellFaultError:
 def _number_of(cell: float | OddCell, expected: str) -> float:
     if isinstance(cell, float):
         return cell
-    if cell.kind is not OddKind.PADDED or cell.number is None:
+    if cell.kind not in (OddKind.PADDED, OddKind.WORDED) or cell.number is None:
         raise odd_cell_fault(cell, expected)
     return cell.number
 
@@ -157,18 +157,22 @@ def read_length(
         value, written = _written_length(text, decimal_comma, expected, unit)
     else:
         text, value, written = show(cell), _number_of(cell, expected), None
+        if isinstance(cell, OddCell) and cell.kind is OddKind.WORDED:
+            _, written = _written_length(cell.text, False, expected, unit)
     if not math.isfinite(value):
         raise CellFaultError("not_finite", expected)
     if value < 0 and not signed:
         raise CellFaultError("length_negative", expected)
     if written is not None and unit is not None and written is not unit:
         same = f"{unit.from_inches(written.to_inches(value)):.6g}"
+        who, plain = "cell", "enter the number without a unit"
+        if not isinstance(cell, str):
+            who, plain = "number format of the cell", "format the cell as a plain number"
         raise CellFaultError(
             "unit_contradiction",
             f"{expected}, in the unit of the column ({unit.value})",
-            f"The cell says {written.value}, the column says {unit.value}. If the cell is right,"
-            f" enter {same} ({unit.value}); if the column is right, enter the number without a"
-            " unit.",
+            f"The {who} says {written.value}, the column says {unit.value}. If the cell is right,"
+            f" enter {same} ({unit.value}); if the column is right, {plain}.",
         )
     found = written or unit or declared
     if found is None:
@@ -232,7 +236,7 @@ def read_value(
             column.high,
             decimal_comma=decimal_comma,
             expected=column.asked,
-            suffix=column.unit.lstrip("°"),
+            units=tuple(filter(None, (column.unit.lstrip("°").lower(),))),
         )
     if column.holds is Holds.YES_NO:
         return _read_yes_no(cell)
@@ -253,12 +257,14 @@ def read_number(
     *,
     decimal_comma: bool,
     expected: str,
-    suffix: str = "",
+    units: tuple[str, ...] = (),
 ) -> float:
     if isinstance(cell, str):
-        value = _written_number(plain_text(cell), decimal_comma, expected, suffix)
+        value = _written_number(plain_text(cell), decimal_comma, expected, units)
     else:
         value = _number_of(cell, expected)
+        if isinstance(cell, OddCell) and cell.kind is OddKind.WORDED:
+            _written_number(cell.text, False, expected, units)
     if not math.isfinite(value):
         raise CellFaultError("not_finite", expected)
     if not low <= value <= high:
@@ -266,9 +272,11 @@ def read_number(
     return value
 
 
-def _written_number(text: str, decimal_comma: bool, expected: str, suffix: str) -> float:
-    if suffix and text.lower().endswith(suffix.lower()):
-        text = text[: -len(suffix)].rstrip().rstrip("°").rstrip()
+def _written_number(text: str, decimal_comma: bool, expected: str, units: tuple[str, ...]) -> float:
+    for unit in units:
+        if text.lower().endswith(unit):
+            text = text[: -len(unit)].rstrip().rstrip("°").rstrip()
+            break
     sign = _SIGNED.match(text)
     if sign is not None:
         text = ("" if sign[1] == "+" else "-") + text[sign.end() :]

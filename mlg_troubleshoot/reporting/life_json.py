@@ -12,7 +12,7 @@ from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.looking_back import Advice
 from mlg_troubleshoot.life.outlook import FleetLine, LandingsLeft, fleet_lines, quantiles
 from mlg_troubleshoot.life.wear_paths import stretches
-from mlg_troubleshoot.schemas import SCHEMA_VERSION
+from mlg_troubleshoot.outputs import SCHEMA_VERSION
 from mlg_troubleshoot.store import Record, RecordKind
 
 

@@ -4,11 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
+import msgspec
+
 from mlg_troubleshoot.indices.given_data import GivenDataResult
+from mlg_troubleshoot.output_types import (
+    MetTarget,
+    ReconstructOutput,
+    StudiedAmplification,
+    StudiedBound,
+    StudiedStatement,
+)
+from mlg_troubleshoot.outputs import SCHEMA_VERSION
 from mlg_troubleshoot.paper.reconstruct import Reconstruction
 from mlg_troubleshoot.paper.study import StudyFindings
-from mlg_troubleshoot.reporting.json_form import chosen, plain
-from mlg_troubleshoot.schemas import SCHEMA_VERSION
+from mlg_troubleshoot.reporting.json_form import plain, written
 from mlg_troubleshoot.surveying.result import SurveyResult
 
 
@@ -17,7 +26,7 @@ def study_as_json(findings: StudyFindings, given: GivenDataResult | None = None)
     result, options = findings.result, findings.options
     growth = result.growth
     values = {
-        **result.table.as_dict(),
+        **msgspec.to_builtins(result.table),
         "directions": str(options.directions),
         "distribution": options.distribution,
         "of": "exceeding the margin" if options.beyond_margin else "displacement",
@@ -30,21 +39,17 @@ def study_as_json(findings: StudyFindings, given: GivenDataResult | None = None)
         "second_order": result.indices.second_order,
         "groups": result.groups,
         "ensemble": [linkage.name for linkage in findings.gear.ensemble],
-        "amplification": {
-            **chosen(growth, "local_stage", "max_stage", "local_plunger", "max_plunger"),
-            "exact_plunger": growth.exact,
-        },
-        "statements": [
-            {**plain(statement), "paragraph": statement.paragraph}
-            for statement in findings.statements
-        ],
+        "amplification": written(StudiedAmplification, growth, exact_plunger=growth.exact),
+        "statements": [written(StudiedStatement, statement) for statement in findings.statements],
         "bounds": [
-            {
-                "sense": "over-travel" if found.sense > 0 else "under-travel",
-                **chosen(found, "sequential_in", "searched_in"),
-                **chosen(found.proved, "found_in", "bound_in", "stroke_in"),
-                "directions_rad": found.proved.directions,
-            }
+            written(
+                StudiedBound,
+                found.proved,
+                sense="over-travel" if found.sense > 0 else "under-travel",
+                sequential_in=found.sequential_in,
+                searched_in=found.searched_in,
+                directions_rad=found.proved.directions,
+            )
             for found in findings.searches
         ],
     }
@@ -52,7 +57,9 @@ def study_as_json(findings: StudyFindings, given: GivenDataResult | None = None)
         found = given.indices
         lists = (found.first_order.tolist(), found.interval.tolist(), found.rows.tolist())
         values["given_data"] = {
-            **chosen(given, "file", "rows_read", "rows_used"),
+            "file": given.file,
+            "rows_read": given.rows_read,
+            "rows_used": given.rows_used,
             "joints": [
                 {"joint": number, "first_order": first, "first_order_interval": ends, "rows": rows}
                 for number, first, ends, rows in zip(
@@ -126,20 +133,23 @@ def survey_as_json(result: SurveyResult) -> dict[str, Any]:
 
 
 def reconstruction_as_json(found: Reconstruction, text: str) -> dict[str, object]:
-    return {
-        "schema_version": SCHEMA_VERSION,
-        "seed": found.seed,
-        "linkages_tried": found.evaluations,
-        **chosen(found, "meets_all", "numbers", "determined"),
-        "free": found.numbers - found.determined,
-        "loosest": [{"number": name, "free_part": part} for name, part in found.loosest],
-        "targets": [
-            {
-                **chosen(each.target, "quantity", "printed", "unit"),
-                "accepted": each.target.tolerance,
-                **chosen(each, "computed", "holds", "binds"),
-            }
+    return written(
+        ReconstructOutput,
+        found,
+        schema_version=SCHEMA_VERSION,
+        linkages_tried=found.evaluations,
+        free=found.numbers - found.determined,
+        loosest=[{"number": name, "free_part": part} for name, part in found.loosest],
+        targets=[
+            written(
+                MetTarget,
+                each,
+                quantity=each.target.quantity,
+                printed=each.target.printed,
+                unit=each.target.unit,
+                accepted=each.target.accepted,
+            )
             for each in found.met
         ],
-        "member_toml": text,
-    }
+        member_toml=text,
+    )

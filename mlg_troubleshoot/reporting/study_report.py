@@ -43,7 +43,7 @@ def study_document(
 ) -> Document:
     options = findings.options
     asked = repr(replace(options, scheduler=None, state=None, workers=1))
-    mark = sha256(f"{findings.result.table.geometry_sha256} {asked}".encode()).hexdigest()[:8]
+    mark = sha256(f"{findings.result.table.gear.geometry_sha256} {asked}".encode()).hexdigest()[:8]
     stem = safe_stem("study", findings.gear.id, options.design, f"seed {options.seed}", mark)
     return Document("study.html.j2", _context(findings, provenance, Lengths(unit)), stem)
 

@@ -15,7 +15,7 @@ from mlg_troubleshoot.datafile import LONGEST_NAME, is_name, read_toml
 from mlg_troubleshoot.errors import GearFileError, MechanismError, UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.gear.gear_file import GearFile, load_gear
 from mlg_troubleshoot.indices.index_table import INDEX_TABLE, write_index_table
 from mlg_troubleshoot.outputs import OutputFile, OutputKind, claim_outputs, write_text
 from mlg_troubleshoot.paper.targets import targets_file
@@ -184,7 +184,7 @@ def _write_gear(gear: Gear, found: Survey, path: Path, source: str) -> Path:
 
     ensemble, indices = _beside(path)
     names = {"id": path.stem, "ensemble": ensemble.name, "indices": indices.name}
-    values = {**surveyed_values(read_toml(gear.path).values, found, source), **names}
+    values = {**surveyed_values(read_toml(gear.path, GearFile).values, found, source), **names}
     values["provenance"] = f"surveyed ({len(found.read)} readings, {source})"
     drawn = {
         "source": f"Drawn from the posterior of survey {source}.",

@@ -127,7 +127,7 @@ def test_the_gear_file_is_a_gear_with_its_table_and_says_that_it_was_surveyed(
     gear = load_gear(surveyed[0])
     assert "surveyed" in gear.provenance
     assert len(gear.ensemble) == 12
-    assert load_index_table(gear).gear_id == "mine"
+    assert load_index_table(gear).gear.id == "mine"
     lengths = {frozenset(p[:2]): p[2] for p in GOOD if p[3] == ""}
     m = gear.reference.mechanism
     for pair, length in lengths.items():
@@ -202,6 +202,30 @@ def test_a_bad_cell_is_named_and_its_row_not_used(
     (problem,) = run.json["problems"]
     assert (problem["cell"], problem["row"]) == (cell, 2)
     assert expected in problem["expected"]
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "code", "problems"),
+    [
+        ("D", 3.0, '0.00" mm"', ["not_a_number"]),
+        ("D", 3.0, '0.00" in"', []),
+        ("D", 3.0, '0.00\\"', []),
+        ("F", 30.0, '0.0"°"', []),
+        ("F", 30.0, '0.0" rad"', ["not_a_number"]),
+    ],
+)
+def test_a_unit_that_a_number_format_shows_is_that_of_the_column(
+    tmp_path: Path, column: str, value: float, code: str, problems: list[str]
+) -> None:
+    book = openpyxl.Workbook()
+    sheet = book.worksheets[0]
+    sheet.append(["kind", "from", "to", "value_in", "value_mm", "value_deg"])
+    sheet.append(["DISTANCE", "O2", "A"] if column == "D" else ["PLUNGER"])
+    sheet[f"{column}2"] = value
+    sheet[f"{column}2"].number_format = code
+    book.save(tmp_path / "s.xlsx")
+    found = survey(tmp_path / "s.xlsx", "--json").json["problems"]
+    assert [problem["code"] for problem in found] == problems
 
 
 def test_a_table_without_its_header_is_refused_with_what_to_use(tmp_path: Path) -> None:
