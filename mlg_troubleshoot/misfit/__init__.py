@@ -24,7 +24,6 @@ __all__ = [
     "fitting",
     "held_out",
     "posterior",
-    "screen",
     "search",
     "verdict",
 ]
