@@ -20,7 +20,7 @@ from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, Rows, build_noise
 from mlg_troubleshoot.gear.model import LinkageModel
-from mlg_troubleshoot.misfit import MisfitVerdict as Verdict
+from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.explanation import Context, Effects, Explanation, Key
