@@ -21,7 +21,7 @@ from mlg_troubleshoot.decision.assessment import (
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.decision.plan import Basis, End, Step
 from mlg_troubleshoot.errors import Problem
-from mlg_troubleshoot.gear.sources import Sourced
+from mlg_troubleshoot.gear.gear import Sourced
 
 Version = Literal[1]
 Probability = Annotated[float, Meta(ge=0, le=1)]
@@ -172,11 +172,26 @@ class PossibleCause(TargetedCause):
     separating_reading: str
 
 
+class RivalCause(PossibleCause):
+    """A cause of which something may act, and how probable that is."""
+
+    probability: Probability
+
+
+class LikelierRival(TargetedCause):
+    """How likely the likeliest cause would be if this rival were ten times as likely beforehand."""
+
+    probability_of_first: Probability
+
+
 class NamedCauseOutput(TargetedCause):
-    """A cause that the data name; aliases: what these rows cannot tell from it."""
+    """A cause that the data name; aliases: what these rows cannot distinguish from it.
+
+    probability: that something of this name acts, its aliases counted with it.
+    """
 
     effect_rms_in: Size
-    p_value: Probability | None
+    probability: Probability
     parameters: dict[str, float]
     interval_95: dict[str, Interval]
     aliases: list[PossibleCause]
@@ -223,7 +238,7 @@ class ExtensionGain(TypedDict):
 class Remainder(TypedDict):
     """What no named cause explains."""
 
-    p_value: Probability
+    p_something_else: Probability
     looks_like_noise: bool
     rms_in: Size
     expected_from_gauges_in: Size | None
@@ -232,10 +247,12 @@ class Remainder(TypedDict):
 class DiagnoseOutput(TypedDict):
     """Output of mlg diagnose --json.
 
-    causes: NAMED: by effect; else empty. also_possible: AMBIGUOUS: the whole set that the data
-    cannot separate; else empty. beside: NAMED: causes of which one or more act in addition to what
-    is named; the data cannot tell which. cannot_say: statements that so few rows or aircraft cannot
-    carry.
+    causes: NAMED: by effect; else empty. also_possible: AMBIGUOUS: causes of which something acts,
+    the likeliest first; else empty. beside: NAMED: causes of which one or more act in addition to
+    what is named; the data cannot tell which. p_nothing, p_unlisted: probability that nothing is
+    wrong, and that something is wrong that no list has. sure: probability from which a cause is
+    named. unlisted_rms_in: UNLISTED: root mean square of that effect; else 0. cannot_say:
+    statements that so few rows or aircraft cannot carry.
     """
 
     schema_version: Version
@@ -244,9 +261,14 @@ class DiagnoseOutput(TypedDict):
     misfit: MisfitSize
     verdict: Literal["NONE", "NAMED", "AMBIGUOUS", "UNLISTED"]
     causes: list[NamedCauseOutput]
-    also_possible: list[PossibleCause]
-    beside: list[PossibleCause]
+    also_possible: list[RivalCause]
+    beside: list[RivalCause]
+    p_nothing: Probability
+    p_unlisted: Probability
+    sure: Probability
+    if_ten_times_likelier: Annotated[list[LikelierRival], Meta(max_length=1)]
     unlisted_variables: list[str]
+    unlisted_rms_in: Size
     not_testable: list[NotTestable]
     cannot_say: list[str]
     ruled_out: list[TargetedCause]
@@ -254,8 +276,6 @@ class DiagnoseOutput(TypedDict):
     extension: FittedExtension | None
     gain: ExtensionGain
     remainder: Remainder
-    seed: Count
-    permutations: Count
     warnings: list[str]
 
 

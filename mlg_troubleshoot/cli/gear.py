@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from mlg_troubleshoot.cli import options, output
+from mlg_troubleshoot.errors import ExitCode
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ def show(
     as_json: options.Json = False,
     _version: options.Version = False,
 ) -> None:
-    """Show which model is in use: identity, provenance, joints, coordinates, retraction cycle."""
+    """Show the model in use: identity, provenance, joints, coordinates, retraction cycle."""
     from mlg_troubleshoot.gear.gear_file import load_gear
 
     context.obj = gear
@@ -109,7 +110,7 @@ def verify(
     failed = [n for n in numbers if n.target.expected and not n.holds]
     if as_json:
         output.write_json({"gear": gear.id, "numbers": [_number(n) for n in numbers]})
-        raise typer.Exit(1 if failed else 0)
+        raise typer.Exit(ExitCode.ATTENTION if failed else ExitCode.FINE)
     console = output.console()
     console.print(f"{gear.name}: geometry {gear.provenance}", style="bold")
     table = output.plain_table(None)
@@ -133,7 +134,7 @@ def verify(
         else f"required values that do not hold: {len(failed)}"
     )
     console.print(f"{len(numbers)} numbers: {verdict}.")
-    raise typer.Exit(1 if failed else 0)
+    raise typer.Exit(ExitCode.ATTENTION if failed else ExitCode.FINE)
 
 
 def _number(n: Computed) -> dict[str, object]:

@@ -11,9 +11,9 @@ import typer
 from typer.core import TyperGroup
 
 from mlg_troubleshoot.cli import options, output
-from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.errors import ExitCode, UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
-from mlg_troubleshoot.units import LengthUnit, in_unit
+from mlg_troubleshoot.units import Length, LengthUnit
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.cli.remembered import Settings
@@ -29,14 +29,13 @@ EPILOG = (
     " 2026-05-04[/b] · [b]mlg history verify[/b]"
 )
 _SHOW = "show"
-BROKEN = 1
 
 Place = Annotated[
     str | None,
     typer.Option(
         "--store",
         metavar="PATH|URL",
-        help="Where it is kept; else MLG_STORE, else a file of your own.",
+        help="Store of the records; else MLG_STORE, else a file of your own.",
     ),
 ]
 Tail = Annotated[str, typer.Argument(metavar="TAIL", help="Tail number.")]
@@ -249,7 +248,7 @@ def _show_joints(
     unread = [f"#{joint['joint']}" for joint in joints if not joint["readings"]]
     if unread:
         console.print(
-            f"Not read since new or restored: {', '.join(unread)}; never read counts as 0 above."
+            f"Not read since new or restored: {', '.join(unread)}; unread joints count as 0 above."
         )
 
 
@@ -259,7 +258,7 @@ def _what(event: dict[str, Any], unit: LengthUnit) -> str:
     match event["kind"]:
         case "assessment":
             found = event["predicted_displacement_in"]
-            worst = "" if found is None else in_unit(f", worst case {found:.4f} in", unit)
+            worst = "" if found is None else f", worst case {Length(found).said_in(unit)}"
             return f"assessed {event['verdict']}{worst}"
         case "repair":
             return f"restored {joint_list(event['joints'])}"
@@ -322,7 +321,7 @@ def rerig(
     store: Place = None,
     gear: options.Gear = DEFAULT_GEAR,
 ) -> None:
-    """Record that the reversing valve was re-rigged; the wear of the joints goes on."""
+    """Record that the reversing valve was re-rigged; the wear of the joints continues."""
     from mlg_troubleshoot.store import RecordKind
     from mlg_troubleshoot.workflows import history
 
@@ -334,7 +333,7 @@ def rerig(
 def correct(
     record: RecordId,
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A table with the one right inspection.")
+        Path, typer.Argument(metavar="FILE", help="A table with the one corrected inspection.")
     ],
     store: Place = None,
     gear: options.Gear = DEFAULT_GEAR,
@@ -342,7 +341,7 @@ def correct(
     convention: options.Convention = None,
     sheet: options.Sheet = None,
 ) -> None:
-    """Append the right inspection for a wrong one; both stay in the chain, the right one counts."""
+    """Append a corrected inspection. The wrong one stays in the chain but no longer counts."""
     from mlg_troubleshoot.cli.views import notes
     from mlg_troubleshoot.workflows import keep
     from mlg_troubleshoot.workflows.check import CheckOptions, check_files
@@ -363,7 +362,7 @@ def void(
     store: Place = None,
     gear: options.Gear = DEFAULT_GEAR,
 ) -> None:
-    """Append that a record does not count; it stays in the chain."""
+    """Void a record: it stays in the chain but does not count."""
     from mlg_troubleshoot.workflows import history
 
     added = history.void(kept_in(store, gear), record, why)
@@ -374,12 +373,12 @@ def outcome(
     record: RecordId,
     found: Annotated[str, typer.Option("--found", metavar="TEXT", help="What was found.")],
     joint: Annotated[
-        int | None, typer.Option("--joint", metavar="N", help="The joint that it was.")
+        int | None, typer.Option("--joint", metavar="N", help="The joint that was the cause.")
     ] = None,
     store: Place = None,
     gear: options.Gear = DEFAULT_GEAR,
 ) -> None:
-    """Record what was found after the advice; mlg history then says how often it was right."""
+    """Record what was found after the advice; mlg history then shows how often it was right."""
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.workflows import history
 
@@ -401,11 +400,11 @@ def verify(
     ] = None,
     gear: options.Gear = DEFAULT_GEAR,
 ) -> None:
-    """Walk the chain; the first record that does not fit is named (exit code 1). It does not prove
+    """Check the chain and name the first record that does not fit (exit code 1). It does not prove
     who wrote a record.
 
-    The last hash is printed: noted elsewhere and given to --expect, it shows that no record was
-    taken away since.
+    The last hash is printed. Note it elsewhere and pass it to --expect later: this shows whether
+    records were removed.
     """
     from mlg_troubleshoot.workflows import history
 
@@ -436,7 +435,7 @@ def verify(
             " Otherwise export the chain, and import it into a new store."
         )
     if found.broken is not None or found.wrong or (noted is not None and found.expected is None):
-        raise typer.Exit(BROKEN)
+        raise typer.Exit(ExitCode.ATTENTION)
 
 
 def _expected(found: Verified) -> str:
@@ -472,7 +471,7 @@ def export(
 
 
 def import_chain(file: Chain, store: Place = None, gear: options.Gear = DEFAULT_GEAR) -> None:
-    """Read an exported chain into an empty store, or the rest of it into a store that holds its
+    """Read an exported chain into an empty store, or the rest of it into a store that contains its
     beginning.
     """
     from mlg_troubleshoot.workflows import history
@@ -492,8 +491,8 @@ def history_app() -> typer.Typer:
         name="history",
         cls=HistoryGroup,
         help=(
-            "Records of each gear: [b]mlg history[/b] · [b]mlg history TAIL LH[/b], and what is"
-            " added later."
+            "Show the records of each gear ([b]mlg history[/b], [b]mlg history TAIL LH[/b]) and add"
+            " repairs, corrections and outcomes."
         ),
         epilog=EPILOG,
     )

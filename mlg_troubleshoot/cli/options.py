@@ -59,7 +59,7 @@ Unit = Annotated[
         "--unit",
         parser=LengthUnit.parse,
         metavar="in|thou|mm",
-        help="Unit of lengths that do not say one.",
+        help="Unit of lengths that do not state one.",
     ),
 ]
 Convention = Annotated[
@@ -69,8 +69,8 @@ Convention = Annotated[
         parser=ClearanceConvention.parse,
         metavar="RADIAL|DIAMETRAL|TOTAL_PLAY",
         help=(
-            "What a clearance reading is, for rows that do not say it. No default: the factor 2"
-            " flips verdicts."
+            "What a clearance reading is, for rows that do not state it. No default: the factor"
+            " of 2 changes verdicts."
         ),
     ),
 ]
@@ -129,7 +129,8 @@ Remember = Annotated[
 Force = Annotated[
     bool,
     typer.Option(
-        "--force", help="Replace a file that is not of an earlier run; never an input or a store."
+        "--force",
+        help="Replace a file that an earlier run did not write; never an input or a store.",
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Write the result as JSON to stdout.")]

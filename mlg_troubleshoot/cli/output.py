@@ -19,7 +19,7 @@ from rich.table import Table
 from rich.text import Text
 
 from mlg_troubleshoot.errors import OutputError
-from mlg_troubleshoot.units import LengthUnit, in_unit
+from mlg_troubleshoot.units import LengthUnit, said_in
 from mlg_troubleshoot.visible import visible
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ class DataConsole(Console):
 
     def sentence(self, said: str, style: str = "") -> None:
         """Print a sentence of this program, its lengths in the unit that the user reads."""
-        self.print(in_unit(said, self.unit), style=style)
+        self.print(said_in(said, self.unit), style=style)
 
     def print(self, *objects: Any, **how: Any) -> None:
         """Print; a text is data, made visible before it is measured."""

@@ -1,8 +1,8 @@
 """What is remembered from run to run in ``mlg.toml``: the unit to show, the paper, how headers are
 read.
 
-Never what could turn a verdict: unit of entry, convention, side or margin, nor another meaning for
-a header that is understood by itself. The file is data: it is checked strictly.
+Never what could change a verdict: unit of entry, convention, side or margin, nor another meaning
+for a header that is understood by itself. The file is data: it is checked strictly.
 """
 
 from __future__ import annotations
@@ -153,7 +153,7 @@ def _refuse_understood(file: Path, headers: Mapping[str, str], gear: str) -> Non
         if why:
             raise UsageError(
                 f"{file}: headers: {header!r} = {column!r} is never remembered: by itself"
-                f" {header!r} {why}, and another meaning could turn a verdict",
+                f" {header!r} {why}, and another meaning could change a verdict",
                 f'Delete the line from {file}; give --map "{header}={column}" with each run that'
                 " needs it.",
             )

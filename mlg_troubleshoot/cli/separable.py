@@ -24,14 +24,14 @@ def separable(
         typer.Option(
             "--columns",
             metavar="A,B,…",
-            help="Columns that will be recorded, as in a table; else all.",
+            help="Columns that will be recorded, as in a table; all if not given.",
         ),
     ] = None,
     as_json: options.Json = False,
     _version: options.Version = False,
 ) -> None:
-    """Say which causes the planned columns could distinguish, and at which size, before anything is
-    measured.
+    """Show which causes the planned columns could distinguish, and from which size on, before
+    anything is measured.
     """
     from mlg_troubleshoot.workflows.separable import separable as planned
 

@@ -3,11 +3,12 @@
 __all__ = [
     "assessment",
     "case",
+    "columns",
     "inspection",
     "judge_rows",
     "next_joint",
-    "order",
     "plan",
     "prediction",
+    "ranking",
     "sentences",
 ]

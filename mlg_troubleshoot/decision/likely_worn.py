@@ -146,8 +146,8 @@ def _text(
         f"{' or '.join(f'#{n}' for n in chance.joints)} ({percent(chance.probability)})"
         for chance in likely
     )
-    # Another chance than those of the joints: both can be so at once.
-    also = f" Chance that something else moved the plunger as well: {percent(not_clearance)}."
+    # Not one minus the chances of the joints: both can be true at once.
+    also = f" Chance that something else also moved the plunger: {percent(not_clearance)}."
     if not_clearance > 0.8:
         return (
             "Something other than joint clearance likely moved the plunger"

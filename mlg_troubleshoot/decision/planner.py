@@ -38,9 +38,10 @@ from mlg_troubleshoot.gear.gear import Gear
 BETTER_GAUGES_IN = (0.0004, 0.0003)
 # Readings of one round are read together until the verdict is settled with this chance. [1]
 _SETTLED = 0.35
-# Chance with random directions from which a failure is expected to be one of clearance: what else
-# may fail is as rare.
+# Chance with random directions from which a failure is attributed to clearance: as large as the
+# assumed chance of another cause. [1]
 _OTHER_CAUSE = 0.05
+# Standard scores of 10, 25, 37.5, 50, 62.5, 75 and 90 %: what a round of readings may show. [1]
 _POINTS = np.array([-1.2816, -0.6745, -0.3186, 0.0, 0.3186, 0.6745, 1.2816])
 
 
@@ -72,16 +73,16 @@ def plans(
     cases: Cases, judged: Judged, found: Search, sets: Sequence[tuple[RepairSet, ...]]
 ) -> list[Plan]:
     """The expected course of each gear, step by step to its end."""
-    facts = _Facts(cases, judged, found)
-    return [_Course(facts, i, sets[i]).plan() for i in range(len(cases))]
+    facts = _BatchContext(cases, judged, found)
+    return [_PlanBuilder(facts, i, sets[i]).plan() for i in range(len(cases))]
 
 
-class _Facts:
+class _BatchContext:
     """What the plans of a batch are made from, worked out for all gears at once."""
 
     def __init__(self, cases: Cases, judged: Judged, found: Search) -> None:
         gear, measured, over = cases.gear, cases.measured, cases.over_limit
-        plunger, ahead = judged.plunger, _Ahead(cases, judged)
+        plunger, ahead = judged.plunger, _UnreadJoints(cases, judged)
         self.cases, self.judged = cases, judged
         self.joints_done, self.questions = cases.joints_done, cases.questions
         self.complaint = cases.failed | ((plunger.beyond | over.any(axis=1)) & ~cases.retracted)
@@ -98,8 +99,8 @@ class _Facts:
         self.expected_set, self.expected_end = _expected(cases, judged, ahead, self.complaint)
 
 
-class _Course:
-    def __init__(self, facts: _Facts, row: int, sets: tuple[RepairSet, ...]) -> None:
+class _PlanBuilder:
+    def __init__(self, facts: _BatchContext, row: int, sets: tuple[RepairSet, ...]) -> None:
         self.facts, self.row, self.sets = facts, row, sets
         self.cases, self.judged, self.gear = facts.cases, facts.judged, facts.cases.gear
         self.steps: list[Step] = []
@@ -126,7 +127,7 @@ class _Course:
         return self._to_repair() if f.complaint[i] else self._to_verdict()
 
     def _to_repair(self) -> Plan:
-        """A gear with a complaint: read until a repair is sure to hold, restore, end."""
+        """A gear with a complaint: read until a repair is certain, restore, end."""
         f, i = self.facts, self.row
         unread = not self.cases.measured[i].all()
         if self.sets and not f.read_first[i]:
@@ -189,14 +190,16 @@ class _Course:
             Step(Action.MEASURE, joints, minutes, None, sentences.measure(self.gear, joints))
         )
 
-    def _restore(self, joints: tuple[int, ...], worst_in: float | None, unread: bool) -> _Course:
+    def _restore(
+        self, joints: tuple[int, ...], worst_in: float | None, unread: bool
+    ) -> _PlanBuilder:
         minutes = minutes_to_restore(self.gear, joints, self.opened)
         expected = bool(self.steps) and worst_in is None and joints != self.over
         text = sentences.restore(joints, self.over, worst_in, unread=unread, expected=expected)
         self.steps.append(Step(Action.RESTORE, joints, minutes, None, text))
         return self
 
-    def _restore_over_limit(self) -> _Course:
+    def _restore_over_limit(self) -> _PlanBuilder:
         return self._restore(self.over, None, False) if self.over else self
 
     def _open(self, minutes: float, joints: tuple[int, ...]) -> float:
@@ -208,7 +211,7 @@ class _Course:
         return tuple(self.gear.joint_numbers[j] for j in self.judged.order[self.row] if places[j])
 
 
-class _Ahead:
+class _UnreadJoints:
     """What to expect of the joints that are not measured, gear by gear and level of wear by level
     of wear.
     """
@@ -254,7 +257,7 @@ class _Ahead:
         settle the verdict.
         """
         reach = self.slopes * self.gear.limits_in / self.gear.access_minutes
-        # Rounded: both ends of one link tell alike, and rounding noise must not order them.
+        # Rounded: both ends of one link are worth the same, and rounding noise must not order them.
         order = np.argsort(np.where(candidates, -np.round(reach, 9), np.inf), axis=1, kind="stable")
         chosen, done = np.zeros_like(candidates), ~candidates.any(axis=1)
         rows = np.arange(len(candidates))
@@ -268,7 +271,7 @@ class _Ahead:
         return chosen
 
 
-def _reading_is_quicker(gear: Gear, found: Search, ahead: _Ahead, unread: Mask) -> Mask:
+def _reading_is_quicker(gear: Gear, found: Search, ahead: _UnreadJoints, unread: Mask) -> Mask:
     """Whether reading all that is unread and then restoring is expected to be quicker than
     restoring now.
     """
@@ -361,7 +364,7 @@ def _measure_again(cases: Cases, judged: Judged) -> tuple[Mask, Array]:
 
 
 def _expected(
-    cases: Cases, judged: Judged, ahead: _Ahead, complaint: Mask
+    cases: Cases, judged: Judged, ahead: _UnreadJoints, complaint: Mask
 ) -> tuple[Mask, list[Verdict]]:
     """What will be restored, and the verdict, if every unmeasured joint is as worn as expected."""
     full = cases.filled((ahead.weight @ moments()[0])[:, None] * cases.gear.limits_in)

@@ -8,7 +8,6 @@ __all__ = [
     "gear",
     "gear_file",
     "model",
-    "sources",
 ]
 
 DEFAULT_GEAR = "hawker-800xp"

@@ -6,20 +6,49 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.arrays import Array, Mask, frozen
 from mlg_troubleshoot.datafile import Table, Whole
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.model import Calibration, LinkageModel
-from mlg_troubleshoot.gear.sources import Sourced
 from mlg_troubleshoot.geometry.mechanism import Mechanism
 
 # 0.1905 mm is 0.0075000000000000006 in to a computer: no gauge reads a difference of 1e-9 in.
 ROUNDING_IN = 1e-9
+
+
+class SourceKind(StrEnum):
+    """How much a number is worth."""
+
+    TECHNICAL_ORDER = "technical order"
+    STATED = "stated in the paper"
+    RECONSTRUCTED = "reconstructed"
+    MEASURED = "measured"
+    ASSUMED = "assumed"
+
+
+class Source(Table):
+    """A source in words, which numbers of a gear file refer to by name: document, section, how it
+    was obtained.
+    """
+
+    kind: SourceKind
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Sourced:
+    """A number with its unit and its source in words."""
+
+    value: float
+    unit: str
+    kind: SourceKind
+    source: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +101,7 @@ class JointSpec:
 
     limit, new_part: radial clearance that the manual allows at most, and that a restored joint has.
     [in] access, restore: time to measure it, and to restore it, once its area is open. [min]
-    critical: true for a joint without whose measurement nothing can be cleared (joints 1 to 5 of
+    critical: true if no gear can be cleared before this joint is measured (joints 1 to 5 of
     the paper).
     """
 
@@ -233,15 +262,15 @@ class Gear:
         """Calibrate one linkage of this gear."""
         return LinkageModel(linkage.mechanism, linkage.stroke, self.calibration)
 
-    @property
+    @cached_property
     def joint_numbers(self) -> tuple[int, ...]:
         """Numbers of the joints, in the order of the mechanism."""
         return tuple(joint.number for joint in self.joints)
 
-    @property
+    @cached_property
     def limits_in(self) -> Array:
         """Largest allowed radial clearance of each joint, shape (n_joints,). [in]"""
-        return np.array([joint.limit.value for joint in self.joints])
+        return frozen([joint.limit.value for joint in self.joints])
 
     def over_limit(self, clearance_in: Array) -> Mask:
         """Which clearances are above their limits, shape (…, n_joints): as
@@ -249,22 +278,22 @@ class Gear:
         """
         return np.asarray(clearance_in > self.limits_in + ROUNDING_IN)
 
-    @property
+    @cached_property
     def new_parts_in(self) -> Array:
         """Radial clearance of each joint with a new part. [in]"""
-        return np.array([joint.new_part.value for joint in self.joints])
+        return frozen([joint.new_part.value for joint in self.joints])
 
-    @property
+    @cached_property
     def access_minutes(self) -> Array:
         """How long each joint takes to reach and measure once its area is open. [min]"""
-        return np.array([joint.access.value for joint in self.joints])
+        return frozen([joint.access.value for joint in self.joints])
 
-    @property
+    @cached_property
     def critical(self) -> Mask:
         """Which joints no gear can be cleared without."""
         return np.array([joint.critical for joint in self.joints])
 
-    @property
+    @cached_property
     def link_groups(self) -> tuple[tuple[int, ...], ...]:
         """Joints at both ends of one link together, which the plunger cannot distinguish, the
         others each alone.

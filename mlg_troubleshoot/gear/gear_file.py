@@ -38,9 +38,11 @@ from mlg_troubleshoot.gear.gear import (
     JointSpec,
     Linkage,
     RetractionCycle,
+    Source,
+    Sourced,
+    SourceKind,
 )
 from mlg_troubleshoot.gear.model import Calibration
-from mlg_troubleshoot.gear.sources import Source, Sourced, SourceKind
 from mlg_troubleshoot.geometry.mechanism import (
     Crank,
     Dyad,

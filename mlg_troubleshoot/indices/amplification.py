@@ -32,6 +32,7 @@ from mlg_troubleshoot.geometry.mechanism import (
     needs,
 )
 
+# Positions of the release at which stage indices are computed. [1]
 STROKES = 2001
 
 

@@ -15,6 +15,7 @@ from numpy.random import Generator
 from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.errors import InconclusiveDataError
 
+# Inspections below which no index is estimated. [1]
 _FEWEST = 20
 
 

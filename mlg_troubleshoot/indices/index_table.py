@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -145,7 +146,8 @@ def load_index_table(gear: Gear) -> IndexTable:
     if not path.exists():
         raise GearFileError(f"{path.name}: the table of indices is missing", _remedy(gear))
     try:
-        table = read_json(path, IndexTable, _remedy(gear)).content
+        state = path.stat()
+        table = _read_once(path, state.st_mtime_ns, state.st_size)
     except GearFileError as error:
         raise GearFileError(error.message, _remedy(gear)) from error
     for what, found, wanted in (
@@ -167,6 +169,12 @@ def load_index_table(gear: Gear) -> IndexTable:
             f"{path.name}: was computed for other joints or limits: {named}", _remedy(gear)
         )
     return table
+
+
+@lru_cache(maxsize=4)
+def _read_once(path: Path, _changed_ns: int, _size: int) -> IndexTable:
+    """A file that has not changed is not read again."""
+    return read_json(path, IndexTable, "").content
 
 
 def _text(values: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ from datetime import date
 
 import numpy as np
 
-from mlg_troubleshoot.decision.order import WORST_FIRST
+from mlg_troubleshoot.decision.ranking import WORST_FIRST
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife, KeptInspection
 from mlg_troubleshoot.life.forecast import Forecast

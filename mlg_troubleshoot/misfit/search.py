@@ -23,7 +23,6 @@ from mlg_troubleshoot.misfit.one_by_one import one_by_one, settled
 from mlg_troubleshoot.misfit.rivals import near_and_behind
 from mlg_troubleshoot.misfit.runner import Runner, held_out, least_squares
 from mlg_troubleshoot.misfit.scatter import Whitener, basis_of, build_whitener
-from mlg_troubleshoot.misfit.screen import Screen
 from mlg_troubleshoot.misfit.simulation_inputs import checked
 from mlg_troubleshoot.misfit.simulation_result import (
     HeldOutGain,
@@ -168,11 +167,14 @@ class Metric:
             self.white(point.columns[:, list(fixed)]),
             self.white(point.columns[:, :count]),
         )
-        usable = beside(suspects, held)[1] & np.isin(np.arange(count), point.study.design.testable)
-        screen = Screen(NoiseModel.white(len(held)), suspects, np.zeros(count), held)
-        squared, rest = screen.explained(np.column_stack([self.white(data), self.drawn]))
+        alone, usable = beside(suspects, held)
+        usable &= np.isin(np.arange(count), point.study.design.testable)
+        sets, basis = np.column_stack([self.white(data), self.drawn]), basis_of(held)
+        length = np.maximum(np.sum(alone**2, axis=0), 1e-300)[:, None]
+        squared = (alone.T @ sets) ** 2 / length
+        rest = np.sum(sets**2, axis=0) - np.sum((basis.T @ sets) ** 2, axis=0)
         if point.crowded:
-            spare = max(len(held) - basis_of(held).shape[1] - 1, 1)
+            spare = max(len(held) - basis.shape[1] - 1, 1)
             score = squared / np.maximum(rest - squared, 1e-12 * rest) * spare
         else:
             left = np.r_[self.variance * self.degrees, self._left]

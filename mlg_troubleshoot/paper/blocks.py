@@ -29,6 +29,7 @@ from mlg_troubleshoot.indices.estimators import failed_note
 from mlg_troubleshoot.indices.inputs import Inputs
 from mlg_troubleshoot.paper.designs import middle_of_level, replicated_levels
 
+# Levels of one block: the work that is lost at an interruption. [1]
 LEVELS_PER_BLOCK = 50
 
 

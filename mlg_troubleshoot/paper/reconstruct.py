@@ -24,7 +24,7 @@ from mlg_troubleshoot.geometry.mechanism import Dyad
 from mlg_troubleshoot.paper.targets import INSIDE, Computed, Target
 from mlg_troubleshoot.paper.verification import Facts
 
-Told = Callable[[str, int, int | None], None]
+Progress = Callable[[str, int, int | None], None]
 
 # Stands for the miss of a target that a linkage has no value for, in its tolerances. [1]
 _FAR = 50
@@ -66,7 +66,7 @@ def reconstruct(
     seed: int,
     start: Linkage | None = None,
     minutes: float = 15.0,
-    told: Told | None = None,
+    on_progress: Progress | None = None,
 ) -> Reconstruction:
     """Search a linkage of the gear's topology that meets targets."""
     wanted = tuple(target for target in targets if target.search)
@@ -74,7 +74,7 @@ def reconstruct(
         raise UsageError(
             "no target has search = true", "Mark the numbers that a linkage must meet."
         )
-    search = _Search(gear, wanted, monotonic() + 60.0 * minutes, told)
+    search = _Search(gear, wanted, monotonic() + 60.0 * minutes, on_progress)
     if start is not None:
         return search.report(search.polished(search.space.vector(start), 60), seed)
     while monotonic() < search.until:
@@ -120,20 +120,20 @@ class _Search:
     """Residuals of candidate linkages, with a count and a deadline."""
 
     def __init__(
-        self, gear: Gear, targets: tuple[Target, ...], until: float, told: Told | None
+        self, gear: Gear, targets: tuple[Target, ...], until: float, on_progress: Progress | None
     ) -> None:
         self.gear = gear
         self.targets = targets
         self.space = DesignSpace(gear.reference)
         self.until = until
-        self.told = told
+        self.on_progress = on_progress
         self.tried = 0
 
     def residuals(self, vector: Array) -> Array:
         """Misses of all targets in units of their tolerances, and of plain mechanical sense."""
         self.tried += 1
-        if self.told is not None and self.tried % 20 == 0:
-            self.told("linkages tried", self.tried, None)
+        if self.on_progress is not None and self.tried % 20 == 0:
+            self.on_progress("linkages tried", self.tried, None)
         sense = self._sense(vector)
         try:
             with np.errstate(all="ignore"):

@@ -76,9 +76,9 @@ class StudyOptions:
     design : StudyDesign
         How the points are chosen.
     accuracy : float
-        Wanted error of every index, where the design can be told. [1]
+        Wanted error of every index, where the design takes one. [1]
     seed : int
-        Seed of everything random.
+        Seed of all random draws.
     distribution : str
         Distribution of the clearances.
     limits_in : ndarray, shape (n_joints,), or None
@@ -197,17 +197,17 @@ def run_study(gear: Gear, options: StudyOptions, progress: Progress | None = Non
     if len(inputs.limits_in) != len(gear.joints):
         raise UsageError(
             f"{len(inputs.limits_in)} limits for {len(gear.joints)} joints",
-            "Give one for each joint.",
+            "Give one per joint.",
         )
 
-    def told(name: str) -> Callable[[int, int | None], None]:
+    def on_stage(name: str) -> Callable[[int, int | None], None]:
         return lambda done, total: None if progress is None else progress(name, done, total)
 
     if options.design in (StudyDesign.LHS, StudyDesign.LHS_CCD, StudyDesign.CCD):
-        run = _paper(gear, inputs, options, told)
+        run = _paper(gear, inputs, options, on_stage)
     else:
-        run = _on_linkage(gear, inputs, options, 0, told("samples"))
-    found, advance = [run.indices], told("ensemble")
+        run = _on_linkage(gear, inputs, options, 0, on_stage("samples"))
+    found, advance = [run.indices], on_stage("ensemble")
     finished = run.finished and "interrupted" not in run.indices.note
     for k in range(1, len(gear.ensemble)):
         try:
@@ -245,7 +245,7 @@ def _response(
 def _held(model: LinkageModel, inputs: Inputs, options: StudyOptions) -> HeldDirections:
     if options.directions is Directions.FIXED:
         if options.fixed_rad is None or len(options.fixed_rad) != len(inputs.limits_in):
-            raise UsageError("directions fixed by load", "Give one direction for each joint.")
+            raise UsageError("directions fixed by load", "Give one direction per joint.")
         return HeldDirections(model, np.asarray(options.fixed_rad, float))
     if options.directions is Directions.WORST:
         return worst_directions(model, inputs.limits_in)
@@ -259,7 +259,7 @@ def _on_linkage(
     inputs: Inputs,
     options: StudyOptions,
     k: int,
-    told: Callable[[int, int | None], None] | None = None,
+    on_stage: Callable[[int, int | None], None] | None = None,
 ) -> _Run:
     """Indices of linkage k of the ensemble; of the reference, which is the first, by the design
     that was asked for.
@@ -267,7 +267,7 @@ def _on_linkage(
     cube, n = _response(gear, gear.ensemble_models[k], inputs, options)
     stream = np.random.default_rng(np.random.SeedSequence(options.seed, spawn_key=(k,)))
     accuracy, most = options.accuracy, options.most
-    advance = None if told is None else (lambda done, _width: told(done, None))
+    advance = None if on_stage is None else (lambda done, _width: on_stage(done, None))
     if options.directions is Directions.RANDOM:
         if k:
             accuracy, most = max(accuracy, 3e-3), 1 << 20
@@ -303,7 +303,7 @@ def _of_tensor(tensor: TensorIndices, coarse: TensorIndices | None, seed: int) -
     )
 
 
-def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _Run:
+def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, on_stage: Stages) -> _Run:
     """Run the paper's design for the first order and, for ``lhs``, its study of the total order."""
     from mlg_troubleshoot.paper.blocks import BlockStudy, total_order_study
     from mlg_troubleshoot.paper.replicated import ITERATIONS, PAPER_DESIGNS, replicated_first_order
@@ -311,13 +311,15 @@ def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _
     if options.directions is Directions.RANDOM:
         raise UsageError(
             f"design {options.design} with random directions",
-            "The paper's designs hold directions; use sampled.",
+            "The paper's designs keep directions fixed; use sampled.",
         )
     cube, n = _response(gear, gear.model, inputs, options)
     design = _sized(PAPER_DESIGNS[str(options.design)], n, options)
     n1, n2 = design.n1, design.n2
     iterations = ITERATIONS if options.iterations is None else options.iterations
-    found = replicated_first_order(cube, n, design, options.seed, iterations, told("first order"))
+    found = replicated_first_order(
+        cube, n, design, options.seed, iterations, on_stage("first order")
+    )
     half = student_half(found.scatter, found.iterations)
     total, spread = np.full(n, np.nan), np.full(n, np.nan)
     evaluations, failed, finished = found.evaluations, found.failed, found.iterations == iterations
@@ -326,7 +328,7 @@ def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _
         response = _held(gear.model, inputs, options)
         study = BlockStudy(response, inputs, gear.geometry_sha256, options.seed, n1, n2, iterations)
         totals = total_order_study(
-            study, options.workers, options.state, options.scheduler, told("total order")
+            study, options.workers, options.state, options.scheduler, on_stage("total order")
         )
         total, spread = totals.total_order, student_half(totals.scatter, totals.iterations)
         evaluations, failed = evaluations + totals.evaluations, failed + totals.failed

@@ -23,7 +23,6 @@ __all__ = [
     "SheetLayout",
     "admit",
     "annotate",
-    "columns",
     "dates",
     "expand",
     "gate",

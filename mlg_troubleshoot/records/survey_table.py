@@ -16,6 +16,7 @@ from openpyxl.chart.label import DataLabelList
 from openpyxl.styles import Font
 from openpyxl.worksheet.worksheet import Worksheet
 
+from mlg_troubleshoot.decision.columns import Column, Holds
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.outputs import write_csv
 from mlg_troubleshoot.records.cells import Cell, column_letters, quote, stored
@@ -24,7 +25,7 @@ from mlg_troubleshoot.records.read import load_bytes, open_book
 from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.source import NumberedRow
 from mlg_troubleshoot.records.template import write_book
-from mlg_troubleshoot.records.values import CellFaultError, read_choice, read_number, read_text
+from mlg_troubleshoot.records.values import CellFaultError, read_number, read_text, read_value
 from mlg_troubleshoot.surveying.readings import (
     ReadingKind,
     SurveyedLinkage,
@@ -43,6 +44,7 @@ COLUMNS = (
     "extension_mm",
     "how",
 )
+_KIND = Column(name="kind", holds=Holds.CHOICE, choices=ReadingKind)
 _HEADER_WITHIN = 30
 _KINDS = {kind: kind for kind in ReadingKind if kind not in (ReadingKind.TRAVEL, ReadingKind.ORDER)}
 # No linkage of a landing gear is longer than this; angles are read within one turn.
@@ -237,7 +239,7 @@ class _Rows:
             return None
         self.column = "kind"
         try:
-            kind = read_choice(row.get("kind", ""), ReadingKind, "kind_unknown", {})
+            kind: ReadingKind = read_value(_KIND, row.get("kind") or "")
             turns = self.linkage.space.mechanism.output.kind == "angle"
             is_angle = kind is ReadingKind.ANGLE or (kind is ReadingKind.PLUNGER and turns)
             self._require(

@@ -9,8 +9,9 @@ import re
 from collections.abc import Mapping
 from datetime import date
 from enum import StrEnum
-from typing import TypeVar
+from typing import Any
 
+from mlg_troubleshoot.decision.columns import OUTCOME, Column, Holds
 from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.records.cells import UNWRITABLE, OddCell, OddKind, show, show_number
@@ -109,9 +110,6 @@ NOT_MEASURED = frozenset(
         ),
     )
 )
-
-_E = TypeVar("_E", bound=StrEnum)
-
 
 _ODD_CELLS = {OddKind.NO_VALUE: "formula_without_value", OddKind.DATE: "cell_is_date"}
 
@@ -223,6 +221,35 @@ def _length_fault(text: str, body: str, expected: str, unit: LengthUnit | None) 
     return CellFaultError("not_a_length", expected, remedy)
 
 
+def read_value(
+    column: Column,
+    cell: str | float | OddCell,
+    header: str = "",
+    *,
+    decimal_comma: bool = False,
+) -> Any:
+    """Read a cell of a column that holds neither a length nor a date."""
+    if column.holds is Holds.NUMBER:
+        return read_number(
+            cell,
+            column.low,
+            column.high,
+            decimal_comma=decimal_comma,
+            expected=column.asked,
+            units=(column.unit.lower().lstrip("°") or column.name.rpartition("_")[2],),
+        )
+    if column.holds is Holds.YES_NO:
+        return _read_yes_no(cell)
+    if column is OUTCOME:
+        return _read_outcome(cell, header)
+    if column.choices is not None:
+        return _read_choice(column, cell)
+    if not column.carried:
+        return read_text(cell, column.asked, required=True)
+    is_shown = isinstance(cell, OddCell) and cell.kind in (OddKind.DATE, OddKind.BOOLEAN)
+    return show(cell) if is_shown else read_text(cell, column.asked)
+
+
 def read_number(
     cell: str | float | OddCell,
     low: float,
@@ -274,6 +301,8 @@ def _written_number(text: str, decimal_comma: bool, expected: str, units: tuple[
 def read_text(cell: str | float | OddCell, expected: str, *, required: bool = False) -> str:
     """Read an identifier or another text; numbers keep the digits they show."""
     if isinstance(cell, str):
+        if cell.isascii() and cell.isprintable():
+            return cell.strip()
         text = plain_text(cell)
         if UNWRITABLE.search(text):
             raise CellFaultError("text_unwritable", expected)
@@ -289,24 +318,21 @@ def read_text(cell: str | float | OddCell, expected: str, *, required: bool = Fa
     raise odd_cell_fault(cell, expected)
 
 
-def read_choice(
-    cell: str | float | OddCell, choices: type[_E], code: str, hints: dict[str, str]
-) -> _E:
+def _read_choice(column: Column, cell: str | float | OddCell) -> StrEnum:
     """Read one of a few words, in upper or lower case."""
-    known = choices.__members__
-    if isinstance(cell, str) and cell in known:
-        return known[cell]
-    words = list(known)
-    expected = " or ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
+    choices = column.words_taken
+    if isinstance(cell, str) and cell in choices:
+        return choices[cell]
     text = plain_text(cell) if isinstance(cell, str) else ""
     name = re.sub(r"[\s\-]+", "_", text).upper()
-    if name in known:
-        return known[name]
+    found = choices.get(name) or (column.spelt(text) if column.spelt is not None else None)
+    if found is not None:
+        return found
     if isinstance(cell, OddCell):
-        raise odd_cell_fault(cell, expected)
-    hint = hints.get(text.casefold())
-    remedy = f"Enter {hint} if that is meant." if hint else f"Enter {expected}."
-    raise CellFaultError(code, expected, remedy)
+        raise odd_cell_fault(cell, column.asked)
+    hint = column.hints.get(text.casefold())
+    remedy = f"Enter {hint} if that is meant." if hint else f"Enter {column.asked}."
+    raise CellFaultError(f"{column.filled}_unknown", column.asked, remedy)
 
 
 _YES_NO = {
@@ -321,7 +347,7 @@ def _yes_no(cell: str | float | OddCell) -> bool | None:
     return _YES_NO.get(show(cell).strip().casefold())
 
 
-def read_yes_no(cell: str | float | OddCell) -> bool:
+def _read_yes_no(cell: str | float | OddCell) -> bool:
     """Read the answer to a question: yes or no."""
     said = _yes_no(cell)
     if said is None:
@@ -362,7 +388,7 @@ def says_failed(text: str) -> bool:
     return _outcome_word(text) is Outcome.FAILED
 
 
-def read_outcome(cell: str | float | OddCell, header: str) -> Outcome:
+def _read_outcome(cell: str | float | OddCell, header: str) -> Outcome:
     """Read what the gear did; yes and no count only where the header asks a question (`Retracted?`,
     `Failed?`).
     """

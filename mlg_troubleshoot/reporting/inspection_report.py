@@ -11,7 +11,7 @@ from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Outcome, RowSource, Side
-from mlg_troubleshoot.decision.order import WORST_FIRST, latest_of_each_gear
+from mlg_troubleshoot.decision.ranking import WORST_FIRST, latest_of_each_gear
 from mlg_troubleshoot.decision.sentences import (
     chance_wrong_sentence,
     no_repair_set,
@@ -189,7 +189,7 @@ def _sequence(gear: Gear, a: Assessment, lengths: Lengths) -> Facts:
     for name, value in places:
         sentence = gear.cycle.symptom(value, a.margin_in)
         said.setdefault(sentence, []).append(f"{name} {lengths.full(value, True)}")
-    return [(" and ".join(names), lengths.said(sentence)) for sentence, names in said.items()]
+    return [(" and ".join(names), sentence) for sentence, names in said.items()]
 
 
 def batch_document(

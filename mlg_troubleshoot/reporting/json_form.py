@@ -31,8 +31,9 @@ from mlg_troubleshoot.output_types import (
     SuspectCell,
 )
 from mlg_troubleshoot.outputs import SCHEMA_VERSION
+from mlg_troubleshoot.units import Sentence
 
-_AS_THEY_ARE = frozenset((str, int, bool, type(None)))
+_AS_THEY_ARE = frozenset((str, Sentence, int, bool, type(None)))
 _SINGLE = (Enum, np.generic)
 _JOINT = tuple(CheckedJoint.__annotations__)
 _OF_JOINT = attrgetter(*_JOINT[:-1], "alike")
@@ -181,8 +182,13 @@ def diagnosis_as_json(
         data_faults=[written(SuspectCell, fault) for fault in d.faults],
         misfit=written(MisfitSize, d),
         causes=[_cause(c) for c in d.causes],
-        also_possible=[_possible(c.candidate) for c in d.also_possible],
-        beside=[_possible(c.candidate) for c in d.beside],
+        also_possible=[_rival(c) for c in d.also_possible],
+        beside=[_rival(c) for c in d.beside],
+        sure=d.beliefs.sure,
+        if_ten_times_likelier=[
+            {"cause": cause, "target": target, "probability_of_first": chance}
+            for (cause, target), chance in d.ten_times.items()
+        ],
         not_testable=[
             {"cause": cause, "missing_column": column} for cause, column in d.not_testable
         ],
@@ -192,7 +198,7 @@ def diagnosis_as_json(
         extension=None if extension is None else _extension(extension),
         gain=_gain(d),
         remainder={
-            "p_value": d.remainder_p,
+            "p_something_else": d.p_left,
             "looks_like_noise": d.remainder_is_noise,
             "rms_in": d.residual_u_in,
             "expected_from_gauges_in": d.expected_scatter_in,
@@ -207,6 +213,10 @@ def _named(candidate: Any) -> dict[str, Any]:
 
 def _possible(candidate: Any) -> dict[str, Any]:
     return {**_named(candidate), "separating_reading": candidate.separates}
+
+
+def _rival(c: NamedCause) -> dict[str, Any]:
+    return {**_possible(c.candidate), "probability": plain(c.probability)}
 
 
 def _cause(c: NamedCause) -> dict[str, Any]:

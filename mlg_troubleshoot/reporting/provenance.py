@@ -11,8 +11,7 @@ from importlib.metadata import version
 from typing import Any
 
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.sources import SourceKind
+from mlg_troubleshoot.gear.gear import Gear, SourceKind
 from mlg_troubleshoot.reporting.formats import Lengths, digest
 
 Facts = list[tuple[str, str]]

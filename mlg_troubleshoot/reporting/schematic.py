@@ -234,7 +234,7 @@ class _PlaneDrawing:
         segments = self._links(canvas, at)
         boxes = self._obstacles(at)
         self._plain_points(canvas, at)
-        markers = self._apart(at)
+        markers = self._without_overlap(at)
         here = [j for j in self.gear.joints if self._home(j.point)]
         states = {number: joint_state(finding) for number, finding in shown.findings.items()}
         for joint in self.gear.joints:
@@ -275,7 +275,7 @@ class _PlaneDrawing:
                 if point not in numbered:
                     canvas.marker("circle", *at(point), 3.0)
 
-    def _apart(self, at: _At) -> dict[int, Place]:
+    def _without_overlap(self, at: _At) -> dict[int, Place]:
         """Places of the joints' markers: at the joints, or next to them where two would overlap."""
         places = {j.number: at(j.point) for j in self.gear.joints if j.point in self.points}
         least = 2.0 * _MARKER + 2.0

@@ -25,7 +25,7 @@ from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.reporting.study_figures import BarSeries
 from mlg_troubleshoot.units import LengthUnit
 
-# A reason that explains less than a third of an excess is not its reason.
+# A possible reason is ruled out if the excess is more than this many times what it explains. [1]
 _CLEARLY = 3.0
 _DIRECTIONS = {
     Directions.WORST: (
@@ -33,7 +33,7 @@ _DIRECTIONS = {
     ),
     Directions.OVER: "in the directions of the largest over-travel",
     Directions.UNDER: "in the directions of the largest under-travel",
-    Directions.RANDOM: "in random directions, every direction alike",
+    Directions.RANDOM: "in random directions, all equally likely",
     Directions.FIXED: "in directions set by a load",
 }
 
@@ -85,7 +85,7 @@ def _context(f: StudyFindings, provenance: ReportProvenance, lengths: Lengths) -
 
 
 def _tiny(value: float) -> str:
-    """Write a number of which only the order of magnitude matters."""
+    """Write a number where only the order of magnitude matters."""
     return f"{value:.0e}".replace("-", MINUS) if math.isfinite(value) else ABSENT
 
 

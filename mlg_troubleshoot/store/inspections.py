@@ -8,23 +8,19 @@ from datetime import date
 from enum import Enum
 from typing import Any
 
-from mlg_troubleshoot.decision.inspection import (
-    Approach,
-    EnteredClearance,
-    Inspection,
-    Outcome,
-    RowSource,
-    Side,
-)
+from mlg_troubleshoot.decision.columns import COLUMNS, Holds
+from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, RowSource
 from mlg_troubleshoot.store.database import Record, RecordKind, packed
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from mlg_troubleshoot.units import LengthUnit
 
 # What says where and how an inspection was entered, not what was found.
 _NOT_CONTENT = ("source", "warnings", "entered", "unit_question")
-_BY_JOINT = ("clearance_in", "gauge_u_by_joint_in", "axial_float_in")
+_BY_JOINT = tuple(column.joint_fills for column in COLUMNS if column.joint_fills)
 
-
-_FIELDS = tuple((field.name, field.default) for field in fields(Inspection))
+_FIELDS = tuple(
+    (field.name, field.default) for field in fields(Inspection) if field.name != "other_columns"
+)
+_NAMES = frozenset(name for name, _ in _FIELDS)
 _AS_THEY_ARE = frozenset((str, int, float, bool, type(None)))
 
 
@@ -52,6 +48,7 @@ def inspection_record(
         value = getattr(inspection, name)
         if value is not default and value != default and value not in ({}, ()):
             body[name] = _plain(value)
+    body.update({name: _plain(value) for name, value in inspection.other_columns.items()})
     identity = (inspection.record_id, inspection.tail_no, inspection.side.value, day)
     return Record(
         kind,
@@ -73,8 +70,8 @@ _READ: dict[str, Callable[[Any], Any]] = {
         int(n): EnteredClearance(text, LengthUnit(unit)) for n, (text, unit) in found.items()
     },
     "source": lambda found: RowSource(*found),
-    "inspection_date": date.fromisoformat,
-    **{"side": Side, "convention": ClearanceConvention, "outcome": Outcome, "approach": Approach},
+    **{column.filled: date.fromisoformat for column in COLUMNS if column.holds is Holds.DATE},
+    **{column.filled: column.choices for column in COLUMNS if column.choices is not None},
     **dict.fromkeys(("readings_in", "warnings"), tuple),
 }
 
@@ -82,7 +79,8 @@ _READ: dict[str, Callable[[Any], Any]] = {
 def inspection_from(record: Record) -> Inspection:
     body = record.body["inspection"]
     read = {name: _READ[name](value) if name in _READ else value for name, value in body.items()}
-    return Inspection(**{"clearance_in": {}, **read})
+    other = {name: read.pop(name) for name in [*read] if name not in _NAMES}
+    return Inspection(**{"clearance_in": {}, "other_columns": other, **read})
 
 
 def same_inspection(one: Record, two: Record) -> bool:

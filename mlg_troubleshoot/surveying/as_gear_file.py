@@ -10,6 +10,7 @@ import numpy as np
 
 from mlg_troubleshoot.gear.design import member_values
 from mlg_troubleshoot.surveying.survey import Survey
+from mlg_troubleshoot.units import Length, Sentence
 
 # Further members of the ensemble of a surveyed gear file: their range holds most of the posterior.
 _MEMBERS = 11
@@ -114,12 +115,17 @@ def assemblies(found: Survey) -> tuple[str, ...]:
             name = found.linkage.names[int(np.argmax(moved))].split(".")[0]
             parts = [
                 (
-                    f"one with point {name} elsewhere by {moved.max():.4f} in"
+                    Sentence.of(
+                        "one with point {} elsewhere by {}", name, Length(float(moved.max()))
+                    )
                     if moved.any()
                     else "as written"
                 )
             ]
-        text = ", ".join(parts)
+        text = Sentence.joined(parts, ", ")
         shares[text] = shares.get(text, 0.0) + mode.weight
-    texts = "; ".join(f"{text} ({100 * share:.0f} %)" for text, share in shares.items())
-    return (f"the survey allows {len(shares)} assemblies: {texts}",) if len(shares) > 1 else ()
+    if len(shares) < 2:
+        return ()
+    each = (Sentence.of("{} ({} %)", text, f"{100 * share:.0f}") for text, share in shares.items())
+    texts = Sentence.joined(each, "; ")
+    return (Sentence.of("the survey allows {} assemblies: {}", len(shares), texts),)

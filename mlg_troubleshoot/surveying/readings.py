@@ -18,6 +18,7 @@ from mlg_troubleshoot.gear.gear import Gear, Linkage
 from mlg_troubleshoot.geometry.kernel import Kernel
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot
 from mlg_troubleshoot.geometry.program import write_program
+from mlg_troubleshoot.units import Length, LengthUnit, Sentence
 
 # Positive quantities of a batch of linkages, shape (n_vectors, n_quantities).
 Quantity = Callable[[Array], Array]
@@ -97,32 +98,34 @@ class SurveyReading:
         return self.kind.value, frozenset((self.start, self.end)), self.extension
 
     @property
-    def words(self) -> str:
-        """What is read, in words; as in all sentences of a survey, lengths are in inches with four
-        decimals.
-        """
-        at = (
-            "" if self.extension is None else f" at extension {self.extension:.4f} {self.driven_in}"
-        )
+    def words(self) -> Sentence:
+        """What is read, in words."""
+        at: str = ""
+        if self.extension is not None and self.driven_in == LengthUnit.INCH:
+            at = Sentence.of(" at extension {}", Length(self.extension))
+        elif self.extension is not None:
+            at = f" at extension {self.extension:.4f} {self.driven_in}"
         match self.kind:
             case ReadingKind.DISTANCE:
-                return f"distance {self.start} to {self.end}{at}"
+                return Sentence.of("distance {} to {}{}", self.start, self.end, at)
             case ReadingKind.ANGLE:
-                return f"angle of the {self.end} of {self.start}"
+                return Sentence(f"angle of the {self.end} of {self.start}")
             case ReadingKind.PLUNGER:
-                return f"plunger{at}"
+                return Sentence.of("plunger{}", at)
             case ReadingKind.EXTENSION:
-                return "extension from Down Lock to the reference position"
+                return Sentence("extension from Down Lock to the reference position")
             case _:
-                return "prescribed travel of the plunger"
+                return Sentence("prescribed travel of the plunger")
 
     def in_units(self, value: float) -> float:
         """A value of this reading as a person writes it. [in or deg]"""
         return float(np.degrees(value)) if self.is_angle else value
 
-    def shown(self, value: float) -> str:
+    def shown(self, value: float) -> Sentence:
         """The same with its unit."""
-        return f"{np.degrees(value):.4g}°" if self.is_angle else f"{value:.4f} in"
+        if self.is_angle:
+            return Sentence(f"{np.degrees(value):.4g}°")
+        return Sentence.of("{}", Length(value))
 
 
 class SurveyedLinkage:

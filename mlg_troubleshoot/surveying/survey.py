@@ -30,6 +30,7 @@ from mlg_troubleshoot.surveying.readings import (
     SurveyedLinkage,
     SurveyReading,
 )
+from mlg_troubleshoot.units import Sentence
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,10 +53,8 @@ class Misfit:
         """What would fit, and with which rows it contradicts."""
         if len(self.group) < 2:
             return self.suggestion
-        return (
-            f"rows {', '.join(map(str, self.group))} contradict each other; of this one:"
-            f" {self.suggestion}"
-        )
+        rows = ", ".join(map(str, self.group))
+        return Sentence.of("rows {} contradict each other; of this one: {}", rows, self.suggestion)
 
 
 @dataclass(frozen=True, slots=True)
@@ -604,7 +603,8 @@ class Fitting:
                 if abs(other.value - expected) < near and abs(value - back) < 3.5 * float(
                     spread[j]
                 ):
-                    return f"swapped with row {other.row}: {other.words}", True
+                    said = Sentence.of("swapped with row {}: {}", other.row, other.words)
+                    return said, True
         if not reading.is_angle:
             for slip in tuned.SURVEY_SLIPS:
                 for size, factor, words in (
@@ -612,11 +612,14 @@ class Fitting:
                     ("small", slip.factor, slip.too_small),
                 ):
                     if abs(value * factor - expected) < near:
-                        right = f"{reading.shown(value * factor)} would fit"
-                        return (
-                            f"{right}: the value is {slip.factor:g} times too {size}, {words}",
-                            True,
+                        said = Sentence.of(
+                            "{} would fit: the value is {} times too {}, {}",
+                            reading.shown(value * factor),
+                            f"{slip.factor:g}",
+                            size,
+                            words,
                         )
+                        return said, True
         if reading.kind is ReadingKind.DISTANCE:
             names = [p.name for p in self.linkage.space.mechanism.points]
             others = [
@@ -627,27 +630,28 @@ class Fitting:
             guess = self.linkage.predicted(tuple(others), mode.vector[None])[0]
             best = int(np.nanargmin(np.abs(guess - value)))
             if abs(guess[best] - value) < 3.5 * reading.u:
-                return (
-                    (
-                        f"a wrong pin: {others[best].start} to {others[best].end} measures"
-                        f" {reading.shown(guess[best])}"
-                    ),
-                    True,
+                said = Sentence.of(
+                    "a wrong pin: {} to {} measures {}",
+                    others[best].start,
+                    others[best].end,
+                    reading.shown(guess[best]),
                 )
+                return said, True
         if not reading.is_angle:
             for inches in tuned.MISREAD_IN:
                 if near < 0.4 * inches and abs(abs(gap[i]) - inches) < near:
-                    return (
-                        f"misread by {reading.shown(inches)}: {reading.shown(expected)} would fit",
-                        True,
+                    said = Sentence.of(
+                        "misread by {}: {} would fit",
+                        reading.shown(inches),
+                        reading.shown(expected),
                     )
-        return (
-            (
-                f"the others give {reading.shown(expected)} ± {reading.shown(float(spread[i]))}:"
-                " read it again"
-            ),
-            False,
+                    return said, True
+        said = Sentence.of(
+            "the others give {} ± {}: read it again",
+            reading.shown(expected),
+            reading.shown(float(spread[i])),
         )
+        return said, False
 
     def draws(self, modes: tuple[Mode, ...], kept: Mask, rng: Generator) -> Array:
         """Draws from the posterior, all of which close: of each mode its share."""

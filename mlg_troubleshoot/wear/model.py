@@ -22,9 +22,8 @@ _PATHS, _PATHS_OF_MANY, _MANY = 4096, 256, 64
 # Units read twice or more, and other units, that the population is learnt from at most: more would
 # not narrow it. [1]
 _LEARN_FROM, _LEARN_FROM_OTHERS = 160, 40
-# Beyond the usage that any unit has reached, the clock of drift and increments runs faster or
-# slower by this share (one standard deviation): nothing read so far can tell of a curve that bends
-# later. [1]
+# Standard deviation of the pace of wear beyond the usage that any unit has reached: no reading so
+# far can show a curve that bends later. [1]
 _DOUBT = 0.25
 # The clock of a simulated path never stops. [1]
 _SLOWEST = 0.1

@@ -16,7 +16,7 @@ from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.next_joint import advise
 from mlg_troubleshoot.decision.prediction import Extension
-from mlg_troubleshoot.errors import NOTHING_JUDGED, OutputError, UsageError
+from mlg_troubleshoot.errors import ExitCode, OutputError, UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Gear
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.life.looking_back import PastInspection
     from mlg_troubleshoot.records import ReadResult
     from mlg_troubleshoot.reporting.publish import WrittenReport
-
-ALL_JUDGED, NOT_ALL_WITHIN = 0, 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,18 +83,20 @@ class CheckResult(TableResult):
         return {v: sum(j.verdict is v for j in self.judgements) for v in Verdict}
 
     @property
-    def exit_code(self) -> int:
-        """Exit code of the contract: 3 nothing judged; 1 something needs attention; else 0."""
+    def exit_code(self) -> ExitCode:
+        """NO_CONCLUSION if no row was judged, ATTENTION if one needs it."""
         judged = [j for j in self.judgements if isinstance(j, Assessment)]
         if not judged:
-            return NOTHING_JUDGED
+            return ExitCode.NO_CONCLUSION
         fine = all(
             j.verdict is Verdict.WITHIN_MARGIN
             and not any(f.over_limit for f in j.joints)
             and j.inspection.outcome is not Outcome.FAILED
             for j in judged
         )
-        return ALL_JUDGED if fine and len(judged) == len(self.judgements) else NOT_ALL_WITHIN
+        if fine and len(judged) == len(self.judgements):
+            return ExitCode.FINE
+        return ExitCode.ATTENTION
 
 
 def check_files(

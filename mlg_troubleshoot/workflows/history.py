@@ -152,7 +152,7 @@ def work(
 
 
 def void(store: Store, record_id: str, why: str) -> Record:
-    """Append that a record does not count."""
+    """Void a record: it stays in the chain but does not count."""
     judge_text("--why", why, "Say why the record does not count.")
     wrong = _unreadable(store, record_id) or find(store, record_id)
     body = {"voids": wrong.digest, "why": why}

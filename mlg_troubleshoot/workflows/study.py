@@ -113,7 +113,7 @@ def refuse_other_tables(options: StudyOptions) -> None:
     """Refuse a study whose result is not the table that goes with a gear, before the work."""
     if not options.is_standard:
         raise UsageError(
-            "--write-table with other than the standard study",
+            "--write-table needs the standard study",
             "Use design fast, sampled or tensor, without --directions, --distribution, --limit,"
             " --beyond-margin.",
         )

@@ -58,7 +58,7 @@ def survey_gear(
     write: Path | None = None,
     inspections: Path | None = None,
     seed: int = 0,
-    told: Callable[[int, int], None] = lambda *_: None,
+    on_progress: Callable[[int, int], None] = lambda *_: None,
 ) -> SurveyResult:
     """Find the linkage that a survey speaks of, and write it as a gear file with ensemble and index
     table.
@@ -82,7 +82,7 @@ def survey_gear(
     readings, problems, digest = read_survey(Path(file), linkage)
     members = linkage.amplification(np.array([linkage.vector(each) for each in known.ensemble]))
     before = np.quantile(members, [0.05, 0.95], axis=0).T
-    found = fit(known, readings, rng, told) if readings else None
+    found = fit(known, readings, rng, on_progress) if readings else None
     warnings: tuple[str, ...] = ()
     path = None
     if found is None:

@@ -262,7 +262,7 @@ def test_a_report_shows_what_was_read_what_follows_and_both_linkages(tmp_path: P
     (page,) = (tmp_path / "out").glob("*.html")
     html = page.read_text(encoding="utf-8")
     for words in (
-        "What follows, and what remains unknown",
+        "Indices and their remaining uncertainty",
         "The linkage before and now",
         "distance A to B",
         "7.1500 in",

@@ -14,9 +14,8 @@ import pytest
 
 from mlg_troubleshoot.errors import GearFileError, MechanismError, UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
-from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear import Gear, SourceKind
 from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
-from mlg_troubleshoot.gear.sources import SourceKind
 
 Edit = Callable[[str, str], Path]
 
@@ -404,3 +403,14 @@ def test_a_cause_that_would_change_no_number_of_the_linkage_is_refused(
 ) -> None:
     with pytest.raises(GearFileError, match=r"a number of the linkage instead of 'length\.1-F'"):
         load_gear(edited(f'"{name}"', '"length.1-F"'))
+
+
+def test_a_gear_that_is_given_in_place_of_a_name_is_returned_as_it_is() -> None:
+    gear = load_gear()
+    assert load_gear(gear) is gear
+
+
+def test_a_joint_that_a_gear_does_not_have_is_named_with_the_option_that_gave_it() -> None:
+    with pytest.raises(UsageError, match=r"^--joint 11: .* has no joint 11$") as refused:
+        load_gear().require_joints([3, 11], "--joint")
+    assert refused.value.remedy == "Its joints are 1, 2, 3, 4, 5, 6, 7, 8, 9, 10."

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
-from mlg_troubleshoot.decision.order import latest_of_each_gear, worst_first
+from mlg_troubleshoot.decision.ranking import latest_of_each_gear, worst_first
 from mlg_troubleshoot.errors import OutputError, Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting.inspection_report import batch_document

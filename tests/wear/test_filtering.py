@@ -11,7 +11,12 @@ from scipy import stats
 from mlg_troubleshoot.wear import Samples, WearPath
 from mlg_troubleshoot.wear.filtering import Draws, FilterState, follow
 from mlg_troubleshoot.wear.model import _Ends
-from mlg_troubleshoot.wear.passage import gamma_passage, integrated_passage, wiener_passage
+from mlg_troubleshoot.wear.passage import (
+    first_passage,
+    gamma_passage,
+    integrated_passage,
+    wiener_passage,
+)
 from mlg_troubleshoot.wear.paths import Scale, grid_step, lay_out
 from mlg_troubleshoot.wear.posterior import members
 
@@ -218,3 +223,14 @@ def test_quantiles_of_samples_are_those_of_numpy() -> None:
     assert Samples(samples).quantile(chances) == pytest.approx(
         np.quantile(samples, chances, axis=1).T
     )
+
+
+def test_a_simulated_path_passes_a_limit_between_two_usages_in_proportion_or_never() -> None:
+    paths = np.array([[0.0, 5.0, 0.0], [2.0, 6.0, 0.5], [4.0, 7.0, 1.0]])
+    passed = first_passage(np.array([0.0, 100.0, 300.0]), paths, 3.0)
+    assert passed.tolist() == [200.0, 0.0, np.inf]
+
+
+def test_a_path_without_a_finite_level_passes_at_the_usage_where_it_is_lost() -> None:
+    paths = np.array([[0.0], [1.0], [np.inf]])
+    assert first_passage(np.array([0.0, 100.0, 300.0]), paths, 3.0).tolist() == [300.0]

@@ -19,6 +19,7 @@ import msgspec
 
 from mlg_troubleshoot.cli.prompts.answers import MORE, NOT_MEASURED, Answers, JointAnswer
 from mlg_troubleshoot.datafile import walk
+from mlg_troubleshoot.decision.columns import MARGIN, PLUNGER_DISPLACEMENT
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
 from mlg_troubleshoot.store import Draft, Drafts, Store, own_file
@@ -39,7 +40,7 @@ class DamagedSessionError(SessionFileError):
 
 
 class SessionTakenError(TroubleshootError):
-    """A session that another run has gone on with since this one read or wrote it."""
+    """A session that another run has continued since this one read or wrote it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +100,8 @@ class SessionStore:
             raise OutputError(f"answers cannot be saved: {error.message}", error.remedy) from error
         if not saved:
             raise SessionTakenError(
-                f"another window has gone on with {session.id}",
-                "This entry goes on as one of its own.",
+                f"another window has continued {session.id}",
+                "This entry continues as a separate one.",
             )
         return ours
 
@@ -195,7 +196,7 @@ def read_session(draft: Draft) -> Session:
     try:
         session = replace(_from_json(raw), writer=draft.writer, complete=draft.complete)
         if session.id != draft.id:
-            raise ValueError(f"it holds the session {session.id!r}")
+            raise ValueError(f"it contains the session {session.id!r}")
     except (
         *(KeyError, TypeError, ValueError, OverflowError, AttributeError),
         *(UsageError, msgspec.ValidationError),
@@ -262,7 +263,7 @@ def _as_json(session: Session) -> dict[str, Any]:
 
 def _from_json(raw: Any) -> Session:
     if raw["schema_version"] == 1:
-        lengths = {"plunger_displacement": raw["plunger_in"], "margin": raw["margin_in"]}
+        lengths = {PLUNGER_DISPLACEMENT.name: raw["plunger_in"], MARGIN.name: raw["margin_in"]}
         more = {
             "outcome": raw["outcome"],
             **{n: f"{float(v)!r} in" for n, v in lengths.items() if v is not None},
