@@ -172,23 +172,20 @@ class PossibleCause(TargetedCause):
     separating_reading: str
 
 
-class RivalCause(PossibleCause):
-    """A cause of which something may act, and how probable that is."""
+class LikelyCause(PossibleCause):
+    """A cause of a set, and how likely it is."""
 
     probability: Probability
 
 
-class LikelierRival(TargetedCause):
-    """How likely the likeliest cause would be if this rival were ten times as likely beforehand."""
+class RivalTenTimesLikelier(TargetedCause):
+    """What the first cause would be worth if this rival were ten times as likely beforehand."""
 
     probability_of_first: Probability
 
 
 class NamedCauseOutput(TargetedCause):
-    """A cause that the data name; aliases: what these rows cannot distinguish from it.
-
-    probability: that something of this name acts, its aliases counted with it.
-    """
+    """A cause that the data name; aliases: what these rows cannot tell from it."""
 
     effect_rms_in: Size
     probability: Probability
@@ -247,12 +244,10 @@ class Remainder(TypedDict):
 class DiagnoseOutput(TypedDict):
     """Output of mlg diagnose --json.
 
-    causes: NAMED: by effect; else empty. also_possible: AMBIGUOUS: causes of which something acts,
-    the likeliest first; else empty. beside: NAMED: causes of which one or more act in addition to
-    what is named; the data cannot tell which. p_nothing, p_unlisted: probability that nothing is
-    wrong, and that something is wrong that no list has. sure: probability from which a cause is
-    named. unlisted_rms_in: UNLISTED: root mean square of that effect; else 0. cannot_say:
-    statements that so few rows or aircraft cannot carry.
+    causes: NAMED: by effect; else empty. also_possible: AMBIGUOUS: the whole set that the data
+    cannot separate; else empty. beside: NAMED: causes of which one or more act in addition to what
+    is named; the data cannot tell which. cannot_say: statements that so few rows or aircraft cannot
+    carry.
     """
 
     schema_version: Version
@@ -261,14 +256,14 @@ class DiagnoseOutput(TypedDict):
     misfit: MisfitSize
     verdict: Literal["NONE", "NAMED", "AMBIGUOUS", "UNLISTED"]
     causes: list[NamedCauseOutput]
-    also_possible: list[RivalCause]
-    beside: list[RivalCause]
+    also_possible: list[LikelyCause]
+    beside: list[LikelyCause]
     p_nothing: Probability
     p_unlisted: Probability
     sure: Probability
-    if_ten_times_likelier: Annotated[list[LikelierRival], Meta(max_length=1)]
+    if_ten_times_likelier: list[RivalTenTimesLikelier]
     unlisted_variables: list[str]
-    unlisted_rms_in: Size
+    unlisted_rms_in: Size | None
     not_testable: list[NotTestable]
     cannot_say: list[str]
     ruled_out: list[TargetedCause]

@@ -228,7 +228,7 @@ class Sentence(str):
     be said in the unit of its reader.
     """
 
-    _template = "{}"
+    _template = ""
     _facts: tuple[object, ...] = ()
 
     @classmethod
@@ -244,9 +244,10 @@ class Sentence(str):
         return cls.of(between.join("{}" for _ in parts), *parts)
 
     def said_in(self, unit: LengthUnit) -> str:
-        facts = self._facts if self._facts else (str(self),)
-        template = self._template if self._facts else "{}"
-        return template.format(*(said_in(fact, unit) for fact in facts))
+        """Say it again, its lengths in another unit."""
+        if not self._facts:
+            return str(self)
+        return self._template.format(*(said_in(fact, unit) for fact in self._facts))
 
 
 def said_in(fact: object, unit: LengthUnit) -> str:

@@ -149,7 +149,7 @@ def _show(findings: StudyFindings, unit: LengthUnit) -> None:
         else "plunger displacement at mid-position"
     )
     console.print(f"{gear.name}: sensitivity of {what}", style="bold")
-    console.print(f"Geometry: {gear.provenance}. StudyDesign: {table.design}, seed {table.seed}.")
+    console.print(f"Geometry: {gear.provenance}. Design: {table.design}, seed {table.seed}.")
     failed = f"{table.failed} did not close" if table.failed else "none failed"
     console.print(
         f"{table.evaluations} solutions of the linkage over {len(gear.ensemble)} linkages,"

@@ -55,7 +55,7 @@ class Column:
     bears_verdict: a mistake in it changes a verdict, so the row is not judged.
     carried: it travels to the report unread.
     blank_by_word: a word such as ``n/a`` says that nothing was measured.
-    covariate: place among the covariates of a diagnosis, from 1; 0 if it is none.
+    covariate: place among the covariates of a diagnosis, from 1; 0 for any other column.
     effort: place in the order of what it takes to record it in addition to clearances, from 1.
     words: what the column is about, in a sentence.
     sign_off: place on the sign-off page of the prompts, from 1; prompt, prompt_word: what is asked
@@ -105,11 +105,6 @@ class Column:
     @cached_property
     def is_length(self) -> bool:
         return self.holds is Holds.LENGTH
-
-    @cached_property
-    def measures(self) -> bool:
-        """Whether its cells may state a unit."""
-        return self.holds in (Holds.LENGTH, Holds.NUMBER)
 
     @cached_property
     def is_numbered(self) -> bool:
@@ -293,6 +288,7 @@ LANDINGS = Column(
     holds=Holds.NUMBER,
     meaning="Landings since overhaul, 0 or more.",
     high=1e6,
+    unit="landings",
     expected="landings since overhaul, {low:g} or more",
     spellings=(
         "ldgs|landings since o h|landings|landings since overhaul|gear landings since overhaul"

@@ -28,6 +28,7 @@ from mlg_troubleshoot.decision.columns import (
     STROKE,
     UNIT,
     Column,
+    Holds,
 )
 from mlg_troubleshoot.decision.inspection import (
     DEFAULT_GAUGE_U_IN,
@@ -185,7 +186,11 @@ class RowReader:
             if p.field is None and not (p.refused or p.is_mapped or re.search(r"\d", p.header))
         ]
         # What a number format adds counts where a unit does.
-        self._plain = [p.index for p in placed if p.field is None or not p.field.column.measures]
+        self._plain = [
+            p.index
+            for p in placed
+            if p.field is None or p.field.column.holds not in (Holds.LENGTH, Holds.NUMBER)
+        ]
         self._blankable = [index for index, field in good if field.column.blank_by_word]
         self.not_measured: Counter[str] = Counter()
         self._without_unit: set[str | None] = set()

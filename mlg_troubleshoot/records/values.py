@@ -236,7 +236,7 @@ def read_value(
             column.high,
             decimal_comma=decimal_comma,
             expected=column.asked,
-            units=(column.unit.lower().lstrip("°") or column.name.rpartition("_")[2],),
+            units=tuple(filter(None, (column.unit.lstrip("°").lower(),))),
         )
     if column.holds is Holds.YES_NO:
         return _read_yes_no(cell)

@@ -128,7 +128,7 @@ def _by_verdict() -> list[dict[str, Any]]:
         }
         for verdict, key, least in (
             ("NAMED", "causes", 1),
-            ("AMBIGUOUS", "also_possible", 1),
+            ("AMBIGUOUS", "also_possible", 2),
             ("NAMED", "beside", 0),
         )
     ]

@@ -14,10 +14,21 @@ _GRID = np.concatenate([[0.0], np.geomspace(0.02, 40.0, 44)])
 
 
 def first_passage(at: Array, paths: Array, limit: float) -> Array:
-    """Where each simulated path first passes a limit, infinite beyond the last usage.
+    """Find where each simulated path first passes a limit; between two usages it is interpolated.
 
-    at, shape (m,): ascending usages, and paths, shape (m, n_samples): the wear there. A passage
-    between two usages is interpolated. [usage, value]
+    Parameters
+    ----------
+    at : ndarray, shape (m,)
+        Ascending usages. [usage]
+    paths : ndarray, shape (m, n_samples)
+        The wear of each path at these usages. [value]
+    limit : float
+        The limit. [value]
+
+    Returns
+    -------
+    ndarray, shape (n_samples,)
+        Usage of each first passage, infinite beyond the last usage. [usage]
     """
     over = paths > limit
     k = np.argmax(over, axis=0)

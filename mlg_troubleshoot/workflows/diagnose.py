@@ -13,7 +13,6 @@ from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
@@ -43,7 +42,7 @@ class DiagnoseOptions(TableOptions):
     gear: str = DEFAULT_GEAR
     remembered: str | None = None
     cause_files: tuple[Path, ...] = ()
-    sure: float = Beliefs().sure
+    sure: float = 0.9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,6 +97,7 @@ def diagnose_files(
         load_causes,
         table_from_inspections,
     )
+    from mlg_troubleshoot.misfit.beliefs import Beliefs
     from mlg_troubleshoot.records import ReadOptions, read_many
 
     gear = load_gear(options.gear)

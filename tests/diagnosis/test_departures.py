@@ -29,6 +29,7 @@ from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
 from mlg_troubleshoot.gear.directions import worst_case, worst_of_sense
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import links_from
+from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
 
 from .conftest import Array, fleet
@@ -266,6 +267,21 @@ def test_one_scale_that_the_data_do_not_reject_is_likelier_than_factors_of_all_j
     chances = found("readings 1.1 times as large").probabilities
     assert next(iter(chances)) == ("calibration_rate", None)
     assert chances[("calibration_rate", None)] > 0.8
+
+
+def test_a_cause_is_named_from_the_probability_that_is_asked_for(gear: Gear) -> None:
+    table, ensemble = FLEETS["readings 1.1 times as large"](gear), gear.ensemble_models[1:]
+    verdicts = [
+        diagnose(
+            gear.model,
+            table,
+            gear.discrepancies,
+            ensemble=ensemble,
+            beliefs=Beliefs(sure=sure),
+        ).verdict
+        for sure in (0.8, 0.95)
+    ]
+    assert verdicts == ["NAMED", "AMBIGUOUS"]
 
 
 def test_one_pin_far_off_and_the_others_alike_are_directions_under_load() -> None:

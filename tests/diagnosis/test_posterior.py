@@ -18,6 +18,7 @@ from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.explanation import Context, Effects, Key
 from mlg_troubleshoot.misfit.marginal import Marginal, Products
 from mlg_troubleshoot.misfit.posterior import MisfitPosterior, posterior
+from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions
 
 PAGE = Path(__file__).parents[2] / "docs/explanation/diagnosis.md"
 Array = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
@@ -222,3 +223,7 @@ def test_the_page_of_the_diagnosis_states_how_large_each_cause_plausibly_is(caus
     assert (f"`{cause.name}`" in said) == (
         cause.plausible is not None or isinstance(cause, JointFactors)
     )
+
+
+def test_the_command_says_what_the_beliefs_say_from_the_same_probability() -> None:
+    assert DiagnoseOptions().sure == Beliefs().sure
