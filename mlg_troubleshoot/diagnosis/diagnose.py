@@ -35,10 +35,10 @@ from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel
-from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.explanation import Key
 from mlg_troubleshoot.misfit.fitting import shrunk
+from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 from mlg_troubleshoot.units import MM_PER_IN
 
 LEAST_ROWS = 20

@@ -20,11 +20,11 @@ from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, Rows, build_noise
 from mlg_troubleshoot.gear.model import LinkageModel
-from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.explanation import Context, Effects, Explanation, Key
 from mlg_troubleshoot.misfit.posterior import MisfitPosterior, posterior
+from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 
 # The noise is estimated again from what is left as long as that changes the likeliest explanation,
 # so often at most.
