@@ -36,6 +36,15 @@ class Kind(StrEnum):
     TECHNICIAN_ID = "technician_id"
     OUTCOME = "outcome"
     SMALL_READINGS_TRUE = "small_readings_true"
+    RESTORED_JOINTS = "restored_joints"
+    REPAIR_DATE = "repair_date"
+    PLUNGER_DATE = "plunger_date"
+    OUTCOME_DATE = "outcome_date"
+    RIGGING_CHECKED = "rigging_checked"
+    CANNOT_REACH = "cannot_reach"
+    NO_SPARE = "no_spare"
+    OPEN_AREAS = "open_areas"
+    MINUTES_AVAILABLE = "minutes_available"
     WORK_ORDER = "work_order"
     MANUAL_REF = "manual_ref"
     MANUAL_REV = "manual_rev"
@@ -71,6 +80,8 @@ VERDICT_BEARING = frozenset(
             Kind.JOINT,
             Kind.CLEARANCE,
             Kind.SMALL_READINGS_TRUE,
+            Kind.RESTORED_JOINTS,
+            Kind.RIGGING_CHECKED,
         ),
         *(
             Kind.OUTCOME,

@@ -46,6 +46,8 @@ _AS_IN_A_TABLE = (
         "margin_u_in",
         "small_readings_true",
     ),
+    *("restored_joints", "repair_date", "plunger_date", "outcome_date", "rigging_checked"),
+    *("cannot_reach", "no_spare", "open_areas", "minutes_available"),
 )
 _NOBODY = {Kind.RECORD_ID.value: "-", Kind.TAIL_NO.value: "-", Kind.SIDE.value: "LH"}
 
@@ -182,6 +184,10 @@ def _cell(value: object) -> Cell:
         return None
     if isinstance(value, str):
         return str(value)
+    if isinstance(value, tuple | list):
+        return "; ".join(map(str, value)) or None
+    if isinstance(value, datetime):
+        return value.isoformat(sep=" ")
     if isinstance(value, bool) or not isinstance(value, Real | date):
         return OddCell(OddKind.BOOLEAN, str(value))
     return iso_date_cell(value.isoformat()) if isinstance(value, date) else float(value)

@@ -42,7 +42,7 @@ from mlg_troubleshoot.records.columns import (
     Kind,
 )
 from mlg_troubleshoot.records.dates import DateOrder, readings
-from mlg_troubleshoot.records.model import TableInHand
+from mlg_troubleshoot.records.model import ReadOptions, TableInHand
 from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.slips import scale_slip
 from mlg_troubleshoot.records.unit_fit import UnitFit, judge_unit, plunger_question
@@ -51,11 +51,15 @@ from mlg_troubleshoot.records.values import (
     AmbiguousDateError,
     CellFaultError,
     plain_text,
+    read_areas,
     read_choice,
     read_date,
+    read_joints,
     read_length,
+    read_moment,
     read_number,
     read_outcome,
+    read_rigging,
     read_text,
     read_yes_no,
     says_failed,
@@ -128,6 +132,29 @@ LOOSE_CELLS: dict[Kind, Callable[[bool, str, str | float | OddCell], object]] = 
 }
 
 
+# What a row says of repairs and of the day: the gear and the options say what can be meant.
+_DAY_CELLS: dict[Kind, Callable[[ReadOptions, date, str | float | OddCell], object]] = {
+    **dict.fromkeys(
+        (Kind.RESTORED_JOINTS, Kind.CANNOT_REACH, Kind.NO_SPARE),
+        lambda options, _, cell: read_joints(cell, options.joint_numbers),
+    ),
+    **dict.fromkeys(
+        (Kind.REPAIR_DATE, Kind.PLUNGER_DATE, Kind.OUTCOME_DATE),
+        lambda options, latest, cell: read_moment(cell, options.dates, latest),
+    ),
+    Kind.OPEN_AREAS: lambda options, _, cell: read_areas(cell, options.areas),
+    Kind.MINUTES_AVAILABLE: lambda options, _, cell: read_number(
+        cell,
+        0.0,
+        1e5,
+        decimal_comma=options.decimal_comma,
+        expected="minutes, 0 or more",
+        suffix="min",
+    ),
+    Kind.RIGGING_CHECKED: lambda _, __, cell: read_rigging(cell),
+}
+
+
 # A column, the name of what it holds, and how a cell of it is read.
 _Loose = tuple[int, str, Callable[[Any], object]]
 
@@ -188,6 +215,8 @@ class RowReader:
         self._table = table
         self._options = table.options
         self._comma = table.decimal_comma
+        # Somewhere it is tomorrow already.
+        self._latest = date.today() + timedelta(days=1)
         self._placed = {p.index: p for p in placed}
         self._width = max(self._placed, default=-1) + 1
         good = [(p.index, p.field) for p in placed if p.field is not None and not p.refused]
@@ -221,6 +250,11 @@ class RowReader:
         self._others += [
             (i, Kind.DATE.value, self._read_date) for i, f in good if f.kind is Kind.DATE
         ]
+        self._others += [
+            (i, f.kind.value, partial(_DAY_CELLS[f.kind], self._options, self._latest))
+            for i, f in good
+            if f.kind in _DAY_CELLS
+        ]
         self._carried: list[_Loose] = [
             (index, field.kind.value, _carried_text)
             for index, field in good
@@ -248,8 +282,6 @@ class RowReader:
         self._cells: Sequence[Cell] = ()
         self._bad: set[int] = set()
         self._faults: list[tuple[int, CellFaultError]] = []
-        # Somewhere it is tomorrow already.
-        self._latest = date.today() + timedelta(days=1)
         # The plunger readings of the row, with the unit of each. [in]
         self._plunger: list[tuple[float, LengthUnit]] = []
         # Which orders fit the dates that are written as numbers, and the dates of rows that wait

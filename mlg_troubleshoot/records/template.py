@@ -14,7 +14,7 @@ from openpyxl.worksheet.pagebreak import Break
 from openpyxl.worksheet.properties import PageSetupProperties
 from openpyxl.worksheet.worksheet import Worksheet
 
-from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN
+from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN, RiggingCheck
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.joints import JointSpec
 from mlg_troubleshoot.outputs import write_bytes
@@ -40,6 +40,7 @@ _CHOICES: dict[Kind, tuple[str, ...]] = {
     Kind.UNIT: tuple(LengthUnit),
     Kind.APPROACH: ("EXTENDING", "RETRACTING"),
     Kind.OUTCOME: ("RETRACTED", "FAILED"),
+    Kind.RIGGING_CHECKED: tuple(RiggingCheck),
 }
 # What each column holds, in the order of the columns; in braces the numbers of `_numbers`.
 _MEANING: dict[Kind, str] = {
@@ -81,6 +82,20 @@ _MEANING: dict[Kind, str] = {
     Kind.MANUAL_REF: "Optional. Manual reference; goes to the report unchanged.",
     Kind.MANUAL_REV: "Optional. Manual revision; goes to the report unchanged.",
     Kind.REMARKS: "Optional. Goes to the report unchanged.",
+    Kind.RESTORED_JOINTS: (
+        "Optional. Joints restored since the failure, for example 3 5. Their clearances in this row"
+        " are those after the repair; outcome and plunger reading count as older."
+    ),
+    Kind.REPAIR_DATE: "Optional. When they were restored: year-month-day, with the time if known.",
+    Kind.PLUNGER_DATE: "Optional. When the plunger was read, if that was after the repair.",
+    Kind.OUTCOME_DATE: "Optional. When the outcome was seen, if that was after the repair.",
+    Kind.RIGGING_CHECKED: (
+        "Optional. Rigging and lock roller: no, yes (looked at) or corrected (set right)."
+    ),
+    Kind.CANNOT_REACH: "Optional. Joints that cannot be reached today, for example 4.",
+    Kind.NO_SPARE: "Optional. Joints for which there is no spare part today.",
+    Kind.OPEN_AREAS: "Optional. Areas that are open already: {areas}.",
+    Kind.MINUTES_AVAILABLE: "Optional. Minutes left for the work today.",
     Kind.AXIAL_FLOAT: "Optional. End float of the joint along its pin.",
 }
 _INSTRUCTIONS = (
@@ -171,6 +186,7 @@ def _numbers(gear: Gear, unit: LengthUnit) -> dict[str, str]:
         "gauge_u": _length(DEFAULT_GAUGE_U_IN, unit),
         "down_lock": f"{low} to {high}",
         "margin": _length(gear.margin.value, unit),
+        "areas": "; ".join(area.name for area in gear.areas),
     }
 
 

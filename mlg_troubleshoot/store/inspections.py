@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from datetime import date
+from datetime import date, datetime
 from enum import Enum
 from typing import Any
 
@@ -13,6 +13,7 @@ from mlg_troubleshoot.decision.inspection import (
     EnteredClearance,
     Inspection,
     Outcome,
+    RiggingCheck,
     RowSource,
     Side,
 )
@@ -62,6 +63,11 @@ def inspection_record(inspection: Inspection, kind: Kind = Kind.INSPECTION, **mo
     )
 
 
+def _moment(text: str) -> date:
+    """A day, or a day with its time."""
+    return datetime.fromisoformat(text) if "T" in text else date.fromisoformat(text)
+
+
 # How a field is read back where it does not stand in JSON as it is.
 _READ: dict[str, Callable[[Any], Any]] = {
     **dict.fromkeys(
@@ -72,8 +78,11 @@ _READ: dict[str, Callable[[Any], Any]] = {
     },
     "source": lambda found: RowSource(*found),
     "inspection_date": date.fromisoformat,
+    **dict.fromkeys(("repair_date", "plunger_date", "outcome_date"), _moment),
+    "rigging_checked": RiggingCheck,
     **{"side": Side, "convention": ClearanceConvention, "outcome": Outcome, "approach": Approach},
-    **dict.fromkeys(("readings_in", "warnings"), tuple),
+    **dict.fromkeys(("readings_in", "warnings", "restored_joints"), tuple),
+    **dict.fromkeys(("cannot_reach", "no_spare", "open_areas"), tuple),
 }
 
 

@@ -10,12 +10,12 @@ from dataclasses import fields
 from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Verdict
-from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.decision.inspection import Inspection, RiggingCheck, Side
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.records.columns import LENGTH_RANGE_IN, Kind
 from mlg_troubleshoot.records.rows import LOOSE_CELLS
-from mlg_troubleshoot.records.values import CellFaultError, read_date, read_text
+from mlg_troubleshoot.records.values import CellFaultError, read_date, read_moment, read_text
 from mlg_troubleshoot.store import Kind as RecordKind
 from mlg_troubleshoot.store import Record
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
@@ -72,6 +72,11 @@ class KeptGate:
             "warnings": _each(_some_text),
             "source": _source,
             "inspection_date": _cell(lambda _, __, day: read_date(day)),
+            **dict.fromkeys(("restored_joints", "cannot_reach", "no_spare"), _each(self._joint)),
+            **dict.fromkeys(("repair_date", "plunger_date", "outcome_date"), _moment),
+            "rigging_checked": _one_of(RiggingCheck),
+            "open_areas": _each(_text),
+            "minutes_available": _number(0.0, 1e5),
             "small_readings_true": _flag,
             "unit_question": _some_text,
         }
@@ -219,7 +224,7 @@ def _number(low: float = -1e12, high: float = 1e12, *, above: bool = False) -> _
 _any_number = _number()
 
 
-def _one_of(words: type[Side | ClearanceConvention | Verdict]) -> _Check:
+def _one_of(words: type[Side | ClearanceConvention | Verdict | RiggingCheck]) -> _Check:
     known = frozenset(word.value for word in words)
 
     def check(column: str, value: Any) -> None:
@@ -251,6 +256,15 @@ def _cell(read: Callable[[bool, str, Any], object]) -> _Check:
             raise _WrongError(column, value, f"written as it was kept ({found})")
 
     return check
+
+
+def _moment(column: str, value: Any) -> None:
+    try:
+        if isinstance(value, str) and read_moment(value).isoformat() == value:
+            return
+    except CellFaultError:
+        pass
+    raise _WrongError(column, value, "a date, with its time if known")
 
 
 def _each(check: _Check) -> _Check:
