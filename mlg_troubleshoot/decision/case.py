@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
-from mlg_troubleshoot.decision.inspection import Inspection, Outcome
+from mlg_troubleshoot.decision.inspection import Inspection, Outcome, RiggingCheck
 from mlg_troubleshoot.decision.prediction import (
     DEFAULT_PLUNGER_U_IN,
     DIRECTION_SETS,
@@ -45,6 +45,8 @@ class Cases:
     mean_u_in: Array
     failed: Mask
     retracted: Mask
+    reachable: Mask
+    restorable: Mask
 
     @classmethod
     def of(
@@ -69,8 +71,12 @@ class Cases:
             margin_u_in=np.array([i.margin_u_in for i in rows]),
             mean_in=np.array([math.nan if mean is None else mean for mean in means]),
             mean_u_in=np.array([plunger_u(i) for i in rows]),
-            failed=np.array([i.outcome is Outcome.FAILED for i in rows]),
-            retracted=np.array([i.outcome is Outcome.RETRACTED for i in rows]),
+            failed=np.array([i.standing_outcome is Outcome.FAILED for i in rows]),
+            retracted=np.array([i.standing_outcome is Outcome.RETRACTED for i in rows]),
+            reachable=np.array([[n not in i.cannot_reach for n in numbers] for i in rows]),
+            restorable=np.array(
+                [[n not in (*i.cannot_reach, *i.no_spare) for n in numbers] for i in rows]
+            ),
         )
 
     def __len__(self) -> int:
@@ -93,6 +99,21 @@ class Cases:
     def critical_missing(self) -> Mask:
         """True for a gear of which a critical joint was not measured."""
         return np.asarray((~self.measured & self.gear.critical).any(axis=1))
+
+    @property
+    def complained(self) -> Mask:
+        """True for a gear that failed before it was repaired, and was not tried since.
+
+        A corrected rigging stands for a failure: nobody sets it right without one.
+        """
+        return np.array(
+            [
+                i.standing_outcome is None
+                and i.is_repaired
+                and (i.outcome is Outcome.FAILED or i.rigging_checked is RiggingCheck.CORRECTED)
+                for i in self.inspections
+            ]
+        )
 
     @property
     def joints_done(self) -> Mask:
@@ -133,7 +154,7 @@ def _disagreement(inspection: Inspection, margin_in: float) -> str:
     """Plunger readings of which one is outside the margin and the mean is not."""
     mean, one_u = inspection.measured_displacement_in, inspection.plunger_gauge_u_in
     beyond = margin_in + 2.0 * (DEFAULT_PLUNGER_U_IN if one_u is None else one_u)
-    far = [reading for reading in inspection.readings_in if abs(reading) > beyond]
+    far = [reading for reading in inspection.standing_readings_in if abs(reading) > beyond]
     if mean is None or not far or abs(mean) > margin_in:
         return ""
     return (
@@ -149,7 +170,7 @@ def plunger_u(inspection: Inspection) -> float:
         if inspection.plunger_gauge_u_in is None
         else inspection.plunger_gauge_u_in
     )
-    return one / math.sqrt(max(len(inspection.readings_in), 1))
+    return one / math.sqrt(max(len(inspection.standing_readings_in), 1))
 
 
 def predict_batch(cases: Cases) -> BatchPrediction:

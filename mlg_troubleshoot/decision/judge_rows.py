@@ -19,6 +19,7 @@ from mlg_troubleshoot.decision.assessment import (
     Verdict,
 )
 from mlg_troubleshoot.decision.case import Cases, predict_batch
+from mlg_troubleshoot.decision.causes import believed
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
 from mlg_troubleshoot.decision.likely_worn import explain
 from mlg_troubleshoot.decision.monte_carlo import check_probability
@@ -107,10 +108,10 @@ def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Ass
         p_lower,
         batch.lower.standard_uncertainty(cases.margin_u_in),
     )
-    courses = plans(cases, judged, found, sets)
+    causes = believed(cases)
+    planned = plans(cases, judged, causes, causes.with_chances(sets))
     return [
-        _assessment(cases, judged, i, findings[i], courses[i], sets[i], seed)
-        for i in range(len(cases))
+        _assessment(cases, judged, i, findings[i], *planned[i], seed) for i in range(len(cases))
     ]
 
 

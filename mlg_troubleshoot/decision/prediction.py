@@ -18,7 +18,8 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 
 DIRECTION_SETS = 4096
-DEFAULT_PLUNGER_U_IN = 0.0005
+# What a hand-held gauge reads the plunger to. [in]
+DEFAULT_PLUNGER_U_IN = 0.0015
 # The model's standard uncertainty until a diagnosis gives it: the larger of a length and a share of
 # the prediction.
 PROVISIONAL_U_IN, PROVISIONAL_U_SHARE = 0.003, 0.10

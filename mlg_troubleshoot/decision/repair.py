@@ -12,7 +12,7 @@ from statistics import NormalDist
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
-from mlg_troubleshoot.decision.assessment import RepairSet, Rigging, UncertaintyBudget
+from mlg_troubleshoot.decision.assessment import RepairKind, RepairSet, Rigging, UncertaintyBudget
 from mlg_troubleshoot.decision.case import Cases, exact_chance
 from mlg_troubleshoot.decision.plan import minutes_to_measure, minutes_to_restore
 from mlg_troubleshoot.decision.prediction import Prediction, model_uncertainty
@@ -111,7 +111,11 @@ def _surest(table: Subsets, slack_in: Array, among: Mask) -> Places:
 
 def removable(cases: Cases) -> Mask:
     """Joints that can be restored with a gain: measured, and worn beyond a new part."""
-    return cases.measured & (cases.filled(0.0) > cases.gear.new_parts_in + _AS_NEW_IN)
+    return (
+        cases.measured
+        & cases.restorable
+        & (cases.filled(0.0) > cases.gear.new_parts_in + _AS_NEW_IN)
+    )
 
 
 def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
@@ -121,7 +125,7 @@ def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
     table, linkages = subsets_of(cases.gear), responses(cases.gear)
     worn, now = removable(cases), cases.filled(cases.gear.limits_in)
     less = np.where(worn, now - cases.gear.new_parts_in, 0.0)
-    over = cases.over_limit
+    over = cases.over_limit & cases.restorable
     # A subset may hold no joint that gains nothing and must hold every joint over its limit.
     barred = (~worn).astype(float) @ table.weights.T + over.astype(float) @ (
         1.0 - table.weights.T
@@ -245,7 +249,7 @@ def repair_sets(cases: Cases, found: Search, wanted: Mask) -> list[tuple[RepairS
         which = sets[k]
         minutes = table.to_measure[which], float(table.minutes[which])
         result[rows[k]].append(
-            RepairSet(table.joints[which], float(moved[k]), float(p[k]), *minutes)
+            RepairSet(table.joints[which], float(moved[k]), float(p[k]), *minutes, RepairKind.SURE)
         )
     return [tuple(sets) for sets in result]
 

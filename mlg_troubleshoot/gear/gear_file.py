@@ -47,6 +47,9 @@ _UNSTATED = {
     "read_min": 12.0,
     "horizon_landings": 20_000.0,
     "accepted_chance": 0.05,
+    "second_repair_chance": 0.02,
+    "minutes": 30.0,
+    "retraction_min": 15.0,
 }
 _GEOMETRY_KEYS = ("input", "planes", "points", "steps", "output", "calibration")
 
@@ -112,6 +115,10 @@ def _read(path: Path) -> Gear:
     entry = table.table("entry")
     table.skip(*_GEOMETRY_KEYS)
     (plunger_reading,) = _not_needed(table, "plunger", numbers, read_min="min")
+    second_repair, retraction = _not_needed(
+        table, "repair", numbers, second_repair_chance="1", retraction_min="min"
+    )
+    (rigging_check,) = _not_needed(table, "rigging_check", numbers, minutes="min")
     horizon, accepted = _not_needed(
         table, "forecast", numbers, horizon_landings="landings", accepted_chance="1"
     )
@@ -128,6 +135,9 @@ def _read(path: Path) -> Gear:
         joints=tuple(_joint(t, numbers) for t in table.tables("joints")),
         areas=tuple(_area(t, numbers) for t in table.tables("areas")),
         plunger_reading=plunger_reading,
+        rigging_check=rigging_check,
+        retraction=retraction,
+        second_repair_chance=second_repair,
         horizon=horizon,
         accepted_chance=accepted,
         calibration=calibration,

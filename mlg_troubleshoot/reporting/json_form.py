@@ -197,7 +197,12 @@ def _joint(finding: JointFinding) -> dict[str, Any]:
 
 def _course(judgement: Judgement) -> dict[str, Any]:
     steps = plain(judgement.plan.steps)
-    return {"next_action": steps[0], "plan": steps, "end": judgement.end.value}
+    return {
+        "next_action": steps[0],
+        "plan": steps,
+        "end": judgement.end.value,
+        "open_question": judgement.plan.open_question,
+    }
 
 
 def diagnosis_as_json(
