@@ -80,8 +80,9 @@ class Run:
     def _judged(self) -> task.CheckResult:
         if self._files and any(astuple(self._flags)):
             raise UsageError(
-                "--set, --tail, --side, --record-id, --outcome, --measured and --margin describe"
-                " one gear entered by hand, and a FILE was given as well",
+                "--set, --tail, --side, --record-id, --outcome, --measured, --margin and the flags"
+                " of repairs and of the day (--restored … --minutes) describe one gear entered by"
+                " hand, and a FILE was given as well",
                 "Give either a FILE or the values of one gear.",
             )
         if not self._files:

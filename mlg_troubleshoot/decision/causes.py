@@ -134,8 +134,8 @@ class Causes:
     joints, rigging, elsewhere: chances that a failure is one of the joints, of the rigging or lock
     roller, or of something that leaves the plunger within its margin. [1]
     worn: chance that each joint is beyond its limit, 0 or 1 where it was read. [1]
-    exceeds: chance that the joints alone hold the plunger beyond its margin, unread ones by their
-    wear. [1]
+    exceeds: chance with random directions that the joints hold the plunger beyond its margin,
+    unread ones by their wear, whatever the plunger reads. [1]
     waves: characteristic function of each joint, (n, joints, terms).
     loaded: chance that loads hold the pins in their worst directions. [1]
     """
@@ -216,12 +216,12 @@ class Causes:
 
 def believed(cases: Cases) -> Causes:
     """Weigh what may be the matter with n gears, by everything that is known of each."""
-    gear, n = cases.gear, len(cases)
+    gear = cases.gear
     tables, read, limits = _tables(gear), cases.measured, gear.limits_in
     levels = _levels(cases)
     known = _bessel(_T * (tables.amplification * cases.filled(0.0))[:, :, None])
     known = known * _blur(np.sqrt(0.5) * tables.amplification * cases.gauge_u_in)
-    margin, x = cases.margin_in, np.abs(np.nan_to_num(cases.mean_in))
+    x = np.abs(np.nan_to_num(cases.mean_in))
     u = np.hypot(cases.mean_u_in, 1e-4)
     seen = np.isfinite(cases.mean_in)
     likely, worn = levels.copy(), levels @ tables.worn_chance
@@ -231,9 +231,14 @@ def believed(cases: Cases) -> Causes:
         likely[rows], worn[rows] = _given_plunger(
             tables, read[rows], known[rows], levels[rows], x[rows], u[rows]
         )
-    waves = np.where(read[:, :, None], known, np.einsum("nl,ljk->njk", likely, tables.unread))
+    before = np.where(read[:, :, None], known, np.einsum("nl,ljk->njk", levels, tables.unread))
+    exceeds = 1.0 - _inside(np.prod(before, axis=1) * _blur(_LINKAGE_U_IN), cases.margin_in)
+    waves = before.copy()
+    if len(rows):
+        after = np.einsum("nl,ljk->njk", likely[rows], tables.unread)
+        waves[rows] = np.where(read[rows, :, None], known[rows], after)
     mean_in = np.where(read, cases.filled(0.0), (likely @ tables.share_mean)[:, None] * limits)
-    return _weighed(cases, tables, waves, mean_in, np.clip(worn, 0.0, 1.0), u)
+    return _weighed(cases, tables, waves, mean_in, np.clip(worn, 0.0, 1.0), u, exceeds)
 
 
 def _given_plunger(
@@ -257,14 +262,19 @@ def _given_plunger(
 
 
 def _weighed(
-    cases: Cases, tables: _Tables, waves: Array, mean_in: Array, worn: Array, u: Array
+    cases: Cases,
+    tables: _Tables,
+    waves: Array,
+    mean_in: Array,
+    worn: Array,
+    u: Array,
+    exceeds: Array,
 ) -> Causes:
     """Divide each gear between its joints, its rigging and everything else."""
-    gear, margin, seen = cases.gear, cases.margin_in, np.isfinite(cases.mean_in)
+    margin, seen = cases.margin_in, np.isfinite(cases.mean_in)
     x = np.nan_to_num(cases.mean_in)
     together = np.prod(waves, axis=1) * _blur(_LINKAGE_U_IN)
     shift = np.sum(tables.bend * mean_in**2, axis=1)
-    inside = _inside(together, margin)
     density = np.maximum(0.5 + together @ _COSINES, 0.0) * _STEP_IN / _HALF_IN
     fits = np.exp(-0.5 * ((x[:, None] - shift[:, None] - _AT) / u[:, None]) ** 2) / u[:, None]
     stands = np.abs(_AT + shift[:, None])
@@ -303,7 +313,7 @@ def _weighed(
         rigging=parts[1],
         elsewhere=parts[2],
         worn=np.where(cases.measured, cases.over_limit, worn),
-        exceeds=1.0 - inside,
+        exceeds=exceeds,
         waves=waves,
         loaded=np.where(seen, loaded / np.maximum(all_joints, 1e-300), _LOADED),
         mean_in=mean_in,

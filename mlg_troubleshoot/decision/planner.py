@@ -93,9 +93,10 @@ class _Facts:
         self.cases, self.judged, self.causes = cases, judged, causes
         self.questions, self.complained = cases.questions, cases.complained
         self.over, self.removable = cases.over_limit & cases.restorable, removable(cases)
-        self.open = ~cases.measured & cases.reachable
-        critical: Mask = np.asarray(self.open & gear.critical)
-        self.candidates = np.where(critical.any(axis=1)[:, None], critical, self.open)
+        self.open: Mask = np.asarray(~cases.measured & cases.reachable)
+        critical = self.open & gear.critical
+        missing = np.asarray(critical.any(axis=1))
+        self.candidates = np.where(missing[:, None], critical, self.open)
         self.group = ahead.group(self.candidates)
         self.rest = self.open & ~self.group
         excess = cases.filled(0.0) - gear.limits_in

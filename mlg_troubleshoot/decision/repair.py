@@ -273,13 +273,20 @@ def _least(table: Subsets, slack_in: Array) -> Sequence[Places]:
 def rigging_alternative(
     one: Cases, worst_in: tuple[float, float], budget: UncertaintyBudget
 ) -> Rigging:
-    """Shift the plunger so that the worst cases of both senses are equally far.
+    """Shift the plunger back by what was measured, else so that the worst cases of both senses are
+    equally far.
 
     Re-rigging moves the range of the plunger and cannot narrow it: what remains is half the
-    distance between both worst cases. The uncertainties of the decision rule stay as they are.
+    distance between both worst cases, or, where a measured offset is taken out, the worst case of
+    the joints. The uncertainties of the decision rule stay as they are.
     """
     over, under = worst_in
-    shift, left = -0.5 * (over + under), 0.5 * (over - under)
-    chance = exact_chance(one, one.filled(0.0), shift)
+    measured = float(one.mean_in[0])
+    if np.isfinite(measured):
+        shift, left = -measured, max(over, -under)
+        chance = exact_chance(one, one.filled(0.0))
+    else:
+        shift, left = -0.5 * (over + under), 0.5 * (over - under)
+        chance = exact_chance(one, one.filled(0.0), shift)
     within = float(normal_cdf((one.margin_in - left) / budget.combined_in)[0])
     return Rigging(shift, left, within, float(chance[0]))

@@ -50,6 +50,10 @@ JOINTS_DONE = (
 FAILED_BUT_WITHIN = (
     "Joint clearances do not explain this failure: check hydraulics, reversing valve, doors."
 )
+FAILED_AND_UNREAD = (
+    "Joint clearances do not explain this failure: check rigging and lock roller first, unless the"
+    " plunger is read within its margin."
+)
 _BEYOND_NOT_EXPLAINED = (
     "Joint clearances do not explain where the plunger stands: the cause is rigging or the lock"
     " roller first, then the plunger gauge and parts outside the listed joints."
@@ -144,6 +148,8 @@ class Predicted:
     displacement_in: float
     bound_in: float
     chance: float
+    read: int = 1
+    unread: int = 0
 
     @property
     def loaded(self) -> bool:
@@ -152,12 +158,20 @@ class Predicted:
 
     def __str__(self) -> str:
         chance = f"chance with random directions {percent(self.chance)}"
+        if self.unread:
+            chance += ", unread joints by their usual wear"
+        if not self.read:
+            return f"no joint was read; {chance}"
         if self.loaded:
             return (
-                f"as loaded {self.displacement_in:.4f} in, worst case {self.bound_in:.4f} in,"
-                f" {chance}"
+                f"as loaded {self.displacement_in:.4f} in, worst case {self.bound_in:.4f} in"
+                f"{self._alone}, {chance}"
             )
-        return f"worst case {self.displacement_in:.4f} in, {chance}"
+        return f"worst case {self.displacement_in:.4f} in{self._alone}, {chance}"
+
+    @property
+    def _alone(self) -> str:
+        return " from the measured joints alone" if self.unread else ""
 
 
 def outside(margin_in: float, said: Predicted) -> str:
@@ -187,9 +201,13 @@ def explained(explained_in: float, unexplained_in: float) -> str:
     )
 
 
-def within(margin_in: float, said: Predicted, *, failed: bool, joints_done: bool) -> str:
+def within(
+    margin_in: float, said: Predicted, *, failed: bool, clears: bool, joints_done: bool
+) -> str:
     """Headline of WITHIN_MARGIN."""
-    then = FAILED_BUT_WITHIN if failed else "Continue fault isolation; not a release."
+    then = "Continue fault isolation; not a release."
+    if failed:
+        then = FAILED_BUT_WITHIN if clears else FAILED_AND_UNREAD
     then = JOINTS_DONE if joints_done else then
     if not said.loaded:
         return f"Even the worst case stays within the margin of {margin_in:.4f} in ({said}). {then}"
@@ -202,10 +220,7 @@ def within(margin_in: float, said: Predicted, *, failed: bool, joints_done: bool
 
 def incomplete(open_joints: Sequence[int], said: Predicted) -> str:
     """Headline of INCOMPLETE."""
-    return (
-        f"Cannot clear: not measured {joint_list(open_joints)} ({said} from the measured joints"
-        " alone)."
-    )
+    return f"Cannot clear: not measured {joint_list(open_joints)} ({said})."
 
 
 def entry_in_question(question: str, said: Predicted) -> str:
@@ -319,6 +334,26 @@ def no_repair_set(a: Assessment) -> str:
             " their limit here."
         )
     return f"No {_SET_THAT_HOLDS}"
+
+
+def older_than_the_repair(inspection: Inspection) -> list[str]:
+    """Ask about what stands in a row and may be older than the repair."""
+    if not inspection.is_repaired:
+        return []
+    said = []
+    if inspection.outcome is not None and inspection.standing_outcome is None:
+        said.append(
+            f"The outcome {inspection.outcome} counts as older than the repair. Is it newer? Then"
+            " enter outcome_date, on the day of the repair with both times."
+        )
+    if inspection.readings_in and not inspection.standing_readings_in:
+        said.append(
+            "The plunger reading counts as older than the repair. Is it newer? Then enter"
+            " plunger_date, on the day of the repair with both times."
+        )
+    if inspection.repair_date is None:
+        said.append("The repair has no date: enter repair_date, with the time if known.")
+    return said
 
 
 def rigging_sentence(rigging: Rigging) -> str:

@@ -80,8 +80,8 @@ class ReadOptions(TableOptions):
     """What is declared about tables, and what the gear says of the values in them.
 
     joint_names: names of the gear's joints, by which a header's number is checked; empty takes the
-    reference gear's. areas: names of the areas to open. clearance_hard_max_in, clearance_confirm_above_in: a radial clearance above
-    the one is refused, above the other
+    reference gear's. areas: names of the areas to open. clearance_hard_max_in,
+    clearance_confirm_above_in: a radial clearance above the one is refused, above the other
         accepted with a warning. [in]
     plunger_hard_max_in: a measured plunger displacement beyond this, either way, is refused. [in]
     new_part_in, limit_in: radial clearance of a new part, and the largest one allowed, by joint;

@@ -186,7 +186,7 @@ def test_a_failure_that_clearances_hardly_cause_is_expected_to_have_another_caus
 @pytest.mark.parametrize(
     ("outcome", "first", "end"),
     [
-        (Outcome.FAILED, Action.RESTORE, End.DONE),
+        (Outcome.FAILED, Action.CHECK_RIGGING, End.DONE),
         (None, Action.CONTINUE, End.OUTSIDE_NO_COMPLAINT),
         (Outcome.RETRACTED, Action.CONTINUE, End.OUTSIDE_NO_COMPLAINT),
     ],
