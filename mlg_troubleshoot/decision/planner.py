@@ -49,6 +49,8 @@ _EDGE_IS_SOUND = 0.35
 _MOST_EXTRA = 2
 # A repair that leaves the plunger outside with more than this chance is not worth its minutes. [1]
 _HOPELESS = 0.5
+# What one repair may be above the chance that the shop accepts over all: most are far below it. [1]
+_FOR_ONE_REPAIR = 2.0
 
 
 def correct(row: InvalidRow) -> Plan:
@@ -217,8 +219,8 @@ class _Course:
         worn = self.facts.causes.worn[self.row]
         numbers = self.gear.joint_numbers
         likely = max(following, key=lambda n: worn[numbers.index(n)])
-        expected = self.over if self.over else (likely,)
-        return self._try(expected, expected=True)
+        # What is over its limit already does not suffice, or there would be nothing to read.
+        return self._try((*self.over, likely), expected=True)
 
     def _repair(self) -> RepairSet | None:
         """The quickest repair of which a second one is no likelier than the shop accepts; None if
@@ -242,7 +244,7 @@ class _Course:
             members[row, list(places)] = True
         second = f.causes.second_repair(i, members)
         minutes = np.array([self._restoring(row) for row in members])
-        accepted = self.gear.second_repair_chance.value
+        accepted = _FOR_ONE_REPAIR * self.gear.second_repair_chance.value
         sure = [s for s in self.sets if (s.second_repair_probability or 0.0) <= accepted]
         enough = np.flatnonzero(second <= accepted)
         if len(enough):

@@ -62,7 +62,7 @@ class World:
 WORLDS = (
     World("A uniform"),
     World("A uniform 1:1:1", mix=(1.0, 1.0, 1.0, 0.0)),
-    World("A mis-rigged", mix=(3.0, 1.0, 4.0, 4.0)),
+    World("A mis-rigged", mix=(3.0, 1.0, 4.0, 1.0)),
     World("B loaded", "B", "loaded"),
     World("C uniform, #3 halved", "C", slips={3: 0.5}),
     World("D gravity, gauge x1.2", "D", "gravity", gauge=1.2),
@@ -198,6 +198,19 @@ class Hangar:
         gear.row["repair_date"] = gear.clock
         gear.stale = True
 
+    def read_plunger(self, gear: Gear) -> None:
+        """Read the plunger: a second reading stands beside the first until a repair."""
+        row = gear.row
+        seen = float(self.moved([gear])[0]) + self.rng.normal(0.0, self.world.plunger_u_in)
+        if gear.stale or "plunger_displacement_in" not in row:
+            row.pop("plunger_displacement_2_in", None)
+            row["plunger_displacement_in"] = seen
+        else:
+            row["plunger_displacement_2_in"] = seen
+        row["plunger_date"], gear.stale = gear.clock, False
+        if self.world.states_plunger_u:
+            row["plunger_gauge_u_in"] = self.world.plunger_u_in
+
     def obey(self, gear: Gear, said: dict[str, Any]) -> None:
         """Do the next action."""
         step, row = said["next_action"], gear.row
@@ -215,15 +228,7 @@ class Hangar:
                         row[f"gauge_u_{j}_in"] = needed
             case "READ_PLUNGER":
                 gear.minutes += PLUNGER_MIN
-                seen = float(self.moved([gear])[0]) + self.rng.normal(0.0, self.world.plunger_u_in)
-                if gear.stale or "plunger_displacement_in" not in row:
-                    row.pop("plunger_displacement_2_in", None)
-                    row["plunger_displacement_in"] = seen
-                else:
-                    row["plunger_displacement_2_in"] = seen
-                row["plunger_date"], gear.stale = gear.clock, False
-                if self.world.states_plunger_u:
-                    row["plunger_gauge_u_in"] = self.world.plunger_u_in
+                self.read_plunger(gear)
             case "CHECK_RIGGING":
                 gear.minutes += RIGGING_MIN
                 row["rigging_checked"] = "corrected" if gear.offset_in else "yes"
