@@ -50,7 +50,7 @@ _MOST_EXTRA = 2
 # A repair that leaves the plunger outside with more than this chance is not worth its minutes. [1]
 _HOPELESS = 0.5
 # What one repair may be above the chance that the shop accepts over all: most are far below it. [1]
-_FOR_ONE_REPAIR = 2.0
+_FOR_ONE_REPAIR = 3.0
 
 
 def correct(row: InvalidRow) -> Plan:
@@ -200,7 +200,9 @@ class _Course:
             minutes = np.inf
         if not self.looked and self.read_plunger:
             check = self.gear.rigging_check.value
-            if rigging * minutes > joints * check and rigging > _EXCLUDED:
+            # No sound joint is restored before the rigging was looked at, unless it is excluded.
+            tears = not following and best is not None and set(best.joints) > set(self.over)
+            if rigging > _EXCLUDED and (tears or rigging * minutes > joints * check):
                 self._check_rigging()
                 if rigging > 0.5:
                     return self._restore_over_limit()._end(End.NOT_EXPLAINED)

@@ -22,7 +22,7 @@ DIRECTION_SETS = 4096
 DEFAULT_PLUNGER_U_IN = 0.0015
 # The model's standard uncertainty until a diagnosis gives it: the larger of a length and a share of
 # the prediction.
-PROVISIONAL_U_IN, PROVISIONAL_U_SHARE = 0.003, 0.10
+PROVISIONAL_U_IN, PROVISIONAL_U_SHARE = 0.0005, 0.02
 _STEP_IN = 1e-5
 
 

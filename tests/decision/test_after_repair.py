@@ -160,7 +160,7 @@ def test_a_default_plunger_uncertainty_is_announced(judge: Judge) -> None:
 
 
 def test_a_gear_that_is_too_close_is_looked_at_again_by_a_date_and_landings(judge: Judge) -> None:
-    found = judge(every_joint(0.0019), gear_landings=1200.0, inspection_date=date(2026, 3, 4))
+    found = judge(every_joint(0.0022), gear_landings=1200.0, inspection_date=date(2026, 3, 4))
     assert found.end is End.TOO_CLOSE
     assert "1500 landings or by 2026-09-04" in found.next_action.text
 

@@ -293,16 +293,16 @@ def shares(gear: Gear, largest: float) -> dict[Verdict, float]:
 
 def test_gears_worn_up_to_the_limit_are_mostly_outside_and_some_inconclusive(gear: Gear) -> None:
     found = shares(gear, 0.0075)
-    assert found[Verdict.OUTSIDE_MARGIN] == pytest.approx(0.87, abs=0.03)
-    assert found[Verdict.INCONCLUSIVE] == pytest.approx(0.12, abs=0.03)
+    assert found[Verdict.OUTSIDE_MARGIN] == pytest.approx(0.92, abs=0.03)
+    assert found[Verdict.INCONCLUSIVE] == pytest.approx(0.07, abs=0.03)
 
 
 def test_gears_worn_up_to_three_thou_are_mostly_within_and_the_others_inconclusive(
     gear: Gear,
 ) -> None:
     found = shares(gear, 0.003)
-    assert found[Verdict.WITHIN_MARGIN] == pytest.approx(0.79, abs=0.03)
-    assert found[Verdict.INCONCLUSIVE] == pytest.approx(0.21, abs=0.03)
+    assert found[Verdict.WITHIN_MARGIN] == pytest.approx(0.89, abs=0.03)
+    assert found[Verdict.INCONCLUSIVE] == pytest.approx(0.11, abs=0.03)
     assert found[Verdict.OUTSIDE_MARGIN] == 0.0
 
 
