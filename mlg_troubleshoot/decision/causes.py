@@ -53,7 +53,7 @@ _T = np.pi * np.arange(1, _TERMS + 1) / _HALF_IN
 _AT = np.linspace(-_HALF_IN, _HALF_IN, _PLACES)
 _STEP_IN = _AT[1] - _AT[0]
 _COSINES = np.cos(_T[:, None] * _AT)
-_SHARES = (np.arange(50) + 0.5) / 25.0
+SHARES = (np.arange(50) + 0.5) / 25.0
 
 
 @lru_cache(maxsize=1)
@@ -68,11 +68,11 @@ def _bessel(z: Array) -> Array:
     return np.asarray(np.interp(z, np.arange(len(table)) * 0.05, table))
 
 
-def _share_densities() -> Array:
+def share_densities() -> Array:
     """Chance of each share of a joint's wear at each level, (levels, shares). [1]"""
-    even = np.exp(-_SHARES / _LEVELS[:, None])
+    even = np.exp(-SHARES / _LEVELS[:, None])
     even /= even.sum(axis=1, keepdims=True)
-    out = np.where(_SHARES > 1.0, 1.0, 0.0)
+    out = np.where(SHARES > 1.0, 1.0, 0.0)
     return np.asarray((1.0 - _WORN_OUT) * even + _WORN_OUT * out / out.sum())
 
 
@@ -95,11 +95,11 @@ class _Tables:
 @lru_cache(maxsize=4)
 def _tables(gear: Gear) -> _Tables:
     response = responses(gear)[0]
-    chances = _share_densities()
+    chances = share_densities()
     reach = response.amplification * gear.limits_in
-    waves = _bessel(_T[None, None, :] * reach[:, None, None] * _SHARES[None, :, None])
+    waves = _bessel(_T[None, None, :] * reach[:, None, None] * SHARES[None, :, None])
     unread = np.einsum("ls,jsk->ljk", chances, waves)
-    over = np.where(_SHARES > 1.0, chances, 0.0)
+    over = np.where(SHARES > 1.0, chances, 0.0)
     worn = np.einsum("ls,jsk->ljk", over, waves)
     diagonal = np.diag(response.curvature)
     bend = 0.25 * (diagonal[0::2] + diagonal[1::2])
@@ -110,8 +110,8 @@ def _tables(gear: Gear) -> _Tables:
         unread,
         worn,
         over.sum(axis=1),
-        chances @ _SHARES,
-        chances @ _SHARES**2,
+        chances @ SHARES,
+        chances @ SHARES**2,
         bend,
         exceeds,
     )
@@ -218,7 +218,7 @@ def believed(cases: Cases) -> Causes:
     """Weigh what may be the matter with n gears, by everything that is known of each."""
     gear = cases.gear
     tables, read, limits = _tables(gear), cases.measured, gear.limits_in
-    levels = _levels(cases)
+    levels = level_chances_of(cases)
     known = _bessel(_T * (tables.amplification * cases.filled(0.0))[:, :, None])
     known = known * _blur(np.sqrt(0.5) * tables.amplification * cases.gauge_u_in)
     x = np.abs(np.nan_to_num(cases.mean_in))
@@ -321,12 +321,12 @@ def _weighed(
     )
 
 
-def _levels(cases: Cases) -> Array:
+def level_chances_of(cases: Cases) -> Array:
     """Chances of the levels of wear of each gear, given what was read on it. [1]"""
     share = np.clip(cases.filled(0.0) / cases.gear.limits_in, 0.0, 2.0)
     # A reading blurs the density by its own uncertainty.
-    log = np.log(_share_densities() / (_SHARES[1] - _SHARES[0]))
-    each = np.array([np.interp(share, _SHARES, level) for level in log])
+    log = np.log(share_densities() / (SHARES[1] - SHARES[0]))
+    each = np.array([np.interp(share, SHARES, level) for level in log])
     total = np.sum(np.where(cases.measured, each, 0.0), axis=2).T
     chances = np.exp(total - total.max(axis=1, keepdims=True))
     return np.asarray(chances / chances.sum(axis=1, keepdims=True))

@@ -49,8 +49,10 @@ _EDGE_IS_SOUND = 0.35
 _MOST_EXTRA = 2
 # A repair that leaves the plunger outside with more than this chance is not worth its minutes. [1]
 _HOPELESS = 0.5
+# Chance that the joints are the cause from which a sound one is restored. [1]
+_SURE_ENOUGH = 0.75
 # What one repair may be above the chance that the shop accepts over all: most are far below it. [1]
-_FOR_ONE_REPAIR = 3.0
+_FOR_ONE_REPAIR = 4.0
 
 
 def correct(row: InvalidRow) -> Plan:
@@ -208,8 +210,10 @@ class _Course:
                     return self._restore_over_limit()._end(End.NOT_EXPLAINED)
         if following:
             return self._read_and_restore(following)
-        if best is not None:
+        if best is not None and (joints >= _SURE_ENOUGH or set(best.joints) <= set(self.over)):
             return self._try(best.joints, best)
+        if best is not None:
+            return self._elsewhere()
         if joints < 0.5 or not self.over:
             explained = joints >= 0.5
             return self._end(End.CANNOT_CLEAR if explained else End.NOT_EXPLAINED)
