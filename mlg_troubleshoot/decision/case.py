@@ -173,9 +173,11 @@ def plunger_u(inspection: Inspection) -> float:
     return one / math.sqrt(max(len(inspection.standing_readings_in), 1))
 
 
-def predict_batch(cases: Cases) -> BatchPrediction:
+def predict_batch(cases: Cases, exceeds: Array | None = None) -> BatchPrediction:
     """Predict with unmeasured joints at 0 and at their limit, and the chance with random
     directions.
+
+    exceeds: that chance with unmeasured joints by their wear; None takes them at 0. [1]
     """
     at_zero = cases.filled(0.0)
     lower = upper = cases.predict(at_zero)
@@ -183,7 +185,12 @@ def predict_batch(cases: Cases) -> BatchPrediction:
     if len(open_rows):
         some = cases.take(open_rows)
         upper = with_rows(lower, some.predict(some.filled(cases.gear.limits_in)), open_rows)
-    return BatchPrediction(lower, upper, _chance(cases, at_zero))
+    if exceeds is None or cases.extension is not None:
+        return BatchPrediction(lower, upper, _chance(cases, at_zero))
+    chance, rows = exceeds.copy(), np.flatnonzero(cases.measured.all(axis=1))
+    if len(rows):
+        chance[rows] = _chance(cases.take(rows), at_zero[rows])
+    return BatchPrediction(lower, upper, chance)
 
 
 def _chance(cases: Cases, clearance_in: Array) -> Array:

@@ -156,12 +156,21 @@ class Causes:
         """Chance of leaving the margin from which the joints are the likelier cause. [1]"""
         return _tables(self.cases.gear).exceeds / _JOINTS_FOR_ONE_ELSEWHERE
 
+    @property
+    def reach_in(self) -> Array:
+        """How far each joint can move the plunger. [in]"""
+        return _tables(self.cases.gear).amplification * self.mean_in
+
     def with_chances(self, sets: Sequence[tuple[RepairSet, ...]]) -> list[tuple[RepairSet, ...]]:
-        """Repair sets with the chance of a second repair after each."""
-        numbers = np.array(self.cases.gear.joint_numbers)
+        """Repair sets with the chance of a second repair after each, of gears that failed."""
+        numbers = self.cases.gear.joint_numbers
+        failed = self.cases.failed | self.cases.complained
         said: list[tuple[RepairSet, ...]] = []
         for row, some in enumerate(sets):
-            members = np.array([np.isin(numbers, each.joints) for each in some], bool)
+            if not failed[row]:
+                said.append(some)
+                continue
+            members = np.array([[n in each.joints for n in numbers] for each in some], bool)
             second = self.second_repair(row, members).tolist() if some else []
             said.append(
                 tuple(
@@ -231,11 +240,12 @@ def believed(cases: Cases) -> Causes:
         likely[rows], worn[rows] = _given_plunger(
             tables, read[rows], known[rows], levels[rows], x[rows], u[rows]
         )
-    before = np.where(read[:, :, None], known, np.einsum("nl,ljk->njk", levels, tables.unread))
+    flat = tables.unread.reshape(len(_LEVELS), -1)
+    before = np.where(read[:, :, None], known, (levels @ flat).reshape(known.shape))
     exceeds = 1.0 - _inside(np.prod(before, axis=1) * _blur(_LINKAGE_U_IN), cases.margin_in)
     waves = before.copy()
     if len(rows):
-        after = np.einsum("nl,ljk->njk", likely[rows], tables.unread)
+        after = (likely[rows] @ flat).reshape(known[rows].shape)
         waves[rows] = np.where(read[rows, :, None], known[rows], after)
     mean_in = np.where(read, cases.filled(0.0), (likely @ tables.share_mean)[:, None] * limits)
     return _weighed(cases, tables, waves, mean_in, np.clip(worn, 0.0, 1.0), u, exceeds)

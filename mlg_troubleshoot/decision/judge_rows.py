@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -81,12 +80,7 @@ def assess(
 
 def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Assessment]:
     causes = believed(cases)
-    batch = predict_batch(cases)
-    if cases.extension is None:
-        # Unread joints by their wear, as the plan takes them.
-        unread = ~cases.measured.all(axis=1) & np.isfinite(batch.lower.displacement_in)
-        chance = np.where(unread, causes.exceeds, batch.chance_random)
-        batch = replace(batch, chance_random=chance)
+    batch = predict_batch(cases, causes.exceeds)
     p_lower = batch.lower.probability_within(cases.margin_in, cases.margin_u_in)
     p_upper = batch.upper.probability_within(cases.margin_in, cases.margin_u_in)
     plunger = plunger_reading.compare(cases, batch.upper)

@@ -47,6 +47,8 @@ _TOGETHER = 0.6
 _EDGE_IS_SOUND = 0.35
 # Joints beyond those over their limit that a repair to be tried may hold. [1]
 _MOST_EXTRA = 2
+# They are chosen among as many joints, those that move the plunger most.
+_MOST_TRIED = 6
 # A repair that leaves the plunger outside with more than this chance is not worth its minutes. [1]
 _HOPELESS = 0.5
 # Chance that the joints are the cause from which a sound one is restored. [1]
@@ -85,7 +87,31 @@ def plans(
     """The plan of each gear, and the repairs that it chose from."""
     facts = _Facts(cases, judged, causes)
     courses = [_Course(facts, i, sets[i]) for i in range(len(cases))]
-    return [(course.plan(), course.sets) for course in courses]
+    planned = [course.plan() for course in courses]
+    _predict_tried(cases, courses)
+    return [(plan, course.sets) for plan, course in zip(planned, courses, strict=True)]
+
+
+def _predict_tried(cases: Cases, courses: Sequence[_Course]) -> None:
+    """Predict the gears after the repairs to be tried, all at once: the plans need no more than
+    their chances.
+    """
+    rows = [i for i, course in enumerate(courses) if course.tried is not None]
+    if not rows:
+        return
+    some, numbers = cases.take(np.array(rows)), np.array(cases.gear.joint_numbers)
+    tried = [course.tried for course in courses if course.tried is not None]
+    members = np.array([np.isin(numbers, each.joints) for each in tried])
+    now = some.filled(cases.gear.limits_in)
+    after = some.predict(np.where(members, np.minimum(now, cases.gear.new_parts_in), now))
+    within = after.probability_within(some.margin_in, some.margin_u_in)
+    for k, row in enumerate(rows):
+        found = replace(
+            tried[k],
+            predicted_displacement_in=float(after.displacement_in[k]),
+            probability_within_margin=float(within[k]),
+        )
+        courses[row].sets = (*courses[row].sets, found)
 
 
 class _Facts:
@@ -95,6 +121,12 @@ class _Facts:
         gear = cases.gear
         ahead = _Ahead(cases, judged)
         self.cases, self.judged, self.causes = cases, judged, causes
+        self.numbers = gear.joint_numbers
+        self.restore_min = np.array([joint.restore.value for joint in gear.joints])
+        self.access_min = np.array([area.access.value for area in gear.areas])
+        self.inside = np.array(
+            [[joint.area == area.name for joint in gear.joints] for area in gear.areas]
+        )
         self.questions, self.complained = cases.questions, cases.complained
         self.over, self.removable = cases.over_limit & cases.restorable, removable(cases)
         self.open: Mask = np.asarray(~cases.measured & cases.reachable)
@@ -121,8 +153,10 @@ class _Course:
     def __init__(self, facts: _Facts, row: int, sets: tuple[RepairSet, ...]) -> None:
         self.facts, self.row, self.sets = facts, row, sets
         self.cases, self.judged, self.gear = facts.cases, facts.judged, facts.cases.gear
+        self.numbers = facts.numbers
         self.inspection = self.cases.inspections[row]
         self.steps: list[Step] = []
+        self.tried: RepairSet | None = None
         self.opened: frozenset[str] = frozenset(self.inspection.open_areas)
         self.over = self._joints(facts.over[row])
         self.read_plunger = bool(np.isfinite(self.cases.mean_in[row]))
@@ -223,7 +257,7 @@ class _Course:
         """Read joints, then the expected repair."""
         self._measure(following)
         worn = self.facts.causes.worn[self.row]
-        numbers = self.gear.joint_numbers
+        numbers = self.numbers
         likely = max(following, key=lambda n: worn[numbers.index(n)])
         # What is over its limit already does not suffice, or there would be nothing to read.
         return self._try((*self.over, likely), expected=True)
@@ -237,6 +271,7 @@ class _Course:
         f, i = self.facts, self.row
         over = np.flatnonzero(f.over[i])
         more = np.flatnonzero(f.removable[i] & ~f.over[i])
+        more = more[np.argsort(-f.causes.reach_in[i, more], kind="stable")][:_MOST_TRIED]
         chosen = [
             (*over, *extra)
             for count in range(_MOST_EXTRA + 1)
@@ -249,7 +284,9 @@ class _Course:
         for row, places in enumerate(chosen):
             members[row, list(places)] = True
         second = f.causes.second_repair(i, members)
-        minutes = np.array([self._restoring(row) for row in members])
+        shut = [k for k, area in enumerate(self.gear.areas) if area.name not in self.opened]
+        opened = (members[:, None, :] & f.inside[shut]).any(axis=2)
+        minutes = members @ f.restore_min + opened @ f.access_min[shut]
         accepted = _FOR_ONE_REPAIR * self.gear.second_repair_chance.value
         sure = [s for s in self.sets if (s.second_repair_probability or 0.0) <= accepted]
         enough = np.flatnonzero(second <= accepted)
@@ -267,23 +304,15 @@ class _Course:
         tried = self._try_set(members[best], float(second[best]))
         quicker = [s for s in sure if s.minutes < tried.minutes]
         if all(set(s.joints) != set(tried.joints) for s in self.sets):
-            self.sets = (*self.sets, tried)
+            self.tried = tried
         return quicker[0] if quicker else tried
 
-    def _restoring(self, members: Mask) -> float:
-        numbers = np.array(self.gear.joint_numbers)[members].tolist()
-        return minutes_to_restore(self.gear, numbers, self.opened)
-
     def _try_set(self, members: Mask, second: float) -> RepairSet:
-        some = self.cases.take(np.array([self.row]))
-        now = some.filled(self.gear.limits_in)
-        after = some.predict(np.where(members, np.minimum(now, self.gear.new_parts_in), now))
-        within = after.probability_within(some.margin_in, some.margin_u_in)
-        joints = tuple(np.array(self.gear.joint_numbers)[members].tolist())
+        joints = tuple(np.array(self.numbers)[members].tolist())
         return RepairSet(
             joints,
-            float(after.displacement_in[0]),
-            float(within[0]),
+            np.nan,
+            np.nan,
             minutes_to_measure(self.gear, joints),
             minutes_to_restore(self.gear, joints),
             RepairKind.TRY,
@@ -310,7 +339,7 @@ class _Course:
                 taken += worn[j]
                 if len(group) > 1 and taken >= _TOGETHER * total:
                     break
-            numbers = tuple(self.gear.joint_numbers[j] for j in group)
+            numbers = tuple(self.numbers[j] for j in group)
             if not group:
                 continue
             rate = taken / minutes_to_measure(self.gear, numbers, self.opened)
@@ -319,7 +348,7 @@ class _Course:
         if best is None or not chosen:
             return chosen
         sound = [n for n in best.joints if n not in self.over]
-        places = [self.gear.joint_numbers.index(n) for n in chosen]
+        places = [self.numbers.index(n) for n in chosen]
         saved = minutes_to_restore(self.gear, sound, self.opened) if sound else 0.0
         saved *= 1.0 - float(np.prod(1.0 - worn[places]))
         return chosen if saved > minutes_to_measure(self.gear, chosen, self.opened) else ()
@@ -358,7 +387,7 @@ class _Course:
         self, joints: Sequence[int], best: RepairSet | None = None, *, expected: bool = False
     ) -> Plan:
         """Restore, read the plunger, retract the gear: done."""
-        ranked = self._joints(np.isin(self.gear.joint_numbers, list(joints)))
+        ranked = self._joints(np.array([n in joints for n in self.numbers]))
         self._restore(ranked, best, expected=expected)
         self._step(Action.READ_PLUNGER, self.gear.plunger_reading.value, sentences.READ_PLUNGER)
         return self._retract()
@@ -451,11 +480,12 @@ class _Course:
         return minutes
 
     def _place(self, number: int) -> int:
-        return self.gear.joint_numbers.index(number)
+        return self.numbers.index(number)
 
     def _joints(self, places: Mask) -> tuple[int, ...]:
         """Numbers of joints in the order of their rank."""
-        return tuple(self.gear.joint_numbers[j] for j in self.judged.order[self.row] if places[j])
+        order = self.judged.order[self.row].tolist()
+        return tuple(self.numbers[j] for j in order if places[j]) if places.any() else ()
 
     def _open_question(self, found: Plan) -> str | None:
         """What cannot be settled because of the day."""

@@ -270,14 +270,15 @@ def _judge(
         from mlg_troubleshoot.workflows.since_repairs import since_kept_repairs
 
         as_they_count = since_kept_repairs(rows, store, gear)
-    found = assess(as_they_count, gear, load_index_table(gear), **asked, progress=on_judged)
-    # What is shown and kept of an inspection is what was found, whatever counts no more.
-    judgements = tuple(
-        replace(judged, inspection=row)
-        if isinstance(judged, Assessment) and isinstance(row, Inspection)
-        else judged
-        for judged, row in zip(found, rows, strict=True)
-    )
+    judgements = assess(as_they_count, gear, load_index_table(gear), **asked, progress=on_judged)
+    if store is not None:
+        # What is shown and kept of an inspection is what was found, whatever counts no more.
+        judgements = tuple(
+            replace(judged, inspection=row)
+            if isinstance(judged, Assessment) and isinstance(row, Inspection)
+            else judged
+            for judged, row in zip(judgements, rows, strict=True)
+        )
     return CheckResult(gear=gear, judgements=judgements, seed=options.seed, **told)
 
 
