@@ -103,6 +103,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=20_000)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--first", type=int, default=0, help="the number of the first case")
     parser.add_argument("--only", type=int, help="the number of one case")
     parser.add_argument("--kinds", default="", help="names of kinds, with commas")
     parser.add_argument(
@@ -113,7 +114,7 @@ def main() -> int:
     )
     parser.add_argument("--folder", type=Path, help="a new folder to work in, which stays")
     given = parser.parse_args()
-    numbers = range(given.cases) if given.only is None else [given.only]
+    numbers = range(given.first, given.first + given.cases) if given.only is None else [given.only]
     with tempfile.TemporaryDirectory() as scratch:
         asked = Asked(
             given.seed,

@@ -108,13 +108,13 @@ def code_lines(function: ast.FunctionDef, text: Sequence[str]) -> int:
     return sum(bool(line) and not line.startswith("#") for line in lines)
 
 
-def test_no_function_is_longer_than_sixty_lines() -> None:
+def test_no_function_is_longer_than_seventy_lines() -> None:
     long = [
         f"{path.relative_to(ROOT)}:{node.lineno} {node.name}"
         for path in sources()
         for text in [path.read_text(encoding="utf-8")]
         for node in ast.walk(ast.parse(text))
-        if isinstance(node, ast.FunctionDef) and code_lines(node, text.splitlines()) > 60
+        if isinstance(node, ast.FunctionDef) and code_lines(node, text.splitlines()) > 70
     ]
     assert long == []
 

@@ -6,10 +6,18 @@ from __future__ import annotations
 
 import csv
 import re
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from mlg_troubleshoot.cli.prompts.lines import BLANK, Tone, keys, line
-from mlg_troubleshoot.cli.prompts.terminal import RichTerminal
+from mlg_troubleshoot.cli.prompts.conversation import (
+    Conversation,
+    Effect,
+    Page,
+    Terminal,
+    Turn,
+    again,
+)
+from mlg_troubleshoot.cli.prompts.lines import BLANK, Line, Tone, keys, line
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.outputs import write_csv
@@ -18,7 +26,11 @@ from mlg_troubleshoot.surveying.readings import SurveyedLinkage
 from mlg_troubleshoot.units import THOU_PER_IN
 
 _KEYS = keys(
-    ("Enter", "not read"), ("b", "back"), ("done", "no more"), ("q", "stop; what was read is kept")
+    ("Enter", "not read"),
+    ("b", "back"),
+    ("done", "no more"),
+    ("?", "help"),
+    ("q", "stop; what was read is kept"),
 )
 _TYPED = re.compile(
     r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+))\s*(?P<unit>in|thou|mm|deg|°)?", re.IGNORECASE
@@ -26,7 +38,7 @@ _TYPED = re.compile(
 _SIGNED = re.compile(r"[-+]\d*\.?\d+(e-\d+)?")
 
 
-def ask_survey(file: Path, gear: Gear, terminal: RichTerminal) -> bool:
+def ask_survey(file: Path, gear: Gear, terminal: Terminal) -> bool:
     """Ask for the readings that a template still lacks and keep each in it; False if the user
     stopped.
     """
@@ -34,65 +46,113 @@ def ask_survey(file: Path, gear: Gear, terminal: RichTerminal) -> bool:
         raise UsageError(
             f"{file.name!r} does not end in .csv", "Answers are kept as CSV: give such a name."
         )
-    linkage = SurveyedLinkage(gear)
-    with file.open(newline="", encoding="utf-8-sig", errors="replace") as text:
-        header, *rows = [*csv.reader(text)] or [[]]
-    if not set(COLUMNS) <= set(header):
-        raise UsageError(
-            f"{file} is not a survey template",
-            "Give a new name, or one that mlg gear survey wrote.",
+    sheet = _Sheet(file, gear)
+    terminal.say([_KEYS])
+    turn, conversation = Turn(sheet.first_open), Conversation(sheet, terminal)
+    while turn.effect is Effect.NONE and turn.state < len(sheet.rows):
+        turn = conversation.next(turn)
+    return turn.effect is not Effect.STOP
+
+
+@dataclass(slots=True)
+class _Sheet:
+    """The course through the rows of a template; its state is the place of a row."""
+
+    file: Path
+    gear: Gear
+    header: list[str] = field(init=False)
+    rows: list[list[str]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        with self.file.open(newline="", encoding="utf-8-sig", errors="replace") as text:
+            self.header, *rows = [*csv.reader(text)] or [[]]
+        if not set(COLUMNS) <= set(self.header):
+            raise UsageError(
+                f"{self.file} is not a survey template",
+                "Give a new name, or one that mlg gear survey wrote.",
+            )
+        self.rows = [[*row, *[""] * (len(self.header) - len(row))] for row in rows]
+
+    @property
+    def first_open(self) -> int:
+        """The first row without a reading."""
+        return next((k for k in range(len(self.rows)) if not self._read(k)), len(self.rows))
+
+    def page(self, state: int, width: int) -> Page:  # noqa: ARG002
+        row = self._row(state)
+        asked = line((f"{state + 1} of {len(self.rows)}: {_words(row)}", Tone.STRONG))
+        return Page(
+            (BLANK, asked, line(row.get("how", ""))), f" {self._read(state) or _unit(row)} > "
         )
-    rows = [[*row, *[""] * (len(header) - len(row))] for row in rows]
-    values = [i for i, name in enumerate(header) if name.startswith("value_")]
-    terminal.say([_KEYS, BLANK])
-    at = next((k for k, row in enumerate(rows) if not any(row[i] for i in values)), len(rows))
-    while at < len(rows):
-        row = dict(zip(header, rows[at], strict=False))
-        unit = "deg" if row.get("u_deg") else "mm" if row.get("u_mm") else "in"
-        terminal.say(
-            [
-                line((f"{at + 1} of {len(rows)}: {_words(row)}", Tone.STRONG)),
-                line(row.get("how", "")),
-            ]
+
+    def help(self, state: int) -> tuple[Line, ...]:
+        unit = _unit(self._row(state))
+        return (
+            line(f"A number, as 7.15 or 181.6 mm, in {unit} where it has no unit.", indent=3),
+            _KEYS,
         )
-        known = next(
-            (
-                row[header[i]] + " " + header[i].removeprefix("value_")
-                for i in values
-                if rows[at][i]
-            ),
-            "",
-        )
-        typed = terminal.ask(f" {known or unit} > ").strip()
-        if typed in ("q", "done"):
-            return typed == "done"
-        if typed == "b" or not typed:
-            at = max(at - 1, 0) if typed else at + 1
-            continue
-        before = rows[at]
+
+    def back(self, state: int) -> Turn[int]:
+        return Turn(max(state - 1, 0))
+
+    def take(self, state: int, typed: str) -> Turn[int]:
+        if typed.lower() == "done":
+            return Turn(state, effect=Effect.COMPUTE)
+        if not typed:
+            return Turn(state + 1)
         found = _TYPED.fullmatch(typed)
-        if found is not None:
-            rows[at] = [*before]
-            _put(
-                rows[at],
-                header,
-                float(found["number"]),
-                (found["unit"] or unit).lower().replace("°", "deg"),
+        unit = _unit(self._row(state))
+        if found is None:
+            return again(
+                state,
+                f"{typed!r}: expected a number, as 7.15 or 181.6 mm, in {unit} where it has no"
+                " unit.",
             )
-            _keep(file, header, rows)
-        wrong = [p for p in read_survey(file, linkage)[1] if p.row == at + 2]
-        if found is None or wrong:
-            rows[at] = before
-            _keep(file, header, rows)
-            expected = (
-                wrong[0].expected
-                if wrong
-                else f"a number, as 7.15 or 181.6 mm, in {unit} where it has no unit"
-            )
-            terminal.say([line((f"{typed!r}: expected {expected}.", Tone.BAD))])
-        else:
-            at += 1
-    return True
+        before = self.rows[state]
+        stated = (found["unit"] or unit).lower().replace("°", "deg")
+        self.rows[state] = self._with(before, float(found["number"]), stated)
+        self._keep()
+        problems = read_survey(self.file, SurveyedLinkage(self.gear))[1]
+        wrong = [p for p in problems if p.row == state + 2]
+        if wrong:
+            self.rows[state] = before
+            self._keep()
+            return again(state, f"{typed!r}: expected {wrong[0].expected}.")
+        return Turn(state + 1)
+
+    def _row(self, place: int) -> dict[str, str]:
+        return dict(zip(self.header, self.rows[place], strict=False))
+
+    def _read(self, place: int) -> str:
+        """The reading of a row with its unit; empty if there is none."""
+        known = (
+            f"{text} {name.removeprefix('value_')}"
+            for name, text in self._row(place).items()
+            if name.startswith("value_") and text
+        )
+        return next(known, "")
+
+    def _with(self, row: list[str], number: float, unit: str) -> list[str]:
+        """The row with a value in the column of its unit alone; thou are kept in inches."""
+        if unit == "thou":
+            number, unit = number / THOU_PER_IN, "in"
+        return [
+            repr(number) if name == f"value_{unit}" else "" if name.startswith("value_") else text
+            for name, text in zip(self.header, row, strict=False)
+        ]
+
+    def _keep(self) -> None:
+        """Write the table; numbers as numbers, since a text that begins with a sign would be taken
+        for a formula.
+        """
+        plain = [
+            [float(cell) if _SIGNED.fullmatch(cell) else cell for cell in row] for row in self.rows
+        ]
+        write_csv(self.file, self.header, plain)
+
+
+def _unit(row: dict[str, str]) -> str:
+    return "deg" if row.get("u_deg") else "mm" if row.get("u_mm") else "in"
 
 
 def _words(row: dict[str, str]) -> str:
@@ -104,21 +164,3 @@ def _words(row: dict[str, str]) -> str:
         "",
     )
     return " ".join(part for part in (row["kind"].lower(), ends, at) if part)
-
-
-def _put(row: list[str], header: list[str], number: float, unit: str) -> None:
-    """Put a value into the column of its unit; thou are kept in inches."""
-    for i, name in enumerate(header):
-        if name.startswith("value_"):
-            row[i] = ""
-    if unit == "thou":
-        number, unit = number / THOU_PER_IN, "in"
-    row[header.index(f"value_{unit}")] = repr(number)
-
-
-def _keep(file: Path, header: list[str], rows: list[list[str]]) -> None:
-    """Write the table; numbers as numbers, since a text that begins with a sign would be taken for
-    a formula.
-    """
-    plain = [[float(cell) if _SIGNED.fullmatch(cell) else cell for cell in row] for row in rows]
-    write_csv(file, header, plain)

@@ -76,7 +76,13 @@ def test_what_is_no_such_reading_is_asked_again_and_not_kept(file: Path, answer:
     terminal, _, values = typed(file, answer, "done")
     assert "expected" in terminal.said
     assert values == {}
-    assert terminal.said.count("1 of 3") == 2
+    assert terminal.said.count(" in > ") == 2
+
+
+def test_a_question_mark_says_what_can_be_typed(file: Path) -> None:
+    terminal, _, values = typed(file, "?", "done")
+    assert "A number, as 7.15 or 181.6 mm, in in where it has no unit." in terminal.said
+    assert values == {}
 
 
 def test_a_later_run_goes_on_at_the_first_reading_that_lacks(file: Path) -> None:

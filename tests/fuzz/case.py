@@ -147,7 +147,8 @@ def _rows(store: Path) -> list[tuple[object, ...]]:
             return raw.execute(
                 "SELECT CAST(seq AS TEXT), CAST(hash AS BLOB) FROM mlg_records ORDER BY 1"
             ).fetchall()
-    except sqlite3.Error:
+    except (sqlite3.Error, UnicodeDecodeError):
+        # What SQLite says of a damaged schema quotes it, and that may not be text.
         return []
 
 

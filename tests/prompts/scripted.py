@@ -12,7 +12,8 @@ from mlg_troubleshoot.cli.prompts import (
     SessionStore,
     ask_inspection,
 )
-from mlg_troubleshoot.cli.prompts.flow import Effect, Flow, State, Turn
+from mlg_troubleshoot.cli.prompts.conversation import Effect, Turn, answer
+from mlg_troubleshoot.cli.prompts.flow import Flow, State
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
@@ -73,7 +74,7 @@ def play(flow: Flow, typed: Iterable[str], preset: Answers = RADIAL_INCHES) -> T
     turn = flow.begin(preset)
     for text in typed:
         assert turn.effect is not Effect.COMPUTE, f"nothing is asked any more, {text!r} is left"
-        turn = flow.answer(turn.state, text)
+        turn = answer(flow, turn.state, text)
     return turn
 
 

@@ -9,8 +9,9 @@ import pytest
 
 from mlg_troubleshoot.cli.output import to_ascii
 from mlg_troubleshoot.cli.prompts import Answers, Session, SessionStore, ask_inspection
-from mlg_troubleshoot.cli.prompts.answers import plunger_in
-from mlg_troubleshoot.cli.prompts.flow import Ask, Effect, Flow, Turn
+from mlg_troubleshoot.cli.prompts.answers import judge, plunger_in
+from mlg_troubleshoot.cli.prompts.conversation import Effect, Turn, answer
+from mlg_troubleshoot.cli.prompts.flow import Ask, Flow
 from mlg_troubleshoot.cli.prompts.sketch import sketch
 from mlg_troubleshoot.decision.inspection import Outcome, Side
 from mlg_troubleshoot.errors import UsageError
@@ -35,6 +36,21 @@ from tests.prompts.scripted import (
 TEN = [".004"] * 10
 
 
+def test_the_tenth_joint_costs_as_many_judgements_as_the_first(
+    flow: Flow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = []
+    for room in ("flow", "pages"):
+        name = f"mlg_troubleshoot.cli.prompts.{room}.judge"
+        monkeypatch.setattr(name, lambda *given: calls.append(given) or judge(*given))
+    turn, counts = flow.begin(RADIAL_INCHES), []
+    for _ in range(10):
+        calls.clear()
+        turn = answer(flow, turn.state, ".004")
+        counts.append(len(calls))
+    assert counts == [1] * 10
+
+
 # The heading.
 
 
@@ -46,7 +62,7 @@ def test_tail_side_unit_and_convention_are_asked_in_this_order(flow: Flow) -> No
 @pytest.mark.parametrize("place", range(4))
 def test_no_question_of_the_heading_has_a_default(flow: Flow, place: int) -> None:
     before = play(flow, ["N1", "l", "i", "r"][:place], Answers())
-    after = flow.answer(before.state, "")
+    after = answer(flow, before.state, "")
     assert after.state == before.state
     assert "Enter alone enters nothing" in said(after)
 
@@ -106,7 +122,7 @@ def test_what_a_flag_gave_is_not_asked(flow: Flow, missing: str) -> None:
 def test_back_reaches_what_a_flag_gave_and_enter_keeps_it(flow: Flow) -> None:
     turn = play(flow, ["b", "b", "b", "b"])
     assert "(Enter keeps N123AB)" in shown(flow, turn.state)
-    kept = flow.answer(turn.state, "").state
+    kept = answer(flow, turn.state, "").state
     assert (kept.ask, kept.at, kept.answers) == (Ask.JOINT, 1, RADIAL_INCHES)
 
 
@@ -214,7 +230,7 @@ def test_b_goes_back_and_enter_keeps_and_goes_on_where_it_was(flow: Flow) -> Non
     back = play(flow, [".004", ".005", "b", "b"])
     assert back.state.joint == 1
     assert "(Enter keeps .004 in)" in shown(flow, back.state)
-    kept = flow.answer(back.state, "")
+    kept = answer(flow, back.state, "")
     assert (kept.state.joint, kept.state.answers.radial_in[1]) == (3, 0.004)
 
 
@@ -259,7 +275,7 @@ def test_help_names_the_joint_that_acts_alike(flow: Flow) -> None:
 @pytest.mark.parametrize("place", range(4))
 def test_help_keeps_the_question_of_the_heading(flow: Flow, place: int) -> None:
     before = play(flow, ["N1", "l", "i", "r"][:place], Answers())
-    turn = flow.answer(before.state, "?")
+    turn = answer(flow, before.state, "?")
     assert turn.state == before.state
     assert turn.lines
 
@@ -274,13 +290,13 @@ def test_q_stops_at_every_question(flow: Flow, place: int) -> None:
 def test_b_leads_to_the_question_before(flow: Flow, place: int) -> None:
     typed = ["N1", "l", "i", "r", *TEN, *ENTERS]
     before, at = (play(flow, typed[:n], Answers()).state for n in (place - 1, place))
-    back = flow.answer(at, "b").state
+    back = answer(flow, at, "b").state
     assert (back.ask, back.at) == (before.ask, before.at)
 
 
-def test_b_never_leads_back_into_a_confirmation_that_was_given(flow: Flow) -> None:
+def test_b_after_a_confirmation_leads_to_the_question_before_in_one_key(flow: Flow) -> None:
     confirmed = play(flow, [*TEN, "p -.3", "y"])
-    assert flow.answer(confirmed.state, "b").state.ask is not Ask.CONFIRM_MORE
+    assert answer(flow, confirmed.state, "b").state.ask is Ask.JOINT
 
 
 # Values that cannot or can hardly be.
@@ -447,14 +463,14 @@ def test_enter_goes_to_the_joint_that_was_suggested(gear: Gear) -> None:
     flow = Flow(gear, advice=lambda _measured, _left: ("Worth most next.", 5))
     turn = play(flow, [".004"])
     assert "(Enter goes to #5)" in shown(flow, turn.state)
-    assert flow.answer(turn.state, "").state.at == 5
+    assert answer(flow, turn.state, "").state.at == 5
 
 
 def test_b_after_a_jump_leads_back_to_where_one_came_from(flow: Flow) -> None:
     jumped = play(flow, [".004", "#7"])
-    assert flow.answer(jumped.state, "b").state.at == 2
-    answered = flow.answer(jumped.state, ".002")
-    assert flow.answer(answered.state, "b").state.at == 7
+    assert answer(flow, jumped.state, "b").state.at == 2
+    answered = answer(flow, jumped.state, ".002")
+    assert answer(flow, answered.state, "b").state.at == 7
 
 
 def test_advice_is_shown_after_a_critical_joint(gear: Gear) -> None:
@@ -518,7 +534,7 @@ def test_a_plunger_farther_off_than_worn_joints_could_push_it_is_asked_again(
     asked = play(flow, [*TEN, "p -.3"])
     assert asked.state.ask is Ask.CONFIRM_MORE
     assert "farther than all joints at their limits" in shown(flow, asked.state)
-    after = flow.answer(asked.state, typed).state
+    after = answer(flow, asked.state, typed).state
     assert (after.ask, after.answers.more.get("plunger_displacement")) == (Ask.MORE, taken)
 
 
@@ -849,7 +865,7 @@ def test_a_yes_takes_the_readings_in_their_unit(flow: Flow, gear: Gear) -> None:
 
 
 def test_b_after_a_yes_does_not_ask_about_the_unit_again(flow: Flow) -> None:
-    assert flow.answer(in_millimetres(flow, "y").state, "b").state.ask is not Ask.CONFIRM_UNIT
+    assert answer(flow, in_millimetres(flow, "y").state, "b").state.ask is not Ask.CONFIRM_UNIT
 
 
 def test_a_no_goes_back_to_the_table(flow: Flow) -> None:
@@ -863,7 +879,7 @@ def test_enter_alone_does_not_confirm_the_unit(flow: Flow) -> None:
 def test_another_unit_takes_the_confirmation_back(flow: Flow) -> None:
     turn = in_millimetres(flow, "y")
     for typed in ("unit", "t", "y"):
-        turn = flow.answer(turn.state, typed)
+        turn = answer(flow, turn.state, typed)
     assert "small_readings_true" not in turn.state.answers.more
 
 

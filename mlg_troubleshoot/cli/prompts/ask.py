@@ -8,7 +8,8 @@ from datetime import datetime
 
 from mlg_troubleshoot.cli.prompts import pages
 from mlg_troubleshoot.cli.prompts.answers import Answers
-from mlg_troubleshoot.cli.prompts.flow import Advice, Ask, Effect, Flow, State, Turn
+from mlg_troubleshoot.cli.prompts.conversation import Conversation, Effect, Turn
+from mlg_troubleshoot.cli.prompts.flow import Advice, Ask, Flow, State
 from mlg_troubleshoot.cli.prompts.lines import BLANK, Tone, line
 from mlg_troubleshoot.cli.prompts.store import Session, SessionStore, SessionTakenError, new_session
 from mlg_troubleshoot.cli.prompts.terminal import RichTerminal
@@ -140,31 +141,28 @@ def ask_inspection(
         raise _stopped(terminal, saver) from None
 
 
-def _converse(flow: Flow, turn: Turn, terminal: RichTerminal, saver: _Saver) -> Entry:
-    shown = None
+def _converse(flow: Flow, turn: Turn[State], terminal: RichTerminal, saver: _Saver) -> Entry:
+    conversation = Conversation(flow, terminal)
     while True:
-        if turn.effect is Effect.COMPUTE:
-            try:
-                return Entry(
-                    turn.state.answers.inspection(flow.gear, _record_id(saver.session)),
-                    saver.session,
-                )
-            except UsageError as error:
-                turn = Turn(turn.state, (line((f"{error.message}. {error.remedy}", Tone.BAD)),))
         saver.save(turn.state.answers)
-        terminal.say(turn.lines)
-        page = flow.page(turn.state, terminal.width)
-        if replace(turn.state, trail=()) != shown:
-            terminal.say(page.lines)
-            shown = replace(turn.state, trail=())
-        turn = flow.answer(turn.state, terminal.ask(page.prompt))
+        turn = conversation.next(turn)
         match turn.effect:
             case Effect.STOP:
                 raise EOFError
-            case Effect.RESUME if turn.session is not None:
-                saver.resume(turn.session)
-            case Effect.PUT_AWAY if turn.session is not None:
-                saver.put_away(turn.session)
+            case Effect.RESUME if turn.state.saved is not None:
+                saver.resume(turn.state.saved)
+            case Effect.PUT_AWAY if turn.state.saved is not None:
+                saver.put_away(turn.state.saved)
+            case Effect.COMPUTE:
+                saver.save(turn.state.answers)
+                try:
+                    return Entry(
+                        turn.state.answers.inspection(flow.gear, _record_id(saver.session)),
+                        saver.session,
+                    )
+                except UsageError as error:
+                    said = line((f"{error.message}. {error.remedy}", Tone.BAD))
+                    turn = Turn(turn.state, (said,))
 
 
 def _stopped(terminal: RichTerminal, saver: _Saver) -> EntryInterruptedError:

@@ -24,8 +24,8 @@ from mlg_troubleshoot.cli.prompts.answers import (
     plunger_in,
     read_more,
 )
+from mlg_troubleshoot.cli.prompts.conversation import Effect, Page, Turn, again
 from mlg_troubleshoot.cli.prompts.lines import Line, Tone, line
-from mlg_troubleshoot.cli.prompts.pages import Page
 from mlg_troubleshoot.cli.prompts.store import Session
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import UsageError
@@ -88,29 +88,6 @@ class State:
         return self.at
 
 
-class Effect(StrEnum):
-    """What the caller does besides showing the next question."""
-
-    NONE = "none"
-    STOP = "stop"
-    COMPUTE = "compute"
-    RESUME = "resume"
-    PUT_AWAY = "put away"
-
-
-@dataclass(frozen=True, slots=True)
-class Turn:
-    """What follows from an answer: the next question, what to say before it, and what else to
-    do.
-    """
-
-    state: State
-    lines: tuple[Line, ...] = ()
-    effect: Effect = Effect.NONE
-    session: Session | None = None
-
-
-_WORDS = {"b": "b", "back": "b", "?": "?", "help": "?", "q": "q", "quit": "q"}
 _YES, _NO = ("y", "yes"), ("n", "no")
 _UNITS = {"i": LengthUnit.INCH, "t": LengthUnit.THOU, "m": LengthUnit.MILLIMETRE}
 _CONVENTIONS = {c.value[0].lower(): c for c in ClearanceConvention}
@@ -136,7 +113,7 @@ class Flow:
     def open_joints(self, answers: Answers) -> tuple[int, ...]:
         return tuple(number for number in self.order if number not in answers.joints)
 
-    def resume(self, saved: Session, given: Answers) -> Turn:
+    def resume(self, saved: Session, given: Answers) -> Turn[State]:
         answers = saved.answers
         if saved.gear_id != self.gear.id or not set(answers.joints) <= set(self.gear.joint_numbers):
             raise UsageError(
@@ -150,56 +127,43 @@ class Flow:
                 "Resume without that flag, or begin a new inspection.",
             )
         answers = answers.beside(given)
-        return self._go_on(answers, told=self._resumed(answers))
+        return self._read_anew(answers, told=self._resumed(answers))
 
     def page(self, state: State, width: int) -> Page:
         return _QUESTIONS[state.ask].page(self, state, width)
 
-    def answer(self, state: State, text: str) -> Turn:
-        typed = text.strip()
-        if not typed.isprintable() or "\ufffd" in typed:
-            return _again(
-                state, "A key that does nothing here, perhaps an arrow. Type the line again."
-            )
-        word = _WORDS.get(typed.lower())
-        if word == "q":
-            return Turn(state, effect=Effect.STOP)
-        if word == "b":
-            return self._back(state)
-        if word == "?":
-            of_joint = state.ask in (Ask.JOINT, Ask.CONFIRM)
-            own = (
-                pages.joint_help(self.gear, state.answers, state.joint)
-                if of_joint
-                else _QUESTIONS[state.ask].help
-            )
-            return Turn(state, own)
+    def help(self, state: State) -> tuple[Line, ...]:
+        if state.ask in (Ask.JOINT, Ask.CONFIRM):
+            return pages.joint_help(self.gear, state.answers, state.joint)
+        return _QUESTIONS[state.ask].help
+
+    def take(self, state: State, typed: str) -> Turn[State]:
         turn = _QUESTIONS[state.ask].take(self, state, typed)
-        here, passing = (state.ask, state.at), (Ask.OFFER, Ask.REREAD, *_CONFIRMS)
-        moved = (turn.state.ask, turn.state.at) != here and state.ask not in passing
+        here, there = (_question(each) for each in (state, turn.state))
+        moved = there != here and state.ask not in (Ask.OFFER, Ask.REREAD)
         return replace(
             turn, state=replace(turn.state, trail=(*state.trail, here) if moved else state.trail)
         )
 
-    def _tail(self, state: State, typed: str) -> Turn:
+    def _tail(self, state: State, typed: str) -> Turn[State]:
         answers = state.answers
         if not typed and answers.tail_no is None:
-            return _again(
+            return again(
                 state, "Enter alone enters nothing. Type the tail number, for example N123AB."
             )
         return self.begin(replace(answers, tail_no=typed or answers.tail_no), state.from_review)
 
-    def _side(self, state: State, typed: str) -> Turn:
+    def _side(self, state: State, typed: str) -> Turn[State]:
         side = Side.spelt(typed) if typed else state.answers.side
         if side is None:
-            return _again(state, _not_taken(typed, "Type l for the left gear or r for the right."))
+            return again(state, _not_taken(typed, "Type l for the left gear or r for the right."))
         return self.begin(replace(state.answers, side=side), state.from_review)
 
-    def _unit(self, state: State, typed: str) -> Turn:
+    def _unit(self, state: State, typed: str) -> Turn[State]:
         answers = state.answers
         unit = _chosen(typed, _UNITS, LengthUnit.parse, answers.unit)
         if unit is None:
-            return _again(
+            return again(
                 state, _not_taken(typed, "Type i for inch, t for thou or m for millimetre.")
             )
         changed = replace(answers, unit=unit)
@@ -210,9 +174,9 @@ class Flow:
             return Turn(
                 State(Ask.REREAD, changed, old_unit=answers.unit, from_review=state.from_review)
             )
-        return self._go_on(changed, state.from_review)
+        return self._read_anew(changed, state.from_review)
 
-    def _reread(self, state: State, typed: str) -> Turn:
+    def _reread(self, state: State, typed: str) -> Turn[State]:
         old = _known(state.old_unit)
 
         def in_old(answer: JointAnswer) -> JointAnswer:
@@ -224,15 +188,15 @@ class Flow:
             )
 
         if typed.lower() not in (*_YES, *_NO):
-            return _again(state, _not_taken(typed, "Type y or n."))
+            return again(state, _not_taken(typed, "Type y or n."))
         change = _unconfirmed if typed.lower() in _YES else in_old
-        return self._go_on(state.answers.with_each(change), state.from_review)
+        return self._read_anew(state.answers.with_each(change), state.from_review)
 
-    def _convention(self, state: State, typed: str) -> Turn:
+    def _convention(self, state: State, typed: str) -> Turn[State]:
         answers = state.answers
         convention = _chosen(typed, _CONVENTIONS, ClearanceConvention.parse, answers.convention)
         if convention is None:
-            return _again(state, _not_taken(typed, "Type r, d or t; ? explains them."))
+            return again(state, _not_taken(typed, "Type r, d or t; ? explains them."))
         if convention is answers.convention:
             return self._go_on(answers, state.from_review)
         told: tuple[Line, ...] = ()
@@ -240,20 +204,21 @@ class Flow:
             name = pages.CONVENTION_NAMES[convention]
             told = (line((f"The readings stay as typed and are now read as {name}.", Tone.WARN)),)
         changed = replace(answers, convention=convention).with_each(_unconfirmed)
-        return self._go_on(changed, state.from_review, told)
+        return self._read_anew(changed, state.from_review, told)
 
-    def _offer(self, state: State, typed: str) -> Turn:
+    def _offer(self, state: State, typed: str) -> Turn[State]:
         saved = _known(state.saved)
         if typed.lower() in _YES:
-            turn = self._go_on(
+            turn = self._read_anew(
                 saved.answers.beside(state.answers), told=self._resumed(saved.answers)
             )
-            return replace(turn, effect=Effect.RESUME, session=saved)
+            return replace(turn, state=replace(turn.state, saved=saved), effect=Effect.RESUME)
         if typed.lower() in _NO:
-            return replace(self._go_on(state.answers), effect=Effect.PUT_AWAY, session=saved)
-        return _again(state, _not_taken(typed, "Type y to go on with it or n to begin a new one."))
+            turn = self._go_on(state.answers)
+            return replace(turn, state=replace(turn.state, saved=saved), effect=Effect.PUT_AWAY)
+        return again(state, _not_taken(typed, "Type y to go on with it or n to begin a new one."))
 
-    def _joint(self, state: State, typed: str) -> Turn:
+    def _joint(self, state: State, typed: str) -> Turn[State]:
         number, answers = state.joint, state.answers
         if not typed and number not in answers.joints and state.suggested not in (None, number):
             typed = f"#{state.suggested}"
@@ -270,7 +235,7 @@ class Flow:
         if here is not None:
             return self._answered(state, number, here)
         if not typed:
-            return _again(
+            return again(
                 state,
                 "Enter alone enters nothing. Type the clearance, or s if it was not measured.",
             )
@@ -278,18 +243,18 @@ class Flow:
             return self._done(state)
         return self._value(state, number, typed)
 
-    def _confirm(self, state: State, typed: str) -> Turn:
+    def _confirm(self, state: State, typed: str) -> Turn[State]:
         if not typed:
-            return _again(state, "Enter alone does not confirm it. Type y, or the value again.")
+            return again(state, "Enter alone does not confirm it. Type y, or the value again.")
         if typed.lower() in _YES:
             return self._answered(
                 state, state.joint, JointAnswer(self._pending(state).written, confirmed=True)
             )
         if typed.lower() in _NO:
-            return self._back(state)
+            return self.back(state)
         return self._joint(state, typed)
 
-    def _value(self, state: State, number: int, typed: str) -> Turn:
+    def _value(self, state: State, number: int, typed: str) -> Turn[State]:
         answers = state.answers
         judged = judge(typed, number, _known(answers.unit), _known(answers.convention), self.gear)
         if judged.refused:
@@ -304,7 +269,7 @@ class Flow:
             return Turn(replace(state, ask=Ask.CONFIRM, pending=written))
         return self._answered(state, number, JointAnswer(written, confirmed=unusual))
 
-    def _answered(self, state: State, number: int, answer: JointAnswer) -> Turn:
+    def _answered(self, state: State, number: int, answer: JointAnswer) -> Turn[State]:
         answers = state.answers.with_joint(number, answer)
         told = list(pages.echo_lines(self.gear, answers, number))
         still_open = self.open_joints(answers)
@@ -317,7 +282,7 @@ class Flow:
             turn = replace(turn, state=replace(turn.state, suggested=advised[1]))
         return replace(turn, lines=(*told, *turn.lines))
 
-    def _done(self, state: State) -> Turn:
+    def _done(self, state: State) -> Turn[State]:
         answers = state.answers
         rest = self.open_joints(answers)
         answers = replace(
@@ -328,20 +293,20 @@ class Flow:
         told = (line((f"– {names}  not measured", Tone.WARN)),) if rest else ()
         return self._go_on(answers, state.from_review, told)
 
-    def _jump(self, state: State, number: int) -> Turn:
+    def _jump(self, state: State, number: int) -> Turn[State]:
         if number not in self.gear.joint_numbers:
-            return _again(
+            return again(
                 state, f"There is no joint #{number}. The joints are {self._joint_names()}."
             )
         return Turn(State(Ask.JOINT, state.answers, number, from_review=state.from_review))
 
-    def _more(self, state: State, typed: str) -> Turn:
+    def _more(self, state: State, typed: str) -> Turn[State]:
         if typed.lower() in ("", "s"):
             return Turn(State(Ask.DETAIL, state.answers, SIGN_OFF[0]))
         try:
             answers, told = read_more(state.answers, typed, self.gear)
         except UsageError as error:
-            return _again(state, f"{error.message}. {error.remedy}")
+            return again(state, f"{error.message}. {error.remedy}")
         stands = plunger_in(answers, self.gear)
         new = answers.more.get("plunger_displacement") != state.answers.more.get(
             "plunger_displacement"
@@ -350,13 +315,13 @@ class Flow:
             return Turn(replace(state, ask=Ask.CONFIRM_MORE, pending=answers), told)
         return Turn(replace(state, ask=Ask.MORE, answers=answers, pending=None), told)
 
-    def _confirm_more(self, state: State, typed: str) -> Turn:
+    def _confirm_more(self, state: State, typed: str) -> Turn[State]:
         if typed.lower() in _YES and isinstance(state.pending, Answers):
             return Turn(State(Ask.MORE, state.pending))
         if typed.lower() in _NO:
-            return self._back(state)
+            return self.back(state)
         if not typed:
-            return _again(
+            return again(
                 state,
                 "Enter alone does not confirm it. Type y, n, or p with the displacement again.",
             )
@@ -369,7 +334,7 @@ class Flow:
         """
         return float(worst_case(self.gear.model, self.gear.limits_in[None]).magnitude_in[0])
 
-    def _detail(self, state: State, typed: str) -> Turn:
+    def _detail(self, state: State, typed: str) -> Turn[State]:
         column, answers = str(state.at), state.answers
         if (
             not typed
@@ -384,14 +349,14 @@ class Flow:
             try:
                 judge_more(column, typed, answers.unit, self.gear)
             except UsageError as error:
-                return _again(state, f"{error.message}. {error.remedy}")
+                return again(state, f"{error.message}. {error.remedy}")
             answers = answers.with_more(**{column: typed})
         after = SIGN_OFF.index(column) + 1
         if after == len(SIGN_OFF) or state.from_review:
             return Turn(State(Ask.REVIEW, answers))
         return Turn(State(Ask.DETAIL, answers, SIGN_OFF[after]))
 
-    def _review(self, state: State, typed: str) -> Turn:
+    def _review(self, state: State, typed: str) -> Turn[State]:
         answers = state.answers
         if not typed:
             return self._compute(state)
@@ -402,14 +367,14 @@ class Flow:
         number = re.fullmatch(r"#?\s*(\d{1,4})", typed)
         if number is not None:
             return self._jump(replace(state, from_review=True), int(number[1]))
-        return _again(
+        return again(
             state,
             _not_taken(typed, f"Type a joint number ({self._joint_names()}), or Enter alone."),
         )
 
-    def _compute(self, state: State) -> Turn:
+    def _compute(self, state: State) -> Turn[State]:
         if not state.answers.radial_in:
-            return _again(
+            return again(
                 state,
                 "No joint has a clearance, so there is nothing to compute. Type a joint number.",
             )
@@ -417,17 +382,17 @@ class Flow:
             return Turn(replace(state, ask=Ask.CONFIRM_UNIT))
         return Turn(state, effect=Effect.COMPUTE)
 
-    def _confirm_unit(self, state: State, typed: str) -> Turn:
+    def _confirm_unit(self, state: State, typed: str) -> Turn[State]:
         if typed.lower() in _YES:
             return Turn(
                 State(Ask.REVIEW, state.answers.with_more(small_readings_true="yes")),
                 effect=Effect.COMPUTE,
             )
         if typed.lower() in _NO:
-            return self._back(state)
-        return _again(state, _not_taken(typed, "Type y if the unit is right, or n to correct it."))
+            return self.back(state)
+        return again(state, _not_taken(typed, "Type y if the unit is right, or n to correct it."))
 
-    def begin(self, answers: Answers, from_review: bool = False) -> Turn:
+    def begin(self, answers: Answers, from_review: bool = False) -> Turn[State]:
         """Begin with what flags already gave; `b` still reaches it.
 
         An unfinished inspection is offered as soon as tail and side are known.
@@ -455,11 +420,10 @@ class Flow:
 
     def _go_on(
         self, answers: Answers, from_review: bool = False, told: tuple[Line, ...] = ()
-    ) -> Turn:
-        """Go to the first open question; readings that have become impossible are open again."""
+    ) -> Turn[State]:
+        """Go to the first open question."""
         # What was confirmed of the readings holds for these readings only.
-        answers, settled = self._settled(answers.with_more(small_readings_true=None))
-        told = (*told, *settled)
+        answers = answers.with_more(small_readings_true=None)
         for ask, value in zip(_HEADING, answers.heading, strict=True):
             if value is None:
                 return Turn(State(ask, answers), told)
@@ -467,6 +431,15 @@ class Flow:
         if still_open:
             return Turn(State(Ask.JOINT, answers, still_open[0], from_review=from_review), told)
         return Turn(State(Ask.REVIEW if from_review else Ask.MORE, answers), told)
+
+    def _read_anew(
+        self, answers: Answers, from_review: bool = False, told: tuple[Line, ...] = ()
+    ) -> Turn[State]:
+        """Judge every answer again, in another unit or convention or on another day, and go on;
+        readings that have become impossible are open again.
+        """
+        answers, settled = self._settled(answers)
+        return self._go_on(answers, from_review, (*told, *settled))
 
     def _settled(self, answers: Answers) -> tuple[Answers, tuple[Line, ...]]:
         kept: dict[int, JointAnswer] = {}
@@ -501,7 +474,7 @@ class Flow:
             )
         return replace(answers, joints=MappingProxyType(kept)), tuple(told)
 
-    def _back(self, state: State) -> Turn:
+    def back(self, state: State) -> Turn[State]:
         if state.ask in _CONFIRMS:
             return Turn(replace(state, ask=_CONFIRMS[state.ask], pending=None))
         if state.ask is Ask.REREAD:
@@ -522,7 +495,7 @@ class Flow:
         ]
         place = course.index((state.ask, state.at))
         if place == 0:
-            return _again(state, "This is the first question.")
+            return again(state, "This is the first question.")
         ask, at = course[place - 1]
         return Turn(State(ask, state.answers, at))
 
@@ -546,6 +519,11 @@ class Flow:
         return ", ".join(map(str, self.gear.joint_numbers))
 
 
+def _question(state: State) -> Place:
+    """The question where a state stands; a confirmation belongs to the one that it is of."""
+    return _CONFIRMS.get(state.ask, state.ask), state.at
+
+
 def _known(value: _T | None) -> _T:
     if value is None:
         raise ValueError("the state lacks what its question needs")
@@ -559,10 +537,6 @@ def _contradictions(saved: Answers, given: Answers) -> str:
         for ask, kept, new in zip(_HEADING, saved.heading, given.heading, strict=True)
         if kept is not None and new is not None and kept.casefold() != new.casefold()
     )
-
-
-def _again(state: State, message: str) -> Turn:
-    return Turn(state, (line((message, Tone.WARN), indent=3),))
 
 
 def _chosen(
@@ -595,7 +569,7 @@ class _Question:
     joint's own.
     """
 
-    take: Callable[[Flow, State, str], Turn]
+    take: Callable[[Flow, State, str], Turn[State]]
     page: Callable[[Flow, State, int], Page]
     help: tuple[Line, ...] = ()
 

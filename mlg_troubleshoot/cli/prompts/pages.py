@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from datetime import date
 
 from mlg_troubleshoot.cli.prompts.answers import DAY, Answers, Reading, judge
+from mlg_troubleshoot.cli.prompts.conversation import Page
 from mlg_troubleshoot.cli.prompts.lines import BLANK, Line, Tone, keys, line
 from mlg_troubleshoot.cli.prompts.sketch import sketch
 from mlg_troubleshoot.cli.prompts.store import Session
@@ -51,14 +51,6 @@ OFFER_HELP = (line("y goes on where you stopped. n begins with empty joints.", i
 REREAD_HELP = (
     line("Readings with their own unit, such as 13 thou, stay as they are either way.", indent=3),
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Page:
-    """A question as it is shown: what stands above the prompt, and the text before the cursor."""
-
-    lines: tuple[Line, ...]
-    prompt: str
 
 
 def length(length_in: float, unit: LengthUnit | None) -> str:
