@@ -54,7 +54,7 @@ _HOPELESS = 0.5
 # Chance that the joints are the cause from which a sound one is restored. [1]
 _SURE_ENOUGH = 0.75
 # What one repair may be above the chance that the shop accepts over all: most are far below it. [1]
-_FOR_ONE_REPAIR = 4.0
+_FOR_ONE_REPAIR = 3.0
 
 
 def correct(row: InvalidRow) -> Plan:
@@ -258,9 +258,11 @@ class _Course:
         self._measure(following)
         worn = self.facts.causes.worn[self.row]
         numbers = self.numbers
-        likely = max(following, key=lambda n: worn[numbers.index(n)])
-        # What is over its limit already does not suffice, or there would be nothing to read.
-        return self._try((*self.over, likely), expected=True)
+        likely = sorted(following, key=lambda n: -worn[numbers.index(n)])
+        # What is over its limit already does not suffice, or there would be nothing to read. Where
+        # nobody read any joint, two are restored on average.
+        more = 1 if self.cases.measured[self.row].any() else 2
+        return self._try((*self.over, *likely[:more]), expected=True)
 
     def _repair(self) -> RepairSet | None:
         """The quickest repair of which a second one is no likelier than the shop accepts; None if

@@ -89,3 +89,29 @@ def test_a_gear_that_no_further_joint_will_settle_is_told_so() -> None:
         r"measuring them will hardly settle it: too close to the margin \(chance 9[\d.]+ %\)", text
     )
     assert "Measure the plunger displacement at mid-position" in text
+
+
+DAY = ("--outcome", "FAILED", "--measured", "0.036in")
+WORN = tuple(
+    flag
+    for joint in range(1, 11)
+    for flag in ("--set", f"{joint}={0.013 if joint == 3 else 0.001}in")
+)
+
+
+def test_flags_of_the_day_bind_next_and_say_what_stays_open() -> None:
+    shown = said(*HAND, *WORN, *DAY, "--no-spare", "3")
+    assert "OPEN: #3 is over the limit and cannot be restored today." in shown
+
+
+def test_a_repair_by_flags_leads_to_the_plunger_and_the_retraction() -> None:
+    restored = tuple("3=0.0005in" if flag == "3=0.013in" else flag for flag in WORN)
+    shown = said(*HAND, *restored, *DAY, "--restored", "3", "--repair-date", "2026-03-04 08:00")
+    assert "NEXT (12 min): Read the plunger displacement at mid-position." in shown
+    assert "retract the gear (15 min)" in shown
+
+
+def test_a_joint_that_a_flag_of_the_day_names_must_exist() -> None:
+    run = mlg(*HAND, *WORN, "--cannot-reach", "14")
+    assert run.code == 2
+    assert "--cannot-reach '14'" in run.err

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -373,8 +372,3 @@ def say(name: str, found: Counted) -> str:
     ]
     rest = "; ".join(f"{what} {value:.3g}" for what, value in found.figures.items())
     return f"{name}: {', '.join(kinds)}\n    {rest}"
-
-
-@lru_cache(maxsize=1)
-def _worlds() -> dict[str, World]:
-    return {world.name: world for world in WORLDS}
