@@ -157,6 +157,12 @@ class Causes:
         return _tables(self.cases.gear).exceeds / _JOINTS_FOR_ONE_ELSEWHERE
 
     @property
+    def leverage(self) -> Array:
+        """Amplification of each joint as a share of the largest. [1]"""
+        amplification = _tables(self.cases.gear).amplification
+        return np.asarray(amplification / amplification.max())
+
+    @property
     def reach_in(self) -> Array:
         """How far each joint can move the plunger. [in]"""
         return _tables(self.cases.gear).amplification * self.mean_in

@@ -256,7 +256,7 @@ class _Course:
     def _read_and_restore(self, following: tuple[int, ...]) -> Plan:
         """Read joints, then the expected repair."""
         self._measure(following)
-        worn = self.facts.causes.worn[self.row]
+        worn = self.facts.causes.worn[self.row] * self.facts.causes.leverage
         numbers = self.numbers
         likely = sorted(following, key=lambda n: -worn[numbers.index(n)])
         # What is over its limit already does not suffice, or there would be nothing to read. Where
@@ -265,8 +265,8 @@ class _Course:
         return self._try((*self.over, *likely[:more]), expected=True)
 
     def _repair(self) -> RepairSet | None:
-        """The quickest repair of which a second one is no likelier than the shop accepts; None if
-        none is.
+        """The quickest repair after which a second one is at most as likely as the shop accepts;
+        None without one.
 
         Offered are what is over its limit with the fewest more, and what holds in the worst case.
         """
@@ -324,7 +324,8 @@ class _Course:
     def _worth_reading(self, best: RepairSet | None) -> tuple[int, ...]:
         """The joints to read next; none where a repair is quicker than what reading may save."""
         f, i = self.facts, self.row
-        worn = f.causes.worn[i]
+        # A worn joint that hardly moves the plunger is hardly the cause.
+        worn = f.causes.worn[i] * f.causes.leverage
         chosen: tuple[int, ...] = ()
         most = -1.0
         for area in self.gear.areas:
@@ -351,6 +352,7 @@ class _Course:
             return chosen
         sound = [n for n in best.joints if n not in self.over]
         places = [self.numbers.index(n) for n in chosen]
+        worn = f.causes.worn[i]
         saved = minutes_to_restore(self.gear, sound, self.opened) if sound else 0.0
         saved *= 1.0 - float(np.prod(1.0 - worn[places]))
         return chosen if saved > minutes_to_measure(self.gear, chosen, self.opened) else ()
