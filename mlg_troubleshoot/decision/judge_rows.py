@@ -100,7 +100,13 @@ def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Ass
     )
     wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in verdicts]) & closes
     sets = repair_sets(cases, found, wanted)
-    findings = rank_joints(cases.gear, table, cases.clearance_in, allowances(cases, batch.lower))
+    findings = rank_joints(
+        cases.gear,
+        table,
+        cases.clearance_in,
+        allowances(cases, batch.lower),
+        cases.gauge_u_in,
+    )
     order = np.array([[f.rank for f in row] for row in findings]).argsort(axis=1)
     judged = Judged(
         verdicts,
