@@ -78,7 +78,7 @@ class _Sheet:
         """The first row without a reading."""
         return next((k for k in range(len(self.rows)) if not self._read(k)), len(self.rows))
 
-    def page(self, state: int, width: int) -> Page:  # noqa: ARG002
+    def page(self, state: int, width: int) -> Page:  # noqa: ARG002 - as every course
         row = self._row(state)
         asked = line((f"{state + 1} of {len(self.rows)}: {_words(row)}", Tone.STRONG))
         return Page(
