@@ -85,7 +85,8 @@ def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Ass
     p_upper = batch.upper.probability_within(cases.margin_in, cases.margin_u_in)
     plunger = plunger_reading.compare(cases, batch.upper)
     # A gear whose entry leaves a question cannot be cleared either.
-    absent = cases.critical_missing | np.array([bool(question) for question in cases.questions])
+    questions = cases.questions
+    absent = cases.critical_missing | np.array([bool(question) for question in questions])
     verdicts = [
         (
             Verdict.OUTSIDE_MARGIN
@@ -115,6 +116,8 @@ def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Ass
         order,
         p_lower,
         batch.lower.standard_uncertainty(cases.margin_u_in),
+        questions,
+        cases.joints_done,
     )
     planned = plans(cases, judged, causes, causes.with_chances(sets))
     return [
@@ -270,7 +273,7 @@ def _headline(cases: Cases, judged: Judged, i: int) -> str:
             for n, read in zip(cases.gear.joint_numbers, cases.measured[i], strict=True)
             if not read
         ]
-        (question,) = cases.take(np.array([i])).questions
+        question = judged.questions[i]
         return (
             sentences.entry_in_question(question, said)
             if question
@@ -279,7 +282,7 @@ def _headline(cases: Cases, judged: Judged, i: int) -> str:
     if found is Verdict.OUTSIDE_MARGIN:
         return sentences.outside(margin, said)
     if found is Verdict.WITHIN_MARGIN:
-        done = bool(cases.take(np.array([i])).joints_done[0])
+        done = bool(judged.joints_done[i])
         failed = bool(cases.failed[i])
         clears = bool(plunger.clears[i])
         return sentences.within(margin, said, failed=failed, clears=clears, joints_done=done)

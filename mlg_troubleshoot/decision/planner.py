@@ -70,7 +70,8 @@ class Judged:
     """What the verdict found about n gears.
 
     order: places of the joints in the order of their rank. p_within, u_in: chance that the worst
-    case is within the margin, its uncertainty against the margin. [1, in]
+    case is within the margin, its uncertainty against the margin. [1, in] questions, joints_done: as
+    `Cases` says them, found once.
     """
 
     verdicts: Sequence[Verdict]
@@ -79,6 +80,8 @@ class Judged:
     order: Places
     p_within: Array
     u_in: Array
+    questions: Sequence[str]
+    joints_done: Mask
 
 
 def plans(
@@ -127,7 +130,7 @@ class _Facts:
         self.inside = np.array(
             [[joint.area == area.name for joint in gear.joints] for area in gear.areas]
         )
-        self.questions, self.complained = cases.questions, cases.complained
+        self.questions, self.complained = judged.questions, cases.complained
         self.over, self.removable = cases.over_limit & cases.restorable, removable(cases)
         self.open: Mask = np.asarray(~cases.measured & cases.reachable)
         critical = self.open & gear.critical
@@ -384,7 +387,7 @@ class _Course:
         if self.over:
             self._restore_over_limit()
             return self._done()
-        done = bool(self.cases.joints_done[self.row]) and where is End.WITHIN
+        done = bool(self.judged.joints_done[self.row]) and where is End.WITHIN
         return self._done() if done else self._end(where)
 
     def _try(
