@@ -70,8 +70,8 @@ class Judged:
     """What the verdict found about n gears.
 
     order: places of the joints in the order of their rank. p_within, u_in: chance that the worst
-    case is within the margin, its uncertainty against the margin. [1, in] questions, joints_done: as
-    `Cases` says them, found once.
+    case is within the margin, its uncertainty against the margin. [1, in] questions, joints_done:
+    as `Cases` says them, found once.
     """
 
     verdicts: Sequence[Verdict]
