@@ -11,6 +11,9 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Places = NDArray[np.intp]
 Wholes = NDArray[np.int64]
+# Step of a derivative by central differences: short against every length of a linkage, long against
+# the rounding of its solution (1e-14 in). [in, rad]
+STEP = 1e-5
 
 
 def frozen(values: ArrayLike) -> Array:
@@ -18,3 +21,14 @@ def frozen(values: ArrayLike) -> Array:
     fixed = np.array(values, float)
     fixed.flags.writeable = False
     return fixed
+
+
+def central_steps(n: int, step: float = STEP) -> Array:
+    """Changes of n variables, each one up and then each one down, shape (2 n, n)."""
+    return np.vstack([np.eye(n), -np.eye(n)]) * step
+
+
+def central_slopes(values: Array, step: float = STEP, axis: int = 0) -> Array:
+    """Derivatives from the values at `central_steps`, which stand along an axis."""
+    up, down = np.split(values, 2, axis=axis)
+    return np.asarray((up - down) / (2.0 * step))

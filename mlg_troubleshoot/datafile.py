@@ -1,8 +1,8 @@
 """The one place where TOML and JSON from outside are read: files that are data, never code.
 
-A gear file, an ensemble, targets, a table of indices and an extension may come from anybody. They
-are read as regular files of sane size and depth, and every value is checked for its type,
-finiteness and range; what is wrong is a `GearFileError` that says file, key, value and what was
+A gear file, an ensemble, targets, a table of indices, an extension and settings may come from
+anybody. They are read as regular files of sane size and depth. What may stand in them is a struct
+that msgspec decodes; what is wrong is a `GearFileError` that says file, key, value and what was
 expected.
 """
 
@@ -10,31 +10,102 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 import stat
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import UnionType
+from typing import (
+    Annotated,
+    Any,
+    Generic,
+    Literal,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+import msgspec
+from msgspec import Meta, inspect
 
 from mlg_troubleshoot.errors import GearFileError
 
 # The shipped files have 25 kB, lines of 400 characters and tables four deep; reading dotted keys
 # takes time with the square of a line's length, and deep nesting ends in a full stack.
 MOST_BYTES, LONGEST_LINE, DEEPEST, MOST_ENTRIES = 2_000_000, 8_000, 24, 200
-LONGEST_NAME, LONGEST_TEXT, LARGEST = 40, 2_000, 1e12
+LONGEST_NAME, LONGEST_TEXT, LARGEST = 40, 2_000, 10**12
 _SHOWN = 80
+
+Number = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
+AboveZero = Annotated[float, Meta(gt=0, le=LARGEST)]
+Whole = Annotated[int, Meta(ge=-LARGEST, le=LARGEST)]
+Count = Annotated[int, Meta(ge=0, le=LARGEST)]
+Pair = tuple[Number, Number]
+# A name becomes part of messages, keys and drawings.
+Name = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME, pattern=r"^[^\n]*\S[^\n]*$")]
+Sibling = Annotated[
+    str,
+    Meta(
+        pattern=r"^(?!\.{1,2}$)[^/\\\n]+$",
+        description="the name of a file in the same folder, without a folder",
+    ),
+]
+
+T = TypeVar("T")
+Place = tuple[str | int, ...]
+
+
+# By name, since a checker of types would otherwise ask for ``frozen`` at every kind of table.
+_STRICT: dict[str, Any] = {"frozen": True, "forbid_unknown_fields": True}
+
+
+class Table(msgspec.Struct, **_STRICT):
+    """A table of a data file: its fields are the keys that it may have."""
+
+
+class RefusedValueError(ValueError):
+    """What is wrong with the value of a key of a table, raised by the table itself."""
+
+    def __init__(self, key: str, expected: str) -> None:
+        super().__init__(expected)
+        self.key = key
+
+
+@dataclass(frozen=True, slots=True)
+class DataFile(Generic[T]):
+    """A data file: what was decoded, and the values as they stand."""
+
+    path: Path
+    values: dict[str, Any]
+    content: T
+
+    def fail(self, place: Place, expected: str) -> GearFileError:
+        """Return the error of a value, found by its keys and its index in lists."""
+        return _error(self.path, self.values, place, expected)
 
 
 def read_toml(
-    path: Path, missing: str = "Put it next to the gear file that names it."
-) -> DataTable:
-    """Read a TOML file; `missing` is the remedy if it does not exist."""
-    return _read(path, missing, "TOML", _parsed_toml)
+    path: Path, kind: type[T], missing: str = "Put it next to the gear file that names it."
+) -> DataFile[T]:
+    """Read a TOML file of a kind; `missing` is the remedy if it does not exist."""
+    return _read(path, kind, missing, "TOML", _parsed_toml)
 
 
-def read_json(path: Path, missing: str) -> DataTable:
-    """Read a JSON file that holds an object; `missing` is the remedy if it does not exist."""
-    return _read(path, missing, "JSON", json.loads)
+def read_json(path: Path, kind: type[T], missing: str) -> DataFile[T]:
+    """Read a JSON file of a kind; `missing` is the remedy if it does not exist."""
+    return _read(path, kind, missing, "JSON", json.loads)
+
+
+def decode(path: Path, values: dict[str, Any], kind: type[T]) -> T:
+    """Return the values of a file as a kind of table; `GearFileError` if they do not fit it."""
+    try:
+        return msgspec.convert(values, kind, str_keys=True)
+    except (msgspec.ValidationError, OverflowError):
+        raise _error(path, values, *_refusal(values, kind)) from None
 
 
 def _parsed_toml(text: str) -> Any:
@@ -44,8 +115,13 @@ def _parsed_toml(text: str) -> Any:
     return tomllib.loads(text)
 
 
-def _read(path: Path, missing: str, form: str, parse: Callable[[str], Any]) -> DataTable:
+def _read(
+    path: Path, kind: type[T], missing: str, form: str, parse: Callable[[str], Any]
+) -> DataFile[T]:
     remedy = "Correct the file and run again."
+    deep = GearFileError(
+        f"{path}: cannot be read as {form}: nested more than {DEEPEST} deep", remedy
+    )
     try:
         found = path.stat()
         if not stat.S_ISREG(found.st_mode):
@@ -58,38 +134,72 @@ def _read(path: Path, missing: str, form: str, parse: Callable[[str], Any]) -> D
     except FileNotFoundError:
         raise GearFileError(f"{path}: there is no such file", missing) from None
     except RecursionError:
-        raise GearFileError(
-            f"{path}: cannot be read as {form}: nested more than {DEEPEST} deep", remedy
-        ) from None
+        raise deep from None
     except (OSError, ValueError) as error:
         raise GearFileError(f"{path}: cannot be read as {form}: {error}", remedy) from error
     if not isinstance(raw, dict):
         raise GearFileError(
             f"{path}: expected names with values at the top, found {_shown(raw)}", remedy
         )
-    if _is_deeper(raw, DEEPEST):
-        raise GearFileError(
-            f"{path}: cannot be read as {form}: nested more than {DEEPEST} deep", remedy
-        )
-    return DataTable(raw, path)
+    for place, value in walk(raw):
+        if len(place) >= DEEPEST:
+            raise deep
+        if isinstance(value, dict | list) and len(value) > MOST_ENTRIES:
+            raise _error(path, raw, place, f"at most {MOST_ENTRIES} entries")
+        if isinstance(value, str) and not _is_text(value):
+            expected = f"a text of at most {LONGEST_TEXT} characters, all of them printable"
+            raise _error(path, raw, place, expected)
+        if place and isinstance(place[-1], str) and not place[-1].isprintable():
+            raise _error(path, raw, place, f"a name of 1 to {LONGEST_NAME} printable characters")
+    return DataFile(path, raw, decode(path, raw, kind))
 
 
-def _is_deeper(value: Any, most: int) -> bool:
-    level = [value]
-    for _ in range(most):
+def walk(values: Any, place: Place = ()) -> Iterator[tuple[Place, Any]]:
+    """Walk over all values, those at the top first; nothing deeper than allowed."""
+    level = [(place, values)]
+    while level:
+        yield from level
         level = [
-            part
-            for parts in level
-            if isinstance(parts, (dict, list))
-            for part in (parts.values() if isinstance(parts, dict) else parts)
+            ((*place, key), part)
+            for place, value in level
+            if isinstance(value, dict | list) and len(place) < DEEPEST
+            for key, part in (value.items() if isinstance(value, dict) else enumerate(value))
         ]
-        if not level:
-            return False
-    return True
+
+
+def _is_text(text: str) -> bool:
+    return len(text) <= LONGEST_TEXT and all(c.isprintable() or c == "\n" for c in text)
+
+
+def _error(path: Path, values: Any, place: Place, expected: str) -> GearFileError:
+    words = ""
+    found: Any = values
+    for key in place:
+        here = found
+        if isinstance(key, int):
+            found = here[key]
+            words += f"[{_label(found, key)}]"
+        else:
+            found = here.get(key, msgspec.UNSET) if isinstance(here, dict) else msgspec.UNSET
+            shown = key if key.isprintable() and len(key) <= _SHOWN else _shown(key)
+            words += f".{shown}" if words else shown
+    shown = "nothing" if found is msgspec.UNSET else _shown(found)
+    return GearFileError(
+        f"{path.name}: {words}: expected {expected}, found {shown}",
+        "Correct the file and run again.",
+    )
+
+
+def _label(entry: Any, index: int) -> str | int:
+    """Return what an entry of a list calls itself, or which one it is."""
+    named = entry if isinstance(entry, dict) else {}
+    label = named.get("name", named.get("joint", named.get("number")))
+    is_shown = is_name(label) if isinstance(label, str) else isinstance(label, int)
+    return str(label) if is_shown else index + 1
 
 
 def _shown(value: Any) -> str:
-    if isinstance(value, (dict, list)) and len(value) > 4:
+    if isinstance(value, dict | list) and len(value) > 4:
         return f"{len(value)} entries"
     # More than 4,300 digits cannot be printed at all.
     large = isinstance(value, int) and abs(value) > LARGEST
@@ -97,206 +207,132 @@ def _shown(value: Any) -> str:
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
 
 
-class DataTable:
-    """A table of a data file that knows its place and which of its keys were read."""
+def _refusal(value: Any, kind: Any, place: Place = ()) -> tuple[Place, str]:
+    """Return which value within a refused one is wrong, and what was expected there."""
+    for key, part, of in _parts(value, kind):
+        if _why(part, of) is not None:
+            return _refusal(part, of, (*place, key))
+    known = _fields(value, kind)
+    for key in value if known else ():
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1)
+            meant = f"one of the known keys; did you mean {near[0]!r}?" if near else "a known key"
+            return (*place, key), meant
+    why = _why(value, kind)
+    if isinstance(why, RefusedValueError):
+        return (*place, why.key), str(why)
+    return place, _words(inspect.type_info(kind))
 
-    def __init__(self, values: dict[str, Any], file: Path, place: str = "") -> None:
-        self.values = values
-        self._file = file
-        self._place = place
-        self._read: set[str] = set()
 
-    def fail(self, key: str, expected: str) -> GearFileError:
-        found = _shown(self.values[key]) if key in self.values else "nothing"
-        return GearFileError(
-            f"{self._file.name}: {self._at(key)}: expected {expected}, found {found}",
-            "Correct the file and run again.",
-        )
+def _why(value: Any, kind: Any) -> Exception | None:
+    """Return why a value is not of a kind; None if it is."""
+    try:
+        msgspec.convert(value, kind, str_keys=True)
+    except (msgspec.ValidationError, OverflowError) as error:
+        return error.__cause__ if isinstance(error.__cause__, RefusedValueError) else error
+    return None
 
-    def _at(self, key: str) -> str:
-        shown = key if key.isprintable() and len(key) <= _SHOWN else _shown(key)
-        return f"{self._place}.{shown}" if self._place else shown
 
-    def get(self, key: str) -> Any:
-        """The value as it stands, None if it is absent; whoever takes it so checks it himself."""
-        self._read.add(key)
-        return self.values.get(key)
+def _alternatives(kind: Any) -> list[Any]:
+    """Return what a value may be, but for nothing."""
+    if get_origin(kind) is Annotated:
+        return _alternatives(get_args(kind)[0])
+    if get_origin(kind) in (Union, UnionType):
+        return [each for each in get_args(kind) if each is not type(None)]
+    return [kind]
 
-    def has(self, key: str) -> bool:
-        return key in self.values
 
-    def text(self, key: str, default: str | None = None) -> str:
-        """A text that can be shown as it is; without a default it must be there."""
-        value = self.get(key)
-        if value is None and default is not None:
-            return default
-        if not isinstance(value, str):
-            raise self.fail(key, "a text")
-        if len(value) > LONGEST_TEXT or not all(c.isprintable() or c == "\n" for c in value):
-            raise self.fail(
-                key, f"a text of at most {LONGEST_TEXT} characters, all of them printable"
-            )
-        return value
+def _structs(kind: Any) -> list[Any]:
+    """Return the kinds of table that a kind allows."""
+    return [k for k in _alternatives(kind) if isinstance(k, type) and issubclass(k, Table)]
 
-    def name(self, key: str, default: str | None = None) -> str:
-        """A short name: it becomes part of messages, keys and drawings."""
-        value = self.text(key, default)
-        self._check_name(key, value)
-        return value
 
-    def _check_name(self, key: str, value: str) -> None:
-        if not is_name(value):
-            raise self.fail(key, f"a name of 1 to {LONGEST_NAME} printable characters")
+def _fields(value: Any, kind: Any) -> dict[str, tuple[Any, bool]]:
+    """Return the keys of a table, their kinds, and whether they must be there; nothing for a
+    value of another kind.
+    """
+    structs = _structs(kind)
+    if not structs or not isinstance(value, dict):
+        return {}
+    fields: dict[str, tuple[Any, bool]] = {}
+    tag = structs[0].__struct_config__.tag_field
+    if tag is not None:
+        # Among several kinds of table its own word for itself says which it is.
+        tags = tuple(each.__struct_config__.tag for each in structs)
+        fields[tag] = (Literal[tags], True)
+        structs = [each for each in structs if each.__struct_config__.tag == value.get(tag)]
+    for struct in structs[:1]:
+        hints = get_type_hints(struct, include_extras=True)
+        for field in msgspec.structs.fields(struct):
+            fields[field.name] = (hints[field.name], field.required)
+    return fields
 
-    def one_of(self, key: str, known: tuple[str, ...], default: str | None = None) -> str:
-        value = self.text(key, default)
-        if value not in known:
-            raise self.fail(key, "one of " + ", ".join(known))
-        return value
 
-    def sibling(self, key: str, default: str) -> Path:
-        """A file in the same folder, by its name alone."""
-        value = self.text(key, default)
-        if value in ("", ".", "..") or "/" in value or "\\" in value or "\n" in value:
-            raise self.fail(key, "the name of a file in the same folder, without a folder")
-        return self._file.with_name(value)
+def _parts(value: Any, kind: Any) -> Iterator[tuple[str | int, Any, Any]]:
+    """Walk over keys, values and kinds of what a table, or a list of tables, consists of."""
+    for key, (of, required) in _fields(value, kind).items():
+        if required or key in value:
+            yield key, value.get(key, msgspec.UNSET), of
+    container = _alternatives(kind)[0]
+    if isinstance(value, dict) and get_origin(container) is dict:
+        of_keys, of_values = get_args(container)
+        for key, part in value.items():
+            is_key = _why({key: None}, dict[of_keys, Any]) is None  # type: ignore[valid-type]
+            yield (key, part, of_values) if is_key else (key, key, of_keys)
+    if isinstance(value, list) and get_origin(container) is tuple:
+        of = get_args(container)[0]
+        yield from ((i, part, of) for i, part in enumerate(value) if _structs(of))
 
-    def number(
-        self,
-        key: str,
-        default: float | None = None,
-        *,
-        least: float = -LARGEST,
-        most: float = LARGEST,
-    ) -> float:
-        """A finite number in a range; without a default it must be there."""
-        value = self.get(key)
-        if value is None and default is not None:
-            return default
-        if not _is_number(value):
-            raise self.fail(key, "a number")
-        if not least <= value <= most:
-            raise self.fail(key, _range_words("a number", least, most))
-        return float(value)
 
-    def positive(self, key: str, *, or_zero: bool = False, most: float = LARGEST) -> float:
-        """A finite number above 0, or 0 where that is allowed."""
-        value = self.number(key)
-        if value < 0.0 or (value == 0.0 and not or_zero) or value > most:
-            words = "a number of 0 or more" if or_zero else "a number above 0"
-            raise self.fail(key, words if most == LARGEST else f"{words}, at most {most:g}")
-        return value
+def _words(info: Any) -> str:
+    """Say what a value of a kind is: a number from 0 to 1, a name of 1 to 40 characters, …"""
+    match info:
+        case inspect.Metadata():
+            words = str((info.extra_json_schema or {})["description"])
+        case inspect.UnionType():
+            words = _words(next(t for t in info.types if not isinstance(t, inspect.NoneType)))
+        case inspect.FloatType():
+            words = f"a number{_range(info)}"
+        case inspect.IntType():
+            words = f"a whole number{_range(info)}"
+        case inspect.StrType():
+            most = info.max_length
+            words = f"a name of 1 to {most} printable characters" if most else "a text"
+        case inspect.BoolType():
+            words = "true or false"
+        case inspect.LiteralType():
+            words = _choice(info.values)
+        case inspect.EnumType():
+            words = _choice(info.cls)
+        case inspect.TupleType():
+            words = f"two {_plural(info.item_types[0])}"
+        case inspect.VarTupleType(item_type=inspect.StructType() | inspect.UnionType()):
+            words = "an array of tables"
+        case inspect.VarTupleType():
+            words = f"a list of {_plural(info.item_type)}"
+        case _:
+            words = "a table"
+    return words
 
-    def whole(self, key: str, *, least: float = -LARGEST, most: float = LARGEST) -> int:
-        value = self.get(key)
-        if not _is_whole(value):
-            raise self.fail(key, "a whole number")
-        if not least <= value <= most:
-            raise self.fail(key, _range_words("a whole number", least, most))
-        return int(value)
 
-    def flag(self, key: str, default: bool = False) -> bool:
-        value = self.get(key)
-        if value is None:
-            return default
-        if not isinstance(value, bool):
-            raise self.fail(key, "true or false")
-        return value
+def _choice(values: Iterable[object]) -> str:
+    *others, last = map(str, values)
+    return f"{', '.join(others)} or {last}" if others else last
 
-    def pair(
-        self, key: str, *, least: float = -LARGEST, most: float = LARGEST
-    ) -> tuple[float, float]:
-        """Two finite numbers in a range."""
-        value = self.get(key)
-        if not isinstance(value, list) or len(value) != 2 or not all(_is_number(v) for v in value):
-            raise self.fail(key, "two numbers")
-        if not all(least <= v <= most for v in value):
-            raise self.fail(key, _range_words("two numbers", least, most))
-        return float(value[0]), float(value[1])
 
-    def rising(
-        self, key: str, *, least: float = -LARGEST, most: float = LARGEST
-    ) -> tuple[float, float]:
-        """Two finite numbers, the first not above the second."""
-        low, high = self.pair(key, least=least, most=most)
-        if low > high:
-            raise self.fail(key, "two numbers, the smaller one first")
-        return low, high
+def _plural(info: Any) -> str:
+    words = re.sub(r"^a (whole number|\w+)", r"\1s", _words(info))
+    return re.sub("^two", "pairs of", words)
 
-    def wholes(self, key: str) -> tuple[int, ...]:
-        """A list of whole numbers, empty if the key is absent."""
-        return self._list(key, _is_whole, "a list of whole numbers")
 
-    def pairs(self, key: str) -> tuple[tuple[int, int], ...]:
-        """A list of pairs of whole numbers, empty if the key is absent."""
-        found = self._list(
-            key,
-            lambda pair: isinstance(pair, list) and len(pair) == 2 and all(map(_is_whole, pair)),
-            "a list of pairs of whole numbers",
-        )
-        return tuple((pair[0], pair[1]) for pair in found)
-
-    def texts(self, key: str) -> tuple[str, ...]:
-        """A list of texts; it must be there."""
-        if self.get(key) is None:
-            raise self.fail(key, "a list of texts")
-        return self._list(
-            key,
-            lambda v: isinstance(v, str) and len(v) <= LONGEST_TEXT and v.isprintable(),
-            "a list of texts",
-        )
-
-    def _list(self, key: str, is_good: Callable[[Any], bool], expected: str) -> tuple[Any, ...]:
-        value = self.get(key)
-        if value is None:
-            return ()
-        if not isinstance(value, list) or not all(map(is_good, value)):
-            raise self.fail(key, expected)
-        if len(value) > MOST_ENTRIES:
-            raise self.fail(key, f"at most {MOST_ENTRIES} entries")
-        return tuple(value)
-
-    def table(self, key: str) -> DataTable:
-        """A sub-table; it must be there."""
-        value = self.get(key)
-        if not isinstance(value, dict):
-            raise self.fail(key, "a table")
-        return DataTable(value, self._file, self._at(key))
-
-    def tables(self, key: str) -> Iterator[DataTable]:
-        for i, entry in enumerate(
-            self._list(key, lambda v: isinstance(v, dict), "an array of tables"), start=1
-        ):
-            label = entry.get("name", entry.get("joint", entry.get("number", i)))
-            shown = label if _is_whole(label) or (isinstance(label, str) and is_name(label)) else i
-            yield DataTable(entry, self._file, f"{self._at(key)}[{shown}]")
-
-    def skip(self, *keys: str) -> None:
-        """Count keys as read that another reader takes care of."""
-        self._read.update(keys)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The keys of the table, each of them a name."""
-        if len(self.values) > MOST_ENTRIES:
-            raise GearFileError(
-                f"{self._file.name}: {self._place}: expected at most {MOST_ENTRIES} entries, found"
-                f" {len(self.values)}",
-                "Correct the file and run again.",
-            )
-        for key in self.values:
-            self._check_name(key, key)
-        return tuple(self.values)
-
-    def finish(self) -> None:
-        """Refuse keys that nobody read, with the nearest known name."""
-        for key in self.values:
-            if key not in self._read:
-                near = difflib.get_close_matches(key, self._read, n=1)
-                raise self.fail(
-                    key,
-                    f"one of the known keys; did you mean {near[0]!r}?" if near else "a known key",
-                )
+def _range(info: Any) -> str:
+    """Say the range of a number; nothing if it has none."""
+    has_most = info.le is not None and info.le < LARGEST
+    if info.gt is not None:
+        return f" above {info.gt:g}" + (f", at most {info.le:g}" if has_most else "")
+    if info.ge is None or info.ge <= -LARGEST:
+        return ""
+    return f" from {info.ge:g} to {info.le:g}" if has_most else f" of {info.ge:g} or more"
 
 
 def is_name(text: str) -> bool:
@@ -304,17 +340,3 @@ def is_name(text: str) -> bool:
     turned directions.
     """
     return 0 < len(text) <= LONGEST_NAME and text.isprintable() and not text.isspace()
-
-
-def _range_words(what: str, least: float, most: float) -> str:
-    if most == LARGEST:
-        return f"{what} of {least:g} or more"
-    return f"{what} from {least:g} to {most:g}"
-
-
-def _is_whole(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and abs(value) <= LARGEST
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= LARGEST

@@ -1,8 +1,23 @@
-"""What can go wrong, as exceptions that carry facts, and bad input as a value."""
+"""What can go wrong, as exceptions that carry facts; bad input as a value; exit codes."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from enum import IntEnum
+
+
+class ExitCode(IntEnum):
+    """How a command ends: the one table of exit codes."""
+
+    FINE = 0
+    # Something was found: a gear not within margin, a cause, a reading that does not fit.
+    ATTENTION = 1
+    USAGE = 2
+    # Nothing could be judged, or the data allow no conclusion.
+    NO_CONCLUSION = 3
+    NOT_WRITTEN = 5
+    INTERNAL = 70
+    INTERRUPTED = 130
 
 
 class TroubleshootError(Exception):

@@ -12,9 +12,12 @@ import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Literal
 
 from mlg_troubleshoot.errors import OutputError, UsageError
+
+# Of every JSON output: raised when a name or a meaning changes.
+SCHEMA_VERSION: Literal[1] = 1
 
 Field = str | float | int | bool | None
 # What begins a field of a CSV, whichever separator a program assumes: the start of the text, a

@@ -7,6 +7,7 @@ from the hole centre (section 3.2 of the paper).
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -40,6 +41,11 @@ class LengthUnit(StrEnum):
     def decimals(self) -> int:
         """Decimals that show a length to about 0.0001 in."""
         return {"in": 4, "thou": 1, "mm": 3}[self.value]
+
+    @property
+    def spellings(self) -> tuple[str, ...]:
+        """How people write this unit, in lower case."""
+        return tuple(word for word, unit in UNIT_SPELLINGS.items() if unit is self)
 
     def to_inches(self, value: float) -> float:
         """A length in this unit, in inches. [in]"""
@@ -193,31 +199,59 @@ def parse_length(text: str) -> WrittenLength:
     return WrittenLength(float(match["number"]), unit, text.strip())
 
 
-_NUMBER = r"\b\d*\.\d{2,}\b"
-_SAID = re.compile(
-    rf"(?<!\w)'[^']*'(?!\w)"
-    rf"|(?P<numbers>(?:{_NUMBER}|\b0)(?:\s*(?:to|and|or|…|–|/)\s*[+\u2212-]?{_NUMBER})?)"
-    rf"(?P<gap>[\s\u00a0])in\b(?!\s(?:the|an?|any|each|every|this)\b)"
-)
+@dataclass(frozen=True, slots=True)
+class Length:
+    """A length in a sentence. [in]
 
-
-def in_unit(sentence: str, unit: LengthUnit) -> str:
-    """Say a sentence of this program, which is written in inches, in the unit that the user reads.
-
-    A length is a number with two decimals or more before ``in``, or two such numbers (``0.01 to
-    0.02 in``); it keeps its resolution. What stands in quotation marks is somebody's entry and
-    stays as it is.
+    decimals: of the number in inches; in another unit it keeps that resolution.
+    named: false where the unit follows later, as in ``0.01 to 0.05 in``.
     """
-    if unit is LengthUnit.INCH:
-        return sentence
 
-    def converted(number: re.Match[str]) -> str:
-        decimals = max(len(number[0].partition(".")[2]) - 4 + unit.decimals, 0)
-        return f"{unit.from_inches(float(number[0])):.{decimals}f}"
+    value_in: float
+    decimals: int = 4
+    sign: bool = False
+    named: bool = True
 
-    def said(found: re.Match[str]) -> str:
-        if found["numbers"] is None:
-            return found[0]
-        return re.sub(_NUMBER, converted, found["numbers"]) + found["gap"] + unit.value
+    @classmethod
+    def brief(cls, value_in: float) -> Length:
+        """With as many decimals as the number has, to four digits."""
+        return cls(value_in, len(f"{value_in:.4g}".partition(".")[2]))
 
-    return _SAID.sub(said, sentence)
+    def said_in(self, unit: LengthUnit) -> str:
+        decimals = max(self.decimals - LengthUnit.INCH.decimals + unit.decimals, 0)
+        number = f"{unit.from_inches(self.value_in):{'+' if self.sign else ''}.{decimals}f}"
+        return f"{number} {unit}" if self.named else number
+
+
+class Sentence(str):
+    """A sentence with lengths: a text in inches, as it is kept and written to JSON, that can also
+    be said in the unit of its reader.
+    """
+
+    _template = ""
+    _facts: tuple[object, ...] = ()
+
+    @classmethod
+    def of(cls, template: str, *facts: object) -> Sentence:
+        """Make a sentence; each ``{}`` stands for a `Length`, another sentence or a text."""
+        made = cls(template.format(*(said_in(fact, LengthUnit.INCH) for fact in facts)))
+        made._template, made._facts = template, facts
+        return made
+
+    @classmethod
+    def joined(cls, sentences: Iterable[str], between: str = " ") -> Sentence:
+        parts = tuple(sentences)
+        return cls.of(between.join("{}" for _ in parts), *parts)
+
+    def said_in(self, unit: LengthUnit) -> str:
+        """Say it again, its lengths in another unit."""
+        if not self._facts:
+            return str(self)
+        return self._template.format(*(said_in(fact, unit) for fact in self._facts))
+
+
+def said_in(fact: object, unit: LengthUnit) -> str:
+    """Say a part of a sentence in the unit of its reader; a text has no lengths of its own."""
+    if isinstance(fact, Length | Sentence):
+        return fact.said_in(unit)
+    return str(fact)

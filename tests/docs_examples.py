@@ -6,6 +6,7 @@ pages that are named only those); ``test_docs.py`` fails while that would change
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import subprocess
@@ -20,6 +21,8 @@ PAGES = (README, *sorted((ROOT / "docs").rglob("*.md")), ROOT / "inspection_data
 PICTURES = ROOT / ".github" / "pictures"
 _BLOCK = re.compile(r"^```console\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _PROMPT = "$ "
+# What stands between this and the next blank line is made from the table of columns.
+COLUMNS_MARK = "<!-- made by tests/docs_examples.py from mlg_troubleshoot/decision/columns.py -->\n"
 _FONTS = "DejaVu Sans, Verdana, Segoe UI, sans-serif"
 
 
@@ -75,8 +78,38 @@ def run(commands: tuple[str, ...], folder: Path) -> Session:
     return Session(commands, tuple(printed))
 
 
+def columns_table() -> str:
+    """The columns of an inspection table, one line per column, from the table of the package."""
+    from mlg_troubleshoot import load_gear
+    from mlg_troubleshoot.decision.columns import COLUMNS, Need
+    from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN
+
+    gear = load_gear()
+    low, high = gear.down_lock_range
+    numbers = {
+        "gauge_u": f"{DEFAULT_GAUGE_U_IN:g} in",
+        "margin": f"{gear.margin.value:g} in",
+        "down_lock": f"{low:g} to {high:g} in",
+    }
+    lines = ["| column | need | meaning, range |", "|---|---|---|"]
+    for column in COLUMNS:
+        unit = "_in" if column.is_length else ""
+        names = [] if column.needs_joint else [f"{column.name}{unit}"]
+        names += [f"{column.name}_n{unit}"] * bool(column.joint_fills)
+        names += [f"{column.name}_{k}{unit}" for k in range(2, column.copies + 1)]
+        meaning = column.meaning.format(low=column.low, high=column.high, **numbers)
+        if column.is_length and column.high < math.inf:
+            meaning += f" Range {column.low:g} to {column.high:g} in."
+        need = "" if column.need is Need.OTHERWISE else column.need.lower()
+        lines.append(f"| {', '.join(f'`{name}`' for name in names)} | {need} | {meaning} |")
+    return "\n".join(lines) + "\n"
+
+
 def refreshed(text: str, folder: Path) -> str:
     """The README with what its commands print today."""
+    before, mark, rest = text.partition(COLUMNS_MARK)
+    if mark:
+        text = before + mark + columns_table() + "\n" + rest.partition("\n\n")[2]
     pieces, end = [], 0
     for match, session in sessions(text):
         pieces += [text[end : match.start(1)], run(session.commands, folder).written()]

@@ -13,8 +13,8 @@ from urllib.parse import unquote
 import pytest
 from pytest_examples import CodeExample, EvalExample, find_examples
 
+from mlg_troubleshoot.decision.columns import COLUMNS, Column
 from mlg_troubleshoot.diagnosis import CATALOGUE
-from mlg_troubleshoot.records.columns import Kind
 from tests import docs_examples
 from tests.docs_examples import PAGES, PICTURES, README, ROOT
 
@@ -182,10 +182,56 @@ def test_every_cause_has_a_page_that_says_what_it_needs(cause: str) -> None:
     assert "| needs |" in page
 
 
-@pytest.mark.parametrize("kind", list(Kind))
-def test_every_column_is_described(kind: Kind) -> None:
+@pytest.mark.parametrize("column", COLUMNS, ids=lambda column: column.name)
+def test_every_column_is_described(column: Column) -> None:
     page = (ROOT / "docs/reference/columns.md").read_text(encoding="utf-8")
-    assert f"`{kind}" in page
+    assert f"`{column.name}" in page
+
+
+SUMMARY = [
+    [cell.strip() for cell in line.strip("|").split("|")]
+    for line in (ROOT / "docs/reference/figures.md").read_text(encoding="utf-8").splitlines()
+    if re.match(r"\| (?:technician|fleet engineer|analyst) \|", line)
+]
+
+
+def section(page: Path, anchor: str) -> str:
+    """The text below a heading, up to the next heading."""
+    parts = re.split(r"^#+ (.*)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    (text,) = [
+        text
+        for heading, text in zip(parts[1::2], parts[2::2], strict=True)
+        if anchors(f"# {heading}") == {anchor}
+    ]
+    return text
+
+
+def test_the_figures_begin_with_the_twenty_numbers_that_matter() -> None:
+    assert len(SUMMARY) == 20
+
+
+@pytest.mark.parametrize("row", SUMMARY, ids=lambda row: str(row[1]))
+def test_a_number_that_matters_stands_in_the_section_it_links_to(row: list[str]) -> None:
+    _reader, _what, value, _meaning, link = row
+    anchor = link.partition("(")[2].rstrip(")")
+    details = section(ROOT / "docs/reference/figures.md", anchor)
+    assert [n for n in re.findall(r"\d+(?:\.\d+)?", value) if n not in details] == []
+
+
+NAMED_PATHS = re.findall(
+    r"`((?:mlg_troubleshoot|docs|tests|templates)/[\w./-]*)`",
+    (ROOT / "docs/contributing.md").read_text(encoding="utf-8"),
+)
+
+
+@pytest.mark.parametrize("path", NAMED_PATHS)
+def test_a_place_that_contributors_are_sent_to_exists(path: str) -> None:
+    assert (ROOT / path).exists()
+
+
+def test_contributors_are_sent_to_every_room_that_holds_a_rule() -> None:
+    rooms = {path.split("/")[1] for path in NAMED_PATHS if path.startswith("mlg_troubleshoot/")}
+    assert {"cli", "decision", "diagnosis", "gear", "misfit", "records", "store"} <= rooms
 
 
 def test_the_readme_is_no_book() -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Callable, Iterator
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,22 @@ import pytest
 from mlg_troubleshoot import schemas
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from tests.cli.conftest import FAILURE, FLEET, HAND, mlg
+from mlg_troubleshoot.output_types import CheckedInspection, CheckedJoint, CheckOutput
+from mlg_troubleshoot.store import RecordKind
+from tests.cli.conftest import FAILURE, FLEET, HAND, mlg, row
 from tests.hidden_effect.simulator.generate import draw_fleet, write_csv
+from tests.store.places import table
 
+FOUR_BAR = Path(__file__).parent / "geometry" / "data" / "four-bar.toml"
+SURVEY_HEADER = "kind,from,to,value_in,u_in"
+GOOD_READINGS = [
+    "DISTANCE,O2,A,2.1,0.005",
+    "DISTANCE,A,B,7.15,0.005",
+    "DISTANCE,B,O4,9.1,0.005",
+    "DISTANCE,O2,O4,6.05,0.005",
+    "DISTANCE,A,O4,4.0197,0.005",
+]
+BAD_READINGS = [*GOOD_READINGS, "DISTANCE,A,B,7.36,0.005", "DISTANCE,A,X,1,0.005"]
 Change = Callable[[Any], object]
 ROOT = Path(__file__).parents[1]
 BAD_ROWS = (
@@ -30,14 +44,19 @@ def complain(name: str, document: Any) -> list[str]:
     return [f"{error.json_path}: {error.message}" for error in validator.iter_errors(document)]
 
 
-@pytest.mark.parametrize("name", schemas.NAMES)
+@pytest.mark.parametrize("name", schemas.NAMES + schemas.FILES)
 def test_every_schema_is_itself_valid(name: str) -> None:
     jsonschema.Draft202012Validator.check_schema(schemas.schema(name))
 
 
 def test_an_unknown_schema_is_refused() -> None:
-    with pytest.raises(UsageError, match="there is no schema 'doctor'"):
-        schemas.schema("doctor")
+    with pytest.raises(UsageError, match="there is no schema 'template'"):
+        schemas.schema("template")
+
+
+def test_the_contract_names_eleven_outputs_and_the_verification() -> None:
+    named = "check diagnose study fleet history life gear survey separable reconstruct doctor"
+    assert set(schemas.NAMES) == {*named.split(), "verify"}
 
 
 @pytest.mark.parametrize(
@@ -81,7 +100,7 @@ FLEETS: dict[str, dict[str, Any]] = {
 def test_every_diagnosis_fits_its_schema(fleet: str, tmp_path: Path) -> None:
     path = tmp_path / "measured.csv"
     write_csv(draw_fleet(3, rows=60, **FLEETS[fleet]), path)
-    assert complain("diagnose", mlg("diagnose", path, "--permutations", "99", "--json").json) == []
+    assert complain("diagnose", mlg("diagnose", path, "--json").json) == []
 
 
 def test_the_shipped_table_of_indices_fits_the_schema_of_a_study(gear: Gear) -> None:
@@ -101,6 +120,155 @@ def test_the_shipped_table_of_indices_fits_the_schema_of_a_study(gear: Gear) -> 
 )
 def test_a_study_of_any_kind_fits_its_schema(options: tuple[object, ...]) -> None:
     assert complain("study", mlg("study", *options, "--json").json) == []
+
+
+def objects(schema: Any) -> Iterator[Mapping[str, Any]]:
+    """Every object that a schema describes by its names."""
+    if isinstance(schema, dict):
+        if isinstance(schema.get("type"), str) and "properties" in schema:
+            yield schema
+        for part in schema.values():
+            yield from objects(part)
+    elif isinstance(schema, list):
+        for part in schema:
+            yield from objects(part)
+
+
+@pytest.mark.parametrize("name", schemas.NAMES + schemas.FILES)
+def test_no_object_of_a_schema_allows_further_names(name: str) -> None:
+    assert all(part["additionalProperties"] is False for part in objects(schemas.schema(name)))
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Any]]:
+    """Run on a store in which one gear has a life with every kind of record."""
+    folder = tmp_path_factory.mktemp("store")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MLG_STORE", str(folder / "store.sqlite"))
+
+        def run(*arguments: object) -> Any:
+            found = mlg(*arguments)
+            assert found.code < 2, found.err
+            return found
+
+        for n in range(3):
+            day = f"2024-0{n + 1}-10"
+            seen = {"inspection_date": day, "gear_landings": str(400 * n)}
+            rows = [
+                row(record_id=f"{tail}-{n}", tail_no=tail, **seen, clearance_3_in=f"0.00{n + 3}")
+                for tail in ("N1", "N2")
+            ]
+            run("check", table(folder, *rows), "--keep")
+        wrong = row(record_id="N1-9", tail_no="N1", inspection_date="2024-03-20")
+        run("check", table(folder, wrong), "--keep")
+        run("history", "void", "N1-9", "--why", "another gear")
+        right = row(record_id="N1-2", tail_no="N1", inspection_date="2024-03-10")
+        run("history", "correct", "N1-2", table(folder, right))
+        run("history", "outcome", "N1-1", "--found", "joint 3 worn", "--joint", "3")
+        work = ("--date", "2024-02-12", "--work-order", "W7")
+        run("history", "repair", "N1", "LH", "--joint", "3", *work, "--landings", "410")
+        run("history", "rerig", "N1", "LH", *work)
+        yield run
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("fleet", ("fleet", "-q")),
+        ("fleet", ("fleet", "-q", "--no-forecast")),
+        ("history", ("history",)),
+        ("life", ("history", "N1", "LH")),
+        ("life", ("history", "N2", "LH", "--no-forecast")),
+    ],
+)
+def test_what_is_kept_fits_its_schema(
+    kept: Callable[..., Any], name: str, arguments: tuple[object, ...]
+) -> None:
+    assert complain(name, kept(*arguments, "--json").json) == []
+
+
+def test_the_life_that_is_checked_has_every_kind_of_record(kept: Callable[..., Any]) -> None:
+    events = kept("history", "N1", "LH", "--json").json["events"]
+    assert {event["kind"] for event in events} == set(RecordKind)
+
+
+def test_an_empty_store_fits_its_schema(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MLG_STORE", str(tmp_path / "empty.sqlite"))
+    assert complain("fleet", mlg("fleet", "--json", "-q").json) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("gear", ("gear",)),
+        ("gear", ("gear", "--gear", FOUR_BAR)),
+        ("verify", ("gear", "verify")),
+        ("doctor", ("doctor",)),
+        ("separable", ("gear", "separable", "--columns", "tail_no,side,clearance_3_in")),
+        ("reconstruct", ("gear", "reconstruct", "--start", "A", "--minutes", "0.01")),
+        pytest.param("study", ("study", "--bound"), marks=pytest.mark.slow),
+    ],
+)
+def test_what_is_said_of_the_gear_fits_its_schema(name: str, arguments: tuple[object, ...]) -> None:
+    assert complain(name, mlg(*arguments, "--json").json) == []
+
+
+def test_a_diagnosis_that_cannot_be_concluded_fits_its_schema() -> None:
+    assert complain("diagnose", mlg("diagnose", FAILURE, "--json").json) == []
+
+
+@pytest.mark.parametrize("rows", [GOOD_READINGS, GOOD_READINGS[:1], BAD_READINGS])
+def test_every_survey_fits_its_schema(rows: Sequence[str], tmp_path: Path) -> None:
+    file = tmp_path / "s.csv"
+    file.write_text("\n".join((SURVEY_HEADER, *rows)) + "\n")
+    run = mlg("gear", "--gear", FOUR_BAR, "survey", file, "--json")
+    assert complain("survey", run.json) == []
+
+
+def test_the_keys_of_an_output_stand_in_the_order_of_its_type(judged: Any) -> None:
+    assert list(judged) == list(CheckOutput.__annotations__)
+    assert list(judged["inspections"][0]) == list(CheckedInspection.__annotations__)
+    assert list(judged["inspections"][0]["joints"][0]) == list(CheckedJoint.__annotations__)
+
+
+def as_read(path: Path) -> Any:
+    text = path.read_text(encoding="utf-8")
+    return json.loads(text) if path.suffix == ".json" else tomllib.loads(text)
+
+
+@pytest.mark.parametrize(
+    ("name", "end"),
+    [
+        ("gear-file", ".toml"),
+        ("ensemble", "-ensemble.toml"),
+        ("targets", "-targets.toml"),
+        ("indices", "-indices.json"),
+    ],
+)
+def test_the_shipped_files_fit_the_schema_of_their_kind(name: str, end: str, gear: Gear) -> None:
+    assert complain(name, as_read(gear.path.with_name(gear.path.stem + end))) == []
+
+
+def test_an_extension_that_was_written_fits_the_schema_of_its_kind(tmp_path: Path) -> None:
+    data = tmp_path / "measured.csv"
+    write_csv(draw_fleet(3, rows=60, **FLEETS["one cause"]), data)
+    extension = tmp_path / "e.toml"
+    mlg("diagnose", data, "--permutations", "99", "--write-extension", extension)
+    assert complain("extension", as_read(extension)) == []
+
+
+def test_settings_that_were_remembered_fit_the_schema_of_their_kind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    mlg("check", FAILURE, "--show", "mm", "--map", "Spiel=clearance_3", "--remember")
+    assert complain("settings", as_read(tmp_path / "mlg.toml")) == []
+
+
+def test_a_gear_file_that_is_refused_does_not_fit_its_schema(gear: Gear) -> None:
+    spoilt = as_read(gear.path)
+    spoilt["joints"][0]["limit"] = 0
+    assert complain("gear-file", spoilt) != []
 
 
 @pytest.fixture(scope="module")

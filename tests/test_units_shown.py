@@ -2,44 +2,66 @@
 
 from __future__ import annotations
 
+import copy
+import json
+
 import pytest
 
-from mlg_troubleshoot.units import LengthUnit, in_unit
+from mlg_troubleshoot.units import Length, LengthUnit, Sentence, said_in
 
 THOU, MM = LengthUnit.THOU, LengthUnit.MILLIMETRE
 
 
 @pytest.mark.parametrize(
-    ("sentence", "thou", "mm"),
+    ("length", "inches", "thou", "mm"),
     [
-        (
-            "a margin of 0.0300 in (worst",
-            "a margin of 30.0 thou (worst",
-            "a margin of 0.762 mm (worst",
-        ),
-        ("±0.0300 in", "±30.0 thou", "±0.762 mm"),
-        ("shifted by -0.0022 in)", "shifted by -2.2 thou)", "shifted by -0.056 mm)"),
-        ("gives 0.0472 to 0.0473 in.", "gives 47.2 to 47.3 thou.", "gives 1.199 to 1.201 mm."),
-        ("0.00050 in radial", "0.50 thou radial", "0.0127 mm radial"),
+        (Length(0.03), "0.0300 in", "30.0 thou", "0.762 mm"),
+        (Length(-0.0022, sign=True), "-0.0022 in", "-2.2 thou", "-0.056 mm"),
+        (Length(0.0022, sign=True), "+0.0022 in", "+2.2 thou", "+0.056 mm"),
+        (Length(0.0005, 5), "0.00050 in", "0.50 thou", "0.0127 mm"),
+        (Length(0.01, 2, named=False), "0.01", "10", "0.3"),
+        (Length.brief(0.015), "0.015 in", "15 thou", "0.38 mm"),
     ],
 )
-def test_a_length_in_a_sentence_is_said_in_the_users_unit(
-    sentence: str, thou: str, mm: str
+def test_a_length_keeps_its_resolution_in_every_unit(
+    length: Length, inches: str, thou: str, mm: str
 ) -> None:
-    assert (in_unit(sentence, THOU), in_unit(sentence, MM)) == (thou, mm)
+    said = tuple(length.said_in(unit) for unit in (LengthUnit.INCH, THOU, MM))
+    assert said == (inches, thou, mm)
 
 
-@pytest.mark.parametrize(
-    "sentence", ["#3 in this order", "p = 0.05 in every row", "row 12 in file", "2.5 inches"]
-)
-def test_the_preposition_is_no_unit(sentence: str) -> None:
-    assert in_unit(sentence, THOU) == sentence
+def test_a_length_is_rounded_once_in_the_unit_of_the_reader() -> None:
+    assert Length(0.04724).said_in(MM) == "1.200 mm"
 
 
-def test_an_entry_in_quotation_marks_stays_as_it_was_written() -> None:
-    said = in_unit("found '0.013 in'; the gear's margin is 0.0300 in", THOU)
-    assert said == "found '0.013 in'; the gear's margin is 30.0 thou"
+def test_a_sentence_is_said_in_the_users_unit() -> None:
+    sentence = Sentence.of("gives {} to {}.", Length(0.0472, named=False), Length(0.0473))
+    assert sentence.said_in(THOU) == "gives 47.2 to 47.3 thou."
 
 
-def test_in_inches_nothing_changes() -> None:
-    assert in_unit("0.0300 in", LengthUnit.INCH) == "0.0300 in"
+def test_a_sentence_is_kept_as_a_text_in_inches() -> None:
+    assert json.dumps(Sentence.of("worst case {}", Length(0.0472))) == '"worst case 0.0472 in"'
+
+
+def test_a_sentence_within_a_sentence_is_said_in_the_same_unit() -> None:
+    inner = Sentence.of("worst case {}", Length(0.0472))
+    assert said_in(Sentence.of("Predicted: {}.", inner), THOU) == "Predicted: worst case 47.2 thou."
+
+
+def test_what_a_person_wrote_stays_as_it_was_written() -> None:
+    sentence = Sentence.of("found {}; the margin is {}", "'0.013 in' {}", Length(0.03))
+    assert sentence.said_in(THOU) == "found '0.013 in' {}; the margin is 30.0 thou"
+
+
+def test_a_sentence_without_lengths_may_hold_braces() -> None:
+    assert Sentence("as {written}").said_in(THOU) == "as {written}"
+
+
+def test_joined_sentences_are_said_in_one_unit() -> None:
+    joined = Sentence.joined([Sentence.of("{}", Length(0.03)), "and more"], "; ")
+    assert joined.said_in(THOU) == "30.0 thou; and more"
+
+
+def test_a_copied_sentence_still_knows_its_lengths() -> None:
+    sentence = copy.deepcopy(Sentence.of("worst case {} {{}}", Length(0.0472)))
+    assert sentence.said_in(THOU) == "worst case 47.2 thou {}"

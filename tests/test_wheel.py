@@ -14,8 +14,6 @@ from pathlib import Path
 import pypdf
 import pytest
 
-from mlg_troubleshoot import schemas
-
 ROOT = Path(__file__).parents[1]
 TABLE = (
     "record_id,tail_no,side,clearance_convention,clearance_3_in,clearance_5_in,outcome\n"
@@ -89,7 +87,7 @@ def checked(scripts: Path, elsewhere: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_the_wheel_carries_templates_fonts_gears_schemas_and_its_types(wheel: Path) -> None:
+def test_the_wheel_carries_templates_fonts_gears_and_its_types(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {
         "mlg_troubleshoot/templates/inspection.html.j2",
@@ -97,7 +95,6 @@ def test_the_wheel_carries_templates_fonts_gears_schemas_and_its_types(wheel: Pa
         "mlg_troubleshoot/gear/data/hawker-800xp.toml",
         "mlg_troubleshoot/gear/data/hawker-800xp-indices.json",
         "mlg_troubleshoot/py.typed",
-        *(f"mlg_troubleshoot/schemas/{name}.schema.json" for name in schemas.NAMES),
     } <= names
 
 

@@ -11,4 +11,4 @@ def main() -> None:
     app(prog_name="mlg")
 
 
-__all__ = ["app", "main"]
+__all__ = ["app", "main", "remembered"]

@@ -23,17 +23,18 @@ from mlg_troubleshoot.cli import (
     survey,
     template,
 )
-from mlg_troubleshoot.cli.boundary import USAGE, Boundary
+from mlg_troubleshoot.cli.boundary import Boundary
+from mlg_troubleshoot.errors import ExitCode
 
 
-class Program(TyperGroup):
+class CommandGroup(TyperGroup):
     """All commands behind one boundary; without a command the help is shown."""
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **named: Any) -> Any:
         given = list(sys.argv[1:] if args is None else args)
         with Boundary():
             code = super().main(given or ["--help"], *more, **{**named, "standalone_mode": False})
-            raise SystemExit(code if given else USAGE)
+            raise SystemExit(code if given else ExitCode.USAGE)
 
     def invoke(self, ctx: Any) -> Any:
         """Also run the command behind the boundary: on its way out typer says nothing of an
@@ -45,7 +46,7 @@ class Program(TyperGroup):
 
 app = typer.Typer(
     name="mlg",
-    cls=Program,
+    cls=CommandGroup,
     help=(
         "Do worn joints push the reversing-valve plunger of a main landing gear outside its margin?"
         " Which joint next? Where is the model wrong?\n\nTroubleshooting aid, not maintenance data:"
@@ -58,7 +59,7 @@ app = typer.Typer(
 gear_app = typer.Typer(
     name="gear",
     help=(
-        "Which model is in use: joints, coordinates, provenance; [b]mlg gear verify[/b] checks it."
+        "Show the model in use: joints, coordinates, provenance; [b]mlg gear verify[/b] checks it."
     ),
     invoke_without_command=True,
 )

@@ -1,4 +1,4 @@
-"""The edge of the program: errors become messages and exit codes."""
+"""Around every command: errors become messages and exit codes."""
 
 from __future__ import annotations
 
@@ -11,9 +11,13 @@ from types import TracebackType
 import typer
 
 from mlg_troubleshoot.cli.output import abandon_stdout, say
-from mlg_troubleshoot.errors import InconclusiveDataError, OutputError, TroubleshootError
+from mlg_troubleshoot.errors import (
+    ExitCode,
+    InconclusiveDataError,
+    OutputError,
+    TroubleshootError,
+)
 
-USAGE, NOTHING_JUDGED, OUTPUT, INTERNAL, INTERRUPTED = 2, 3, 5, 70, 130
 _CANNOT_WRITE = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
 # Some releases of typer carry their own click: what it says about usage is found through a name
 # that typer exports.
@@ -21,12 +25,7 @@ _UsageMessage: type[typer.BadParameter] = typer.BadParameter.__mro__[2]
 
 
 class Boundary:
-    """A context that turns what goes wrong inside into a message on stderr and the exit code of the
-    contract.
-
-    Usage 2 · nothing could be judged or concluded 3 · output could not be written 5 · internal
-    error 70 · interrupted 130.
-    """
+    """A context that turns an exception into a message on stderr and an exit code."""
 
     def __enter__(self) -> Boundary:
         return self
@@ -45,28 +44,30 @@ class Boundary:
             # A prompt that was interrupted has said already how to go on.
             if type(error) in (KeyboardInterrupt, typer.Abort):
                 say("\nInterrupted.")
-            raise SystemExit(INTERRUPTED) from None
+            raise SystemExit(ExitCode.INTERRUPTED) from None
         if isinstance(error, BrokenPipeError):
             # Results survive a closed pipe (see output.py); what else was cut short was not
             # finished.
             abandon_stdout()
-            raise SystemExit(OUTPUT) from None
+            raise SystemExit(ExitCode.NOT_WRITTEN) from None
         if isinstance(error, Exception):
             code = _explain(error)
-            if code == INTERNAL and os.environ.get("MLG_DEBUG"):
+            if code == ExitCode.INTERNAL and os.environ.get("MLG_DEBUG"):
                 traceback.print_exception(kind, error, trace)
             raise SystemExit(code) from None
 
 
-def _explain(error: Exception) -> int:
+def _explain(error: Exception) -> ExitCode:
     if isinstance(error, TroubleshootError):
         say(f"Error: {error.message}" + (f"\nWhat to do: {error.remedy}" if error.remedy else ""))
         if isinstance(error, OutputError):
-            return OUTPUT
-        return NOTHING_JUDGED if isinstance(error, InconclusiveDataError) else USAGE
+            return ExitCode.NOT_WRITTEN
+        if isinstance(error, InconclusiveDataError):
+            return ExitCode.NO_CONCLUSION
+        return ExitCode.USAGE
     if isinstance(error, _UsageMessage):
         say(f"Error: {error.format_message()}\nWhat to do: See the options with --help.")
-        return USAGE
+        return ExitCode.USAGE
     if isinstance(error, OSError) and error.errno in _CANNOT_WRITE:
         say(f"Error: {error.filename or 'the output'} cannot be written: {error.strerror}")
         say("What to do: Make room, or write to another place.")
@@ -76,10 +77,10 @@ def _explain(error: Exception) -> int:
             sys.stdout.flush()
         except OSError:
             abandon_stdout()
-        return OUTPUT
+        return ExitCode.NOT_WRITTEN
     say(
         f"Internal error: {type(error).__name__}: {error}\nWhat to do: this is a defect of the"
         " program, not of your input. Run again with MLG_DEBUG=1 and send the output to the"
         " maintainers."
     )
-    return INTERNAL
+    return ExitCode.INTERNAL

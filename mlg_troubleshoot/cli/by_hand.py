@@ -8,6 +8,16 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from mlg_troubleshoot.cli.flags import Flags
+from mlg_troubleshoot.decision.columns import (
+    CLEARANCE,
+    CONVENTION,
+    MARGIN,
+    OUTCOME,
+    PLUNGER_DISPLACEMENT,
+    RECORD_ID,
+    SIDE,
+    TAIL_NO,
+)
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
@@ -39,9 +49,9 @@ def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
             " RADIAL, DIAMETRAL or TOTAL_PLAY): there is no default.",
         )
     values: dict[str, object] = {
-        "record_id": flags.record_id or "-",
-        "tail_no": flags.tail,
-        "side": flags.side,
+        RECORD_ID.name: flags.record_id or "-",
+        TAIL_NO.name: flags.tail,
+        SIDE.name: flags.side,
     }
     labels: dict[str, str] = {}
     for text in flags.values or ():
@@ -51,7 +61,7 @@ def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
             raise UsageError(
                 f"--set {text!r} is not JOINT=VALUE", "Write for example --set 3=0.013in."
             )
-        column = f"clearance_{int(number)}"
+        column = CLEARANCE.header(int(number))
         if column in values:
             raise UsageError(f"--set gives joint {int(number)} twice", "Give each joint once.")
         values[column], labels[column] = written, f"--set {text!r}"
@@ -85,15 +95,20 @@ def _judged(
     from mlg_troubleshoot.records import ReadOptions, admit
 
     more = {
-        "outcome": flags.outcome,
-        "plunger_displacement": flags.measured,
-        "margin": flags.margin,
+        OUTCOME.name: flags.outcome,
+        PLUNGER_DISPLACEMENT.name: flags.measured,
+        MARGIN.name: flags.margin,
         **_day(flags),
     }
-    typed = {"record_id": flags.record_id, "tail_no": flags.tail, "side": flags.side, **more}
+    typed = {
+        RECORD_ID.name: flags.record_id,
+        TAIL_NO.name: flags.tail,
+        SIDE.name: flags.side,
+        **more,
+    }
     names = {
-        "tail_no": "tail",
-        "plunger_displacement": "measured",
+        TAIL_NO.name: "tail",
+        PLUNGER_DISPLACEMENT.name: "measured",
         "restored_joints": "restored",
         "open_areas": "open",
         "minutes_available": "minutes",
@@ -123,14 +138,14 @@ def ask(
     if resume and saved is None:
         raise UsageError("there is no unfinished entry to resume", "Start a new one: mlg check")
     nobody = {
-        "record_id": "-",
-        "tail_no": "-",
-        "side": flags.side or "LH",
-        "clearance_convention": "RADIAL",
+        RECORD_ID.name: "-",
+        TAIL_NO.name: "-",
+        SIDE.name: flags.side or "LH",
+        CONVENTION.name: "RADIAL",
     }
     judged = _judged(nobody, {}, flags, declared)
     unit = declared.unit or LengthUnit.INCH
-    lengths = {"plunger_displacement": flags.measured, "margin": flags.margin}
+    lengths = {PLUNGER_DISPLACEMENT.name: flags.measured, MARGIN.name: flags.margin}
     given = Answers(
         tail_no=flags.tail,
         side=None if flags.side is None else judged.side,
@@ -186,7 +201,7 @@ def _advice(
         if joint is None:
             return None
         if advice.expected is not None and joint == advice.joint:
-            return f"{advice.text} Or done.", joint
+            return f"{advice.text} Or type done.", joint
         return f"Most useful next reading: {gear.joint(joint).label}.", joint
 
     return advise

@@ -171,7 +171,7 @@ class Run:
     def _write_reports(self, result: task.CheckResult, directory: Path, seen: Settings) -> None:
         before = []
         if self._place is not None:
-            from mlg_troubleshoot.workflows.history import seen_before
+            from mlg_troubleshoot.life.looking_back import seen_before
 
             before = seen_before(result.judgements, self._place)
         formats = tuple(
@@ -195,7 +195,7 @@ class Run:
     def _keep(self, result: task.CheckResult) -> None:
         if self._place is None:
             return
-        from mlg_troubleshoot.workflows.history import keep
+        from mlg_troubleshoot.workflows.keep import keep
 
         tails = self._wanted.tails
         if tails not in (None, "same", "apart"):

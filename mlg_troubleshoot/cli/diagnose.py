@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mlg_troubleshoot.cli import options, output
-from mlg_troubleshoot.errors import InconclusiveDataError
+from mlg_troubleshoot.errors import ExitCode, InconclusiveDataError
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.diagnosis import Diagnosis
     from mlg_troubleshoot.units import LengthUnit
 
-NOTHING_FOUND, SOMETHING_FOUND = 0, 1
 EPILOG = (
     "Example: [b]mlg diagnose fleet.csv --write-extension EXT.toml[/b], then [b]mlg check FILE"
     " --extension EXT.toml[/b]"
@@ -33,15 +32,22 @@ def diagnose(
     ],
     write_extension: Annotated[
         Path | None,
-        typer.Option("--write-extension", metavar="EXT.toml", help="Keep the extended model."),
+        typer.Option(
+            "--write-extension", metavar="EXT.toml", help="Write the extended model to this file."
+        ),
     ] = None,
     report: options.Report = None,
     page: options.Paper = None,
     causes: options.Causes = None,
-    permutations: Annotated[
-        int, typer.Option("--permutations", min=99, max=99999, help="Number of null simulations.")
-    ] = 999,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all randomness.")] = 0,
+    sure: Annotated[
+        float,
+        typer.Option(
+            "--sure",
+            min=0.5,
+            max=0.999,
+            help="Probability from which a cause is named: of ten named at 0.9 nine are right.",
+        ),
+    ] = 0.9,
     tables: options.Tables,
     force: options.Force = False,
     show: options.Show = None,
@@ -52,8 +58,7 @@ def diagnose(
 ) -> None:
     """Compare measured with predicted: what is wrong, the cause by name, the extension, the gain.
 
-    Exit codes: 0 nothing found · 1 something found · 3 cannot be concluded from this table · 2
-    usage.
+    Exit codes: 0 nothing found · 1 something found · 3 this table allows no conclusion · 2 usage.
     """
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.progress import stages
@@ -61,9 +66,8 @@ def diagnose(
     from mlg_troubleshoot.cli.views.notes import show_notes, show_problems
     from mlg_troubleshoot.diagnosis import EXTENSION
     from mlg_troubleshoot.diagnosis import write_extension as keep_extension
-    from mlg_troubleshoot.outputs import OutputFile
+    from mlg_troubleshoot.outputs import SCHEMA_VERSION, OutputFile
     from mlg_troubleshoot.reporting.json_form import diagnosis_as_json
-    from mlg_troubleshoot.schemas import SCHEMA_VERSION
     from mlg_troubleshoot.workflows import diagnose as task
 
     written = OutputFile("--write-extension", write_extension, EXTENSION)
@@ -73,8 +77,7 @@ def diagnose(
         **tables.declared(shown.headers),
         remembered=shown.note or None,
         cause_files=tuple(causes or ()),
-        permutations=permutations,
-        seed=seed,
+        sure=sure,
     )
     try:
         with stages(quiet=quiet) as bar:
@@ -97,10 +100,7 @@ def diagnose(
         show_problems(result.problems)
         _show(result.diagnosis, shown.show)
     if write_extension is not None and result.extension is None:
-        output.say(
-            f"No extension written: the verdict is {result.diagnosis.verdict}, no cause of the"
-            " model is named alone."
-        )
+        output.say(_unwritten(result.diagnosis))
     elif write_extension is not None and result.extension is not None:
         keep_extension(result.extension, write_extension)
         output.say(
@@ -110,14 +110,22 @@ def diagnose(
         made = task.write_diagnosis_report(result, asked, report, str(shown.page), unit=shown.show)
         output.say_written([made], quiet=quiet)
     nothing = result.diagnosis.verdict == "NONE" and not result.diagnosis.faults
-    raise typer.Exit(NOTHING_FOUND if nothing else SOMETHING_FOUND)
+    raise typer.Exit(ExitCode.FINE if nothing else ExitCode.ATTENTION)
+
+
+def _unwritten(diagnosis: Diagnosis) -> str:
+    if diagnosis.gain is not None and not diagnosis.gain.likelier:
+        return "No extension written: held-out aircraft are not likelier with it than without."
+    return (
+        f"No extension written: the verdict is {diagnosis.verdict}, no cause of the model is named"
+        " alone."
+    )
 
 
 def _show(diagnosis: Diagnosis, unit: LengthUnit) -> None:
     from mlg_troubleshoot.reporting.diagnosis_lines import seven_lines
-    from mlg_troubleshoot.units import in_unit
 
     console = output.console(unit=unit)
     for line in seven_lines(diagnosis):
-        said = output.text(in_unit(line.text, unit), "not bold")
+        said = output.text(line.text, "not bold")
         console.print(output.text(f"{line.number} {line.word:<7}", "bold").append_text(said))

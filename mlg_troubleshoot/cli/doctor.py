@@ -7,11 +7,13 @@ from dataclasses import asdict
 import typer
 
 from mlg_troubleshoot.cli import options, output
-from mlg_troubleshoot.schemas import SCHEMA_VERSION
+from mlg_troubleshoot.errors import ExitCode
+from mlg_troubleshoot.gear import DEFAULT_GEAR
+from mlg_troubleshoot.outputs import SCHEMA_VERSION
 
 
 def doctor(
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
     as_json: options.Json = False,
     _version: options.Version = False,
 ) -> None:
@@ -32,4 +34,5 @@ def doctor(
             console.print(f"{mark} {finding.ability}: {finding.detail}")
             if not finding.works and finding.remedy:
                 console.print(f"         What to do: {finding.remedy}")
-    raise typer.Exit(1 if any(f.needed and not f.works for f in findings) else 0)
+    lacking = any(f.needed and not f.works for f in findings)
+    raise typer.Exit(ExitCode.ATTENTION if lacking else ExitCode.FINE)

@@ -10,6 +10,7 @@ import typer
 
 from mlg_troubleshoot.cli import history, options
 from mlg_troubleshoot.cli.options import ReportFormat
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +26,7 @@ class Flags:
     ] = None
     side: Annotated[str | None, typer.Option("--side", metavar="LH|RH", help="Which gear.")] = None
     record_id: Annotated[
-        str | None, typer.Option("--record-id", help="Identity of the record.")
+        str | None, typer.Option("--record-id", help="Identifier of the record.")
     ] = None
     outcome: Annotated[
         str | None, typer.Option("--outcome", metavar="RETRACTED|FAILED", help="What the gear did.")
@@ -133,23 +134,24 @@ class Wanted:
         typer.Option(
             "--tails",
             metavar="same|apart",
-            help="Spellings of a tail that differ in case, blanks or dashes.",
+            help="Whether tails that differ only in case, blanks or dashes are one aircraft.",
         ),
     ] = None
     detail: Annotated[
         bool, typer.Option("--detail", help="All joints, repairs, re-rigging and the uncertainty.")
     ] = False
     every: Annotated[
-        bool, typer.Option("--all", help="A batch: every inspection, not the latest of each gear.")
+        bool,
+        typer.Option(
+            "--all", help="In a batch, every inspection instead of the latest of each gear."
+        ),
     ] = False
     force: options.Force = False
     show: options.Show = None
     remember: options.Remember = False
     seed: Annotated[
         int,
-        typer.Option(
-            "--seed", min=0, help="Seed of the Monte Carlo draws of a gear looked at alone."
-        ),
+        typer.Option("--seed", min=0, help="Seed of the Monte Carlo check of a single gear."),
     ] = 1
     as_json: options.Json = False
     quiet: options.Quiet = False
@@ -159,7 +161,7 @@ class Wanted:
 class StudyFlags:
     """What ``mlg study`` computes, shows and writes."""
 
-    gear: options.Gear = options.DEFAULT_GEAR
+    gear: options.Gear = DEFAULT_GEAR
     design: Annotated[
         str,
         typer.Option(
@@ -174,7 +176,7 @@ class StudyFlags:
     accuracy: Annotated[float, typer.Option("--accuracy", help="Maximum error of every index.")] = (
         1e-3
     )
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")] = 0
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all random draws.")] = 0
     directions: Annotated[
         str,
         typer.Option(
@@ -184,7 +186,7 @@ class StudyFlags:
     fixed: Annotated[
         str | None,
         typer.Option(
-            "--fixed", metavar="DEG,DEG,…", help="Directions set by a load, one for each joint."
+            "--fixed", metavar="DEG,DEG,…", help="Directions set by a load, one per joint."
         ),
     ] = None
     distribution: Annotated[
@@ -198,13 +200,16 @@ class StudyFlags:
     limit: Annotated[
         float | None,
         typer.Option(
-            "--limit", metavar="IN", help="One limit for all joints, in, instead of the gear's."
+            "--limit",
+            metavar="IN",
+            help="One limit in inches for all joints, instead of the gear's.",
         ),
     ] = None
     beyond_margin: Annotated[
         bool,
         typer.Option(
-            "--beyond-margin", help="Indices of exceeding the margin, not of the displacement."
+            "--beyond-margin",
+            help="Indices of the event that the margin is exceeded, instead of the displacement.",
         ),
     ] = False
     statements: Annotated[
@@ -223,14 +228,18 @@ class StudyFlags:
     most: Annotated[int, typer.Option("--most", min=1, help="Maximum number of evaluations.")] = (
         1 << 24
     )
-    n1: Annotated[int | None, typer.Option("--n1", help="Repetitions of a paper design, 100.")] = (
-        None
-    )
+    n1: Annotated[
+        int | None, typer.Option("--n1", help="Repetitions of a paper design; 100 if not given.")
+    ] = None
     n2: Annotated[
-        int | None, typer.Option("--n2", help="Levels of a paper design, 1000 or 862.")
+        int | None,
+        typer.Option(
+            "--n2", help="Levels of a paper design; 1000 (lhs) or 862 (lhs+ccd) if not given."
+        ),
     ] = None
     iterations: Annotated[
-        int | None, typer.Option("--iterations", help="Iterations of a paper design, 10.")
+        int | None,
+        typer.Option("--iterations", help="Iterations of a paper design; 10 if not given."),
     ] = None
     workers: Annotated[
         int, typer.Option("--workers", min=1, help="Cores for the total order of lhs.")

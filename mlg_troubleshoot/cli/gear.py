@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import typer
 
 from mlg_troubleshoot.cli import options, output
+from mlg_troubleshoot.errors import ExitCode
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
@@ -16,11 +18,11 @@ if TYPE_CHECKING:
 
 def show(
     context: typer.Context,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
     as_json: options.Json = False,
     _version: options.Version = False,
 ) -> None:
-    """Show which model is in use: identity, provenance, joints, coordinates, retraction cycle."""
+    """Show the model in use: identity, provenance, joints, coordinates, retraction cycle."""
     from mlg_troubleshoot.gear.gear_file import load_gear
 
     context.obj = gear
@@ -33,6 +35,8 @@ def show(
 
 
 def _show(gear: Gear) -> None:
+    from mlg_troubleshoot.decision.sentences import joint_list
+
     console = output.console()
     console.print(f"{gear.name} ({gear.id})", style="bold")
     console.print(
@@ -51,7 +55,7 @@ def _show(gear: Gear) -> None:
     joints = output.plain_table(None, *headings, right=("#", "limit in"))
     for joint in gear.joints:
         point = gear.reference.mechanism.point(joint.point)
-        alike = ", ".join(f"#{n}" for n in gear.alike[joint.number]) or "-"
+        alike = joint_list(gear.alike[joint.number]) or "-"
         joints.add_row(
             str(joint.number),
             joint.name,
@@ -72,29 +76,24 @@ def _show(gear: Gear) -> None:
 
 
 def _as_json(gear: Gear) -> dict[str, object]:
-    from mlg_troubleshoot.reporting.json_form import chosen, plain
+    from mlg_troubleshoot.output_types import GearOutput, ShownJoint
+    from mlg_troubleshoot.reporting.json_form import written
 
-    told = ("name", "location", "limit", "new_part", "access", "area", "critical")
-    return {
-        **chosen(gear, "id", "name", "provenance", "geometry_sha256"),
-        "ensemble": [linkage.name for linkage in gear.ensemble],
-        "calibration_rate": gear.model.rate,
-        "margin": plain(gear.margin),
-        "release_stroke_in": gear.reference.stroke[1],
-        "joints": [
-            {
-                "joint": joint.number,
-                **chosen(joint, *told),
-                "acts_like": list(gear.alike[joint.number]),
-            }
+    return written(
+        GearOutput,
+        gear,
+        ensemble=[linkage.name for linkage in gear.ensemble],
+        calibration_rate=gear.model.rate,
+        release_stroke_in=gear.reference.stroke[1],
+        joints=[
+            written(ShownJoint, joint, joint=joint.number, acts_like=gear.alike[joint.number])
             for joint in gear.joints
         ],
-        "points": {
+        points={
             point.name: {"plane": point.plane, "at_in": [point.x, point.y], "fixed": point.fixed}
             for point in gear.reference.mechanism.points
         },
-        "numbers": plain(gear.numbers),
-    }
+    )
 
 
 def verify(
@@ -111,7 +110,7 @@ def verify(
     failed = [n for n in numbers if n.target.expected and not n.holds]
     if as_json:
         output.write_json({"gear": gear.id, "numbers": [_number(n) for n in numbers]})
-        raise typer.Exit(1 if failed else 0)
+        raise typer.Exit(ExitCode.ATTENTION if failed else ExitCode.FINE)
     console = output.console()
     console.print(f"{gear.name}: geometry {gear.provenance}", style="bold")
     table = output.plain_table(None)
@@ -135,16 +134,13 @@ def verify(
         else f"required values that do not hold: {len(failed)}"
     )
     console.print(f"{len(numbers)} numbers: {verdict}.")
-    raise typer.Exit(1 if failed else 0)
+    raise typer.Exit(ExitCode.ATTENTION if failed else ExitCode.FINE)
 
 
 def _number(n: Computed) -> dict[str, object]:
-    from mlg_troubleshoot.reporting.json_form import chosen
+    from mlg_troubleshoot.output_types import VerifiedNumber
+    from mlg_troubleshoot.reporting.json_form import written
 
-    return {
-        **chosen(n.target, "quantity", "section", "printed"),
-        **chosen(n, "computed"),
-        **chosen(n.target, "unit", "tolerance"),
-        **chosen(n, "status", "holds"),
-        "should_hold": n.target.expected,
-    }
+    own = {"computed": n.computed, "status": n.status, "holds": n.holds}
+    said = {"tolerance": n.target.accepted, "should_hold": n.target.expected}
+    return written(VerifiedNumber, n.target, **own, **said)

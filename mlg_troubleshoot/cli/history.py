@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,27 +11,31 @@ import typer
 from typer.core import TyperGroup
 
 from mlg_troubleshoot.cli import options, output
-from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.units import LengthUnit, in_unit
+from mlg_troubleshoot.errors import ExitCode, UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
+from mlg_troubleshoot.units import Length, LengthUnit
 
 if TYPE_CHECKING:
+    from mlg_troubleshoot.cli.remembered import Settings
     from mlg_troubleshoot.gear.gear import Gear
-    from mlg_troubleshoot.store import Store
-    from mlg_troubleshoot.workflows.history import Forecast, GearLife, Verified
+    from mlg_troubleshoot.life.folding import GearLife
+    from mlg_troubleshoot.life.forecast import Forecast
+    from mlg_troubleshoot.life.looking_back import Advice
+    from mlg_troubleshoot.store import Record, Store
+    from mlg_troubleshoot.workflows.history import Lives, Verified
 
 EPILOG = (
     "Example: [b]mlg history N123 LH[/b] · [b]mlg history repair N123 LH --joint 3 --date"
     " 2026-05-04[/b] · [b]mlg history verify[/b]"
 )
 _SHOW = "show"
-BROKEN = 1
 
 Place = Annotated[
     str | None,
     typer.Option(
         "--store",
         metavar="PATH|URL",
-        help="Where it is kept; else MLG_STORE, else a file of your own.",
+        help="Store of the records; else MLG_STORE, else a file of your own.",
     ),
 ]
 Tail = Annotated[str, typer.Argument(metavar="TAIL", help="Tail number.")]
@@ -76,7 +80,7 @@ def show(
         str | None, typer.Argument(metavar="[LH|RH]", help="Which gear; without it both.")
     ] = None,
     store: Place = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
     no_forecast: NoForecast = False,
     report: options.Report = None,
     page: options.Paper = None,
@@ -90,59 +94,59 @@ def show(
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.workflows import history as task
+    from mlg_troubleshoot.life.folding import lives
+    from mlg_troubleshoot.reporting import life_json
+    from mlg_troubleshoot.workflows import history
 
     place, known = kept_in(store, gear), load_gear(gear)
     claim(gear, (), (), report, store=store, force=force)
     shown = settings(gear, show_in, page)
-    if tail is None and report is not None:
-        raise UsageError(
-            "--report needs a gear",
-            "Give TAIL, or write the page of all gears: mlg fleet --report DIR",
-        )
     if tail is None:
-        found = task.lives(place)
-        if as_json:
-            output.write_json(task.fleet_as_json(list(found.values()), {}))
-        else:
-            _show_gears(list(found.values()), place.place)
-        return
-    tail, meant = task.key_of(tail, "LH" if side is None else side)
-    sides = ["LH", "RH"] if side is None else [meant]
-    wanted = [key for key in place.gears() if key[0] == tail and key[1] in sides]
-    if not wanted:
-        task.life_of(place, tail, sides[0])
-    # The whole fleet teaches how joints wear.
-    everything = task.lives(place, tail if no_forecast else None)
-    model = None if no_forecast else task.fit_fleet(everything.values(), known)
-    ahead = task.forecast([everything[key] for key in wanted], model, known)
-    if as_json:
-        if len(wanted) != 1:
+        if report is not None:
             raise UsageError(
-                f"{tail} has two gears here, and JSON shows one",
-                f"Run: mlg history {tail} LH --json",
+                "--report needs a gear",
+                "Give TAIL, or write the page of all gears: mlg fleet --report DIR",
             )
-        output.write_json(task.life_as_json(everything[wanted[0]], ahead[wanted[0]], known))
-    else:
-        for key in wanted:
-            _show_life(everything[key], ahead[key], known, shown.show)
-    if report is not None:
-        lives = [everything[key] for key in wanted]
-        written = task.write_pages(
-            lives,
-            ahead,
-            known,
-            report,
-            fleet=False,
-            page=shown.page.value,
-            unit=shown.show,
-            remembered=shown.note or None,
+        everything = list(lives(place).values())
+        if as_json:
+            output.write_json(life_json.fleet_as_json(everything, {}))
+        else:
+            _show_gears(everything, place.place)
+        return
+    found = history.show_lives(place, known, tail, side, ahead=not no_forecast)
+    if as_json and len(found.lives) != 1:
+        tail = found.lives[0].key[0]
+        raise UsageError(
+            f"{tail} has two gears here, and JSON shows one", f"Run: mlg history {tail} LH --json"
         )
-        output.say_written(written)
+    for life in found.lives:
+        if as_json:
+            output.write_json(life_json.life_as_json(life, found.forecasts[life.key], known))
+        else:
+            _show_life(life, found.forecasts[life.key], known, shown.show)
+    if report is not None:
+        write_pages(found, report, shown, fleet=False)
+
+
+def write_pages(
+    found: Lives, report: Path, shown: Settings, *, fleet: bool, quiet: bool = False
+) -> None:
+    """Write the pages of gears, and name them on stderr."""
+    from mlg_troubleshoot.workflows import history
+
+    written = history.write_pages(
+        found,
+        report,
+        fleet=fleet,
+        page=shown.page.value,
+        unit=shown.show,
+        remembered=shown.note or None,
+    )
+    output.say_written(written, quiet=quiet)
 
 
 def _show_gears(found: Sequence[GearLife], place: str) -> None:
-    from mlg_troubleshoot.workflows import history as task
+    from mlg_troubleshoot.life.looking_back import Advice
 
     console = output.console()
     if not found:
@@ -160,116 +164,122 @@ def _show_gears(found: Sequence[GearLife], place: str) -> None:
     )
     table = output.plain_table(console, *headings, right=("landings", "inspections", "repairs"))
     for life in found:
-        seen = life.latest
-        landings = None if seen is None else seen.inspection.gear_landings
-        joint = None if seen is None else task.worst_joint(seen)
-        table.add_row(
-            output.word(life.key[0]),
-            life.key[1],
-            "-" if seen is None else seen.record.day or "no date",
-            "-" if landings is None else f"{landings:g}",
-            "-" if seen is None else str(seen.result.get("verdict")),
-            "-" if joint is None else f"#{joint}",
-            str(len(life.inspections)),
-            str(len(life.repairs)),
-        )
-    show_warnings(console, [warning for life in found for warning in life.warnings])
+        state = ["-", "-", "-", "-"]
+        if life.latest is not None:
+            state = [
+                life.latest.record.day or "no date",
+                _count(life.latest.inspection.gear_landings),
+                str(life.latest.result.get("verdict")),
+                output.joint(life.latest.worst_joint),
+            ]
+        seen = str(len(life.inspections)), str(len(life.repairs))
+        table.add_row(output.word(life.key[0]), life.key[1], *state, *seen)
+    show_warnings(console, found)
     console.print(table)
-    advice = task.advice(found)
-    if advice.asked:
-        console.print(advice.words)
+    _show_advice(console, Advice.of(found))
 
 
-def show_warnings(console: output.DataConsole, warnings: Iterable[str]) -> None:
-    for warning in warnings:
-        console.print(output.text(f"Warning: {warning}"))
+def _count(landings: float | None) -> str:
+    return "-" if landings is None else f"{landings:g}"
 
 
-def say_warnings(place: Store, keys: Collection[tuple[str, str]]) -> None:
-    """Say on stderr which records of gears that were just added to disagree."""
-    from mlg_troubleshoot.workflows.history import warnings_of
+def show_warnings(console: output.DataConsole, found: Iterable[GearLife]) -> None:
+    for life in found:
+        for warning in life.warnings:
+            console.print(output.text(f"Warning: {warning}"))
 
-    for warning in warnings_of(place, keys):
-        output.say(f"Warning: {warning}")
+
+def _show_advice(console: output.DataConsole, advice: Advice) -> None:
+    if advice.outcomes:
+        console.print(advice.sentence)
 
 
 def _show_life(life: GearLife, ahead: Forecast, gear: Gear, unit: LengthUnit) -> None:
-    from mlg_troubleshoot.workflows import history as task
+    from mlg_troubleshoot.life.looking_back import Advice
+    from mlg_troubleshoot.life.outlook import outlook_sentence
+    from mlg_troubleshoot.reporting.life_json import life_as_json
 
     console = output.console(unit=unit)
-    told = task.life_as_json(life, ahead, gear)
-    console.print(output.text(" ".join(life.key), "bold"))
+    told = life_as_json(life, ahead, gear)
+    console.print(output.text(life.name, "bold"))
     table = output.plain_table(
         console, "date", "landings", "what", "record", "hash", right=("landings",)
     )
     for event in told["events"]:
-        landings = event["gear_landings"]
         table.add_row(
             event["date"] or "no date",
-            "-" if landings is None else f"{landings:g}",
+            _count(event["gear_landings"]),
             _what(event, unit),
             output.word(event["record_id"] or "-"),
             event["hash"][:10],
         )
     console.print(table)
-    show_warnings(console, life.warnings)
-    if outlook := task.outlook_words(life, ahead, gear):
+    show_warnings(console, [life])
+    if outlook := outlook_sentence(life, ahead, gear):
         console.print(outlook)
-    headings = (
+    _show_joints(console, told["joints"], ahead, gear)
+    _show_advice(console, Advice.of([life]))
+
+
+def _show_joints(
+    console: output.DataConsole, joints: Sequence[dict[str, Any]], ahead: Forecast, gear: Gear
+) -> None:
+    from mlg_troubleshoot.life.outlook import span
+
+    table = output.plain_table(
+        console,
         "joint",
-        f"limit {unit}",
-        f"readings since restored (landings: {unit})",
+        f"limit {console.unit}",
+        f"readings since restored (landings: {console.unit})",
         "landings to its limit",
     )
-    joints = output.plain_table(console, *headings)
-    unread = [f"#{joint['joint']}" for joint in told["joints"] if not joint["readings"]]
-    for joint in told["joints"]:
+    for joint in joints:
         if not joint["readings"] and joint["joint"] not in ahead.joints:
             continue
-        shown = joint["readings"][-4:]
-        read = (
-            ", ".join(f"{landings:g}: {console.length(clearance)}" for landings, clearance in shown)
-            or "none"
-        )
-        joints.add_row(
+        newest = joint["readings"][-4:]
+        read = ", ".join(f"{at:g}: {console.length(clearance)}" for at, clearance in newest)
+        table.add_row(
             f"#{joint['joint']}",
             console.length(joint["limit_in"]),
-            ("… " if len(joint["readings"]) > len(shown) else "") + read,
-            task.span(joint["landings_to_limit"], gear),
+            ("… " if len(joint["readings"]) > len(newest) else "") + (read or "none"),
+            span(joint["landings_to_limit"], gear),
         )
-    console.print(joints)
+    console.print(table)
+    unread = [f"#{joint['joint']}" for joint in joints if not joint["readings"]]
     if unread:
         console.print(
-            f"Not read since new or restored: {', '.join(unread)}; never read counts as 0 above."
+            f"Not read since new or restored: {', '.join(unread)}; unread joints count as 0 above."
         )
-    advice = task.advice([life])
-    if advice.asked:
-        console.print(advice.words)
 
 
 def _what(event: dict[str, Any], unit: LengthUnit) -> str:
+    from mlg_troubleshoot.decision.sentences import joint_list
+
     match event["kind"]:
         case "assessment":
             found = event["predicted_displacement_in"]
-            worst = "" if found is None else in_unit(f", worst case {found:.4f} in", unit)
+            worst = "" if found is None else f", worst case {Length(found).said_in(unit)}"
             return f"assessed {event['verdict']}{worst}"
         case "repair":
-            return "restored " + ", ".join(f"#{joint}" for joint in event["joints"])
+            return f"restored {joint_list(event['joints'])}"
         case "void":
             return f"void: {event['why']}"
         case "outcome":
-            return f"found: {event['found']}" + (
-                "" if event["joint"] is None else f" (#{event['joint']})"
-            )
+            joint = "" if event["joint"] is None else f" (#{event['joint']})"
+            return f"found: {event['found']}{joint}"
+        case "inspection" if not event["counts"]:
+            return "inspection (corrected or void)"
         case kind:
-            corrected = kind == "inspection" and not event["counts"]
-            return (
-                f"{kind} (corrected or void)"
-                if corrected
-                else "re-rigged"
-                if kind == "rerig"
-                else str(kind)
-            )
+            return "re-rigged" if kind == "rerig" else str(kind)
+
+
+def _say_added(place: Store, what: str, record: Record) -> None:
+    """Say on stderr what was added, and which records of its gear disagree now."""
+    from mlg_troubleshoot.life.folding import warnings_of
+
+    output.say(f"Kept: {what}.")
+    for warning in warnings_of(place, [(record.tail_no, record.side)]):
+        output.say(f"Warning: {warning}")
 
 
 def repair(
@@ -283,22 +293,23 @@ def repair(
     landings: Landings = None,
     work_order: WorkOrder = None,
     store: Place = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
 ) -> None:
     """Record joints that were restored: their wear starts again."""
+    from mlg_troubleshoot.decision.sentences import joint_list
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.store import Kind
-    from mlg_troubleshoot.workflows import history as task
+    from mlg_troubleshoot.store import RecordKind
+    from mlg_troubleshoot.workflows import history
 
     known = load_gear(gear)
-    _refuse_unknown(joints, known)
+    known.require_joints(joints, "--joint")
     restored = sorted(set(joints))
     place = kept_in(store, gear)
-    record = task.work(place, Kind.REPAIR, (tail, side), day, work_order, landings, restored)
-    output.say(
-        f"Kept: repair of {record.tail_no} {record.side}, {', '.join(f'#{j}' for j in restored)}."
+    record = history.work(
+        place, RecordKind.REPAIR, (tail, side), day, work_order, landings, restored
     )
-    say_warnings(place, [(record.tail_no, record.side)])
+    listed = joint_list(restored)
+    _say_added(place, f"repair of {record.tail_no} {record.side}, {listed}", record)
 
 
 def rerig(
@@ -308,50 +319,39 @@ def rerig(
     landings: Landings = None,
     work_order: WorkOrder = None,
     store: Place = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
 ) -> None:
-    """Record that the reversing valve was re-rigged; the wear of the joints goes on."""
-    from mlg_troubleshoot.store import Kind
-    from mlg_troubleshoot.workflows import history as task
+    """Record that the reversing valve was re-rigged; the wear of the joints continues."""
+    from mlg_troubleshoot.store import RecordKind
+    from mlg_troubleshoot.workflows import history
 
     place = kept_in(store, gear)
-    record = task.work(place, Kind.RERIG, (tail, side), day, work_order, landings)
-    output.say(f"Kept: re-rigging of {record.tail_no} {record.side}.")
-    say_warnings(place, [(record.tail_no, record.side)])
-
-
-def _refuse_unknown(joints: Sequence[int], gear: Gear) -> None:
-    unknown = [joint for joint in joints if joint not in gear.joint_numbers]
-    if unknown:
-        raise UsageError(
-            f"--joint {unknown[0]}: {gear.name} has no joint {unknown[0]}",
-            f"Its joints are {', '.join(map(str, gear.joint_numbers))}.",
-        )
+    record = history.work(place, RecordKind.RERIG, (tail, side), day, work_order, landings)
+    _say_added(place, f"re-rigging of {record.tail_no} {record.side}", record)
 
 
 def correct(
     record: RecordId,
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A table with the one right inspection.")
+        Path, typer.Argument(metavar="FILE", help="A table with the one corrected inspection.")
     ],
     store: Place = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
     unit: options.Unit = None,
     convention: options.Convention = None,
     sheet: options.Sheet = None,
 ) -> None:
-    """Append the right inspection for a wrong one; both stay in the chain, the right one counts."""
+    """Append a corrected inspection. The wrong one stays in the chain but no longer counts."""
     from mlg_troubleshoot.cli.views import notes
-    from mlg_troubleshoot.workflows import history as task
+    from mlg_troubleshoot.workflows import keep
     from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 
     asked = CheckOptions(gear=gear, unit=unit, convention=convention, sheet=sheet)
     result = check_files([file], asked)
     notes.show_problems(result.problems)
     place = kept_in(store, gear)
-    added = task.correct(place, record, result, asked)
-    output.say(f"Kept: correction of {record} ({added.tail_no} {added.side}).")
-    say_warnings(place, [(added.tail_no, added.side)])
+    added = keep.correct(place, record, result, asked)
+    _say_added(place, f"correction of {record} ({added.tail_no} {added.side})", added)
 
 
 def void(
@@ -360,12 +360,12 @@ def void(
         str, typer.Option("--why", metavar="TEXT", help="Why the record does not count.")
     ],
     store: Place = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
 ) -> None:
-    """Append that a record does not count; it stays in the chain."""
-    from mlg_troubleshoot.workflows import history as task
+    """Void a record: it stays in the chain but does not count."""
+    from mlg_troubleshoot.workflows import history
 
-    added = task.void(kept_in(store, gear), record, why)
+    added = history.void(kept_in(store, gear), record, why)
     output.say(f"Kept: {record} ({added.tail_no} {added.side}) does not count.")
 
 
@@ -373,18 +373,18 @@ def outcome(
     record: RecordId,
     found: Annotated[str, typer.Option("--found", metavar="TEXT", help="What was found.")],
     joint: Annotated[
-        int | None, typer.Option("--joint", metavar="N", help="The joint that it was.")
+        int | None, typer.Option("--joint", metavar="N", help="The joint that was the cause.")
     ] = None,
     store: Place = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
 ) -> None:
-    """Record what was found after the advice; mlg history then says how often it was right."""
+    """Record what was found after the advice; mlg history then shows how often it was right."""
     from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.workflows import history as task
+    from mlg_troubleshoot.workflows import history
 
     if joint is not None:
-        _refuse_unknown([joint], load_gear(gear))
-    added = task.outcome(kept_in(store, gear), record, found, joint)
+        load_gear(gear).require_joints([joint], "--joint")
+    added = history.outcome(kept_in(store, gear), record, found, joint)
     output.say(f"Kept: outcome of {record} ({added.tail_no} {added.side}).")
 
 
@@ -398,15 +398,15 @@ def verify(
             help="A last hash noted earlier; it must still be in the chain.",
         ),
     ] = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
 ) -> None:
-    """Walk the chain; the first record that does not fit is named (exit code 1). It does not prove
+    """Check the chain and name the first record that does not fit (exit code 1). It does not prove
     who wrote a record.
 
-    The last hash is printed: noted elsewhere and given to --expect, it shows that no record was
-    taken away since.
+    The last hash is printed. Note it elsewhere and pass it to --expect later: this shows whether
+    records were removed.
     """
-    from mlg_troubleshoot.workflows import history as task
+    from mlg_troubleshoot.workflows import history
 
     noted = None if expect is None else expect.strip().lower()
     if noted is not None and not re.fullmatch(r"[0-9a-f]{64}", noted):
@@ -414,7 +414,7 @@ def verify(
             f"--expect {expect!r} is not a hash",
             "Give the 64 letters and digits that verify printed.",
         )
-    found = task.verify(kept_in(store, gear), noted)
+    found = history.verify(kept_in(store, gear), noted)
     if found.broken is None:
         output.write(f"{found.count} records fit the chain.")
     else:
@@ -435,7 +435,7 @@ def verify(
             " Otherwise export the chain, and import it into a new store."
         )
     if found.broken is not None or found.wrong or (noted is not None and found.expected is None):
-        raise typer.Exit(BROKEN)
+        raise typer.Exit(ExitCode.ATTENTION)
 
 
 def _expected(found: Verified) -> str:
@@ -455,7 +455,7 @@ def _expected(found: Verified) -> str:
 def export(
     file: Chain,
     store: Place = None,
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
     force: options.Force = False,
 ) -> None:
     """Write the whole chain as JSON Lines."""
@@ -470,15 +470,13 @@ def export(
     output.say(f"Written: {file}, {len(lines)} records.")
 
 
-def import_chain(
-    file: Chain, store: Place = None, gear: options.Gear = options.DEFAULT_GEAR
-) -> None:
-    """Read an exported chain into an empty store, or the rest of it into a store that holds its
+def import_chain(file: Chain, store: Place = None, gear: options.Gear = DEFAULT_GEAR) -> None:
+    """Read an exported chain into an empty store, or the rest of it into a store that contains its
     beginning.
     """
-    from mlg_troubleshoot.workflows import history as task
+    from mlg_troubleshoot.workflows import history
 
-    added = task.import_file(kept_in(store, gear), file)
+    added = history.import_file(kept_in(store, gear), file)
     output.say(f"Imported: {added.new} records; {added.known} were there already.")
 
 
@@ -493,8 +491,8 @@ def history_app() -> typer.Typer:
         name="history",
         cls=HistoryGroup,
         help=(
-            "Records of each gear: [b]mlg history[/b] · [b]mlg history TAIL LH[/b], and what is"
-            " added later."
+            "Show the records of each gear ([b]mlg history[/b], [b]mlg history TAIL LH[/b]) and add"
+            " repairs, corrections and outcomes."
         ),
         epilog=EPILOG,
     )

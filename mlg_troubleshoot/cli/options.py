@@ -13,9 +13,8 @@ from typing import Annotated, Any, get_type_hints
 import typer
 
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
-
-DEFAULT_GEAR = "hawker-800xp"
 
 
 class ReportFormat(StrEnum):
@@ -31,7 +30,7 @@ def report_format(text: str) -> ReportFormat:
         raise UsageError(f"a report cannot be written as {text!r}", remedy) from None
 
 
-class Page(StrEnum):
+class PaperSize(StrEnum):
     A4 = "A4"
     LETTER = "Letter"
 
@@ -60,7 +59,7 @@ Unit = Annotated[
         "--unit",
         parser=LengthUnit.parse,
         metavar="in|thou|mm",
-        help="Unit of lengths that do not say one.",
+        help="Unit of lengths that do not state one.",
     ),
 ]
 Convention = Annotated[
@@ -70,8 +69,8 @@ Convention = Annotated[
         parser=ClearanceConvention.parse,
         metavar="RADIAL|DIAMETRAL|TOTAL_PLAY",
         help=(
-            "What a clearance reading is, for rows that do not say it. No default: the factor 2"
-            " flips verdicts."
+            "What a clearance reading is, for rows that do not state it. No default: the factor"
+            " of 2 changes verdicts."
         ),
     ),
 ]
@@ -113,7 +112,7 @@ Report = Annotated[
     typer.Option("--report", metavar="DIR", help="Write printable reports to this folder."),
 ]
 Paper = Annotated[
-    Page | None, typer.Option("--page", help="Paper of the report; A4 unless remembered.")
+    PaperSize | None, typer.Option("--page", help="Paper of the report; A4 unless remembered.")
 ]
 Show = Annotated[
     str | None,
@@ -130,7 +129,8 @@ Remember = Annotated[
 Force = Annotated[
     bool,
     typer.Option(
-        "--force", help="Replace a file that is not of an earlier run; never an input or a store."
+        "--force",
+        help="Replace a file that an earlier run did not write; never an input or a store.",
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Write the result as JSON to stdout.")]

@@ -19,11 +19,11 @@ from rich.table import Table
 from rich.text import Text
 
 from mlg_troubleshoot.errors import OutputError
-from mlg_troubleshoot.units import LengthUnit, in_unit
+from mlg_troubleshoot.units import LengthUnit, said_in
 from mlg_troubleshoot.visible import visible
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.reporting import WrittenReport
+    from mlg_troubleshoot.reporting.publish import WrittenReport
 
 _WIDTH_ELSEWHERE = 80
 WIDE, WIDEST = 100, 120
@@ -95,7 +95,7 @@ class DataConsole(Console):
 
     def sentence(self, said: str, style: str = "") -> None:
         """Print a sentence of this program, its lengths in the unit that the user reads."""
-        self.print(in_unit(said, self.unit), style=style)
+        self.print(said_in(said, self.unit), style=style)
 
     def print(self, *objects: Any, **how: Any) -> None:
         """Print; a text is data, made visible before it is measured."""
@@ -172,6 +172,11 @@ def word(data: str | None, style: str = "") -> Text:
     none.
     """
     return Text("?" if data is None else visible(data, one_line=True), style=style)
+
+
+def joint(number: int | None) -> str:
+    """Return a joint for a cell: ``#3``, and a dash where there is none."""
+    return "-" if number is None else f"#{number}"
 
 
 def say(message: str) -> None:

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 
 Advance = Callable[[str, int, int | None], None]
 
+# A bar that would be gone before it is read is not shown. [s]
 _WORTH_SHOWING_AFTER_S = 0.5
 
 

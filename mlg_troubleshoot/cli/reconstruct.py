@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mlg_troubleshoot.cli import options, output
+from mlg_troubleshoot.errors import ExitCode
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.paper.reconstruct import Reconstruction
@@ -25,7 +27,9 @@ def reconstruct(
     targets: Annotated[
         Path | None,
         typer.Option(
-            "--targets", metavar="TOML", help="Numbers to meet, else those printed in the paper."
+            "--targets",
+            metavar="TOML",
+            help="Numbers to meet; those printed in the paper if not given.",
         ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random linkages.")] = 0,
@@ -34,12 +38,12 @@ def reconstruct(
         typer.Option(
             "--start",
             metavar="NAME",
-            help="Polish this linkage of the gear (A, B, …), else from scratch.",
+            help="Start from this linkage of the gear (A, B, …); if not given, from random ones.",
         ),
     ] = None,
     name: Annotated[str, typer.Option("--name", help="Name of the new linkage.")] = "N",
     minutes: Annotated[
-        float, typer.Option("--minutes", min=0.01, help="Time to give up after.")
+        float, typer.Option("--minutes", min=0.01, help="Minutes after which to give up.")
     ] = 15.0,
     out: Annotated[
         Path | None,
@@ -52,16 +56,16 @@ def reconstruct(
     quiet: options.Quiet = False,
     _version: options.Version = False,
 ) -> None:
-    """Search a linkage that meets printed numbers: where the coordinates come from.
+    """Search for a linkage that meets printed numbers: the origin of the coordinates.
 
-    Exit codes: 0 found · 1 polished, but not everything is met · 3 nothing found in time.
+    Exit codes: 0 found · 1 improved, but not every number is met · 3 nothing found in time.
     """
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.progress import stages
     from mlg_troubleshoot.outputs import OutputFile
     from mlg_troubleshoot.workflows import reconstruct as task
 
-    gear = context.obj or options.DEFAULT_GEAR
+    gear = context.obj or DEFAULT_GEAR
     claim(gear, [targets], [OutputFile("--out", out, task.LINKAGE)], force=force)
     with stages(quiet=quiet) as advance:
         found, text = task.reconstruct_linkage(
@@ -75,12 +79,14 @@ def reconstruct(
             progress=advance,
         )
     if as_json:
-        output.write_json(task.reconstruction_values(found, text))
+        from mlg_troubleshoot.reporting.model_json import reconstruction_as_json
+
+        output.write_json(reconstruction_as_json(found, text))
     else:
         _show(found, text, show_member=out is None)
     if out is not None:
         output.say(f"Linkage written: {out}")
-    raise typer.Exit(0 if found.meets_all else 1)
+    raise typer.Exit(ExitCode.FINE if found.meets_all else ExitCode.ATTENTION)
 
 
 def _show(found: Reconstruction, text: str, *, show_member: bool) -> None:
@@ -93,7 +99,7 @@ def _show(found: Reconstruction, text: str, *, show_member: bool) -> None:
             each.target.quantity,
             each.target.printed,
             f"{each.computed:.5g} {each.target.unit}".strip(),
-            each.target.tolerance,
+            each.target.accepted,
             "met" if each.holds else "NOT MET",
             "binds" if each.binds else "slack",
         )

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from mlg_troubleshoot.cli import options, output
-from mlg_troubleshoot.schemas import SCHEMA_VERSION
+from mlg_troubleshoot.gear import DEFAULT_GEAR
+from mlg_troubleshoot.outputs import SCHEMA_VERSION
 
 EPILOG = (
     "Example: [b]mlg gear separable --columns"
@@ -23,21 +24,21 @@ def separable(
         typer.Option(
             "--columns",
             metavar="A,B,…",
-            help="Columns that will be recorded, as in a table; else all.",
+            help="Columns that will be recorded, as in a table; all if not given.",
         ),
     ] = None,
     as_json: options.Json = False,
     _version: options.Version = False,
 ) -> None:
-    """Say which causes the planned columns could distinguish, and at which size, before anything is
-    measured.
+    """Show which causes the planned columns could distinguish, and from which size on, before
+    anything is measured.
     """
     from mlg_troubleshoot.workflows.separable import separable as planned
 
     names = (
         None if columns is None else [name.strip() for name in columns.split(",") if name.strip()]
     )
-    gear = context.obj or options.DEFAULT_GEAR
+    gear = context.obj or DEFAULT_GEAR
     causes = planned(gear, names)
     if as_json:
         output.write_json(

@@ -14,26 +14,26 @@ import typer
 from rich.table import Table
 
 from mlg_troubleshoot.cli import output
-from mlg_troubleshoot.cli.boundary import INTERRUPTED
 from mlg_troubleshoot.cli.flags import StudyFlags
 from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.remembered import Settings
-from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.errors import ExitCode, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.indices.given_data import GivenDataResult
 from mlg_troubleshoot.paper.study import (
-    Design,
     Directions,
+    StudyDesign,
     StudyFindings,
     StudyOptions,
     StudyResult,
 )
 from mlg_troubleshoot.paper.targets import targets_file
-from mlg_troubleshoot.units import LengthUnit
+from mlg_troubleshoot.units import Length, LengthUnit, Sentence
 from mlg_troubleshoot.workflows import study as task
 
 _BAR = 16
-_Choice = TypeVar("_Choice", Design, Directions)
+_Choice = TypeVar("_Choice", StudyDesign, Directions)
 
 
 @contextmanager
@@ -47,7 +47,7 @@ def asked(flags: StudyFlags) -> Iterator[tuple[Gear, StudyOptions]]:
         except ValueError:
             raise UsageError(
                 f"directions {flags.fixed!r}",
-                "Give degrees with commas between, one for each joint.",
+                "Give degrees separated by commas, one per joint.",
             ) from None
     plain = {
         each.name: getattr(flags, each.name)
@@ -55,7 +55,7 @@ def asked(flags: StudyFlags) -> Iterator[tuple[Gear, StudyOptions]]:
         if hasattr(flags, each.name)
     }
     read = {
-        "design": _choice(Design, flags.design, "design"),
+        "design": _choice(StudyDesign, flags.design, "design"),
         "directions": (
             _choice(Directions, flags.directions, "directions")
             if fixed is None
@@ -89,7 +89,9 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
     )
     shown = replace(findings, statements=said, searches=searched)
     if flags.as_json:
-        output.write_json(task.study_values(shown, given))
+        from mlg_troubleshoot.reporting.model_json import study_as_json
+
+        output.write_json(study_as_json(shown, given))
     else:
         _show(shown, settings.show)
         if given is not None:
@@ -109,7 +111,7 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
         output.say(f"Table written: {task.write_study_table(findings)}")
     if not findings.result.finished:
         output.say("Interrupted: these are partial results.")
-        raise typer.Exit(INTERRUPTED)
+        raise typer.Exit(ExitCode.INTERRUPTED)
 
 
 def _choice(kind: type[_Choice], text: str, what: str) -> _Choice:
@@ -176,16 +178,22 @@ def _show(findings: StudyFindings, unit: LengthUnit) -> None:
         gap = (
             "could not be proved"
             if math.isinf(proved.bound_in)
-            else f"proved ≤ {proved.bound_in:.6f} in"
+            else Sentence.of("proved ≤ {}", Length(proved.bound_in, 6))
         )
         console.sentence(
-            f"Worst {sense} with every clearance at its limit: {proved.found_in:.6f} in, {gap} over"
-            f" all directions and the whole stroke (sequential rule {found.sequential_in:.6f} in,"
-            f" global search {found.searched_in:.6f} in)."
+            Sentence.of(
+                "Worst {} with every clearance at its limit: {}, {} over all directions and the"
+                " whole stroke (sequential rule {}, global search {}).",
+                sense,
+                Length(proved.found_in, 6),
+                gap,
+                Length(found.sequential_in, 6),
+                Length(found.searched_in, 6),
+            )
         )
     for statement in findings.statements:
         console.print()
-        console.sentence(statement.paragraph)
+        console.print(statement.paragraph)
 
 
 def _joints(gear: Gear, result: StudyResult) -> Table:
@@ -220,7 +228,7 @@ def _joints(gear: Gear, result: StudyResult) -> Table:
     return shown
 
 
-def _show_given(gear: Gear, given: task.GivenDataResult) -> None:
+def _show_given(gear: Gear, given: GivenDataResult) -> None:
     found = given.indices
     each = ", ".join(
         f"#{number} {_number(first)} ({_number(ends[0])} to {_number(ends[1])})"
@@ -230,8 +238,8 @@ def _show_given(gear: Gear, given: task.GivenDataResult) -> None:
     )
     output.console().print(
         f"Without a model, from {given.rows_used} measured of {given.rows_read} inspections in"
-        f" {given.file}, first order with 95 % intervals: {each}. Where joints wear together each"
-        " also explains what the others do, and these add to more than 1."
+        f" {given.file}, first order with 95 % intervals: {each}. Where joints wear together, each"
+        " index includes part of the others, and their sum exceeds 1."
     )
 
 

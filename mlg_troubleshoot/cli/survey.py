@@ -10,6 +10,8 @@ import typer
 
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
+from mlg_troubleshoot.units import Sentence
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.surveying.result import SurveyResult
@@ -27,7 +29,8 @@ def survey(
     file: Annotated[
         str,
         typer.Argument(
-            metavar="FILE|template|ask", help="Filled-in survey, or the word template or ask."
+            metavar="FILE|template|ask",
+            help="Filled-in survey, or one of the words template and ask.",
         ),
     ],
     template: Annotated[
@@ -48,7 +51,7 @@ def survey(
         typer.Option(
             "--for",
             metavar="INSPECTIONS",
-            help="Narrow the displacement of these, not the indices.",
+            help="Inspections whose displacement to narrow, instead of the indices.",
         ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the starts and draws.")] = 0,
@@ -70,7 +73,7 @@ def survey(
     from mlg_troubleshoot.outputs import TO_FILL_IN, OutputFile
     from mlg_troubleshoot.workflows import survey as task
 
-    gear = context.obj or options.DEFAULT_GEAR
+    gear = context.obj or DEFAULT_GEAR
     shown = settings(gear, show, page)
     if file in ("template", "ask") and template is None and not Path(file).exists():
         raise UsageError(
@@ -101,10 +104,12 @@ def survey(
             write=write,
             inspections=inspections,
             seed=seed,
-            told=partial(bar, "Fitting"),
+            on_progress=partial(bar, "Fitting"),
         )
     if as_json:
-        output.write_json(task.survey_values(result))
+        from mlg_troubleshoot.reporting.model_json import survey_as_json
+
+        output.write_json(survey_as_json(result))
     else:
         _show(result, output.console(unit=shown.show))
     written = None
@@ -174,18 +179,25 @@ def _show(result: SurveyResult, console: output.DataConsole) -> None:
         )
         for misfit in found.misfits:
             console.sentence(
-                f"Row {misfit.reading.row}, {misfit.reading.words}: {misfit.words}.", "bold"
+                Sentence.of(
+                    "Row {}, {}: {}.", misfit.reading.row, misfit.reading.words, misfit.words
+                ),
+                "bold",
             )
     for each in result.inspections:
-        console.sentence(f"{each.record_id}: {each.words}.")
+        console.sentence(Sentence.of("{}: {}.", each.record_id, each.words))
     for warning in result.warnings:
-        console.sentence(f"Note: {warning}.")
+        console.sentence(Sentence.of("Note: {}.", warning))
     if result.suggestion is None:
         console.print("No further reading would narrow this by 1 %: you can stop.")
     else:
         share = 100 * result.suggestion.narrowing
         console.sentence(
-            f"Next: {result.suggestion.reading.words}; narrows this by about {share:.0f} %."
+            Sentence.of(
+                "Next: {}; narrows this by about {} %.",
+                result.suggestion.reading.words,
+                f"{share:.0f}",
+            )
         )
     if result.gear_file is not None:
         console.print(

@@ -9,6 +9,7 @@ import typer
 
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 
 
 def template(
@@ -18,7 +19,7 @@ def template(
             metavar="FILE.xlsx|FILE.pdf", help="Where to write it: a workbook, or a form to print."
         ),
     ],
-    gear: options.Gear = options.DEFAULT_GEAR,
+    gear: options.Gear = DEFAULT_GEAR,
     force: options.Force = False,
     page: options.Paper = None,
     show: options.Show = None,

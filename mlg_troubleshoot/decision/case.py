@@ -25,6 +25,7 @@ from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.directions import chance_beyond
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.units import Length, Sentence
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +98,7 @@ class Cases:
 
     @property
     def critical_missing(self) -> Mask:
-        """True for a gear of which a critical joint was not measured."""
+        """True for a gear with a critical joint that was not measured."""
         return np.asarray((~self.measured & self.gear.critical).any(axis=1))
 
     @property
@@ -151,15 +152,18 @@ class Cases:
 
 
 def _disagreement(inspection: Inspection, margin_in: float) -> str:
-    """Plunger readings of which one is outside the margin and the mean is not."""
+    """Plunger readings with one outside the margin although their mean is not."""
     mean, one_u = inspection.measured_displacement_in, inspection.plunger_gauge_u_in
     beyond = margin_in + 2.0 * (DEFAULT_PLUNGER_U_IN if one_u is None else one_u)
     far = [reading for reading in inspection.standing_readings_in if abs(reading) > beyond]
     if mean is None or not far or abs(mean) > margin_in:
         return ""
-    return (
-        f"the plunger readings disagree: {far[0]:.4f} in is outside the margin of {margin_in:.4f}"
-        f" in, their mean of {mean:.4f} in is not. Read the plunger again."
+    return Sentence.of(
+        "the plunger readings disagree: {} is outside the margin of {}, their mean of {} is not."
+        " Read the plunger again.",
+        Length(far[0]),
+        Length(margin_in),
+        Length(mean),
     )
 
 

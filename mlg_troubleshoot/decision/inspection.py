@@ -9,10 +9,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import date, datetime
 from enum import StrEnum
+from typing import Any
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
+# Standard uncertainty of a clearance reading that states none. [in]
 DEFAULT_GAUGE_U_IN = 0.0005
 
 
@@ -172,6 +174,8 @@ class Inspection:
     unit_question : str
         What must be confirmed about the unit of the readings before this gear can be cleared; empty
         if nothing.
+    other_columns : mapping of str to object
+        Values of columns of the table that have no field of their own, by column.
     carried : mapping of str to str
         Columns that only travel to the report: work order, manual reference, remarks, unknown
         columns.
@@ -217,9 +221,18 @@ class Inspection:
     minutes_available: float | None = None
     small_readings_true: bool = False
     unit_question: str = ""
+    other_columns: Mapping[str, object] = field(default_factory=dict)
     carried: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     source: RowSource = RowSource()
+
+    def value(self, column: str) -> Any:
+        """What a column of the table says, by the name of its field; None if nothing."""
+        return (
+            self.other_columns[column]
+            if column in self.other_columns
+            else getattr(self, column, None)
+        )
 
     @property
     def is_repaired(self) -> bool:

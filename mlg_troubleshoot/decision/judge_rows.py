@@ -40,7 +40,9 @@ from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import verdict
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
+from mlg_troubleshoot.units import Length, Sentence
 
+# Rows judged at once: bounds the memory. [1]
 _CHUNK = 1024
 
 
@@ -146,7 +148,7 @@ def _assessment(
     # unknown.
     known = closes and bool(np.isfinite(judged.u_in[i]))
 
-    def told(value: Any, when: bool = closes) -> float | None:
+    def number_or_none(value: Any, when: bool = closes) -> float | None:
         return float(value) if when and np.isfinite(value) else None
 
     worst = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
@@ -159,15 +161,15 @@ def _assessment(
         inspection=inspection,
         verdict=found,
         # Adding zero turns a minus zero into zero.
-        predicted_displacement_in=told(lower.displacement_in[i] + 0.0),
-        over_travel_in=told(worst[0]),
-        under_travel_in=told(worst[1]),
-        predicted_upper_in=told(judged.batch.upper.displacement_in[i], True),
+        predicted_displacement_in=number_or_none(lower.displacement_in[i] + 0.0),
+        over_travel_in=number_or_none(worst[0]),
+        under_travel_in=number_or_none(worst[1]),
+        predicted_upper_in=number_or_none(judged.batch.upper.displacement_in[i], True),
         margin_in=margin,
-        remaining_in=told(margin - lower.displacement_in[i]),
-        standard_uncertainty_in=told(judged.u_in[i]),
+        remaining_in=number_or_none(margin - lower.displacement_in[i]),
+        standard_uncertainty_in=number_or_none(judged.u_in[i]),
         probability_within_margin=float(judged.p_within[i]),
-        probability_exceed_random_directions=told(judged.batch.chance_random[i]),
+        probability_exceed_random_directions=number_or_none(judged.batch.chance_random[i]),
         geometry_spread_in=(
             (
                 float(lower.spread_low_in[i]) + 0.0,
@@ -182,9 +184,9 @@ def _assessment(
         joints=findings,
         plan=plan,
         basis=Basis.MEASURED if beyond else Basis.PREDICTED,
-        bound_in=told(lower.bound_in[i] + 0.0, True),
-        explained_at_most_in=told(plunger.explained_at_most_in[i]),
-        unexplained_in=told(plunger.unexplained_in[i]),
+        bound_in=number_or_none(lower.bound_in[i] + 0.0, True),
+        explained_at_most_in=number_or_none(plunger.explained_at_most_in[i]),
+        unexplained_in=number_or_none(plunger.unexplained_in[i]),
         headline=_headline(cases, judged, i),
         measured_statement=(
             None
@@ -199,9 +201,11 @@ def _assessment(
     )
 
 
-_PROVISIONAL = (
-    f"provisional: the larger of {PROVISIONAL_U_IN:g} in and {100 * PROVISIONAL_U_SHARE:.0f} % of"
-    " the prediction, because one published failure gives none"
+_PROVISIONAL = Sentence.of(
+    "provisional, the larger of {} and {} % of the prediction; a single published failure is too"
+    " little to estimate it",
+    Length.brief(PROVISIONAL_U_IN),
+    f"{100 * PROVISIONAL_U_SHARE:.0f}",
 )
 
 
@@ -263,8 +267,12 @@ def _headline(cases: Cases, judged: Judged, i: int) -> str:
         explained = sentences.explained(
             float(plunger.explained_at_most_in[i]), float(plunger.unexplained_in[i])
         )
-        then = f"{explained} Predicted: {said}." if closes else sentences.NO_CLOSURE
-        return f"{sentences.measured(mean, margin, 'outside')} {then}"
+        then = (
+            Sentence.of("{} Predicted: {}.", explained, said.words)
+            if closes
+            else sentences.NO_CLOSURE
+        )
+        return Sentence.joined([sentences.measured(mean, margin, "outside"), then])
     if not closes:
         return sentences.NO_CLOSURE
     if found is Verdict.INCOMPLETE:
@@ -302,12 +310,17 @@ def _warnings(
     if lacking:
         warnings.append(
             f"The extension of the model needs {', '.join(lacking)}, which this inspection lacks:"
-            " predicted without."
+            " predicted without it."
         )
     warnings += [
-        f"Joint #{finding.joint} {finding.name}: {finding.clearance_in:.4f} in radial is above its"
-        f" limit of {finding.limit_in:.4f} in ({gear.joint(finding.joint).limit.kind}): reject to"
-        " the manual."
+        Sentence.of(
+            "Joint #{} {}: {} radial is above its limit of {} ({}): reject to the manual.",
+            finding.joint,
+            finding.name,
+            Length(finding.clearance_in),
+            Length(finding.limit_in),
+            gear.joint(finding.joint).limit.kind,
+        )
         for finding in findings
         if finding.over_limit and finding.clearance_in is not None
     ]
@@ -315,8 +328,12 @@ def _warnings(
     low, high = gear.down_lock_range
     if down_lock is not None and not low <= down_lock <= high:
         warnings.append(
-            f"Plunger at Down Lock {down_lock:.4f} in is outside {low:.2f} to {high:.2f} in: check"
-            " the rigging first."
+            Sentence.of(
+                "Plunger at Down Lock {} is outside {} to {}: check the rigging first.",
+                Length(down_lock),
+                Length(low, 2, named=False),
+                Length(high, 2),
+            )
         )
     if not np.all(np.isfinite(worst_in)):
         warnings.append(
@@ -334,8 +351,10 @@ def _warnings(
             warnings.append(differs)
     if inspection.gauge_u_is_default:
         warnings.append(
-            f"Standard uncertainty of the gauge not stated: {inspection.gauge_u_in:.5f} in radial"
-            " taken as the default."
+            Sentence.of(
+                "Standard uncertainty of the gauge not stated: {} radial taken as the default.",
+                Length(inspection.gauge_u_in, 5),
+            )
         )
     if inspection.standing_readings_in and inspection.plunger_gauge_u_in is None:
         warnings.append(
@@ -360,7 +379,7 @@ def allowances(cases: Cases, lower: Prediction) -> Array:
     sense = np.where(lower.worst.over_in >= -lower.worst.under_in, 1.0, -1.0)[:, None]
     left = (cases.margin_in - worst)[:, None]
     room = np.maximum(gear.limits_in - start, 0.0)
-    # Root of slope·t + ½·bend·t² = left, in the form that stays good where the curvature is zero.
+    # Root of slope·t + ½·bend·t² = left, in the form that is stable where the curvature is zero.
     root = np.sqrt(np.maximum(slopes**2 + 2.0 * sense * bend * left, 0.0))
     wear = np.minimum(2.0 * left / np.maximum(slopes + root, 1e-9), room)
     if cases.extension is None:

@@ -17,6 +17,7 @@ from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.wear_levels import normal_cdf
 
+# Draws of the readings' errors. [1]
 _DRAWS = 4096
 
 

@@ -28,6 +28,7 @@ from mlg_troubleshoot.decision.wear_levels import (
 COST_OF_WRONG_WITHIN = CONFORMANCE / (1.0 - CONFORMANCE)
 # A drop in risk below this is rounding: the reading has no value of its own.
 _NO_VALUE = 1e-6
+# Clearances that a reading may show, at evenly spaced probabilities. [1]
 _QUANTILES = 12
 # An expectation is enough where being wrong costs at most this share of what a just conforming
 # OUTSIDE does. [1]
@@ -113,7 +114,7 @@ def outlook(one: Cases, anchor: tuple[float, float] | None = None) -> Outlook:
 class _Belief:
     """One gear with its unmeasured joints distributed, level of wear by level of wear.
 
-    At each level the worst case is taken as normal: a sum over several joints, of which none
+    At each level the worst case is taken as normal: a sum over several joints, where none
     dominates. The unmeasured joints are at their mean there, and the worst case is linearised.
     """
 
@@ -177,7 +178,7 @@ def advise(one: Cases) -> MeasuringAdvice:
     """
     ends = np.vstack([one.filled(0.0), one.filled(one.gear.limits_in)])
     four = one.take(np.zeros(4, np.intp))
-    # As it is, and as if both ends had been read.
+    # Unread joints at 0 and at their limit: as unread, then as if those were readings.
     read = np.vstack([one.measured, one.measured, np.ones_like(ends, bool)])
     prediction = four.predict(np.vstack([ends, ends]), read)
     p = prediction.probability_within(four.margin_in, four.margin_u_in)
@@ -235,14 +236,14 @@ def _text(one: Cases, ahead: Outlook) -> str:
         return (
             "If the unmeasured joints are worn like the measured ones, measuring them will hardly"
             f" settle it: too close to the margin (chance {percent(ahead.too_close)}).{plunger} The"
-            f" joint that tells most is {name} ({minutes})."
+            f" most informative joint is {name} ({minutes})."
         )
     if ahead.enough is None:
         if best.risk_drop > 0.0:
             return f"Most useful next reading: {name} ({minutes})."
         return (
-            f"Next: {name} ({minutes}); no single reading decides, it removes most of the"
-            " uncertainty per minute."
+            f"Next: {name} ({minutes}); no single reading is decisive, but this one removes"
+            " the most uncertainty per minute."
         )
     likely = within > 0.5
     chance = percent(within if likely else 1.0 - within)

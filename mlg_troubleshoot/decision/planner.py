@@ -88,14 +88,14 @@ def plans(
     cases: Cases, judged: Judged, causes: Causes, sets: Sequence[tuple[RepairSet, ...]]
 ) -> list[tuple[Plan, tuple[RepairSet, ...]]]:
     """The plan of each gear, and the repairs that it chose from."""
-    facts = _Facts(cases, judged, causes)
-    courses = [_Course(facts, i, sets[i]) for i in range(len(cases))]
+    facts = _BatchContext(cases, judged, causes)
+    courses = [_PlanBuilder(facts, i, sets[i]) for i in range(len(cases))]
     planned = [course.plan() for course in courses]
     _predict_tried(cases, courses)
     return [(plan, course.sets) for plan, course in zip(planned, courses, strict=True)]
 
 
-def _predict_tried(cases: Cases, courses: Sequence[_Course]) -> None:
+def _predict_tried(cases: Cases, courses: Sequence[_PlanBuilder]) -> None:
     """Predict the gears after the repairs to be tried, all at once: the plans need no more than
     their chances.
     """
@@ -117,12 +117,12 @@ def _predict_tried(cases: Cases, courses: Sequence[_Course]) -> None:
         courses[row].sets = (*courses[row].sets, found)
 
 
-class _Facts:
+class _BatchContext:
     """What the plans of a batch are made from, worked out for all gears at once."""
 
     def __init__(self, cases: Cases, judged: Judged, causes: Causes) -> None:
         gear = cases.gear
-        ahead = _Ahead(cases, judged)
+        ahead = _UnreadJoints(cases, judged)
         self.cases, self.judged, self.causes = cases, judged, causes
         self.numbers = gear.joint_numbers
         self.restore_min = np.array([joint.restore.value for joint in gear.joints])
@@ -150,10 +150,10 @@ class _Facts:
         self.at_edge: Mask = np.asarray(apart < 2.0 * u)
 
 
-class _Course:
+class _PlanBuilder:
     """The course of one gear: each branch appends its steps and ends."""
 
-    def __init__(self, facts: _Facts, row: int, sets: tuple[RepairSet, ...]) -> None:
+    def __init__(self, facts: _BatchContext, row: int, sets: tuple[RepairSet, ...]) -> None:
         self.facts, self.row, self.sets = facts, row, sets
         self.cases, self.judged, self.gear = facts.cases, facts.judged, facts.cases.gear
         self.numbers = facts.numbers
@@ -410,7 +410,7 @@ class _Course:
         self._step(Action.DONE, 0.0, sentences.done(repaired=repaired))
         return Plan(tuple(self.steps), End.DONE)
 
-    def _check_rigging(self) -> _Course:
+    def _check_rigging(self) -> _PlanBuilder:
         if not self.looked:
             beyond = bool(self.judged.plunger.beyond[self.row])
             as_new = self._joints(
@@ -463,7 +463,7 @@ class _Course:
 
     def _restore(
         self, joints: tuple[int, ...], best: RepairSet | None, *, expected: bool
-    ) -> _Course:
+    ) -> _PlanBuilder:
         """Restore joints; those whose reading is over the limit by less than its uncertainty are
         read again first, if that is expected to be quicker.
         """
@@ -479,7 +479,7 @@ class _Course:
         self.opened = frozenset()
         return self
 
-    def _restore_over_limit(self) -> _Course:
+    def _restore_over_limit(self) -> _PlanBuilder:
         return self._restore(self.over, None, expected=False) if self.over else self
 
     def _open(self, minutes: float, joints: tuple[int, ...]) -> float:
@@ -533,7 +533,7 @@ class _Course:
         return frozenset(self.inspection.open_areas)
 
 
-class _Ahead:
+class _UnreadJoints:
     """What to expect of the joints that are not measured, gear by gear and level of wear by level
     of wear.
     """
@@ -579,7 +579,7 @@ class _Ahead:
         settle the verdict.
         """
         reach = self.slopes * self.gear.limits_in / self.gear.access_minutes
-        # Rounded: both ends of one link tell alike, and rounding noise must not order them.
+        # Rounded: both ends of one link are worth the same, and rounding noise must not order them.
         order = np.argsort(np.where(candidates, -np.round(reach, 9), np.inf), axis=1, kind="stable")
         chosen, done = np.zeros_like(candidates), ~candidates.any(axis=1)
         rows = np.arange(len(candidates))
@@ -653,7 +653,7 @@ def _measure_again(cases: Cases, judged: Judged) -> tuple[Mask, Array]:
     return chosen, needed
 
 
-def _expected(cases: Cases, judged: Judged, ahead: _Ahead) -> list[Verdict]:
+def _expected(cases: Cases, judged: Judged, ahead: _UnreadJoints) -> list[Verdict]:
     """The verdict if every unmeasured joint is as worn as expected."""
     full = cases.filled((ahead.weight @ moments()[0])[:, None] * cases.gear.limits_in)
     ends = list(judged.verdicts)

@@ -11,7 +11,7 @@ from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.decision.case import Cases, plunger_u
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.prediction import Prediction
-from mlg_troubleshoot.units import SLIPS, ClearanceConvention, LengthUnit
+from mlg_troubleshoot.units import SLIPS, ClearanceConvention, Length, LengthUnit, Sentence
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,22 +62,25 @@ def disagreement(
     u = math.hypot(standard_uncertainty_in, plunger_u(inspection))
     if abs(measured - over_in) <= 2.0 * u:
         return None
-    differs = (
-        f"Measured {measured:+.4f} in differs from the predicted over-travel {over_in:+.4f} in by"
-        f" more than two combined standard uncertainties ({2 * u:.4f} in)."
+    differs = Sentence.of(
+        "Measured {} differs from the predicted over-travel {} by more than two combined standard"
+        " uncertainties ({}).",
+        Length(measured, sign=True),
+        Length(over_in, sign=True),
+        Length(2 * u),
     )
     if under_in - 2.0 * u <= measured < over_in:
-        return (
-            f"{differs} It lies inside the worst-case bounds, so it is possible: the clearances"
-            " need not be taken up in the worst direction."
+        return Sentence.of(
+            "{} It lies inside the worst-case bounds, so it is possible: the clearances need not be"
+            " taken up in the worst direction.",
+            differs,
         )
-    return (
-        f"{differs} It is beyond what the entered clearances can do in any direction. Look for: a"
-        " clearance read "
-        "smaller than it is or entered with the wrong unit or convention, an unmeasured joint, a"
-        " part outside "
-        "the listed joints, a changed rigging, the plunger gauge."
-        f"{_entry_error(inspection, abs(measured), over_in if measured > 0.0 else -under_in, u)}"
+    return Sentence.of(
+        "{} It is beyond what the entered clearances can do in any direction. Look for: a clearance"
+        " read smaller than it is or entered with the wrong unit or convention, an unmeasured"
+        " joint, a part outside the listed joints, a changed rigging, the plunger gauge.{}",
+        differs,
+        _entry_error(inspection, abs(measured), over_in if measured > 0.0 else -under_in, u),
     )
 
 

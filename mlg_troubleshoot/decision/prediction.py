@@ -12,18 +12,17 @@ from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.wear_levels import normal_cdf
-from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
+from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_slopes, adjusted_worst_case
 from mlg_troubleshoot.gear.directions import WorstCase
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.model import LinkageModel, links_from
 
+# Sets of random directions behind the chance of exceeding the margin. [1]
 DIRECTION_SETS = 4096
 # What a hand-held gauge reads the plunger to. [in]
 DEFAULT_PLUNGER_U_IN = 0.0015
 # The model's standard uncertainty until a diagnosis gives it: the larger of a length and a share of
 # the prediction.
 PROVISIONAL_U_IN, PROVISIONAL_U_SHARE = 0.0005, 0.02
-_STEP_IN = 1e-5
 
 
 class Extension(Protocol):
@@ -46,7 +45,7 @@ class Extension(Protocol):
 def model_uncertainty(displacement_in: Array, residual_u_in: float | None) -> Array:
     """Standard uncertainty of the model itself.
 
-    Provisional without a diagnosis: one published failure gives none. [in]
+    Provisional without a diagnosis: one published failure is too little to estimate it. [in]
     """
     if residual_u_in is not None:
         return np.full(np.shape(displacement_in), residual_u_in)
@@ -115,7 +114,7 @@ def predict(
         if len(spread) > 1
         else np.zeros(len(clearance_in))
     )
-    slopes = _slopes(gear.model, adjustment, worst)
+    slopes = adjusted_slopes(gear.model, adjustment, worst)
     each_u = gauge_u_in if gauge_u_in.ndim == 2 else gauge_u_in[:, None]
     u_readings = np.abs(slopes * measured * each_u)
     u_model = model_uncertainty(
@@ -142,34 +141,14 @@ def _members(gear: Gear, adjustment: Adjustment, extension: Extension | None) ->
     members, rows = [], np.flatnonzero(~small)
     for model, response in zip(others, responses(gear)[1:], strict=True):
         member = np.empty(len(clearance))
-        part = clearance[small]
-        sides = [
-            sense * model.displacement(list(response.worst_links(part, sense).T))
-            for sense in (1.0, -1.0)
-        ]
-        member[small] = np.maximum(*sides)
+        part = np.concatenate([clearance[small], clearance[small]])
+        sense = np.repeat([1.0, -1.0], len(part) // 2)
+        sides = sense * model.displacement(list(response.worst_links(part, sense).T))
+        member[small] = np.maximum(*np.split(sides, 2))
         if len(rows):
             member[rows] = adjusted_worst_case(model, adjustment.take(rows)).magnitude_in
         members.append(member)
     return members
-
-
-def _slopes(model: LinkageModel, adjustment: Adjustment, worst: WorstCase) -> Array:
-    """Amplification of each clearance to the plunger at the clearances that act, directions held.
-    [1]
-    """
-    directions, changed = worst.governing_directions, adjustment.numbers(model)
-    factor = 1.0 if adjustment.rate_factor is None else adjustment.rate_factor
-    slopes = np.empty_like(adjustment.clearance_in)
-    for j in range(slopes.shape[1]):
-        sides = []
-        for step in (_STEP_IN, -_STEP_IN):
-            moved = adjustment.clearance_in.copy()
-            moved[:, j] += step
-            acting = replace(adjustment, clearance_in=moved).acting_in
-            sides.append(model.displacement(links_from(acting, directions), changed))
-        slopes[:, j] = factor * (sides[0] - sides[1]) / (2 * _STEP_IN)
-    return slopes
 
 
 @dataclass(frozen=True, slots=True)

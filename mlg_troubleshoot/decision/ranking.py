@@ -1,11 +1,15 @@
-"""The ranked table of joints: which to inspect first, and how sure that order is."""
+"""What is looked at first: of the joints of a gear, of the gears of a batch."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from datetime import date
 
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
-from mlg_troubleshoot.decision.assessment import JointFinding
+from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Verdict
+from mlg_troubleshoot.decision.plan import Basis
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
@@ -13,6 +17,10 @@ from mlg_troubleshoot.indices.index_table import IndexTable
 # Two readings differ for sure where they do by this many standard uncertainties of the difference:
 # 90 % intervals. [1]
 _SURELY = 1.645
+WORST_FIRST = (
+    *(Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE, Verdict.INCOMPLETE),
+    *(Verdict.INVALID, Verdict.WITHIN_MARGIN),
+)
 
 
 def rank_joints(
@@ -96,3 +104,44 @@ def _places(over: Mask, contribution: Array, total_order: Array) -> Places:
     keys = (-np.round(total_order, 6), -np.round(contribution, 9), ~over)
     order = np.lexsort([np.broadcast_to(key, contribution.shape) for key in keys], axis=-1)
     return np.argsort(order, axis=-1) + 1
+
+
+def latest_of_each_gear(judgements: Sequence[Judgement]) -> tuple[list[int], list[int]]:
+    """Places of the latest inspection of each gear and of the earlier ones, both worst first.
+
+    A row whose gear or date is not known stands by itself: nothing says that it is an earlier one.
+    """
+    last: dict[object, tuple[date, int]] = {}
+    for place, judgement in enumerate(judgements):
+        day = judgement.inspection.inspection_date if isinstance(judgement, Assessment) else None
+        key = place if day is None else (judgement.row.tail_no, judgement.row.side)
+        if key not in last or (day or date.min) >= last[key][0]:
+            last[key] = day or date.min, place
+    latest = {place for _, place in last.values()}
+    return worst_first(judgements, latest), worst_first(
+        judgements, set(range(len(judgements))) - latest
+    )
+
+
+def worst_first(judgements: Sequence[Judgement], places: Iterable[int]) -> list[int]:
+    """Measured beyond the margin first, then by verdict, then by the displacement against the
+    margin.
+    """
+    return sorted(places, key=lambda place: (_severity(judgements[place]), place))
+
+
+def _severity(judgement: Judgement) -> tuple[int, int, float]:
+    rank = WORST_FIRST.index(judgement.verdict)
+    if not isinstance(judgement, Assessment):
+        return 1, rank, 0.0
+    measured = judgement.basis is Basis.MEASURED
+    size = (
+        judgement.inspection.measured_displacement_in
+        if measured
+        else judgement.predicted_displacement_in
+    )
+    return (
+        0 if measured else 1,
+        rank,
+        float("-inf") if size is None else -abs(size) / judgement.margin_in,
+    )

@@ -21,15 +21,14 @@ from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.decision.wear_levels import normal_cdf
 from mlg_troubleshoot.gear.gear import Gear
 
-_SHOWN = 5
-_ROWS = 256
+# Repair sets that are shown, and gears searched at once. [1]
+_SHOWN, _ROWS = 5, 256
 # Standard score of the conformance probability. [1]
 SCORE = NormalDist().inv_cdf(CONFORMANCE)
 # Within this of the conformance limit a subset counts as about sufficient: how far the expansion
 # may be off. [in]
 _ABOUT_IN = 5e-4
-# A reading this far above a new part is one of a part to restore; below, restoring gains nothing.
-# [in]
+# A reading less than this above a new part: restoring the joint gains nothing. [in]
 _AS_NEW_IN = 1e-4
 
 
@@ -126,21 +125,20 @@ def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
     worn, now = removable(cases), cases.filled(cases.gear.limits_in)
     less = np.where(worn, now - cases.gear.new_parts_in, 0.0)
     over = cases.over_limit & cases.restorable
-    # A subset may hold no joint that gains nothing and must hold every joint over its limit.
+    # A subset must contain every joint over its limit, and no joint that gains nothing.
     barred = (~worn).astype(float) @ table.weights.T + over.astype(float) @ (
         1.0 - table.weights.T
     ) > 0.0
-    # Slopes fall with the clearances that are restored, and with them what the errors of the
-    # readings do.
+    # Restoring a clearance also lowers the slopes, and so the uncertainty from the other readings.
     readings = (cases.gauge_u_in * cases.measured) ** 2
     slack = np.empty(barred.shape)
     for start in range(0, len(cases), _ROWS):
         part = slice(start, start + _ROWS)
         some, gone = now[part], less[part]
-        # What bends the ensemble is found with everything restored, and goes with the square of the
-        # fall.
+        # Curvature of the other linkages: exact with everything restored, scaled to a subset by the
+        # square of its drop.
         falls = [(gone * linkage.slopes(some)) @ table.weights.T for linkage in linkages]
-        after = worst_in[part, None] - falls[0] + _bend(linkages[0], table, some, gone)
+        after = worst_in[part, None] - falls[0] + _curvature_change(linkages[0], table, some, gone)
         square = (falls[0] / np.maximum(falls[0][:, -1:], 1e-12)) ** 2
         after += _third_order(cases, some - gone, after[:, -1])[:, None] * square
         members = []
@@ -149,7 +147,7 @@ def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
             members.append(whole[:, None] - fall + (least - whole + fall[:, -1])[:, None] * square)
         geometry = _variance(members)
         model = model_uncertainty(after, cases.residual_u_in)
-        gauges = u_clearances_in[part, None] ** 2 - _calmer(
+        gauges = u_clearances_in[part, None] ** 2 - _variance_drop(
             linkages[0], table, some, gone, readings[part]
         )
         u = np.sqrt(
@@ -159,7 +157,9 @@ def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
     return Search(table, np.where(barred | ~np.isfinite(slack), -np.inf, slack))
 
 
-def _bend(linkage: Response, table: Subsets, clearance_in: Array, less_in: Array) -> Array:
+def _curvature_change(
+    linkage: Response, table: Subsets, clearance_in: Array, less_in: Array
+) -> Array:
     """What the curvature adds to the worst case with each subset restored. [in]"""
     first, second = np.triu_indices(less_in.shape[1])
     curved = linkage.worst_curvature[first, second] * np.where(first == second, 0.5, 1.0)
@@ -179,7 +179,7 @@ def _third_order(cases: Cases, least_in: Array, expanded_in: Array) -> Array:
     return np.where(np.isfinite(missed), missed, 0.0)
 
 
-def _calmer(
+def _variance_drop(
     linkage: Response, table: Subsets, clearance_in: Array, less_in: Array, variance_in2: Array
 ) -> Array:
     """What restoring each subset takes from the variance that the readings cause, to first order.
@@ -234,7 +234,7 @@ def repair_sets(cases: Cases, found: Search, wanted: Mask) -> list[tuple[RepairS
     by the exact worst case.
     """
     table = subsets_of(cases.gear)
-    chosen = _least(table, found.slack_in[wanted])
+    chosen = _quickest_sets(table, found.slack_in[wanted])
     rows, sets = (
         np.repeat(np.flatnonzero(wanted), [len(c) for c in chosen]),
         np.concatenate([*chosen, [0]])[:-1],
@@ -254,7 +254,7 @@ def repair_sets(cases: Cases, found: Search, wanted: Mask) -> list[tuple[RepairS
     return [tuple(sets) for sets in result]
 
 
-def _least(table: Subsets, slack_in: Array) -> Sequence[Places]:
+def _quickest_sets(table: Subsets, slack_in: Array) -> Sequence[Places]:
     """Places of the quickest sufficient subsets of each gear, none within another; none where none
     is needed.
     """
@@ -265,7 +265,7 @@ def _least(table: Subsets, slack_in: Array) -> Sequence[Places]:
         best = _surest(table, slack_in, open_sets)
         for row in np.flatnonzero(best > 0):
             chosen[row].append(int(best[row]))
-        # Whatever holds the set just chosen is longer: it holds as many of its joints as it has.
+        # Drop the sets that contain the set just chosen.
         open_sets &= members[best] @ members.T < members[best].sum(axis=1, keepdims=True)
     return [np.array(places, dtype=np.intp) for places in chosen]
 

@@ -13,11 +13,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, central_slopes, central_steps
 from mlg_troubleshoot.gear.directions import random_directions
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
 
+# Step of second derivatives: their rounding is divided by its square. [in]
 _STEP_IN = 1e-3
 
 
@@ -112,9 +113,9 @@ def expand(model: LinkageModel) -> Response:
     unit = np.eye(n)
     i, j = np.triu_indices(n)
     plus, minus = (unit[i] + unit[j]) * _STEP_IN, (unit[i] - unit[j]) * _STEP_IN
-    points = np.vstack([unit * 1e-5, -unit * 1e-5, plus, -plus, minus, -minus])
+    points = np.vstack([central_steps(n), plus, -plus, minus, -minus])
     moved = model.displacement(list(points.T))
-    gradient = (moved[:n] - moved[n : 2 * n]) / 2e-5
+    gradient = central_slopes(moved[: 2 * n])
     of_plus, of_minus = np.split(moved[2 * n :], 2)
     mixed = of_plus.reshape(2, -1).sum(axis=0) - of_minus.reshape(2, -1).sum(axis=0)
     curvature = np.empty((n, n))

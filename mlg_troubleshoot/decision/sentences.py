@@ -19,6 +19,7 @@ from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.plan import End, Step
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.units import Length, Sentence
 
 NO_CLOSURE = (
     "With these clearances the linkage does not close in its worst position: outside any margin."
@@ -44,6 +45,7 @@ GO_ON = {
 }
 
 
+ALL_WITHIN_LIMITS = "Every joint was measured and is within its limit."
 JOINTS_DONE = (
     "Joints are within limits. No further action on the joints; this is not a release to service."
 )
@@ -90,16 +92,23 @@ def done(*, repaired: bool) -> str:
     return _REPAIRED_DONE if repaired else JOINTS_DONE
 
 
-def check_rigging(stands_in: float | None, as_new: Sequence[int]) -> str:
+def check_rigging(stands_in: float | None, as_new: Sequence[int]) -> Sentence:
     """Step CHECK_RIGGING; `as_new`: joints that read like new parts on a gear that failed."""
-    stands = "" if stands_in is None else f" The plunger stands {stands_in:+.4f} in off."
-    said = f"Check rigging and lock roller.{stands} Enter rigging_checked: yes or corrected."
+    stands = (
+        ""
+        if stands_in is None
+        else Sentence.of(" The plunger stands {} off.", Length(stands_in, sign=True))
+    )
+    said = Sentence.of(
+        "Check rigging and lock roller.{} Enter rigging_checked: yes or corrected.", stands
+    )
     if not as_new:
         return said
-    return (
-        f"{said} If {joint_list(as_new)} were restored after the failure, enter them in"
-        " restored_joints and read the plunger again instead."
+    asked = (
+        f" If {joint_list(as_new)} were restored after the failure, enter them in restored_joints"
+        " and read the plunger again instead."
     )
+    return Sentence.of("{}{}", said, asked)
 
 
 # Landings and months after which a gear that is too close is looked at again: half of what most
@@ -156,31 +165,34 @@ class Predicted:
         """True where the prediction is an expectation, not a bound."""
         return self.displacement_in != self.bound_in
 
-    def __str__(self) -> str:
+    @property
+    def words(self) -> Sentence:
         chance = f"chance with random directions {percent(self.chance)}"
         if self.unread:
             chance += ", unread joints by their usual wear"
         if not self.read:
-            return f"no joint was read; {chance}"
+            return Sentence(f"no joint was read; {chance}")
+        displacement, bound = Length(self.displacement_in), Length(self.bound_in)
+        alone = " from the measured joints alone" if self.unread else ""
         if self.loaded:
-            return (
-                f"as loaded {self.displacement_in:.4f} in, worst case {self.bound_in:.4f} in"
-                f"{self._alone}, {chance}"
+            return Sentence.of(
+                "as loaded {}, worst case {}{}, {}", displacement, bound, alone, chance
             )
-        return f"worst case {self.displacement_in:.4f} in{self._alone}, {chance}"
-
-    @property
-    def _alone(self) -> str:
-        return " from the measured joints alone" if self.unread else ""
+        return Sentence.of("worst case {}{}, {}", displacement, alone, chance)
 
 
-def outside(margin_in: float, said: Predicted) -> str:
+def outside(margin_in: float, said: Predicted) -> Sentence:
     """Headline of OUTSIDE_MARGIN, predicted."""
     can = "push" if said.loaded else "could push"
-    return f"Clearances {can} the plunger outside its margin of {margin_in:.4f} in ({said})."
+    return Sentence.of(
+        "Clearances {} the plunger outside its margin of {} ({}).",
+        can,
+        Length(margin_in),
+        said.words,
+    )
 
 
-def measured(measured_in: float, margin_in: float, where: str) -> str:
+def measured(measured_in: float, margin_in: float, where: str) -> Sentence:
     """Where the plunger was measured: ``outside`` or ``within`` its margin; outside is said first
     and loudest.
     """
@@ -188,55 +200,75 @@ def measured(measured_in: float, margin_in: float, where: str) -> str:
         "beyond" if measured_in > 0 else "short of",
         "MEASURED" if where == "outside" else "Measured",
     )
-    stands = f"the plunger stands {abs(measured_in):.4f} in {sense} mid-position"
-    return f"{word}: {stands}, {where} its margin of {margin_in:.4f} in."
+    return Sentence.of(
+        "{}: the plunger stands {} {} mid-position, {} its margin of {}.",
+        word,
+        Length(abs(measured_in)),
+        sense,
+        where,
+        Length(margin_in),
+    )
 
 
-def explained(explained_in: float, unexplained_in: float) -> str:
+def explained(explained_in: float, unexplained_in: float) -> Sentence:
     if unexplained_in <= 0.0:
-        return "Joint clearances can explain all of it."
-    return (
-        f"Joint clearances explain at most {explained_in:.4f} in of it; {unexplained_in:.4f} in has"
-        " another cause."
+        return Sentence("Joint clearances can explain all of it.")
+    return Sentence.of(
+        "Joint clearances explain at most {} of it; {} has another cause.",
+        Length(explained_in),
+        Length(unexplained_in),
     )
 
 
 def within(
     margin_in: float, said: Predicted, *, failed: bool, clears: bool, joints_done: bool
-) -> str:
+) -> Sentence:
     """Headline of WITHIN_MARGIN."""
     then = "Continue fault isolation; not a release."
     if failed:
         then = FAILED_BUT_WITHIN if clears else FAILED_AND_UNREAD
-    then = JOINTS_DONE if joints_done else then
+    then = ALL_WITHIN_LIMITS if joints_done else then
     if not said.loaded:
-        return f"Even the worst case stays within the margin of {margin_in:.4f} in ({said}). {then}"
-    loads = f"Other loads than this fleet's could push it to {said.bound_in:.4f} in."
-    return (
-        f"Within its margin of {margin_in:.4f} in as loaded ({said.displacement_in:.4f} in)."
-        f" {loads} {then}"
+        return Sentence.of(
+            "Even the worst case stays within the margin of {} ({}). {}",
+            Length(margin_in),
+            said.words,
+            then,
+        )
+    return Sentence.of(
+        "Within its margin of {} as loaded ({}). Other loads than this fleet's could push it to {}."
+        " {}",
+        Length(margin_in),
+        Length(said.displacement_in),
+        Length(said.bound_in),
+        then,
     )
 
 
-def incomplete(open_joints: Sequence[int], said: Predicted) -> str:
+def incomplete(open_joints: Sequence[int], said: Predicted) -> Sentence:
     """Headline of INCOMPLETE."""
-    return f"Cannot clear: not measured {joint_list(open_joints)} ({said})."
+    return Sentence.of("Cannot clear: not measured {} ({}).", joint_list(open_joints), said.words)
 
 
-def entry_in_question(question: str, said: Predicted) -> str:
+def entry_in_question(question: str, said: Predicted) -> Sentence:
     """Headline of a gear whose readings must be confirmed first."""
-    return f"Cannot clear before the readings are confirmed: {question} ({said} as entered)."
+    return Sentence.of(
+        "Cannot clear before the readings are confirmed: {} ({} as entered).", question, said.words
+    )
 
 
 CONFIRM = "Do not use. Confirm the readings in question and their unit, or correct them."
 
 
-def inconclusive(margin_in: float, said: Predicted, p_within: float) -> str:
+def inconclusive(margin_in: float, said: Predicted, p_within: float) -> Sentence:
     """Headline of INCONCLUSIVE."""
     what = "the plunger" if said.loaded else "the bound"
-    return (
-        f"Too close to the margin of {margin_in:.4f} in to say ({said}; probability that {what} is"
-        f" within the margin {percent(p_within)})."
+    return Sentence.of(
+        "Too close to the margin of {} to say ({}; probability that {} is within the margin {}).",
+        Length(margin_in),
+        said.words,
+        what,
+        percent(p_within),
     )
 
 
@@ -247,11 +279,12 @@ def measure(gear: Gear, joints: Sequence[int]) -> str:
     return f"Measure, in this order: {joint_list(joints)}."
 
 
-def measure_again(joints: Sequence[int], gauge_u_needed_in: float) -> str:
+def measure_again(joints: Sequence[int], gauge_u_needed_in: float) -> Sentence:
     """Step MEASURE_AGAIN."""
-    return (
-        f"Measure {joint_list(joints)} again, with a standard uncertainty of"
-        f" {gauge_u_needed_in:.5f} in radial or less."
+    return Sentence.of(
+        "Measure {} again, with a standard uncertainty of {} radial or less.",
+        joint_list(joints),
+        Length(gauge_u_needed_in, 5),
     )
 
 
@@ -276,15 +309,17 @@ def restore(
     )
     if over:
         said += f" Above its limit, reject to the manual: {joint_list(over)}."
-    if best is not None and best.kind is RepairKind.TRY:
+    if best is None:
+        return said
+    if best.kind is RepairKind.TRY:
         chance = percent(best.second_repair_probability or 0.0)
-        said += f" Then read the plunger again; chance of a second repair {chance}."
-    elif best is not None:
-        said += (
-            f" The worst case is then {best.predicted_displacement_in:.4f}"
-            f" in{', unmeasured joints at their limit' if unread else ''}."
-        )
-    return said
+        return f"{said} Then read the plunger again; chance of a second repair {chance}."
+    return Sentence.of(
+        "{} The worst case is then {}{}.",
+        said,
+        Length(best.predicted_displacement_in),
+        ", unmeasured joints at their limit" if unread else "",
+    )
 
 
 def correct(columns: Sequence[str]) -> str:
@@ -316,8 +351,8 @@ def chance_wrong_sentence(a: Assessment) -> str | None:
         else ""
     )
     return (
-        f"Called {a.verdict.words.lower()}, the {what} of this gear lies on the other side of the"
-        f" margin with a chance of {percent(a.chance_wrong)}{unread}."
+        f"This gear is called {a.verdict.words.lower()}. The chance that its {what} lies on the"
+        f" other side of the margin is {percent(a.chance_wrong)}{unread}."
     )
 
 
@@ -330,8 +365,8 @@ def no_repair_set(a: Assessment) -> str:
     if unread:
         are = "is" if len(unread) == 1 else "are"
         return (
-            f"No set is sure to hold while {joint_list(unread)} {are} not measured: they count at"
-            " their limit here."
+            f"No repair set is certain while {joint_list(unread)} {are} not measured: unmeasured"
+            " joints count at their limit here."
         )
     return f"No {_SET_THAT_HOLDS}"
 
@@ -356,11 +391,13 @@ def older_than_the_repair(inspection: Inspection) -> list[str]:
     return said
 
 
-def rigging_sentence(rigging: Rigging) -> str:
-    return (
-        f"Re-rigging alone (plunger shifted by {rigging.shift_in:+.4f} in) would leave a worst case"
-        f" of {rigging.predicted_displacement_in:.4f} in: probability within the margin"
-        f" {percent(rigging.probability_within_margin)}, chance of leaving it with random"
-        f" directions {percent(rigging.probability_exceed_random_directions)}; the joints stay"
-        " worn."
+def rigging_sentence(rigging: Rigging) -> Sentence:
+    return Sentence.of(
+        "Re-rigging alone (plunger shifted by {}) would leave a worst case of {}: probability"
+        " within the margin {}, chance of leaving it with random directions {}; the joints stay"
+        " worn.",
+        Length(rigging.shift_in, sign=True),
+        Length(rigging.predicted_displacement_in),
+        percent(rigging.probability_within_margin),
+        percent(rigging.probability_exceed_random_directions),
     )

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from mlg_troubleshoot.decision.assessment import Verdict
 
+# Conformance probability of a verdict (JCGM 106). [1]
 CONFORMANCE = 0.95
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.decision.second_order import Response
 
+# Mean wear of a gear's joints as a share of their limit, before it is cut off at the limit. [1]
 _LEVELS = np.geomspace(0.05, 5.0, 24)
 
 

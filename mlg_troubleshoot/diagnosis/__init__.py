@@ -17,8 +17,10 @@ from mlg_troubleshoot.misfit import (
     SimulationDiagnosis,
     Suspect,
     SuspectFound,
-    Verdict,
     diagnose_simulation,
+)
+from mlg_troubleshoot.misfit import (
+    MisfitVerdict as Verdict,
 )
 
 __all__ = [
@@ -37,10 +39,18 @@ __all__ = [
     "SuspectFound",
     "Term",
     "Verdict",
+    "causes",
     "diagnose",
     "diagnose_simulation",
+    "extension",
+    "faults",
+    "inference",
     "load_causes",
     "load_extension",
+    "model_choice",
+    "noise",
+    "scene",
+    "table",
     "table_from_inspections",
     "write_extension",
 ]

@@ -12,7 +12,7 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.causes.base import Scene, levels
 
-# What the rows of one aircraft, gauge or technician may move with alone.
+# What the rows of one aircraft may move with alone.
 WITHIN = ("hydraulic_pressure_psi", "temperature_c", "gear_landings", "predicted")
 _LEAST_OF_TAIL = 6
 _PERIODS_DAYS = (120.0, 150.0, 185.0, 225.0, 275.0, 365.25)
@@ -73,10 +73,12 @@ def build_bank(scene: Scene, catalogue: Array) -> Bank:
         ]
     for tail in levels(scene.table.tails, _LEAST_OF_TAIL):
         one = scene.table.tails == tail
+        # About its mean, or from either end on: then its rows are shifted as well.
         alone = [
-            (one * (smooth[n] - np.mean(smooth[n][one])), ("tail_no", n))
+            (one * (smooth[n] - about(smooth[n][one])), ("tail_no", n))
             for n in WITHIN
             if n in smooth
+            for about in (np.mean, np.min, np.max)
         ]
         shapes += [(shape, v) for shape, v in alone if np.any(shape)]
     return _distinct(shapes, catalogue, smooth)

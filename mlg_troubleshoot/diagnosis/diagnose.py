@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
@@ -17,14 +19,12 @@ from mlg_troubleshoot.diagnosis.bank import build_bank
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
-from mlg_troubleshoot.diagnosis.causes.together import JointFactors
+from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
+from mlg_troubleshoot.diagnosis.explain import Finding, MisfitProblem, explain
 from mlg_troubleshoot.diagnosis.extension import Term
 from mlg_troubleshoot.diagnosis.faults import LEAST_ALONG, DataFault, screen_faults
 from mlg_troubleshoot.diagnosis.gain import LEAST_TAILS, Gain, measure_gain
-from mlg_troubleshoot.diagnosis.inference import Finding, Inference
-from mlg_troubleshoot.diagnosis.model_choice import infer
 from mlg_troubleshoot.diagnosis.noise import (
-    EXPECTED_SLOPE,
     Rows,
     estimate_repeatability,
     measured_uncertainty,
@@ -35,8 +35,10 @@ from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel
-from mlg_troubleshoot.misfit.screen import shrunk
-from mlg_troubleshoot.misfit.verdict import Verdict
+from mlg_troubleshoot.misfit.beliefs import Beliefs
+from mlg_troubleshoot.misfit.explanation import Key
+from mlg_troubleshoot.misfit.fitting import shrunk
+from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 from mlg_troubleshoot.units import MM_PER_IN
 
 LEAST_ROWS = 20
@@ -69,15 +71,15 @@ class NamedCause(Term):
         As in a term.
     effect_in : ndarray, shape (n_used,)
         Its effect in each row used. [in]
-    p_value : float or None
-        p-value. [1]
+    probability : float
+        Probability that something of its name acts. [1]
     aliases : tuple of Candidate
         What these rows cannot tell from it, one cause or two together: the class is named by its
         likeliest member.
     """
 
     effect_in: Array
-    p_value: float | None
+    probability: float
     aliases: tuple[Candidate, ...] = ()
 
     @property
@@ -138,8 +140,19 @@ class Diagnosis:
         Causes and the column that each lacks.
     unsaid : tuple of str
         Statements that so few rows or gears cannot carry.
+    unlisted_rms_in : float
+        Root mean square of that effect. [in]
+    probabilities : mapping of (str, str or None) to float
+        Probability that each cause acts, by its name and target. [1]
+    p_nothing, p_unlisted : float
+        Probability that nothing is wrong, and that something is that no list has. [1]
+    p_left : float
+        Probability that something else acts in addition to what is named. [1]
+    ten_times : mapping of (str, str or None) to float
+        The probability of what is named, or likeliest, if its likeliest rival, by its name and
+        target, were ten times as likely beforehand. [1]
     ruled_out : tuple of (str, str or None)
-        Rivals that explain clearly less.
+        Rivals that would explain something alone, but hardly act.
     faults, corrected : tuple of DataFault
         Data faults, and clearances that a named convention slip says were meant otherwise.
     rows_read, rows_used : int
@@ -165,18 +178,14 @@ class Diagnosis:
         Scatter of the residual. [in]
     expected_scatter_in : float or None
         What reading and clearance gauges alone would leave. [in]
-    remainder_p : float
-        Chance of as much left if only noise is left. [1]
     remainder_is_noise : bool
-        True if the residual looks like noise.
+        True if the residual is noise, more likely than not.
     used : DiagnosisTable
         The rows behind the verdict.
     predicted_in, misfit_in : ndarray, shape (n_used,)
         Prediction and misfit of these rows. [in]
-    seed : int
-        Seed.
-    permutations : int
-        Number of null simulations.
+    beliefs : Beliefs
+        What was believed beforehand.
     """
 
     verdict: Verdict
@@ -184,6 +193,12 @@ class Diagnosis:
     also_possible: tuple[NamedCause, ...]
     beside: tuple[NamedCause, ...]
     unlisted_variables: tuple[str, ...]
+    unlisted_rms_in: float
+    probabilities: Mapping[Key, float]
+    p_nothing: float
+    p_unlisted: float
+    p_left: float
+    ten_times: Mapping[Key, float]
     not_testable: tuple[tuple[str, str], ...]
     unsaid: tuple[str, ...]
     ruled_out: tuple[tuple[str, str | None], ...]
@@ -203,13 +218,11 @@ class Diagnosis:
     terms: tuple[Term, ...]
     residual_u_in: float
     expected_scatter_in: float | None
-    remainder_p: float
     remainder_is_noise: bool
     used: DiagnosisTable
     predicted_in: Array
     misfit_in: Array
-    seed: int
-    permutations: int
+    beliefs: Beliefs
 
 
 def diagnose(
@@ -219,8 +232,7 @@ def diagnose(
     *,
     own_causes: Sequence[Cause] = (),
     ensemble: Sequence[LinkageModel] = (),
-    permutations: int = 999,
-    seed: int = 0,
+    beliefs: Beliefs | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Diagnosis:
     """Compare measured outputs with the model's predictions, and name what the model gets wrong.
@@ -239,10 +251,8 @@ def diagnose(
         A user's own causes, in addition to the catalogue.
     ensemble : sequence of LinkageModel
         Other linkages that the true one may be instead, from which the cause `geometry` is made.
-    permutations : int
-        Number of null simulations.
-    seed : int
-        Seed of all randomness.
+    beliefs : Beliefs, optional
+        What is believed beforehand, and from which probability something is said.
     progress : callable, optional
         Called with the share that is done.
 
@@ -258,7 +268,7 @@ def diagnose(
     """
     # The matrices are small: threads that wait for each other cost several times what they save.
     with threadpool_limits(1, "blas"):
-        where = where or Discrepancies()
+        where, report_progress = where or Discrepancies(), progress or (lambda _share: None)
         read = len(table)
         table = _answerable(table)
         (scene, rows), faults = _without_faults(model, table, where, None)
@@ -273,38 +283,50 @@ def diagnose(
         testable = [cause for cause in catalogue if set(cause.needs) <= told]
         blind = [cause for cause in catalogue if cause not in testable]
         not_testable = tuple((c.name, next(n for n in c.needs if n not in told)) for c in blind)
-        rng = np.random.default_rng(seed)
-        case = _infer(scene, rows, (testable, blind), ensemble, permutations, rng, progress)
-        if case.finding.fit is not None:
-            # A large effect hides slips of single cells: look again with what is named taken out.
+        told_by, beliefs = (testable, blind), beliefs or Beliefs()
+        case = _explained(scene, rows, told_by, ensemble, beliefs)
+        report_progress(0.6)
+        if case.acts:
+            # A large effect hides slips of single cells: look again with what is likely taken out.
             again, more = _without_faults(model, scene.table, where, case.explained)
             if more:
                 faults = (*faults, *more)
-                case = _infer(*again, (testable, blind), ensemble, permutations, rng, progress)
-        return _report(
-            model, case.scene.table, read, faults, not_testable, case, seed, permutations, rng
-        )
+                case = _explained(*again, told_by, ensemble, beliefs)
+        report_progress(1.0)
+        return _report(model, case.scene.table, read, faults, not_testable, case)
 
 
 @dataclass(frozen=True)
 class _Case:
     """Candidates with their effects, the misfit and what the inference makes of it."""
 
-    candidates: Sequence[Candidate]
-    columns: Array
-    misfit: Array
+    problem: MisfitProblem
     finding: Finding
     scene: Scene
-    rows: Rows
+    chosen: tuple[int, ...]
+    block: Block | None
     values: Array
     covariance: Array
 
     @property
+    def acts(self) -> bool:
+        """True if some listed cause is likely to act."""
+        return self.finding.verdict in {Verdict.NAMED, Verdict.AMBIGUOUS}
+
+    @property
+    def columns(self) -> Array:
+        """Effects of what is reported to act, the all-joint ones last. [in / unit]"""
+        held = self.problem.columns[:, list(self.chosen)]
+        return held if self.block is None else np.hstack([held, self.block.columns])
+
+    @property
     def explained(self) -> Array:
-        """What is named does to each row. [in]"""
-        block = self.finding.block
-        held = self.columns[:, list(self.finding.chosen)]
-        return (held if block is None else np.hstack([held, block.columns])) @ self.values
+        """What is likely to act does to each row. [in]"""
+        return np.asarray(self.columns @ self.values)
+
+    def effect(self, place: int) -> Array:
+        """What one of the chosen does to each row. [in]"""
+        return np.asarray(self.columns[:, place] * self.values[place])
 
 
 def _without_faults(
@@ -328,15 +350,14 @@ def _without_faults(
     return plain, faults
 
 
-def _infer(
+def _explained(
     scene: Scene,
     rows: Rows,
     causes: tuple[Sequence[Cause], Sequence[Cause]],
     ensemble: Sequence[LinkageModel],
-    permutations: int,
-    rng: np.random.Generator,
-    progress: Callable[[float], None] | None,
+    beliefs: Beliefs,
 ) -> _Case:
+    """Say what may explain the rows, and fit the likeliest explanation of what is said."""
     table, (testable, blind) = scene.table, causes
     candidates = [candidate for cause in testable for candidate in cause.candidates(scene)]
     candidates += [candidate for cause in blind for candidate in cause.stand_ins(scene)]
@@ -351,27 +372,37 @@ def _infer(
         for b in cause.blocks(scene, ensemble)
     ]
     _comparable(table.measured_in, scene.over_in, scene.contribution_in, ~table.along)
-    misfit = table.measured_in - scene.over_in
-    bank = build_bank(scene, columns)
 
+    @cache
     def columns_in(other: LinkageModel) -> Array:
         changed = scene_at(other, table, scene.where, scene.clearance_in, scene.drawn_share)
         return np.nan_to_num(effect_columns(changed, candidates))
 
-    whole = Inference(
-        misfit, rows, candidates, columns, bank, permutations, rng, progress, columns_in=columns_in
+    problem = MisfitProblem(
+        table.measured_in - scene.over_in,
+        rows,
+        candidates,
+        columns,
+        build_bank(scene, columns),
+        blocks,
+        (*testable, *blind),
+        columns_in,
+        beliefs,
     )
-    finding = infer(whole, blocks)
-    values, covariance = np.empty(0), np.empty((0, 0))
-    if finding.fit is not None:
-        values, covariance = finding.fit.values, np.diag(finding.fit.errors**2)
-        if finding.block is not None:
-            held, block = columns[:, list(finding.chosen)], finding.block
-            expected = misfit - EXPECTED_SLOPE * scene.over_in
-            values, covariance = shrunk(
-                finding.noise, held, block.columns, block.covariance, expected
-            )
-    return _Case(candidates, columns, misfit, finding, scene, rows, values, covariance)
+    finding = explain(problem)
+    best, effects = finding.best, finding.posterior.effects
+    chosen = tuple(k for k in best.members if k < len(candidates))
+    others = [k for k in best.members if k >= len(candidates)]
+    block = blocks[best.context - 1] if best.context else None
+    known, spread = effects.columns[:, others], np.diag(effects.size[others] ** 2)
+    if block is not None:
+        known = np.hstack([block.columns, known])
+        spread = block_diag(block.covariance, spread)
+    values, covariance = shrunk(
+        finding.noise, columns[:, list(chosen)], known, spread, problem.expected
+    )
+    count = len(chosen) + (0 if block is None else block.columns.shape[1])
+    return _Case(problem, finding, scene, chosen, block, values[:count], covariance[:count, :count])
 
 
 def _answerable(table: DiagnosisTable) -> DiagnosisTable:
@@ -526,34 +557,37 @@ def _enough(table: DiagnosisTable) -> None:
         )
 
 
-def _report(  # noqa: PLR0913 - everything that a diagnosis says
+def _report(
     model: LinkageModel,
     table: DiagnosisTable,
     rows_read: int,
     faults: tuple[DataFault, ...],
     not_testable: tuple[tuple[str, str], ...],
     case: _Case,
-    seed: int,
-    permutations: int,
-    rng: np.random.Generator,
 ) -> Diagnosis:
-    misfit, finding = case.misfit, case.finding
-    verdict = Verdict.NAMED if finding.sure else finding.verdict
+    misfit, finding = case.problem.misfit, case.finding
     causes, open_ = _told(case)
     read = np.isfinite(table.clearance_in)
     seen = np.asarray(read.any(axis=0))
     latent = np.where(seen, 0.0, case.scene.clearance_in)
     raw = predicted(model, table, np.where(read, table.clearance_in, latent))[0]
     raw_misfit = table.measured_in - raw
-    gain = _gain(case, rng) if verdict is Verdict.NAMED else None
+    gain = _gain(case) if finding.verdict is Verdict.NAMED else None
     left = misfit - np.sum([cause.effect_in for cause in causes], axis=0)
     repeatability, source = estimate_repeatability(table)
+    chances = finding.posterior
     return Diagnosis(
-        verdict=verdict,
+        verdict=finding.verdict,
         causes=causes,
         also_possible=() if causes else open_,
         beside=open_ if causes else (),
         unlisted_variables=finding.variables,
+        unlisted_rms_in=finding.unlisted_rms_in,
+        probabilities=finding.probabilities,
+        p_nothing=chances.nothing,
+        p_unlisted=chances.unlisted,
+        p_left=finding.left,
+        ten_times=finding.ten_times,
         not_testable=not_testable,
         unsaid=_unsaid(table),
         ruled_out=finding.ruled_out,
@@ -563,41 +597,49 @@ def _report(  # noqa: PLR0913 - everything that a diagnosis says
         rows_used=len(set(table.record_id)),
         unread=tuple(n for n, some in zip(model.joint_numbers, seen, strict=True) if not some),
         unread_in=float(np.mean(case.scene.contribution_in[:, ~seen].sum(axis=1))),
-        unread_u_in=float(np.sqrt(np.mean(np.sum(case.rows.unread_in**2, axis=1)))),
+        unread_u_in=float(np.sqrt(np.mean(np.sum(case.problem.rows.unread_in**2, axis=1)))),
         mean_in=float(np.mean(raw_misfit)),
         rms_in=float(np.sqrt(np.mean(raw_misfit**2))),
         repeatability_in=repeatability if np.isfinite(repeatability) else None,
         repeatability_source=source,
         smallest_rms_in=finding.smallest_rms_in,
         gain=gain,
-        terms=() if gain is None else tuple(cause for cause in causes if cause.predicts),
+        # What makes aircraft that it was not fitted to no likelier is not written.
+        terms=(
+            tuple(cause for cause in causes if cause.predicts)
+            if gain is not None and gain.likelier
+            else ()
+        ),
         residual_u_in=float(np.std(left)),
         expected_scatter_in=_expected_scatter(model, table, repeatability),
-        remainder_p=finding.remainder_p,
-        # Where nothing stands out beyond chance, the residual is noise by the same test.
-        remainder_is_noise=verdict is Verdict.NONE
-        or (finding.verdict is Verdict.NAMED and finding.remainder_p > 0.05),
+        remainder_is_noise=finding.left < 0.5,
         used=table,
         predicted_in=case.scene.over_in,
         misfit_in=misfit,
-        seed=seed,
-        permutations=permutations,
+        beliefs=case.problem.beliefs,
     )
 
 
-def _gain(case: _Case, rng: np.random.Generator) -> Gain:
+def _gain(case: _Case) -> Gain:
     """What the extension gains on tails that it was not fitted to, on rows if it is about one tail.
 
     What else acts, being one of a set, is noise of the size that it was found with.
     """
-    finding, columns, block = case.finding, case.columns, case.finding.block
-    noise, firm = finding.noise, list(finding.firm)
-    if finding.sure:
-        others = [place for place, k in enumerate(finding.chosen) if k not in finding.sure]
-        noise = noise.beside(columns[:, list(finding.chosen)][:, others] * case.values[others])
-        noise, block = noise if block is None else noise.beside(block.effects_in), None
+    noise, block, said = case.finding.noise, case.block, case.finding.said
+    keys = [case.problem.candidates[k].key for k in case.chosen]
+    firm = [place for place, key in enumerate(keys) if key in said]
+    others = [case.effect(place)[:, None] for place in range(len(keys)) if place not in firm]
+    if block is not None and (block.cause.name, None) not in said:
+        others, block = [*others, block.effects_in], None
+    if others:
+        noise = noise.beside(np.hstack(others))
     return measure_gain(
-        noise, columns[:, firm], case.misfit, case.scene.over_in, case.scene.table, rng, block
+        noise,
+        case.columns[:, firm],
+        case.problem.misfit,
+        case.scene.over_in,
+        case.scene.table,
+        block,
     )
 
 
@@ -618,35 +660,41 @@ def _corrected(
 
 
 def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
-    """The causes that are named, by effect, and the set of those that the data cannot separate."""
-    finding, block = case.finding, case.finding.block
-    fitted: list[tuple[NamedCause, bool]] = []
-    p_values = (*finding.p_values, *[None] * len(finding.chosen))
-    for place, k in enumerate(finding.chosen if finding.fit is not None else ()):
+    """The causes that are named, by effect, and those of which something acts, the likeliest
+    first.
+    """
+    finding, candidates = case.finding, case.problem.candidates
+    fitted: dict[Key, NamedCause] = {}
+    for place, k in enumerate(case.chosen):
         value, error = float(case.values[place]), float(np.sqrt(case.covariance[place, place]))
-        effect = case.columns[:, k] * value
-        found = NamedCause(
-            case.candidates[k], value, _interval(value, error), effect, p_values[place]
+        key = candidates[k].key
+        fitted[key] = NamedCause(
+            candidates[k],
+            value,
+            _interval(value, error),
+            case.effect(place),
+            finding.probability(key),
         )
-        fitted.append((found, k in finding.firm))
-    if block is not None:
-        k = len(finding.chosen)
-        change, candidate = (
-            case.values[k:],
-            block.candidate(case.values[k:], case.covariance[k:, k:]),
+    if case.block is not None:
+        k, key = len(case.chosen), (case.block.cause.name, None)
+        change = case.values[k:]
+        candidate = case.block.candidate(change, case.covariance[k:, k:])
+        fitted[key] = NamedCause(
+            candidate,
+            1.0,
+            (1.0, 1.0),
+            case.block.columns @ change,
+            finding.probability(key),
+            tuple(case.problem.candidate(other) for other in finding.aliases),
         )
-        effect = block.columns @ change
-        found = NamedCause(candidate, 1.0, (1.0, 1.0), effect, finding.block_p, finding.aliases)
-        fitted.append((found, finding.verdict is Verdict.NAMED))
-    fitted.sort(key=lambda told: -told[0].effect_rms_in)
-    rivals = [case.candidates[k] for k in finding.rivals]
-    rivals += [] if finding.rival is None else [Candidate(finding.rival.cause)]
-    none = np.zeros(len(case.misfit))
-    possible = [NamedCause(candidate, 0.0, (0.0, 0.0), none, None) for candidate in rivals]
-    return tuple(c for c, firm in fitted if firm), (
-        *(c for c, firm in fitted if not firm),
-        *possible,
-    )
+    none = np.zeros(len(case.problem.misfit))
+
+    def found(key: Key) -> NamedCause:
+        rival = case.problem.candidate(key, finding.posterior)
+        return fitted.get(key) or NamedCause(rival, 0.0, (0.0, 0.0), none, finding.probability(key))
+
+    named = sorted((found(key) for key in finding.said), key=lambda cause: -cause.effect_rms_in)
+    return tuple(named), tuple(found(key) for key in finding.open)
 
 
 def _interval(value: float, error: float) -> tuple[float, float]:

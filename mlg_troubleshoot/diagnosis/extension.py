@@ -7,13 +7,25 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Literal
 
+import msgspec
 import numpy as np
 import tomli_w
+from msgspec import Meta
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.datafile import DataTable, read_toml
+from mlg_troubleshoot.datafile import (
+    LARGEST,
+    DataFile,
+    Name,
+    Number,
+    Pair,
+    RefusedValueError,
+    Table,
+    Whole,
+    read_toml,
+)
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
@@ -30,11 +42,41 @@ from mlg_troubleshoot.gear.gear import Discrepancies, Gear
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.outputs import OutputKind, write_text
 
-SCHEMA = 1
 _HEADING = "# Extension of the model by a diagnosis of measured displacements.\n"
 EXTENSION = OutputKind.marked("is not an extension of the model", _HEADING)
 # No plunger moves further; a larger scatter would clear nothing and reject nothing. [in]
 MOST_IN = 1.0
+
+
+class TermTable(Table):
+    """A named cause with its fitted parameter; setting: what the cause fixes in addition."""
+
+    cause: str
+    value: Number
+    interval_95: Pair
+    words: str = ""
+    parameter: str = ""
+    target: str | None = None
+    setting: dict[Name, str | Number | Whole | tuple[Whole, ...] | dict[Name, Number]] = (
+        msgspec.field(default_factory=dict)
+    )
+
+    def __post_init__(self) -> None:
+        if self.interval_95[0] > self.interval_95[1]:
+            raise RefusedValueError("interval_95", "two numbers, the smaller one first")
+
+
+class ExtensionFile(Table):
+    """An extension of the model, as ``mlg diagnose`` writes it."""
+
+    schema: Literal[1]
+    geometry_sha256: str
+    data_sha256: tuple[str, ...]
+    rows: Annotated[int, Meta(ge=1, le=LARGEST)]
+    residual_u_in: Annotated[float, Meta(gt=0, le=MOST_IN)]
+    terms: Annotated[tuple[TermTable, ...], Meta(min_length=1, description="at least one term")]
+    gear: str = ""
+    unread_joints: tuple[Whole, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -168,25 +210,26 @@ def write_extension(extension: ModelExtension, file: Path) -> None:
     terms = []
     for term in extension.terms:
         cause, candidate = term.candidate.cause, term.candidate
-        entry: dict[str, Any] = {
-            "words": term.words(),
-            "cause": cause.name,
-            "parameter": cause.parameter,
-            "value": term.value,
-            "interval_95": list(term.interval),
-        }
-        if candidate.target is not None:
-            entry["target"] = candidate.target
         setting = {k: v for k, v in candidate.setting.items() if v is not None}
-        terms.append(entry | ({"setting": setting} if setting else {}))
+        terms.append(
+            {
+                "words": term.words(),
+                "cause": cause.name,
+                "parameter": cause.parameter,
+                "value": term.value,
+                "interval_95": term.interval,
+                **({} if candidate.target is None else {"target": candidate.target}),
+                **({"setting": setting} if setting else {}),
+            }
+        )
     whole = {
-        "schema": SCHEMA,
+        "schema": 1,
         "gear": extension.gear.id,
         "geometry_sha256": extension.gear.geometry_sha256,
-        "data_sha256": list(extension.data_sha256),
+        "data_sha256": extension.data_sha256,
         "rows": extension.rows,
         "residual_u_in": extension.residual_u_in,
-        "unread_joints": list(extension.unread),
+        "unread_joints": extension.unread,
         "terms": terms,
     }
     write_text(file, _HEADING + tomli_w.dumps(whole))
@@ -219,24 +262,18 @@ def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ())
     rows, residual, unread = 0, float("nan"), set[int]()
     known = {cause.name: cause for cause in (*CATALOGUE, *own)}
     for file in files:
-        raw = read_toml(file, "Give a file that mlg diagnose wrote.")
-        raw.skip("gear")
-        if raw.whole("schema") != SCHEMA:
-            raise raw.fail("schema", f"{SCHEMA}, as mlg diagnose writes it")
-        if raw.text("geometry_sha256") != gear.geometry_sha256:
+        read = read_toml(file, ExtensionFile, "Give a file that mlg diagnose wrote.")
+        found = read.content
+        if found.geometry_sha256 != gear.geometry_sha256:
             raise GearFileError(
                 f"{file}: this extension was made on another geometry"
-                f" ({raw.text('geometry_sha256')[:12]} instead of {gear.geometry_sha256[:12]})",
+                f" ({found.geometry_sha256[:12]} instead of {gear.geometry_sha256[:12]})",
                 "Diagnose again with this gear, or name the gear that it was made on with --gear.",
             )
-        rows, residual = raw.whole("rows", least=1), raw.positive("residual_u_in", most=MOST_IN)
-        unread |= set(raw.wholes("unread_joints"))
-        hashes += raw.texts("data_sha256")
-        added = [_term(entry, known, gear) for entry in raw.tables("terms")]
-        if not added:
-            raise raw.fail("terms", "at least one term")
-        raw.finish()
-        terms += added
+        rows, residual = found.rows, found.residual_u_in
+        unread |= set(found.unread_joints)
+        hashes += found.data_sha256
+        terms += [_term(read, index, known, gear) for index in range(len(found.terms))]
     return ModelExtension(gear, tuple(terms), residual, tuple(hashes), rows, tuple(sorted(unread)))
 
 
@@ -261,47 +298,25 @@ def _tried_out(term: Term, gear: Gear) -> float:
     return float(adjusted_worst_case(gear.model, adjustment).magnitude_in[0])
 
 
-def _term(entry: DataTable, known: Mapping[str, Cause], gear: Gear) -> Term:
-    entry.skip("words", "parameter")
-    name = entry.text("cause")
-    if name not in known:
-        raise entry.fail(
-            "cause", "the name of a cause; give the file of your own causes with --causes"
+def _term(
+    file: DataFile[ExtensionFile], index: int, known: Mapping[str, Cause], gear: Gear
+) -> Term:
+    read, place = file.content.terms[index], ("terms", index)
+    if read.cause not in known:
+        raise file.fail(
+            (*place, "cause"),
+            "the name of a cause; give the file of your own causes with --causes",
         )
-    setting = _setting(entry.table("setting")) if entry.has("setting") else {}
-    target = entry.text("target") if entry.has("target") else None
-    term = Term(
-        Candidate(known[name], target, setting), entry.number("value"), entry.rising("interval_95")
-    )
-    entry.finish()
+    candidate = Candidate(known[read.cause], read.target, read.setting)
+    term = Term(candidate, read.value, read.interval_95)
     try:
         moved = _tried_out(term, gear)
     except (KeyError, TypeError, ValueError, TroubleshootError) as error:
-        raise entry.fail("setting", f"what {name} needs of this gear ({error})") from error
+        needed = f"what {read.cause} needs of this gear ({error})"
+        raise file.fail((*place, "setting"), needed) from error
     if not moved <= MOST_IN:
-        raise entry.fail(
-            "value", f"a number that leaves the plunger within {MOST_IN:g} in of its place"
+        raise file.fail(
+            (*place, "value"),
+            f"a number that leaves the plunger within {MOST_IN:g} in of its place",
         )
     return term
-
-
-def _setting(setting: DataTable) -> dict[str, Any]:
-    """What a cause fixes in addition to its parameter: texts, numbers, lists of joints, numbers by
-    name.
-    """
-    read: dict[str, Any] = {}
-    for key in setting.names:
-        value = setting.get(key)
-        if isinstance(value, dict):
-            part = setting.table(key)
-            read[key] = {name: part.number(name) for name in part.names}
-        elif isinstance(value, list):
-            read[key] = setting.wholes(key)
-        else:
-            whole = isinstance(value, int)
-            read[key] = (
-                setting.text(key)
-                if isinstance(value, str)
-                else (setting.whole if whole else setting.number)(key)
-            )
-    return read

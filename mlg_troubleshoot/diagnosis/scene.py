@@ -21,7 +21,7 @@ from mlg_troubleshoot.diagnosis.wear import (
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.gear import Discrepancies
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
-from mlg_troubleshoot.misfit.screen import fit
+from mlg_troubleshoot.misfit.fitting import fit
 
 # Doubt whether clearances were read as well as declared: standard deviation of the share of the
 # declared error. [1]

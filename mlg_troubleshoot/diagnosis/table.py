@@ -11,14 +11,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.arrays import Array, Mask, Wholes
+from mlg_troubleshoot.decision.columns import (
+    ACTUATOR_EXTENSION,
+    AXIAL_FLOAT,
+    COVARIATES,
+    DATE,
+    SIDE,
+    TAIL_NO,
+    Holds,
+)
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.gear.gear import Gear
 
 Texts = NDArray[np.str_]
 
-FACTORS = ("tail_no", "side", "gauge_id", "technician_id", "approach")
-QUANTITIES = ("temperature_c", "hydraulic_pressure_psi", "gear_landings", "day")
-ALONG = "actuator_extension_in"
+_TEXTS = tuple(c for c in COVARIATES if c.holds in (Holds.TEXT, Holds.CHOICE))
+ALONG = ACTUATOR_EXTENSION.filled
+FACTORS = tuple(column.variable for column in _TEXTS)
+QUANTITIES = tuple(c.variable for c in COVARIATES if c not in (*_TEXTS, ACTUATOR_EXTENSION))
 
 
 @dataclass(frozen=True)
@@ -43,12 +53,10 @@ class DiagnosisTable:
     gauge_u_in : ndarray, shape (n,)
         Standard uncertainty of one radial clearance. [in]
     quantities : mapping of str to ndarray of shape (n,)
-        Numbers by name: ``temperature_c`` [°C], ``hydraulic_pressure_psi`` [psi],
-        ``gear_landings``, ``day`` (days since the earliest date), ``actuator_extension_in`` (of
-        rows along the stroke), or a user's own.
+        Numbers by name: covariates of the table of columns, ``day`` (days since the earliest
+        date), the extension of rows along the stroke, or a user's own.
     factors : mapping of str to ndarray of str of shape (n,)
-        Texts by name: ``tail_no``, ``side``, ``gauge_id``, ``technician_id``, ``approach``, or a
-        user's own.
+        Texts by name: covariates of the table of columns, or a user's own.
     axial_float_in : ndarray, shape (n, n_joints), or None
         End floats, NaN where not measured. [in]
     first_day : str or None
@@ -94,16 +102,16 @@ class DiagnosisTable:
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the covariates that the table has."""
-        floats = ("axial_float",) if self.axial_float_in is not None else ()
+        floats = (AXIAL_FLOAT.variable,) if self.axial_float_in is not None else ()
         return (*self.quantities, *self.factors, *floats)
 
     @property
     def gears(self) -> Texts:
         """The single gear of each row, tail and side, shape (n,)."""
-        tail = self.factors.get("tail_no")
+        tail = self.factors.get(TAIL_NO.variable)
         if tail is None:
             return np.array([str(i) for i in range(len(self))])
-        side = self.factors.get("side")
+        side = self.factors.get(SIDE.variable)
         if side is None:
             return tail
         return np.array([f"{t} {s}" for t, s in zip(tail, side, strict=True)])
@@ -111,7 +119,7 @@ class DiagnosisTable:
     @property
     def tails(self) -> Texts:
         """The aircraft of each row, shape (n,); each row its own where no tail is given."""
-        tail = self.factors.get("tail_no")
+        tail = self.factors.get(TAIL_NO.variable)
         return np.array([str(i) for i in range(len(self))]) if tail is None else tail
 
     def take(self, rows: Any) -> DiagnosisTable:
@@ -185,20 +193,12 @@ def table_from_inspections(
     ]
     known = [day for day in days if day is not None]
     first = min(known) if known else None
-    quantities: dict[str, list[float | None]] = {
-        "temperature_c": [i.temperature_c for i in inspections],
-        "hydraulic_pressure_psi": [i.hydraulic_pressure_psi for i in inspections],
-        "gear_landings": [i.gear_landings for i in inspections],
-        "day": [None if day is None or first is None else day - first for day in days],
-        ALONG: [None if np.isnan(at) else at for at in stroke.tolist()],
+    given: dict[str, Sequence[float | None]] = {
+        c.variable: [i.value(c.filled) for i in inspections] for c in COVARIATES if c not in _TEXTS
     }
-    factors: dict[str, list[str]] = {
-        "tail_no": [i.tail_no for i in inspections],
-        "side": [str(i.side) for i in inspections],
-        "gauge_id": [i.gauge_id or "" for i in inspections],
-        "technician_id": [i.technician_id or "" for i in inspections],
-        "approach": ["" if i.approach is None else str(i.approach) for i in inspections],
-    }
+    given[DATE.variable] = [None if day is None or first is None else day - first for day in days]
+    given[ALONG] = [None if np.isnan(at) else at for at in stroke.tolist()]
+    factors = {c.variable: [str(i.value(c.filled) or "") for i in inspections] for c in _TEXTS}
     declared = [
         np.nan if i.plunger_gauge_u_in is None else i.plunger_gauge_u_in for i in inspections
     ]
@@ -215,7 +215,7 @@ def table_from_inspections(
         gauge_u_in=np.array([i.gauge_u_in for i in inspections]),
         quantities={
             name: np.array([np.nan if v is None else v for v in values], float)
-            for name, values in quantities.items()
+            for name, values in given.items()
             if any(v is not None for v in values)
         },
         factors={name: np.array(values) for name, values in factors.items() if any(values)},

@@ -1,0 +1,13 @@
+"""One gear type: its file, joints and limits, and how far worn joints move the plunger."""
+
+__all__ = [
+    "DEFAULT_GEAR",
+    "adjustment",
+    "design",
+    "directions",
+    "gear",
+    "gear_file",
+    "model",
+]
+
+DEFAULT_GEAR = "hawker-800xp"

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Places
-from mlg_troubleshoot.gear.directions import WorstCase, worst_case
+from mlg_troubleshoot.arrays import STEP, Array, Places
+from mlg_troubleshoot.gear.directions import IN_CACHE, WorstCase, worst_case
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 
 
@@ -82,3 +82,22 @@ def adjusted_worst_case(model: LinkageModel, adjustment: Adjustment) -> WorstCas
     if adjustment.offset_in is not None:
         over, under = over + adjustment.offset_in, under + adjustment.offset_in
     return WorstCase(over, under, plain.over_directions, plain.under_directions)
+
+
+def adjusted_slopes(model: LinkageModel, adjustment: Adjustment, worst: WorstCase) -> Array:
+    """Amplification of each clearance to the plunger at the clearances that act, directions held,
+    shape (n, n_joints): central differences. [1]
+    """
+    clearance, joints = adjustment.clearance_in, adjustment.clearance_in.shape[1]
+    directions, changed = worst.governing_directions, adjustment.numbers(model)
+    steps = STEP * np.concatenate([np.eye(joints), -np.eye(joints)])[:, None, :]
+    factors = 1.0 if adjustment.direction_factors is None else adjustment.direction_factors
+    slopes = np.empty_like(clearance)
+    at_once = max(IN_CACHE // len(steps), 1)
+    for start in range(0, len(clearance), at_once):
+        rows = slice(start, start + at_once)
+        links = links_from((clearance[rows] + steps) * factors, directions[rows])
+        moved = model.displacement(links, {name: each[rows] for name, each in changed.items()})
+        slopes[rows] = (moved[:joints] - moved[joints:]).T / (2 * STEP)
+    rate = 1.0 if adjustment.rate_factor is None else adjustment.rate_factor[:, None]
+    return np.asarray(rate * slopes)

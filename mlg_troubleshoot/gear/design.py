@@ -28,7 +28,7 @@ class DesignSpace:
         self.mechanism = m = given.mechanism
         base = [p for p in m.points if p.plane == m.planes[0].name]
         self.held = next((p for p in base if p.fixed and p.virtual_link is not None), base[0])
-        others = [p for p in base if p is not self.held and _apart(p, self.held) > 0.0]
+        others = [p for p in base if p is not self.held and _distance(p, self.held) > 0.0]
         level = (
             [p for p in others if p.y == self.held.y and not p.fixed]
             or [p for p in others if p.fixed]
@@ -58,7 +58,7 @@ class DesignSpace:
         base = m.planes[0].name
         turn = np.arctan2(self.guide.y - self.held.y, self.guide.x - self.held.x)
         back = turn - np.arctan2(guide.y - held.y, guide.x - held.x)
-        values: list[float] = [_apart(guide, held)]
+        values: list[float] = [_distance(guide, held)]
         for point in map(m.point, self.points):
             x, y = point.x, point.y
             if point.plane == base and (back or (held.x, held.y) != (self.held.x, self.held.y)):
@@ -156,7 +156,7 @@ def _plain(part: Any) -> Any:
     )
 
 
-def _apart(a: Point, b: Point) -> float:
+def _distance(a: Point, b: Point) -> float:
     return float(np.hypot(a.x - b.x, a.y - b.y))
 
 

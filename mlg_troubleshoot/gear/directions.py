@@ -10,24 +10,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import STEP, Array
 from mlg_troubleshoot.gear.model import LinkageModel
 
+# Directions around a joint among which the worst one is bracketed. [rad]
 _ANGLES = 2.0 * np.pi * np.arange(8) / 8
 _ROOT_HALF = np.sqrt(0.5)
 # A joint without clearance still has a direction in which it would act: found with this length.
-_PROBE_IN = 1e-5
+_PROBE_IN = STEP
 _ROWS = 512
-# Positions solved at once: twice as many no longer stay in the cache and take half as long again,
-# each.
-_IN_CACHE = 4096
+# Positions solved at once. Twice as many do not fit the cache: each then takes 1.5 times as long.
+IN_CACHE = 4096
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class WorstCase:
     """Worst displacement of each gear in both senses, with the directions that give it.
 
@@ -42,12 +43,12 @@ class WorstCase:
     over_directions: Array
     under_directions: Array
 
-    @property
+    @cached_property
     def magnitude_in(self) -> Array:
         """The larger of the two in magnitude. [in]"""
         return np.maximum(self.over_in, -self.under_in)
 
-    @property
+    @cached_property
     def governing_directions(self) -> Array:
         """Directions of the sense that governs. [rad]"""
         over = (self.over_in >= -self.under_in)[:, None]
@@ -66,32 +67,39 @@ def worst_case(
     clearance_in, shape (n, n_joints): radial clearances. [in]
     changed, shape (n,): numbers of the linkage that differ from the nominal ones, row by row.
     """
-    over, over_directions = worst_of_sense(model, clearance_in, 1.0, changed)
-    under, under_directions = worst_of_sense(model, clearance_in, -1.0, changed)
-    return WorstCase(over, under, over_directions, under_directions)
+    clearance = np.atleast_2d(np.asarray(clearance_in, float))
+    n = len(clearance)
+    # Both senses at once: each step of the search solves the mechanism for all of them.
+    moved, directions = worst_of_sense(
+        model,
+        np.concatenate([clearance, clearance]),
+        np.repeat([1.0, -1.0], n),
+        {name: np.tile(np.broadcast_to(value, n), 2) for name, value in (changed or {}).items()},
+    )
+    return WorstCase(moved[:n], moved[n:], directions[:n], directions[n:])
 
 
 def worst_of_sense(
     model: LinkageModel,
     clearance_in: Array,
-    sense: float = 1.0,
+    sense: Array | float = 1.0,
     changed: Mapping[str, Array] | None = None,
 ) -> tuple[Array, Array]:
     """Find the worst displacement of one sense, over-travel if 1 and under-travel if −1, and its
-    directions.
+    directions; the sense may differ from row to row.
     """
     clearance = np.atleast_2d(np.asarray(clearance_in, float))
     n, joints = clearance.shape
-    moved, angles = np.empty(n), np.empty((n, joints))
+    moved, angles, senses = np.empty(n), np.empty((n, joints)), np.broadcast_to(sense, n)
     for start in range(0, n, _ROWS):
         rows = slice(start, min(start + _ROWS, n))
         part = {name: np.asarray(value)[rows] for name, value in (changed or {}).items()}
-        moved[rows], angles[rows] = _sequential(model, clearance[rows], sense, part)
+        moved[rows], angles[rows] = _sequential(model, clearance[rows], senses[rows], part)
     return moved, angles
 
 
 def _sequential(
-    model: LinkageModel, clearance: Array, sense: float, changed: Mapping[str, Array]
+    model: LinkageModel, clearance: Array, sense: Array, changed: Mapping[str, Array]
 ) -> tuple[Array, Array]:
     n, joints = clearance.shape
     # Gears run along the last axis: every operation then works on long rows of memory.
@@ -182,7 +190,7 @@ def chance_beyond(
     cosines, sines = np.ascontiguousarray(np.cos(turns).T), np.ascontiguousarray(np.sin(turns).T)
     chance = np.empty(len(clearance))
     margin = np.asarray(margin_in)
-    rows = max(1, _IN_CACHE // n)
+    rows = max(1, IN_CACHE // n)
     for start in range(0, len(clearance), rows):
         part = slice(start, start + rows)
         c = clearance[part]

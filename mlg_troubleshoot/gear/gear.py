@@ -4,18 +4,51 @@ well.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Mask
-from mlg_troubleshoot.gear.cycle import RetractionCycle
-from mlg_troubleshoot.gear.joints import ROUNDING_IN, JointSpec
+from mlg_troubleshoot.arrays import Array, Mask, frozen
+from mlg_troubleshoot.datafile import Table, Whole
+from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.model import Calibration, LinkageModel
-from mlg_troubleshoot.gear.sources import Sourced
 from mlg_troubleshoot.geometry.mechanism import Mechanism
+
+# 0.1905 mm is 0.0075000000000000006 in to a computer: no gauge reads a difference of 1e-9 in.
+ROUNDING_IN = 1e-9
+
+
+class SourceKind(StrEnum):
+    """How much a number is worth."""
+
+    TECHNICAL_ORDER = "technical order"
+    STATED = "stated in the paper"
+    RECONSTRUCTED = "reconstructed"
+    MEASURED = "measured"
+    ASSUMED = "assumed"
+
+
+class Source(Table):
+    """A source in words, which numbers of a gear file refer to by name: document, section, how it
+    was obtained.
+    """
+
+    kind: SourceKind
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Sourced:
+    """A number with its unit and its source in words."""
+
+    value: float
+    unit: str
+    kind: SourceKind
+    source: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,18 +71,16 @@ class Area:
     access: Sourced
 
 
-@dataclass(frozen=True, slots=True)
-class TiltedLink:
+class TiltedLink(Table):
     """A link whose projected length shrinks when end float of its joints (of a lever: of its pivot)
     lets it tilt.
     """
 
     length: str
-    floats: tuple[int, ...]
+    floats: tuple[Whole, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Discrepancies:
+class Discrepancies(Table):
     """Where inside the linkage physical causes outside the plain model act.
 
     elastic: lengths that hydraulic load stretches.
@@ -60,8 +91,84 @@ class Discrepancies:
 
     elastic: tuple[str, ...] = ()
     wear_shift: str | None = None
-    contact: tuple[tuple[int, int], ...] = ()
+    contact: tuple[tuple[Whole, Whole], ...] = ()
     tilt: tuple[TiltedLink, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class JointSpec:
+    """A joint as the gear file describes it; its number is also that of its virtual link.
+
+    limit, new_part: radial clearance that the manual allows at most, and that a restored joint has.
+    [in] access, restore: time to measure it, and to restore it, once its area is open. [min]
+    critical: true if no gear can be cleared before this joint is measured (joints 1 to 5 of
+    the paper).
+    """
+
+    number: int
+    point: str
+    name: str
+    location: str
+    limit: Sourced
+    new_part: Sourced
+    access: Sourced
+    restore: Sourced
+    area: str
+    critical: bool
+
+    def is_over_limit(self, clearance_in: float) -> bool:
+        """Tell whether a clearance is above the limit, beyond the rounding of a conversion from
+        another unit.
+        """
+        return clearance_in > self.limit.value + ROUNDING_IN
+
+    @property
+    def label(self) -> str:
+        """Number and name: ``#3 short link inner bearing``."""
+        return f"#{self.number} {self.name}"
+
+
+class Stage(Table):
+    """One of the four stages of the cycle, with the position of the plunger in it: in, mid or
+    out.
+    """
+
+    name: str
+    meaning: str
+    plunger: str
+
+
+class ValveState(Table):
+    """What follows from a position of the plunger and a direction of the oil flow; it may be "not
+    stated".
+    """
+
+    plunger: str
+    flow: str
+    stage: str
+    result: str
+
+
+class RetractionCycle(Table):
+    """Steps of the release, order of doors and gear, valve combinations, and what a misplaced
+    plunger means.
+    """
+
+    stages: tuple[Stage, ...]
+    release: tuple[str, ...]
+    retraction_order: tuple[str, ...]
+    extension_order: tuple[str, ...]
+    valve: tuple[ValveState, ...]
+    beyond: str
+    short: str
+    within: str
+    source: str
+
+    def symptom(self, displacement_in: float, margin_in: float) -> str:
+        """Say what a plunger at this displacement means, in the source's terms."""
+        if abs(displacement_in) <= margin_in:
+            return self.within
+        return self.beyond if displacement_in > 0 else self.short
 
 
 @dataclass(frozen=True)
@@ -162,15 +269,15 @@ class Gear:
         """Calibrate one linkage of this gear."""
         return LinkageModel(linkage.mechanism, linkage.stroke, self.calibration)
 
-    @property
+    @cached_property
     def joint_numbers(self) -> tuple[int, ...]:
         """Numbers of the joints, in the order of the mechanism."""
         return tuple(joint.number for joint in self.joints)
 
-    @property
+    @cached_property
     def limits_in(self) -> Array:
         """Largest allowed radial clearance of each joint, shape (n_joints,). [in]"""
-        return np.array([joint.limit.value for joint in self.joints])
+        return frozen([joint.limit.value for joint in self.joints])
 
     def over_limit(self, clearance_in: Array) -> Mask:
         """Which clearances are above their limits, shape (…, n_joints): as
@@ -178,22 +285,22 @@ class Gear:
         """
         return np.asarray(clearance_in > self.limits_in + ROUNDING_IN)
 
-    @property
+    @cached_property
     def new_parts_in(self) -> Array:
         """Radial clearance of each joint with a new part. [in]"""
-        return np.array([joint.new_part.value for joint in self.joints])
+        return frozen([joint.new_part.value for joint in self.joints])
 
-    @property
+    @cached_property
     def access_minutes(self) -> Array:
         """How long each joint takes to reach and measure once its area is open. [min]"""
-        return np.array([joint.access.value for joint in self.joints])
+        return frozen([joint.access.value for joint in self.joints])
 
-    @property
+    @cached_property
     def critical(self) -> Mask:
         """Which joints no gear can be cleared without."""
         return np.array([joint.critical for joint in self.joints])
 
-    @property
+    @cached_property
     def link_groups(self) -> tuple[tuple[int, ...], ...]:
         """Joints at both ends of one link together, which the plunger cannot distinguish, the
         others each alone.
@@ -208,6 +315,16 @@ class Gear:
             for group in self.link_groups
             for n in group
         }
+
+    def require_joints(self, numbers: Iterable[int], what: str = "") -> None:
+        """Refuse numbers of joints that this gear does not have; `what` names the option."""
+        unknown = sorted(set(numbers) - set(self.joint_numbers))
+        if unknown:
+            given = f"{what} {unknown[0]}: " if what else ""
+            raise UsageError(
+                f"{given}{self.name} has no joint {unknown[0]}",
+                f"Its joints are {', '.join(map(str, self.joint_numbers))}.",
+            )
 
     def joint(self, number: int) -> JointSpec:
         """Return the joint of that number; `KeyError` if the gear has none."""

@@ -6,21 +6,43 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from copy import deepcopy
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
-from mlg_troubleshoot.datafile import DataTable, read_toml
+from mlg_troubleshoot.datafile import (
+    DataFile,
+    Name,
+    Number,
+    Pair,
+    RefusedValueError,
+    Sibling,
+    Table,
+    decode,
+    read_toml,
+    walk,
+)
 from mlg_troubleshoot.errors import GearFileError, UsageError
-from mlg_troubleshoot.gear.cycle import RetractionCycle, Stage, ValveState
-from mlg_troubleshoot.gear.gear import Area, Discrepancies, Gear, Linkage, TiltedLink
-from mlg_troubleshoot.gear.joints import JointSpec
+from mlg_troubleshoot.gear import DEFAULT_GEAR
+from mlg_troubleshoot.gear.gear import (
+    Area,
+    Discrepancies,
+    Gear,
+    JointSpec,
+    Linkage,
+    RetractionCycle,
+    Source,
+    Sourced,
+    SourceKind,
+)
 from mlg_troubleshoot.gear.model import Calibration
-from mlg_troubleshoot.gear.sources import Source, Sourced, SourceKind
 from mlg_troubleshoot.geometry.mechanism import (
     Crank,
     Dyad,
@@ -35,13 +57,8 @@ from mlg_troubleshoot.geometry.mechanism import (
 )
 from mlg_troubleshoot.geometry.program import write_program
 
-DEFAULT_GEAR = "hawker-800xp"
 _DATA = Path(str(files("mlg_troubleshoot.gear"))) / "data"
-# Nothing of a landing gear is longer, and no angle needs more than two turns; far beyond, formulas
-# overflow.
-_LENGTH, _ANGLE = {"least": -1e4, "most": 1e4}, {"least": -720.0, "most": 720.0}
-_LARGEST = {"in": 1e4, "min": 1e5, "landings": 1e6, "1": 0.5}
-# What a gear file need not state, and what stands for it.
+# What a gear file need not state, and what stands for it, assumed.
 _UNSTATED = {
     "restore_min": 120.0,
     "read_min": 12.0,
@@ -51,7 +68,287 @@ _UNSTATED = {
     "minutes": 30.0,
     "retraction_min": 15.0,
 }
+
+# Nothing of a landing gear is longer, and no angle needs more than two turns; far beyond, formulas
+# overflow.
+Coordinate = Annotated[float, Meta(ge=-1e4, le=1e4)]
+Length = Annotated[float, Meta(gt=0, le=1e4)]
+Angle = Annotated[float, Meta(ge=-720, le=720)]
+Minutes = Annotated[float, Meta(gt=0, le=1e5)]
+LinkNumber = Annotated[int, Meta(ge=1, le=999)]
+
+
+def _need_source(table: Table, key: str, *numbers: float | None) -> None:
+    if getattr(table, key) is None and any(number is not None for number in numbers):
+        raise RefusedValueError(key, "a text")
+
+
+class InputTable(Table):
+    """The input of a linkage, in inches or radians."""
+
+    name: str
+    range: tuple[Coordinate, Coordinate]
+    reference: Coordinate
+    source: str
+
+    def __post_init__(self) -> None:
+        if self.range[0] == self.range[1]:
+            raise RefusedValueError("range", "two different numbers")
+
+
+class PlaneTable(Table):
+    """A plane; one with a parent is hinged to it."""
+
+    name: Name
+    parent: Name | None = None
+    hinge_point: Name | None = None
+    hinge_direction_deg: Angle | None = None
+    dihedral_deg: Angle | None = None
+    source: str | None = None
+
+    def __post_init__(self) -> None:
+        for key, expected in (
+            ("hinge_point", "the name of a point"),
+            ("hinge_direction_deg", "a number"),
+            ("dihedral_deg", "a number"),
+            ("source", "a text"),
+        ):
+            if (getattr(self, key) is None) != (self.parent is None):
+                raise RefusedValueError(key, expected if self.parent else "it with a parent only")
+
+    def plane(self) -> Plane:
+        direction, dihedral = self.hinge_direction_deg or 0.0, self.dihedral_deg or 0.0
+        turned = float(np.radians(direction)), float(np.radians(dihedral))
+        return Plane(self.name, self.parent, self.hinge_point or "", *turned)
+
+
+class PointTable(Table):
+    """A point of a linkage, in inches."""
+
+    name: Name
+    plane: Name
+    at: tuple[Coordinate, Coordinate]
+    source: str
+    fixed: bool = False
+    virtual_link: LinkNumber | None = None
+
+
+class StepTable(Table, tag_field="type"):
+    """How a joint is located; virtual_links: those of the joints at both ends."""
+
+    joint: Name
+    source: str
+    virtual_links: tuple[LinkNumber, ...] = ()
+
+
+class CrankTable(StepTable, tag="crank", kw_only=True):
+    pivot: Name
+
+
+class LeverTable(StepTable, tag="lever", kw_only=True):
+    pivot: Name
+    follows: Name
+
+
+class SlotTable(StepTable, tag="slot", kw_only=True):
+    pivot: Name
+    pin: Name
+
+
+class SignedTable(StepTable, kw_only=True):
+    """A step with two solutions, of which the sign takes one."""
+
+    upstream: Name
+    sign: Number
+
+    def __post_init__(self) -> None:
+        if self.sign not in (1.0, -1.0):
+            raise RefusedValueError("sign", "+1 or -1")
+
+
+class DyadTable(SignedTable, tag="dyad", kw_only=True):
+    downstream: Name
+    driven: bool = False
+
+
+class SliderTable(SignedTable, tag="slider", kw_only=True):
+    axis_deg: Angle
+
+
+class OutputTable(Table):
+    """What a linkage is for."""
+
+    kind: Literal["position", "angle"]
+    joint: Name
+    pivot: Name | None = None
+
+
+class CalibrationTable(Table):
+    """The plunger at Down Lock and its travel, in inches."""
+
+    down_lock: Coordinate
+    travel: Length
+    down_lock_range: tuple[Coordinate, Coordinate]
+    source: str
+
+    def __post_init__(self) -> None:
+        if self.down_lock_range[0] > self.down_lock_range[1]:
+            raise RefusedValueError("down_lock_range", "two numbers, the smaller one first")
+
+
+class GeometryTable(Table):
+    """What the hash of a geometry is made of."""
+
+    input: InputTable
+    planes: tuple[PlaneTable, ...]
+    points: tuple[PointTable, ...]
+    steps: tuple[CrankTable | DyadTable | LeverTable | SlotTable | SliderTable, ...]
+    output: OutputTable
+    calibration: CalibrationTable | None = None
+
+
+class LengthTable(Table):
+    """One length with its source, in inches."""
+
+    value: Length
+    source: str
+
+
+class EntryTable(Table):
+    """Radial clearances that no reading may exceed, and above which it is asked again."""
+
+    hard_limit: Length
+    confirm_above: Length
+    source: str
+
+
+class PlungerTable(Table):
+    """How long it takes to read the plunger."""
+
+    read_min: Minutes | None = None
+    source: str | None = None
+
+    def __post_init__(self) -> None:
+        _need_source(self, "source", self.read_min)
+
+
+class RiggingCheckTable(Table):
+    """How long it takes to check rigging and lock roller."""
+
+    minutes: Minutes | None = None
+    source: str | None = None
+
+    def __post_init__(self) -> None:
+        _need_source(self, "source", self.minutes)
+
+
+class RepairTable(Table):
+    """Which chance of a second repair is accepted, and how long a trial retraction takes."""
+
+    second_repair_chance: Annotated[float, Meta(gt=0, le=0.5)] | None = None
+    retraction_min: Minutes | None = None
+    source: str | None = None
+
+    def __post_init__(self) -> None:
+        _need_source(self, "source", self.second_repair_chance, self.retraction_min)
+
+
+class ForecastTable(Table):
+    """How far forecasts look ahead, and which chance is accepted."""
+
+    horizon_landings: Annotated[float, Meta(gt=0, le=1e6)] | None = None
+    accepted_chance: Annotated[float, Meta(gt=0, le=0.5)] | None = None
+    source: str | None = None
+
+    def __post_init__(self) -> None:
+        _need_source(self, "source", self.horizon_landings, self.accepted_chance)
+
+
+class JointTable(Table):
+    """A joint; lengths are radial, in inches, times in minutes."""
+
+    number: LinkNumber
+    name: Name
+    location: str
+    limit: Length
+    limit_source: str
+    new_part: Annotated[float, Meta(ge=0, le=1e4)]
+    new_part_source: str
+    access_min: Minutes
+    access_source: str
+    area: Name
+    restore_min: Minutes | None = None
+    restore_source: str | None = None
+    point: Name | None = None
+    critical: bool = False
+
+    def __post_init__(self) -> None:
+        _need_source(self, "restore_source", self.restore_min)
+
+
+class AreaTable(Table):
+    """An area that is opened once for all joints in it."""
+
+    name: Name
+    description: str
+    access_min: Annotated[float, Meta(ge=0, le=1e5)]
+    source: str
+
+
+class DiscrepancyTable(Discrepancies, kw_only=True):
+    """Where a diagnosis may change the model, with the source of that."""
+
+    source: str
+
+
+class GearFile(GeometryTable, kw_only=True):
+    """A gear file: numbers name their source by its key in ``sources``."""
+
+    schema: Literal[1]
+    id: Name
+    name: Name
+    provenance: str
+    sources: dict[Name, Source]
+    margin: LengthTable
+    bearing_span: LengthTable
+    entry: EntryTable
+    joints: tuple[JointTable, ...]
+    areas: tuple[AreaTable, ...]
+    ensemble: Sibling | None = None
+    indices: Sibling | None = None
+    plunger: PlungerTable = PlungerTable()
+    rigging_check: RiggingCheckTable = RiggingCheckTable()
+    repair: RepairTable = RepairTable()
+    forecast: ForecastTable = ForecastTable()
+    diagnosis: DiscrepancyTable | None = None
+    cycle: RetractionCycle | None = None
+
+
+class MemberTable(Table):
+    """A linkage of the ensemble, by the numbers in which it differs from the gear file."""
+
+    range: Pair
+    reference: Number
+    points: dict[Name, Pair]
+    steps: dict[Name, dict[Name, Number]]
+    planes: dict[Name, dict[Name, Number]] = msgspec.field(default_factory=dict)
+
+
+class EnsembleFile(Table):
+    """Further linkages that reproduce the published numbers."""
+
+    source: str
+    members: dict[Name, MemberTable]
+
+
 _GEOMETRY_KEYS = ("input", "planes", "points", "steps", "output", "calibration")
+_STEPS: dict[type[StepTable], type[Step]] = {
+    CrankTable: Crank,
+    DyadTable: Dyad,
+    LeverTable: Lever,
+    SlotTable: Slot,
+    SliderTable: Slider,
+}
 
 
 def shipped_gears() -> tuple[str, ...]:
@@ -60,13 +357,13 @@ def shipped_gears() -> tuple[str, ...]:
     return tuple(sorted(n for n in names if not n.endswith(("-ensemble", "-targets"))))
 
 
-def load_gear(name_or_path: str | Path = DEFAULT_GEAR) -> Gear:
+def load_gear(name_or_path: str | Path | Gear = DEFAULT_GEAR) -> Gear:
     """Load a gear by its shipped name or from a gear file; a file is read anew each time.
 
     Parameters
     ----------
-    name_or_path : str or Path
-        ``hawker-800xp``, or the path of a TOML file.
+    name_or_path : str, Path or Gear
+        ``hawker-800xp``, or the path of a TOML file; a gear is returned as it is.
 
     Returns
     -------
@@ -82,6 +379,8 @@ def load_gear(name_or_path: str | Path = DEFAULT_GEAR) -> Gear:
     MechanismError
         If the linkage cannot be assembled.
     """
+    if isinstance(name_or_path, Gear):
+        return name_or_path
     text = str(name_or_path)
     if text in shipped_gears():
         return _shipped(text)
@@ -100,40 +399,54 @@ def _shipped(name: str) -> Gear:
 
 
 def _read(path: Path) -> Gear:
-    table = read_toml(path)
-    if table.whole("schema") != 1:
-        raise table.fail("schema", "1")
-    sources = _sources(table.table("sources"))
-    numbers = _Numbers(sources)
-    reference = _linkage(table, "A", numbers)
+    file = read_toml(path, GearFile)
+    _check_sources(file)
+    found = file.content
+    numbers = _Numbers(found.sources)
+    _add_numbers(found, numbers)
+    reference = _linkage(found, "A")
     members: dict[str, dict[str, Any]] = {}
     ensemble_path = path
-    if table.has("ensemble"):
-        ensemble_path = table.sibling("ensemble", "")
-        members = _members(table.values, ensemble_path)
-    calibration, down_lock_range = _calibration(table, numbers)
-    entry = table.table("entry")
-    table.skip(*_GEOMETRY_KEYS)
-    (plunger_reading,) = _not_needed(table, "plunger", numbers, read_min="min")
-    second_repair, retraction = _not_needed(
-        table, "repair", numbers, second_repair_chance="1", retraction_min="min"
+    if found.ensemble is not None:
+        ensemble_path = path.with_name(found.ensemble)
+        members = _members(file.values, ensemble_path)
+    calibration, down_lock_range = _calibration(found.calibration, numbers)
+    plunger, forecast, entry = found.plunger, found.forecast, found.entry
+    plunger_reading = numbers.or_assumed("read_min", plunger.read_min, "min", plunger.source)
+    rigging, repair = found.rigging_check, found.repair
+    rigging_check = numbers.or_assumed("minutes", rigging.minutes, "min", rigging.source)
+    second_repair, retraction = (
+        numbers.or_assumed(key, value, unit, repair.source)
+        for key, value, unit in (
+            ("second_repair_chance", repair.second_repair_chance, "1"),
+            ("retraction_min", repair.retraction_min, "min"),
+        )
     )
-    (rigging_check,) = _not_needed(table, "rigging_check", numbers, minutes="min")
-    horizon, accepted = _not_needed(
-        table, "forecast", numbers, horizon_landings="landings", accepted_chance="1"
+    horizon, accepted = (
+        numbers.or_assumed(key, value, unit, forecast.source)
+        for key, value, unit in (
+            ("horizon_landings", forecast.horizon_landings, "landings"),
+            ("accepted_chance", forecast.accepted_chance, "1"),
+        )
     )
-    indices_file = table.sibling("indices", f"{path.stem}-indices.json")
+    indices_file = path.with_name(found.indices or f"{path.stem}-indices.json")
     gear = Gear(
-        id=table.name("id"),
-        name=table.name("name"),
-        provenance=table.text("provenance"),
+        id=found.id,
+        name=found.name,
+        provenance=found.provenance,
         reference=reference,
         ensemble=(
             reference,
-            *(_linkage(DataTable(m, ensemble_path), n, None) for n, m in members.items()),
+            *(
+                _linkage(decode(ensemble_path, member, GeometryTable), name)
+                for name, member in members.items()
+            ),
         ),
-        joints=tuple(_joint(t, numbers) for t in table.tables("joints")),
-        areas=tuple(_area(t, numbers) for t in table.tables("areas")),
+        joints=tuple(_joint(joint, numbers) for joint in found.joints),
+        areas=tuple(
+            Area(a.name, a.description, numbers.add(a.access_min, "min", a.source))
+            for a in found.areas
+        ),
         plunger_reading=plunger_reading,
         rigging_check=rigging_check,
         retraction=retraction,
@@ -141,18 +454,16 @@ def _read(path: Path) -> Gear:
         horizon=horizon,
         accepted_chance=accepted,
         calibration=calibration,
-        margin=numbers.only(table.table("margin"), "in"),
-        bearing_span=numbers.only(table.table("bearing_span"), "in"),
-        hard_limit=numbers.read(entry, "hard_limit", "in"),
-        confirm_above=numbers.read(entry, "confirm_above", "in"),
+        margin=numbers.add(found.margin.value, "in", found.margin.source),
+        bearing_span=numbers.add(found.bearing_span.value, "in", found.bearing_span.source),
+        hard_limit=numbers.add(entry.hard_limit, "in", entry.source),
+        confirm_above=numbers.add(entry.confirm_above, "in", entry.source),
         down_lock_range=down_lock_range,
-        discrepancies=_discrepancies(table, reference.mechanism, numbers),
-        cycle=_cycle(table.table("cycle")) if table.has("cycle") else None,
+        discrepancies=_discrepancies(file, reference.mechanism),
+        cycle=found.cycle,
         numbers=tuple(numbers.found),
-        geometry_sha256=_sha256({k: table.values.get(k) for k in _GEOMETRY_KEYS}),
-        ensemble_sha256=_sha256(
-            {n: {k: m.get(k) for k in _GEOMETRY_KEYS} for n, m in members.items()}
-        ),
+        geometry_sha256=_sha256({k: file.values.get(k) for k in _GEOMETRY_KEYS}),
+        ensemble_sha256=_sha256(members),
         path=path,
         indices_file=indices_file,
         files=tuple(
@@ -161,8 +472,6 @@ def _read(path: Path) -> Gear:
             )
         ),
     )
-    entry.finish()
-    table.finish()
     _check_joints(gear, path)
     return gear
 
@@ -171,283 +480,136 @@ def _sha256(value: Any) -> str:
     return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
 
 
+def _check_sources(file: DataFile[GearFile]) -> None:
+    """Refuse a source that is not described; that of the cycle stands in words."""
+    known = file.content.sources
+    for place, value in walk(file.values):
+        names_one = str(place[-1:]).endswith("source',)") and place[0] != "cycle"
+        if names_one and value not in known:
+            raise file.fail(place, f"one of the sources {', '.join(known)}")
+
+
 class _Numbers:
-    """Reads numbers with their sources and remembers them all."""
+    """Gathers numbers with their sources."""
 
     def __init__(self, sources: dict[str, Source]) -> None:
         self.sources = sources
         self.found: list[Sourced] = []
 
-    def source(self, table: DataTable, key: str = "source") -> Source:
-        name = table.text(key)
-        if name not in self.sources:
-            raise table.fail(key, f"one of the sources {', '.join(self.sources)}")
-        return self.sources[name]
-
-    def add(self, value: float, unit: str, source: Source) -> Sourced:
-        number = Sourced(value, unit, source.kind, source.text)
+    def add(self, value: float, unit: str, source: str | Source) -> Sourced:
+        known = source if isinstance(source, Source) else self.sources[source]
+        number = Sourced(float(value), unit, known.kind, known.text)
         self.found.append(number)
         return number
 
-    def read(
-        self,
-        table: DataTable,
-        key: str,
-        unit: str,
-        source_key: str = "source",
-        *,
-        or_zero: bool = False,
-    ) -> Sourced:
-        """Read a number that cannot be negative."""
-        number = table.positive(key, or_zero=or_zero, most=_LARGEST[unit])
-        return self.add(number, unit, self.source(table, source_key))
-
-    def or_assumed(
-        self, table: DataTable, key: str, unit: str = "min", source_key: str = "source"
-    ) -> Sourced:
-        """Read a number that a gear file need not state: it is then assumed, and says so."""
-        if table.has(key):
-            return self.read(table, key, unit, source_key)
+    def or_assumed(self, key: str, value: float | None, unit: str, source: str | None) -> Sourced:
+        """Add a number that a gear file need not state: it is then assumed, and says so."""
+        if value is not None and source is not None:
+            return self.add(value, unit, source)
         shown = f"{_UNSTATED[key]:g}{'' if unit == '1' else f' {unit}'}"
         text = f"Not stated in the gear file: {shown} is assumed by the authors of this tool."
-        return self.add(_UNSTATED[key], unit, Source("unstated", SourceKind.ASSUMED, text))
-
-    def only(self, table: DataTable, unit: str) -> Sourced:
-        """Read a table that holds one value and its source, and nothing else."""
-        number = self.read(table, "value", unit)
-        table.finish()
-        return number
+        return self.add(_UNSTATED[key], unit, Source(kind=SourceKind.ASSUMED, text=text))
 
 
-def _sources(table: DataTable) -> dict[str, Source]:
-    sources = {}
-    for name in table.names:
-        entry = table.table(name)
-        kind = SourceKind(entry.one_of("kind", tuple(SourceKind)))
-        sources[name] = Source(name, kind, entry.text("text"))
-        entry.finish()
-    return sources
+def _add_numbers(table: GeometryTable, numbers: _Numbers) -> None:
+    """Add the numbers of a linkage with their sources."""
+    for value in (*table.input.range, table.input.reference):
+        numbers.add(value, "in", table.input.source)
+    for plane in table.planes:
+        for angle in (plane.hinge_direction_deg, plane.dihedral_deg):
+            if angle is not None and plane.source is not None:
+                numbers.add(angle, "deg", plane.source)
+    for point in table.points:
+        for value in point.at:
+            numbers.add(value, "in", point.source)
+    for step in table.steps:
+        if isinstance(step, SliderTable):
+            numbers.add(step.axis_deg, "deg", step.source)
 
 
-def _linkage(table: DataTable, name: str, numbers: _Numbers | None) -> Linkage:
-    """Read the mechanism; numbers of the reference are remembered with their sources."""
-
-    def sourced(entry: DataTable, *values: tuple[float, str]) -> None:
-        if numbers is not None:
-            source = numbers.source(entry)
-            for value, unit in values:
-                numbers.add(value, unit, source)
-        elif entry.has("source"):
-            entry.text("source")
-
-    drive = table.table("input")
-    stroke, reference = drive.pair("range", **_LENGTH), drive.number("reference", **_LENGTH)
-    if stroke[0] == stroke[1]:
-        raise drive.fail("range", "two different numbers")
-    drive.text("name")
-    sourced(drive, (stroke[0], "in"), (stroke[1], "in"), (reference, "in"))
-    drive.finish()
-    planes = []
-    for entry in table.tables("planes"):
-        if entry.has("parent"):
-            direction, dihedral = (
-                entry.number("hinge_direction_deg", **_ANGLE),
-                entry.number("dihedral_deg", **_ANGLE),
-            )
-            names = entry.name("name"), entry.name("parent"), entry.name("hinge_point")
-            planes.append(Plane(*names, float(np.radians(direction)), float(np.radians(dihedral))))
-            sourced(entry, (direction, "deg"), (dihedral, "deg"))
-        else:
-            planes.append(Plane(entry.name("name")))
-        entry.finish()
-    points = []
-    for entry in table.tables("points"):
-        x, y = entry.pair("at", **_LENGTH)
-        link = entry.whole("virtual_link", least=1, most=999) if entry.has("virtual_link") else None
-        points.append(
-            Point(entry.name("name"), entry.name("plane"), x, y, entry.flag("fixed"), link)
-        )
-        sourced(entry, (x, "in"), (y, "in"))
-        entry.finish()
-    steps = []
-    for entry in table.tables("steps"):
-        step = _step(entry)
-        steps.append(step)
-        sourced(entry, *([(entry.number("axis_deg"), "deg")] if isinstance(step, Slider) else []))
-        entry.finish()
-    read = table.table("output")
-    kind = read.text("kind")
-    if kind not in ("position", "angle"):
-        raise read.fail("kind", "position or angle")
-    pivot = read.name("pivot") if read.has("pivot") else ""
-    output = Output("position" if kind == "position" else "angle", read.name("joint"), pivot)
-    read.finish()
-    mechanism = Mechanism(tuple(planes), tuple(points), tuple(steps), output, reference)
-    return Linkage(name, mechanism, stroke)
+def _linkage(table: GeometryTable, name: str) -> Linkage:
+    drive = table.input
+    points = (Point(p.name, p.plane, *p.at, p.fixed, p.virtual_link) for p in table.points)
+    read = table.output
+    mechanism = Mechanism(
+        tuple(plane.plane() for plane in table.planes),
+        tuple(points),
+        tuple(map(_step, table.steps)),
+        Output(read.kind, read.joint, read.pivot or ""),
+        drive.reference,
+    )
+    return Linkage(name, mechanism, drive.range)
 
 
-def _step(t: DataTable) -> Step:
-    joint, links = t.name("joint"), t.wholes("virtual_links")
-    if not all(1 <= link <= 999 for link in links):
-        raise t.fail("virtual_links", "whole numbers from 1 to 999")
-    match t.text("type"):
-        case "crank":
-            return Crank(joint, t.name("pivot"), links)
-        case "dyad":
-            return Dyad(
-                joint, t.name("upstream"), t.name("downstream"), _sign(t), links, t.flag("driven")
-            )
-        case "lever":
-            return Lever(joint, t.name("pivot"), t.name("follows"), links)
-        case "slot":
-            return Slot(joint, t.name("pivot"), t.name("pin"), links)
-        case "slider":
-            return Slider(
-                joint,
-                t.name("upstream"),
-                float(np.radians(t.number("axis_deg", **_ANGLE))),
-                _sign(t),
-                links,
-            )
-        case _:
-            raise t.fail("type", "crank, dyad, lever, slot or slider")
-
-
-def _sign(table: DataTable) -> float:
-    sign = table.number("sign")
-    if sign not in (1.0, -1.0):
-        raise table.fail("sign", "+1 or -1")
-    return sign
+def _step(table: StepTable) -> Step:
+    values = msgspec.structs.asdict(table)
+    del values["source"]
+    if isinstance(table, SliderTable):
+        values["axis"] = float(np.radians(values.pop("axis_deg")))
+    return _STEPS[type(table)](**values)
 
 
 def _members(raw: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:
     """Each member of the ensemble as a full description: the reference with its own numbers in
     place.
     """
-    table = read_toml(path)
-    table.text("source")
-    members = table.table("members")
+    file = read_toml(path, EnsembleFile)
     full = {}
-    for name in members.names:
-        member = members.table(name)
+    for name, member in file.content.members.items():
         new: dict[str, Any] = deepcopy({k: raw.get(k) for k in _GEOMETRY_KEYS})
-        new["input"].update(range=list(member.pair("range")), reference=member.number("reference"))
-        points = member.table("points")
-        for point in points.names:
-            _entry(new["points"], "name", point, points)["at"] = list(points.pair(point))
-        for part, key in (("planes", "name"), ("steps", "joint")):
-            changes = (
-                member.table(part) if member.has(part) or part == "steps" else DataTable({}, path)
-            )
-            for name_of in changes.names:
-                change = changes.table(name_of)
-                _entry(new[part], key, name_of, changes).update(
-                    {k: change.number(k) for k in change.names}
-                )
-        member.finish()
+        new["input"].update(range=list(member.range), reference=member.reference)
+        changes: dict[str, Mapping[str, Mapping[str, object]]] = {
+            "points": {point: {"at": list(at)} for point, at in member.points.items()},
+            "planes": member.planes,
+            "steps": member.steps,
+        }
+        for part, of_names in changes.items():
+            key = "joint" if part == "steps" else "name"
+            entries = {entry.get(key): entry for entry in new[part]}
+            for name_of, change in of_names.items():
+                if name_of not in entries:
+                    place = ("members", name, part, name_of)
+                    raise file.fail(place, f"a {key} of the gear file")
+                entries[name_of].update(change)
         full[name] = new
-    table.finish()
     return full
 
 
-def _entry(entries: list[dict[str, Any]], key: str, value: str, table: DataTable) -> dict[str, Any]:
-    for entry in entries:
-        if entry.get(key) == value:
-            return entry
-    raise table.fail(value, f"a {key} of the gear file")
-
-
-def _calibration(table: DataTable, numbers: _Numbers) -> tuple[Calibration, tuple[float, float]]:
-    if not table.has("calibration"):
+def _calibration(
+    table: CalibrationTable | None, numbers: _Numbers
+) -> tuple[Calibration, tuple[float, float]]:
+    if table is None:
         return Calibration(), (-np.inf, np.inf)
-    entry = table.table("calibration")
-    down_lock = numbers.add(entry.number("down_lock", **_LENGTH), "in", numbers.source(entry))
-    found = Calibration(down_lock.value, numbers.read(entry, "travel", "in").value)
-    allowed = entry.rising("down_lock_range", **_LENGTH)
-    for end in allowed:
-        numbers.add(end, "in", numbers.source(entry))
-    entry.finish()
-    return found, allowed
+    for value in (table.down_lock, table.travel, *table.down_lock_range):
+        numbers.add(value, "in", table.source)
+    return Calibration(table.down_lock, table.travel), table.down_lock_range
 
 
-def _joint(t: DataTable, numbers: _Numbers) -> JointSpec:
-    joint = JointSpec(
-        number=t.whole("number", least=1, most=999),
-        point=t.name("point", str(t.whole("number"))),
-        name=t.name("name"),
-        location=t.text("location"),
-        limit=numbers.read(t, "limit", "in", "limit_source"),
-        new_part=numbers.read(t, "new_part", "in", "new_part_source", or_zero=True),
-        access=numbers.read(t, "access_min", "min", "access_source"),
-        restore=numbers.or_assumed(t, "restore_min", source_key="restore_source"),
-        area=t.name("area"),
-        critical=t.flag("critical"),
+def _joint(table: JointTable, numbers: _Numbers) -> JointSpec:
+    return JointSpec(
+        number=table.number,
+        point=table.point or str(table.number),
+        name=table.name,
+        location=table.location,
+        limit=numbers.add(table.limit, "in", table.limit_source),
+        new_part=numbers.add(table.new_part, "in", table.new_part_source),
+        access=numbers.add(table.access_min, "min", table.access_source),
+        restore=numbers.or_assumed("restore_min", table.restore_min, "min", table.restore_source),
+        area=table.area,
+        critical=table.critical,
     )
-    t.finish()
-    return joint
 
 
-def _not_needed(table: DataTable, name: str, numbers: _Numbers, **units: str) -> list[Sourced]:
-    """Read a table of numbers that a gear file need not have."""
-    entry = table.table(name) if table.has(name) else DataTable({}, Path())
-    read = [numbers.or_assumed(entry, key, unit) for key, unit in units.items()]
-    entry.finish()
-    return read
-
-
-def _area(t: DataTable, numbers: _Numbers) -> Area:
-    area = Area(
-        t.name("name"), t.text("description"), numbers.read(t, "access_min", "min", or_zero=True)
-    )
-    t.finish()
-    return area
-
-
-def _discrepancies(table: DataTable, mechanism: Mechanism, numbers: _Numbers) -> Discrepancies:
-    if not table.has("diagnosis"):
+def _discrepancies(file: DataFile[GearFile], mechanism: Mechanism) -> Discrepancies:
+    found = file.content.diagnosis
+    if found is None:
         return Discrepancies()
-    entry = table.table("diagnosis")
-    numbers.source(entry)
     known = write_program(mechanism).parameters
-    found = Discrepancies(
-        elastic=entry.texts("elastic") if entry.has("elastic") else (),
-        wear_shift=entry.text("wear_shift") if entry.has("wear_shift") else None,
-        contact=entry.pairs("contact"),
-        tilt=tuple(TiltedLink(t.text("length"), t.wholes("floats")) for t in entry.tables("tilt")),
-    )
-    used = (
-        *found.elastic,
-        *(t.length for t in found.tilt),
-        *((found.wear_shift,) if found.wear_shift else ()),
-    )
-    for name in used:
-        if name not in known:
-            raise entry.fail(
-                "elastic, tilt or wear_shift", f"a number of the linkage instead of {name!r}"
-            )
-    entry.finish()
+    for name in (*found.elastic, *(t.length for t in found.tilt), found.wear_shift or ""):
+        if name and name not in known:
+            place = ("diagnosis", "elastic, tilt or wear_shift")
+            raise file.fail(place, f"a number of the linkage instead of {name!r}")
     return found
-
-
-def _cycle(t: DataTable) -> RetractionCycle:
-    cycle = RetractionCycle(
-        stages=tuple(
-            Stage(s.text("name"), s.text("meaning"), s.text("plunger")) for s in t.tables("stages")
-        ),
-        release=t.texts("release"),
-        retraction_order=t.texts("retraction_order"),
-        extension_order=t.texts("extension_order"),
-        valve=tuple(
-            ValveState(v.text("plunger"), v.text("flow"), v.text("stage"), v.text("result"))
-            for v in t.tables("valve")
-        ),
-        beyond=t.text("beyond"),
-        short=t.text("short"),
-        within=t.text("within"),
-        source=t.text("source"),
-    )
-    t.finish()
-    return cycle
 
 
 def _check_joints(gear: Gear, path: Path) -> None:

@@ -8,13 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import Array, central_slopes, central_steps
 from mlg_troubleshoot.errors import MechanismError
 from mlg_troubleshoot.geometry.kernel import Kernel
 from mlg_troubleshoot.geometry.mechanism import Mechanism
-
-# Step of central differences. [in]
-_STEP_IN = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,10 +115,8 @@ class LinkageModel:
         """Amplification index A_iP of each joint to the plunger at mid-position (Eq. 8), for small
         clearances. [1]
         """
-        n = 2 * len(self.joint_numbers)
-        steps = np.vstack([np.eye(n), -np.eye(n)]) * _STEP_IN
-        moved = self.displacement([steps[:, i] for i in range(n)])
-        gradient = (moved[:n] - moved[n:]) / (2 * _STEP_IN)
+        steps = central_steps(2 * len(self.joint_numbers))
+        gradient = central_slopes(self.displacement(list(steps.T)))
         return np.hypot(gradient[0::2], gradient[1::2])
 
 

@@ -1,0 +1,10 @@
+"""Mechanisms as data: planes, dyads, levers, slots and sliders, solved in batch. Knows no
+aircraft.
+"""
+
+__all__ = [
+    "intervals",
+    "kernel",
+    "mechanism",
+    "program",
+]

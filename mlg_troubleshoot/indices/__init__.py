@@ -1,3 +1,12 @@
-"""Sensitivity and amplification indices (Eqs. 1, 2 and 7 to 10), and the precomputed table of
-them.
-"""
+"""Sensitivity and amplification indices (Eqs. 1, 2, 7 to 10), and the precomputed table of them."""
+
+__all__ = [
+    "amplification",
+    "displacement",
+    "estimators",
+    "given_data",
+    "index_table",
+    "inputs",
+    "saltelli",
+    "tensor",
+]

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, frozen
+from mlg_troubleshoot.arrays import STEP, Array, frozen
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.geometry.mechanism import (
@@ -32,8 +32,8 @@ from mlg_troubleshoot.geometry.mechanism import (
     needs,
 )
 
+# Positions of the release at which stage indices are computed. [1]
 STROKES = 2001
-_STEP_IN = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,9 +258,7 @@ class _Chain:
             links[at + axis] = step
             return np.stack(self.model.kernel.positions(self.stroke, links)[joint], axis=-1)
 
-        moved = [
-            (place(axis, _STEP_IN) - place(axis, -_STEP_IN)) / (2 * _STEP_IN) for axis in (0, 1)
-        ]
+        moved = [(place(axis, STEP) - place(axis, -STEP)) / (2 * STEP) for axis in (0, 1)]
         return np.linalg.svd(np.stack(moved, axis=-1), compute_uv=False)[..., 0]
 
 

@@ -20,10 +20,10 @@ from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.indices.displacement import Response
 from mlg_troubleshoot.indices.estimators import Indices, failed_note, without_numbers
 
-_HELD_OUT = 48
-_CORNERS = 16
-_MOST_TERMS = 500
-_PER_TERM = 1.3
+# Points held out inside the range and at its corners to judge an expansion by. [1]
+_HELD_OUT, _CORNERS = 48, 16
+# Terms of an expansion at most, and points for each term at least. [1]
+_MOST_TERMS, _PER_TERM = 500, 1.3
 # A fit that follows the inside of the range but misses a corner by more than this share of the
 # standard deviation has met a kink.
 _CORNER_MISS = 0.1

@@ -15,6 +15,7 @@ from numpy.random import Generator
 from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.errors import InconclusiveDataError
 
+# Inspections below which no index is estimated. [1]
 _FEWEST = 20
 
 
@@ -29,6 +30,18 @@ class GivenDataIndices:
     first_order: Array
     interval: Array
     rows: Wholes
+
+
+@dataclass(frozen=True, slots=True)
+class GivenDataResult:
+    """First-order indices of measured inspections; used are valid rows that have a measured
+    displacement.
+    """
+
+    file: str
+    rows_read: int
+    rows_used: int
+    indices: GivenDataIndices
 
 
 def given_data_indices(

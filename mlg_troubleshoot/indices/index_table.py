@@ -4,28 +4,38 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
 from mlg_troubleshoot.arrays import Array, Wholes
-from mlg_troubleshoot.datafile import MOST_ENTRIES, DataTable, read_json
+from mlg_troubleshoot.datafile import (
+    LARGEST,
+    MOST_ENTRIES,
+    AboveZero,
+    Count,
+    RefusedValueError,
+    Table,
+    read_json,
+)
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
-from mlg_troubleshoot.outputs import OutputKind, write_text
+from mlg_troubleshoot.outputs import SCHEMA_VERSION, OutputKind, write_text
 
-SCHEMA_VERSION = 1
 # A sampled index may lie a little outside 0 to 1, its interval further.
-_INDEX = {"least": -2.0, "most": 3.0}
+Index = Annotated[float, Meta(ge=-2, le=3)]
+Growth = Annotated[float, Meta(ge=0, le=1e6)]
+Rank = Annotated[int, Meta(ge=1, le=MOST_ENTRIES)]
 # First-order indices closer than this are one rank: both ends of a link differ by less.
 _SAME_RANK = 1e-4
 
 
-@dataclass(frozen=True, slots=True)
-class JointIndices:
+class JointIndices(Table):
     """Indices of one joint, as fractions of the variance and not normalised to 1.
 
     limit_in: upper end of its clearance's distribution. [in] first_order, total_order: indices of
@@ -37,35 +47,50 @@ class JointIndices:
     total_order_spread: least and greatest index over the ensemble. [1]
     """
 
-    joint: int
-    limit_in: float
-    first_order: float
-    first_order_interval: tuple[float, float]
-    total_order: float
-    total_order_interval: tuple[float, float]
-    plunger_amplification: float
-    max_amplification_index: float
-    rank: int
-    rank_range: tuple[int, int]
-    first_order_spread: tuple[float, float]
-    total_order_spread: tuple[float, float]
+    joint: Annotated[int, Meta(ge=1, le=LARGEST)]
+    limit_in: AboveZero
+    first_order: Index
+    first_order_interval: tuple[Index, Index]
+    total_order: Index
+    total_order_interval: tuple[Index, Index]
+    plunger_amplification: Growth
+    max_amplification_index: Growth
+    rank: Rank
+    rank_range: tuple[Rank, Rank]
+    first_order_spread: tuple[Index, Index]
+    total_order_spread: tuple[Index, Index]
+
+    def __post_init__(self) -> None:
+        for key in (
+            "first_order_interval",
+            "total_order_interval",
+            "rank_range",
+            "first_order_spread",
+            "total_order_spread",
+        ):
+            low, high = getattr(self, key)
+            if low > high:
+                raise RefusedValueError(key, "two numbers, the smaller one first")
 
 
-@dataclass(frozen=True, slots=True)
-class IndexTable:
-    """Precomputed indices of a gear.
+class TableGear(Table):
+    """The gear that a table was computed for, and the hashes of its geometry."""
 
-    geometry_sha256, ensemble_sha256: hashes of the geometry that the table was computed for.
-    """
-
-    gear_id: str
+    id: str
     geometry_sha256: str
     ensemble_sha256: str
     provenance: str
-    seed: int
+
+
+class IndexTable(Table):
+    """Precomputed indices of a gear, as the file holds them."""
+
+    schema_version: Literal[1]
+    gear: TableGear
+    seed: Count
     design: str
-    evaluations: int
-    failed: int
+    evaluations: Count
+    failed: Count
     joints: tuple[JointIndices, ...]
 
     @property
@@ -77,16 +102,6 @@ class IndexTable:
     def total_order(self) -> Array:
         """Total-order index of every joint, shape (n_joints,). [1]"""
         return np.array([entry.total_order for entry in self.joints])
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the table as plain values, in the order of the JSON contract of ``mlg study``."""
-        told = asdict(self)
-        names = {
-            "gear_id": "id",
-            **{n: n for n in ("geometry_sha256", "ensemble_sha256", "provenance")},
-        }
-        gear = {shown: told.pop(name) for name, shown in names.items()}
-        return {"schema_version": SCHEMA_VERSION, "gear": gear, **told}
 
 
 def ranks(first_order: Array) -> Wholes:
@@ -131,13 +146,14 @@ def load_index_table(gear: Gear) -> IndexTable:
     if not path.exists():
         raise GearFileError(f"{path.name}: the table of indices is missing", _remedy(gear))
     try:
-        table = _index_table(read_json(path, _remedy(gear)))
+        state = path.stat()
+        table = _read_once(path, state.st_mtime_ns, state.st_size)
     except GearFileError as error:
         raise GearFileError(error.message, _remedy(gear)) from error
     for what, found, wanted in (
-        ("gear", table.gear_id, gear.id),
-        ("geometry", table.geometry_sha256, gear.geometry_sha256),
-        ("ensemble", table.ensemble_sha256, gear.ensemble_sha256),
+        ("gear", table.gear.id, gear.id),
+        ("geometry", table.gear.geometry_sha256, gear.geometry_sha256),
+        ("ensemble", table.gear.ensemble_sha256, gear.ensemble_sha256),
     ):
         if found != wanted:
             raise GearFileError(
@@ -155,6 +171,12 @@ def load_index_table(gear: Gear) -> IndexTable:
     return table
 
 
+@lru_cache(maxsize=4)
+def _read_once(path: Path, _changed_ns: int, _size: int) -> IndexTable:
+    """A file that has not changed is not read again."""
+    return read_json(path, IndexTable, "").content
+
+
 def _text(values: Mapping[str, Any]) -> str:
     return json.dumps(values, indent=1, allow_nan=False) + "\n"
 
@@ -168,50 +190,10 @@ INDEX_TABLE = OutputKind.marked(
 
 def write_index_table(table: IndexTable, path: Path) -> None:
     """Write a table of indices, whole or not at all."""
-    write_text(path, _text(table.as_dict()))
+    write_text(path, _text(msgspec.to_builtins(table)))
 
 
 def _remedy(gear: Gear) -> str:
     shipped = gear.id in shipped_gears() and load_gear(gear.id).path == gear.path
     name = gear.id if shipped else str(gear.path)
     return f"Run: mlg study --gear {name} --write-table"
-
-
-def _index_table(t: DataTable) -> IndexTable:
-    if t.whole("schema_version") != SCHEMA_VERSION:
-        raise t.fail("schema_version", str(SCHEMA_VERSION))
-    gear = t.table("gear")
-    return IndexTable(
-        gear_id=gear.text("id"),
-        geometry_sha256=gear.text("geometry_sha256"),
-        ensemble_sha256=gear.text("ensemble_sha256"),
-        provenance=gear.text("provenance"),
-        seed=t.whole("seed", least=0),
-        design=t.text("design"),
-        evaluations=t.whole("evaluations", least=0),
-        failed=t.whole("failed", least=0),
-        joints=tuple(map(_joint_indices, t.tables("joints"))),
-    )
-
-
-def _joint_indices(t: DataTable) -> JointIndices:
-    def indices(key: str) -> tuple[float, float]:
-        return t.rising(key, **_INDEX)
-
-    low, high = t.rising("rank_range", least=1, most=MOST_ENTRIES)
-    entry = JointIndices(
-        joint=t.whole("joint", least=1),
-        limit_in=t.positive("limit_in"),
-        first_order=t.number("first_order", **_INDEX),
-        first_order_interval=indices("first_order_interval"),
-        total_order=t.number("total_order", **_INDEX),
-        total_order_interval=indices("total_order_interval"),
-        plunger_amplification=t.number("plunger_amplification", least=0.0, most=1e6),
-        max_amplification_index=t.number("max_amplification_index", least=0.0, most=1e6),
-        rank=t.whole("rank", least=1, most=MOST_ENTRIES),
-        rank_range=(int(low), int(high)),
-        first_order_spread=indices("first_order_spread"),
-        total_order_spread=indices("total_order_spread"),
-    )
-    t.finish()
-    return entry

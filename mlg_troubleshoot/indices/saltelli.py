@@ -19,9 +19,10 @@ from mlg_troubleshoot.indices.chaos import ChaosFit, chaos_indices
 from mlg_troubleshoot.indices.displacement import Response
 from mlg_troubleshoot.indices.estimators import Indices, failed_note, student_half, without_numbers
 
+# Independent scrambles of the Sobol points: their spread gives the interval. [1]
 SCRAMBLES = 8
-_ROWS = 1 << 14
-_FIRST_POWER = 8
+# Points evaluated at once, and the power of two that the first estimate begins with. [1]
+_ROWS, _FIRST_POWER = 1 << 14, 8
 
 
 def saltelli_indices(  # noqa: PLR0913 - what is asked, where it stops, what a first attempt by another route hands on

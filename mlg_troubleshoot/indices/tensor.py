@@ -14,8 +14,8 @@ from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.indices.displacement import Response
 
-_MOST_POINTS = 2_000_000
-_ROWS = 1 << 16
+# Points of a tensor at most, and those evaluated at once. [1]
+_MOST_POINTS, _ROWS = 2_000_000, 1 << 16
 
 
 @dataclass(frozen=True, slots=True)

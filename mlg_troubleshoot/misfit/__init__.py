@@ -9,13 +9,21 @@ from mlg_troubleshoot.misfit.simulation_result import (
     Suspect,
     SuspectFound,
 )
-from mlg_troubleshoot.misfit.verdict import Verdict
+from mlg_troubleshoot.misfit.verdict import MisfitVerdict
 
 __all__ = [
     "HeldOutGain",
+    "MisfitVerdict",
     "SimulationDiagnosis",
     "Suspect",
     "SuspectFound",
-    "Verdict",
+    "chance",
+    "covariance",
     "diagnose_simulation",
+    "held_out",
+    "one_by_one",
+    "rivals",
+    "screen",
+    "search",
+    "verdict",
 ]

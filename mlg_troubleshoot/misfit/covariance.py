@@ -112,13 +112,3 @@ class NoiseModel:
         lower = np.linalg.cholesky(np.eye(indicator.shape[1]) + indicator.T @ scaled)
         log_determinant += 2.0 * float(np.sum(np.log(np.diag(lower))))
         return solve_triangular(lower, scaled.T, lower=True), log_determinant
-
-    def draw(
-        self, residuals: Array, tail_ratio: float, scale: float, n: int, rng: np.random.Generator
-    ) -> Array:
-        """Draw data sets in which nothing is wrong."""
-        rows = len(self.relative)
-        drawn = rng.choice(residuals, size=(rows, n)) * rng.choice([-1.0, 1.0], size=(rows, n))
-        low = self.factors(tail_ratio)
-        common = low @ rng.standard_normal((low.shape[1], n))
-        return np.asarray(scale * (self.relative[:, None] * drawn + common))

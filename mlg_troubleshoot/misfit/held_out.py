@@ -6,7 +6,7 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.misfit.covariance import NoiseModel
-from mlg_troubleshoot.misfit.screen import fit, shrunk
+from mlg_troubleshoot.misfit.fitting import fit, shrunk
 
 _FOLDS = 10
 # Share of what a cause does that must remain in the rows it is learned from. [1]

@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import Protocol, Self, TypeVar
 
 
-class Explanation(Protocol):
+class GrowingSet(Protocol):
     """Causes that explain data together, by their places in a list of candidates."""
 
     @property
@@ -25,7 +25,7 @@ class Explanation(Protocol):
         """
 
 
-E = TypeVar("E", bound=Explanation)
+E = TypeVar("E", bound=GrowingSet)
 
 
 def one_by_one(explanation: E, most: int) -> E:

@@ -23,7 +23,6 @@ from mlg_troubleshoot.misfit.one_by_one import one_by_one, settled
 from mlg_troubleshoot.misfit.rivals import near_and_behind
 from mlg_troubleshoot.misfit.runner import Runner, held_out, least_squares
 from mlg_troubleshoot.misfit.scatter import Whitener, basis_of, build_whitener
-from mlg_troubleshoot.misfit.screen import Screen
 from mlg_troubleshoot.misfit.simulation_inputs import checked
 from mlg_troubleshoot.misfit.simulation_result import (
     HeldOutGain,
@@ -31,7 +30,8 @@ from mlg_troubleshoot.misfit.simulation_result import (
     Suspect,
     SuspectFound,
 )
-from mlg_troubleshoot.misfit.verdict import ALARM, NAME, Verdict, refutes, verdict_of
+from mlg_troubleshoot.misfit.verdict import ALARM, NAME, refutes, verdict_of
+from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 
 # Thresholds: set in 2026 on five simulated rigs (tests/simulation/rigs.py; groups, far readings,
 # gaps; other seeds than the benchmark's) and the three sets of measured data in docs/tutorial/data;
@@ -140,7 +140,7 @@ class Metric:
     """The data under one whitener, with data sets in which nothing is wrong."""
 
     def __init__(
-        self, point: Point, white: Whitener, drawn: Array, everything: Array, degrees: int
+        self, point: SearchPoint, white: Whitener, drawn: Array, everything: Array, degrees: int
     ) -> None:
         self.point, self.white, self.drawn, self.everything, self.degrees = (
             point,
@@ -167,11 +167,14 @@ class Metric:
             self.white(point.columns[:, list(fixed)]),
             self.white(point.columns[:, :count]),
         )
-        usable = beside(suspects, held)[1] & np.isin(np.arange(count), point.study.design.testable)
-        screen = Screen(NoiseModel.white(len(held)), suspects, np.zeros(count), held)
-        squared, rest = screen.explained(np.column_stack([self.white(data), self.drawn]))
+        alone, usable = beside(suspects, held)
+        usable &= np.isin(np.arange(count), point.study.design.testable)
+        sets, basis = np.column_stack([self.white(data), self.drawn]), basis_of(held)
+        length = np.maximum(np.sum(alone**2, axis=0), 1e-300)[:, None]
+        squared = (alone.T @ sets) ** 2 / length
+        rest = np.sum(sets**2, axis=0) - np.sum((basis.T @ sets) ** 2, axis=0)
         if point.crowded:
-            spare = max(len(held) - basis_of(held).shape[1] - 1, 1)
+            spare = max(len(held) - basis.shape[1] - 1, 1)
             score = squared / np.maximum(rest - squared, 1e-12 * rest) * spare
         else:
             left = np.r_[self.variance * self.degrees, self._left]
@@ -180,7 +183,7 @@ class Metric:
         return score[:, 0], Chance(score[:, 1:].max(axis=0, initial=0.0))
 
 
-class Point:
+class SearchPoint:
     """The data at one setting of the parameters: misfit, sensitivities, scatter, and what stands
     out.
     """
@@ -356,7 +359,7 @@ class Point:
         )
         return found, cost / by.variance
 
-    def further(self) -> Point | None:
+    def further(self) -> SearchPoint | None:
         """The point with one more cause that stands out and helps, fitted anew; None if there is
         none.
         """
@@ -377,9 +380,9 @@ class Point:
             for j in fits
             if j in study.design.class_of(k) and fits[j][1] < fits[k][1] + 2.0 * RULED_OUT
         )
-        return Point(study, fits[k][0], (*self.chosen, k))
+        return SearchPoint(study, fits[k][0], (*self.chosen, k))
 
-    def _nearer(self, told: Evidence) -> Point | None:
+    def _nearer(self, told: Evidence) -> SearchPoint | None:
         """Try the cause that stands out where the residual looks like a pattern: it may be the bend
         of its effect.
         """
@@ -391,10 +394,10 @@ class Point:
         ):
             return None
         chosen = (*self.chosen, k)
-        there = settled(Point(self.study, self.fit(chosen, self.values)[0], chosen))
+        there = settled(SearchPoint(self.study, self.fit(chosen, self.values)[0], chosen))
         return there if k in there.chosen and there.white is there.plain else None
 
-    def without_idle(self) -> Point | None:
+    def without_idle(self) -> SearchPoint | None:
         """The point without the cause that no longer stands out given the others; None if all
         do.
         """
@@ -404,7 +407,7 @@ class Point:
         values = self.values.copy()
         values[k] = self.study.runner.nominal[k]
         chosen = tuple(j for j in self.chosen if j != k)
-        return Point(self.study, self.fit(chosen, values)[0], chosen)
+        return SearchPoint(self.study, self.fit(chosen, values)[0], chosen)
 
     def helps(self, k: int) -> bool:
         """Tell whether a suspect, fitted as well, makes rows smaller that are held out."""
@@ -463,12 +466,12 @@ class Study:
             scatter.smooth_shapes(predicted, wide.reshape(self.n, -1), group) if self.n >= 8 else []
         )
 
-    def run(self) -> tuple[Point, Point]:
+    def run(self) -> tuple[SearchPoint, SearchPoint]:
         """Add causes until none stands out any more; the point before and the point after."""
         values = self.runner.nominal
-        point = Point(self, values, (), self.columns)
+        point = SearchPoint(self, values, (), self.columns)
         if self.nuisance:
-            point = Point(self, point.fit((), values)[0], ())
+            point = SearchPoint(self, point.fit((), values)[0], ())
             # Where a nuisance parameter is far from nominal, what it absorbs shows only now.
             columns = point.plain(point.columns)
             size = np.linalg.norm(point.columns[:, : self.count] / point.scale[:, None], axis=0)
@@ -476,7 +479,7 @@ class Study:
             self.design = self.design.within(np.flatnonzero(seen))
         return point, one_by_one(point, _MOST_CAUSES)
 
-    def rivals(self, point: Point, k: int) -> list[int]:
+    def rivals(self, point: SearchPoint, k: int) -> list[int]:
         """Suspects that could stand in the place of a cause, the nearest first."""
         told = point.beside_others(k)
         by = int(told.by[k])
@@ -566,7 +569,7 @@ def diagnose_simulation(
 
 
 def _report(
-    study: Study, start: Point, point: Point, permutations: int, seed: int
+    study: Study, start: SearchPoint, point: SearchPoint, permutations: int, seed: int
 ) -> SimulationDiagnosis:
     """Say what was found, with its rivals, its gain and the residual."""
     runner = study.runner
@@ -615,7 +618,7 @@ def _report(
     )
 
 
-def _found(study: Study, point: Point, k: int) -> SuspectFound:
+def _found(study: Study, point: SearchPoint, k: int) -> SuspectFound:
     """Describe a cause, or a rival as it would be in the place of what it rivals or in addition to
     what is named.
     """
@@ -655,7 +658,7 @@ def _found(study: Study, point: Point, k: int) -> SuspectFound:
     )
 
 
-def _gain(study: Study, start: Point, point: Point) -> HeldOutGain:
+def _gain(study: Study, start: SearchPoint, point: SearchPoint) -> HeldOutGain:
     """Misfit of rows held out, before and after, in the unit of the readings."""
     weight = point.scale[:, None]
     parts, by = folds_of(

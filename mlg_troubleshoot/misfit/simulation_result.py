@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from mlg_troubleshoot.misfit.verdict import Verdict
+from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 
 
 @dataclass(frozen=True, slots=True)

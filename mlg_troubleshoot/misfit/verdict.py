@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 
-class Verdict(StrEnum):
+class MisfitVerdict(StrEnum):
     """What measured data say about a simulation."""
 
     NONE = "NONE"
@@ -30,13 +30,13 @@ def refutes(p: float, size: float = np.inf, slip: float = 0.0) -> bool:
     return p <= REMAINS and size >= slip
 
 
-def verdict_of(p: float, rivals: bool, refuted: bool) -> Verdict:
+def verdict_of(p: float, rivals: bool, refuted: bool) -> MisfitVerdict:
     """What follows from the p-value, from rivals of what is named, and from the residual.
 
     A name needs clearer evidence than an alarm does.
     """
     if refuted:
-        return Verdict.UNLISTED
+        return MisfitVerdict.UNLISTED
     if p > ALARM:
-        return Verdict.NONE
-    return Verdict.AMBIGUOUS if rivals or p > NAME else Verdict.NAMED
+        return MisfitVerdict.NONE
+    return MisfitVerdict.AMBIGUOUS if rivals or p > NAME else MisfitVerdict.NAMED

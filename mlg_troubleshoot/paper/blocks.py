@@ -29,10 +29,11 @@ from mlg_troubleshoot.indices.estimators import failed_note
 from mlg_troubleshoot.indices.inputs import Inputs
 from mlg_troubleshoot.paper.designs import middle_of_level, replicated_levels
 
+# Levels of one block: the work that is lost at an interruption. [1]
 LEVELS_PER_BLOCK = 50
 
 
-class Block(NamedTuple):
+class StudyBlock(NamedTuple):
     """A range of levels of one iteration: the first and the one after the last."""
 
     iteration: int
@@ -88,10 +89,10 @@ class BlockStudy:
         return self.iterations * self.n1 * self.n2 * (self.n1 * self.n + 1)
 
     @property
-    def blocks(self) -> tuple[Block, ...]:
+    def blocks(self) -> tuple[StudyBlock, ...]:
         starts = range(0, self.n2, LEVELS_PER_BLOCK)
         return tuple(
-            Block(i, start, min(start + LEVELS_PER_BLOCK, self.n2))
+            StudyBlock(i, start, min(start + LEVELS_PER_BLOCK, self.n2))
             for i in range(self.iterations)
             for start in starts
         )
@@ -130,7 +131,7 @@ class TotalOrder:
     note: str
 
 
-def compute_block(study: BlockStudy, block: Block) -> BlockSums:
+def compute_block(study: BlockStudy, block: StudyBlock) -> BlockSums:
     response = replace(study.response, compiled=numba_is_installed())
     n, n1, n2 = study.n, study.n1, study.n2
     levels = _levels(n, n1, n2, study.seed, block.iteration)
@@ -179,7 +180,7 @@ def total_order_study(
     blocks = study.blocks
     done = {} if state is None else _resumed(study, state)
     missing = [block for block in blocks if block not in done]
-    runner: Iterator[tuple[Block, BlockSums]]
+    runner: Iterator[tuple[StudyBlock, BlockSums]]
     if scheduler is not None:
         waiting = {
             scheduler.submit(compute_block, study, block, pure=False): block for block in missing
@@ -205,8 +206,8 @@ def total_order_study(
 
 
 def _on_this_machine(
-    study: BlockStudy, blocks: list[Block], workers: int
-) -> Iterator[tuple[Block, BlockSums]]:
+    study: BlockStudy, blocks: list[StudyBlock], workers: int
+) -> Iterator[tuple[StudyBlock, BlockSums]]:
     # The compiled loop runs without the interpreter's lock: threads share its memory. Forking a
     # process that has threads of its own can hang; a fresh interpreter cannot.
     fresh = partial(ProcessPoolExecutor, mp_context=get_context("spawn"))
@@ -218,7 +219,7 @@ def _on_this_machine(
         pool.shutdown(cancel_futures=True)
 
 
-def _summed(study: BlockStudy, done: dict[Block, BlockSums]) -> TotalOrder:
+def _summed(study: BlockStudy, done: dict[StudyBlock, BlockSums]) -> TotalOrder:
     """Add up blocks in their order, whoever computed them when."""
     indices = []
     for iteration in range(study.iterations):
@@ -249,7 +250,7 @@ def _append(path: Path, entry: Any) -> None:
         raise OutputError(f"{path}: cannot be written: {error}", "Choose another file.") from error
 
 
-def _resumed(study: BlockStudy, path: Path) -> dict[Block, BlockSums]:
+def _resumed(study: BlockStudy, path: Path) -> dict[StudyBlock, BlockSums]:
     """Read finished blocks; a last line that was cut off by an interruption is dropped with its
     block.
     """
@@ -267,7 +268,7 @@ def _resumed(study: BlockStudy, path: Path) -> dict[Block, BlockSums]:
     known = set(study.blocks)
     try:
         found = [
-            (Block(*block), BlockSums(tuple(sums[0]), *sums[1:]))
+            (StudyBlock(*block), BlockSums(tuple(sums[0]), *sums[1:]))
             for block, sums in map(json.loads, lines[1:])
         ]
     except (ValueError, TypeError, LookupError, RecursionError) as error:

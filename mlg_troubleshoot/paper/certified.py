@@ -21,9 +21,9 @@ from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
 from mlg_troubleshoot.geometry.intervals import Box, Range, cosine_range
 
-_STROKES = 64
-_BATCH = 64
-_MOST_BOXES = 4000
+# Parts of the stroke that the search begins with, boxes contracted at once, and boxes examined at
+# most. [1]
+_STROKES, _BATCH, _MOST_BOXES = 64, 64, 4000
 # Wanted difference of the bound and the best that was found. [in]
 _GAP_IN = 1e-6
 

@@ -16,7 +16,7 @@ from time import monotonic
 import numpy as np
 from numpy.random import Generator
 
-from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.arrays import STEP, Array
 from mlg_troubleshoot.errors import InconclusiveDataError, MechanismError, UsageError
 from mlg_troubleshoot.gear.design import DesignSpace
 from mlg_troubleshoot.gear.gear import Gear, Linkage
@@ -24,14 +24,16 @@ from mlg_troubleshoot.geometry.mechanism import Dyad
 from mlg_troubleshoot.paper.targets import INSIDE, Computed, Target
 from mlg_troubleshoot.paper.verification import Facts
 
-Told = Callable[[str, int, int | None], None]
+Progress = Callable[[str, int, int | None], None]
 
-_FAR = 50.0
+# Stands for the miss of a target that a linkage has no value for, in its tolerances. [1]
+_FAR = 50
+# Decimals of a coordinate, as the paper prints them. [1]
 _DECIMALS = 4
-_WAVE = 150
-_POLISHED = 4
-_DAMPINGS = 12
-_SMALL_LENGTH_IN, _LARGE_IN = 0.4, 22.0
+# Linkages drawn at a time, how many of them are polished, and dampings tried in a step. [1]
+_WAVE, _POLISHED, _DAMPINGS = 150, 4, 12
+# Links outside these lengths are not of a landing gear of this size, assumed. [in]
+_SMALL_LENGTH_IN, _LARGE_IN = 0.4, 22
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +66,7 @@ def reconstruct(
     seed: int,
     start: Linkage | None = None,
     minutes: float = 15.0,
-    told: Told | None = None,
+    on_progress: Progress | None = None,
 ) -> Reconstruction:
     """Search a linkage of the gear's topology that meets targets."""
     wanted = tuple(target for target in targets if target.search)
@@ -72,7 +74,7 @@ def reconstruct(
         raise UsageError(
             "no target has search = true", "Mark the numbers that a linkage must meet."
         )
-    search = _Search(gear, wanted, monotonic() + 60.0 * minutes, told)
+    search = _Search(gear, wanted, monotonic() + 60.0 * minutes, on_progress)
     if start is not None:
         return search.report(search.polished(search.space.vector(start), 60), seed)
     while monotonic() < search.until:
@@ -118,20 +120,20 @@ class _Search:
     """Residuals of candidate linkages, with a count and a deadline."""
 
     def __init__(
-        self, gear: Gear, targets: tuple[Target, ...], until: float, told: Told | None
+        self, gear: Gear, targets: tuple[Target, ...], until: float, on_progress: Progress | None
     ) -> None:
         self.gear = gear
         self.targets = targets
         self.space = DesignSpace(gear.reference)
         self.until = until
-        self.told = told
+        self.on_progress = on_progress
         self.tried = 0
 
     def residuals(self, vector: Array) -> Array:
         """Misses of all targets in units of their tolerances, and of plain mechanical sense."""
         self.tried += 1
-        if self.told is not None and self.tried % 20 == 0:
-            self.told("linkages tried", self.tried, None)
+        if self.on_progress is not None and self.tried % 20 == 0:
+            self.on_progress("linkages tried", self.tried, None)
         sense = self._sense(vector)
         try:
             with np.errstate(all="ignore"):
@@ -194,7 +196,7 @@ class _Search:
                 break
         return vector
 
-    def _slopes(self, vector: Array, value: Array, step: float = 1e-5) -> Array:
+    def _slopes(self, vector: Array, value: Array, step: float = STEP) -> Array:
         columns = [
             (self.residuals(vector + moved) - value) / step for moved in step * np.eye(len(vector))
         ]

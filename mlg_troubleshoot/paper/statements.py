@@ -11,7 +11,7 @@ from mlg_troubleshoot.paper.targets import Target, load_targets, targets_file
 from mlg_troubleshoot.paper.verification import Facts
 
 
-class Outcome(StrEnum):
+class ClaimOutcome(StrEnum):
     HOLDS = "holds"
     READING = "holds only under a reading"
     SOME = "holds on some linkages"
@@ -19,7 +19,7 @@ class Outcome(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Evidence:
+class ClaimEvidence:
     """One computed number that bears on a statement, on every linkage.
 
     values: the number on each linkage, the reference first. [unit]
@@ -42,9 +42,9 @@ class Statement:
 
     claim: str
     section: str
-    outcome: Outcome
+    outcome: ClaimOutcome
     linkages: tuple[str, ...]
-    evidence: tuple[Evidence, ...]
+    evidence: tuple[ClaimEvidence, ...]
 
     @property
     def numbers(self) -> str:
@@ -93,14 +93,14 @@ def check_statements(
     return tuple(found)
 
 
-def _evidence(t: Target, values: tuple[float, ...]) -> Evidence:
-    return Evidence(t.quantity, t.tolerance, t.unit, values, tuple(map(t.holds, values)), t.why)
+def _evidence(t: Target, values: tuple[float, ...]) -> ClaimEvidence:
+    return ClaimEvidence(t.quantity, t.accepted, t.unit, values, tuple(map(t.holds, values)), t.why)
 
 
-def _outcome(evidence: tuple[Evidence, ...], *, by_reading: bool) -> Outcome:
+def _outcome(evidence: tuple[ClaimEvidence, ...], *, by_reading: bool) -> ClaimOutcome:
     everywhere = [all(each.holds) for each in evidence]
     if all(everywhere):
-        return Outcome.HOLDS
+        return ClaimOutcome.HOLDS
     if by_reading and any(everywhere):
-        return Outcome.READING
-    return Outcome.SOME if any(any(each.holds) for each in evidence) else Outcome.FAILS
+        return ClaimOutcome.READING
+    return ClaimOutcome.SOME if any(any(each.holds) for each in evidence) else ClaimOutcome.FAILS

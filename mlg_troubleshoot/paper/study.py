@@ -24,7 +24,13 @@ from mlg_troubleshoot.indices.displacement import (
     worst_sense,
 )
 from mlg_troubleshoot.indices.estimators import GroupIndices, Indices, group_indices, student_half
-from mlg_troubleshoot.indices.index_table import IndexTable, JointIndices, rank_ranges, ranks
+from mlg_troubleshoot.indices.index_table import (
+    IndexTable,
+    JointIndices,
+    TableGear,
+    rank_ranges,
+    ranks,
+)
 from mlg_troubleshoot.indices.inputs import (
     Inputs,
     beyond_margin,
@@ -33,6 +39,7 @@ from mlg_troubleshoot.indices.inputs import (
 )
 from mlg_troubleshoot.indices.saltelli import fast_indices, saltelli_indices
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
+from mlg_troubleshoot.outputs import SCHEMA_VERSION
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.paper.replicated import PaperDesign, ReplicatedIndices
@@ -43,7 +50,7 @@ Progress = Callable[[str, int, int | None], None]
 Stages = Callable[[str], Callable[[int, int | None], None]]
 
 
-class Design(StrEnum):
+class StudyDesign(StrEnum):
     FAST = "fast"
     SAMPLED = "sampled"
     TENSOR = "tensor"
@@ -66,12 +73,12 @@ class StudyOptions:
 
     Parameters
     ----------
-    design : Design
+    design : StudyDesign
         How the points are chosen.
     accuracy : float
-        Wanted error of every index, where the design can be told. [1]
+        Wanted error of every index, where the design takes one. [1]
     seed : int
-        Seed of everything random.
+        Seed of all random draws.
     distribution : str
         Distribution of the clearances.
     limits_in : ndarray, shape (n_joints,), or None
@@ -94,7 +101,7 @@ class StudyOptions:
         Dask client to compute it with.
     """
 
-    design: Design = Design.FAST
+    design: StudyDesign = StudyDesign.FAST
     accuracy: float = 1e-3
     seed: int = 0
     distribution: str = "uniform"
@@ -114,7 +121,7 @@ class StudyOptions:
     def is_standard(self) -> bool:
         """True if the result is the table that goes with a gear."""
         return (
-            self.design in (Design.FAST, Design.SAMPLED, Design.TENSOR)
+            self.design in (StudyDesign.FAST, StudyDesign.SAMPLED, StudyDesign.TENSOR)
             and self.distribution == "uniform"
             and self.limits_in is None
             and self.directions is Directions.WORST
@@ -190,17 +197,17 @@ def run_study(gear: Gear, options: StudyOptions, progress: Progress | None = Non
     if len(inputs.limits_in) != len(gear.joints):
         raise UsageError(
             f"{len(inputs.limits_in)} limits for {len(gear.joints)} joints",
-            "Give one for each joint.",
+            "Give one per joint.",
         )
 
-    def told(name: str) -> Callable[[int, int | None], None]:
+    def on_stage(name: str) -> Callable[[int, int | None], None]:
         return lambda done, total: None if progress is None else progress(name, done, total)
 
-    if options.design in (Design.LHS, Design.LHS_CCD, Design.CCD):
-        run = _paper(gear, inputs, options, told)
+    if options.design in (StudyDesign.LHS, StudyDesign.LHS_CCD, StudyDesign.CCD):
+        run = _paper(gear, inputs, options, on_stage)
     else:
-        run = _on_linkage(gear, inputs, options, 0, told("samples"))
-    found, advance = [run.indices], told("ensemble")
+        run = _on_linkage(gear, inputs, options, 0, on_stage("samples"))
+    found, advance = [run.indices], on_stage("ensemble")
     finished = run.finished and "interrupted" not in run.indices.note
     for k in range(1, len(gear.ensemble)):
         try:
@@ -238,7 +245,7 @@ def _response(
 def _held(model: LinkageModel, inputs: Inputs, options: StudyOptions) -> HeldDirections:
     if options.directions is Directions.FIXED:
         if options.fixed_rad is None or len(options.fixed_rad) != len(inputs.limits_in):
-            raise UsageError("directions fixed by load", "Give one direction for each joint.")
+            raise UsageError("directions fixed by load", "Give one direction per joint.")
         return HeldDirections(model, np.asarray(options.fixed_rad, float))
     if options.directions is Directions.WORST:
         return worst_directions(model, inputs.limits_in)
@@ -252,7 +259,7 @@ def _on_linkage(
     inputs: Inputs,
     options: StudyOptions,
     k: int,
-    told: Callable[[int, int | None], None] | None = None,
+    on_stage: Callable[[int, int | None], None] | None = None,
 ) -> _Run:
     """Indices of linkage k of the ensemble; of the reference, which is the first, by the design
     that was asked for.
@@ -260,19 +267,19 @@ def _on_linkage(
     cube, n = _response(gear, gear.ensemble_models[k], inputs, options)
     stream = np.random.default_rng(np.random.SeedSequence(options.seed, spawn_key=(k,)))
     accuracy, most = options.accuracy, options.most
-    advance = None if told is None else (lambda done, _width: told(done, None))
+    advance = None if on_stage is None else (lambda done, _width: on_stage(done, None))
     if options.directions is Directions.RANDOM:
         if k:
             accuracy, most = max(accuracy, 3e-3), 1 << 20
         sets = joint_groups(len(inputs.limits_in))
         return _Run(saltelli_indices(cube, n, stream, options.seed, accuracy, most, sets, advance))
-    if options.design is Design.TENSOR:
+    if options.design is StudyDesign.TENSOR:
         tensor = tensor_indices(cube, np.ones(n))
         coarse = None if k else tensor_indices(cube, np.ones(n), order=2)
         return _Run(
             _of_tensor(tensor, coarse, options.seed), groups=group_indices(gear, tensor.closed)
         )
-    if options.design is Design.SAMPLED and not k:
+    if options.design is StudyDesign.SAMPLED and not k:
         return _Run(saltelli_indices(cube, n, stream, options.seed, accuracy, most, None, advance))
     if k and options.beyond_margin:
         most = 1 << 18
@@ -296,7 +303,7 @@ def _of_tensor(tensor: TensorIndices, coarse: TensorIndices | None, seed: int) -
     )
 
 
-def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _Run:
+def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, on_stage: Stages) -> _Run:
     """Run the paper's design for the first order and, for ``lhs``, its study of the total order."""
     from mlg_troubleshoot.paper.blocks import BlockStudy, total_order_study
     from mlg_troubleshoot.paper.replicated import ITERATIONS, PAPER_DESIGNS, replicated_first_order
@@ -304,22 +311,24 @@ def _paper(gear: Gear, inputs: Inputs, options: StudyOptions, told: Stages) -> _
     if options.directions is Directions.RANDOM:
         raise UsageError(
             f"design {options.design} with random directions",
-            "The paper's designs hold directions; use sampled.",
+            "The paper's designs keep directions fixed; use sampled.",
         )
     cube, n = _response(gear, gear.model, inputs, options)
     design = _sized(PAPER_DESIGNS[str(options.design)], n, options)
     n1, n2 = design.n1, design.n2
     iterations = ITERATIONS if options.iterations is None else options.iterations
-    found = replicated_first_order(cube, n, design, options.seed, iterations, told("first order"))
+    found = replicated_first_order(
+        cube, n, design, options.seed, iterations, on_stage("first order")
+    )
     half = student_half(found.scatter, found.iterations)
     total, spread = np.full(n, np.nan), np.full(n, np.nan)
     evaluations, failed, finished = found.evaluations, found.failed, found.iterations == iterations
     note = f"first order corrected for the bias (1 - S)/{n1}"
-    if options.design is Design.LHS and finished and not options.beyond_margin:
+    if options.design is StudyDesign.LHS and finished and not options.beyond_margin:
         response = _held(gear.model, inputs, options)
         study = BlockStudy(response, inputs, gear.geometry_sha256, options.seed, n1, n2, iterations)
         totals = total_order_study(
-            study, options.workers, options.state, options.scheduler, told("total order")
+            study, options.workers, options.state, options.scheduler, on_stage("total order")
         )
         total, spread = totals.total_order, student_half(totals.scatter, totals.iterations)
         evaluations, failed = evaluations + totals.evaluations, failed + totals.failed
@@ -405,10 +414,8 @@ def _table(
         for i, joint in enumerate(gear.joints)
     )
     return IndexTable(
-        gear_id=gear.id,
-        geometry_sha256=gear.geometry_sha256,
-        ensemble_sha256=gear.ensemble_sha256,
-        provenance=gear.provenance,
+        schema_version=SCHEMA_VERSION,
+        gear=TableGear(gear.id, gear.geometry_sha256, gear.ensemble_sha256, gear.provenance),
         seed=options.seed,
         design=reference.design,
         evaluations=sum(each.evaluations for each in found),

@@ -6,26 +6,35 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Literal
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
-from mlg_troubleshoot.datafile import DataTable, read_toml
+from mlg_troubleshoot.datafile import (
+    LARGEST,
+    Number,
+    RefusedValueError,
+    Table,
+    Whole,
+    read_toml,
+)
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
 
 # A limit is met with this share of it, or of 0.05, to spare. [1]
 INSIDE = 0.02
-KINDS = ("fitted", "calibrated", "reproduced", "not reproduced")
 
 
-@dataclass(frozen=True, slots=True)
-class Target:
-    """One printed number or statement.
+JointKey = Annotated[int, Meta(ge=0, le=LARGEST, description="the number of a joint")]
+
+
+class Target(Table):
+    """One printed number or statement: a value with its tolerance, or a limit.
 
     measure: name of the computation that gives it.
-    low, high: accepted range of the computed number. [unit]
-    tolerance: the same in words.
-    over: how several joints become one number: min, max or sum.
+    over: how several joints become one number.
     clearance_in: clearances by joint, for a case; the others are 0. [in]
     reading: which of two readings of a statement.
     expected: false if it is known not to hold.
@@ -35,24 +44,70 @@ class Target:
 
     quantity: str
     measure: str
-    unit: str
     printed: str
     section: str
-    kind: str
-    low: float
-    high: float
-    tolerance: str
-    joints: tuple[int, ...]
-    over: str
-    clearance_in: dict[int, float]
-    reading: str
-    expected: bool
-    search: bool
-    claim: str
-    why: str
+    kind: Literal["fitted", "calibrated", "reproduced", "not reproduced"]
+    unit: str = ""
+    value: Number | None = None
+    tolerance: Number | None = None
+    at_least: Number | None = None
+    at_most: Number | None = None
+    joints: tuple[Whole, ...] = ()
+    over: Literal["min", "max", "sum"] = "min"
+    clearance_in: dict[JointKey, Annotated[float, Meta(ge=0, le=1)]] = msgspec.field(
+        default_factory=dict
+    )
+    reading: str = "maximum"
+    expected: bool = True
+    search: bool = False
+    claim: str = ""
+    why: str = ""
+
+    def __post_init__(self) -> None:
+        stated = [limit is not None for limit in (self.value, self.at_least, self.at_most)]
+        if sum(stated) != 1:
+            raise RefusedValueError("value", "one of value with tolerance, at_least, at_most")
+        if (self.tolerance is None) == stated[0]:
+            raise RefusedValueError(
+                "tolerance", "a number" if stated[0] else "it with a value only"
+            )
+        if not self.low < self.high:
+            raise RefusedValueError(
+                "tolerance", "a number above 0 that the value can be distinguished from"
+            )
+
+    @property
+    def low(self) -> float:
+        """The least accepted number. [unit]"""
+        if self.value is not None and self.tolerance is not None:
+            return self.value - self.tolerance
+        return -np.inf if self.at_least is None else self.at_least
+
+    @property
+    def high(self) -> float:
+        """The greatest accepted number. [unit]"""
+        if self.value is not None and self.tolerance is not None:
+            return self.value + self.tolerance
+        return np.inf if self.at_most is None else self.at_most
+
+    @property
+    def accepted(self) -> str:
+        """The accepted range in words."""
+        if self.tolerance is not None:
+            return f"± {self.tolerance:g}"
+        return f"≤ {self.at_most:g}" if self.at_least is None else f"≥ {self.at_least:g}"
 
     def holds(self, computed: float) -> bool:
         return self.low <= computed <= self.high
+
+
+class TargetsFile(Table):
+    """What a source says about a gear."""
+
+    schema: Literal[1]
+    gear: str
+    source: str
+    targets: tuple[Target, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +124,8 @@ class Computed:
     @property
     def status(self) -> str:
         """Fitted, calibrated, reproduced or not reproduced, as it turned out."""
-        kind = "reproduced" if self.target.kind == KINDS[-1] else self.target.kind
-        return kind if self.holds else KINDS[-1]
+        kind = "reproduced" if self.target.kind == "not reproduced" else self.target.kind
+        return kind if self.holds else "not reproduced"
 
     @property
     def binds(self) -> bool:
@@ -93,59 +148,4 @@ def load_targets(path: Path) -> tuple[Target, ...]:
     remedy = "Write one like hawker-800xp-targets.toml next to the gear file."
     if not path.exists():
         raise GearFileError(f"{path.name}: there are no printed numbers to compare with", remedy)
-    table = read_toml(path)
-    if table.whole("schema") != 1:
-        raise table.fail("schema", "1")
-    table.text("gear")
-    table.text("source")
-    found = tuple(_target(entry) for entry in table.tables("targets"))
-    table.finish()
-    return found
-
-
-def _target(entry: DataTable) -> Target:
-    low, high, tolerance = -np.inf, np.inf, ""
-    unit = entry.text("unit", "")
-    if entry.has("value"):
-        value, width = entry.number("value"), entry.number("tolerance")
-        low, high, tolerance = value - width, value + width, f"± {width:g}"
-        if not low < high:
-            raise entry.fail(
-                "tolerance", "a number above 0 that the value can be distinguished from"
-            )
-    elif entry.has("at_least"):
-        low = entry.number("at_least")
-        tolerance = f"≥ {low:g}"
-    elif entry.has("at_most"):
-        high = entry.number("at_most")
-        tolerance = f"≤ {high:g}"
-    else:
-        raise entry.fail("value", "value with tolerance, at_least or at_most")
-    clearance: dict[int, float] = {}
-    if entry.has("clearance_in"):
-        lengths = entry.table("clearance_in")
-        for key in lengths.names:
-            if not key.isdecimal():
-                raise lengths.fail(key, "the number of a joint")
-            clearance[int(key)] = lengths.number(key, least=0.0, most=1.0)
-    target = Target(
-        quantity=entry.text("quantity"),
-        measure=entry.text("measure"),
-        unit=unit,
-        printed=entry.text("printed"),
-        section=entry.text("section"),
-        kind=entry.one_of("kind", KINDS),
-        low=low,
-        high=high,
-        tolerance=tolerance,
-        joints=entry.wholes("joints"),
-        over=entry.one_of("over", ("min", "max", "sum"), "min"),
-        clearance_in=clearance,
-        reading=entry.text("reading", "maximum"),
-        expected=entry.flag("expected", True),
-        search=entry.flag("search"),
-        claim=entry.text("claim", ""),
-        why=entry.text("why", ""),
-    )
-    entry.finish()
-    return target
+    return read_toml(path, TargetsFile).content.targets

@@ -18,9 +18,10 @@ from mlg_troubleshoot.indices.displacement import HeldDirections, worst_directio
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
 from mlg_troubleshoot.paper.targets import Computed, Target, load_targets, targets_file
 
-_CURVE = 401
-_QUICK_CURVE = 61
-_CORNERS = (np.array([0.0, 1.0]), np.array([0.5, 0.5]))
+# Strokes of a curve: of the answer, and while a linkage is still sought. [1]
+_CURVE, _QUICK_CURVE = 401, 61
+# Nodes and weights of a two-point rule: the response at no clearance and at the limit. [1]
+_CORNERS = (np.array([0, 1], float), np.array([0.5, 0.5]))
 
 
 def verify(gear: Gear, targets: Path | None = None) -> tuple[Computed, ...]:

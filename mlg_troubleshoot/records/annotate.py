@@ -24,11 +24,11 @@ from openpyxl.worksheet.pagebreak import Break
 from openpyxl.worksheet.worksheet import Worksheet
 from openpyxl.writer.excel import ExcelWriter
 
+from mlg_troubleshoot.decision.columns import CLEARANCE, IDENTITY, RECORD_ID
 from mlg_troubleshoot.decision.inspection import RowSource
 from mlg_troubleshoot.errors import OutputError, Problem, UsageError
 from mlg_troubleshoot.outputs import OutputKind, write_bytes
 from mlg_troubleshoot.records.cells import column_letters, writable
-from mlg_troubleshoot.records.columns import Field, Kind
 from mlg_troubleshoot.records.model import ReadResult, SheetLayout
 from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.template import FONT, HEADER_FILL
@@ -210,7 +210,7 @@ def _mark(sheet: Worksheet, layout: SheetLayout, problem: Problem) -> None:
     place = problem.cell
     if place is None:
         row = problem.row or layout.header_row
-        place = f"{column_letters(layout.index_of(Kind.RECORD_ID.value) or 0)}{row}"
+        place = f"{column_letters(layout.index_of(RECORD_ID.name) or 0)}{row}"
     cell = sheet[place]
     if isinstance(cell, MergedCell):
         anchor = next(r for r in sheet.merged_cells.ranges if place in r)
@@ -230,7 +230,7 @@ def _mark_over_limit(sheet: Worksheet, layout: SheetLayout, over_limit: OverLimi
     """Mark the clearances of a wide table or a form that are over their limit."""
     for source, limits in over_limit.items():
         for joint, limit_in in limits.items():
-            names = {Field(Kind.CLEARANCE, joint, unit).name for unit in (None, *LengthUnit)}
+            names = {CLEARANCE.header(joint, unit) for unit in (None, *LengthUnit)}
             read = next((column for column in layout.columns if column.read_as in names), None)
             row = source.row if read is None else read.row or source.row
             if read is None or row is None:
@@ -303,7 +303,7 @@ def _print_well(sheet: Worksheet, layout: SheetLayout, free: int) -> None:
         return
     sheet.page_setup.orientation, sheet.page_setup.scale = "landscape", _LANDSCAPE_SCALE
     sheet.print_title_rows = f"{layout.header_row}:{layout.header_row}"
-    named = [layout.index_of(kind.value) for kind in (Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE)]
+    named = [layout.index_of(column.name) for column in IDENTITY]
     last = max((index for index in named if index is not None and index < len(named)), default=0)
     sheet.print_title_cols = f"A:{column_letters(last)}"
     sheet.col_breaks.append(Break(id=free - 1))

@@ -21,13 +21,14 @@ class OddKind(StrEnum):
     BOOLEAN = "boolean"
     NO_VALUE = "formula without a result"
     PADDED = "number shown with leading zeros"
+    WORDED = "number shown with words"
 
 
 @dataclass(frozen=True, slots=True)
 class OddCell:
     """A cell that is neither blank nor text nor a plain number.
 
-    day: the day, if it is a date that the calendar knows.
+    text: what it shows. day: the day, if it is a date that the calendar knows.
     """
 
     kind: OddKind
@@ -56,7 +57,13 @@ def show_number(value: float) -> str:
     return f"{value:.15g}"
 
 
+def stored(cell: Cell) -> Cell:
+    """Return a cell without the words that only its number format shows."""
+    return cell.number if isinstance(cell, OddCell) and cell.kind is OddKind.WORDED else cell
+
+
 def show(cell: Cell) -> str:
+    cell = stored(cell)
     if cell is None:
         return ""
     if isinstance(cell, str):
@@ -70,7 +77,7 @@ def quote(cell: Cell, limit: int = 300) -> str:
     """Return a cell as text for a message: not endless, and without characters that steer a
     terminal.
     """
-    text = show(cell)
+    text = cell.text if isinstance(cell, OddCell) else show(cell)
     if len(text) > limit:
         text = text[:limit] + "…"
     return writable(_STEERING.sub(_visible, text))
@@ -88,26 +95,101 @@ def _visible(match: re.Match[str]) -> str:
 UNWRITABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 _STEERING = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]")
 _ELAPSED = re.compile(r"\[[hms]+\]", re.IGNORECASE)
-_NOT_CODE = re.compile(r'"[^"]*"|\\.|_.|\*.|\[[^\]]*\]', re.DOTALL)
 _BUILTIN_DATES = frozenset((*range(14, 23), *range(27, 37), *range(45, 48), *range(50, 59)))
+# What a number format is made of: words in quotes, a character behind a backslash, the sign of a
+# currency, blanks of a width, colours and conditions, the number, the end of a section, the rest.
+_PIECE = re.compile(
+    r"""
+    "(?P<words>[^"]*)" | \\(?P<character>.) | \[\$(?P<currency>[^\]-]*)[^\]]*\] | [_*].
+    | (?P<bracket>\[[^\]]*\]) | (?P<number>general|@|e[+-]|[0\#?.,%]+) | (?P<end>;) | (?P<bare>.)
+    """,
+    re.VERBOSE | re.IGNORECASE | re.DOTALL,
+)
+_CONDITION = re.compile(r"\[[<>=]")
+_NUMBER_PLACE = "\0"
+_UNIT_MARKS = frozenset("\"'°″′”’%‰")
 
 
-def is_date_format(format_id: int, code: str | None) -> bool:
-    """Tell whether a number format shows a number as a date or a time."""
-    if code is None:
-        return format_id in _BUILTIN_DATES
-    if _ELAPSED.search(code):
-        return True
-    bare = _NOT_CODE.sub("", code).lower()
-    if "general" in bare:
-        return False
-    # In a plain number format E is the exponent; y, m, d, h and s stand only in dates and times.
-    return any(letter in bare for letter in "ymdhs")
+@dataclass(frozen=True, slots=True)
+class NumberFormat:
+    """What a number format makes of a number.
+
+    width: digits that a format such as ``000`` fills up with zeros. sections: the text of each
+    section, with a mark where the number stands; none if the format adds no words to numbers.
+    """
+
+    is_date: bool = False
+    width: int = 0
+    sections: tuple[str, ...] = ()
+    has_conditions: bool = False
+
+    @classmethod
+    def of(cls, code: str | None, format_id: int = 0) -> NumberFormat | None:
+        """Read a format, or take the one that programs know by a number; None if it shows plain
+        numbers.
+        """
+        if code is None:
+            return cls(is_date=True) if format_id in _BUILTIN_DATES else None
+        if _ELAPSED.search(code):
+            return cls(is_date=True)
+        pieces = list(_PIECE.finditer(code))
+        bare = "".join(piece["bare"] or "" for piece in pieces).lower()
+        # y, m, d, h and s without quotes stand only in dates and times.
+        if any(letter in bare for letter in "ymdhs") and "general" not in code.lower():
+            return cls(is_date=True)
+        if len(code) > 1 and set(code) == {"0"}:
+            return cls(width=len(code))
+        sections, is_worded = _sections(pieces)
+        if not is_worded:
+            return None
+        return cls(sections=sections[:3], has_conditions=_CONDITION.search(code) is not None)
+
+    def cell(self, number: float, *, epoch_1904: bool) -> Cell:
+        """Return the cell of a number that is shown so."""
+        if not abs(number) < 1e15:
+            return number
+        if self.is_date:
+            return date_cell(number, epoch_1904=epoch_1904)
+        text = self._worded(number) if self.sections else show_number(number).zfill(self.width)
+        return OddCell(OddKind.WORDED if self.sections else OddKind.PADDED, text, None, number)
+
+    def _worded(self, number: float) -> str:
+        signed, size = show_number(number), show_number(abs(number))
+        if self.has_conditions:
+            # Which section is meant is not guessed: where they differ, no unit is understood.
+            return " or ".join(
+                dict.fromkeys(section.replace(_NUMBER_PLACE, signed) for section in self.sections)
+            )
+        if number < 0 and len(self.sections) > 1:
+            return self.sections[1].replace(_NUMBER_PLACE, size)
+        section = self.sections[-1 if number == 0 and len(self.sections) > 2 else 0]
+        return section.replace(_NUMBER_PLACE, signed)
 
 
-def padding_width(code: str | None) -> int:
-    """Return how many digits a format such as ``000`` fills up with zeros."""
-    return len(code) if code is not None and len(code) > 1 and set(code) == {"0"} else 0
+def _sections(pieces: list[re.Match[str]]) -> tuple[tuple[str, ...], bool]:
+    """Return the text of each section of a number format; True if one holds letters or signs of
+    units.
+    """
+    sections = [""]
+    words = ""
+    is_of_texts = False
+    for piece in pieces:
+        literal = piece["words"] or piece["character"] or piece["currency"] or piece["bare"] or ""
+        words += literal
+        is_of_texts = not piece["end"] and (is_of_texts or piece["number"] == "@")
+        if piece["end"]:
+            sections.append("")
+        elif piece["number"] and _NUMBER_PLACE not in sections[-1]:
+            sections[-1] += _NUMBER_PLACE
+        sections[-1] += literal
+    if len(sections) > 1 and is_of_texts:
+        sections.pop()
+    return tuple(map(str.strip, sections)), has_words(words)
+
+
+def has_words(text: str) -> bool:
+    """Whether a text holds letters or signs of units."""
+    return any(c.isalpha() or c in _UNIT_MARKS for c in text)
 
 
 def date_cell(serial: float, *, epoch_1904: bool) -> OddCell:

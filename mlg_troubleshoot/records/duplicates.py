@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from mlg_troubleshoot.decision.columns import RECORD_ID, Column
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import column_letters
-from mlg_troubleshoot.records.columns import Kind
 from mlg_troubleshoot.records.model import SheetLayout
 
 
@@ -38,7 +38,7 @@ def settle_duplicates(
             continue
         for place, row in zip(places, found, strict=True):
             others = [where(other.source) for other in found if other is not row]
-            header, cell = cell_of(row.source, layouts, Kind.RECORD_ID)
+            header, cell = cell_of(row.source, layouts, RECORD_ID)
             problems.append(_problem(record_id, row.source, others, header, cell))
             correct = row.correct if isinstance(row, InvalidRow) else ()
             columns = tuple(dict.fromkeys((header, *correct)))
@@ -62,7 +62,7 @@ def where(source: RowSource) -> str:
 
 
 def cell_of(
-    source: RowSource, layouts: Sequence[SheetLayout], kind: Kind
+    source: RowSource, layouts: Sequence[SheetLayout], wanted: Column
 ) -> tuple[str, str | None]:
     """Header of a column as it was written, and its cell in a row or a form; no cell if the table
     does not have it.
@@ -70,12 +70,12 @@ def cell_of(
     for layout in layouts:
         if (layout.file, layout.sheet) == (source.file, source.sheet):
             for column in layout.columns:
-                if column.read_as == kind:
+                if column.read_as == wanted.name:
                     return (
                         column.header,
                         f"{column_letters(column.index)}{column.row or source.row}",
                     )
-    return kind.value, None
+    return wanted.name, None
 
 
 def _problem(

@@ -6,8 +6,15 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from mlg_troubleshoot.decision.columns import (
+    CLEARANCE,
+    CONVENTION,
+    IDENTITY,
+    RECORD_ID,
+    UNIT,
+    Column,
+)
 from mlg_troubleshoot.records.cells import Cell, column_letters
-from mlg_troubleshoot.records.columns import IDENTITY, Kind
 from mlg_troubleshoot.records.headers import UNKNOWN, recognise
 from mlg_troubleshoot.records.layout import ColumnReader
 from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout, TableInHand
@@ -17,7 +24,7 @@ from mlg_troubleshoot.records.tables import Collected
 
 FORM_TITLE = "MLG inspection form"
 # What an untouched copy of the form may hold: it says how to read, not what was found.
-_DECLARATIONS = frozenset({Kind.UNIT, Kind.CONVENTION})
+_DECLARATIONS = (UNIT, CONVENTION)
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,21 +38,21 @@ class Form:
         fields = (
             recognise(label, options.joint_numbers, options.joint_names).field for label in filled
         )
-        return all(field is not None and field.kind in _DECLARATIONS for field in fields)
+        return all(field is not None and field.column in _DECLARATIONS for field in fields)
 
 
 def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
-    kinds: dict[int, list[Kind]] = {}
+    kinds: dict[int, list[Column]] = {}
     for _, cells in rows:
         for index, cell in enumerate(cells[:4]):
             text = cell if isinstance(cell, str) else ""
             found = recognise(text, options.joint_numbers, options.joint_names).field
             if found is not None:
-                kinds.setdefault(index, []).append(found.kind)
+                kinds.setdefault(index, []).append(found.column)
                 break
     column = max(kinds, key=lambda index: len(kinds[index]), default=0)
     known = kinds.get(column, [])
-    if len(known) < 3 or not {*IDENTITY} & {*known} or Kind.CLEARANCE not in known:
+    if len(known) < 3 or not {*IDENTITY} & {*known} or CLEARANCE not in known:
         return None
     ours = any(cell == FORM_TITLE for _, cells in rows[:2] for cell in cells[:1])
     value_column = column + 1
@@ -88,7 +95,7 @@ def read_form(
     out.notes += filter(None, columns.notes())
     reader = RowReader(columns.placed, table)
     named = list(zip((row for row, _, _ in form.lines), columns.placed, strict=True))
-    ids = [row for row, p in named if p.field is not None and p.field.kind is Kind.RECORD_ID]
+    ids = [row for row, p in named if p.field is not None and p.field.column is RECORD_ID]
     start = ids[0] if ids else form.lines[0][0]
     out.rows.append(reader.read(start, [value for _, _, value in form.lines], value_places))
     out.notes += filter(None, [reader.settle_dates(out.rows)])

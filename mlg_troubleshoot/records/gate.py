@@ -9,55 +9,43 @@ from dataclasses import replace
 from datetime import date, datetime
 from numbers import Real
 
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource, Side
+from mlg_troubleshoot.decision.columns import (
+    CLEARANCE,
+    COLUMNS,
+    CONVENTION,
+    GAUGE_U,
+    IDENTITY,
+    PLUNGER_DISPLACEMENT,
+    RECORD_ID,
+    SIDE,
+    TAIL_NO,
+)
+from mlg_troubleshoot.decision.inspection import (
+    DEFAULT_GAUGE_U_IN,
+    Inspection,
+    InvalidRow,
+    RowSource,
+    Side,
+)
 from mlg_troubleshoot.errors import Problem, UsageError
 from mlg_troubleshoot.records.cells import Cell, OddCell, OddKind, iso_date_cell
-from mlg_troubleshoot.records.columns import Kind
 from mlg_troubleshoot.records.headers import no_joint
 from mlg_troubleshoot.records.layout import ColumnReader
 from mlg_troubleshoot.records.model import ReadOptions, TableInHand
 from mlg_troubleshoot.records.rows import RowReader
 from mlg_troubleshoot.records.values import CellFaultError, read_text
+from mlg_troubleshoot.units import LengthUnit
 
-# Fields of an inspection that a column of the same name holds, and the convention.
-_AS_IN_A_TABLE = (
-    *(
-        "record_id",
-        "tail_no",
-        "side",
-        "convention",
-        "outcome",
-        "inspection_date",
-        "gear_landings",
-        "temperature_c",
-    ),
-    *(
-        "hydraulic_pressure_psi",
-        "approach",
-        "gauge_id",
-        "technician_id",
-        "plunger_gauge_u_in",
-        "plunger_down_lock_in",
-    ),
-    *(
-        "actuator_extension_in",
-        "plunger_position_in",
-        "margin_in",
-        "margin_u_in",
-        "small_readings_true",
-    ),
-    *("restored_joints", "repair_date", "plunger_date", "outcome_date", "rigging_checked"),
-    *("cannot_reach", "no_spare", "open_areas", "minutes_available"),
-)
-_NOBODY = {Kind.RECORD_ID.value: "-", Kind.TAIL_NO.value: "-", Kind.SIDE.value: "LH"}
+# Who and which gear a value is judged for before that is known.
+NOBODY = {RECORD_ID.name: "-", TAIL_NO.name: "-", SIDE.name: "LH"}
 
 
 def judge_row(
     values: Mapping[str, object], options: ReadOptions
 ) -> tuple[Inspection | InvalidRow, list[Problem]]:
     """Judge values by column name as a table with these headers and one row would be."""
-    if not any(name.startswith("clearance_") and name != Kind.CONVENTION for name in values):
-        values = {**values, f"clearance_{options.joint_numbers[0]}": None}
+    if not any(name.startswith("clearance_") and name != CONVENTION.name for name in values):
+        values = {**values, CLEARANCE.header(options.joint_numbers[0]): None}
     problems: list[Problem] = []
     table = TableInHand(
         options,
@@ -106,7 +94,7 @@ def judge_length(
     column: str, text: str, options: ReadOptions
 ) -> tuple[Inspection | InvalidRow, list[Problem]]:
     """Judge one length alone, before it is known whose it is."""
-    return judge_row({**_NOBODY, column: text}, options)
+    return judge_row({**NOBODY, column: text}, options)
 
 
 def judge_text(label: str, text: str, remedy: str) -> None:
@@ -132,33 +120,32 @@ def judge_again(inspection: Inspection, options: ReadOptions) -> Inspection:
     """
     given = inspection
     factor = given.convention.per_radial if given.entered and given.convention is not None else 1.0
-    values = {
-        "clearance_convention" if name == "convention" else name: getattr(given, name)
-        for name in _AS_IN_A_TABLE
-    }
-    for kind, by_joint, scale in (
-        ("clearance", given.clearance_in, factor),
-        ("gauge_u", given.gauge_u_by_joint_in, factor),
-        ("axial_float", given.axial_float_in, 1.0),
-    ):
+    values: dict[str, object] = {}
+    for column in COLUMNS:
+        scale = factor if column.scales else 1.0
+        if column is PLUNGER_DISPLACEMENT:
+            for place, value in enumerate(given.readings_in, 1):
+                values[column.header(place, LengthUnit.INCH)] = value
+            continue
+        unit = LengthUnit.INCH if column.is_length else None
+        by_joint = getattr(given, column.joint_fills) if column.joint_fills else {}
         for joint, value in by_joint.items():
+            name = column.header(joint, unit)
             if isinstance(joint, bool) or joint not in options.joint_numbers:
                 low, high = min(options.joint_numbers), max(options.joint_numbers)
                 said = no_joint(joint, options.joint_numbers)
-                raise UsageError(
-                    f"{kind}_{joint}_in: expected a joint from {low} to {high}", f"T{said[1:]}."
-                )
-            values[f"{kind}_{joint}_in"] = _times(value, scale)
-    stated = (
-        not given.gauge_u_is_default
-        or given.gauge_u_in != Inspection.__dataclass_fields__["gauge_u_in"].default
-    )
-    if stated:
-        values["gauge_u_in"] = _times(given.gauge_u_in, factor)
-    for place, value in enumerate(given.readings_in, 1):
-        values[f"plunger_displacement_{place}_in"] = value
+                raise UsageError(f"{name}: expected a joint from {low} to {high}", f"T{said[1:]}.")
+            values[name] = _times(value, scale)
+        assumed = (
+            column is GAUGE_U
+            and given.gauge_u_is_default
+            and given.gauge_u_in == DEFAULT_GAUGE_U_IN
+        )
+        if not (column.carried or column.needs_joint or assumed):
+            values[column.header(unit=unit)] = _times(given.value(column.filled), scale)
+    required = [column.name for column in IDENTITY]
     read = admit(
-        {name: value for name, value in values.items() if value is not None or name in _NOBODY},
+        {name: value for name, value in values.items() if value is not None or name in required},
         options,
     )
     return replace(

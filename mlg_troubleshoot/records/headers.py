@@ -9,16 +9,57 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.records.columns import (
-    LENGTHS,
-    NUMBERED,
-    PER_JOINT,
-    VERDICT_BEARING,
-    Field,
-    Kind,
+from mlg_troubleshoot.decision.columns import (
+    AXIAL_FLOAT,
+    BY_NAME,
+    CLEARANCE,
+    COLUMNS,
+    JOINT,
+    PLUNGER_DISPLACEMENT,
+    SIDE,
+    UNIT,
+    Column,
 )
+from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.units import UNIT_SPELLINGS, LengthUnit
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One column of a table in hand: what it holds, of which joint or reading, in which unit."""
+
+    column: Column
+    number: int | None = None
+    unit: LengthUnit | None = None
+
+    @classmethod
+    def of(cls, column: Column, number: int | None = None, unit: LengthUnit | None = None) -> Field:
+        """The first of repeat readings needs no number."""
+        return cls(column, 1 if number is None and column.copies > 1 else number, unit)
+
+    @property
+    def name(self) -> str:
+        """Canonical name, for example ``clearance_3_mm``."""
+        return self.column.header(self.number, self.unit)
+
+    @property
+    def label(self) -> str:
+        """The label of its line in the template's form, for example ``Clearance #3`` or ``Tail
+        no``.
+        """
+        words = self.column.plain
+        if self.column.copies == 1 and self.number is not None:
+            words += f" #{self.number}"
+        elif self.number not in (None, 1):
+            words += f" {self.number}"
+        return words[:1].upper() + words[1:]
+
+    @property
+    def quantity(self) -> tuple[Column, int | None]:
+        """What it is a reading of, whatever the unit: two columns of one quantity are
+        duplicates.
+        """
+        return (self.column, self.number)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,90 +133,23 @@ _OTHER_MATTER = frozenset(
     )
 )
 
-_ALIASES: dict[str, Kind] = {
-    alias: kind
-    for kind, aliases in (
-        (
-            Kind.RECORD_ID,
-            (
-                "id|insp no|insp id|record|record no|record nr|record number|inspection"
-                " id|inspection no|inspection number"
-            ),
-        ),
-        (
-            Kind.TAIL_NO,
-            (
-                "aircraft|aircraft no|aircraft number|aircraft reg|reg|reg no|registration"
-                " no|tail|tail number|tail nr|tail #|a c reg|a c registration|a c tail no|aircraft"
-                " tail|aircraft tail no|aircraft registration|registration"
-            ),
-        ),
-        (
-            Kind.SIDE,
-            "posn|position|gear position|gear posn|l r|gear side|lh rh|side lh rh|gear side lh rh",
-        ),
-        (Kind.CONVENTION, "convention|clearance type convention|convention of the clearances"),
-        (Kind.UNIT, "units|length unit|clearance unit|unit of the clearances|unit of the lengths"),
-        (Kind.JOINT, "joint no|joint nr|joint number|jt|jt no|joint #"),
-        (Kind.DATE, "insp date|inspected on|date inspected|date measured|date|date of inspection"),
-        (
-            Kind.LANDINGS,
-            "ldgs|landings since o h|landings|landings since overhaul|gear landings since overhaul",
-        ),
-        (Kind.APPROACH, "approach direction"),
-        (
-            Kind.OUTCOME,
-            (
-                "result|test result|retraction result|retraction|retracted|gear"
-                " retracted|failed|gear failed|failed to retract|did it retract|did the gear"
-                " retract|retracted y n|gear retracted y n|failed y n|gear failed y"
-                " n|failure|retraction failed|not retracted|retraction ok|retraction"
-                " outcome|retraction test|gear result|ergebnis"
-            ),
-        ),
-        (Kind.GAUGE_ID, "gauge id no|gauge s n|gauge|gauge no|gauge number|gauge set"),
-        (
-            Kind.TECHNICIAN_ID,
-            (
-                "tech|mechanic|inspector|inspected by|technician|technician no|technician"
-                " number|measured by"
-            ),
-        ),
-        (Kind.WORK_ORDER, "wo|work order no|work order number|w o"),
-        (Kind.MANUAL_REF, "manual reference"),
-        (Kind.MANUAL_REV, "manual revision"),
-        (Kind.REMARKS, "remark|comment|comments|notes"),
-        (Kind.GAUGE_U, "gauge uncertainty|standard uncertainty of one reading"),
-        (Kind.PLUNGER_GAUGE_U, "plunger gauge uncertainty|repeatability of the plunger reading"),
-        (Kind.PLUNGER_DOWN_LOCK, "plunger at down lock|plunger position at down lock"),
-        (
-            Kind.PLUNGER_DISPLACEMENT,
-            (
-                "plunger displacement at mid position|measured plunger displacement|plunger|plunger"
-                " reading|measured plunger|plunger measured|plunger travel|plunger offset|plunger"
-                " disp"
-            ),
-        ),
-        (Kind.MARGIN, "plunger margin|margin found at rigging|margin as found at rigging"),
-        (Kind.MARGIN_U, "margin uncertainty|standard uncertainty of the margin"),
-    )
-    for alias in aliases.split("|")
-} | {
-    kind.value.replace("_", " "): kind
-    for kind in Kind
-    if kind not in (Kind.TEMPERATURE, Kind.PRESSURE)
+# Headers as people write them; of a number with a unit the unit belongs to the spelling.
+_ALIASES: dict[str, Column] = {
+    spelling: column
+    for column in COLUMNS
+    if not column.unit
+    for spelling in (*filter(None, column.spellings.split("|")), column.plain)
 }
-_WITH_OTHER_UNIT: dict[str, Kind] = {
-    "temperature c": Kind.TEMPERATURE,
-    "temp c": Kind.TEMPERATURE,
-    "hydraulic pressure psi": Kind.PRESSURE,
-    "pressure psi": Kind.PRESSURE,
+_WITH_OTHER_UNIT: dict[str, Column] = {
+    spelling: column
+    for column in COLUMNS
+    if column.unit
+    for spelling in (*filter(None, column.spellings.split("|")), column.plain)
 }
 
 _CANONICAL = re.compile(
-    r"(?P<kind>[a-z]+(?:_[a-z]+)*?)(?:_(?P<number>[1-9]\d?))?(?:_(?P<unit>in|thou|mm))?", re.ASCII
+    r"(?P<name>[a-z]+(?:_[a-z]+)*?)(?:_(?P<number>[1-9]\d?))?(?:_(?P<unit>in|thou|mm))?", re.ASCII
 )
-_KINDS: dict[str, Kind] = {kind.value: kind for kind in Kind}
 _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
 _TOKEN = re.compile(r"""[a-zµμ]+\d*|\d+(?:[.,]\d+)?|["″]|''|\#""")
 _GLUED = re.compile(r"(j|jt|joint|clearance|clr|no|nr)0?(\d{1,2})", re.ASCII)
@@ -195,18 +169,18 @@ def tidy(header: str) -> str:
 
 def parse_canonical(name: str, joint_numbers: tuple[int, ...]) -> Field | None:
     match = _CANONICAL.fullmatch(name)
-    if match is None or match["kind"] not in _KINDS:
+    column = None if match is None else BY_NAME.get(match["name"])
+    if match is None or column is None:
         return None
-    kind = _KINDS[match["kind"]]
     number = int(match["number"]) if match["number"] else None
     unit = LengthUnit(match["unit"]) if match["unit"] else None
-    if (unit is not None and kind not in LENGTHS) or (number is not None and kind not in NUMBERED):
+    if (unit is not None and not column.is_length) or (
+        number is not None and not column.is_numbered
+    ):
         return None
-    if kind is not Kind.PLUNGER_DISPLACEMENT and number is not None and number not in joint_numbers:
+    if column.copies == 1 and number is not None and number not in joint_numbers:
         return None
-    if kind is Kind.PLUNGER_DISPLACEMENT and number is None:
-        number = 1
-    return Field(kind, number, unit)
+    return Field.of(column, number, unit)
 
 
 @lru_cache(maxsize=4096)
@@ -273,19 +247,20 @@ def _trailing_unit(words: list[str]) -> tuple[list[str], LengthUnit | None]:
 def _by_alias(
     plain: str, units: set[LengthUnit], foreign: list[str], odd: list[str]
 ) -> Recognition:
-    kind = _ALIASES.get(f"{plain} {' '.join(odd)}") if odd else None
-    odd = [] if kind is not None else odd
-    kind = kind or _ALIASES.get(plain)
-    if kind is None or (kind not in LENGTHS and (units or foreign or odd)):
+    column = _ALIASES.get(f"{plain} {' '.join(odd)}") if odd else None
+    odd = [] if column is not None else odd
+    column = column or _ALIASES.get(plain)
+    if column is None or (not column.is_length and (units or foreign or odd)):
         return UNKNOWN
-    field = Field(kind, 1 if kind is Kind.PLUNGER_DISPLACEMENT else None)
-    return _with_unit(field, units, foreign, odd)
+    return _with_unit(Field.of(column), units, foreign, odd)
 
 
 def _resembles_plunger(words: list[str], has_unit: bool) -> Recognition:
     """Doubt a length of the plunger that none of its columns names."""
     if has_unit and "plunger" in words and not set(words) & _OTHER_MATTER:
-        return _doubt("it may be the measured displacement of the plunger", "plunger_displacement")
+        return _doubt(
+            "it may be the measured displacement of the plunger", PLUNGER_DISPLACEMENT.name
+        )
     return UNKNOWN
 
 
@@ -358,15 +333,15 @@ def _numbered(  # noqa: PLR0911 - each return is one reason to doubt
     everything = said | set(after)
     if not (is_joint or is_clearance or is_float):
         if said == {"plunger", "displacement"} and not after:
-            return Recognition(Field(Kind.PLUNGER_DISPLACEMENT, number))
+            return Recognition(Field(PLUNGER_DISPLACEMENT, number))
         return None
     if everything & _OTHER_MATTER and not (is_clearance or is_float):
         return UNKNOWN
-    kind = Kind.AXIAL_FLOAT if is_float else Kind.CLEARANCE
-    nearest = f"{kind.value}_{number}"
+    column = AXIAL_FLOAT if is_float else CLEARANCE
+    nearest = column.header(number)
     if number not in joint_numbers:
         close = difflib.get_close_matches(
-            nearest, [f"{kind.value}_{n}" for n in joint_numbers], 2, 0.0
+            nearest, [column.header(n) for n in joint_numbers], 2, 0.0
         )
         return _doubt(no_joint(number, joint_numbers), " or ".join(close), "joint_unknown")
     if everything & _CONVENTION_WORDS:
@@ -381,7 +356,7 @@ def _numbered(  # noqa: PLR0911 - each return is one reason to doubt
         )
     if after and not is_float and set(after) <= _CLEARANCE_WORDS:
         after = []
-    return _check_name(kind, number, after, names)
+    return _check_name(Field(column, number), after, names)
 
 
 def no_joint(number: object, joint_numbers: tuple[int, ...]) -> str:
@@ -391,11 +366,9 @@ def no_joint(number: object, joint_numbers: tuple[int, ...]) -> str:
     )
 
 
-def _check_name(
-    kind: Kind, number: int, after: list[str], names: tuple[tuple[int, str], ...]
-) -> Recognition:
+def _check_name(field: Field, after: list[str], names: tuple[tuple[int, str], ...]) -> Recognition:
     """Accept a joint's name behind its number only if it is this joint's, not another's."""
-    nearest = f"{kind.value}_{number}"
+    nearest, number = field.name, field.number
     said = set(after) - _FILLERS
     if said - _vocabulary(names):
         return _doubt(f"{' '.join(after)!r} may mean something other than the clearance", nearest)
@@ -405,7 +378,7 @@ def _check_name(
         if others or own:
             hint = f"; that is joint {others[0]}" if len(others) == 1 else ""
             return _doubt(f"{' '.join(after)!r} is not the name of joint {number}{hint}", nearest)
-    return Recognition(Field(kind, number))
+    return Recognition(field)
 
 
 def _vocabulary(names: tuple[tuple[int, str], ...]) -> frozenset[str]:
@@ -442,16 +415,16 @@ def near_miss(header: str, joint_numbers: tuple[int, ...]) -> Recognition:
     snake = _snake(header)
     bare = re.sub(r"_(in|thou|mm)$", "", snake)
     candidates = [
-        k.value for k in Kind if k not in PER_JOINT and k not in (Kind.UNIT, Kind.SIDE, Kind.JOINT)
-    ]
-    candidates += [
-        f"{k.value}_{n}" for k in (Kind.CLEARANCE, Kind.AXIAL_FLOAT) for n in joint_numbers
+        column.header(number)
+        for column in COLUMNS
+        if column not in (UNIT, SIDE, JOINT)
+        for number in (joint_numbers if column.needs_joint else (None,))
     ]
     close = difflib.get_close_matches(bare, candidates, 1, 0.87)
     if not close:
         return UNKNOWN
     field = parse_canonical(close[0], joint_numbers)
-    if field is not None and field.kind in VERDICT_BEARING:
+    if field is not None and field.column.bears_verdict:
         unit = snake[len(bare) :]
         return _doubt(f"it looks like an entry error for {close[0]}{unit}", close[0] + unit)
     return Recognition(nearest=close[0])

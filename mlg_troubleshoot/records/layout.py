@@ -7,17 +7,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise, zip_longest
 
-from mlg_troubleshoot.records.cells import Cell, column_letters, show, writable
-from mlg_troubleshoot.records.columns import (
-    ALONG,
-    CARRIED,
+from mlg_troubleshoot.decision.columns import (
+    CLEARANCE,
     IDENTITY,
-    LENGTHS,
-    PER_JOINT,
-    REQUIRED,
-    VERDICT_BEARING,
-    Kind,
+    JOINT,
+    RECORD_ID,
+    SIDE,
+    STROKE,
+    TAIL_NO,
+    Column,
 )
+from mlg_troubleshoot.records.cells import Cell, column_letters, show, writable
 from mlg_troubleshoot.records.headers import (
     UNKNOWN,
     Recognition,
@@ -84,7 +84,7 @@ def _mapped(text: str, index: int, options: ReadOptions) -> bool:
 
 
 def header_score(cells: Sequence[Cell], options: ReadOptions) -> int:
-    known: set[tuple[Kind, int | None]] = set()
+    known: set[tuple[Column, int | None]] = set()
     doubtful = 0
     for index, cell in enumerate(cells):
         if isinstance(cell, str):
@@ -94,10 +94,10 @@ def header_score(cells: Sequence[Cell], options: ReadOptions) -> int:
             )
             known |= set() if found.field is None else {found.field.quantity}
             doubtful += mapped or bool(found.reason)
-    kinds = {kind for kind, _ in known}
-    core = len(kinds & {*IDENTITY, Kind.CLEARANCE}) + bool(doubtful)
+    columns = {column for column, _ in known}
+    core = len(columns & {*IDENTITY, CLEARANCE}) + bool(doubtful)
     # A table of clearances alone is a table, too: what it lacks is then named column by column.
-    clearances = sum(kind is Kind.CLEARANCE and number is not None for kind, number in known)
+    clearances = sum(column is CLEARANCE and number is not None for column, number in known)
     if clearances < 2 and (core < 2 or len(known) + doubtful < 3):
         return 0
     return 2 * len(known) + doubtful
@@ -188,7 +188,7 @@ def _unit_row(
             if word in UNIT_SPELLINGS
             else None
         )
-        if known is not None and known.kind not in LENGTHS:
+        if known is not None and not known.column.is_length:
             return None
     units = [UNIT_SPELLINGS.get(word) for word in words[: len(header.texts)]]
     return tuple(units) if any(units) else None
@@ -204,7 +204,7 @@ def why_not_remembered(header: str, column: str, options: ReadOptions) -> str:
         return f"is read as {found.field.name}"
     if found.reason:
         target = parse_target(column, options.joint_numbers)
-        if target is None or target.kind not in VERDICT_BEARING | PER_JOINT:
+        if target is None or not (target.column.bears_verdict or target.column.needs_joint):
             return f"is doubtful: {found.reason}"
     return ""
 
@@ -318,13 +318,13 @@ class ColumnReader:
         one.
         """
         fields = [p.field for p in columns.placed if p.field is not None and not p.refused]
-        numbered = any(f.kind in PER_JOINT and f.number is not None for f in fields)
+        numbered = any(f.column.needs_joint and f.number is not None for f in fields)
         loose = [
             p
             for p in columns.placed
-            if p.field and p.field.kind in PER_JOINT and p.field.number is None
+            if p.field and p.field.column.needs_joint and p.field.number is None
         ]
-        joint = next((p for p in columns.placed if p.field and p.field.kind is Kind.JOINT), None)
+        joint = next((p for p in columns.placed if p.field and p.field.column is JOINT), None)
         if joint is not None and loose and not numbered:
             columns.is_long = True
             return
@@ -347,7 +347,7 @@ class ColumnReader:
         self._tell(code, placed, expected, remedy)
 
     def _duplicates(self, columns: Columns) -> None:
-        seen: dict[tuple[Kind, int | None], PlacedField] = {}
+        seen: dict[tuple[Column, int | None], PlacedField] = {}
         for placed in list(columns.placed):
             if placed.field is None or placed.refused:
                 continue
@@ -357,14 +357,14 @@ class ColumnReader:
             plain = [
                 p for p in (first, placed) if tidy(p.header).replace(" ", "_") == placed.field.name
             ]
-            if placed.field.kind not in LENGTHS and len(plain) == 1:
+            if not placed.field.column.is_length and len(plain) == 1:
                 # The column that bears the name is meant; the other one is another matter, such as
                 # the aircraft's type.
                 other = placed if plain[0] is first else first
                 columns.placed[other.index] = replace(other, field=None)
                 seen[placed.field.quantity] = plain[0]
                 continue
-            if placed.field.kind in CARRIED:
+            if placed.field.column.carried:
                 # A second column of remarks is a column of its own.
                 columns.placed[placed.index] = replace(placed, field=None)
                 continue
@@ -380,23 +380,25 @@ class ColumnReader:
             )
 
     def _missing(self, columns: Columns, row: int) -> None:
-        fields = {p.field.kind for p in columns.placed if p.field is not None}
+        fields = {p.field.column for p in columns.placed if p.field is not None}
         unknown = [p.header for p in columns.placed if p.field is None and p.header]
         missing = [
-            (kind.value, f"a column {kind.value}") for kind in REQUIRED if kind not in fields
+            (column.name, f"a column {column.name}")
+            for column in (TAIL_NO, SIDE)
+            if column not in fields
         ]
-        if Kind.RECORD_ID not in fields and columns.is_long:
+        if RECORD_ID not in fields and columns.is_long:
             missing.insert(
                 0,
                 (
-                    "record_id",
-                    "a column record_id, by which the rows of one inspection are gathered",
+                    RECORD_ID.name,
+                    f"a column {RECORD_ID.name}, by which the rows of one inspection are gathered",
                 ),
             )
-        elif Kind.RECORD_ID not in fields:
+        elif RECORD_ID not in fields:
             columns.ids_made = True
         clearance_refused = any(p.refused for p in columns.placed)
-        if Kind.CLEARANCE not in fields and not clearance_refused and not fields >= set(ALONG):
+        if CLEARANCE not in fields and not clearance_refused and not fields >= set(STROKE):
             missing.append(
                 ("clearance_1_in", "at least one clearance column, such as clearance_3_in")
             )

@@ -6,9 +6,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+from mlg_troubleshoot.decision.columns import JOINT, RECORD_ID, Column
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
-from mlg_troubleshoot.records.cells import Cell, OddCell, column_letters, quote, show
-from mlg_troubleshoot.records.columns import PER_JOINT, Kind
+from mlg_troubleshoot.records.cells import Cell, OddCell, column_letters, quote, show, stored
 from mlg_troubleshoot.records.headers import tidy
 from mlg_troubleshoot.records.model import TableInHand
 from mlg_troubleshoot.records.rows import PlacedField, RowReader
@@ -33,9 +33,9 @@ class LongReader:
         options = table.options
         self._table = table
         self._placed = list(placed)
-        self._record = self._find(Kind.RECORD_ID)
-        self._joint = self._find(Kind.JOINT)
-        self._per_joint = [p for p in placed if p.field is not None and p.field.kind in PER_JOINT]
+        self._record = self._find(RECORD_ID)
+        self._joint = self._find(JOINT)
+        self._per_joint = [p for p in placed if p.field is not None and p.field.column.needs_joint]
         # What is of one reading, not of the whole inspection.
         self._own = [*self._per_joint, *([] if self._joint is None else [self._joint])]
         wide: list[PlacedField] = [
@@ -54,12 +54,12 @@ class LongReader:
         self._groups: dict[str | int, _Group] = {}
         self.reader = RowReader(wide, table)
 
-    def _find(self, kind: Kind) -> PlacedField | None:
+    def _find(self, column: Column) -> PlacedField | None:
         return next(
             (
                 p
                 for p in self._placed
-                if p.field is not None and p.field.kind is kind and not p.refused
+                if p.field is not None and p.field.column is column and not p.refused
             ),
             None,
         )
@@ -130,6 +130,7 @@ class LongReader:
                 self._fault(group, (p, row, reading), "joint_twice", expected, remedy)
 
     def _joint_number(self, cell: Cell) -> int | None:
+        cell = stored(cell)
         if cell is None or isinstance(cell, OddCell):
             return None
         if isinstance(cell, float):

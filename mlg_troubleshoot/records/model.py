@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from mlg_troubleshoot.decision.columns import CLEARANCE, PLUNGER_DISPLACEMENT, Column
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
@@ -101,6 +102,14 @@ class ReadOptions(TableOptions):
     limit_in: Mapping[int, float] = field(default_factory=dict)
     margin_in: float = math.inf
     asks: bool = False
+
+    def range_in(self, column: Column) -> tuple[float, float]:
+        """Least and largest length that a column can hold, radial. [in]"""
+        high = {
+            CLEARANCE: self.clearance_hard_max_in,
+            PLUNGER_DISPLACEMENT: self.plunger_hard_max_in,
+        }.get(column, column.high)
+        return max(column.low, -high), high
 
     @classmethod
     def of(cls, gear: Gear, tables: TableOptions | None = None, **declared: Any) -> ReadOptions:

@@ -17,7 +17,9 @@ from mlg_troubleshoot.records.cells import (
     Cell,
     OddCell,
     OddKind,
+    has_words,
     iso_date_cell,
+    show_number,
 )
 from mlg_troubleshoot.records.source import MergedRange, NumberedRow, Sheet, Workbook
 from mlg_troubleshoot.records.zipguard import (
@@ -30,6 +32,7 @@ from mlg_troubleshoot.records.zipguard import (
 
 _CONTENT = "content.xml"
 _PADDED = re.compile(r"0\d+", re.ASCII)
+_NUMBER = re.compile(r"[+-]?\d[\d.,]*(?:[eE][+-]?\d+)?%?", re.ASCII)
 _ERROR_TEXT = re.compile(r"#[A-Z/0-9!?]+|Err:\d+")
 _OASIS = "urn:oasis:names:tc:opendocument:xmlns:"
 _OFFICE, _STYLE, _TABLE, _TEXT = (
@@ -158,7 +161,12 @@ def _value(element: Element) -> Cell:  # noqa: PLR0911 - one return for each kin
             return OddCell(OddKind.BOOLEAN, shown)
         if _PADDED.fullmatch(shown) and float(shown) == number:
             return OddCell(OddKind.PADDED, shown, None, number)
-        return number
+        words = _NUMBER.sub("", shown, count=1)
+        if not has_words(words):
+            return number
+        # The number that is shown may be rounded, and have a comma.
+        text = _NUMBER.sub(show_number(number), shown, count=1)
+        return OddCell(OddKind.WORDED, text, None, number)
     if kind == "date":
         return iso_date_cell(element.get(f"{_OFFICE}date-value", ""))
     if kind == "time":

@@ -17,10 +17,10 @@ from mlg_troubleshoot.records.cells import writable
 from mlg_troubleshoot.records.csvfile import csv_book
 from mlg_troubleshoot.records.duplicates import settle_duplicates
 from mlg_troubleshoot.records.forms import Form, find_form, read_form
-from mlg_troubleshoot.records.history import history_warnings, order_warnings
 from mlg_troubleshoot.records.layout import Header, find_header, header_score
 from mlg_troubleshoot.records.model import FileRead, Progress, ReadOptions, ReadResult
 from mlg_troubleshoot.records.refusals import FileRefusedError
+from mlg_troubleshoot.records.row_consistency import history_warnings, order_warnings
 from mlg_troubleshoot.records.sniff import sniff
 from mlg_troubleshoot.records.source import NumberedRow, Sheet, Workbook
 from mlg_troubleshoot.records.tables import Collected, read_table

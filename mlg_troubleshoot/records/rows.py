@@ -5,83 +5,75 @@ from __future__ import annotations
 import re
 import zlib
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from datetime import date, timedelta
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import PurePath
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
+from mlg_troubleshoot.decision.columns import (
+    AXIAL_FLOAT,
+    CLEARANCE,
+    CONVENTION,
+    DATE,
+    GAUGE_U,
+    IDENTITY,
+    JOINT,
+    OUTCOME,
+    PLUNGER_DISPLACEMENT,
+    RECORD_ID,
+    SMALL_READINGS_TRUE,
+    STROKE,
+    UNIT,
+    Column,
+    Holds,
+)
 from mlg_troubleshoot.decision.inspection import (
     DEFAULT_GAUGE_U_IN,
-    Approach,
     EnteredClearance,
     Inspection,
     InvalidRow,
     RowSource,
-    Side,
 )
 from mlg_troubleshoot.records.cells import (
     Cell,
     OddCell,
-    OddKind,
     column_letters,
     quote,
     show,
+    stored,
     writable,
 )
-from mlg_troubleshoot.records.columns import (
-    ALONG,
-    CARRIED,
-    IDENTITY,
-    LENGTH_RANGE_IN,
-    LENGTHS,
-    VERDICT_BEARING,
-    Field,
-    Kind,
-)
 from mlg_troubleshoot.records.dates import DateOrder, readings
-from mlg_troubleshoot.records.model import ReadOptions, TableInHand
+from mlg_troubleshoot.records.headers import Field
+from mlg_troubleshoot.records.model import TableInHand
 from mlg_troubleshoot.records.refusals import FileRefusedError
-from mlg_troubleshoot.records.slips import scale_slip
-from mlg_troubleshoot.records.unit_fit import UnitFit, judge_unit, plunger_question
+from mlg_troubleshoot.records.unit_fit import (
+    UnitFit,
+    judge_unit,
+    plunger_question,
+    scale_slip,
+)
 from mlg_troubleshoot.records.values import (
     NOT_MEASURED,
     AmbiguousDateError,
     CellFaultError,
     plain_text,
     read_areas,
-    read_choice,
     read_date,
     read_joints,
     read_length,
     read_moment,
-    read_number,
-    read_outcome,
-    read_rigging,
-    read_text,
-    read_yes_no,
+    read_value,
     says_failed,
 )
-from mlg_troubleshoot.units import UNIT_SPELLINGS, ClearanceConvention, LengthUnit
-
-_T = TypeVar("_T")
+from mlg_troubleshoot.units import ClearanceConvention, Length, LengthUnit, Sentence
 
 _EPS_IN = 1e-9
 _REMEMBERED = 20_000
 _NO_FLOATS: Mapping[int, float] = MappingProxyType({})
-
-_APPROACH_HINTS = {
-    **dict.fromkeys(("extend", "ext"), "EXTENDING"),
-    **dict.fromkeys(("retract", "ret"), "RETRACTING"),
-}
-_CONVENTION_HINTS = {
-    **dict.fromkeys(("radius", "rad", "offset"), "RADIAL"),
-    **dict.fromkeys(("dia", "diameter", "diametrical"), "DIAMETRAL"),
-    **dict.fromkeys(("play", "total", "tir", "dial"), "TOTAL_PLAY"),
-}
-
 _MISSING_CONVENTION = (
     "RADIAL, DIAMETRAL or TOTAL_PLAY",
     (
@@ -90,76 +82,8 @@ _MISSING_CONVENTION = (
         " TOTAL_PLAY is the dial reading."
     ),
 )
-_NEVER_BLANK = frozenset(
-    (*IDENTITY, *CARRIED, Kind.CONVENTION, Kind.UNIT, Kind.JOINT, Kind.MARGIN, Kind.MARGIN_U)
-) | {
-    Kind.GAUGE_ID,
-    Kind.TECHNICIAN_ID,
-    Kind.SMALL_READINGS_TRUE,
-}
-_SIGNED = frozenset({Kind.PLUNGER_DOWN_LOCK, Kind.PLUNGER_POSITION, Kind.PLUNGER_DISPLACEMENT})
-# What else a row may say, read cell by cell; the flag says whether a comma is the decimal mark, the
-# text is the header.
-LOOSE_CELLS: dict[Kind, Callable[[bool, str, str | float | OddCell], object]] = {
-    Kind.LANDINGS: lambda comma, _, cell: read_number(
-        cell, 0.0, 1e6, decimal_comma=comma, expected="landings since overhaul, 0 or more"
-    ),
-    Kind.TEMPERATURE: lambda comma, _, cell: read_number(
-        cell,
-        -60.0,
-        60.0,
-        decimal_comma=comma,
-        expected="a temperature from -60 to 60 degrees Celsius",
-        suffix="C",
-    ),
-    Kind.PRESSURE: lambda comma, _, cell: read_number(
-        cell,
-        0.0,
-        4000.0,
-        decimal_comma=comma,
-        expected="a pressure from 0 to 4000 psi",
-        suffix="psi",
-    ),
-    Kind.APPROACH: lambda _, __, cell: read_choice(
-        cell, Approach, "approach_unknown", _APPROACH_HINTS
-    ),
-    Kind.OUTCOME: lambda _, header, cell: read_outcome(cell, header),
-    Kind.SMALL_READINGS_TRUE: lambda _, __, cell: read_yes_no(cell),
-    Kind.GAUGE_ID: lambda _, __, cell: read_text(cell, "a gauge id (text)", required=True),
-    Kind.TECHNICIAN_ID: lambda _, __, cell: read_text(
-        cell, "a technician id (text)", required=True
-    ),
-}
-
-
-# What a row says of repairs and of the day: the gear and the options say what can be meant.
-_DAY_CELLS: dict[Kind, Callable[[ReadOptions, date, str | float | OddCell], object]] = {
-    **dict.fromkeys(
-        (Kind.RESTORED_JOINTS, Kind.CANNOT_REACH, Kind.NO_SPARE),
-        lambda options, _, cell: read_joints(cell, options.joint_numbers),
-    ),
-    **dict.fromkeys(
-        (Kind.REPAIR_DATE, Kind.PLUNGER_DATE, Kind.OUTCOME_DATE),
-        lambda options, latest, cell: read_moment(cell, options.dates, latest),
-    ),
-    Kind.OPEN_AREAS: lambda options, _, cell: read_areas(cell, options.areas),
-    Kind.MINUTES_AVAILABLE: lambda options, _, cell: read_number(
-        cell,
-        0.0,
-        1e5,
-        decimal_comma=options.decimal_comma,
-        expected="minutes, 0 or more",
-        suffix="min",
-    ),
-    Kind.RIGGING_CHECKED: lambda _, __, cell: read_rigging(cell),
-}
-
-
-# A column, the name of what it holds, and how a cell of it is read.
-_Loose = tuple[int, str, Callable[[Any], object]]
-
-
 _MADE_FROM_A_ROW = re.compile(r"-\d+-[0-9a-f]{8}\Z")
+_FIELDS = frozenset(field.name for field in fields(Inspection))
 
 
 def place_in_file(record_id: str) -> str:
@@ -168,18 +92,6 @@ def place_in_file(record_id: str) -> str:
     """
     made = _MADE_FROM_A_ROW.search(record_id)
     return "" if made is None else made[0]
-
-
-def _carried_text(cell: str | float | OddCell) -> str:
-    is_shown = isinstance(cell, OddCell) and cell.kind in (OddKind.DATE, OddKind.BOOLEAN)
-    return show(cell) if is_shown else read_text(cell, "text")
-
-
-def _taken(lengths: dict[tuple[Kind, int | None], float], kind: Kind) -> dict[int, float]:
-    """Take the lengths of one kind out, by number; one without a number stands under 0."""
-    return {
-        number or 0: lengths.pop((kind, number)) for each, number in list(lengths) if each is kind
-    }
 
 
 class _CellPlace(NamedTuple):
@@ -210,71 +122,79 @@ class PlacedField:
         return None if self.field is None or self.refused else self.field.name
 
 
+class _LengthKind(NamedTuple):
+    """How a length is read, whichever joint it is of: equal cells of one kind are one length."""
+
+    column: Column
+    unit: LengthUnit | None
+    above_zero: bool
+
+
+class _LengthColumn(NamedTuple):
+    at: int
+    field: Field
+    kind: _LengthKind
+
+
+@dataclass(slots=True)
+class _Found:
+    """What the cells of one row say; lengths as entered and what each is in inches."""
+
+    values: dict[Column, Any]
+    carried: dict[str, str]
+    lengths: dict[Column, dict[int, float]]
+    entered: dict[int, EnteredClearance]
+    plunger: list[tuple[float, LengthUnit]]
+
+
 class RowReader:
+    """Reads the rows of one table, each bad cell reported once."""
+
     def __init__(self, placed: Sequence[PlacedField], table: TableInHand) -> None:
         self._table = table
         self._options = table.options
-        self._comma = table.decimal_comma
-        # Somewhere it is tomorrow already.
-        self._latest = date.today() + timedelta(days=1)
         self._placed = {p.index: p for p in placed}
         self._width = max(self._placed, default=-1) + 1
         good = [(p.index, p.field) for p in placed if p.field is not None and not p.refused]
         self._refused = [p.index for p in placed if p.refused]
-        self._at = {field.kind: index for index, field in reversed(good)}
-        self._makes_ids = all(p.field is None or p.field.kind is not Kind.RECORD_ID for p in placed)
-        self._clearances = sorted(
-            (field.number or 0, index, field.unit)
-            for index, field in good
-            if field.kind is Kind.CLEARANCE
-        )
-        self._lengths = {
-            index: field
-            for index, field in good
-            if field.kind in LENGTHS and field.kind is not Kind.CLEARANCE
-        }
-        # The readings of a fleet repeat: what was understood once is not taken apart again.
-        self._clearance_of = lru_cache(_REMEMBERED)(self._one_clearance)
-        self._length_of = lru_cache(_REMEMBERED)(self._one_length)
-        # Cells that bear no verdict, by the names under which they are found: what is read, and
-        # what is only carried.
-        self._others: list[_Loose] = [
-            (
+        self._at = {field.column: index for index, field in reversed(good)}
+        self._makes_ids = all(p.field is None or p.field.column is not RECORD_ID for p in placed)
+        lengths = [
+            _LengthColumn(
                 index,
-                field.kind.value,
-                partial(LOOSE_CELLS[field.kind], self._comma, self._placed[index].header),
+                field,
+                _LengthKind(field.column, field.unit, field.column.is_above_zero(field.number)),
             )
             for index, field in good
-            if field.kind in LOOSE_CELLS
+            if field.column.is_length
         ]
-        self._others += [
-            (i, Kind.DATE.value, self._read_date) for i, f in good if f.kind is Kind.DATE
+        clearances = [each for each in lengths if each.field.column is CLEARANCE]
+        # Clearances stand first, in the order of the joints, whatever the order of their columns.
+        self._lengths = [
+            *sorted(clearances, key=lambda each: each.field.number or 0),
+            *(each for each in lengths if each not in clearances),
         ]
-        self._others += [
-            (i, f.kind.value, partial(_DAY_CELLS[f.kind], self._options, self._latest))
-            for i, f in good
-            if f.kind in _DAY_CELLS
-        ]
-        self._carried: list[_Loose] = [
-            (index, field.kind.value, _carried_text)
+        self._others = [
+            (index, field.column)
             for index, field in good
-            if field.kind in CARRIED
+            if not field.column.is_length and field.column not in (CONVENTION, UNIT, JOINT)
         ]
-        for p in placed:
-            if p.field is None and not p.refused:
-                name = p.header or f"column {column_letters(p.index)}"
-                while any(name == carried for _, carried, _ in self._carried):
-                    name = f"{name} (again)"
-                self._carried.append((p.index, name, lambda cell: writable(show(cell))))
+        # The readings of a fleet repeat: what was understood once is not taken apart again.
+        self._length_of = lru_cache(_REMEMBERED)(self._one_length)
+        self._unread = self._names_of_unread(placed)
         # What was not understood, and may still say that the gear failed.
         self._unknown = [
             p
             for p in placed
             if p.field is None and not (p.refused or p.is_mapped or re.search(r"\d", p.header))
         ]
-        # In these cells a word says that nothing was measured; a margin or an identity is never
-        # left out by a word.
-        self._blankable = [index for index, field in good if field.kind not in _NEVER_BLANK]
+        # What a number format adds counts where a unit does.
+        self._plain = [
+            p.index
+            for p in placed
+            if p.field is None or p.field.column.holds not in (Holds.LENGTH, Holds.NUMBER)
+        ]
+        self._blankable = [index for index, field in good if field.column.blank_by_word]
         self.not_measured: Counter[str] = Counter()
         self._without_unit: set[str | None] = set()
         self._row = 0
@@ -282,12 +202,25 @@ class RowReader:
         self._cells: Sequence[Cell] = ()
         self._bad: set[int] = set()
         self._faults: list[tuple[int, CellFaultError]] = []
-        # The plunger readings of the row, with the unit of each. [in]
-        self._plunger: list[tuple[float, LengthUnit]] = []
+        # Somewhere it is tomorrow already.
+        self._latest = date.today() + timedelta(days=1)
         # Which orders fit the dates that are written as numbers, and the dates of rows that wait
         # for the others.
         self._date_orders = set(DateOrder)
         self._waiting: dict[RowSource, _WaitingDate] = {}
+
+    def _names_of_unread(self, placed: Sequence[PlacedField]) -> list[tuple[int, str]]:
+        """The columns that are only carried because nobody knows them, each under its own name."""
+        named: list[tuple[int, str]] = []
+        taken = {column.name for column in self._at if column.carried}
+        for p in placed:
+            if p.field is None and not p.refused:
+                name = p.header or f"column {column_letters(p.index)}"
+                while name in taken:
+                    name = f"{name} (again)"
+                taken.add(name)
+                named.append((p.index, name))
+        return named
 
     def read(
         self, row: int, cells: Sequence[Cell], places: Sequence[tuple[int, str]] | None = None
@@ -295,74 +228,156 @@ class RowReader:
         """Read one row; every bad cell is reported once."""
         self._begin(row, cells, places)
         warnings: list[str] = []
-
-        record_id = (
-            self._made_id()
-            if self._makes_ids
-            else self._identity(Kind.RECORD_ID, "a record id (unique text)")
-        )
-        tail_no = self._identity(Kind.TAIL_NO, "a tail number (text)")
-        side = self._read_side()
-        convention = self._read_convention()
-        row_unit = self._read_row_unit()
-        clearance, entered = self._read_clearances(convention, row_unit, warnings)
-        lengths = self._read_lengths(convention, row_unit)
-        others, carried = self._read_loose(self._others), self._read_loose(self._carried)
-
-        if "outcome" not in others:
-            self._look_for_failure()
+        convention, unit = self._read_convention(), self._read_row_unit()
+        found = self._read_cells(convention, unit, warnings)
+        question = self._unit_question(found, convention, warnings)
         source = self._table.source(row)
-        question = self._unit_question(clearance, entered, convention, others, warnings)
-        for place, found in sorted(self._faults, key=lambda fault: fault[0]):
-            if isinstance(found, AmbiguousDateError):
-                self._waiting[source] = _WaitingDate(self._place(place), self._cells[place], found)
-            else:
-                self._tell(place, found)
+        self._report_faults(source)
+        record_id, tail_no, side = (found.values.pop(column, None) for column in IDENTITY)
         if self._bad or record_id is None or tail_no is None or side is None or convention is None:
             return InvalidRow(record_id, tail_no, side, self._correct(), tuple(warnings), source)
-        if self._clearances and not clearance:
-            warnings.append("no clearance is given in this row: no joint was measured")
-        elif len(clearance) > 1 and not any(clearance.values()):
-            warnings.append(
-                "every clearance is 0: a zero is read as measured; leave a joint blank if it was"
-                " not measured"
-            )
-        alone = [kind for kind in ALONG if (kind, None) in lengths]
-        if len(alone) == 1:
-            (other,) = set(ALONG) - set(alone)
-            warnings.append(f"{alone[0].value}_in is not used: the row has no {other.value}_in")
-        gauge_us = _taken(lengths, Kind.GAUGE_U)
-        gauge_u = gauge_us.pop(0, None)
-        idle = [f"#{joint}" for joint in gauge_us if joint not in clearance]
-        if idle:
-            warnings.append(
-                f"standard uncertainty of the gauge at joint {', '.join(idle)} is not used: the"
-                " joint has no reading"
-            )
-        readings = sorted(_taken(lengths, Kind.PLUNGER_DISPLACEMENT).items())
-        floats = _taken(lengths, Kind.AXIAL_FLOAT)
-        # Columns bear the names of the fields that they fill.
-        others.update({f"{kind.value}_in": value for (kind, _), value in lengths.items()})
+        self._warn(found, warnings)
+        lengths = found.lengths
+        clearance = lengths.pop(CLEARANCE, {})
+        gauge_u = {
+            joint: value / convention.per_radial
+            for joint, value in lengths.pop(GAUGE_U, {}).items()
+            if joint in (0, *clearance)
+        }
+        readings = sorted(lengths.pop(PLUNGER_DISPLACEMENT, {}).items())
+        floats = lengths.pop(AXIAL_FLOAT, None)
+        said = {column.filled: value for column, value in found.values.items()}
+        said.update({column.filled: value[0] for column, value in lengths.items()})
+        other = {name: said.pop(name) for name in [*said] if name not in _FIELDS}
         return Inspection(
             record_id=record_id,
             tail_no=tail_no,
             side=side,
             convention=convention,
             clearance_in=clearance,
-            entered=entered,
-            gauge_u_in=DEFAULT_GAUGE_U_IN if gauge_u is None else gauge_u / convention.per_radial,
-            gauge_u_is_default=gauge_u is None,
-            gauge_u_by_joint_in={
-                j: u / convention.per_radial for j, u in gauge_us.items() if j in clearance
-            },
+            entered=found.entered,
+            gauge_u_is_default=0 not in gauge_u,
+            gauge_u_in=gauge_u.pop(0, DEFAULT_GAUGE_U_IN),
+            gauge_u_by_joint_in=gauge_u,
             readings_in=tuple(value for _, value in readings),
             axial_float_in=floats or _NO_FLOATS,
             unit_question=question,
-            carried=carried,
+            other_columns=other,
+            carried=found.carried,
             warnings=tuple(warnings),
             source=source,
-            **others,
+            **said,
         )
+
+    def _read_cells(
+        self,
+        convention: ClearanceConvention | None,
+        row_unit: LengthUnit | None,
+        warnings: list[str],
+    ) -> _Found:
+        """Read every cell but those that say how to read the others."""
+        found = _Found({}, {}, {}, {}, [])
+        if self._makes_ids:
+            found.values[RECORD_ID] = self._made_id()
+        # Without its convention a reading can still be checked, as the largest radial value that it
+        # may be.
+        self._read_lengths(found, convention or ClearanceConvention.TOTAL_PLAY, row_unit, warnings)
+        for index, column in self._others:
+            value = self._noted(column, index)
+            if value is not None and column.carried:
+                found.carried[column.name] = value
+            elif value is not None:
+                found.values[column] = value
+        for index, name in self._unread:
+            cell = self._cells[index]
+            if cell is not None:
+                found.carried[name] = writable(show(cell))
+        if OUTCOME not in found.values:
+            self._look_for_failure()
+        return found
+
+    def _read_lengths(
+        self,
+        found: _Found,
+        scale: ClearanceConvention,
+        row_unit: LengthUnit | None,
+        warnings: list[str],
+    ) -> None:
+        for index, field, kind in self._lengths:
+            cell = self._cells[index]
+            if cell is None:
+                continue
+            try:
+                length, entered = self._length_of(kind, row_unit, scale, cell)
+            except CellFaultError as fault:
+                self._fault(index, fault)
+                continue
+            number = field.number or 0
+            found.lengths.setdefault(kind.column, {})[number] = length
+            if kind.column is CLEARANCE:
+                found.entered[number] = entered
+                if length > self._options.clearance_confirm_above_in + _EPS_IN:
+                    warnings.append(self._confirm_text(number, length, entered, scale))
+            elif kind.column is PLUNGER_DISPLACEMENT:
+                found.plunger.append((length, entered.unit))
+
+    def _value(self, column: Column, index: int) -> Any:
+        cell = self._cells[index]
+        if cell is not None:
+            if column is DATE:
+                return self._read_date(cell)
+            if column.holds is Holds.MOMENT:
+                return read_moment(cell, self._options.dates, self._latest)
+            if column.holds is Holds.JOINTS:
+                return read_joints(cell, self._options.joint_numbers)
+            if column.holds is Holds.AREAS:
+                return read_areas(cell, self._options.areas)
+            return read_value(
+                column,
+                cell,
+                self._placed[index].header,
+                decimal_comma=self._table.decimal_comma,
+            )
+        if column not in IDENTITY:
+            return None
+        remedy = (
+            "Enter it; a row without it cannot be used."
+            if column.choices is None
+            else f"Enter {column.asked}; there is no default."
+        )
+        raise CellFaultError(f"{column.name}_missing", column.asked, remedy)
+
+    def _report_faults(self, source: RowSource) -> None:
+        for place, fault in sorted(self._faults, key=lambda fault: fault[0]):
+            if isinstance(fault, AmbiguousDateError):
+                self._waiting[source] = _WaitingDate(self._place(place), self._cells[place], fault)
+            else:
+                self._tell(place, fault)
+
+    def _warn(self, found: _Found, warnings: list[str]) -> None:
+        """Say what of a good row is of no use, or unusual."""
+        clearance = found.lengths.get(CLEARANCE, {})
+        if CLEARANCE in self._at and not clearance:
+            warnings.append("no clearance is given in this row: no joint was measured")
+        elif len(clearance) > 1 and not any(clearance.values()):
+            warnings.append(
+                "every clearance is 0: a zero is read as measured; leave a joint blank if it was"
+                " not measured"
+            )
+        alone = [column for column in STROKE if column in found.lengths]
+        if len(alone) == 1:
+            (other,) = set(STROKE) - set(alone)
+            warnings.append(f"{alone[0].filled} is not used: the row has no {other.filled}")
+        idle = [
+            f"#{joint}"
+            for joint in found.lengths.get(GAUGE_U, {})
+            if joint and joint not in clearance
+        ]
+        if idle:
+            warnings.append(
+                f"standard uncertainty of the gauge at joint {', '.join(idle)} is not used: the"
+                " joint has no reading"
+            )
 
     def ragged(self, row: int, cells: Sequence[Cell], expected: int) -> InvalidRow:
         """Refuse a row that does not have as many fields as the header."""
@@ -375,7 +390,7 @@ class RowReader:
             if comma
             else "Check the separators and the quotation marks of this row."
         )
-        first = cells[0] if self._at.get(Kind.RECORD_ID) == 0 and cells else None
+        first = cells[0] if self._at.get(RECORD_ID) == 0 and cells else None
         record_id = plain_text(first) or None if isinstance(first, str) else None
         told = (
             "row_field_count",
@@ -410,6 +425,8 @@ class RowReader:
         measured.
         """
         cells = [*cells, *[None] * (self._width - len(cells))]
+        for index in self._plain:
+            cells[index] = stored(cells[index])
         for index in self._blankable:
             cell = cells[index]
             if cell.__class__ is str and cell.strip().casefold() in NOT_MEASURED:
@@ -418,7 +435,6 @@ class RowReader:
         self._row, self._places, self._cells = row, places, cells
         self._bad = {index for index in self._refused if cells[index] is not None}
         self._faults = []
-        self._plunger = []
 
     def _look_for_failure(self) -> None:
         """Stop a row in which a column that was not understood says that the gear failed."""
@@ -432,65 +448,16 @@ class RowReader:
                 expected = "the outcome in a column outcome"
                 self._fault(placed.index, CellFaultError("outcome_elsewhere", expected, remedy))
 
-    def _read_loose(self, columns: Sequence[_Loose]) -> dict[str, Any]:
-        found = {
-            name: self._noted(index, read, bearing=name in VERDICT_BEARING)
-            for index, name, read in columns
-            if self._cells[index] is not None
-        }
-        return {name: value for name, value in found.items() if value is not None}
-
-    def _noted(self, index: int, read: Callable[[Any], _T], *, bearing: bool = True) -> _T | None:
-        """Read a cell and note its fault; where the cell bears the verdict, the row cannot be
-        judged then.
-        """
-        try:
-            return read(self._cells[index])
-        except CellFaultError as fault:
-            self._fault(index, fault, bearing=bearing)
-            return None
-
-    def _required(self, kind: Kind, read: Callable[[Cell], _T]) -> _T | None:
-        index = self._at.get(kind)
-        return None if index is None else self._noted(index, read)
-
-    def _identity(self, kind: Kind, expected: str) -> str | None:
-        def read(cell: Cell) -> str:
-            if isinstance(cell, str) and cell.isprintable() and cell.isascii():
-                return cell.strip()
-            if cell is None:
-                raise CellFaultError(
-                    f"{kind.value}_missing", expected, "Enter it; a row without it cannot be used."
-                )
-            return read_text(cell, expected, required=True)
-
-        return self._required(kind, read)
-
     def _made_id(self) -> str:
         content = zlib.crc32("\x1f".join(map(show, self._cells)).encode("utf-8", "replace"))
         name = PurePath(self._table.file or "-").stem
         return f"{'stdin' if name == '-' else name}-{self._row}-{content:08x}"
 
-    def _read_side(self) -> Side | None:
-        def read(cell: Cell) -> Side:
-            if cell is None:
-                raise CellFaultError(
-                    "side_missing", "LH or RH", "Enter LH or RH; there is no default."
-                )
-            spelt = Side.spelt(cell) if isinstance(cell, str) else None
-            return spelt or read_choice(cell, Side, "side_unknown", {})
-
-        return self._required(Kind.SIDE, read)
-
     def _read_convention(self) -> ClearanceConvention | None:
-        index, declared = self._at.get(Kind.CONVENTION), self._options.convention
+        index, declared = self._at.get(CONVENTION), self._options.convention
         if index is not None and self._cells[index] is not None:
-            return self._noted(
-                index,
-                lambda cell: read_choice(
-                    cell, ClearanceConvention, "convention_unknown", _CONVENTION_HINTS
-                ),
-            )
+            found: ClearanceConvention | None = self._noted(CONVENTION, index)
+            return found
         if declared is None and self._is_curve_alone():
             return ClearanceConvention.RADIAL
         if declared is None and index is not None:
@@ -498,169 +465,118 @@ class RowReader:
         elif declared is None:
             self._bad.add(-1)
             self._table.tell(
-                "convention_missing", None, *_MISSING_CONVENTION, self._row, Kind.CONVENTION.value
+                "convention_missing", None, *_MISSING_CONVENTION, self._row, CONVENTION.name
             )
         return declared
 
+    def _noted(self, column: Column, index: int) -> Any:
+        """Read a cell and note its fault."""
+        try:
+            return self._value(column, index)
+        except CellFaultError as fault:
+            self._fault(index, fault)
+            return None
+
     def _is_curve_alone(self) -> bool:
         """A position along the stroke needs no clearance, and then no convention of one."""
-        filled = [kind in self._at and self._cells[self._at[kind]] is not None for kind in ALONG]
-        return all(filled) and all(
-            self._cells[index] is None for _, index, _unit in self._clearances
-        )
+        filled = {each.kind.column for each in self._lengths if self._cells[each.at] is not None}
+        return filled >= set(STROKE) and CLEARANCE not in filled
 
     def _read_row_unit(self) -> LengthUnit | None:
-        index = self._at.get(Kind.UNIT)
+        index = self._at.get(UNIT)
         if index is None or self._cells[index] is None:
             return self._options.unit
-
-        def read(cell: Cell) -> LengthUnit:
-            unit = UNIT_SPELLINGS.get(plain_text(cell).lower()) if isinstance(cell, str) else None
-            if unit is None:
-                raise CellFaultError("unit_unknown", "in, thou or mm", "Enter in, thou or mm.")
-            self._check_headers_agree(unit)
-            return unit
-
-        return self._noted(index, read) or self._options.unit
-
-    def _check_headers_agree(self, unit: LengthUnit) -> None:
-        """Refuse a row whose unit is not the one that a header with something below it states."""
-        stated = [(index, u) for _, index, u in self._clearances] + [
-            (i, f.unit) for i, f in self._lengths.items()
+        unit: LengthUnit | None = self._noted(UNIT, index)
+        against = [
+            (i, field.unit)
+            for i, field, _ in self._lengths
+            if field.unit not in (None, unit) and self._cells[i] is not None
         ]
-        for index, header_unit in stated:
-            if (
-                header_unit is not None
-                and header_unit is not unit
-                and self._cells[index] is not None
-            ):
-                raise CellFaultError(
-                    "unit_contradiction",
-                    f"{header_unit.value}, as the header {self._placed[index].header!r} says",
-                    "The row and the header name different units. Correct the one that is wrong.",
-                )
+        if unit is None or not against:
+            return unit or self._options.unit
+        i, header_unit = against[0]
+        self._fault(
+            index,
+            CellFaultError(
+                "unit_contradiction",
+                f"{header_unit}, as the header {self._placed[i].header!r} says",
+                "The row and the header name different units. Correct the one that is wrong.",
+            ),
+        )
+        return self._options.unit
 
-    def _read_clearances(
+    def _one_length(
         self,
-        convention: ClearanceConvention | None,
-        row_unit: LengthUnit | None,
-        warnings: list[str],
-    ) -> tuple[dict[int, float], dict[int, EnteredClearance]]:
-        clearance: dict[int, float] = {}
-        entered: dict[int, EnteredClearance] = {}
-        # Without its convention a reading can still be checked, as the largest radial value that it
-        # may be.
-        scale = convention or ClearanceConvention.TOTAL_PLAY
-        for joint, index, unit in self._clearances:
-            if self._cells[index] is not None:
-                found = self._noted(index, partial(self._clearance_of, unit, row_unit, scale))
-                if found is not None:
-                    clearance[joint], entered[joint], confirm = found
-                    if confirm:
-                        warnings.append(
-                            self._confirm_text(joint, clearance[joint], entered[joint], scale)
-                        )
-        return clearance, entered
-
-    def _one_clearance(
-        self,
-        unit: LengthUnit | None,
+        kind: _LengthKind,
         row_unit: LengthUnit | None,
         scale: ClearanceConvention,
         cell: str | float | OddCell,
-    ) -> tuple[float, EnteredClearance, bool]:
-        limit, usual = self._options.clearance_hard_max_in, self._options.clearance_confirm_above_in
+    ) -> tuple[float, EnteredClearance]:
+        """Read a length that its column can hold; a clearance is radial. [in]"""
+        column, unit, above_zero = kind
+        low, high = self._options.range_in(column)
+        is_clearance = column is CLEARANCE
+        # The uncertainty of a gauge is one of the reading: its bound is that of its radial value.
+        factor = scale.per_radial if column.scales else 1.0
+
+        def expected(shown: LengthUnit, *, refined: bool = False) -> str:
+            top = f"{shown.from_inches(high * factor):.4g} {shown.value}"
+            if refined and above_zero:
+                return f"a {column.plain} above 0 and up to {top}"
+            what = column.expected or column.plain
+            return f"{what} from {shown.from_inches(low):.4g} to {top}"
+
         stated = unit or row_unit or LengthUnit.INCH
-
-        def expected(shown: LengthUnit) -> str:
-            return (
-                f"a clearance from 0 to {shown.from_inches(limit * scale.per_radial):.4g}"
-                f" {shown.value}"
-            )
-
         try:
             value_in, found, text = read_length(
                 cell,
                 unit,
                 row_unit,
-                signed=False,
-                decimal_comma=self._comma,
+                signed=column.signed,
+                decimal_comma=self._table.decimal_comma,
                 expected=expected(stated),
             )
         except CellFaultError as fault:
-            if fault.code == "length_negative":
+            if is_clearance and fault.code == "length_negative":
                 fault.code = "clearance_negative"
             raise
-        radial_in = value_in / scale.per_radial
-        if radial_in > limit + _EPS_IN:
-            slip = scale_slip(radial_in, found, scale, usual)
-            remedy = slip or "Measure again, or check the unit and the decimal point."
-            raise CellFaultError("clearance_out_of_range", expected(found), remedy)
-        return radial_in + 0.0, EnteredClearance(text, found), radial_in > usual + _EPS_IN
+        beyond = not low - _EPS_IN <= value_in / factor <= high + _EPS_IN
+        if beyond or (above_zero and value_in <= 0.0):
+            if is_clearance:
+                usual = self._options.clearance_confirm_above_in
+                slip = scale_slip(value_in / factor, found, scale, usual)
+            else:
+                radial = ClearanceConvention.RADIAL
+                slip = scale_slip(abs(value_in), found, radial, high * factor, halves=False)
+            again = "Measure again, or check" if is_clearance else "Check"
+            raise CellFaultError(
+                f"{column.name}_out_of_range",
+                expected(found if is_clearance else stated, refined=True),
+                slip or f"{again} the unit and the decimal point.",
+            )
+        return (value_in / factor if is_clearance else value_in) + 0.0, EnteredClearance(
+            text, found
+        )
 
     def _confirm_text(
         self, joint: int, radial_in: float, text: EnteredClearance, scale: ClearanceConvention
     ) -> str:
         slip = scale_slip(radial_in, text.unit, scale, self._options.clearance_confirm_above_in)
-        return (
-            f"joint {joint}: {text.text} {text.unit.value} is {radial_in:.4g} in radial, above "
-            f"{self._options.clearance_confirm_above_in:g} in: check the reading. {slip}"
-        ).rstrip()
-
-    def _read_lengths(
-        self, convention: ClearanceConvention | None, row_unit: LengthUnit | None
-    ) -> dict[tuple[Kind, int | None], float]:
-        # The uncertainty of a gauge is one of the reading: its bound is that of its radial value.
-        scale = convention or ClearanceConvention.TOTAL_PLAY
-        found: dict[tuple[Kind, int | None], float] = {}
-        for index, field in self._lengths.items():
-            if self._cells[index] is not None:
-                read = partial(self._length_of, index, row_unit, scale)
-                length = self._noted(index, read, bearing=field.kind in VERDICT_BEARING)
-                if length is not None:
-                    found[field.quantity] = length[0]
-                    if field.kind is Kind.PLUNGER_DISPLACEMENT:
-                        self._plunger.append(length)
-        return found
-
-    def _one_length(
-        self,
-        index: int,
-        row_unit: LengthUnit | None,
-        scale: ClearanceConvention,
-        cell: str | float | OddCell,
-    ) -> tuple[float, LengthUnit]:
-        field = self._lengths[index]
-        most = self._options.plunger_hard_max_in
-        low, high = LENGTH_RANGE_IN.get(field.kind, (-most, most))
-        if field.kind is Kind.GAUGE_U:
-            high *= scale.per_radial
-        unit = field.unit or row_unit or LengthUnit.INCH
-        what = field.kind.value.replace("_", " ")
-        expected = (
-            f"{what} from {unit.from_inches(low):.4g} to {unit.from_inches(high):.4g} {unit.value}"
+        return Sentence.of(
+            "joint {}: {} {} is {} radial, above {}: check the reading.{}",
+            joint,
+            text.text,
+            text.unit,
+            Length.brief(radial_in),
+            Length.brief(self._options.clearance_confirm_above_in),
+            f" {slip}" if slip else "",
         )
-        signed, comma = field.kind in _SIGNED, self._comma
-        value_in, found, _ = read_length(
-            cell, field.unit, row_unit, signed=signed, decimal_comma=comma, expected=expected
-        )
-        above_zero = field.kind is Kind.MARGIN or (
-            field.kind is Kind.GAUGE_U and field.number is not None
-        )
-        if not low - _EPS_IN <= value_in <= high + _EPS_IN or (above_zero and value_in <= 0.0):
-            if above_zero:
-                expected = f"a {what} above 0 and up to {unit.from_inches(high):.4g} {unit.value}"
-            slip = scale_slip(abs(value_in), found, ClearanceConvention.RADIAL, high, halves=False)
-            raise CellFaultError(
-                f"{field.kind.value}_out_of_range",
-                expected,
-                slip or "Check the unit and the decimal point.",
-            )
-        return value_in + 0.0, found
 
-    def _fault(self, index: int, fault: CellFaultError, *, bearing: bool = True) -> None:
+    def _fault(self, index: int, fault: CellFaultError) -> None:
+        """Note a fault; where the cell bears the verdict, the row cannot be judged then."""
         self._faults.append((index, fault))
-        if bearing:
+        field = self._placed[index].field
+        if field is None or field.column.bears_verdict:
             self._bad.add(index)
 
     def _tell(self, index: int, fault: CellFaultError) -> None:
@@ -723,12 +639,7 @@ class RowReader:
         )
 
     def _unit_question(
-        self,
-        clearance: Mapping[int, float],
-        entered: Mapping[int, EnteredClearance],
-        convention: ClearanceConvention | None,
-        others: Mapping[str, object],
-        warnings: list[str],
+        self, found: _Found, convention: ClearanceConvention | None, warnings: list[str]
     ) -> str:
         """Refuse readings that cannot be of the stated unit; return what must be asked before the
         gear is cleared.
@@ -736,31 +647,33 @@ class RowReader:
         if (
             convention is None
             or self._options.small_readings_true
-            or others.get(Kind.SMALL_READINGS_TRUE)
+            or found.values.get(SMALL_READINGS_TRUE)
         ):
             return ""
-        found = judge_unit(clearance, entered, convention, self._options)
-        if found.scale is UnitFit.TOO_SMALL and not self._options.asks:
-            (index,) = (i for joint, i, _ in self._clearances if joint == found.joints[0])
+        clearance = found.lengths.get(CLEARANCE, {})
+        fit = judge_unit(clearance, found.entered, convention, self._options)
+        if fit.scale is UnitFit.TOO_SMALL and not self._options.asks:
+            quantity = (CLEARANCE, fit.joints[0])
+            index = next(i for i, field, _ in self._lengths if field.quantity == quantity)
             expected = "readings of new or worn parts in the unit that is stated"
-            remedy = f"{found.question[:1].upper()}{found.question[1:]}"
+            remedy = f"{fit.question[:1].upper()}{fit.question[1:]}"
             self._fault(index, CellFaultError("readings_too_small", expected, remedy))
-        elif found.question:
-            warnings.append(found.question)
-        plunger = {plunger_question(value, unit, self._options) for value, unit in self._plunger}
+        elif fit.question:
+            warnings.append(fit.question)
+        plunger = {plunger_question(value, unit, self._options) for value, unit in found.plunger}
         asked = sorted(plunger - {""})
         warnings += asked
-        if found.scale in (UnitFit.DOUBTFUL, UnitFit.TOO_SMALL):
-            asked.insert(0, found.question)
-        return " ".join(asked)
+        if fit.scale in (UnitFit.DOUBTFUL, UnitFit.TOO_SMALL):
+            asked.insert(0, fit.question)
+        return Sentence.joined(asked)
 
     def _correct(self) -> tuple[str, ...]:
         """Return the columns to correct, in the order of the table; missing columns stand last."""
         named = [self._placed[index].header for index in sorted(self._bad) if index >= 0]
-        for kind in (Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE):
-            made = kind is Kind.RECORD_ID and self._makes_ids
-            if kind not in self._at and kind.value not in named and not made:
-                named.append(kind.value)
+        for column in IDENTITY:
+            made = column is RECORD_ID and self._makes_ids
+            if column not in self._at and column.name not in named and not made:
+                named.append(column.name)
         if -1 in self._bad:
-            named.append(Kind.CONVENTION.value)
+            named.append(CONVENTION.name)
         return tuple(named)

@@ -16,16 +16,22 @@ from openpyxl.chart.label import DataLabelList
 from openpyxl.styles import Font
 from openpyxl.worksheet.worksheet import Worksheet
 
+from mlg_troubleshoot.decision.columns import Column, Holds
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.outputs import write_csv
-from mlg_troubleshoot.records.cells import Cell, column_letters, quote
+from mlg_troubleshoot.records.cells import Cell, column_letters, quote, stored
 from mlg_troubleshoot.records.model import ReadOptions
 from mlg_troubleshoot.records.read import load_bytes, open_book
 from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.source import NumberedRow
 from mlg_troubleshoot.records.template import write_book
-from mlg_troubleshoot.records.values import CellFaultError, read_choice, read_number, read_text
-from mlg_troubleshoot.surveying.readings import Kind, Reading, SurveyedLinkage, default_u
+from mlg_troubleshoot.records.values import CellFaultError, read_number, read_text, read_value
+from mlg_troubleshoot.surveying.readings import (
+    ReadingKind,
+    SurveyedLinkage,
+    SurveyReading,
+    default_u,
+)
 from mlg_troubleshoot.units import LengthUnit
 
 _UNITS = ("in", "mm", "deg")
@@ -38,19 +44,21 @@ COLUMNS = (
     "extension_mm",
     "how",
 )
+_KIND = Column(name="kind", holds=Holds.CHOICE, choices=ReadingKind)
 _HEADER_WITHIN = 30
-_KINDS = {kind: kind for kind in Kind if kind not in (Kind.TRAVEL, Kind.ORDER)}
+_KINDS = {kind: kind for kind in ReadingKind if kind not in (ReadingKind.TRAVEL, ReadingKind.ORDER)}
 # No linkage of a landing gear is longer than this; angles are read within one turn.
 _LONGEST_IN, _WIDEST_DEG = 500.0, 360.0
+_DEGREES = ("°", "deg", "degrees")
 _HOW = {
-    Kind.DISTANCE: (
+    ReadingKind.DISTANCE: (
         "Pin centre to pin centre: over the outside of both pins, less half of each diameter."
     ),
-    Kind.PLUNGER: (
+    ReadingKind.PLUNGER: (
         "Dial on the plunger, zero at the reference extension; actuator at the extension given."
     ),
-    Kind.EXTENSION: "Travel of the actuator from Down Lock to the reference position.",
-    Kind.ANGLE: (
+    ReadingKind.EXTENSION: "Travel of the actuator from Down Lock to the reference position.",
+    ReadingKind.ANGLE: (
         "In the gear file's axes, with an inclinometer or from a photograph square to the plane."
     ),
 }
@@ -59,7 +67,7 @@ _HOW = {
 def write_survey_template(
     path: Path,
     linkage: SurveyedLinkage,
-    planned: Iterable[tuple[Reading, bool]],
+    planned: Iterable[tuple[SurveyReading, bool]],
     unit: LengthUnit = LengthUnit.INCH,
 ) -> None:
     """Write the rows that are worth reading on this gear, as CSV or as a workbook with a sketch; in
@@ -149,7 +157,7 @@ def _sketch(sheet: Worksheet, linkage: SurveyedLinkage) -> None:
 
 def read_survey(
     path: Path, linkage: SurveyedLinkage
-) -> tuple[tuple[Reading, ...], tuple[Problem, ...], str]:
+) -> tuple[tuple[SurveyReading, ...], tuple[Problem, ...], str]:
     """Read the rows that have a value, the cells that are wrong, and the file's SHA-256."""
     label = str(path)
     try:
@@ -218,7 +226,7 @@ class _Rows:
                     "Remove one of the columns.",
                 )
 
-    def read(self, numbered: NumberedRow) -> Reading | None:
+    def read(self, numbered: NumberedRow) -> SurveyReading | None:
         """Read one row; None if it has no value, or a cell that is wrong."""
         number, cells = numbered
         row = {
@@ -231,9 +239,9 @@ class _Rows:
             return None
         self.column = "kind"
         try:
-            kind = read_choice(row.get("kind", ""), Kind, "kind_unknown", {})
+            kind: ReadingKind = read_value(_KIND, row.get("kind") or "")
             turns = self.linkage.space.mechanism.output.kind == "angle"
-            is_angle = kind is Kind.ANGLE or (kind is Kind.PLUNGER and turns)
+            is_angle = kind is ReadingKind.ANGLE or (kind is ReadingKind.PLUNGER and turns)
             self._require(
                 kind in _KINDS,
                 "kind",
@@ -249,7 +257,9 @@ class _Rows:
             self._require(
                 one, given[-1], expected, "Leave the other columns blank.", "value_columns"
             )
-            value = self._quantity(row, given[0], signed=kind in (Kind.PLUNGER, Kind.ANGLE))
+            value = self._quantity(
+                row, given[0], signed=kind in (ReadingKind.PLUNGER, ReadingKind.ANGLE)
+            )
             u = default_u(kind, is_angle=is_angle)
             for unit in _UNITS:
                 column, expected = f"u_{unit}", "an uncertainty in the unit of the value"
@@ -269,7 +279,7 @@ class _Rows:
                 number, self.column, row.get(self.column), fault.code, fault.expected, fault.remedy
             )
             return None
-        return Reading(
+        return SurveyReading(
             kind, start, end, value, u, extension, number, is_angle, self.linkage.driven_in
         )
 
@@ -279,13 +289,17 @@ class _Rows:
         if unit == "deg":
             low, most = (-_WIDEST_DEG, _WIDEST_DEG) if signed else (0.0, _WIDEST_DEG)
             expected = f"an angle from {low:g} to {most:g} degrees"
-            value = float(np.radians(self._number(cell, low, most, expected)))
+            value = float(np.radians(self._number(cell, low, most, expected, _DEGREES)))
         else:
             length = LengthUnit.parse(unit)
             most = length.from_inches(_LONGEST_IN)
             value = length.to_inches(
                 self._number(
-                    cell, -most if signed else 0.0, most, f"a length up to {most:g} {unit}"
+                    cell,
+                    -most if signed else 0.0,
+                    most,
+                    f"a length up to {most:g} {unit}",
+                    length.spellings,
                 )
             )
         remedy = "Read it again, or leave it blank."
@@ -304,20 +318,32 @@ class _Rows:
                 expected = "one extension, in the unit of the input"
                 self._require(one, self.column, expected, "Leave one.", "extension_columns")
                 read = self._number(
-                    row[self.column], 0.0, most, f"an extension from 0 to {most:.4g}"
+                    row[self.column],
+                    0.0,
+                    most,
+                    f"an extension from 0 to {most:.4g}",
+                    unit.spellings,
                 )
                 extension = unit.to_inches(read)
         return extension
 
-    def _number(self, cell: Cell, low: float, most: float, expected: str) -> float:
+    def _number(
+        self, cell: Cell, low: float, most: float, expected: str, units: tuple[str, ...]
+    ) -> float:
+        """Read a number, which may be followed by the unit of its column."""
         return read_number(
-            "" if cell is None else cell, low, most, decimal_comma=self.comma, expected=expected
+            "" if cell is None else cell,
+            low,
+            most,
+            decimal_comma=self.comma,
+            expected=expected,
+            units=units,
         )
 
-    def _ends(self, kind: Kind, row: Mapping[str, Cell]) -> tuple[str, str]:
+    def _ends(self, kind: ReadingKind, row: Mapping[str, Cell]) -> tuple[str, str]:
         texts = []
         for column in ("from", "to"):
-            cell = row.get(column)
+            cell = stored(row.get(column))
             self.column = column
             # A spreadsheet takes the point 4 for a number.
             texts.append(
@@ -325,12 +351,12 @@ class _Rows:
             )
         start, end = texts
         space = self.linkage.space
-        if kind is Kind.DISTANCE:
+        if kind is ReadingKind.DISTANCE:
             points = f"one of the points {', '.join(self.points)}"
             for column, name in (("from", start), ("to", end)):
                 self._require(name in self.points, column, points, "Correct the name.")
             self._require(start != end, "to", "another point than in from", "Name both pins.")
-        elif kind is Kind.ANGLE:
+        elif kind is ReadingKind.ANGLE:
             known = {
                 **dict.fromkeys(space.planes, ("hinge", "dihedral")),
                 **dict.fromkeys(space.sliders, ("axis",)),
@@ -351,7 +377,9 @@ class _Rows:
             )
         expected = "DISTANCE, PLUNGER or ANGLE"
         remedy = "The reference position of this gear is its Down Lock."
-        self._require(kind is not Kind.EXTENSION or space.moves_reference, "kind", expected, remedy)
+        self._require(
+            kind is not ReadingKind.EXTENSION or space.moves_reference, "kind", expected, remedy
+        )
         return start, end
 
     def _require(

@@ -6,10 +6,10 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
+from mlg_troubleshoot.decision.columns import CLEARANCE, SIDE, TAIL_NO
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import Cell, column_letters, quote
-from mlg_troubleshoot.records.columns import Kind
 from mlg_troubleshoot.records.layout import ColumnReader, Columns, Header
 from mlg_troubleshoot.records.longform import LongReader
 from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout, TableInHand
@@ -104,8 +104,8 @@ class _Table:
         self._aside: list[str] = []
         self._dates = ""
         self._telling = [
-            [p.index for p in columns.placed if p.field is not None and p.field.kind is kind]
-            for kind in (Kind.TAIL_NO, Kind.SIDE, Kind.CLEARANCE)
+            [p.index for p in columns.placed if p.field is not None and p.field.column is column]
+            for column in (TAIL_NO, SIDE, CLEARANCE)
         ]
 
     def take(self, number: int, cells: Sequence[Cell]) -> None:

@@ -14,13 +14,22 @@ from openpyxl.worksheet.pagebreak import Break
 from openpyxl.worksheet.properties import PageSetupProperties
 from openpyxl.worksheet.worksheet import Worksheet
 
-from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN, RiggingCheck
-from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.joints import JointSpec
+from mlg_troubleshoot.decision.columns import (
+    CLEARANCE,
+    COLUMNS,
+    MARGIN_U,
+    REMARKS,
+    UNIT,
+    Column,
+    Holds,
+    Need,
+)
+from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN
+from mlg_troubleshoot.gear.gear import Gear, JointSpec
 from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.records.cells import column_letters
-from mlg_troubleshoot.records.columns import CARRIED, LENGTHS, PER_JOINT, Field, Kind
 from mlg_troubleshoot.records.forms import FORM_TITLE
+from mlg_troubleshoot.records.headers import Field
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 _ROWS = 500
@@ -30,74 +39,7 @@ HEADER_FILL = "FFD9E2EC"
 _LINE_PT = 15.0
 _LINE = Side(style="thin", color="FF9AA5B1")
 _REQUIRED_FILL = "FFFFE9A8"
-_TEXT_KINDS = (Kind.RECORD_ID, Kind.TAIL_NO, Kind.GAUGE_ID, Kind.TECHNICIAN_ID, *CARRIED)
-_NUMBER_FORMATS = {**dict.fromkeys(_TEXT_KINDS, "@"), Kind.DATE: "yyyy-mm-dd"}
-_MUST = frozenset({Kind.RECORD_ID, Kind.TAIL_NO, Kind.SIDE, Kind.CONVENTION, Kind.UNIT})
-_NEVER_NEGATIVE = (LENGTHS | {Kind.LANDINGS}) - {Kind.PLUNGER_DISPLACEMENT, Kind.PLUNGER_DOWN_LOCK}
-_CHOICES: dict[Kind, tuple[str, ...]] = {
-    Kind.SIDE: ("LH", "RH"),
-    Kind.CONVENTION: tuple(ClearanceConvention),
-    Kind.UNIT: tuple(LengthUnit),
-    Kind.APPROACH: ("EXTENDING", "RETRACTING"),
-    Kind.OUTCOME: ("RETRACTED", "FAILED"),
-    Kind.RIGGING_CHECKED: tuple(RiggingCheck),
-}
-# What each column holds, in the order of the columns; in braces the numbers of `_numbers`.
-_MEANING: dict[Kind, str] = {
-    Kind.RECORD_ID: "Required. Your own unique name of this inspection.",
-    Kind.TAIL_NO: "Required. Tail number, kept as text.",
-    Kind.SIDE: "Required. LH or RH; there is no default.",
-    Kind.CONVENTION: (
-        "Required. " + " ".join(f"{c.value}: {c.meaning}." for c in ClearanceConvention)
-    ),
-    Kind.UNIT: "Unit of every length on this sheet: in, thou or mm.",
-    Kind.CLEARANCE: (
-        "Clearance. Leave blank if it was not measured; 0 means measured and found to be zero."
-    ),
-    Kind.DATE: "Optional. Year-month-day, for example 2026-03-04.",
-    Kind.OUTCOME: "Optional. What the gear did: RETRACTED or FAILED.",
-    Kind.LANDINGS: "Optional. Landings since overhaul, 0 or more.",
-    Kind.GAUGE_U: (
-        "Optional. Standard uncertainty of one reading, as read. Blank: {gauge_u} radial is"
-        " assumed."
-    ),
-    Kind.PLUNGER_DISPLACEMENT: (
-        "Optional. Measured change of the plunger position at mid-position, over-travel "
-        "positive, under-travel negative. Repeat readings have their own columns."
-    ),
-    Kind.PLUNGER_DOWN_LOCK: (
-        "Optional. Measured plunger position at Down Lock; {down_lock} is allowed."
-    ),
-    Kind.PLUNGER_GAUGE_U: "Optional. Repeatability of one plunger reading.",
-    Kind.MARGIN: "Optional. This gear's margin as found at rigging. Blank: {margin}.",
-    Kind.MARGIN_U: "Optional. Standard uncertainty of that margin. Blank: 0.",
-    Kind.TEMPERATURE: "Optional. Temperature in degrees Celsius, -60 to 60.",
-    Kind.PRESSURE: "Optional. Hydraulic pressure in psi, 0 to 4000.",
-    Kind.APPROACH: (
-        "Optional. How the position was approached before the reading: EXTENDING or RETRACTING."
-    ),
-    Kind.GAUGE_ID: "Optional. The gauge set that was used.",
-    Kind.TECHNICIAN_ID: "Optional. Who measured.",
-    Kind.WORK_ORDER: "Optional. Goes to the report unchanged.",
-    Kind.MANUAL_REF: "Optional. Manual reference; goes to the report unchanged.",
-    Kind.MANUAL_REV: "Optional. Manual revision; goes to the report unchanged.",
-    Kind.REMARKS: "Optional. Goes to the report unchanged.",
-    Kind.RESTORED_JOINTS: (
-        "Optional. Joints restored since the failure, for example 3 5. Their clearances in this row"
-        " are those after the repair; outcome and plunger reading count as older."
-    ),
-    Kind.REPAIR_DATE: "Optional. When they were restored: year-month-day, with the time if known.",
-    Kind.PLUNGER_DATE: "Optional. When the plunger was read, if that was after the repair.",
-    Kind.OUTCOME_DATE: "Optional. When the outcome was seen, if that was after the repair.",
-    Kind.RIGGING_CHECKED: (
-        "Optional. Rigging and lock roller: no, yes (looked at) or corrected (set right)."
-    ),
-    Kind.CANNOT_REACH: "Optional. Joints that cannot be reached today, for example 4.",
-    Kind.NO_SPARE: "Optional. Joints for which there is no spare part today.",
-    Kind.OPEN_AREAS: "Optional. Areas that are open already: {areas}.",
-    Kind.MINUTES_AVAILABLE: "Optional. Minutes left for the work today.",
-    Kind.AXIAL_FLOAT: "Optional. End float of the joint along its pin.",
-}
+_FORMATS = {Holds.TEXT: "@", Holds.DATE: "yyyy-mm-dd"}
 _INSTRUCTIONS = (
     "Instructions (this sheet is not read)",
     "",
@@ -156,38 +98,33 @@ def _fields(gear: Gear, unit: LengthUnit | None) -> list[Field]:
     """Return the columns in one unit, or the lines of the form: these say their unit on a line of
     its own.
     """
-    numbers = gear.joint_numbers
-    several = {
-        Kind.CLEARANCE: numbers,
-        Kind.PLUNGER_DISPLACEMENT: (1, 2, 3),
-        Kind.AXIAL_FLOAT: numbers,
-    }
-    kinds = [kind for kind in _MEANING if kind is not Kind.UNIT or unit is None]
     return [
-        Field(kind, n, unit if kind in LENGTHS else None)
-        for kind in kinds
-        for n in several.get(kind, (None,))
+        Field(column, number, unit if column.is_length else None)
+        for column in COLUMNS
+        if column.in_template and (column is not UNIT or unit is None)
+        for number in _numbers_of(column, gear)
     ]
 
 
+def _numbers_of(column: Column, gear: Gear) -> Sequence[int | None]:
+    if column.needs_joint:
+        return gear.joint_numbers
+    return range(1, column.copies + 1) if column.copies > 1 else (None,)
+
+
 def _explain(field: Field, gear: Gear, unit: LengthUnit) -> str:
-    text = _MEANING[field.kind].format(**_numbers(gear, unit))
-    if field.number is None or field.kind not in PER_JOINT:
+    low, high = (_length(end, unit) for end in gear.down_lock_range)
+    text = field.column.explained(
+        gauge_u=_length(DEFAULT_GAUGE_U_IN, unit),
+        down_lock=f"{low} to {high}",
+        margin=_length(gear.margin.value, unit),
+    )
+    if field.number is None or not field.column.needs_joint:
         return text
     joint = gear.joint(field.number)
-    if field.kind is Kind.CLEARANCE:
+    if field.column is CLEARANCE:
         text += f" Limit: {_length(joint.limit.value, unit)} radial."
     return f"Joint {joint.number}: {joint.name}. {joint.location}. {text}"
-
-
-def _numbers(gear: Gear, unit: LengthUnit) -> dict[str, str]:
-    low, high = (_length(end, unit) for end in gear.down_lock_range)
-    return {
-        "gauge_u": _length(DEFAULT_GAUGE_U_IN, unit),
-        "down_lock": f"{low} to {high}",
-        "margin": _length(gear.margin.value, unit),
-        "areas": "; ".join(area.name for area in gear.areas),
-    }
 
 
 def _length(value_in: float, unit: LengthUnit) -> str:
@@ -230,15 +167,15 @@ def _table(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
         cell = sheet.cell(1, index + 1, field.name)
         cell.font = Font(name=FONT, bold=True)
         cell.fill = PatternFill(
-            "solid", fgColor=_REQUIRED_FILL if field.kind in _MUST else HEADER_FILL
+            "solid", fgColor=_REQUIRED_FILL if _is_must(field.column) else HEADER_FILL
         )
         cell.alignment = Alignment(wrap_text=True, vertical="center", horizontal="center")
         cell.border = Border(bottom=_LINE, right=_LINE)
         cell.comment = Comment(_explain(field, gear, unit), "mlg", width=320, height=120)
-        sheet.column_dimensions[letters].width = 30 if field.kind is Kind.REMARKS else 13
-        for row in range(2, _ROWS + 2) if field.kind in _NUMBER_FORMATS else ():
-            sheet.cell(row, index + 1).number_format = _NUMBER_FORMATS[field.kind]
-        _validate(sheet, field.kind, f"{letters}2:{letters}{_ROWS + 1}")
+        sheet.column_dimensions[letters].width = 30 if field.column is REMARKS else 13
+        for row in range(2, _ROWS + 2) if field.column.holds in _FORMATS else ():
+            sheet.cell(row, index + 1).number_format = _FORMATS[field.column.holds]
+        _validate(sheet, field.column, f"{letters}2:{letters}{_ROWS + 1}")
     sheet.row_dimensions[1].height = 45
     sheet.freeze_panes = "D2"
     # On paper: which gear on every page, and its clearances together on the first.
@@ -248,30 +185,30 @@ def _table(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
         "landscape",
         53,
     )
-    for after in (Kind.CLEARANCE, Kind.MARGIN_U, Kind.REMARKS):
+    for after in (CLEARANCE, MARGIN_U, REMARKS):
         sheet.col_breaks.append(
-            Break(id=max(i for i, field in enumerate(fields, 1) if field.kind is after))
+            Break(id=max(i for i, field in enumerate(fields, 1) if field.column is after))
         )
 
 
-def _validate(sheet: Worksheet, kind: Kind, cells: str) -> None:
-    if kind in _CHOICES:
-        rule = DataValidation(
-            "list", formula1='"' + ",".join(_CHOICES[kind]) + '"', allow_blank=True
-        )
-        rule.errorTitle, rule.error = (
-            "Not in the list",
-            "Choose one of: " + ", ".join(_CHOICES[kind]),
-        )
-    elif kind in _NEVER_NEGATIVE:
+def _is_must(column: Column) -> bool:
+    """Whether the column is yellow: the unit is asked for in the form alone."""
+    return column.need is Need.REQUIRED or column is UNIT
+
+
+def _validate(sheet: Worksheet, column: Column, cells: str) -> None:
+    words = ",".join(column.words_taken)
+    if words:
+        rule = DataValidation("list", formula1=f'"{words}"', allow_blank=True)
+        rule.errorTitle = "Not in the list"
+        rule.error = "Choose one of: " + words.replace(",", ", ")
+    elif column.holds in (Holds.LENGTH, Holds.NUMBER) and not column.signed:
         rule = DataValidation(
             "decimal", operator="greaterThanOrEqual", formula1="0", allow_blank=True
         )
-        if kind in LENGTHS:
-            rule.errorTitle, rule.error = (
-                "Not a length",
-                "Enter a number, 0 or more, or leave the cell blank.",
-            )
+        if column.is_length:
+            rule.errorTitle = "Not a length"
+            rule.error = "Enter a number, 0 or more, or leave the cell blank."
             rule.errorStyle = "warning"
     else:
         return
@@ -291,10 +228,10 @@ def _form(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
         sheet.column_dimensions[letters].width = width
     for row, field in enumerate(_fields(gear, None), 4):
         label, value, hint = sheet.cell(row, 1, field.label), sheet.cell(row, 2), sheet.cell(row, 3)
-        must = field.kind in _MUST
+        must = _is_must(field.column)
         value.fill = PatternFill("solid", fgColor=_REQUIRED_FILL if must else "FFFFFFFF")
         value.border = Border(left=_LINE, right=_LINE, top=_LINE, bottom=_LINE)
-        value.number_format = _NUMBER_FORMATS.get(field.kind, "General")
+        value.number_format = _FORMATS.get(field.column.holds, "General")
         value.alignment = label.alignment = Alignment(horizontal="left", vertical="top")
         label.font = Font(name=FONT, bold=must)
         hint.value = _explain(field, gear, unit)
@@ -302,7 +239,7 @@ def _form(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
         hint.alignment = Alignment(wrap_text=True, vertical="top")
         hint.font = Font(name=FONT, size=9, color="FF52606D")
         _as_high_as(sheet, row, hint.value, 94)
-        _validate(sheet, field.kind, f"B{row}")
+        _validate(sheet, field.column, f"B{row}")
     sheet.freeze_panes = "B4"
     sheet.print_title_rows = "1:2"
     _fit_to_width(sheet)

@@ -12,7 +12,15 @@ from enum import StrEnum
 
 from mlg_troubleshoot.decision.inspection import EnteredClearance
 from mlg_troubleshoot.records.model import ReadOptions
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from mlg_troubleshoot.units import (
+    MM_PER_IN,
+    SLIPS,
+    THOU_PER_IN,
+    ClearanceConvention,
+    Length,
+    LengthUnit,
+    Sentence,
+)
 
 # Below this ratio to new parts a reading is clearly too small. Inches taken for millimetres stay
 # below it unless the joints are worn beyond their limits on average (0.6 x 25.4 x 0.0005 in =
@@ -24,6 +32,8 @@ _FEWEST = 3
 # A plunger reading of this size or less would be that of a failure in a larger unit. [in]
 _PLUNGER_NEAR_ZERO_IN = 0.0025
 _ROUNDING = 1e-9
+# No reading of a clearance is smaller. [in]
+_SMALLEST_IN = 0.0001
 CONFIRM_SMALL = (
     "Correct the unit, or confirm the readings: --small-readings-true, or yes in a column"
     " small_readings_true."
@@ -105,9 +115,13 @@ def plunger_question(displacement_in: float, stated: LengthUnit, options: ReadOp
         return ""
     confirm = "" if options.asks else f" {CONFIRM_SMALL}"
     read = f"read in {' or '.join(others)}, not in {stated.words}"
-    return (
-        f"the plunger reading of {number:g} {stated} is {displacement_in:.4f} in: was it"
-        f" {read}?{confirm}"
+    return Sentence.of(
+        "the plunger reading of {} {} is {}: was it {}?{}",
+        f"{number:g}",
+        stated,
+        Length(displacement_in),
+        read,
+        confirm,
     )
 
 
@@ -180,3 +194,61 @@ def _asked(joints: tuple[int, ...]) -> str:
 
 def _kind(convention: ClearanceConvention) -> str:
     return f" {convention.value.lower().replace('_', ' ')}"
+
+
+def scale_slip(
+    value_in: float,
+    unit: LengthUnit,
+    convention: ClearanceConvention,
+    plausible_max_in: float,
+    *,
+    halves: bool = True,
+) -> str:
+    """Name the slip of unit, decimal point or convention that would bring a value into the usual
+    range.
+    """
+    entered = unit.from_inches(value_in * convention.per_radial)
+    found: list[str] = []
+    if (
+        unit is LengthUnit.INCH
+        and entered >= 1.0
+        and _usual(value_in / THOU_PER_IN, plausible_max_in)
+    ):
+        found.append(
+            f"{entered:.4g} thou would be {entered / THOU_PER_IN:.4g} in: was it read in thou"
+            " (factor 1000)?"
+        )
+    if unit is LengthUnit.INCH and _usual(value_in / MM_PER_IN, plausible_max_in):
+        found.append(
+            f"{entered:.4g} mm would be {entered / MM_PER_IN:.4g} in: was it read in millimetres"
+            " (factor 25.4)?"
+        )
+    if (
+        unit is LengthUnit.MILLIMETRE
+        and entered >= 1.0
+        and _usual(value_in * MM_PER_IN / THOU_PER_IN, plausible_max_in)
+    ):
+        inches = entered / THOU_PER_IN
+        found.append(
+            f"{entered:.4g} thou would be {inches * MM_PER_IN:.4g} mm: was it read in thou?"
+        )
+    if (
+        halves
+        and convention is ClearanceConvention.RADIAL
+        and _usual(value_in / SLIPS["convention"].factor, plausible_max_in)
+    ):
+        found.append(
+            "Is it a diametral clearance or total play (factor 2)? Then say so in"
+            " clearance_convention."
+        )
+    ten = SLIPS["point"].factor
+    if _usual(value_in / ten, plausible_max_in):
+        found.append(
+            f"Has the decimal point slipped (factor {ten:g})? It would be {entered / ten:.4g}"
+            f" {unit.value}."
+        )
+    return " ".join(found)
+
+
+def _usual(value_in: float, plausible_max_in: float) -> bool:
+    return _SMALLEST_IN <= value_in <= plausible_max_in

@@ -9,9 +9,10 @@ import re
 from collections.abc import Collection, Mapping
 from datetime import date, datetime, time
 from enum import StrEnum
-from typing import TypeVar
+from typing import Any
 
-from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck
+from mlg_troubleshoot.decision.columns import OUTCOME, Column, Holds
+from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.records.cells import UNWRITABLE, OddCell, OddKind, show, show_number
 from mlg_troubleshoot.records.dates import DateOrder, readings, written_day
@@ -110,9 +111,6 @@ NOT_MEASURED = frozenset(
     )
 )
 
-_E = TypeVar("_E", bound=StrEnum)
-
-
 _ODD_CELLS = {OddKind.NO_VALUE: "formula_without_value", OddKind.DATE: "cell_is_date"}
 
 
@@ -133,7 +131,7 @@ def odd_cell_fault(cell: OddCell, expected: str) -> CellFaultError:
 def _number_of(cell: float | OddCell, expected: str) -> float:
     if isinstance(cell, float):
         return cell
-    if cell.kind is not OddKind.PADDED or cell.number is None:
+    if cell.kind not in (OddKind.PADDED, OddKind.WORDED) or cell.number is None:
         raise odd_cell_fault(cell, expected)
     return cell.number
 
@@ -159,18 +157,22 @@ def read_length(
         value, written = _written_length(text, decimal_comma, expected, unit)
     else:
         text, value, written = show(cell), _number_of(cell, expected), None
+        if isinstance(cell, OddCell) and cell.kind is OddKind.WORDED:
+            _, written = _written_length(cell.text, False, expected, unit)
     if not math.isfinite(value):
         raise CellFaultError("not_finite", expected)
     if value < 0 and not signed:
         raise CellFaultError("length_negative", expected)
     if written is not None and unit is not None and written is not unit:
         same = f"{unit.from_inches(written.to_inches(value)):.6g}"
+        who, plain = "cell", "enter the number without a unit"
+        if not isinstance(cell, str):
+            who, plain = "number format of the cell", "format the cell as a plain number"
         raise CellFaultError(
             "unit_contradiction",
             f"{expected}, in the unit of the column ({unit.value})",
-            f"The cell says {written.value}, the column says {unit.value}. If the cell is right,"
-            f" enter {same} ({unit.value}); if the column is right, enter the number without a"
-            " unit.",
+            f"The {who} says {written.value}, the column says {unit.value}. If the cell is right,"
+            f" enter {same} ({unit.value}); if the column is right, {plain}.",
         )
     found = written or unit or declared
     if found is None:
@@ -219,6 +221,35 @@ def _length_fault(text: str, body: str, expected: str, unit: LengthUnit | None) 
     return CellFaultError("not_a_length", expected, remedy)
 
 
+def read_value(
+    column: Column,
+    cell: str | float | OddCell,
+    header: str = "",
+    *,
+    decimal_comma: bool = False,
+) -> Any:
+    """Read a cell of a column that holds neither a length nor a date."""
+    if column.holds is Holds.NUMBER:
+        return read_number(
+            cell,
+            column.low,
+            column.high,
+            decimal_comma=decimal_comma,
+            expected=column.asked,
+            units=tuple(filter(None, (column.unit.lstrip("°").lower(),))),
+        )
+    if column.holds is Holds.YES_NO:
+        return _read_yes_no(cell)
+    if column is OUTCOME:
+        return _read_outcome(cell, header)
+    if column.choices is not None:
+        return _read_choice(column, cell)
+    if not column.carried:
+        return read_text(cell, column.asked, required=True)
+    is_shown = isinstance(cell, OddCell) and cell.kind in (OddKind.DATE, OddKind.BOOLEAN)
+    return show(cell) if is_shown else read_text(cell, column.asked)
+
+
 def read_number(
     cell: str | float | OddCell,
     low: float,
@@ -226,12 +257,14 @@ def read_number(
     *,
     decimal_comma: bool,
     expected: str,
-    suffix: str = "",
+    units: tuple[str, ...] = (),
 ) -> float:
     if isinstance(cell, str):
-        value = _written_number(plain_text(cell), decimal_comma, expected, suffix)
+        value = _written_number(plain_text(cell), decimal_comma, expected, units)
     else:
         value = _number_of(cell, expected)
+        if isinstance(cell, OddCell) and cell.kind is OddKind.WORDED:
+            _written_number(cell.text, False, expected, units)
     if not math.isfinite(value):
         raise CellFaultError("not_finite", expected)
     if not low <= value <= high:
@@ -239,9 +272,11 @@ def read_number(
     return value
 
 
-def _written_number(text: str, decimal_comma: bool, expected: str, suffix: str) -> float:
-    if suffix and text.lower().endswith(suffix.lower()):
-        text = text[: -len(suffix)].rstrip().rstrip("°").rstrip()
+def _written_number(text: str, decimal_comma: bool, expected: str, units: tuple[str, ...]) -> float:
+    for unit in units:
+        if text.lower().endswith(unit):
+            text = text[: -len(unit)].rstrip().rstrip("°").rstrip()
+            break
     sign = _SIGNED.match(text)
     if sign is not None:
         text = ("" if sign[1] == "+" else "-") + text[sign.end() :]
@@ -266,6 +301,8 @@ def _written_number(text: str, decimal_comma: bool, expected: str, suffix: str) 
 def read_text(cell: str | float | OddCell, expected: str, *, required: bool = False) -> str:
     """Read an identifier or another text; numbers keep the digits they show."""
     if isinstance(cell, str):
+        if cell.isascii() and cell.isprintable():
+            return cell.strip()
         text = plain_text(cell)
         if UNWRITABLE.search(text):
             raise CellFaultError("text_unwritable", expected)
@@ -281,24 +318,21 @@ def read_text(cell: str | float | OddCell, expected: str, *, required: bool = Fa
     raise odd_cell_fault(cell, expected)
 
 
-def read_choice(
-    cell: str | float | OddCell, choices: type[_E], code: str, hints: dict[str, str]
-) -> _E:
+def _read_choice(column: Column, cell: str | float | OddCell) -> StrEnum:
     """Read one of a few words, in upper or lower case."""
-    known = choices.__members__
-    if isinstance(cell, str) and cell in known:
-        return known[cell]
-    words = list(known)
-    expected = " or ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
+    choices = column.words_taken
+    if isinstance(cell, str) and cell in choices:
+        return choices[cell]
     text = plain_text(cell) if isinstance(cell, str) else ""
     name = re.sub(r"[\s\-]+", "_", text).upper()
-    if name in known:
-        return known[name]
+    found = choices.get(name) or (column.spelt(text) if column.spelt is not None else None)
+    if found is not None:
+        return found
     if isinstance(cell, OddCell):
-        raise odd_cell_fault(cell, expected)
-    hint = hints.get(text.casefold())
-    remedy = f"Enter {hint} if that is meant." if hint else f"Enter {expected}."
-    raise CellFaultError(code, expected, remedy)
+        raise odd_cell_fault(cell, column.asked)
+    hint = column.hints.get(text.casefold())
+    remedy = f"Enter {hint} if that is meant." if hint else f"Enter {column.asked}."
+    raise CellFaultError(f"{column.filled}_unknown", column.asked, remedy)
 
 
 _YES_NO = {
@@ -313,24 +347,12 @@ def _yes_no(cell: str | float | OddCell) -> bool | None:
     return _YES_NO.get(show(cell).strip().casefold())
 
 
-def read_yes_no(cell: str | float | OddCell) -> bool:
+def _read_yes_no(cell: str | float | OddCell) -> bool:
     """Read the answer to a question: yes or no."""
     said = _yes_no(cell)
     if said is None:
         raise CellFaultError("not_yes_or_no", "yes or no", "Enter yes or no.")
     return said
-
-
-def read_rigging(cell: str | float | OddCell) -> RiggingCheck:
-    """Read whether rigging and lock roller were looked at, or set right."""
-    word = RiggingCheck.__members__.get(plain_text(show(cell)).upper())
-    if word is not None:
-        return word
-    said = _yes_no(cell)
-    if said is None:
-        expected = "no, yes (looked at) or corrected (set right)"
-        raise CellFaultError("rigging_unknown", expected, "Enter no, yes or corrected.")
-    return RiggingCheck.YES if said else RiggingCheck.NO
 
 
 _OUTCOME_WORDS = {
@@ -366,7 +388,7 @@ def says_failed(text: str) -> bool:
     return _outcome_word(text) is Outcome.FAILED
 
 
-def read_outcome(cell: str | float | OddCell, header: str) -> Outcome:
+def _read_outcome(cell: str | float | OddCell, header: str) -> Outcome:
     """Read what the gear did; yes and no count only where the header asks a question (`Retracted?`,
     `Failed?`).
     """

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 
 import xlrd
 
@@ -16,12 +17,10 @@ from mlg_troubleshoot.records.cells import (
     MAX_COLUMNS,
     MAX_ROWS,
     Cell,
+    NumberFormat,
     OddCell,
     OddKind,
     date_cell,
-    is_date_format,
-    padding_width,
-    show_number,
 )
 from mlg_troubleshoot.records.refusals import COPY_THE_TABLE, FileRefusedError
 from mlg_troubleshoot.records.source import MACROS, MergedRange, NumberedRow, Sheet, Workbook
@@ -66,6 +65,7 @@ class _XlsSheet(Sheet):
         super().__init__(sheet.name, hidden=bool(sheet.visibility))
         self._book = book
         self._sheet = sheet
+        self._epoch_1904 = bool(book.datemode)
 
     def merged(self) -> Sequence[MergedRange]:
         return [
@@ -91,7 +91,7 @@ class _XlsSheet(Sheet):
                 self.facts.hidden_rows.add(place + 1)
             yield place + 1, cells
 
-    def _cell(self, row: int, column: int) -> Cell:  # noqa: PLR0911 - one return for each kind of cell
+    def _cell(self, row: int, column: int) -> Cell:
         kind, value = self._sheet.cell_type(row, column), self._sheet.cell_value(row, column)
         if kind in (xlrd.XL_CELL_EMPTY, xlrd.XL_CELL_BLANK):
             return None
@@ -102,17 +102,19 @@ class _XlsSheet(Sheet):
         if kind == xlrd.XL_CELL_BOOLEAN:
             return OddCell(OddKind.BOOLEAN, "TRUE" if value else "FALSE")
         number = float(value)
-        code = self._format(row, column)
-        if kind == xlrd.XL_CELL_DATE or (code is not None and is_date_format(0, code)):
-            return date_cell(number, epoch_1904=bool(self._book.datemode))
-        width = padding_width(code)
-        if width and abs(number) < 1e15:
-            return OddCell(OddKind.PADDED, show_number(number).zfill(width), None, number)
-        return number
+        if kind == xlrd.XL_CELL_DATE:
+            return date_cell(number, epoch_1904=self._epoch_1904)
+        shown = self._format(row, column)
+        return number if shown is None else shown.cell(number, epoch_1904=self._epoch_1904)
 
-    def _format(self, row: int, column: int) -> str | None:
+    def _format(self, row: int, column: int) -> NumberFormat | None:
         index = self._sheet.cell_xf_index(row, column)
         if index is None or index >= len(self._book.xf_list):
             return None
         known = self._book.format_map.get(self._book.xf_list[index].format_key)
-        return None if known is None else known.format_str
+        return None if known is None else _read_format(known.format_str)
+
+
+@lru_cache(1000)
+def _read_format(code: str | None) -> NumberFormat | None:
+    return NumberFormat.of(code)

@@ -38,13 +38,10 @@ from mlg_troubleshoot.records.cells import (
     MAX_ROWS,
     NO_VALUE_TEXT,
     Cell,
+    NumberFormat,
     OddCell,
     OddKind,
-    date_cell,
-    is_date_format,
     iso_date_cell,
-    padding_width,
-    show_number,
 )
 from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.source import MACROS, MergedRange, NumberedRow, Sheet, Workbook
@@ -130,10 +127,8 @@ class XlsxFile(Workbook):
         return found
 
     @cached_property
-    def odd_styles(self) -> dict[str, int]:
-        """Return the styles that show a number as a date (0) or with leading zeros (how many
-        digits).
-        """
+    def formats(self) -> dict[str, NumberFormat]:
+        """Return the formats by style that do not show plain numbers."""
         part = self._parts.get("styles", "")
         if part.lower() not in self.archive.names:
             return {}
@@ -143,16 +138,13 @@ class XlsxFile(Workbook):
             number.get("numFmtId"): number.get("formatCode", "")
             for number in root.iterfind(".//{*}numFmt")
         }
-        found: dict[str, int] = {}
+        found: dict[str, NumberFormat] = {}
         for index, style in enumerate(root.iterfind("{*}cellXfs/{*}xf")):
-            format_id = style.get("numFmtId", "0")
-            code = codes.get(format_id)
-            if is_date_format(
-                int(format_id) if re.fullmatch(r"[0-9]{1,5}", format_id) else 0, code
-            ):
-                found[str(index)] = 0
-            elif padding_width(code):
-                found[str(index)] = padding_width(code)
+            known = style.get("numFmtId", "0")
+            number = int(known) if re.fullmatch(r"[0-9]{1,5}", known) else 0
+            shown = NumberFormat.of(codes.get(known), number)
+            if shown is not None:
+                found[str(index)] = shown
         return found
 
 
@@ -223,7 +215,7 @@ class _Rows(WorkSheetParser):
     def __init__(self, sheet: XlsxSheet) -> None:
         super().__init__(cast(Any, None), cast(Any, sheet.book.strings), data_only=True)
         self._sheet = sheet
-        self._styles = sheet.book.odd_styles
+        self._formats = sheet.book.formats
 
     def parse(self) -> Generator[NumberedRow]:
         """Read the rows only: what stands behind them, such as rules, can make openpyxl refuse the
@@ -286,12 +278,10 @@ class _Rows(WorkSheetParser):
             return None if kind == "str" else OddCell(OddKind.NO_VALUE, NO_VALUE_TEXT)
         if kind == "n":
             number = float(value)
-            width = self._styles.get(style) if style else None
-            if width is None or not abs(number) < 1e15:
+            shown = self._formats.get(style) if style else None
+            if shown is None:
                 return number
-            if width == 0:
-                return date_cell(number, epoch_1904=self._sheet.book.epoch_1904)
-            return OddCell(OddKind.PADDED, show_number(number).zfill(width), None, number)
+            return shown.cell(number, epoch_1904=self._sheet.book.epoch_1904)
         if kind == "s":
             return self._sheet.book.strings[int(value)]
         if kind == "e":

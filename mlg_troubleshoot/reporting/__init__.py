@@ -1,17 +1,16 @@
-"""Reports on paper and screen: one self-contained HTML file and one PDF a document."""
-
-from __future__ import annotations
-
-from mlg_troubleshoot.reporting.inspection_report import batch_document, inspection_document
-from mlg_troubleshoot.reporting.provenance import ReportProvenance, provenance_of
-from mlg_troubleshoot.reporting.publish import WrittenReport, publish, publish_all
+"""Reports on paper and screen: one self-contained HTML file and one PDF per document; the JSON."""
 
 __all__ = [
-    "ReportProvenance",
-    "WrittenReport",
-    "batch_document",
-    "inspection_document",
-    "provenance_of",
+    "diagnosis_lines",
+    "diagnosis_report",
+    "fleet_report",
+    "form",
+    "inspection_report",
+    "json_form",
+    "life_json",
+    "model_json",
+    "provenance",
     "publish",
-    "publish_all",
+    "study_report",
+    "survey_report",
 ]

@@ -11,6 +11,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.decision.columns import AXIAL_FLOAT, CLEARANCE, COVARIATES
 from mlg_troubleshoot.diagnosis import Candidate, Diagnosis
 from mlg_troubleshoot.diagnosis.table import ALONG
 from mlg_troubleshoot.reporting.diagnosis_lines import column_words
@@ -21,11 +22,12 @@ from mlg_troubleshoot.units import LengthUnit
 Texts = NDArray[np.str_]
 
 # Width and height of one plot of two side by side. [canvas units]
-_PLOT = (335.0, 236.0)
+_PLOT = (335, 236)
+_BAR, _BAR_HIGH = 150, 10
 _BINS = 8
 _FEWEST_IN_A_BIN = 5
 MOST_TAILS = 36
-_UNITS = {"temperature_c": "°C", "hydraulic_pressure_psi": "psi", ALONG: "in"}
+_UNITS = {c.variable: "in" if c.is_length else c.unit for c in COVARIATES}
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ class Residuals:
 
 
 @dataclass(frozen=True)
-class Against:
+class ResidualAxis:
     """What residuals are drawn against.
 
     values: a number for each row, NaN where missing.
@@ -86,7 +88,7 @@ class Against:
     marked_label: str = ""
 
 
-def against_cause(residuals: Residuals, candidate: Candidate, effect_in: Array) -> Against:
+def against_cause(residuals: Residuals, candidate: Candidate, effect_in: Array) -> ResidualAxis:
     """Choose what to draw residuals against: the column that the cause lives on, else the
     prediction.
     """
@@ -95,51 +97,51 @@ def against_cause(residuals: Residuals, candidate: Candidate, effect_in: Array) 
     if joints:
         least = residuals.drawn(np.min([residuals.clearance(joint) for joint in joints], axis=0))
         named = " and ".join(f"#{joint}" for joint in joints)
-        return Against(
+        return ResidualAxis(
             f"{'smaller ' if len(joints) > 1 else ''}clearance of {named}, {residuals.unit}", least
         )
     if "tail" in setting and "day" in table.quantities:
         rows = table.factors["tail_no"] == setting["tail"]
         if "side" in setting:
             rows = rows & (table.factors["side"] == setting["side"])
-        return Against(
+        return ResidualAxis(
             _day_label(residuals),
             table.quantities["day"],
             marked=rows,
             marked_label=candidate.target or "",
         )
     for need in candidate.cause.needs:
-        if need == "axial_float" and table.axial_float_in is not None:
-            return _most_telling_float(residuals, table.axial_float_in, effect_in)
+        if need == AXIAL_FLOAT.variable and table.axial_float_in is not None:
+            return _most_correlated_float(residuals, table.axial_float_in, effect_in)
         if need in table.quantities or need in table.factors:
             return against_column(residuals, need)
     return against_column(residuals, ALONG if table.along.any() else "predicted")
 
 
-def against_column(residuals: Residuals, name: str) -> Against:
+def against_column(residuals: Residuals, name: str) -> ResidualAxis:
     table, unit = residuals.diagnosis.used, residuals.unit
     if name == "day" and "day" in table.quantities:
-        return Against(_day_label(residuals), table.quantities["day"])
+        return ResidualAxis(_day_label(residuals), table.quantities["day"])
     if name in table.quantities:
         label = ", ".join(filter(None, (column_words(name), _UNITS.get(name))))
-        return Against(label, table.quantities[name])
+        return ResidualAxis(label, table.quantities[name])
     if name in table.factors:
-        return Against(column_words(name), groups=table.factors[name])
+        return ResidualAxis(column_words(name), groups=table.factors[name])
     kind, _, joint = name.rpartition("_")
     if joint.isdigit() and int(joint) in residuals.joints:
-        if kind == "clearance":
-            return Against(
+        if kind == CLEARANCE.name:
+            return ResidualAxis(
                 f"{column_words(name)}, {unit}", residuals.drawn(residuals.clearance(int(joint)))
             )
-        if kind == "axial_float" and table.axial_float_in is not None:
+        if kind == AXIAL_FLOAT.name and table.axial_float_in is not None:
             values = table.axial_float_in[:, residuals.joints.index(int(joint))]
-            return Against(f"{column_words(name)}, {unit}", residuals.drawn(values))
-    return Against(
+            return ResidualAxis(f"{column_words(name)}, {unit}", residuals.drawn(values))
+    return ResidualAxis(
         f"predicted displacement, {unit}", residuals.drawn(residuals.diagnosis.predicted_in)
     )
 
 
-def split_by(residuals: Residuals, name: str, other: Against) -> tuple[Mask, str, str] | None:
+def split_by(residuals: Residuals, name: str, other: ResidualAxis) -> tuple[Mask, str, str] | None:
     """Split the rows by a column, so that what moves with two columns together can be seen."""
     column = against_column(residuals, name)
     if column.values is not None:
@@ -171,7 +173,9 @@ def split_by(residuals: Residuals, name: str, other: Against) -> tuple[Mask, str
     )
 
 
-def _most_telling_float(residuals: Residuals, floats_in: Array, effect_in: Array) -> Against:
+def _most_correlated_float(
+    residuals: Residuals, floats_in: Array, effect_in: Array
+) -> ResidualAxis:
     """The end float with which the fitted effect goes most."""
     best, place = -1.0, 0
     for j in range(floats_in.shape[1]):
@@ -181,7 +185,7 @@ def _most_telling_float(residuals: Residuals, floats_in: Array, effect_in: Array
             if alike > best:
                 best, place = alike, j
     label = f"end float of #{residuals.joints[place]}, {residuals.unit}"
-    return Against(label, residuals.drawn(floats_in[:, place]))
+    return ResidualAxis(label, residuals.drawn(floats_in[:, place]))
 
 
 def _day_label(residuals: Residuals) -> str:
@@ -191,7 +195,7 @@ def _day_label(residuals: Residuals) -> str:
 
 def residual_plot(
     residuals: Residuals,
-    against: Against,
+    against: ResidualAxis,
     title: str,
     *,
     after: bool = False,
@@ -333,4 +337,12 @@ def measured_against_predicted(residuals: Residuals) -> Markup:
             x = plot.area[0] + 6 + 62 * k
             _point(canvas, x, 10, after=is_after)
             canvas.text(x + 7, 13.5, label, size=10)
+    return canvas.svg()
+
+
+def probability_bar(chance: float) -> Markup:
+    """Draw a probability as a bar that fills its frame at certainty."""
+    canvas = Canvas(_BAR + 2, _BAR_HIGH + 2, f"probability {chance:.1%}")
+    canvas.rectangle(1, 1, _BAR, _BAR_HIGH, fill=PAPER, colour=SOFT, width=1)
+    canvas.rectangle(1, 1, _BAR * min(max(chance, 0.0), 1.0), _BAR_HIGH, fill=INK)
     return canvas.svg()

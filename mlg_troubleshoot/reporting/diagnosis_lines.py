@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from mlg_troubleshoot.decision.columns import AXIAL_FLOAT, BY_NAME, CLEARANCE, COVARIATES
 from mlg_troubleshoot.diagnosis import Diagnosis, NamedCause
 from mlg_troubleshoot.diagnosis.faults import DataFault
 from mlg_troubleshoot.reporting.formats import Lengths
 from mlg_troubleshoot.reporting.html import environment
 from mlg_troubleshoot.units import LengthUnit
 
-NOISE_ABOVE = 0.05
 _WORDS = ("DATA", "MISFIT", "CAUSE", "MODEL", "GAIN", "LEFT", "DO")
 _KINDS = {
     "mm_as_in": "millimetres entered as inches",
@@ -21,22 +21,15 @@ _KINDS = {
     "implausible": "implausible",
     "other_convention": "the other convention",
 }
-_COLUMNS = {
-    "temperature_c": "temperature",
-    "hydraulic_pressure_psi": "hydraulic pressure",
-    "gear_landings": "landings since overhaul",
-    "actuator_extension_in": "actuator extension",
-    "predicted": "predicted displacement",
-    "day": "date",
-    "tail_no": "tail",
-    "gauge_id": "gauge",
-    "technician_id": "technician",
-    "axial_float": "end float",
-}
+_VARIABLES = {c.variable: c.said for c in (*COVARIATES, AXIAL_FLOAT)}
+
+
+# What is less likely than this is not worth a word, and more than so many are not read.
+_LEAST_SAID, _MOST_SAID = 0.01, 3
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class DiagnosisLine:
     """One of the seven lines: its number, what it is about in one word, and what it says."""
 
     number: int
@@ -50,15 +43,24 @@ def kind_words(kind: str) -> str:
 
 def column_words(name: str) -> str:
     kind, _, joint = name.rpartition("_")
-    if joint.isdigit() and kind in {"clearance", "axial_float"}:
-        return f"{'clearance' if kind == 'clearance' else 'end float'} of joint {joint}"
-    return _COLUMNS.get(name, name.replace("_", " "))
+    if joint.isdigit() and kind in (CLEARANCE.name, AXIAL_FLOAT.name):
+        return f"{BY_NAME[kind].said} of joint {joint}"
+    if name == "predicted":
+        return "predicted displacement"
+    return _VARIABLES.get(name, name.replace("_", " "))
 
 
-def chance_words(chance: float, permutations: int) -> str:
-    """Write a chance as far as the null simulations can resolve it."""
-    least = 1.0 / (permutations + 1)
-    return f"{chance:.2g}" if chance > 1.001 * least else f"≤ {least:.2g}"
+def chance_words(chance: float) -> str:
+    """Write a probability in percent, as far as it means something."""
+    if chance < 0.0005:
+        return "< 0.1 %"
+    if chance > 0.9995:
+        return "> 99.9 %"
+    return (
+        f"{100.0 * chance:.1f} %"
+        if min(chance, 1.0 - chance) < 0.0995
+        else f"{chance:.0%}".replace("%", " %")
+    )
 
 
 def name_words(cause: str) -> str:
@@ -79,12 +81,13 @@ def cause_words(cause: NamedCause) -> str:
     )
 
 
-def seven_lines(d: Diagnosis, unit: LengthUnit = LengthUnit.THOU) -> tuple[Line, ...]:
+def seven_lines(d: Diagnosis, unit: LengthUnit = LengthUnit.THOU) -> tuple[DiagnosisLine, ...]:
     """Say what a diagnosis found: data, misfit, cause, model, gain, residual, what to do."""
     # Blanks of every kind break a line of the terminal, and long words where they must.
     texts = [" ".join(text.split()) for text in _said(d, unit, *_WORDS)]
     return tuple(
-        Line(k, word, text) for k, (word, text) in enumerate(zip(_WORDS, texts, strict=True), 1)
+        DiagnosisLine(k, word, text)
+        for k, (word, text) in enumerate(zip(_WORDS, texts, strict=True), 1)
     )
 
 
@@ -96,18 +99,28 @@ def headline(d: Diagnosis, unit: LengthUnit) -> str:
 def _said(d: Diagnosis, unit: LengthUnit, *parts: str) -> Iterator[str]:
     words = {
         "kind_words": kind_words,
-        "chance_words": chance_words,
         "fitted_numbers": fitted_numbers,
     }
     context = {
         **words,
         "d": d,
         "by_slip": by_slip,
-        "noise_above": NOISE_ABOVE,
+        "likeliest": likeliest(d),
         "lengths": Lengths(unit),
     }
     said = environment().get_template("diagnosis.txt.j2").make_module(context)
     return (str(getattr(said, part)).replace("\u200b", "") for part in parts)
+
+
+def likeliest(d: Diagnosis) -> list[tuple[str, float]]:
+    """What may be wrong and is not said already, likeliest first, each with its probability."""
+    said = {c.candidate.key for c in (*d.causes, *d.also_possible, *d.beside)}
+    found = [
+        (f"{name_words(cause)}{f' {target}' if target else ''}", chance)
+        for (cause, target), chance in d.probabilities.items()
+        if (cause, target) not in said and chance >= _LEAST_SAID
+    ]
+    return found[:_MOST_SAID]
 
 
 def by_slip(faults: Sequence[DataFault]) -> list[list[DataFault]]:
@@ -143,5 +156,8 @@ def fitted_numbers(d: Diagnosis, lengths: Lengths) -> tuple[str, ...]:
 
 
 environment().filters.update(
-    name_words=name_words, cause_words=cause_words, column_words=column_words
+    chance_words=chance_words,
+    name_words=name_words,
+    cause_words=cause_words,
+    column_words=column_words,
 )

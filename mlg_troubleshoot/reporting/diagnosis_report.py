@@ -15,7 +15,6 @@ from mlg_troubleshoot.diagnosis import CATALOGUE, Diagnosis, ModelExtension
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import diagnosis_figures as drawn
-from mlg_troubleshoot.reporting.common import head
 from mlg_troubleshoot.reporting.diagnosis_figures import Residuals
 from mlg_troubleshoot.reporting.diagnosis_lines import (
     cause_words,
@@ -29,7 +28,7 @@ from mlg_troubleshoot.reporting.diagnosis_lines import (
 )
 from mlg_troubleshoot.reporting.formats import Lengths, short
 from mlg_troubleshoot.reporting.html import Document
-from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.reporting.provenance import ReportProvenance, head
 from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.units import LengthUnit
 
@@ -42,6 +41,7 @@ _WORDS = {
 _MOST_PANELS = 2
 _MOST_RULED_OUT = 14
 _MOST_CHANGES = 40
+_MOST_LIKELY, _LEAST_LIKELY = 8, 0.005
 
 PlotPair = tuple[Markup, Markup, str]
 
@@ -75,7 +75,6 @@ def _context(
     residuals = Residuals(d, gear.joint_numbers, lengths.unit)
     words, tone = _WORDS[d.verdict]
     found = d.causes or d.also_possible
-    chance = found[0].p_value if found else d.remainder_p
     return {
         **head(
             f"Measured against predicted – {source}",
@@ -92,7 +91,9 @@ def _context(
         "tone": tone,
         "headline": headline(d, lengths.unit),
         "action": seven_lines(d, lengths.unit)[-1].text,
-        "chance": None if chance is None else chance_words(chance, d.permutations),
+        "sure": chance_words(d.beliefs.sure),
+        "likely": _likely(d),
+        "probability_bar": drawn.probability_bar,
         "plots": _plots(residuals),
         "scatter": drawn.measured_against_predicted(residuals),
         "strips": drawn.tail_strips(residuals),
@@ -114,6 +115,22 @@ def _context(
         "extension": extension,
         "approval": [("Proposed by", ""), ("Checked by", ""), ("Approved for use by", "")],
     }
+
+
+def _likely(d: Diagnosis) -> list[tuple[str, str, float]]:
+    """What may be wrong, with its target and its probability, the likeliest first; then what no
+    list has, and nothing.
+    """
+    listed = [
+        (name_words(cause), target or "–", chance)
+        for (cause, target), chance in d.probabilities.items()
+        if chance >= _LEAST_LIKELY
+    ]
+    return [
+        *listed[:_MOST_LIKELY],
+        ("not on the list", "–", d.p_unlisted),
+        ("nothing wrong", "–", d.p_nothing),
+    ]
 
 
 def _days(d: Diagnosis) -> int | None:

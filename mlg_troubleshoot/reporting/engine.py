@@ -73,7 +73,7 @@ def finished(
     ):
         address = str(annotation.get("/A", {}).get("/URI", ""))
         if address.startswith(_HERE):
-            # A link to a file beside this one, which a reader of the PDF opens there.
+            # A link to a file in the same folder, which the PDF viewer opens.
             annotation[NameObject("/A")] = DictionaryObject(
                 {
                     NameObject("/S"): NameObject("/GoToR"),

@@ -25,7 +25,8 @@ PALE = "#e4e8ec"
 PAPER = "#ffffff"
 ACCENT = "#0b4f8a"
 
-TEXT_SIZE = 11.0
+# Size of the text of a figure. [px]
+TEXT_SIZE = 11
 # Average width of a character of the report's font, per unit of its size.
 _CHARACTER = 0.62
 

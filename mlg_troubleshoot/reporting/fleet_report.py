@@ -5,20 +5,24 @@ side.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from markupsafe import Markup
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting.common import head
+from mlg_troubleshoot.life.folding import GearKey, GearLife
+from mlg_troubleshoot.life.forecast import Forecast
+from mlg_troubleshoot.life.looking_back import Advice, side_by_side
+from mlg_troubleshoot.life.outlook import FleetLine, fleet_lines, outlook_sentence
 from mlg_troubleshoot.reporting.figures import ACCENT, INK, SOFT, Canvas
 from mlg_troubleshoot.reporting.formats import ABSENT, Lengths, landings
 from mlg_troubleshoot.reporting.html import Document
-from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.reporting.life_json import fleet_line_as_json, life_as_json
+from mlg_troubleshoot.reporting.provenance import ReportProvenance, head
 from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.units import LengthUnit
 
-_BAR, _SPARK, _HIGH = 150.0, 90.0, 18.0
+# Length of the bar of landings left, of the line of worst cases, and height of both. [px]
+_BAR, _SPARK, _HIGH = 150, 90, 18
 
 
 def interval_bar(ends: Mapping[str, float | None] | None, horizon: float) -> Markup:
@@ -73,9 +77,8 @@ def _high(value_in: float, top_in: float) -> float:
 
 
 def fleet_document(
-    fleet: Mapping[str, Any],
-    series: Mapping[tuple[str, str], tuple[Sequence[float | None], float | None]],
-    advice: str,
+    lives: Sequence[GearLife],
+    forecasts: Mapping[GearKey, Forecast],
     gear: Gear,
     provenance: ReportProvenance,
     unit: LengthUnit = LengthUnit.INCH,
@@ -86,26 +89,30 @@ def fleet_document(
     lengths = Lengths(unit)
     lines = [
         {
-            **line,
-            "left": interval_bar(line["landings_to_limit"], gear.horizon.value),
-            "spark": sparkline(*series[line["tail_no"], line["side"]], lengths),
-            "link": f"{safe_stem('life', line['tail_no'], line['side'])}.html",
+            **fleet_line_as_json(line),
+            "left": interval_bar(line.outlook.landings_to_limit, gear.horizon.value),
+            "spark": _worst_cases(line, lengths),
+            "link": f"{safe_stem('life', *line.life.key)}.html",
         }
-        for line in fleet["gears"]
+        for line in fleet_lines(lives, forecasts)
     ]
     context = {
         **head("Fleet", "Fleet", gear, provenance, lengths),
         "lines_of": lines,
-        "advice": advice,
-        "notes": fleet["warnings"],
+        "advice": Advice.of(lives).sentence,
+        "notes": [warning for life in lives for warning in life.warnings],
     }
     return Document("fleet.html.j2", context, "fleet", landscape=True)
 
 
+def _worst_cases(line: FleetLine, lengths: Lengths) -> Markup:
+    worst_in = [kept.result.get("predicted_displacement_in") for kept in line.life.inspections]
+    return sparkline(worst_in, line.latest.result.get("margin_in"), lengths)
+
+
 def life_document(
-    life: Mapping[str, Any],
-    outlook: str,
-    steps: Sequence[Mapping[str, Any]],
+    life: GearLife,
+    ahead: Forecast,
     gear: Gear,
     provenance: ReportProvenance,
     unit: LengthUnit = LengthUnit.INCH,
@@ -113,7 +120,10 @@ def life_document(
     """Make one gear's life: its last inspections side by side, what was restored between, landings
     left.
     """
-    name = f"{life['tail_no']} {life['side']}"
-    shown = {"life": life, "outlook": outlook, "steps": steps}
-    context = {**head(f"Life of {name}", name, gear, provenance, Lengths(unit)), **shown}
-    return Document("life.html.j2", context, safe_stem("life", life["tail_no"], life["side"]))
+    shown = {
+        "life": life_as_json(life, ahead, gear),
+        "outlook": outlook_sentence(life, ahead, gear),
+        "steps": side_by_side(life),
+    }
+    context = {**head(f"Life of {life.name}", life.name, gear, provenance, Lengths(unit)), **shown}
+    return Document("life.html.j2", context, safe_stem("life", *life.key))

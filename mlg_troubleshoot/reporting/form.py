@@ -8,11 +8,10 @@ from pathlib import Path
 from mlg_troubleshoot.errors import OutputError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.outputs import write_bytes
-from mlg_troubleshoot.reporting.common import head
 from mlg_troubleshoot.reporting.formats import Lengths
 from mlg_troubleshoot.reporting.html import Document, render
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
-from mlg_troubleshoot.reporting.provenance import provenance_of
+from mlg_troubleshoot.reporting.provenance import head, provenance_of
 from mlg_troubleshoot.reporting.schematic import blank_schematic
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from mlg_troubleshoot.decision import sentences
-from mlg_troubleshoot.units import LengthUnit, in_unit
+from mlg_troubleshoot.units import LengthUnit, said_in
 
 ABSENT = "–"
 MINUS = "−"
@@ -42,8 +42,8 @@ class Lengths:
         return text if text == ABSENT else f"{text}\u00a0{self.unit}"
 
     def said(self, sentence: str) -> str:
-        """Say a sentence of the program, which is written in inches, in this unit."""
-        return in_unit(sentence, self.unit)
+        """Say a sentence of the program in this unit."""
+        return said_in(sentence, self.unit)
 
 
 def percent(share: float | None) -> str:

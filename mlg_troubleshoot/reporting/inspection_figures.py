@@ -232,7 +232,7 @@ def plunger_curve(
         if v is not None
     ]
     heights = [plot.at(0.0, value * per_inch)[1] for value, _, _ in marks]
-    for (_, text, bold), y in zip(marks, _apart(heights, 11.0), strict=True):
+    for (_, text, bold), y in zip(marks, _spread_out(heights, 11.0), strict=True):
         canvas.text(px + 11, y + 3, text, size=9, bold=bold)
     for place, value in measured:
         canvas.marker("triangle", *plot.at(place * per_inch, value * per_inch), 5.0)
@@ -261,7 +261,7 @@ def _measured_along(
     return [(place, value) for place, value in displaced if math.isfinite(value)]
 
 
-def _apart(places: Sequence[float], gap: float) -> list[float]:
+def _spread_out(places: Sequence[float], gap: float) -> list[float]:
     """Move places along a line until none is nearer to another one than the gap."""
     order = sorted(range(len(places)), key=lambda k: places[k])
     moved = list(places)

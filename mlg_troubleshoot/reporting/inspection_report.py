@@ -11,7 +11,7 @@ from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement, Rejected
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Outcome, RowSource, Side
-from mlg_troubleshoot.decision.order import WORST_FIRST, latest_of_each_gear
+from mlg_troubleshoot.decision.ranking import WORST_FIRST, latest_of_each_gear
 from mlg_troubleshoot.decision.sentences import (
     chance_wrong_sentence,
     no_repair_set,
@@ -19,11 +19,11 @@ from mlg_troubleshoot.decision.sentences import (
 )
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.life.looking_back import PastInspection
 from mlg_troubleshoot.reporting import inspection_figures as drawn
-from mlg_troubleshoot.reporting.common import Facts, head
 from mlg_troubleshoot.reporting.formats import Lengths, short
 from mlg_troubleshoot.reporting.html import Document
-from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.reporting.provenance import Facts, ReportProvenance, head
 from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.reporting.schematic import JOINT_STATES, joint_mark, joint_state, schematic
 from mlg_troubleshoot.units import LengthUnit
@@ -41,7 +41,7 @@ def inspection_document(
     provenance: ReportProvenance,
     problems: Iterable[Problem] = (),
     unit: LengthUnit = LengthUnit.INCH,
-    steps: Sequence[Mapping[str, Any]] = (),
+    steps: Sequence[PastInspection] = (),
 ) -> Document:
     """Make the document of one inspection; `steps` are the gear's inspections up to this one, side
     by side.
@@ -189,7 +189,7 @@ def _sequence(gear: Gear, a: Assessment, lengths: Lengths) -> Facts:
     for name, value in places:
         sentence = gear.cycle.symptom(value, a.margin_in)
         said.setdefault(sentence, []).append(f"{name} {lengths.full(value, True)}")
-    return [(" and ".join(names), lengths.said(sentence)) for sentence, names in said.items()]
+    return [(" and ".join(names), sentence) for sentence, names in said.items()]
 
 
 def batch_document(

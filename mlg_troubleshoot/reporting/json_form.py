@@ -19,48 +19,26 @@ from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judge
 from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension, NamedCause
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.schemas import SCHEMA_VERSION
+from mlg_troubleshoot.output_types import (
+    CheckedInspection,
+    CheckedJoint,
+    DiagnoseOutput,
+    ExtensionGain,
+    FittedExtension,
+    GearIdentity,
+    MisfitSize,
+    NamedCauseOutput,
+    SuspectCell,
+)
+from mlg_troubleshoot.outputs import SCHEMA_VERSION
+from mlg_troubleshoot.units import Sentence
 
-_AS_THEY_ARE = frozenset((str, int, bool, type(None)))
+_AS_THEY_ARE = frozenset((str, Sentence, int, bool, type(None)))
 _SINGLE = (Enum, np.generic)
-_NUMBERS = (
-    *(
-        "predicted_displacement_in",
-        "over_travel_in",
-        "under_travel_in",
-        "predicted_upper_in",
-        "bound_in",
-    ),
-    *(
-        "margin_in",
-        "remaining_in",
-        "standard_uncertainty_in",
-        "probability_within_margin",
-        "probability_exceed_random_directions",
-    ),
-    *("geometry_spread_in", "explained_at_most_in", "unexplained_in"),
-)
-_JOINT = (
-    *(
-        "joint",
-        "name",
-        "clearance_in",
-        "over_limit",
-        "contribution_in",
-        "first_order",
-        "total_order",
-    ),
-    *("plunger_amplification", "rank", "rank_range", "allowance_in"),
-)
-_OF_JOINT = attrgetter(*_JOINT)
+_JOINT = tuple(CheckedJoint.__annotations__)
+_OF_JOINT = attrgetter(*_JOINT[:-1], "alike")
 # What the geometry says of a joint of every gear, and so is not kept with each assessment.
-_KEPT = tuple(
-    name
-    for name in _JOINT
-    if name not in ("name", "first_order", "total_order", "plunger_amplification")
-)
-_KEPT_OF_JOINT = attrgetter(*_KEPT)
-_PARTS = ("repair_sets", "rigging", "measuring", "confidence", "posterior")
+_OF_GEOMETRY = ("name", "first_order", "total_order", "plunger_amplification", "acts_like")
 
 
 def plain(value: Any) -> Any:
@@ -74,7 +52,7 @@ def plain(value: Any) -> Any:
         return value
     names = _field_names(kind)
     if names:
-        return chosen(value, *names)
+        return {name: plain(getattr(value, name)) for name in names}
     if isinstance(value, _SINGLE):
         return value.value if isinstance(value, Enum) else plain(value.item())
     if isinstance(value, Mapping):
@@ -87,8 +65,12 @@ def _field_names(kind: type) -> tuple[str, ...]:
     return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else ()
 
 
-def chosen(record: Any, *names: str) -> dict[str, Any]:
-    return {name: plain(getattr(record, name)) for name in names}
+def written(kind: Any, record: Any = None, /, **given: Any) -> dict[str, Any]:
+    """Return a record in the form of an output: each key as it is given, or as the record has
+    it.
+    """
+    names = kind.__annotations__
+    return {n: plain(given[n] if n in given else getattr(record, n)) for n in names}
 
 
 def check_as_json(
@@ -109,11 +91,9 @@ def kept_as_json(assessment: Assessment) -> dict[str, Any]:
     """An assessment as a store keeps it: as in the form of a check, without what the geometry's
     hash says already.
     """
-    joints = [
-        dict(zip(_KEPT, map(plain, _KEPT_OF_JOINT(finding)), strict=True))
-        for finding in assessment.joints
-    ]
-    return _assessment(assessment, joints)
+    joints = [_joint(finding) for finding in assessment.joints]
+    kept = [{n: each for n, each in j.items() if n not in _OF_GEOMETRY} for j in joints]
+    return _assessment(assessment, kept)
 
 
 def check_json_pieces(
@@ -142,7 +122,7 @@ def _head(gear: Gear, seed: int) -> dict[str, Any]:
     return {
         "schema_version": SCHEMA_VERSION,
         "seed": seed,
-        "gear": chosen(gear, "id", "geometry_sha256", "provenance"),
+        "gear": written(GearIdentity, gear),
     }
 
 
@@ -154,50 +134,32 @@ def _inspection(judgement: Judgement, gear: Gear) -> dict[str, Any]:
     """One row of the input; of a row that cannot be judged every number is null."""
     if isinstance(judgement, Assessment):
         return _assessment(judgement, [_joint(finding) for finding in judgement.joints])
-    unknown: dict[str, None] = dict.fromkeys((*_JOINT[2:], "acts_like"))
+    unknown = dict.fromkeys(_JOINT)
     return {
-        **_identity(judgement.row, judgement, judgement.next_action.text),
-        **dict.fromkeys((*_NUMBERS, "measured_displacement_in")),
-        "joints": [{"joint": joint.number, "name": joint.name, **unknown} for joint in gear.joints],
-        "basis": None,
-        **_course(judgement),
-        **dict.fromkeys(_PARTS),
+        **dict.fromkeys(CheckedInspection.__annotations__),
+        **_course(judgement.row, judgement),
+        "headline": judgement.next_action.text,
+        "joints": [{**unknown, "joint": joint.number, "name": joint.name} for joint in gear.joints],
         "warnings": list(judgement.warnings),
     }
 
 
 def _assessment(a: Assessment, joints: list[dict[str, Any]]) -> dict[str, Any]:
     said = [a.measured_statement] if a.measured_statement else []
-    return {
-        **_identity(a.inspection, a, a.headline),
-        **chosen(a, *_NUMBERS),
+    own = {
         "measured_displacement_in": a.inspection.measured_displacement_in,
         "joints": joints,
-        "basis": a.basis.value,
-        **_course(a),
-        **chosen(a, *_PARTS),
         "warnings": [*said, *a.warnings],
     }
+    return written(CheckedInspection, a, **_course(a.inspection, a), **own)
 
 
-def _identity(row: Any, judgement: Judgement, headline: str) -> dict[str, Any]:
-    return {
-        **chosen(row, "record_id", "tail_no", "side"),
-        "verdict": judgement.verdict.value,
-        "headline": headline,
-    }
-
-
-def _joint(finding: JointFinding) -> dict[str, Any]:
-    return {
-        **dict(zip(_JOINT, map(plain, _OF_JOINT(finding)), strict=True)),
-        "acts_like": list(finding.alike),
-    }
-
-
-def _course(judgement: Judgement) -> dict[str, Any]:
+def _course(row: Any, judgement: Judgement) -> dict[str, Any]:
+    """Whose row it is, its verdict and what to do next."""
     steps = plain(judgement.plan.steps)
     return {
+        **{name: plain(getattr(row, name)) for name in ("record_id", "tail_no", "side")},
+        "verdict": judgement.verdict.value,
         "next_action": steps[0],
         "plan": steps,
         "end": judgement.end.value,
@@ -205,39 +167,45 @@ def _course(judgement: Judgement) -> dict[str, Any]:
     }
 
 
+def _joint(finding: JointFinding) -> dict[str, Any]:
+    return dict(zip(_JOINT, map(plain, _OF_JOINT(finding)), strict=True))
+
+
 def diagnosis_as_json(
     diagnosis: Diagnosis, extension: ModelExtension | None, warnings: Sequence[str] = ()
 ) -> dict[str, Any]:
     d = diagnosis
-    return {
-        "schema_version": SCHEMA_VERSION,
-        "rows": {"read": d.rows_read, "used": d.rows_used, "set_aside": d.rows_read - d.rows_used},
-        "data_faults": [
-            chosen(f, "row", "record_id", "column", "kind", "value", "suggested") for f in d.faults
+    return written(
+        DiagnoseOutput,
+        d,
+        schema_version=SCHEMA_VERSION,
+        rows={"read": d.rows_read, "used": d.rows_used, "set_aside": d.rows_read - d.rows_used},
+        data_faults=[written(SuspectCell, fault) for fault in d.faults],
+        misfit=written(MisfitSize, d),
+        causes=[_cause(c) for c in d.causes],
+        also_possible=[_rival(c) for c in d.also_possible],
+        beside=[_rival(c) for c in d.beside],
+        sure=d.beliefs.sure,
+        if_ten_times_likelier=[
+            {"cause": cause, "target": target, "probability_of_first": chance}
+            for (cause, target), chance in d.ten_times.items()
         ],
-        "misfit": chosen(d, "mean_in", "rms_in", "repeatability_in", "repeatability_source"),
-        "verdict": d.verdict,
-        "causes": [_cause(c) for c in d.causes],
-        "also_possible": [_possible(c.candidate) for c in d.also_possible],
-        "beside": [_possible(c.candidate) for c in d.beside],
-        "unlisted_variables": list(d.unlisted_variables),
-        "not_testable": [
+        not_testable=[
             {"cause": cause, "missing_column": column} for cause, column in d.not_testable
         ],
-        "cannot_say": list(d.unsaid),
-        "ruled_out": [{"cause": cause, "target": target} for cause, target in d.ruled_out],
-        "smallest_detectable_rms_in": plain(d.smallest_rms_in),
-        "extension": None if extension is None else _extension(extension),
-        "gain": _gain(d),
-        "remainder": {
-            "p_value": plain(d.remainder_p),
-            "looks_like_noise": plain(d.remainder_is_noise),
-            "rms_in": plain(d.residual_u_in),
-            "expected_from_gauges_in": plain(d.expected_scatter_in),
+        cannot_say=d.unsaid,
+        ruled_out=[{"cause": cause, "target": target} for cause, target in d.ruled_out],
+        smallest_detectable_rms_in=d.smallest_rms_in,
+        extension=None if extension is None else _extension(extension),
+        gain=_gain(d),
+        remainder={
+            "p_something_else": d.p_left,
+            "looks_like_noise": d.remainder_is_noise,
+            "rms_in": d.residual_u_in,
+            "expected_from_gauges_in": d.expected_scatter_in,
         },
-        **chosen(d, "seed", "permutations"),
-        "warnings": list(warnings),
-    }
+        warnings=warnings,
+    )
 
 
 def _named(candidate: Any) -> dict[str, Any]:
@@ -248,47 +216,40 @@ def _possible(candidate: Any) -> dict[str, Any]:
     return {**_named(candidate), "separating_reading": candidate.separates}
 
 
+def _rival(c: NamedCause) -> dict[str, Any]:
+    return {**_possible(c.candidate), "probability": plain(c.probability)}
+
+
 def _cause(c: NamedCause) -> dict[str, Any]:
-    return {
-        **_named(c.candidate),
-        **chosen(c, "effect_rms_in", "p_value", "parameters"),
-        "interval_95": plain(c.interval_shown),
-        "aliases": [_possible(candidate) for candidate in c.aliases],
-    }
+    aliases = [_possible(candidate) for candidate in c.aliases]
+    shown = {**_named(c.candidate), "interval_95": c.interval_shown, "aliases": aliases}
+    return written(NamedCauseOutput, c, **shown)
 
 
 def _extension(extension: ModelExtension) -> dict[str, Any]:
-    return {
-        "geometry_sha256": extension.gear.geometry_sha256,
-        **chosen(extension, "data_sha256", "residual_u_in"),
-        "terms": [
-            {
-                **_named(t.candidate),
-                "parameter": t.candidate.cause.parameter,
-                "value": plain(t.value),
-                "interval_95": plain(t.interval),
-            }
-            for t in extension.terms
-        ],
-    }
+    terms = [
+        {
+            **_named(t.candidate),
+            "parameter": t.candidate.cause.parameter,
+            "value": t.value,
+            "interval_95": t.interval,
+        }
+        for t in extension.terms
+    ]
+    sha256 = extension.gear.geometry_sha256
+    return written(FittedExtension, extension, geometry_sha256=sha256, terms=terms)
 
 
 def _gain(d: Diagnosis) -> dict[str, Any]:
     """What the extension gains; where the model is not extended, everything after is as before."""
-    counts = (
-        "false_within_before",
-        "false_within_after",
-        "false_outside_before",
-        "false_outside_after",
-    )
     if d.gain is not None:
-        g = d.gain
-        return {
-            "held_out_rms_before_in": g.rms_before_in,
-            "held_out_rms_after_in": g.rms_after_in,
-            "share_removed_interval_95": plain(g.share_interval),
-            **chosen(g, "held_out_by", *counts, "verdicts_changed"),
-        }
+        return written(
+            ExtensionGain,
+            d.gain,
+            held_out_rms_before_in=d.gain.rms_before_in,
+            held_out_rms_after_in=d.gain.rms_after_in,
+            share_removed_interval_95=d.gain.share_interval,
+        )
     outside = np.abs(d.used.measured_in) > d.used.margin_in
     said_within = np.abs(d.predicted_in) <= d.used.margin_in
     rms = float(np.sqrt(np.mean(d.misfit_in**2)))
@@ -298,6 +259,9 @@ def _gain(d: Diagnosis) -> dict[str, Any]:
         "held_out_rms_after_in": rms,
         "share_removed_interval_95": [0.0, 0.0],
         "held_out_by": None,
-        **dict(zip(counts, (within, within, beyond, beyond), strict=True)),
+        "false_within_before": within,
+        "false_within_after": within,
+        "false_outside_before": beyond,
+        "false_outside_after": beyond,
         "verdicts_changed": [],
     }

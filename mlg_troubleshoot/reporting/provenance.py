@@ -1,4 +1,4 @@
-"""What a report says about where it comes from."""
+"""What every document has: title, footer, disclaimer, assumptions, and where it comes from."""
 
 from __future__ import annotations
 
@@ -8,9 +8,19 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
+from typing import Any
 
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear import Gear, SourceKind
+from mlg_troubleshoot.reporting.formats import Lengths, digest
+
+Facts = list[tuple[str, str]]
+DISCLAIMER = (
+    "Troubleshooting aid, not maintenance data.",
+    "Does not replace the maintenance manual's limits.",
+    "Within margin is not an approval for return to service.",
+    "In-plane joint clearance only: not hydraulics, friction, doors, switches or structure.",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,3 +72,38 @@ def moment_of_report() -> datetime:
             f"SOURCE_DATE_EPOCH is {given!r}",
             "Set it to seconds since 1970-01-01 UTC, or leave it out.",
         ) from None
+
+
+def head(
+    title: str, footer: str, gear: Gear, provenance: ReportProvenance, lengths: Lengths
+) -> dict[str, Any]:
+    """Return what the base template shows; the caller adds its own and may replace any of it."""
+    return {
+        "title": title,
+        "heading_of_gear": gear.name,
+        "footer_left": footer,
+        "footer_middle": _program_and_hashes(provenance),
+        "disclaimer": DISCLAIMER,
+        "source_counts": [
+            (sum(n.kind is kind for n in gear.numbers), kind.value) for kind in SourceKind
+        ],
+        "limits_of": sorted({(j.limit.value, j.limit.kind, j.limit.source) for j in gear.joints}),
+        "alike": [
+            " = ".join(map("#{}".format, pair)) for pair in gear.link_groups if len(pair) > 1
+        ],
+        "made": provenance,
+        "made_on": provenance.created.date().isoformat(),
+        "lengths": lengths,
+        "unit": lengths.unit.value,
+        "gear": gear,
+    }
+
+
+def _program_and_hashes(p: ReportProvenance) -> str:
+    hashes = list(p.input_sha256.values())
+    parts = [f"mlg {p.program_version}", f"geometry {digest(p.geometry_sha256, 8)}"]
+    if hashes:
+        parts.append(
+            f"input {digest(hashes[0], 8)}" if len(hashes) == 1 else f"{len(hashes)} inputs"
+        )
+    return " · ".join(parts)

@@ -162,7 +162,7 @@ def publish_all(
     count = min(4, os.cpu_count() or 1)
     own, started = threading.local(), list[PdfEngine]()
 
-    def begin() -> None:
+    def start_engine() -> None:
         own.engine = PdfEngine()
         started.append(own.engine)
 
@@ -172,12 +172,12 @@ def publish_all(
     written: list[WrittenReport] = []
     waiting: deque[Future[WrittenReport]] = deque()
 
-    def take() -> None:
+    def collect() -> None:
         written.append(waiting.popleft().result())
         if progress is not None:
             progress(len(written), total)
 
-    pool = ThreadPoolExecutor(count, initializer=begin)
+    pool = ThreadPoolExecutor(count, initializer=start_engine)
     seen: Counter[str] = Counter()
     try:
         for document in documents:
@@ -190,9 +190,9 @@ def publish_all(
             # Documents are handed out a few at a time, so that a long batch does not stand in
             # memory.
             if len(waiting) > 2 * count:
-                take()
+                collect()
         while waiting:
-            take()
+            collect()
         return written
     finally:
         pool.shutdown(cancel_futures=True)

@@ -50,20 +50,22 @@ class Schematic:
     exaggeration: int | None
 
 
-_WIDTH = 690.0
-_MARKER = 9.5
-_LONGEST_ARROW = 42.0
+# Lengths of the drawing: its width, half of a joint's marker, the longest and the shortest arrow of
+# a virtual link. [px]
+_WIDTH, _MARKER = 690, 9.5
+_LONGEST_ARROW, _SHORTEST_ARROW = 42, 2.5
 # One scale for most reports, so that their drawings compare.
 _LARGEST_EXAGGERATION = 100
-_SHORTEST_ARROW = 2.5
 # With more joints over their limit, frames would cover the linkage.
 _MOST_FRAMES = 2
-# Room for labels, supports and the slot above and below the linkage.
-_ABOVE, _BELOW = 44.0, 40.0
+# Room for labels, supports and the slot above and below the linkage. [px]
+_ABOVE, _BELOW = 44, 40
 
+# Where a label is tried around a joint: every 15 degrees, none of them straight along a line, at
+# these distances from its marker. [rad, px]
 _TURNS = np.arange(24) * np.pi / 12 + 1e-6
 _COSINES, _SINES = np.cos(_TURNS), np.sin(_TURNS)
-_RINGS = np.array([0.0, 5.0, 10.0, 16.0, 24.0, 34.0, 46.0])
+_RINGS = np.array([0, 5, 10, 16, 24, 34, 46], float)
 
 Box = tuple[float, float, float, float]
 Segment = tuple[Place, Place]
@@ -232,7 +234,7 @@ class _PlaneDrawing:
         segments = self._links(canvas, at)
         boxes = self._obstacles(at)
         self._plain_points(canvas, at)
-        markers = self._apart(at)
+        markers = self._without_overlap(at)
         here = [j for j in self.gear.joints if self._home(j.point)]
         states = {number: joint_state(finding) for number, finding in shown.findings.items()}
         for joint in self.gear.joints:
@@ -273,7 +275,7 @@ class _PlaneDrawing:
                 if point not in numbered:
                     canvas.marker("circle", *at(point), 3.0)
 
-    def _apart(self, at: _At) -> dict[int, Place]:
+    def _without_overlap(self, at: _At) -> dict[int, Place]:
         """Places of the joints' markers: at the joints, or next to them where two would overlap."""
         places = {j.number: at(j.point) for j in self.gear.joints if j.point in self.points}
         least = 2.0 * _MARKER + 2.0

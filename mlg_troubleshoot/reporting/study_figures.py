@@ -28,11 +28,11 @@ from mlg_troubleshoot.reporting.figures import (
 )
 from mlg_troubleshoot.reporting.formats import Lengths, number
 
+# Points of a curve. [1]
 _POINTS = 81
-_BAR_HEIGHT = 9.0
-_GAP = 7.0
-_TOP = 20.0
-_WIDTH, _LABEL_WIDTH = 430.0, 30.0
+# Bars: height of one, the gap below it, room above all, width of the chart and its labels. [px]
+_BAR_HEIGHT, _GAP, _TOP = 9, 7, 20
+_WIDTH, _LABEL_WIDTH = 430, 30
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ def grouped_bars(
     """
     row = _BAR_HEIGHT * len(series) + _GAP
     canvas = Canvas(_WIDTH, _TOP + row * len(labels) + 2, title, description)
-    x = _LABEL_WIDTH
+    x: float = _LABEL_WIDTH
     for one in series:
         draw_bar(canvas, Bar(1.0, style=one.style), x, 3, 9, 18)
         canvas.text(x + 23, 11.5, one.label, size=9.5)

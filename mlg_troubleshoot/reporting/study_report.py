@@ -14,19 +14,18 @@ import numpy as np
 from markupsafe import Markup
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.paper.statements import Outcome
+from mlg_troubleshoot.paper.statements import ClaimOutcome
 from mlg_troubleshoot.paper.study import Directions, StudyFindings
 from mlg_troubleshoot.reporting import study_figures as drawn
-from mlg_troubleshoot.reporting.common import head
 from mlg_troubleshoot.reporting.figures import Style
 from mlg_troubleshoot.reporting.formats import ABSENT, MINUS, Lengths, joint_list
 from mlg_troubleshoot.reporting.html import Document
-from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.reporting.provenance import ReportProvenance, head
 from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.reporting.study_figures import BarSeries
 from mlg_troubleshoot.units import LengthUnit
 
-# A reason that explains less than a third of an excess is not its reason.
+# A possible reason is ruled out if the excess is more than this many times what it explains. [1]
 _CLEARLY = 3.0
 _DIRECTIONS = {
     Directions.WORST: (
@@ -34,7 +33,7 @@ _DIRECTIONS = {
     ),
     Directions.OVER: "in the directions of the largest over-travel",
     Directions.UNDER: "in the directions of the largest under-travel",
-    Directions.RANDOM: "in random directions, every direction alike",
+    Directions.RANDOM: "in random directions, all equally likely",
     Directions.FIXED: "in directions set by a load",
 }
 
@@ -44,7 +43,7 @@ def study_document(
 ) -> Document:
     options = findings.options
     asked = repr(replace(options, scheduler=None, state=None, workers=1))
-    mark = sha256(f"{findings.result.table.geometry_sha256} {asked}".encode()).hexdigest()[:8]
+    mark = sha256(f"{findings.result.table.gear.geometry_sha256} {asked}".encode()).hexdigest()[:8]
     stem = safe_stem("study", findings.gear.id, options.design, f"seed {options.seed}", mark)
     return Document("study.html.j2", _context(findings, provenance, Lengths(unit)), stem)
 
@@ -68,7 +67,7 @@ def _context(f: StudyFindings, provenance: ReportProvenance, lengths: Lengths) -
         "top": _span(e.joint for e in order[:5]),
         "top_share": sum(e.first_order for e in order[:5]),
         "half": float(np.ptp([e.first_order_interval for e in table.joints], axis=1).max()) / 2.0,
-        "counts": [sum(s.outcome is outcome for s in f.statements) for outcome in Outcome],
+        "counts": [sum(s.outcome is outcome for s in f.statements) for outcome in ClaimOutcome],
         "rows": list(
             zip(f.gear.joints, table.joints, f.result.growth.local_stage.tolist(), strict=True)
         ),
@@ -86,7 +85,7 @@ def _context(f: StudyFindings, provenance: ReportProvenance, lengths: Lengths) -
 
 
 def _tiny(value: float) -> str:
-    """Write a number of which only the order of magnitude matters."""
+    """Write a number where only the order of magnitude matters."""
     return f"{value:.0e}".replace("-", MINUS) if math.isfinite(value) else ABSENT
 
 

@@ -11,17 +11,17 @@ import numpy as np
 from markupsafe import Markup
 
 from mlg_troubleshoot.gear.gear import Linkage
-from mlg_troubleshoot.reporting.common import head
 from mlg_troubleshoot.reporting.figures import INK, RULE, SOFT, Canvas
 from mlg_troubleshoot.reporting.formats import Lengths, number
 from mlg_troubleshoot.reporting.html import Document
-from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.reporting.provenance import ReportProvenance, head
 from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.surveying.result import SurveyResult
 from mlg_troubleshoot.surveying.survey import Survey
 from mlg_troubleshoot.units import LengthUnit
 
-_WIDTH, _EDGE = 330.0, 26.0
+# Width of a panel, and the room around what it shows. [px]
+_WIDTH, _EDGE = 330, 26
 
 
 def survey_document(

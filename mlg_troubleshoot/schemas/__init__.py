@@ -1,27 +1,40 @@
-"""JSON Schemas (draft 2020-12) of what ``mlg check``, ``mlg diagnose`` and ``mlg study`` write with
-``--json``.
+"""JSON Schemas (draft 2020-12), made from the types of what the commands write with ``--json`` and
+of the files that they read.
 """
 
 from __future__ import annotations
 
-import json
-from importlib.resources import files
 from typing import Any
 
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.outputs import SCHEMA_VERSION
 
-NAMES = ("check", "diagnose", "study")
-# Of every JSON output: raised when a name or a meaning changes.
-SCHEMA_VERSION = 1
+NAMES = (
+    "check",
+    "diagnose",
+    "study",
+    "fleet",
+    "history",
+    "life",
+    "gear",
+    "verify",
+    "survey",
+    "separable",
+    "reconstruct",
+    "doctor",
+)
+FILES = ("gear-file", "ensemble", "targets", "indices", "extension", "settings")
 
 
 def schema(name: str) -> dict[str, Any]:
-    """Return the schema of a command's JSON output.
+    """Return the schema of a command's JSON output, or of a file.
 
     Parameters
     ----------
     name : str
-        ``check``, ``diagnose`` or ``study``.
+        ``check``, ``diagnose``, ``study``, ``fleet``, ``history``, ``life``, ``gear``, ``verify``,
+        ``survey``, ``separable``, ``reconstruct`` or ``doctor``; of files ``gear-file``,
+        ``ensemble``, ``targets``, ``indices``, ``extension`` or ``settings``.
 
     Returns
     -------
@@ -33,11 +46,92 @@ def schema(name: str) -> dict[str, Any]:
     UsageError
         If there is no schema of that name.
     """
-    if name not in NAMES:
-        raise UsageError(f"there is no schema {name!r}", f"Give one of {', '.join(NAMES)}.")
-    text = (files("mlg_troubleshoot.schemas") / f"{name}.schema.json").read_text(encoding="utf-8")
-    loaded: dict[str, Any] = json.loads(text)
-    return loaded
+    if name not in NAMES + FILES:
+        known = ", ".join(NAMES + FILES)
+        raise UsageError(f"there is no schema {name!r}", f"Give one of {known}.")
+    import msgspec
+
+    kinds = _kinds(name)
+    roots, parts = msgspec.json.schema_components(kinds, ref_template="#/$defs/{name}")
+    for part in parts.values():
+        _close(part)
+    if name == "check":
+        row, joint = parts["CheckedInspection"], parts["CheckedJoint"]
+        row.update(_of_an_invalid_row(row, joint))
+    if name == "diagnose":
+        parts["DiagnoseOutput"]["allOf"] = _by_verdict()
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": f"urn:mlg-troubleshoot:{name}:{SCHEMA_VERSION}",
+        **(roots[0] if len(roots) == 1 else {"anyOf": list(roots)}),
+        "$defs": parts,
+    }
 
 
-__all__ = ["NAMES", "SCHEMA_VERSION", "schema"]
+def _kinds(name: str) -> list[Any]:
+    from mlg_troubleshoot import output_types as outputs
+
+    if name in FILES:
+        from mlg_troubleshoot.cli.remembered import SettingsFile
+        from mlg_troubleshoot.diagnosis.extension import ExtensionFile
+        from mlg_troubleshoot.gear.gear_file import EnsembleFile, GearFile
+        from mlg_troubleshoot.indices.index_table import IndexTable
+        from mlg_troubleshoot.paper.targets import TargetsFile
+
+        files = (GearFile, EnsembleFile, TargetsFile, IndexTable, ExtensionFile, SettingsFile)
+        return [dict(zip(FILES, files, strict=True))[name]]
+    kinds: dict[str, list[Any]] = {
+        "diagnose": [outputs.DiagnoseOutput, outputs.NotConcluded],
+        "history": [outputs.FleetOutput],
+    }
+    return kinds.get(name) or [getattr(outputs, f"{name.capitalize()}Output")]
+
+
+def _close(part: dict[str, Any]) -> None:
+    """Allow no further names in an object; the fields of a record are always written."""
+    if "properties" not in part or part.get("additionalProperties") is False:
+        return
+    part["additionalProperties"] = False
+    written = [name for name, of in part["properties"].items() if of.pop("default", part) != part]
+    part["required"] = [*part["required"], *written]
+
+
+def _of_an_invalid_row(row: dict[str, Any], joint: dict[str, Any]) -> dict[str, Any]:
+    """Say which values of a row are null, and which are not, by its verdict."""
+    null = {"type": "null"}
+    identity = ("record_id", "tail_no", "side")
+    of_row = {n: null for n, of in row["properties"].items() if null in of.get("anyOf", ())}
+    measured = {"clearance_in", "contribution_in", "allowance_in"}
+    of_joint = {n: {"not": null} for n in joint["properties"] if n not in measured}
+    return {
+        "if": {"properties": {"verdict": {"const": "INVALID"}}},
+        "then": {
+            "properties": {n: null for n in of_row if n not in identity}
+            | {"end": {"const": "CORRECT"}}
+        },
+        "else": {
+            "properties": {
+                **{n: {"not": null} for n in (*identity, "margin_in", "basis")},
+                "joints": {"items": {"properties": of_joint}},
+            }
+        },
+    }
+
+
+def _by_verdict() -> list[dict[str, Any]]:
+    """Say which lists of causes are filled, by the verdict."""
+    return [
+        {
+            "if": {"properties": {"verdict": {"const": verdict}}},
+            "then": {"properties": {key: {"minItems": least}}},
+            "else": {"properties": {key: {"maxItems": 0}}},
+        }
+        for verdict, key, least in (
+            ("NAMED", "causes", 1),
+            ("AMBIGUOUS", "also_possible", 2),
+            ("NAMED", "beside", 0),
+        )
+    ]
+
+
+__all__ = ["FILES", "NAMES", "schema"]

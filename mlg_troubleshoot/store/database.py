@@ -92,7 +92,7 @@ class StoreError(OutputError):
     """The store cannot be used, or refuses what it was given (exit code 5)."""
 
 
-class Kind(StrEnum):
+class RecordKind(StrEnum):
     """What a record is."""
 
     INSPECTION = "inspection"
@@ -104,7 +104,7 @@ class Kind(StrEnum):
     OUTCOME = "outcome"
 
 
-_KINDS = frozenset(kind.value for kind in Kind)
+_KINDS = frozenset(kind.value for kind in RecordKind)
 _TEXTS = ("kind", "record_id", "tail_no", "side", "day")
 _BYTES = ("identity", "body", "hash")
 # A body that is too large is not fetched at all.
@@ -122,7 +122,7 @@ class Record:
     ``judge`` says what is wrong with the content of a record that was read, empty if nothing is.
     """
 
-    kind: Kind
+    kind: RecordKind
     record_id: str
     tail_no: str
     side: str
@@ -421,7 +421,7 @@ class Store:
             )
         texts = row.record_id, row.tail_no, row.side, row.day
         return Record(
-            Kind(row.kind),
+            RecordKind(row.kind),
             *texts,
             bytes(row.body),
             seq=row.seq,
@@ -621,7 +621,7 @@ class Store:
                 "Void the record where it stands: mlg history void HASH --why TEXT. All of them:"
                 " mlg history verify",
             )
-        elif record.kind is Kind.VOID:
+        elif record.kind is RecordKind.VOID:
             wrong.pop(content["voids"], None)
 
     def restore(self, lines: Iterable[str], name: str) -> Added:
@@ -668,7 +668,9 @@ class Store:
                 )
             before = row["hash"]
             texts = row["record_id"], row["tail_no"], row["side"], row["day"]
-            record = Record(Kind(row["kind"]), *texts, row["body"], seq=number, digest=before.hex())
+            record = Record(
+                RecordKind(row["kind"]), *texts, row["body"], seq=number, digest=before.hex()
+            )
             self._note(wrong, record, content, f"{at}, nothing was imported")
             if len(wrong) > _MOST_WRONG:
                 break
@@ -710,7 +712,7 @@ def _imported(line: str, place: str) -> tuple[dict[str, Any], Any]:
     try:
         given = json.loads(line)
         row = {name: given[name] for name in ("seq", *_TEXTS)}
-        Kind(row["kind"])
+        RecordKind(row["kind"])
         if type(row["seq"]) is not int:
             raise ValueError("seq is not a whole number")
         for name in _TEXTS:

@@ -8,24 +8,19 @@ from datetime import date, datetime
 from enum import Enum
 from typing import Any
 
-from mlg_troubleshoot.decision.inspection import (
-    Approach,
-    EnteredClearance,
-    Inspection,
-    Outcome,
-    RiggingCheck,
-    RowSource,
-    Side,
-)
-from mlg_troubleshoot.store.database import Kind, Record, packed
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from mlg_troubleshoot.decision.columns import COLUMNS, Holds
+from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, RowSource
+from mlg_troubleshoot.store.database import Record, RecordKind, packed
+from mlg_troubleshoot.units import LengthUnit
 
 # What says where and how an inspection was entered, not what was found.
 _NOT_CONTENT = ("source", "warnings", "entered", "unit_question")
-_BY_JOINT = ("clearance_in", "gauge_u_by_joint_in", "axial_float_in")
+_BY_JOINT = tuple(column.joint_fills for column in COLUMNS if column.joint_fills)
 
-
-_FIELDS = tuple((field.name, field.default) for field in fields(Inspection))
+_FIELDS = tuple(
+    (field.name, field.default) for field in fields(Inspection) if field.name != "other_columns"
+)
+_NAMES = frozenset(name for name, _ in _FIELDS)
 _AS_THEY_ARE = frozenset((str, int, float, bool, type(None)))
 
 
@@ -43,7 +38,9 @@ def _plain(value: Any) -> Any:
     return [_plain(each) for each in value] if isinstance(value, tuple) else value
 
 
-def inspection_record(inspection: Inspection, kind: Kind = Kind.INSPECTION, **more: Any) -> Record:
+def inspection_record(
+    inspection: Inspection, kind: RecordKind = RecordKind.INSPECTION, **more: Any
+) -> Record:
     """Return an inspection as a record; what is at its default is left out."""
     day = inspection.inspection_date.isoformat() if inspection.inspection_date else ""
     body = {}
@@ -51,6 +48,7 @@ def inspection_record(inspection: Inspection, kind: Kind = Kind.INSPECTION, **mo
         value = getattr(inspection, name)
         if value is not default and value != default and value not in ({}, ()):
             body[name] = _plain(value)
+    body.update({name: _plain(value) for name, value in inspection.other_columns.items()})
     identity = (inspection.record_id, inspection.tail_no, inspection.side.value, day)
     return Record(
         kind,
@@ -59,7 +57,7 @@ def inspection_record(inspection: Inspection, kind: Kind = Kind.INSPECTION, **mo
         inspection.side.value,
         day,
         packed({"inspection": body, **more}),
-        identity if kind is Kind.INSPECTION else (),
+        identity if kind is RecordKind.INSPECTION else (),
     )
 
 
@@ -77,19 +75,19 @@ _READ: dict[str, Callable[[Any], Any]] = {
         int(n): EnteredClearance(text, LengthUnit(unit)) for n, (text, unit) in found.items()
     },
     "source": lambda found: RowSource(*found),
-    "inspection_date": date.fromisoformat,
-    **dict.fromkeys(("repair_date", "plunger_date", "outcome_date"), _moment),
-    "rigging_checked": RiggingCheck,
-    **{"side": Side, "convention": ClearanceConvention, "outcome": Outcome, "approach": Approach},
-    **dict.fromkeys(("readings_in", "warnings", "restored_joints"), tuple),
-    **dict.fromkeys(("cannot_reach", "no_spare", "open_areas"), tuple),
+    **{column.filled: date.fromisoformat for column in COLUMNS if column.holds is Holds.DATE},
+    **{column.filled: _moment for column in COLUMNS if column.holds is Holds.MOMENT},
+    **{column.filled: column.choices for column in COLUMNS if column.choices is not None},
+    **{c.filled: tuple for c in COLUMNS if c.holds in (Holds.JOINTS, Holds.AREAS)},
+    **dict.fromkeys(("readings_in", "warnings"), tuple),
 }
 
 
 def inspection_from(record: Record) -> Inspection:
     body = record.body["inspection"]
     read = {name: _READ[name](value) if name in _READ else value for name, value in body.items()}
-    return Inspection(**{"clearance_in": {}, **read})
+    other = {name: read.pop(name) for name in [*read] if name not in _NAMES}
+    return Inspection(**{"clearance_in": {}, "other_columns": other, **read})
 
 
 def same_inspection(one: Record, two: Record) -> bool:

@@ -10,38 +10,27 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.surveying import tuned
 from mlg_troubleshoot.surveying.readings import (
     DEFAULT_U,
     MINUTES,
-    Kind,
     Quantity,
-    Reading,
+    ReadingKind,
     SurveyedLinkage,
+    SurveyReading,
 )
 from mlg_troubleshoot.surveying.survey import Prior
-
-# Between each two members of the ensemble a template is planned for so many linkages, where they
-# close. An index known to two percent needs no better reading.
-_BETWEEN, _WELL_KNOWN = (0.25, 0.5, 0.75), 0.02
-# A reading counts as checked by the others if they predict it to three times its own uncertainty.
-_CHECKED, _SWEEPS = 0.1, 8
-# What a check by the others is worth compared with a well-known index.
-_BRACING, _LOOSE = 0.2, 0.02
-
-# A reading that narrows less than this is not worth taking; one that so many of the draws cannot
-# reach is not possible.
-_LEAST_NARROWING, _OPEN = 0.01, 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class Suggested:
     """A reading worth taking: the share by which it is expected to narrow what is unknown. [1]"""
 
-    reading: Reading
+    reading: SurveyReading
     narrowing: float
 
 
-def planned(gear: Gear, distances: int = 24) -> tuple[tuple[Reading, bool], ...]:
+def planned(gear: Gear, distances: int = 24) -> tuple[tuple[SurveyReading, bool], ...]:
     """The rows of a template, each with whether the others check it.
 
     The extension, the plunger over the stroke, the angles, and distances at the reference position:
@@ -57,7 +46,7 @@ def planned(gear: Gear, distances: int = 24) -> tuple[tuple[Reading, bool], ...]
         *sorted(design.exchanged(design.free[: min(count, len(design.linkage.rigid))], count)),
     ]
     held = np.median(design.held(rows), axis=0)
-    return tuple((design.pool[i], bool(h > _CHECKED)) for i, h in zip(rows, held, strict=True))
+    return tuple((design.pool[i], bool(h > tuned.CHECKED)) for i, h in zip(rows, held, strict=True))
 
 
 class _Design:
@@ -66,7 +55,7 @@ class _Design:
     def __init__(
         self,
         linkage: SurveyedLinkage,
-        taken: tuple[Reading, ...] = (),
+        taken: tuple[SurveyReading, ...] = (),
         quantity: Quantity | None = None,
     ) -> None:
         prior = Prior(linkage)
@@ -75,7 +64,7 @@ class _Design:
             (1 - t) * a + t * b
             for i, a in enumerate(members)
             for b in members[:i]
-            for t in _BETWEEN
+            for t in tuned.BETWEEN
         ]
         points = np.array([*members, *between])
         points = points[linkage.closes(points)]
@@ -86,11 +75,13 @@ class _Design:
             wanted = linkage.log_slopes(points, quantity) @ prior.root
         sound = np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(wanted).all(axis=(1, 2))
         self.slopes, self.wanted = slopes[sound], wanted[sound]
-        self.given = [i for i, r in enumerate(self.pool) if r.kind is not Kind.DISTANCE]
-        self.free = [i for i, r in enumerate(self.pool) if r.kind is Kind.DISTANCE]
+        self.given = [i for i, r in enumerate(self.pool) if r.kind is not ReadingKind.DISTANCE]
+        self.free = [i for i, r in enumerate(self.pool) if r.kind is ReadingKind.DISTANCE]
         self.known = np.eye(slopes.shape[2])
         if linkage.travel is not None:
-            self.known = self.known + np.outer(*2 * [prior.root[-1] / DEFAULT_U[Kind.TRAVEL]])
+            self.known = self.known + np.outer(
+                *2 * [prior.root[-1] / DEFAULT_U[ReadingKind.TRAVEL]]
+            )
 
     def covariance(self, rows: list[int]) -> Array:
         """Covariance of each linkage's variables after these readings."""
@@ -127,17 +118,20 @@ class _Design:
         held = (
             1.0 - (known @ covariance * known).sum(axis=2)[:, :, None] + (known @ moved) ** 2 / size
         )
-        checks = np.log(np.maximum(np.concatenate([held, 1.0 / size], axis=1), 0.0) + _LOOSE).sum(
-            axis=1
+        checks = np.log(
+            np.maximum(np.concatenate([held, 1.0 / size], axis=1), 0.0) + tuned.LOOSE
+        ).sum(axis=1)
+        cost = (
+            np.log(np.maximum(wanted, 0.0) + tuned.WELL_KNOWN**2).sum(axis=1)
+            - tuned.BRACING * checks
         )
-        cost = np.log(np.maximum(wanted, 0.0) + _WELL_KNOWN**2).sum(axis=1) - _BRACING * checks
         return others[int(np.argmin(cost.mean(axis=0)))]
 
     def exchanged(self, taken: list[int], count: int) -> list[int]:
         """Fill up a choice and exchange its distances stepwise."""
         while len(taken) < count:
             taken = [*taken, self.best(taken)]
-        for _ in range(_SWEEPS if count < len(self.free) else 0):
+        for _ in range(tuned.SWEEPS if count < len(self.free) else 0):
             before = set(taken)
             for _ in range(count):
                 taken = [*taken[1:], self.best(taken[1:])]
@@ -147,7 +141,7 @@ class _Design:
 
 
 def suggested_early(
-    linkage: SurveyedLinkage, taken: tuple[Reading, ...], quantity: Quantity
+    linkage: SurveyedLinkage, taken: tuple[SurveyReading, ...], quantity: Quantity
 ) -> Suggested | None:
     """The reading that narrows the wanted quantities most per minute while little is known.
 
@@ -168,18 +162,18 @@ def suggested_early(
     return _worth_most(tuple(design.pool[j] for j in others), narrowing)
 
 
-def _worth_most(candidates: tuple[Reading, ...], narrowing: Array) -> Suggested | None:
+def _worth_most(candidates: tuple[SurveyReading, ...], narrowing: Array) -> Suggested | None:
     """The reading that narrows most per minute, None if it hardly does."""
     best = int(np.argmax(narrowing / np.array([MINUTES[c.kind] for c in candidates])))
     return (
         Suggested(candidates[best], float(narrowing[best]))
-        if narrowing[best] >= _LEAST_NARROWING
+        if narrowing[best] >= tuned.LEAST_NARROWING
         else None
     )
 
 
 def suggested(
-    linkage: SurveyedLinkage, draws: Array, wanted: Array, taken: tuple[Reading, ...]
+    linkage: SurveyedLinkage, draws: Array, wanted: Array, taken: tuple[SurveyReading, ...]
 ) -> Suggested | None:
     """The reading that narrows the wanted quantities most per minute, None if none of them matters.
 
@@ -193,7 +187,7 @@ def suggested(
         return None
     with np.errstate(all="ignore"):
         y = linkage.predicted(candidates, draws)
-    reached = np.isfinite(y).mean(axis=0) >= 1.0 - _OPEN
+    reached = np.isfinite(y).mean(axis=0) >= 1.0 - tuned.MOST_OPEN
     candidates, y = tuple(c for c, r in zip(candidates, reached, strict=True) if r), y[:, reached]
     sound = np.isfinite(y).all(axis=1) & np.isfinite(wanted).all(axis=1)
     y, q = y[sound] - y[sound].mean(axis=0), wanted[sound] - wanted[sound].mean(axis=0)

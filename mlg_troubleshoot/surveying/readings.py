@@ -12,22 +12,22 @@ from typing import Any
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.arrays import STEP, Array, Mask, central_slopes, central_steps
 from mlg_troubleshoot.gear.design import DesignSpace
 from mlg_troubleshoot.gear.gear import Gear, Linkage
 from mlg_troubleshoot.geometry.kernel import Kernel
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Lever, Mechanism, Slider, Slot
 from mlg_troubleshoot.geometry.program import write_program
+from mlg_troubleshoot.units import Length, LengthUnit, Sentence
 
 # Positive quantities of a batch of linkages, shape (n_vectors, n_quantities).
 Quantity = Callable[[Array], Array]
-_STEP = 1e-5
 # Positions over the stroke among which the plunger's least displacement is sought, and plunger
 # positions to read.
 _POSITIONS, _PLUNGER_READINGS = 25, 9
 
 
-class Kind(StrEnum):
+class ReadingKind(StrEnum):
     """What is read."""
 
     DISTANCE = "DISTANCE"
@@ -42,32 +42,37 @@ class Kind(StrEnum):
     ORDER = "ORDER"
 
 
-# Standard uncertainties where a reading states none: in, in, rad, in; for the travel, in, and the
-# order of the indices.
+# Standard uncertainties where a reading states none, assumed; the last two are those of the travel
+# and of the logarithm of the order of the indices. [in, in, rad, in, in, 1]
 DEFAULT_U = {
-    Kind.DISTANCE: 0.01,
-    Kind.PLUNGER: 0.0015,
-    Kind.ANGLE: float(np.radians(1.0)),
-    Kind.EXTENSION: 0.005,
-    Kind.TRAVEL: 0.005,
-    Kind.ORDER: 1.0,
+    ReadingKind.DISTANCE: 0.01,
+    ReadingKind.PLUNGER: 0.0015,
+    ReadingKind.ANGLE: float(np.radians(1.0)),
+    ReadingKind.EXTENSION: 0.005,
+    ReadingKind.TRAVEL: 0.005,
+    ReadingKind.ORDER: 1.0,
 }
 
 
-def default_u(kind: Kind, *, is_angle: bool) -> float:
+def default_u(kind: ReadingKind, *, is_angle: bool) -> float:
     """Standard uncertainty of a reading that states none; an output that turns is read as an angle.
     [in or rad]
     """
-    return DEFAULT_U[Kind.ANGLE if is_angle else kind]
+    return DEFAULT_U[ReadingKind.ANGLE if is_angle else kind]
 
 
 # Minutes that a reading takes at the gear, assumed: two hands and a caliper; the dial stands once
 # for all positions.
-MINUTES = {Kind.DISTANCE: 3.0, Kind.PLUNGER: 2.0, Kind.ANGLE: 6.0, Kind.EXTENSION: 2.0}
+MINUTES = {
+    ReadingKind.DISTANCE: 3,
+    ReadingKind.PLUNGER: 2,
+    ReadingKind.ANGLE: 6,
+    ReadingKind.EXTENSION: 2,
+}
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class SurveyReading:
     """One row of a survey.
 
     start, end: point names, or plane and ``hinge`` or ``dihedral``, or slider and ``axis``; empty
@@ -77,7 +82,7 @@ class Reading:
     travel. is_angle: true if the value is an angle. driven_in: unit of the input.
     """
 
-    kind: Kind
+    kind: ReadingKind
     start: str = ""
     end: str = ""
     value: float = np.nan
@@ -93,32 +98,34 @@ class Reading:
         return self.kind.value, frozenset((self.start, self.end)), self.extension
 
     @property
-    def words(self) -> str:
-        """What is read, in words; as in all sentences of a survey, lengths are in inches with four
-        decimals.
-        """
-        at = (
-            "" if self.extension is None else f" at extension {self.extension:.4f} {self.driven_in}"
-        )
+    def words(self) -> Sentence:
+        """What is read, in words."""
+        at: str = ""
+        if self.extension is not None and self.driven_in == LengthUnit.INCH:
+            at = Sentence.of(" at extension {}", Length(self.extension))
+        elif self.extension is not None:
+            at = f" at extension {self.extension:.4f} {self.driven_in}"
         match self.kind:
-            case Kind.DISTANCE:
-                return f"distance {self.start} to {self.end}{at}"
-            case Kind.ANGLE:
-                return f"angle of the {self.end} of {self.start}"
-            case Kind.PLUNGER:
-                return f"plunger{at}"
-            case Kind.EXTENSION:
-                return "extension from Down Lock to the reference position"
+            case ReadingKind.DISTANCE:
+                return Sentence.of("distance {} to {}{}", self.start, self.end, at)
+            case ReadingKind.ANGLE:
+                return Sentence(f"angle of the {self.end} of {self.start}")
+            case ReadingKind.PLUNGER:
+                return Sentence.of("plunger{}", at)
+            case ReadingKind.EXTENSION:
+                return Sentence("extension from Down Lock to the reference position")
             case _:
-                return "prescribed travel of the plunger"
+                return Sentence("prescribed travel of the plunger")
 
     def in_units(self, value: float) -> float:
         """A value of this reading as a person writes it. [in or deg]"""
         return float(np.degrees(value)) if self.is_angle else value
 
-    def shown(self, value: float) -> str:
+    def shown(self, value: float) -> Sentence:
         """The same with its unit."""
-        return f"{np.degrees(value):.4g}°" if self.is_angle else f"{value:.4f} in"
+        if self.is_angle:
+            return Sentence(f"{np.degrees(value):.4g}°")
+        return Sentence.of("{}", Length(value))
 
 
 class SurveyedLinkage:
@@ -182,12 +189,12 @@ class SurveyedLinkage:
         least = least + step * (slope + step * bend / 2.0)
         return direction * vectors[:, -1:] / (along[:, -1:] - least[:, None])
 
-    def predicted(self, readings: tuple[Reading, ...], vectors: Array) -> Array:
+    def predicted(self, readings: tuple[SurveyReading, ...], vectors: Array) -> Array:
         """What each vector predicts for each reading, shape (n_vectors, n_readings); NaN where it
         does not close.
         """
         mechanism, reference = self._assembled(vectors)
-        moves = [r for r in readings if r.kind is Kind.PLUNGER or r.extension is not None]
+        moves = [r for r in readings if r.kind is ReadingKind.PLUNGER or r.extension is not None]
         extensions = list(dict.fromkeys(r.extension for r in moves))
         nothing = self.kernel.no_clearance()
         moved: dict[str, Array] = {}
@@ -199,17 +206,20 @@ class SurveyedLinkage:
                 for e in extensions
             ]
             inputs = np.concatenate(at, axis=1)
-            if any(r.kind is Kind.DISTANCE for r in moves):
+            if any(r.kind is ReadingKind.DISTANCE for r in moves):
                 positions = self.kernel.positions(inputs, nothing, numbers)
                 for name in {
-                    name for r in moves if r.kind is Kind.DISTANCE for name in (r.start, r.end)
+                    name
+                    for r in moves
+                    if r.kind is ReadingKind.DISTANCE
+                    for name in (r.start, r.end)
                 }:
                     origin, axes = mechanism.frame(mechanism.point(name).plane)
                     x, y = (np.broadcast_to(c, inputs.shape)[..., None] for c in positions[name])
                     moved[name] = (
                         origin[..., None, :] + x * axes[..., None, 0, :] + y * axes[..., None, 1, :]
                     )
-            if any(r.kind is Kind.PLUNGER for r in moves):
+            if any(r.kind is ReadingKind.PLUNGER for r in moves):
                 curve = self.kernel.output(inputs, nothing, numbers) - self.kernel.output(
                     reference, nothing, numbers
                 )
@@ -218,7 +228,7 @@ class SurveyedLinkage:
         found = np.empty((len(vectors), len(readings)))
         for i, r in enumerate(readings):
             match r.kind:
-                case Kind.DISTANCE:
+                case ReadingKind.DISTANCE:
                     places = (
                         still
                         if r.extension is None
@@ -229,34 +239,33 @@ class SurveyedLinkage:
                     )
                     apart = places[r.start] - places[r.end]
                     found[:, i] = np.sqrt((apart * apart).sum(axis=-1))
-                case Kind.PLUNGER:
+                case ReadingKind.PLUNGER:
                     found[:, i] = curve[:, extensions.index(r.extension)]
-                case Kind.ANGLE:
+                case ReadingKind.ANGLE:
                     name = f"{r.start}.{'direction' if r.end == 'hinge' else r.end}"
                     turned = vectors[:, self.names.index(name)]
                     # The nearest of the turns that mean the same direction.
                     found[:, i] = turned - 2 * np.pi * np.round(
                         (turned - np.nan_to_num(r.value)) / (2 * np.pi)
                     )
-                case Kind.EXTENSION:
+                case ReadingKind.EXTENSION:
                     found[:, i] = reference[:, 0] - self.low
-                case Kind.TRAVEL:
+                case ReadingKind.TRAVEL:
                     found[:, i] = vectors[:, -1]
-                case Kind.ORDER:
+                case ReadingKind.ORDER:
                     found[:, i] = np.log(self.amplification(vectors)).mean(axis=1)
         return found
 
-    def slopes(self, readings: tuple[Reading, ...], vectors: Array) -> tuple[Array, Array]:
+    def slopes(self, readings: tuple[SurveyReading, ...], vectors: Array) -> tuple[Array, Array]:
         """Predictions and their derivatives by central differences, shape (n_vectors, n_readings,
         n_variables).
         """
         count, n = vectors.shape
-        steps = np.concatenate([np.zeros((1, n)), np.eye(n), -np.eye(n)]) * _STEP
+        steps = np.vstack([np.zeros((1, n)), central_steps(n)])
         found = self.predicted(readings, (vectors[:, None, :] + steps).reshape(-1, n)).reshape(
             count, 2 * n + 1, -1
         )
-        slopes: Array = ((found[:, 1 : n + 1] - found[:, n + 1 :]) / (2 * _STEP)).swapaxes(1, 2)
-        return found[:, 0], slopes
+        return found[:, 0], central_slopes(found[:, 1:], axis=1).swapaxes(1, 2)
 
     def _gradient(self, vectors: Array) -> tuple[Array, Array, list[Any], Any]:
         """Derivatives of the displacement by the virtual links, with what a further solution
@@ -265,12 +274,10 @@ class SurveyedLinkage:
         mechanism, reference = self._assembled(vectors)
         numbers = self._numbers(mechanism, len(vectors))
         n = len(self.kernel.no_clearance())
-        links = np.concatenate([np.eye(n), -np.eye(n)]) * _STEP
+        links = central_steps(n)
         rate = self._rate(vectors, numbers, reference)
-        moved = self.kernel.output(
-            reference + self._beyond, [links[:, i] for i in range(n)], numbers
-        )
-        return (moved[:, :n] - moved[:, n:]) / (2 * _STEP) * rate, reference, numbers, rate
+        moved = self.kernel.output(reference + self._beyond, list(links.T), numbers)
+        return central_slopes(moved, axis=1) * rate, reference, numbers, rate
 
     def amplification(self, vectors: Array) -> Array:
         """Plunger amplification index A_iP of each joint (Eq. 8) for a batch, shape (n_vectors,
@@ -305,10 +312,12 @@ class SurveyedLinkage:
         Returns, shape (n_vectors, n_quantities, n_variables). [1/in, 1/rad]
         """
         count, n = vectors.shape
-        steps = np.concatenate([np.eye(n), -np.eye(n)]) * _STEP * 10.0
+        # A quantity may itself be a derivative: a longer step.
+        step = 10.0 * STEP
+        steps = central_steps(n, step)
         values = (quantity or self.amplification)((vectors[:, None, :] + steps).reshape(-1, n))
         found = np.log(np.maximum(values, 1e-9)).reshape(count, 2 * n, -1)
-        return np.asarray(((found[:, :n] - found[:, n:]) / (20.0 * _STEP)).swapaxes(1, 2))
+        return central_slopes(found, step, axis=1).swapaxes(1, 2)
 
     def closes(self, vectors: Array) -> Mask:
         """Tell which vectors make a linkage that moves over its stroke and moves its plunger as
@@ -323,27 +332,32 @@ class SurveyedLinkage:
             np.isfinite(curve).all(axis=1) & np.isfinite(self.amplification(vectors)).all(axis=1)
         )
 
-    def candidates(self) -> tuple[Reading, ...]:
+    def candidates(self) -> tuple[SurveyReading, ...]:
         """Everything that can be read: the extension, the plunger over the stroke, every angle,
         every distance.
         """
         m, (low, high) = self.space.mechanism, self.gear.reference.stroke
-        found = [Reading(Kind.EXTENSION)] if self.space.moves_reference else []
+        found = [SurveyReading(ReadingKind.EXTENSION)] if self.space.moves_reference else []
         # A round figure of each ninth of the stroke is easier to set than the ninth.
         at = [round((high - low) * k / _PLUNGER_READINGS, 2) for k in range(_PLUNGER_READINGS + 1)]
         at.pop(0 if not self.space.moves_reference else _PLUNGER_READINGS)
-        found += [Reading(Kind.PLUNGER, extension=e, is_angle=m.output.kind == "angle") for e in at]
+        found += [
+            SurveyReading(ReadingKind.PLUNGER, extension=e, is_angle=m.output.kind == "angle")
+            for e in at
+        ]
         for plane in self.space.planes:
             found += [
-                Reading(Kind.ANGLE, plane, what, is_angle=True) for what in ("hinge", "dihedral")
+                SurveyReading(ReadingKind.ANGLE, plane, what, is_angle=True)
+                for what in ("hinge", "dihedral")
             ]
         found += [
-            Reading(Kind.ANGLE, slider, "axis", is_angle=True) for slider in self.space.sliders
+            SurveyReading(ReadingKind.ANGLE, slider, "axis", is_angle=True)
+            for slider in self.space.sliders
         ]
         names = [p.name for p in m.points]
         pairs = [*map(tuple, self.rigid), *combinations(names, 2)]
         ends = (sorted(p, key=names.index) for p in pairs)
-        distances = {frozenset(p): Reading(Kind.DISTANCE, p[0], p[1]) for p in ends}
+        distances = {frozenset(p): SurveyReading(ReadingKind.DISTANCE, p[0], p[1]) for p in ends}
         return tuple(
             replace(r, u=default_u(r.kind, is_angle=r.is_angle), driven_in=self.driven_in)
             for r in (*found, *distances.values())

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.errors import ExitCode, Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.surveying.plan import Suggested
 from mlg_troubleshoot.surveying.survey import Survey
+from mlg_troubleshoot.units import Length, Sentence
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,13 +25,16 @@ class InspectedGear:
     probability_within_margin: float
 
     @property
-    def words(self) -> str:
+    def words(self) -> Sentence:
         """The same in words."""
         low, high = self.interval_in
-        return (
-            f"{self.displacement_in:.4f} in in the worst directions, 90 % {low:.4f} to {high:.4f}"
-            f" in; within the margin on {100 * self.probability_within_margin:.0f} % of the"
-            " linkages that fit"
+        return Sentence.of(
+            "{} in the worst directions, 90 % {} to {}; within the margin on {} % of the linkages"
+            " that fit",
+            Length(self.displacement_in),
+            Length(low, named=False),
+            Length(high),
+            f"{100 * self.probability_within_margin:.0f}",
         )
 
 
@@ -61,8 +65,8 @@ class SurveyResult:
     seed: int
 
     @property
-    def exit_code(self) -> int:
-        """0 if everything fits, 1 if something does not, 3 if nothing follows."""
+    def exit_code(self) -> ExitCode:
+        """NO_CONCLUSION without a usable reading, ATTENTION if something does not fit."""
         if self.survey is None:
-            return 3
-        return 1 if self.survey.misfits or self.problems else 0
+            return ExitCode.NO_CONCLUSION
+        return ExitCode.ATTENTION if self.survey.misfits or self.problems else ExitCode.FINE

@@ -23,60 +23,14 @@ from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Slider
-from mlg_troubleshoot.surveying.readings import DEFAULT_U, Kind, Reading, SurveyedLinkage
-from mlg_troubleshoot.units import MM_PER_IN, SLIPS, Slip
-
-# The share of the ensemble's covariances that is believed.
-_BELIEVED = 0.5
-# A gear file without an ensemble: half of the linkage's size, thirty degrees.
-_ALONE_SIZE, _ALONE_ANGLE = 0.5, float(np.radians(30.0))
-_LEAST_SPREAD = 0.01
-# Robust fit: uncertainties widened by these factors in turn, with so many steps each; then few
-# starts are left.
-_WIDENED, _STEPS, _KEPT = (300.0, 100.0, 30.0, 10.0, 3.0, 1.0), 6, 6
-# Draws of the prior that are starts in addition to the ensemble. The loss of a reading where the
-# linkage is open.
-_AROUND, _OPEN, _LAST_STEPS, _TRIALS = 80, 100.0, 25, 8
-# The best few are left and fitted again with uncertainties widened so far, from so many points
-# around each.
-_REHEATED, _TRIED, _AGAIN, _REHEAT_STEPS, _BESIDE = (10.0, 3.0), 100, 12, 4, 0.03
-# One reading in a hundred is a slip, anywhere within some twenty inches: minus twice the logarithm
-# of that density over the one at no error. Without a limit one large slip would cost more than a
-# wrong linkage with small ones.
-_SLIP = 23.0
-_FREEDOM, _TRUSTED = 4.0, 6.0
-# Of a fit: the search, that of slips, what does not fit, the modes, the draws.
-_STAGES = 5
-# In search of a slip: as many starts as make so many residuals, so many steps each; so many points
-# are left at least.
-_RESIDUALS, _FEW_STEPS, _FEWEST = 175_000, 3, 60
-# The greatest of forty clean residuals exceeds 3.9 in 0.4 % of surveys, in about 1 % where the fit
-# bends.
-MISFIT = 3.9
-# Two readings contradict each other, neither of them alone is wrong, if leaving out one or the
-# other fits alike.
-_ALIKE = 9.0
-# With more misfits than this share of the readings nobody knows which of them to believe.
-_MOST_MISFITS = 0.1
-# Two points of the posterior are one if they stand on the same sides and no index differs by more
-# than this share.
-_SAME, _LEAST_WEIGHT = 0.01, 1e-3
-# One reading in a hundred is exchanged, with any of twenty others.
-_EXCHANGE = 16.0
-# A joint's other side is tried where the readings place the joint: to a fifth of its distance from
-# the line between.
-_PLACED = 0.2
-# With fewer readings than this share of the numbers of the linkage few of them are determined.
-FEW = 0.6
-_DRAWS, _DRAW_STEPS, _BEGUN, _ALONG, _FAR = 150, 8, 3, (0.0, 0.1, 0.3, 1.0), 6.0
-_SLIPS = (
-    SLIPS["unit"],
-    Slip(MM_PER_IN / 10.0, "centimetres read as inches", "inches read as centimetres"),
-    SLIPS["point"],
+from mlg_troubleshoot.surveying import tuned
+from mlg_troubleshoot.surveying.readings import (
+    DEFAULT_U,
+    ReadingKind,
+    SurveyedLinkage,
+    SurveyReading,
 )
-# So many draws of the prior give one that closes.
-_DRAWN_FOR_ONE = 5
-_MISREAD_IN = (1.0, 0.5, 0.25, 0.125, 0.1)
+from mlg_troubleshoot.units import Sentence
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +42,7 @@ class Misfit:
     one alone it is the slip.
     """
 
-    reading: Reading
+    reading: SurveyReading
     expected: float
     spread: float
     suggestion: str
@@ -99,10 +53,8 @@ class Misfit:
         """What would fit, and with which rows it contradicts."""
         if len(self.group) < 2:
             return self.suggestion
-        return (
-            f"rows {', '.join(map(str, self.group))} contradict each other; of this one:"
-            f" {self.suggestion}"
-        )
+        rows = ", ".join(map(str, self.group))
+        return Sentence.of("rows {} contradict each other; of this one: {}", rows, self.suggestion)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,13 +85,13 @@ class Survey:
     """
 
     linkage: SurveyedLinkage
-    readings: tuple[Reading, ...]
+    readings: tuple[SurveyReading, ...]
     misfits: tuple[Misfit, ...]
     modes: tuple[Mode, ...]
     draws: Array
 
     @property
-    def read(self) -> tuple[Reading, ...]:
+    def read(self) -> tuple[SurveyReading, ...]:
         """The readings of the table."""
         return tuple(r for r in self.readings if r.row is not None)
 
@@ -160,7 +112,7 @@ class Survey:
         """True if readings contradict each other so that nobody can tell which of them is wrong, or
         too many do.
         """
-        most = max(2, _MOST_MISFITS * len(self.read))
+        most = max(2, tuned.MOST_MISFITS * len(self.read))
         return len(self.misfits) > most or any(len(m.group) > 1 for m in self.misfits)
 
 
@@ -182,8 +134,8 @@ class Prior:
         )
         self.members, self.linkage = members, linkage
         size = float(np.std([c for p in gear.reference.mechanism.points for c in (p.x, p.y)]))
-        alone = np.where(angles, _ALONE_ANGLE, _ALONE_SIZE * size)
-        least = _LEAST_SPREAD * alone
+        alone = np.where(angles, np.radians(tuned.ALONE_ANGLE), tuned.ALONE_SIZE * size)
+        least = tuned.LEAST_SPREAD * alone
         if linkage.travel is not None:
             # What the technical order prescribes is not a number of the ensemble: wide here, a
             # reading elsewhere.
@@ -191,10 +143,12 @@ class Prior:
         covariance = np.diag(alone**2)
         if len(members) > 2:
             around = np.cov(members.T)
-            covariance = _BELIEVED * around + (1.0 - _BELIEVED) * np.diag(np.diag(around))
+            covariance = tuned.COVARIANCE_SHARE * around + (1.0 - tuned.COVARIANCE_SHARE) * np.diag(
+                np.diag(around)
+            )
         self.mean = members.mean(axis=0)
         order = float(np.log(linkage.amplification(members)).mean())
-        self.order = Reading(Kind.ORDER, value=order, u=DEFAULT_U[Kind.ORDER])
+        self.order = SurveyReading(ReadingKind.ORDER, value=order, u=DEFAULT_U[ReadingKind.ORDER])
         self.root = np.linalg.cholesky(covariance + np.diag(least**2))
         self.whiten = np.linalg.inv(self.root)
 
@@ -202,12 +156,16 @@ class Prior:
         """Draws of it, whether they close or not."""
         return np.asarray(self.mean + rng.standard_normal((n, len(self.mean))) @ self.root.T)
 
-    def closing(self, n: int, rng: Generator, readings: tuple[Reading, ...] = ()) -> Array:
+    def closing(self, n: int, rng: Generator, readings: tuple[SurveyReading, ...] = ()) -> Array:
         """Draws of it that close, about so many, as the readings have it that speak of one variable
         each.
         """
-        found = self.drawn(_DRAWN_FOR_ONE * n, rng)
-        own = tuple(r for r in readings if r.kind in (Kind.ANGLE, Kind.EXTENSION, Kind.TRAVEL))
+        found = self.drawn(tuned.DRAWN_FOR_ONE * n, rng)
+        own = tuple(
+            r
+            for r in readings
+            if r.kind in (ReadingKind.ANGLE, ReadingKind.EXTENSION, ReadingKind.TRAVEL)
+        )
         if own:
             slopes = self.linkage.slopes(own, self.mean[None])[1][0] @ self.root
             gain = (
@@ -226,7 +184,7 @@ class Fitting:
     """The readings of one survey against one prior."""
 
     def __init__(
-        self, linkage: SurveyedLinkage, prior: Prior, readings: tuple[Reading, ...]
+        self, linkage: SurveyedLinkage, prior: Prior, readings: tuple[SurveyReading, ...]
     ) -> None:
         self.linkage, self.prior, self.readings = linkage, prior, readings
         self.value = np.array([r.value for r in readings])
@@ -235,7 +193,7 @@ class Fitting:
     @property
     def still(self) -> list[int]:
         """Which of them are read at the reference position, and so need no motion."""
-        moves = (Kind.PLUNGER, Kind.ORDER)
+        moves = (ReadingKind.PLUNGER, ReadingKind.ORDER)
         return [
             i for i, r in enumerate(self.readings) if r.extension is None and r.kind not in moves
         ]
@@ -256,7 +214,7 @@ class Fitting:
         r = np.where(kept, (self.residuals(points) - noise) / widened, 0.0)
         open_ = ~np.isfinite(r)
         r = np.where(open_, 0.0, r)
-        data = np.where(open_, _OPEN, _robust(r)[0] if robust else r * r)
+        data = np.where(open_, tuned.OPEN_LOSS, _robust(r)[0] if robust else r * r)
         z = (points - means) @ self.prior.whiten.T
         return np.asarray(data.sum(axis=1) + (z * z).sum(axis=1))
 
@@ -301,7 +259,7 @@ class Fitting:
                 np.einsum("smi,sm->si", g, weight * r) + (x - means[moving]) @ self.prior.whiten.T
             )
             left = np.arange(len(moving))
-            for _ in range(4 if robust else _TRIALS):
+            for _ in range(4 if robust else tuned.DAMPINGS):
                 at = moving[left]
                 step = np.linalg.solve(
                     gram[left] + damping[at, None, None] * np.eye(n), down[left][..., None]
@@ -333,22 +291,22 @@ class Fitting:
         starts = points
         if len(still) > 2:
             standing = Fitting(self.linkage, self.prior, tuple(self.readings[i] for i in still))
-            for widened in _WIDENED:
+            for widened in tuned.WIDENED:
                 points, _ = standing.descend(
-                    points, everything[: len(still)], widened, _STEPS, True, starts
+                    points, everything[: len(still)], widened, tuned.STEPS_EACH, True, starts
                 )
             # Of the linkages that stand right, those that also move are the ones to go on with.
-            order = np.argsort(self.loss(points, starts, _WIDENED[2], everything, robust=True))[
-                : 3 * _KEPT
-            ]
+            order = np.argsort(
+                self.loss(points, starts, tuned.WIDENED[2], everything, robust=True)
+            )[: 3 * tuned.MOST_MODES]
             points, starts = points[order], starts[order]
-        for k, widened in enumerate(_WIDENED[1:] if len(still) > 2 else _WIDENED):
-            points, loss = self.descend(points, everything, widened, _STEPS, True, starts)
+        for k, widened in enumerate(tuned.WIDENED[1:] if len(still) > 2 else tuned.WIDENED):
+            points, loss = self.descend(points, everything, widened, tuned.STEPS_EACH, True, starts)
             if k >= 1:
-                order = np.argsort(loss)[: max(_KEPT, len(points) // 2)]
+                order = np.argsort(loss)[: max(tuned.MOST_MODES, len(points) // 2)]
                 points, starts = points[order], starts[order]
-        points, loss = self.descend(points, everything, 1.0, _LAST_STEPS, robust=True)
-        return points[np.argsort(loss)][:_KEPT]
+        points, loss = self.descend(points, everything, 1.0, tuned.LAST_STEPS, robust=True)
+        return points[np.argsort(loss)][: tuned.MOST_MODES]
 
     def suspected(self, starts: Array) -> tuple[Array, Mask, Array]:
         """Fit what stands still without each reading in turn, and with each two distances
@@ -362,31 +320,35 @@ class Fitting:
         still = self.still
         part = Fitting(self.linkage, self.prior, tuple(self.readings[i] for i in still))
         pairs = list(
-            combinations([i for i, r in enumerate(part.readings) if r.kind is Kind.DISTANCE], 2)
+            combinations(
+                [i for i, r in enumerate(part.readings) if r.kind is ReadingKind.DISTANCE], 2
+            )
         )
         kept = np.concatenate(
             [~np.eye(len(still), dtype=bool), np.ones((len(pairs), len(still)), dtype=bool)]
         )
-        noise, starts = np.zeros(kept.shape), starts[: max(1, _RESIDUALS // kept.size)]
+        noise, starts = np.zeros(kept.shape), starts[: max(1, tuned.MOST_RESIDUALS // kept.size)]
         for row, (i, j) in zip(noise[len(still) :], pairs, strict=True):
             row[[i, j]] = np.array([1.0, -1.0]) * (part.value[j] - part.value[i]) / part.u[[i, j]]
         points = means = np.tile(starts, (len(kept), 1))
         which = np.repeat(np.arange(len(kept)), len(starts))
-        for widened in _WIDENED:
+        for widened in tuned.WIDENED:
             points, loss = part.descend(
-                points, kept[which], widened, _FEW_STEPS, False, means, noise[which]
+                points, kept[which], widened, tuned.STEPS_LEFT_OUT, False, means, noise[which]
             )
-            better = np.argsort(loss)[: max(_FEWEST, len(loss) // 3)]
+            better = np.argsort(loss)[: max(tuned.FEWEST_STARTS, len(loss) // 3)]
             points, means, which = points[better], means[better], which[better]
-        likely = np.isin(which, list(dict.fromkeys(which))[:_KEPT])
+        likely = np.isin(which, list(dict.fromkeys(which))[: tuned.MOST_MODES])
         points, means, which = points[likely], means[likely], which[likely]
         held, off = (
             np.ones((len(points), len(self.readings)), dtype=bool),
             np.zeros((len(points), len(self.readings))),
         )
         held[:, still], off[:, still] = kept[which], noise[which]
-        for widened in _WIDENED[1:]:
-            points, loss = self.descend(points, held, widened, _FEW_STEPS, False, means, off)
+        for widened in tuned.WIDENED[1:]:
+            points, loss = self.descend(
+                points, held, widened, tuned.STEPS_LEFT_OUT, False, means, off
+            )
         each = [np.flatnonzero(which == k) for k in dict.fromkeys(which)]
         best = np.concatenate([of[self._apart(points[of], loss[of], 2)] for of in each])
         return points[best], held[best], off[best]
@@ -415,10 +377,10 @@ class Fitting:
         around, which, tried = (
             [points],
             np.arange(len(points)),
-            _AGAIN if (kept & (noise == 0.0)).all() else _TRIED,
+            tuned.FITTED_AGAIN if (kept & (noise == 0.0)).all() else tuned.TRIED_AROUND,
         )
         held, off = (np.repeat(each, tried, axis=0) for each in (kept, noise))
-        for widened in _REHEATED:
+        for widened in tuned.REHEATED:
             z = rng.standard_normal((len(points), tried, points.shape[1]))
             z /= np.sqrt(1.0 + np.maximum(values, 0.0) / widened**2)[:, None]
             trial = points[:, None] + np.einsum("pij,pkj->pki", turned, z) @ self.prior.root.T
@@ -429,22 +391,28 @@ class Fitting:
                 len(points), -1
             )
             best = (
-                np.argsort(loss, axis=1)[:, :_AGAIN] + tried * np.arange(len(points))[:, None]
+                np.argsort(loss, axis=1)[:, : tuned.FITTED_AGAIN]
+                + tried * np.arange(len(points))[:, None]
             ).ravel()
             found, _ = self.descend(
-                trial[best], held[best], widened, _REHEAT_STEPS, robust=True, noise=off[best]
+                trial[best], held[best], widened, tuned.REHEAT_STEPS, robust=True, noise=off[best]
             )
             around.append(found)
-        which = np.concatenate([which, *len(_REHEATED) * [np.repeat(which, _AGAIN)]])
+        which = np.concatenate(
+            [which, *len(tuned.REHEATED) * [np.repeat(which, tuned.FITTED_AGAIN)]]
+        )
         points, everything = np.concatenate(around), np.ones(len(self.readings), dtype=bool)
-        for steps, most in ((_STEPS, 3 * _KEPT), (_LAST_STEPS, 2 * _KEPT)):
+        for steps, most in (
+            (tuned.STEPS_EACH, 3 * tuned.MOST_MODES),
+            (tuned.LAST_STEPS, 2 * tuned.MOST_MODES),
+        ):
             points, loss = self.descend(
                 points, everything, 1.0, steps, robust=True, noise=noise[which]
             )
             # A few readings may be fitted by what does not move over its stroke.
-            loss = np.where(self.linkage.closes(points), loss, np.inf) + _EXCHANGE * noise[
-                which
-            ].any(axis=1)
+            loss = np.where(
+                self.linkage.closes(points), loss, np.inf
+            ) + tuned.EXCHANGE_LOSS * noise[which].any(axis=1)
             apart = self._apart(points, loss, most)
             points, loss, which = points[apart], loss[apart], which[apart]
         return points, loss
@@ -456,7 +424,7 @@ class Fitting:
         for k in map(int, np.argsort(loss)):
             if (
                 len(found) < most
-                and (np.abs(whitened[found] - whitened[k]).max(axis=1) > _BESIDE).all()
+                and (np.abs(whitened[found] - whitened[k]).max(axis=1) > tuned.POINTS_APART).all()
             ):
                 found.append(k)
         return found
@@ -465,7 +433,7 @@ class Fitting:
         """Least squares on the readings kept, from every point; each mode with its Laplace
         posterior and evidence.
         """
-        points, loss = self.descend(points, kept, 1.0, _LAST_STEPS, robust=False, means=means)
+        points, loss = self.descend(points, kept, 1.0, tuned.LAST_STEPS, robust=False, means=means)
         with np.errstate(all="ignore"):
             found, slopes = self.linkage.slopes(self.readings, points)
         closes, index = self.linkage.closes(points), self.linkage.amplification(points)
@@ -483,7 +451,7 @@ class Fitting:
             # A valley along which no index changes, as where all of a driving part may turn about
             # its pivot, is one.
             if any(
-                m.sides == sides and np.abs(np.log(a / index[k])).max() < _SAME
+                m.sides == sides and np.abs(np.log(a / index[k])).max() < tuned.SAME_INDEX
                 for m, a in zip(modes, own, strict=True)
             ):
                 continue
@@ -498,7 +466,7 @@ class Fitting:
             return ()
         share = np.exp(np.array(evidence) - max(evidence))
         share /= share.sum()
-        order = [int(k) for k in np.argsort(-share) if share[k] > _LEAST_WEIGHT]
+        order = [int(k) for k in np.argsort(-share) if share[k] > tuned.LEAST_WEIGHT]
         return tuple(replace(modes[k], weight=float(share[k])) for k in order)
 
     def _sides(self, point: Array) -> tuple[int, ...]:
@@ -536,9 +504,9 @@ class Fitting:
                 base = np.array(m.seen_in_plane(plane, step.upstream, step.downstream))
                 across = np.array([-base[1], base[0]]) / np.hypot(*base)
             far = float(arm @ across)
-            if np.sqrt(across @ best.covariance[i : i + 2, i : i + 2] @ across) > _PLACED * abs(
-                far
-            ):
+            if np.sqrt(
+                across @ best.covariance[i : i + 2, i : i + 2] @ across
+            ) > tuned.PLACED * abs(far):
                 continue
             moved = np.zeros(len(names))
             moved[i : i + 2] = -2.0 * far * across
@@ -562,7 +530,7 @@ class Fitting:
             mode = (self.modes(mode.vector[None], mode.mean[None], kept) or (mode,))[0]
             gap, spread = self._left_out(mode, kept)
             size = np.nan_to_num(np.abs(gap) / spread, nan=np.inf)
-            again = ~kept & (size < MISFIT)
+            again = ~kept & (size < tuned.MISFIT)
             if again.any():
                 # Never the same reading out and in: one that was taken back stays.
                 i = int(np.argmin(np.where(again, size, np.inf)))
@@ -570,7 +538,7 @@ class Fitting:
                 continue
             size = np.where(kept & ~back, size, 0.0)
             worst = int(np.argmax(size))
-            if size[worst] < MISFIT:
+            if size[worst] < tuned.MISFIT:
                 break
             kept[worst] = False
         found: dict[int | None, Misfit] = {}
@@ -616,7 +584,9 @@ class Fitting:
         residual = np.eye(len(rows)) - slopes[rows] @ covariance @ slopes[rows].T
         at = int(np.flatnonzero(rows == i)[0])
         alike = residual[at] ** 2 / np.clip(residual[at, at] * np.diag(residual), 1e-12, None)
-        return tuple(int(j) for j in rows[(1.0 - np.minimum(alike, 1.0)) * size**2 < _ALIKE])
+        return tuple(
+            int(j) for j in rows[(1.0 - np.minimum(alike, 1.0)) * size**2 < tuned.ALIKE_LOSS]
+        )
 
     def _suggestion(
         self, mode: Mode, i: int, gap: Array, spread: Array, out: Mask
@@ -633,65 +603,70 @@ class Fitting:
                 if abs(other.value - expected) < near and abs(value - back) < 3.5 * float(
                     spread[j]
                 ):
-                    return f"swapped with row {other.row}: {other.words}", True
+                    said = Sentence.of("swapped with row {}: {}", other.row, other.words)
+                    return said, True
         if not reading.is_angle:
-            for slip in _SLIPS:
+            for slip in tuned.SURVEY_SLIPS:
                 for size, factor, words in (
                     ("large", 1 / slip.factor, slip.too_large),
                     ("small", slip.factor, slip.too_small),
                 ):
                     if abs(value * factor - expected) < near:
-                        right = f"{reading.shown(value * factor)} would fit"
-                        return (
-                            f"{right}: the value is {slip.factor:g} times too {size}, {words}",
-                            True,
+                        said = Sentence.of(
+                            "{} would fit: the value is {} times too {}, {}",
+                            reading.shown(value * factor),
+                            f"{slip.factor:g}",
+                            size,
+                            words,
                         )
-        if reading.kind is Kind.DISTANCE:
+                        return said, True
+        if reading.kind is ReadingKind.DISTANCE:
             names = [p.name for p in self.linkage.space.mechanism.points]
             others = [
-                Reading(Kind.DISTANCE, a, b, extension=reading.extension)
+                SurveyReading(ReadingKind.DISTANCE, a, b, extension=reading.extension)
                 for a, b in [(reading.start, n) for n in names] + [(n, reading.end) for n in names]
                 if a != b and {a, b} != {reading.start, reading.end}
             ]
             guess = self.linkage.predicted(tuple(others), mode.vector[None])[0]
             best = int(np.nanargmin(np.abs(guess - value)))
             if abs(guess[best] - value) < 3.5 * reading.u:
-                return (
-                    (
-                        f"a wrong pin: {others[best].start} to {others[best].end} measures"
-                        f" {reading.shown(guess[best])}"
-                    ),
-                    True,
+                said = Sentence.of(
+                    "a wrong pin: {} to {} measures {}",
+                    others[best].start,
+                    others[best].end,
+                    reading.shown(guess[best]),
                 )
+                return said, True
         if not reading.is_angle:
-            for inches in _MISREAD_IN:
+            for inches in tuned.MISREAD_IN:
                 if near < 0.4 * inches and abs(abs(gap[i]) - inches) < near:
-                    return (
-                        f"misread by {reading.shown(inches)}: {reading.shown(expected)} would fit",
-                        True,
+                    said = Sentence.of(
+                        "misread by {}: {} would fit",
+                        reading.shown(inches),
+                        reading.shown(expected),
                     )
-        return (
-            (
-                f"the others give {reading.shown(expected)} ± {reading.shown(float(spread[i]))}:"
-                " read it again"
-            ),
-            False,
+                    return said, True
+        said = Sentence.of(
+            "the others give {} ± {}: read it again",
+            reading.shown(expected),
+            reading.shown(float(spread[i])),
         )
+        return said, False
 
     def draws(self, modes: tuple[Mode, ...], kept: Mask, rng: Generator) -> Array:
         """Draws from the posterior, all of which close: of each mode its share."""
         prior, n = self.prior, len(self.prior.mean)
         begun = []
         for mode in modes:
-            count = max(1, round(_DRAWS * mode.weight))
+            count = max(1, round(tuned.DRAWS * mode.weight))
             means = mode.mean + rng.standard_normal((count, n)) @ prior.root.T
             noise = rng.standard_normal((count, len(self.readings)))
             g = self.linkage.slopes(self.readings, mode.vector[None])[1][0] / self.u[:, None]
             g = np.where(kept[:, None], g, 0.0)
             pulled = (means - mode.mean) @ prior.whiten.T @ prior.whiten + noise @ g
             # A valley is curved: each draw begins as far along its linear step as that helps.
-            steps = [mode.vector + t * pulled @ mode.covariance for t in _ALONG]
-            if mode.parameters < FEW * n:
+            steps = [mode.vector + t * pulled @ mode.covariance for t in tuned.ALONG_PULL]
+            if mode.parameters < tuned.FEW * n:
                 # So little is known that the modes say little: each draw begins at its own draw of
                 # the prior.
                 means = steps[0] = np.concatenate([prior.closing(count, rng), means])[:count]
@@ -701,14 +676,14 @@ class Fitting:
         points, means, noise = (np.concatenate(parts) for parts in zip(*begun, strict=True))
         # The remaining loss of a draw that arrived is chi-squared, with as many degrees as
         # readings.
-        enough = kept.sum() + _FAR * np.sqrt(2.0 * kept.sum())
+        enough = kept.sum() + tuned.FAR * np.sqrt(2.0 * kept.sum())
         loss, late = np.full(len(points), np.inf), np.arange(len(points))
-        for _ in range(_BEGUN):
+        for _ in range(tuned.DRAW_ROUNDS):
             points[late], loss[late] = self.descend(
                 points[late],
                 kept,
                 1.0,
-                _DRAW_STEPS,
+                tuned.DRAW_STEPS,
                 robust=False,
                 means=means[late],
                 noise=noise[late],
@@ -734,14 +709,14 @@ def _robust(r: Array) -> tuple[Array, Array]:
     """Loss of residuals and their weights: Student's t, or a slip, which costs the same however
     large it is.
     """
-    loss = (_FREEDOM + 1.0) * np.log1p(r * r / _FREEDOM)
-    sound = 1.0 / (1.0 + np.exp((loss - _SLIP) / 2.0))
-    return loss + 2.0 * np.log(sound), sound * (_FREEDOM + 1.0) / (_FREEDOM + r * r)
+    loss = (tuned.FREEDOM + 1.0) * np.log1p(r * r / tuned.FREEDOM)
+    sound = 1.0 / (1.0 + np.exp((loss - tuned.SLIP_LOSS) / 2.0))
+    return loss + 2.0 * np.log(sound), sound * (tuned.FREEDOM + 1.0) / (tuned.FREEDOM + r * r)
 
 
 def fit(
     gear: Gear,
-    readings: tuple[Reading, ...],
+    readings: tuple[SurveyReading, ...],
     rng: Generator,
     told: Callable[[int, int], None] = lambda *_: None,
 ) -> Survey:
@@ -749,29 +724,34 @@ def fit(
 
     told: called with the stages that are done and how many there are.
     """
-    told(0, _STAGES)
+    told(0, tuned.STAGES)
     linkage = SurveyedLinkage(gear)
     prior = Prior(linkage)
     if linkage.travel is not None:
-        readings = (*readings, Reading(Kind.TRAVEL, value=linkage.travel, u=DEFAULT_U[Kind.TRAVEL]))
-    if len(readings) < FEW * len(linkage.names):
+        readings = (
+            *readings,
+            SurveyReading(
+                ReadingKind.TRAVEL, value=linkage.travel, u=DEFAULT_U[ReadingKind.TRAVEL]
+            ),
+        )
+    if len(readings) < tuned.FEW * len(linkage.names):
         readings = (*readings, prior.order)
     fitting = Fitting(linkage, prior, readings)
-    starts = np.concatenate([prior.members, prior.closing(_AROUND, rng, readings)])
+    starts = np.concatenate([prior.members, prior.closing(tuned.STARTS, rng, readings)])
     points, loss = fitting.reheated(fitting.robust(starts), rng)
-    told(1, _STAGES)
-    kept = np.abs(fitting.residuals(points[:1])[0]) < _TRUSTED
+    told(1, tuned.STAGES)
+    kept = np.abs(fitting.residuals(points[:1])[0]) < tuned.TRUSTED
     if not kept.all() and fitting.still:
         # What does not fit is a slip or another valley.
-        points, (without, held, off) = points[:_KEPT], fitting.suspected(starts)
+        points, (without, held, off) = points[: tuned.MOST_MODES], fitting.suspected(starts)
         nothing = np.zeros((len(points), len(readings)))
         held, off = np.concatenate([nothing == 0.0, held]), np.concatenate([nothing, off])
         points, loss = fitting.reheated(np.concatenate([points, without]), rng, held, off)
-        kept = np.abs(fitting.residuals(points[:1])[0]) < _TRUSTED
+        kept = np.abs(fitting.residuals(points[:1])[0]) < tuned.TRUSTED
     # What is that much less likely, each slip counted, is not a mode: without what was exchanged it
     # might seem one.
-    points = points[loss <= loss[0] - 2.0 * np.log(_LEAST_WEIGHT)]
-    told(2, _STAGES)
+    points = points[loss <= loss[0] - 2.0 * np.log(tuned.LEAST_WEIGHT)]
+    told(2, tuned.STAGES)
     modes = fitting.modes(points, np.broadcast_to(prior.mean, points.shape), kept)
     if not modes:
         raise InconclusiveDataError(
@@ -779,12 +759,12 @@ def fit(
             " them",
             "Check the units and the points of the readings.",
         )
-    told(_STAGES - 2, _STAGES)
+    told(tuned.STAGES - 2, tuned.STAGES)
     misfits, kept = fitting.misfits(modes[0], kept)
     vectors, means = (np.array([getattr(m, part) for m in modes]) for part in ("vector", "mean"))
     modes = fitting.modes(vectors, means, kept) or modes
     modes = fitting.with_mirrored(modes, kept)
-    told(_STAGES - 1, _STAGES)
+    told(tuned.STAGES - 1, tuned.STAGES)
     draws = fitting.draws(modes, kept, rng)
-    told(_STAGES, _STAGES)
+    told(tuned.STAGES, tuned.STAGES)
     return Survey(linkage, readings, misfits, modes, draws)

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.wear.filtering import Draws, State, clock, follow
+from mlg_troubleshoot.wear.filtering import Draws, FilterState, clock, follow
+from mlg_troubleshoot.wear.passage import gamma_passage, integrated_passage, wiener_passage
 from mlg_troubleshoot.wear.paths import Scale, WearPath, lay_out, scale_of
 from mlg_troubleshoot.wear.posterior import members, posterior
 
@@ -21,17 +22,13 @@ _PATHS, _PATHS_OF_MANY, _MANY = 4096, 256, 64
 # Units read twice or more, and other units, that the population is learnt from at most: more would
 # not narrow it. [1]
 _LEARN_FROM, _LEARN_FROM_OTHERS = 160, 40
-# Beyond the usage that any unit has reached, the clock of drift and increments runs faster or
-# slower by this share (one standard deviation): nothing read so far can tell of a curve that bends
-# later. [1]
+# Standard deviation of the pace of wear beyond the usage that any unit has reached: no reading so
+# far can show a curve that bends later. [1]
 _DOUBT = 0.25
 # The clock of a simulated path never stops. [1]
 _SLOWEST = 0.1
 # Least drift of gamma increments, as a share of the fleet's typical one. [1]
 _LEAST_DRIFT = 1e-3
-# Where an integrated Wiener path is looked at, in multiples of the time that it would need about.
-# [1]
-_GRID = np.concatenate([[0.0], np.geomspace(0.02, 40.0, 44)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +186,9 @@ class _Ends:
     pace: Array
 
     @classmethod
-    def drawn(cls, draws: Draws, state: State, repeats: int, rng: np.random.Generator) -> _Ends:
+    def drawn(
+        cls, draws: Draws, state: FilterState, repeats: int, rng: np.random.Generator
+    ) -> _Ends:
         """Sample levels and drifts jointly."""
         shape = (*state.level.shape[:2], repeats)
         level, drift, level_var, cov, drift_var = (
@@ -255,87 +254,17 @@ class _Ends:
         power, s, v = self._column("power"), self._column("increment_sd"), self._column("wander_sd")
         ahead = np.maximum(away, 1e-12)
         if self.draws.gamma.any():
-            time = _gamma_passage(ahead / (self.drift * s**2), rng) * s**2
+            time = gamma_passage(ahead / (self.drift * s**2), rng) * s**2
         else:
             wanders = v[:, 0, 0] > 0.0
             time = np.empty(away.shape)
-            time[~wanders] = _wiener_passage(
-                ahead[~wanders], self.drift[~wanders], s[~wanders], rng
-            )
-            time[wanders] = _integrated_passage(
-                ahead[wanders], self.drift[wanders], v[wanders], rng
-            )
+            time[~wanders] = wiener_passage(ahead[~wanders], self.drift[~wanders], s[~wanders], rng)
+            time[wanders] = integrated_passage(ahead[wanders], self.drift[wanders], v[wanders], rng)
         start = clock(last[None, :, None], power)
         within = np.maximum(1.0 - start, 0.0)
         at = start + np.minimum(time, within) + np.maximum(time - within, 0.0) / self.pace
         usage = at ** (1.0 / power)
         return np.where(away <= 0.0, last[None, :, None], np.maximum(usage, last[None, :, None]))
-
-
-def _wiener_passage(away: Array, drift: Array, sd: Array, rng: np.random.Generator) -> Array:
-    """First passage of a Wiener process with drift: inverse Gaussian, sampled after Michael,
-    Schucany and Haas (1976).
-
-    Against its drift it passes with probability exp(2 drift away / sd²) only, and then as if the
-    drift were turned.
-    """
-    speed = np.maximum(np.abs(drift), 1e-9)
-    mean = away / speed
-    phi = rng.standard_normal(away.shape) ** 2 * sd * sd / (away * speed)
-    short = mean / (1.0 + phi / 2.0 + np.sqrt(phi + phi * phi / 4.0))
-    time = np.where(
-        rng.uniform(size=away.shape) * (mean + short) <= mean, short, mean * (mean / short)
-    )
-    against = (drift < 0.0) & (
-        rng.uniform(size=away.shape) > np.exp(-2.0 * speed * away / np.maximum(sd, 1e-9) ** 2)
-    )
-    return np.where(against, np.inf, time)
-
-
-def _integrated_passage(away: Array, drift: Array, sd: Array, rng: np.random.Generator) -> Array:
-    """First passage when the drift itself wanders: paths on a grid, the same for every unit, scaled
-    to each.
-    """
-    draws, _units, repeats = away.shape
-    gap = np.diff(_GRID)
-    one, two = rng.standard_normal((2, draws, 1, repeats, len(gap)))
-    slope = np.cumsum(np.sqrt(gap) * one, axis=-1)
-    begins = np.concatenate([np.zeros_like(slope[..., :1]), slope[..., :-1]], axis=-1)
-    area = np.cumsum(begins * gap + gap**1.5 * (one / 2.0 + two / np.sqrt(12.0)), axis=-1)
-    scale = away / (np.maximum(drift, 0.0) + (sd * sd * away) ** (1.0 / 3.0))
-    rate, rough = drift * scale, sd * scale**1.5
-    time, below, found = (
-        np.full(away.shape, np.inf),
-        np.zeros(away.shape),
-        np.zeros(away.shape, bool),
-    )
-    for k in range(len(gap)):
-        level = rate * _GRID[k + 1] + rough * area[..., k]
-        new = (level >= away) & ~found
-        part = (away[new] - below[new]) / (level[new] - below[new])
-        time[new] = scale[new] * (_GRID[k] + part * gap[k])
-        found |= new
-        below = level
-    return time
-
-
-def _gamma_passage(away: Array, rng: np.random.Generator) -> Array:
-    """Shape at which a gamma process of scale 1 passes ``away``: its distribution inverted by
-    bisection.
-
-    The quantile of a gamma distribution is taken after Wilson and Hilferty (1931).
-    """
-    z = rng.standard_normal(away.shape)
-    low, high = np.zeros(away.shape), away + 6.0 * np.sqrt(away) + 20.0
-    for _ in range(40):
-        middle = (low + high) / 2.0
-        shape = np.maximum(middle, 1e-9)
-        over = (
-            shape * np.maximum(1.0 - 1.0 / (9.0 * shape) + z / (3.0 * np.sqrt(shape)), 0.0) ** 3
-            >= away
-        )
-        low, high = np.where(over, low, middle), np.where(over, middle, high)
-    return (low + high) / 2.0
 
 
 def fit_wear(paths: Sequence[WearPath], *, seed: int = 0) -> WearModel:

@@ -34,8 +34,10 @@ _PRIOR = {
     "kept": (1.0, 1.5),
 }
 _KINDS = ("wiener", "integrated", "gamma")
-_SAMPLES = 800
-_FREEDOM = 6.0
+# Importance samples of each kind of increments, and the degrees of freedom of the Student
+# distribution that they are drawn from: wider tails than the posterior's. [1]
+_SAMPLES, _FREEDOM = 800, 6
+# Readings times samples that are worked out at once: as many stay in the cache. [1]
 _CHUNK = 40_000
 
 

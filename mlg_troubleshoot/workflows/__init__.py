@@ -1,1 +1,14 @@
 """One file for each task of a user: options in, result out. No terminal here."""
+
+__all__ = [
+    "check",
+    "diagnose",
+    "doctor",
+    "history",
+    "keep",
+    "kept",
+    "reconstruct",
+    "separable",
+    "study",
+    "survey",
+]

@@ -16,21 +16,21 @@ from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.next_joint import advise
 from mlg_troubleshoot.decision.prediction import Extension
-from mlg_troubleshoot.errors import OutputError, UsageError
+from mlg_troubleshoot.errors import ExitCode, OutputError, UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import load_index_table
 from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
 from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:
+    from mlg_troubleshoot.life.looking_back import PastInspection
     from mlg_troubleshoot.records import ReadResult
-    from mlg_troubleshoot.reporting import WrittenReport
+    from mlg_troubleshoot.reporting.publish import WrittenReport
     from mlg_troubleshoot.store import Store
-
-ALL_JUDGED, NOT_ALL_WITHIN, NOTHING_JUDGED = 0, 1, 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,18 +84,20 @@ class CheckResult(TableResult):
         return {v: sum(j.verdict is v for j in self.judgements) for v in Verdict}
 
     @property
-    def exit_code(self) -> int:
-        """Exit code of the contract: 3 nothing judged; 1 something needs attention; else 0."""
+    def exit_code(self) -> ExitCode:
+        """NO_CONCLUSION if no row was judged, ATTENTION if one needs it."""
         judged = [j for j in self.judgements if isinstance(j, Assessment)]
         if not judged:
-            return NOTHING_JUDGED
+            return ExitCode.NO_CONCLUSION
         fine = all(
             j.verdict is Verdict.WITHIN_MARGIN
             and not any(f.over_limit for f in j.joints)
             and j.inspection.outcome is not Outcome.FAILED
             for j in judged
         )
-        return ALL_JUDGED if fine and len(judged) == len(self.judgements) else NOT_ALL_WITHIN
+        if fine and len(judged) == len(self.judgements):
+            return ExitCode.FINE
+        return ExitCode.ATTENTION
 
 
 def check_files(
@@ -184,7 +186,7 @@ def check(
     """
     from mlg_troubleshoot.records import ReadOptions, judge_again
 
-    known = gear if isinstance(gear, Gear) else load_gear(gear)
+    known = load_gear(gear)
     row = judge_again(inspection, ReadOptions.of(known))
     (judged,) = assess([row], known, load_index_table(known), advice=advice, extension=extension)
     if not isinstance(judged, Assessment):
@@ -216,15 +218,10 @@ def predict(
     UsageError
         If the gear has no such joint, or a clearance is negative or not a number.
     """
-    known = gear if isinstance(gear, Gear) else load_gear(gear)
+    known = load_gear(gear)
     numbers = known.joint_numbers
     if isinstance(clearance_in, Mapping):
-        unknown = sorted(set(clearance_in) - set(numbers))
-        if unknown:
-            raise UsageError(
-                f"{known.name} has no joint {unknown[0]}",
-                f"Its joints are {', '.join(map(str, numbers))}.",
-            )
+        known.require_joints(clearance_in)
         clearance_in = [clearance_in.get(number, 0.0) for number in numbers]
     rows = np.atleast_2d(np.asarray(clearance_in, float))
     if rows.ndim != 2 or rows.shape[1] != len(numbers):
@@ -291,7 +288,7 @@ def write_reports(
     on_written: Callable[[int, int], None] | None = None,
     *,
     unit: LengthUnit = LengthUnit.INCH,
-    before: Sequence[Sequence[Mapping[str, Any]]] = (),
+    before: Sequence[Sequence[PastInspection]] = (),
 ) -> tuple[WrittenReport, ...]:
     """Write a report for each inspection and, for a batch, its summary.
 
@@ -312,7 +309,7 @@ def write_reports(
     unit : LengthUnit
         The unit that its readers use.
     before : sequence, optional
-        What each gear was like before, as `history.seen_before` says it.
+        What each gear was like before, as `looking_back.seen_before` says it.
 
     Returns
     -------
@@ -328,13 +325,9 @@ def write_reports(
         raise OutputError(
             f"{directory} is a file, not a folder", "Give a folder that you may write to."
         )
-    from mlg_troubleshoot.reporting import (
-        batch_document,
-        inspection_document,
-        provenance_of,
-        publish,
-        publish_all,
-    )
+    from mlg_troubleshoot.reporting.inspection_report import batch_document, inspection_document
+    from mlg_troubleshoot.reporting.provenance import provenance_of
+    from mlg_troubleshoot.reporting.publish import publish, publish_all
 
     gear, judgements, problems = result.gear, result.judgements, result.problems
     extension = None if options.extension is None else options.extension.describe()

@@ -8,16 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.errors import InconclusiveDataError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.diagnosis import Diagnosis, ModelExtension
     from mlg_troubleshoot.diagnosis.faults import DataFault
-    from mlg_troubleshoot.reporting import WrittenReport
+    from mlg_troubleshoot.reporting.publish import WrittenReport
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,17 +35,14 @@ class DiagnoseOptions(TableOptions):
         What was remembered, in words for the report.
     cause_files : tuple of Path
         Python files with the user's own causes.
-    permutations : int
-        Number of null simulations.
-    seed : int
-        Seed of all randomness.
+    sure : float
+        Probability from which a cause is named. [1]
     """
 
     gear: str = DEFAULT_GEAR
     remembered: str | None = None
     cause_files: tuple[Path, ...] = ()
-    permutations: int = 999
-    seed: int = 0
+    sure: float = 0.9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,7 +61,7 @@ class DiagnoseResult(TableResult):
     extension: ModelExtension | None
 
 
-# A length that cannot be is refused by a check; here it is a row whose slip is to be found.
+# A check refuses an impossible length; a diagnosis keeps the row and looks for the entry error.
 _ANY_LENGTH_IN = 10.0
 
 
@@ -98,6 +97,7 @@ def diagnose_files(
         load_causes,
         table_from_inspections,
     )
+    from mlg_troubleshoot.misfit.beliefs import Beliefs
     from mlg_troubleshoot.records import ReadOptions, read_many
 
     gear = load_gear(options.gear)
@@ -129,8 +129,7 @@ def diagnose_files(
         gear.discrepancies,
         own_causes=own,
         ensemble=gear.ensemble_models[1:],
-        permutations=options.permutations,
-        seed=options.seed,
+        beliefs=Beliefs(sure=options.sure),
         progress=progress,
     )
     by_record = {inspection.record_id: inspection for inspection in once}
@@ -179,16 +178,16 @@ def _as_written(fault: DataFault, inspection: Inspection) -> DataFault:
 def _evidence_notes(inspections: Sequence[Inspection], again: int, gear: Gear) -> Iterator[str]:
     """What a diagnosis cannot use: inspections that stand twice, joints that nobody measured."""
     if again:
-        yield f"duplicate inspections count once: rows left out: {again}"
+        yield f"duplicate inspections count once; rows left out: {again}"
     unread = [
         n
         for n in gear.model.joint_numbers
         if all(i.clearance_in.get(n) is None for i in inspections)
     ]
     if len(unread) == len(gear.joint_numbers):
-        yield "no clearance was read in any row: what wear adds is left open"
+        yield "no clearance was read in any row: wear is assumed, not measured"
     elif unread:
-        listed = ", ".join(f"#{n}" for n in unread)
+        listed = joint_list(unread)
         yield (
             f"not measured in any row: {listed}; counted as worn like the others of their gear, and"
             " not testable"
@@ -203,12 +202,11 @@ def write_diagnosis_report(
     *,
     unit: LengthUnit = LengthUnit.INCH,
 ) -> WrittenReport:
-    from mlg_troubleshoot.reporting import provenance_of, publish
     from mlg_troubleshoot.reporting.diagnosis_report import diagnosis_document
+    from mlg_troubleshoot.reporting.provenance import provenance_of
+    from mlg_troubleshoot.reporting.publish import publish
 
-    made = provenance_of(
-        result.gear, result.inputs_sha256, seed=options.seed, remembered=options.remembered
-    )
+    made = provenance_of(result.gear, result.inputs_sha256, remembered=options.remembered)
     told = (result.extension, unit, result.problems, result.notes)
     return publish(
         diagnosis_document(result.diagnosis, result.gear, made, *told), directory, page=page

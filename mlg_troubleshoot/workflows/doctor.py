@@ -7,7 +7,8 @@ from pathlib import Path
 
 from mlg_troubleshoot.decision.assessment import Verdict
 from mlg_troubleshoot.errors import TroubleshootError
-from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.gear import DEFAULT_GEAR
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import load_index_table
 from mlg_troubleshoot.workflows.check import (
     CheckOptions,

@@ -5,20 +5,37 @@ come from anybody.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import fields
+from enum import StrEnum
+from functools import partial
 from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Verdict
-from mlg_troubleshoot.decision.inspection import Inspection, RiggingCheck, Side
+from mlg_troubleshoot.decision.columns import (
+    COLUMNS,
+    CONVENTION,
+    DATE,
+    IDENTITY,
+    LANDINGS,
+    RECORD_ID,
+    SIDE,
+    TAIL_NO,
+    Column,
+    Holds,
+)
+from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records import ReadOptions
-from mlg_troubleshoot.records.columns import LENGTH_RANGE_IN, Kind
-from mlg_troubleshoot.records.rows import LOOSE_CELLS
-from mlg_troubleshoot.records.values import CellFaultError, read_date, read_moment, read_text
-from mlg_troubleshoot.store import Kind as RecordKind
-from mlg_troubleshoot.store import Record
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from mlg_troubleshoot.records.values import (
+    CellFaultError,
+    read_date,
+    read_moment,
+    read_text,
+    read_value,
+)
+from mlg_troubleshoot.store import Record, RecordKind
+from mlg_troubleshoot.units import LengthUnit
 
 _Check = Callable[[str, Any], None]
 _EPS_IN = 1e-9
@@ -45,41 +62,17 @@ class KeptGate:
     def __init__(self, gear: Gear) -> None:
         options = ReadOptions.of(gear)
         self._joints = options.joint_numbers
-        most = options.plunger_hard_max_in
-        lengths = {
-            f"{kind.value}_in": _number(*ends, above=kind is Kind.MARGIN)
-            for kind, ends in LENGTH_RANGE_IN.items()
-        }
-        loose = {kind.value: _cell(read) for kind, read in LOOSE_CELLS.items()}
-        known = {field.name: _anything for field in fields(Inspection)}
         self._fields: dict[str, _Check] = {
-            **known,
-            **loose,
-            **lengths,
-            "record_id": _text,
-            "tail_no": _text,
-            "side": _one_of(Side),
-            "convention": _one_of(ClearanceConvention),
-            "clearance_in": self._by_joint(_number(0.0, options.clearance_hard_max_in)),
-            "gauge_u_by_joint_in": self._by_joint(
-                _number(*LENGTH_RANGE_IN[Kind.GAUGE_U], above=True)
-            ),
-            "axial_float_in": self._by_joint(_number(*LENGTH_RANGE_IN[Kind.AXIAL_FLOAT])),
-            "entered": self._by_joint(_entered),
-            "readings_in": _each(_number(-most, most)),
+            **{field.name: _anything for field in fields(Inspection)},
+            **{name: check for column in COLUMNS for name, check in self._checks(column, options)},
             "gauge_u_is_default": _flag,
+            "entered": self._by_joint(_entered),
             "carried": _texts_by_name,
             "warnings": _each(_some_text),
             "source": _source,
-            "inspection_date": _cell(lambda _, __, day: read_date(day)),
-            **dict.fromkeys(("restored_joints", "cannot_reach", "no_spare"), _each(self._joint)),
-            **dict.fromkeys(("repair_date", "plunger_date", "outcome_date"), _moment),
-            "rigging_checked": _one_of(RiggingCheck),
-            "open_areas": _each(_text),
-            "minutes_available": _number(0.0, 1e5),
-            "small_readings_true": _flag,
             "unit_question": _some_text,
         }
+        del self._fields["other_columns"]
         self._of_kind: dict[RecordKind, Callable[[Record, Mapping[str, Any]], None]] = {
             RecordKind.INSPECTION: self._inspection,
             RecordKind.CORRECTION: self._correction,
@@ -90,16 +83,41 @@ class KeptGate:
             RecordKind.VOID: _void,
         }
 
+    def _checks(self, column: Column, options: ReadOptions) -> Iterator[tuple[str, _Check]]:
+        """What may stand under the names that a column has in a kept record."""
+        if column.is_length:
+            low, high = options.range_in(column)
+            if column.joint_fills:
+                number = _number(low, high, above=column.is_above_zero(1))
+                yield column.joint_fills, self._by_joint(number)
+            if not column.needs_joint:
+                number = _number(low, high, above=column.is_above_zero(None))
+                yield column.filled, _each(number) if column.copies > 1 else number
+        elif column in IDENTITY or column is CONVENTION:
+            yield column.filled, _text if column.choices is None else _one_of(column.choices)
+        elif column.holds is Holds.YES_NO:
+            yield column.filled, _flag
+        elif column.holds is Holds.DATE:
+            yield column.filled, _cell(read_date)
+        elif column.holds is Holds.MOMENT:
+            yield column.filled, _moment
+        elif column.holds is Holds.JOINTS:
+            yield column.filled, _each(self._joint)
+        elif column.holds is Holds.AREAS:
+            yield column.filled, _each(_text)
+        elif not column.carried:
+            yield column.filled, _cell(partial(read_value, column))
+
     def __call__(self, record: Record, body: Any) -> str:
         try:
             if not isinstance(body, dict):
                 raise _WrongError("content", body, "a table of names and values")
             # Whatever stands there can be voided under the names that it has.
             if record.kind is not RecordKind.VOID:
-                self._fields["side"]("side", record.side)
-                _text("tail_no", record.tail_no)
+                self._fields[SIDE.filled](SIDE.name, record.side)
+                _text(TAIL_NO.name, record.tail_no)
                 if record.day:
-                    self._fields["inspection_date"]("day", record.day)
+                    self._fields[DATE.filled]("day", record.day)
             self._of_kind[record.kind](record, body)
         except _WrongError as wrong:
             return str(wrong)
@@ -107,15 +125,21 @@ class KeptGate:
 
     def _inspection(self, record: Record, body: Mapping[str, Any]) -> None:
         found = _taken(body, "inspection", dict)
-        for name in ("record_id", "tail_no", "side", "convention"):
-            _taken(found, name, str)
+        for column in (*IDENTITY, CONVENTION):
+            _taken(found, column.filled, str)
         for name, value in found.items():
             check = self._fields.get(name)
             if check is None:
                 raise _WrongError(name, value, "a column of an inspection")
             check(name, value)
-        beside = {"record_id": record.record_id, "tail_no": record.tail_no, "side": record.side}
-        for name, value in (*beside.items(), ("inspection_date", record.day or None)):
+        filed = {
+            RECORD_ID: record.record_id,
+            TAIL_NO: record.tail_no,
+            SIDE: record.side,
+            DATE: record.day or None,
+        }
+        for column, value in filed.items():
+            name = column.filled
             if found.get(name) != value:
                 raise _WrongError(
                     name, found.get(name), f"what the record is filed under ({value!r})"
@@ -145,7 +169,7 @@ class KeptGate:
 
     def _work(self, _record: Record, body: Mapping[str, Any]) -> None:
         if body.get("landings") is not None:
-            self._fields["gear_landings"]("landings", body["landings"])
+            self._fields[LANDINGS.filled]("landings", body["landings"])
         if body.get("work_order") is not None:
             _text("work_order", body["work_order"])
 
@@ -224,7 +248,7 @@ def _number(low: float = -1e12, high: float = 1e12, *, above: bool = False) -> _
 _any_number = _number()
 
 
-def _one_of(words: type[Side | ClearanceConvention | Verdict | RiggingCheck]) -> _Check:
+def _one_of(words: type[StrEnum]) -> _Check:
     known = frozenset(word.value for word in words)
 
     def check(column: str, value: Any) -> None:
@@ -237,7 +261,7 @@ def _one_of(words: type[Side | ClearanceConvention | Verdict | RiggingCheck]) ->
 _verdict = _one_of(Verdict)
 
 
-def _cell(read: Callable[[bool, str, Any], object]) -> _Check:
+def _cell(read: Callable[[Any], object]) -> _Check:
     """A value as the cell of its column: what comes back is what was kept."""
 
     def check(column: str, value: Any) -> None:
@@ -249,7 +273,7 @@ def _cell(read: Callable[[bool, str, Any], object]) -> _Check:
         if not isinstance(kept, str | float):
             raise _WrongError(column, value, "a text or a number")
         try:
-            found = read(False, column, kept)
+            found = read(kept)
         except CellFaultError as fault:
             raise _WrongError(column, value, fault.expected) from None
         if (found if isinstance(found, float) else str(found)) != kept:

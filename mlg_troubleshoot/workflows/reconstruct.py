@@ -16,7 +16,6 @@ from mlg_troubleshoot.gear.design import member_values
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.outputs import OutputKind, write_text
 from mlg_troubleshoot.paper.targets import load_targets, targets_file
-from mlg_troubleshoot.schemas import SCHEMA_VERSION
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.paper.reconstruct import Reconstruction
@@ -57,25 +56,3 @@ def reconstruct_linkage(
     if out is not None:
         write_text(out, _HEADING + text)
     return found, text
-
-
-def reconstruction_values(found: Reconstruction, text: str) -> dict[str, object]:
-    from mlg_troubleshoot.reporting.json_form import chosen
-
-    return {
-        "schema_version": SCHEMA_VERSION,
-        "seed": found.seed,
-        "linkages_tried": found.evaluations,
-        **chosen(found, "meets_all", "numbers", "determined"),
-        "free": found.numbers - found.determined,
-        "loosest": [{"number": name, "free_part": part} for name, part in found.loosest],
-        "targets": [
-            {
-                **chosen(each.target, "quantity", "printed", "unit"),
-                "accepted": each.target.tolerance,
-                **chosen(each, "computed", "holds", "binds"),
-            }
-            for each in found.met
-        ],
-        "member_toml": text,
-    }

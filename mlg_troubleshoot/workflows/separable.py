@@ -12,51 +12,56 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.decision.columns import (
+    APPROACH,
+    AXIAL_FLOAT,
+    CLEARANCE,
+    COLUMNS,
+    DATE,
+    GAUGE_ID,
+    LANDINGS,
+    PLUNGER_POSITION,
+    PRESSURE,
+    SIDE,
+    TAIL_NO,
+    TECHNICIAN_ID,
+    TEMPERATURE,
+)
 from mlg_troubleshoot.decision.inspection import DEFAULT_GAUGE_U_IN
 from mlg_troubleshoot.diagnosis.causes import CATALOGUE, Candidate
 from mlg_troubleshoot.diagnosis.causes.together import JointFactors
 from mlg_troubleshoot.diagnosis.extension import MOST_IN
-from mlg_troubleshoot.diagnosis.inference import RULED_OUT
-from mlg_troubleshoot.diagnosis.model_choice import CLASS_APART
 from mlg_troubleshoot.diagnosis.noise import TAIL_RATIOS
 from mlg_troubleshoot.diagnosis.scene import build_scene, effect_columns
 from mlg_troubleshoot.diagnosis.table import ALONG, DiagnosisTable
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.gear.gear_file import load_gear
+from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.search import ALIKE, beside
-from mlg_troubleshoot.records.columns import Kind
 from mlg_troubleshoot.records.headers import parse_canonical
+from mlg_troubleshoot.units import LengthUnit
 
 # The planned fleet: two years of twenty aircraft (assumed), and what one row scatters, tail by tail
 # [in] (docs/explanation/diagnosis.md: a gauge that repeats to 1.5 thou, and what clearances and
 # pins add).
 TAILS, VISITS, ROW_IN = 20, 5, 0.0025
 # Expected distance in log-likelihood at which two are distinguished with 80 % power: d²/2 − 0.84 d
-# = RULED_OUT.
-_APART = 0.84 + float(np.sqrt(0.84**2 + 2.0 * RULED_OUT))
-# Effect over the error of its mean (S) from which some hundred candidates let one stand out with 80
-# % power.
-_FOUND = 5.0
+# is the odds from which something is said.
+_BELIEFS = Beliefs()
+_APART = 0.84 + float(np.sqrt(0.84**2 + 2.0 * _BELIEFS.odds))
 # Columns in addition to clearances, cheapest first: written down anyway, read off, to be measured.
 FURTHER = {
-    "side": Kind.SIDE,
-    "tail_no": Kind.TAIL_NO,
-    "day": Kind.DATE,
-    "technician_id": Kind.TECHNICIAN_ID,
-    "gauge_id": Kind.GAUGE_ID,
-    "approach": Kind.APPROACH,
-    "temperature_c": Kind.TEMPERATURE,
-    "hydraulic_pressure_psi": Kind.PRESSURE,
-    "gear_landings": Kind.LANDINGS,
-    ALONG: Kind.ACTUATOR_EXTENSION,
-    "axial_float": Kind.AXIAL_FLOAT,
+    column.variable: column
+    for column in sorted(COLUMNS, key=lambda column: column.effort)
+    if column.effort
 }
 # Of what is tried for all-joint effects, the middle one: directions spread by 45°, linkages half as
 # far apart.
 _MIDDLE = 1
 _JOINT = re.compile(r"clearance_(\d+)_in")
-_NAMES = {kind: name for name, kind in FURTHER.items()} | {Kind.PLUNGER_POSITION: ALONG}
+_NAMES = {column: name for name, column in FURTHER.items()} | {PLUNGER_POSITION: ALONG}
 Key = tuple[str, str | None]
 
 
@@ -103,14 +108,14 @@ def separable(
 
     access = sorted((j.access.value, j.number) for j in model.joints if j.number not in joints)
     further = [name for name in FURTHER if name not in {*recorded, ALONG}]
-    further += [f"clearance_{number}_in" for _min, number in access] + [ALONG] * (
+    further += [CLEARANCE.header(number, LengthUnit.INCH) for _min, number in access] + [ALONG] * (
         ALONG not in recorded
     )
     with threadpool_limits(1, "blas"):
         keys = [*(key for key in here.keys if key not in here.stand_ins), *here.blocks]
         judged = tuple(_judged(here, beside_it, further, key) for key in keys)
     return judged + tuple(
-        CausePlanned(c.name, None, None, FURTHER[lacks].value, None, None, None, c.separates)
+        CausePlanned(c.name, None, None, FURTHER[lacks].name, None, None, None, c.separates)
         for c in CATALOGUE
         if (lacks := next((n for n in c.needs if n not in recorded), None)) is not None
     )
@@ -127,9 +132,9 @@ def _planned(columns: Sequence[str] | None, gear: Gear) -> tuple[set[str], set[i
             raise UsageError(
                 f"{name} is not a column of an inspection table", "see docs/reference/columns.md"
             )
-        if field.kind in _NAMES:
-            recorded.add(_NAMES[field.kind])
-        elif field.kind is Kind.CLEARANCE and field.number in gear.joint_numbers:
+        if field.column in _NAMES:
+            recorded.add(_NAMES[field.column])
+        elif field.column is CLEARANCE and field.number in gear.joint_numbers:
             joints.add(int(field.number))
     return recorded, joints or set(gear.joint_numbers)
 
@@ -178,6 +183,8 @@ class _Plan:
         for k in np.flatnonzero(seen):
             self.keys.setdefault(_key(found[k]), []).append(int(k))
         self.stand_ins = {_key(c) for c in found if c.stands_in}
+        often = _BELIEFS.expected / (len({name for name, _target in self.keys}) + 1.0)
+        self.found = _BELIEFS.seen_from(often / 2.0, len(table))
         self.row_in = ROW_IN / float(np.sqrt(len(table)))
         causes = [c for c in CATALOGUE if isinstance(c, JointFactors)]
         tried = {(c.name, None): c.blocks(scene, gear.ensemble_models[1:]) for c in causes}
@@ -204,7 +211,7 @@ class _Plan:
         if key in self.blocks:
             rival = next(other for other in self.blocks if other != key)
             lead = partial(_divergence, true=self.blocks[key], other=self.blocks[rival])
-            return rival[0], _size_of(lead, CLASS_APART)
+            return rival[0], _size_of(lead, 0.5 * _APART**2)
         best, name = 0.0, None
         for other, places in self.keys.items():
             if other != key:
@@ -226,8 +233,8 @@ class _Plan:
             lead = partial(
                 _divergence, true=self.blocks[key], other=np.zeros_like(self.blocks[key])
             )
-            return _size_of(lead, 0.5 * _FOUND**2)
-        return _FOUND * self._row(key)
+            return _size_of(lead, 0.5 * self.found**2)
+        return self.found * self._row(key)
 
     def _row(self, key: Key) -> float:
         return self.row_in * float(np.min(self.hidden[self.keys[key]]))
@@ -291,7 +298,7 @@ def _judged(
             if beside_it(c).tests(key) and beside_it(c).nearest(key)[1] < 0.5 * apart
         )
         found = next(better, None)
-        split = FURTHER[found].value if found in FURTHER else found
+        split = FURTHER[found].name if found in FURTHER else found
     told = max(apart, here.found_from(key)) if np.isfinite(apart) else None
     return CausePlanned(*key, here.found_from(key), None, name, told, split, here.separates(key))
 
@@ -316,25 +323,27 @@ def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
     clearance = np.abs(wear + DEFAULT_GAUGE_U_IN * rng.standard_normal(wear.shape))
     clearance[:, [joint not in joints for joint in gear.joint_numbers]] = np.nan
     quantities = {
-        "day": day,
-        "gear_landings": landings,
-        "temperature_c": (
+        DATE.variable: day,
+        LANDINGS.variable: landings,
+        TEMPERATURE.variable: (
             12.0 - 14.0 * np.cos(2.0 * np.pi * day / 365.25) + 6.0 * rng.standard_normal(n)
         ),
-        "hydraulic_pressure_psi": rng.choice([1500.0, 2200.0, 2900.0, 3000.0, 3050.0], n),
+        PRESSURE.variable: rng.choice([1500.0, 2200.0, 2900.0, 3000.0, 3050.0], n),
     }
     if ALONG in recorded:
         quantities[ALONG] = np.full(n, np.nan)
     factors = {
-        "tail_no": np.array([f"T{k:02d}" for k in tail]),
-        "side": np.where(gears % 2 == 0, "LH", "RH"),
-        "approach": rng.choice(["EXTENDING", "RETRACTING"], n),
-        "gauge_id": np.where(rng.random(n) < 0.7, tail % 4, rng.integers(0, 4, n)).astype(str),
-        "technician_id": np.array(
+        TAIL_NO.variable: np.array([f"T{k:02d}" for k in tail]),
+        SIDE.variable: np.where(gears % 2 == 0, "LH", "RH"),
+        APPROACH.variable: rng.choice(["EXTENDING", "RETRACTING"], n),
+        GAUGE_ID.variable: np.where(rng.random(n) < 0.7, tail % 4, rng.integers(0, 4, n)).astype(
+            str
+        ),
+        TECHNICIAN_ID.variable: np.array(
             [f"W{k}" for k in np.where(rng.random(n) < 0.7, tail % 5, rng.integers(0, 5, n))]
         ),
     }
-    floats = rng.uniform(0.0, 0.02, clearance.shape) if "axial_float" in recorded else None
+    floats = rng.uniform(0.0, 0.02, clearance.shape) if AXIAL_FLOAT.variable in recorded else None
     planned = DiagnosisTable(
         clearance_in=clearance,
         readings_in=np.full((n, 1), np.nan),
@@ -348,7 +357,7 @@ def _fleet(gear: Gear, recorded: set[str], joints: set[int]) -> DiagnosisTable:
     )
     if ALONG not in recorded:
         return planned
-    # Beside each reading at mid-position one along the stroke.
+    # One reading along the stroke in addition to each at mid-position.
     both = planned.take(np.tile(np.arange(n), 2))
     stroke = np.r_[
         np.full(n, np.nan), rng.permutation(np.linspace(0.0, gear.reference.stroke[1], n))

@@ -13,8 +13,8 @@ from mlg_troubleshoot.decision.inspection import (
     surely_later,
 )
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.store import Kind, Record, Store
-from mlg_troubleshoot.workflows.history import lives
+from mlg_troubleshoot.life.folding import lives
+from mlg_troubleshoot.store import Record, RecordKind, Store
 
 
 def since_kept_repairs(
@@ -45,7 +45,7 @@ def _since(row: Inspection, repairs: Sequence[Record], gear: Gear) -> Inspection
     ]
     if not later:
         return row
-    joints = {int(n) for r in later if r.kind is Kind.REPAIR for n in r.body["joints"]}
+    joints = {int(n) for r in later if r.kind is RecordKind.REPAIR for n in r.body["joints"]}
     day = date.fromisoformat(max(record.day for record in later))
     # On the day of the repair a reading within its limit may be one of the new part.
     gone = {
@@ -54,7 +54,7 @@ def _since(row: Inspection, repairs: Sequence[Record], gear: Gear) -> Inspection
         if surely_later(day, row.inspection_date)
         or gear.joint(joint).is_over_limit(row.clearance_in[joint])
     }
-    rerigged = any(record.kind is Kind.RERIG for record in later)
+    rerigged = any(record.kind is RecordKind.RERIG for record in later)
     named = ", ".join(f"#{joint}" for joint in sorted(joints))
     what = " and ".join(filter(None, [named, "the rigging" if rerigged else ""]))
     said = f"the store keeps a repair of {what} on {day.isoformat()}: what is older does not count"

@@ -8,40 +8,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import write_index_table
 from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
 from mlg_troubleshoot.paper.targets import targets_file
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.indices.given_data import GivenDataIndices
+    from mlg_troubleshoot.indices.given_data import GivenDataResult
     from mlg_troubleshoot.paper.study import StudyFindings, StudyOptions
     from mlg_troubleshoot.paper.worst_search import WorstSearch
-    from mlg_troubleshoot.reporting import WrittenReport
+    from mlg_troubleshoot.reporting.publish import WrittenReport
 
 from mlg_troubleshoot.units import LengthUnit
-
-
-@dataclass(frozen=True, slots=True)
-class GivenDataResult:
-    """First-order indices of measured inspections; used are valid rows that have a measured
-    displacement.
-    """
-
-    file: str
-    rows_read: int
-    rows_used: int
-    indices: GivenDataIndices
-
 
 Progress = Callable[[str, int, int | None], None]
 
@@ -86,7 +74,7 @@ def run_study(
     from mlg_troubleshoot.paper import study
     from mlg_troubleshoot.paper.statements import check_statements
 
-    known = gear if isinstance(gear, Gear) else load_gear(gear)
+    known = load_gear(gear)
     wanted = options or study.StudyOptions()
     told = progress or (lambda _stage, _done, _total: None)
     if statements and not targets_file(known).exists():
@@ -125,7 +113,7 @@ def refuse_other_tables(options: StudyOptions) -> None:
     """Refuse a study whose result is not the table that goes with a gear, before the work."""
     if not options.is_standard:
         raise UsageError(
-            "--write-table with other than the standard study",
+            "--write-table needs the standard study",
             "Use design fast, sampled or tensor, without --directions, --distribution, --limit,"
             " --beyond-margin.",
         )
@@ -149,7 +137,7 @@ def given_data_study(file: Path, gear: Gear, seed: int) -> GivenDataResult:
     measured.
     """
     from mlg_troubleshoot.diagnosis import table_from_inspections
-    from mlg_troubleshoot.indices.given_data import given_data_indices
+    from mlg_troubleshoot.indices.given_data import GivenDataResult, given_data_indices
     from mlg_troubleshoot.records import ReadOptions, read_many
 
     read = read_many([file], ReadOptions.of(gear))
@@ -168,67 +156,14 @@ def write_study_report(
     unit: LengthUnit = LengthUnit.INCH,
     remembered: str | None = None,
 ) -> WrittenReport:
-    from mlg_troubleshoot.reporting import provenance_of, publish
+    from mlg_troubleshoot.reporting.provenance import provenance_of
+    from mlg_troubleshoot.reporting.publish import publish
     from mlg_troubleshoot.reporting.study_report import study_document
 
     targets = targets_file(findings.gear)
     hashes = {targets.name: sha256(targets.read_bytes()).hexdigest()} if findings.statements else {}
     made = provenance_of(findings.gear, hashes, seed=findings.options.seed, remembered=remembered)
     return publish(study_document(findings, made, unit), directory, page=page)
-
-
-def study_values(findings: StudyFindings, given: GivenDataResult | None = None) -> dict[str, Any]:
-    """Return the study as plain values, as the JSON contract has it; what is not known is null."""
-    from mlg_troubleshoot.reporting.json_form import chosen, plain
-
-    result, options = findings.result, findings.options
-    growth = result.growth
-    values = {
-        **result.table.as_dict(),
-        "directions": str(options.directions),
-        "distribution": options.distribution,
-        "of": "exceeding the margin" if options.beyond_margin else "displacement",
-        "accuracy": options.accuracy,
-        "finished": result.finished,
-        "note": result.indices.note,
-        "mean": result.indices.mean,
-        "variance": result.indices.variance,
-        "first_order_plain": result.plain,
-        "second_order": result.indices.second_order,
-        "groups": result.groups,
-        "ensemble": [linkage.name for linkage in findings.gear.ensemble],
-        "amplification": {
-            **chosen(growth, "local_stage", "max_stage", "local_plunger", "max_plunger"),
-            "exact_plunger": growth.exact,
-        },
-        "statements": [
-            {**plain(statement), "paragraph": statement.paragraph}
-            for statement in findings.statements
-        ],
-        "bounds": [
-            {
-                "sense": "over-travel" if found.sense > 0 else "under-travel",
-                **chosen(found, "sequential_in", "searched_in"),
-                **chosen(found.proved, "found_in", "bound_in", "stroke_in"),
-                "directions_rad": found.proved.directions,
-            }
-            for found in findings.searches
-        ],
-    }
-    if given is not None:
-        found = given.indices
-        lists = (found.first_order.tolist(), found.interval.tolist(), found.rows.tolist())
-        values["given_data"] = {
-            **chosen(given, "file", "rows_read", "rows_used"),
-            "joints": [
-                {"joint": number, "first_order": first, "first_order_interval": ends, "rows": rows}
-                for number, first, ends, rows in zip(
-                    findings.gear.joint_numbers, *lists, strict=True
-                )
-            ],
-        }
-    cleaned: dict[str, Any] = plain(values)
-    return cleaned
 
 
 _HEADS = (

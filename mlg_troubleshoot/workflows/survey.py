@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from copy import deepcopy
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import tomli_w
@@ -14,27 +13,21 @@ import tomli_w
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.datafile import LONGEST_NAME, is_name, read_toml
 from mlg_troubleshoot.errors import GearFileError, MechanismError, UsageError
-from mlg_troubleshoot.gear.design import member_values
+from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear
+from mlg_troubleshoot.gear.gear_file import GearFile, load_gear
 from mlg_troubleshoot.indices.index_table import INDEX_TABLE, write_index_table
 from mlg_troubleshoot.outputs import OutputFile, OutputKind, claim_outputs, write_text
 from mlg_troubleshoot.paper.targets import targets_file
-from mlg_troubleshoot.schemas import SCHEMA_VERSION
 from mlg_troubleshoot.units import LengthUnit
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.reporting import WrittenReport
+    from mlg_troubleshoot.reporting.publish import WrittenReport
     from mlg_troubleshoot.surveying.result import SurveyResult
     from mlg_troubleshoot.surveying.survey import Survey
 
 _HEADING = "# Written by mlg gear survey.\n"
 SURVEYED = OutputKind.marked("is not of a gear that was surveyed", _HEADING)
-# Further members of the ensemble of a surveyed gear file: their range holds most of the posterior.
-_MEMBERS = 11
-_DECIMALS = 6
-# A second assembly with less than this share of the posterior is not worth naming.
-_WORTH_NAMING = 0.02
 # Draws of the prior that stand for a gear of which nothing was read yet.
 _UNREAD = 2000
 # Of many inspections about so many stand for all.
@@ -65,7 +58,7 @@ def survey_gear(
     write: Path | None = None,
     inspections: Path | None = None,
     seed: int = 0,
-    told: Callable[[int, int], None] = lambda *_: None,
+    on_progress: Callable[[int, int], None] = lambda *_: None,
 ) -> SurveyResult:
     """Find the linkage that a survey speaks of, and write it as a gear file with ensemble and index
     table.
@@ -74,12 +67,14 @@ def survey_gear(
     what is unknown of their displacement, in place of the indices.
     """
     from mlg_troubleshoot.records.survey_table import read_survey
+    from mlg_troubleshoot.surveying.as_gear_file import assemblies
     from mlg_troubleshoot.surveying.plan import suggested, suggested_early
     from mlg_troubleshoot.surveying.readings import SurveyedLinkage
     from mlg_troubleshoot.surveying.result import InspectedGear, SurveyResult
-    from mlg_troubleshoot.surveying.survey import FEW, Prior, fit
+    from mlg_troubleshoot.surveying.survey import Prior, fit
+    from mlg_troubleshoot.surveying.tuned import FEW
 
-    known = gear if isinstance(gear, Gear) else load_gear(gear)
+    known = load_gear(gear)
     if write is not None:
         claim_outputs(known.files, written_with(write), force=True)
     linkage, rng = SurveyedLinkage(known), np.random.default_rng(seed)
@@ -87,7 +82,7 @@ def survey_gear(
     readings, problems, digest = read_survey(Path(file), linkage)
     members = linkage.amplification(np.array([linkage.vector(each) for each in known.ensemble]))
     before = np.quantile(members, [0.05, 0.95], axis=0).T
-    found = fit(known, readings, rng, told) if readings else None
+    found = fit(known, readings, rng, on_progress) if readings else None
     warnings: tuple[str, ...] = ()
     path = None
     if found is None:
@@ -96,7 +91,7 @@ def survey_gear(
     else:
         draws, middle = found.draws, found.modes[0].vector[None]
         interval = np.quantile(linkage.amplification(draws), [0.05, 0.95], axis=0).T
-        warnings = _assemblies(found)
+        warnings = assemblies(found)
         if write is not None and found.contradicts:
             warnings += ("readings contradict each other, so that no gear file was written",)
         elif write is not None:
@@ -165,37 +160,6 @@ def _clearances(file: Path | None, gear: Gear) -> list[tuple[str, Array]]:
     ]
 
 
-def _assemblies(found: Survey) -> tuple[str, ...]:
-    """Both assemblies, or both shapes of one assembly, where the survey allows two."""
-    steps = [s for s in found.linkage.space.mechanism.steps if hasattr(s, "sign")]
-    modes = [mode for mode in found.modes if mode.weight >= _WORTH_NAMING]
-    places = [
-        f"joint {s.joint} on the {{}} of the line between its links' other ends" for s in steps
-    ]
-    places += ["the rest on the {} of the crank"] * (len(found.modes[0].sides) - len(steps))
-    shares: dict[str, float] = {}
-    for mode in modes:
-        parts = [
-            place.format("left" if mode.sides[i] > 0 else "right")
-            for i, place in enumerate(places)
-            if len({m.sides[i] for m in modes}) > 1
-        ]
-        if len({m.sides for m in modes}) == 1:
-            moved = np.where(found.linkage.angles, 0.0, np.abs(mode.vector - modes[0].vector))
-            name = found.linkage.names[int(np.argmax(moved))].split(".")[0]
-            parts = [
-                (
-                    f"one with point {name} elsewhere by {moved.max():.4f} in"
-                    if moved.any()
-                    else "as written"
-                )
-            ]
-        text = ", ".join(parts)
-        shares[text] = shares.get(text, 0.0) + mode.weight
-    texts = "; ".join(f"{text} ({100 * share:.0f} %)" for text, share in shares.items())
-    return (f"the survey allows {len(shares)} assemblies: {texts}",) if len(shares) > 1 else ()
-
-
 def _left_targets(before: Gear, path: Path) -> tuple[str, ...]:
     """Published numbers that the surveyed gear leaves: they are another gear's, or the paper's
     alone.
@@ -216,18 +180,16 @@ def _left_targets(before: Gear, path: Path) -> tuple[str, ...]:
 def _write_gear(gear: Gear, found: Survey, path: Path, source: str) -> Path:
     """Write the gear file, its ensemble and its table of indices."""
     from mlg_troubleshoot.paper.study import StudyOptions, run_study
+    from mlg_troubleshoot.surveying.as_gear_file import surveyed_members, surveyed_values
 
-    linkage = found.linkage
     ensemble, indices = _beside(path)
-    members = {
-        f"S{k}": member_values(linkage.linkage(np.round(v, _DECIMALS), f"S{k}"))
-        for k, v in enumerate(found.draws[:_MEMBERS], start=1)
-    }
-    values = deepcopy(read_toml(gear.path).values)
-    values.update(id=path.stem, ensemble=ensemble.name, indices=indices.name)
+    names = {"id": path.stem, "ensemble": ensemble.name, "indices": indices.name}
+    values = {**surveyed_values(read_toml(gear.path, GearFile).values, found, source), **names}
     values["provenance"] = f"surveyed ({len(found.read)} readings, {source})"
-    _put(values, found, source)
-    drawn = {"source": f"Drawn from the posterior of survey {source}.", "members": members}
+    drawn = {
+        "source": f"Drawn from the posterior of survey {source}.",
+        "members": surveyed_members(found),
+    }
     try:
         write_text(ensemble, _HEADING + tomli_w.dumps(drawn))
         write_text(path, _HEADING + tomli_w.dumps(values))
@@ -237,132 +199,6 @@ def _write_gear(gear: Gear, found: Survey, path: Path, source: str) -> Path:
             f"the surveyed gear cannot be written: {error.message}", error.remedy
         ) from error
     return path
-
-
-def _put(values: dict[str, Any], found: Survey, source: str) -> None:
-    """Put the surveyed numbers into a gear file's values, each with a source that says its
-    uncertainty.
-    """
-    linkage, mode = found.linkage, found.modes[0]
-    new = member_values(linkage.linkage(np.round(mode.vector, _DECIMALS), "A"))
-    spread = dict(zip(linkage.names, np.std(found.draws, axis=0), strict=True))
-    sources = values["sources"]
-
-    def put(
-        entry: dict[str, Any],
-        numbers: dict[str, Any],
-        what: str,
-        *parts: tuple[str, str, float, str],
-    ) -> None:
-        entry.update(numbers)
-        known = [
-            f"{label} ± {spread[name] * scale:.2g} {unit}"
-            for name, label, scale, unit in parts
-            if name in spread
-        ]
-        text = (
-            f"Survey {source}: {what}, standard uncertainty"
-            f" {', '.join(known) or 'none: held in place'}."
-        )
-        entry["source"] = f"survey_{len(sources)}"
-        sources[entry["source"]] = {"kind": "measured", "text": text}
-
-    turned = float(np.degrees(1.0))
-    stroke = {"range": new["range"], "reference": new["reference"]}
-    put(
-        values["input"],
-        stroke,
-        "actuator extension",
-        ("extension", "extension", 1.0, linkage.driven_in),
-    )
-    for plane in values["planes"]:
-        if plane["name"] in new.get("planes", {}):
-            name = plane["name"]
-            parts = (
-                (f"{name}.direction", "hinge", turned, "°"),
-                (f"{name}.dihedral", "dihedral", turned, "°"),
-            )
-            put(plane, new["planes"][name], f"plane {name}", *parts)
-    for point in values["points"]:
-        name = point["name"]
-        axes = [(f"{name}.{axis}", axis, 1.0, "in") for axis in ("x", "y", "r")]
-        put(point, {"at": new["points"][name]}, f"point {name}", *axes)
-    for step in values["steps"]:
-        step.update(new["steps"].get(step["joint"], {}))
-        if "axis_deg" in step:
-            put(
-                step, {}, f"axis of {step['joint']}", (f"{step['joint']}.axis", "axis", turned, "°")
-            )
-    if linkage.travel is not None:
-        old = sources[values["calibration"]["source"]]["text"]
-        travel = {"travel": float(round(mode.vector[-1], _DECIMALS))}
-        put(
-            values["calibration"],
-            travel,
-            f"travel; the rest as before: {old}",
-            ("travel", "travel", 1.0, "in"),
-        )
-
-
-def survey_values(result: SurveyResult) -> dict[str, Any]:
-    """Return a survey as plain values, as the JSON contract has it."""
-    found, suggestion = result.survey, result.suggestion
-    mode = None if found is None else found.modes[0]
-    rows = zip(
-        result.gear.joints, result.amplification, result.interval, result.before, strict=True
-    )
-    values: dict[str, Any] = {
-        "schema_version": SCHEMA_VERSION,
-        "gear_file": None if result.gear_file is None else str(result.gear_file),
-        "joints": [
-            {
-                "joint": joint.number,
-                "plunger_amplification": float(a),
-                "interval_90": after.tolist(),
-                "before": before.tolist(),
-            }
-            for joint, a, after, before in rows
-        ],
-        "next": (
-            []
-            if suggestion is None
-            else [
-                {
-                    "kind": suggestion.reading.kind.value,
-                    "from": suggestion.reading.start or None,
-                    "to": suggestion.reading.end or None,
-                    "extension_in": suggestion.reading.extension,
-                    "expected_narrowing": suggestion.narrowing,
-                }
-            ]
-        ),
-        "misfits": [
-            {
-                "row": m.reading.row,
-                "value_in": None if m.reading.is_angle else m.reading.value,
-                "expected_in": None if m.reading.is_angle else m.expected,
-                **({k: m.reading.in_units(v) for k, v in angles} if m.reading.is_angle else {}),
-                "suggestion": m.words,
-            }
-            for m in (() if found is None else found.misfits)
-            for angles in [(("value_deg", m.reading.value), ("expected_deg", m.expected))]
-        ],
-        "chi2": None if mode is None else mode.chi2,
-        "degrees_of_freedom": None if found is None else found.degrees_of_freedom,
-        "warnings": list(result.warnings),
-        "problems": [problem.as_dict() for problem in result.problems],
-    }
-    if result.inspections:
-        values["inspections"] = [
-            {
-                "record_id": each.record_id,
-                "displacement_in": each.displacement_in,
-                "interval_90": list(each.interval_in),
-                "probability_within_margin": each.probability_within_margin,
-            }
-            for each in result.inspections
-        ]
-    return values
 
 
 def write_survey_report(
@@ -375,7 +211,8 @@ def write_survey_report(
     remembered: str | None = None,
 ) -> WrittenReport | None:
     """Write the report of a survey; None if nothing follows from the table."""
-    from mlg_troubleshoot.reporting import provenance_of, publish
+    from mlg_troubleshoot.reporting.provenance import provenance_of
+    from mlg_troubleshoot.reporting.publish import publish
     from mlg_troubleshoot.reporting.survey_report import survey_document
 
     if result.survey is None:

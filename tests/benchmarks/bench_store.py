@@ -29,10 +29,14 @@ from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import load_index_table
+from mlg_troubleshoot.life import folding
+from mlg_troubleshoot.life.forecast import fit_fleet, forecast
+from mlg_troubleshoot.life.unrecorded_work import suggestions
+from mlg_troubleshoot.reporting.life_json import fleet_as_json
 from mlg_troubleshoot.store import Record, Store, inspection_record
 from mlg_troubleshoot.units import ClearanceConvention
-from mlg_troubleshoot.workflows import history
 from mlg_troubleshoot.workflows.check import CheckOptions
+from mlg_troubleshoot.workflows.keep import assessment_record
 
 T = TypeVar("T")
 
@@ -88,7 +92,13 @@ def records(drawn: list[list[Inspection]], gear: Gear) -> list[Record]:
         assert isinstance(of, Assessment)
         found.append(inspection_record(inspection))
         found.append(
-            history._assessment(gear, CheckOptions(), replace(of, inspection=inspection), found[-1])
+            assessment_record(
+                gear,
+                CheckOptions(),
+                replace(of, inspection=inspection),
+                found[-1],
+                found[-1],
+            )
         )
     return found
 
@@ -138,8 +148,8 @@ def suggested(drawn: list[list[Inspection]], gear: Gear) -> list[str]:
     with tempfile.TemporaryDirectory() as folder:
         store = Store(Path(folder) / "store.sqlite")
         store.add([inspection_record(inspection) for own in drawn for inspection in own])
-        kept = list(history.lives(store).values())
-    return history.suggestions(kept, history.fit_fleet(kept, gear), gear)
+        kept = list(folding.lives(store).values())
+    return suggestions(kept, fit_fleet(kept, gear), gear)
 
 
 def main() -> None:
@@ -166,18 +176,18 @@ def main() -> None:
         if given.store is None:
             size = Path(store.place).stat().st_size / 1e6
             show("size of the store", f"{size:.0f} MB", "<= 250 MB", met=size <= 250)
-        timed("one gear's life", 0.5, lambda: history.life_of(store, "N7", "LH"))
+        timed("one gear's life", 0.5, lambda: folding.life_of(store, "N7", "LH"))
 
-        def page() -> list[history.GearLife]:
-            found = list(history.lives(store).values())
-            history.fleet_as_json(found, {})
+        def page() -> list[folding.GearLife]:
+            found = list(folding.lives(store).values())
+            fleet_as_json(found, {})
             return found
 
         found = timed("the fleet without forecasts", 10.0, page)
         timed(
             "the fleet's forecasts",
             60.0,
-            lambda: history.forecast(found, history.fit_fleet(found, gear), gear),
+            lambda: forecast(found, fit_fleet(found, gear), gear),
         )
 
 

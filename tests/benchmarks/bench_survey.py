@@ -31,7 +31,7 @@ from mlg_troubleshoot.errors import TroubleshootError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.surveying.plan import planned, suggested_early
-from mlg_troubleshoot.surveying.readings import Kind, Reading, SurveyedLinkage
+from mlg_troubleshoot.surveying.readings import ReadingKind, SurveyedLinkage, SurveyReading
 from mlg_troubleshoot.surveying.result import SurveyResult
 from mlg_troubleshoot.surveying.survey import Fitting, Prior
 from mlg_troubleshoot.workflows.survey import survey_gear, write_survey_template
@@ -193,7 +193,7 @@ def variables(hidden: Hidden, linkage: SurveyedLinkage) -> np.ndarray:
     return np.array([numbers[n] for n in linkage.names])
 
 
-def size_of_slip(hidden: Hidden, readings: tuple[Reading, ...], wrong: set[int]) -> float:
+def size_of_slip(hidden: Hidden, readings: tuple[SurveyReading, ...], wrong: set[int]) -> float:
     """How far the wrong readings are from what all right ones predict for them, in its standard
     deviations; the least.
 
@@ -227,7 +227,7 @@ def left_open(
     linkage: SurveyedLinkage,
     prior: Prior,
     x: np.ndarray,
-    readings: tuple[Reading, ...],
+    readings: tuple[SurveyReading, ...],
     wanted: np.ndarray,
 ) -> np.ndarray:
     """What readings leave open of logarithms on a linkage: their standard deviations by the linear
@@ -236,7 +236,7 @@ def left_open(
     wanted, shape (n_wanted, n_variables): derivatives of the logarithms, in variables in which the
     prior is the unit sphere. [1]
     """
-    rows = (*readings, Reading(Kind.TRAVEL, value=TRAVEL, u=0.005))
+    rows = (*readings, SurveyReading(ReadingKind.TRAVEL, value=TRAVEL, u=0.005))
     slopes = (
         linkage.slopes(rows, x[None])[1][0] / np.array([r.u for r in rows])[:, None] @ prior.root
     )
@@ -249,7 +249,7 @@ def reachable(
     linkage: SurveyedLinkage,
     prior: Prior,
     hidden: Hidden,
-    readings: tuple[Reading, ...],
+    readings: tuple[SurveyReading, ...],
     clearance: np.ndarray,
 ) -> list[float]:
     """Shares of worn gears that the best possible estimate would have within three percent. [1]
@@ -262,8 +262,8 @@ def reachable(
         linkage.log_slopes(x[None], partial(linkage.displacement, clearance_in=clearance))[0]
         @ prior.root
     )
-    every = [r for r in readings if r.kind is not Kind.DISTANCE]
-    every += [r for r in linkage.candidates() if r.kind is Kind.DISTANCE]
+    every = [r for r in readings if r.kind is not ReadingKind.DISTANCE]
+    every += [r for r in linkage.candidates() if r.kind is ReadingKind.DISTANCE]
     spreads = [left_open(linkage, prior, x, rows, wanted) for rows in (readings, tuple(every))]
     return [
         float(np.mean(norm.cdf(np.log1p(0.03) / s) - norm.cdf(np.log1p(-0.03) / s)))
@@ -288,7 +288,7 @@ def orders(
         replace(r, extension=None if r.extension is None else r.extension * reach)
         for r, _ in planned(GEAR)
     ]
-    asked: tuple[Reading, ...] = ()
+    asked: tuple[SurveyReading, ...] = ()
     while (
         len(asked) < len(rows) and (found := suggested_early(linkage, asked, quantity)) is not None
     ):

@@ -10,8 +10,6 @@ import pytest
 from tests.cli.conftest import FAILURE, Run, mlg
 from tests.hidden_effect.simulator.generate import draw_fleet, write_csv
 
-PERMUTATIONS = ("--permutations", "99")
-
 
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -32,7 +30,7 @@ def extension(measured: Path) -> Path:
 @pytest.fixture(scope="module")
 def diagnosed(measured: Path, extension: Path) -> Run:
     """The diagnosis of that fleet, as text; it writes the extension."""
-    return mlg("diagnose", measured, *PERMUTATIONS, "--write-extension", extension)
+    return mlg("diagnose", measured, "--write-extension", extension)
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +62,7 @@ def test_a_diagnosis_speaks_in_seven_lines(diagnosed: Run) -> None:
 
 
 def test_the_same_seed_gives_the_same_diagnosis(measured: Path, diagnosed: Run) -> None:
-    assert mlg("diagnose", measured, *PERMUTATIONS).out == diagnosed.out
+    assert mlg("diagnose", measured).out == diagnosed.out
 
 
 def test_a_diagnosis_says_how_to_use_its_extension(diagnosed: Run, extension: Path) -> None:
@@ -108,8 +106,6 @@ def test_an_extension_of_another_geometry_is_refused(extension: Path, diagnosed:
 def test_an_extension_that_cannot_be_written_exits_5(measured: Path) -> None:
     occupied = measured.with_name("occupied")
     occupied.touch()
-    found = mlg(
-        "diagnose", measured, *PERMUTATIONS, "--quiet", "--write-extension", occupied / "e.toml"
-    )
+    found = mlg("diagnose", measured, "--quiet", "--write-extension", occupied / "e.toml")
     assert found.code == 5
     assert "What to do:" in found.err

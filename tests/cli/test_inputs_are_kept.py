@@ -185,15 +185,13 @@ def extended(tmp_path: Path) -> tuple[object, ...]:
         "diagnose",
         DATA / "measured_pressure.csv",
         "-q",
-        "--permutations",
-        99,
         "--write-extension",
     )
 
 
 @pytest.mark.parametrize(
     "command",
-    [("check", "--csv"), ("diagnose", "--permutations", 99, "--write-extension")],
+    [("check", "--csv"), ("diagnose", "--write-extension")],
     ids=lambda c: c[0],
 )
 def test_a_table_is_not_replaced_through_a_folder_that_is_missing(
@@ -299,7 +297,7 @@ def test_an_export_may_be_written_again_and_not_over_that_of_another_store(
     [
         ("check", FAILURE, "--csv"),
         ("check", DATA / "failure_case.xlsx", "--annotate"),
-        ("diagnose", DATA / "measured_pressure.csv", "--permutations", 99, "--write-extension"),
+        ("diagnose", DATA / "measured_pressure.csv", "--write-extension"),
         ("study", "--csv"),
         ("gear", "reconstruct", "--minutes", "0.01", "--out"),
         ("history", "export"),

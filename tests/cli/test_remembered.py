@@ -245,9 +245,7 @@ def test_what_was_remembered_stands_in_the_json_of_a_check(here: Path, table: Ta
 
 def test_what_was_remembered_stands_in_the_json_of_a_diagnosis(here: Path) -> None:
     (here / "mlg.toml").write_text('[headers]\n"Spiel Drei" = "clearance_3"', encoding="utf-8")
-    found = mlg(
-        "diagnose", DATA / "measured_pressure.csv", "--permutations", 99, "--json", "-q"
-    ).json
+    found = mlg("diagnose", DATA / "measured_pressure.csv", "--json", "-q").json
     assert "remembered in mlg.toml: header 'Spiel Drei' read as clearance_3" in found["warnings"]
 
 
@@ -255,7 +253,7 @@ def test_what_was_remembered_stands_in_the_json_of_a_diagnosis(here: Path) -> No
     "command",
     [
         ("check", FAILURE, "-q", "--format", "html"),
-        ("diagnose", DATA / "measured_pressure.csv", "-q", "--permutations", 99),
+        ("diagnose", DATA / "measured_pressure.csv", "-q"),
         ("fleet", "-q"),
     ],
     ids=lambda command: command[0],

@@ -14,9 +14,10 @@ import pytest
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import load_index_table
 from mlg_troubleshoot.records.survey_table import read_survey, write_survey_template
-from mlg_troubleshoot.surveying.readings import Kind, Reading, SurveyedLinkage
+from mlg_troubleshoot.reporting.model_json import survey_as_json
+from mlg_troubleshoot.surveying.readings import ReadingKind, SurveyedLinkage, SurveyReading
 from mlg_troubleshoot.units import LengthUnit
-from mlg_troubleshoot.workflows.survey import survey_gear, survey_values
+from mlg_troubleshoot.workflows.survey import survey_gear
 
 from .conftest import FAILURE, mlg
 
@@ -126,7 +127,7 @@ def test_the_gear_file_is_a_gear_with_its_table_and_says_that_it_was_surveyed(
     gear = load_gear(surveyed[0])
     assert "surveyed" in gear.provenance
     assert len(gear.ensemble) == 12
-    assert load_index_table(gear).gear_id == "mine"
+    assert load_index_table(gear).gear.id == "mine"
     lengths = {frozenset(p[:2]): p[2] for p in GOOD if p[3] == ""}
     m = gear.reference.mechanism
     for pair, length in lengths.items():
@@ -148,7 +149,7 @@ def test_the_same_seed_gives_the_same_gear(
 ) -> None:
     again = survey_gear(surveyed[0].with_name("s.csv"), FOUR_BAR, write=tmp_path / "mine.toml")
     assert (tmp_path / "mine.toml").read_bytes() == surveyed[0].read_bytes()
-    assert survey_values(again)["joints"] == surveyed[1]["joints"]
+    assert survey_as_json(again)["joints"] == surveyed[1]["joints"]
 
 
 def test_millimetres_and_inches_give_one_gear(tmp_path: Path) -> None:
@@ -203,6 +204,30 @@ def test_a_bad_cell_is_named_and_its_row_not_used(
     assert expected in problem["expected"]
 
 
+@pytest.mark.parametrize(
+    ("column", "value", "code", "problems"),
+    [
+        ("D", 3.0, '0.00" mm"', ["not_a_number"]),
+        ("D", 3.0, '0.00" in"', []),
+        ("D", 3.0, '0.00\\"', []),
+        ("F", 30.0, '0.0"°"', []),
+        ("F", 30.0, '0.0" rad"', ["not_a_number"]),
+    ],
+)
+def test_a_unit_that_a_number_format_shows_is_that_of_the_column(
+    tmp_path: Path, column: str, value: float, code: str, problems: list[str]
+) -> None:
+    book = openpyxl.Workbook()
+    sheet = book.worksheets[0]
+    sheet.append(["kind", "from", "to", "value_in", "value_mm", "value_deg"])
+    sheet.append(["DISTANCE", "O2", "A"] if column == "D" else ["PLUNGER"])
+    sheet[f"{column}2"] = value
+    sheet[f"{column}2"].number_format = code
+    book.save(tmp_path / "s.xlsx")
+    found = survey(tmp_path / "s.xlsx", "--json").json["problems"]
+    assert [problem["code"] for problem in found] == problems
+
+
 def test_a_table_without_its_header_is_refused_with_what_to_use(tmp_path: Path) -> None:
     (tmp_path / "s.csv").write_text("a,b\n1,2\n")
     run = survey(tmp_path / "s.csv", "--json")
@@ -237,7 +262,7 @@ def test_a_report_shows_what_was_read_what_follows_and_both_linkages(tmp_path: P
     (page,) = (tmp_path / "out").glob("*.html")
     html = page.read_text(encoding="utf-8")
     for words in (
-        "What follows, and what remains unknown",
+        "Indices and their remaining uncertainty",
         "The linkage before and now",
         "distance A to B",
         "7.1500 in",
@@ -294,8 +319,8 @@ def test_the_unit_of_a_survey_is_remembered(
 def test_a_template_in_millimetres_means_the_same_as_one_in_inches(tmp_path: Path) -> None:
     linkage = SurveyedLinkage(load_gear())
     plan = [
-        (Reading(Kind.PLUNGER, u=0.0015, extension=0.5), True),
-        (Reading(Kind.DISTANCE, "F", "1", u=0.01), True),
+        (SurveyReading(ReadingKind.PLUNGER, u=0.0015, extension=0.5), True),
+        (SurveyReading(ReadingKind.DISTANCE, "F", "1", u=0.01), True),
     ]
     readings = []
     for unit, factor in ((LengthUnit.INCH, 1.0), (LengthUnit.MILLIMETRE, 25.4)):

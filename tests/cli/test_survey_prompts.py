@@ -15,16 +15,16 @@ from mlg_troubleshoot.cli.survey_prompts import ask_survey
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records.survey_table import read_survey, write_survey_template
-from mlg_troubleshoot.surveying.readings import Kind, Reading, SurveyedLinkage
+from mlg_troubleshoot.surveying.readings import ReadingKind, SurveyedLinkage, SurveyReading
 from tests.cli.conftest import ROOT, mlg
 from tests.keys import interrupt
 
 pexpect = pytest.importorskip("pexpect")
 FOUR_BAR = ROOT / "tests" / "geometry" / "data" / "four-bar.toml"
 PLAN = [
-    Reading(Kind.DISTANCE, "O2", "A"),
-    Reading(Kind.DISTANCE, "A", "B"),
-    Reading(Kind.PLUNGER, u=0.02, extension=0.4, is_angle=True, driven_in="rad"),
+    SurveyReading(ReadingKind.DISTANCE, "O2", "A"),
+    SurveyReading(ReadingKind.DISTANCE, "A", "B"),
+    SurveyReading(ReadingKind.PLUNGER, u=0.02, extension=0.4, is_angle=True, driven_in="rad"),
 ]
 
 

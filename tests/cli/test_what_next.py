@@ -59,7 +59,7 @@ def test_the_quickest_repair_is_shown_with_what_it_leaves() -> None:
         r"restore kind minutes worst case in within second repair #3, #5 sure \d+ 0\.01\d\d",
         shown,
     )
-    assert "A restored joint counts with the 0.0005 in radial of a new part." in shown
+    assert "A restored joint counts with the radial clearance of a new part, 0.0005 in." in shown
 
 
 def test_re_rigging_alone_is_shown_with_the_risk_that_stays(failure: str) -> None:

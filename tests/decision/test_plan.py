@@ -125,9 +125,8 @@ def test_a_joint_whose_own_uncertainty_is_stated_is_not_measured_again(
 
 def test_an_area_counts_once_and_again_after_a_repair_closed_it(judge: Judge) -> None:
     steps = judge({3: 0.013, 5: 0.007}, outcome=Outcome.FAILED).plan.steps
-    # Link assembly 20 min with three joints of 6 min, still open for one restoration; sidestay 15
-    # min with another one.
-    assert [step.minutes for step in steps[:3]] == [12.0, 38.0, 15.0 + 120.0 + 120.0]
+    # Sidestay 15 min with two joints of 10 min, still open for two restorations of 120 min each.
+    assert [step.minutes for step in steps[:3]] == [12.0, 35.0, 240.0]
 
 
 def test_a_gear_that_retracts_has_only_the_joint_over_its_limit_restored(judge: Judge) -> None:

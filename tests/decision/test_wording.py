@@ -41,16 +41,21 @@ def test_a_gear_that_retracted_with_every_joint_within_needs_no_further_action_o
         " service."
     )
     assert (found.verdict, found.next_action.text) == (Verdict.WITHIN_MARGIN, done)
-    assert found.headline.endswith(done)
+
+
+def test_the_headline_does_not_repeat_the_next_step(judge: Judge) -> None:
+    found = judge(every_joint(0.0005), outcome=Outcome.RETRACTED)
+    assert found.headline.endswith("Every joint was measured and is within its limit.")
+    assert "No further action" not in found.headline
 
 
 @pytest.mark.parametrize("more", [{}, {"outcome": Outcome.FAILED}])
 def test_fault_isolation_goes_on_where_the_gear_did_not_retract(
     more: dict[str, Outcome], judge: Judge
 ) -> None:
-    assert "No further action" not in judge(every_joint(0.0005), **more).headline
+    assert "No further action" not in judge(every_joint(0.0005), **more).next_action.text
 
 
 def test_fault_isolation_goes_on_where_a_joint_was_not_read(judge: Judge) -> None:
     read = {number: value for number, value in every_joint(0.0005).items() if number != 10}
-    assert "No further action" not in judge(read, outcome=Outcome.RETRACTED).headline
+    assert "No further action" not in judge(read, outcome=Outcome.RETRACTED).next_action.text

@@ -65,9 +65,7 @@ def _row(k: int, extension: float, position: float, joints: dict[int, float]) ->
 
 def diagnosis(gear: Gear, rows: list[Inspection]) -> Diagnosis:
     table = table_from_inspections(rows, gear, along=True)
-    return diagnose(
-        gear.model, table, gear.discrepancies, ensemble=gear.ensemble_models[1:], permutations=99
-    )
+    return diagnose(gear.model, table, gear.discrepancies, ensemble=gear.ensemble_models[1:])
 
 
 def cells(found: Diagnosis) -> list[tuple[str, str, str, str | None]]:
@@ -165,7 +163,7 @@ def test_a_table_without_clearances_needs_no_convention(gear: Gear, tmp_path: Pa
         "\n".join(["tail_no,side,actuator_extension_in,plunger_position_in", *lines]),
         encoding="utf-8",
     )
-    result = diagnose_files([file], DiagnoseOptions(permutations=99))
+    result = diagnose_files([file], DiagnoseOptions())
     assert (result.problems, result.diagnosis.verdict) == ((), "NONE")
 
 

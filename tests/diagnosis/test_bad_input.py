@@ -65,14 +65,14 @@ CANNOT: dict[str, tuple[Spoil, str, str]] = {
 def test_a_table_that_cannot_answer_says_why(case: str, gear: Gear, plain: DiagnosisTable) -> None:
     spoil, why, _remedy = CANNOT[case]
     with pytest.raises(InconclusiveDataError, match=why):
-        diagnose(gear.model, spoil(plain), gear.discrepancies, permutations=99)
+        diagnose(gear.model, spoil(plain), gear.discrepancies)
 
 
 @pytest.mark.parametrize("case", CANNOT)
 def test_it_says_what_to_record_next_time(case: str, gear: Gear, plain: DiagnosisTable) -> None:
     spoil, _why, remedy = CANNOT[case]
     with pytest.raises(InconclusiveDataError) as refused:
-        diagnose(gear.model, spoil(plain), gear.discrepancies, permutations=99)
+        diagnose(gear.model, spoil(plain), gear.discrepancies)
     assert remedy in refused.value.remedy
 
 
@@ -89,24 +89,20 @@ def test_a_constant_column_names_nothing(
     column: str, value: float, gear: Gear, plain: DiagnosisTable
 ) -> None:
     constant = {**plain.quantities, column: np.full(len(plain), value)}
-    found = diagnose(
-        gear.model, replace(plain, quantities=constant), gear.discrepancies, permutations=199
-    )
+    found = diagnose(gear.model, replace(plain, quantities=constant), gear.discrepancies)
     assert found.verdict == "NONE"
 
 
 @pytest.mark.parametrize("factor", ["gauge_id", "technician_id", "side", "approach"])
 def test_a_constant_name_names_nothing(factor: str, gear: Gear, plain: DiagnosisTable) -> None:
     constant = {**plain.factors, factor: np.full(len(plain), "X")}
-    found = diagnose(
-        gear.model, replace(plain, factors=constant), gear.discrepancies, permutations=199
-    )
+    found = diagnose(gear.model, replace(plain, factors=constant), gear.discrepancies)
     assert found.verdict == "NONE"
 
 
 def test_constant_clearances_are_no_reason_to_fail(gear: Gear, plain: DiagnosisTable) -> None:
     alike = fleet(gear.model, clearance_in=np.full_like(plain.clearance_in, 0.002))
-    assert diagnose(gear.model, alike, gear.discrepancies, permutations=199).verdict == "NONE"
+    assert diagnose(gear.model, alike, gear.discrepancies).verdict == "NONE"
 
 
 def stuck(table: DiagnosisTable) -> DiagnosisTable:
@@ -152,7 +148,7 @@ def test_what_is_wrong_with_the_table_is_no_cause(
 ) -> None:
     spoil, remedy = TABLE_IS_WRONG[case]
     with pytest.raises(InconclusiveDataError) as refused:
-        diagnose(gear.model, spoil(plain), gear.discrepancies, permutations=99)
+        diagnose(gear.model, spoil(plain), gear.discrepancies)
     assert remedy in refused.value.remedy
 
 
@@ -162,7 +158,7 @@ def test_a_column_with_one_value_known_is_no_reason_to_fail(
     lonely = np.full(len(plain), np.nan)
     lonely[7] = 21.0
     table = replace(plain, quantities={**plain.quantities, "temperature_c": lonely})
-    assert diagnose(gear.model, table, gear.discrepancies, permutations=99).verdict == "NONE"
+    assert diagnose(gear.model, table, gear.discrepancies).verdict == "NONE"
 
 
 # At the command line
@@ -266,8 +262,6 @@ def test_the_json_of_a_diagnosis_holds_no_number_that_is_none(tmp_path: Path) ->
     found = run(
         str(write(tmp_path / "t.csv", rows, "plunger_displacement_in")),
         "--json",
-        "--permutations",
-        "99",
     )
     assert json.loads(found.stdout)["schema_version"] == 1
     assert not {"NaN", "Infinity"} & set(found.stdout.split())

@@ -27,9 +27,7 @@ FILES = sorted(file.name for file in FOLDER.glob("measured_*.csv"))
 @cache
 def diagnosis(name: str, *causes: str) -> Diagnosis:
     files = tuple(FOLDER / cause for cause in causes)
-    return diagnose_files(
-        [FOLDER / name], DiagnoseOptions(cause_files=files, permutations=199)
-    ).diagnosis
+    return diagnose_files([FOLDER / name], DiagnoseOptions(cause_files=files)).diagnosis
 
 
 @pytest.mark.parametrize("file", FILES)
@@ -158,7 +156,7 @@ def in_millimetres_across(source: Path, to: Path) -> Path:
 
 def test_a_fault_is_shown_in_the_unit_and_the_convention_of_its_cell(tmp_path: Path) -> None:
     file = in_millimetres_across(FOLDER / "measured_pressure.csv", tmp_path / "across.csv")
-    found = diagnose_files([file], DiagnoseOptions(permutations=99)).diagnosis.faults
+    found = diagnose_files([file], DiagnoseOptions()).diagnosis.faults
     swapped = {(f.column, f.value, f.suggested) for f in found if f.kind == "swapped_joints"}
     assert swapped == {
         ("clearance_2_mm", "0.7620", "0.0762"),
@@ -174,5 +172,5 @@ def test_a_joint_that_nobody_measured_is_said(tmp_path: Path) -> None:
         writer = csv.DictWriter(out, fieldnames=list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
-    notes = diagnose_files([file], DiagnoseOptions(permutations=99)).notes
+    notes = diagnose_files([file], DiagnoseOptions()).notes
     assert any(note.startswith("not measured in any row: #9") for note in notes)

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any, cast
 
 import numpy as np
 import pytest
-from scipy.stats import gumbel_r, norm
+from scipy.stats import norm
 
 from mlg_troubleshoot.diagnosis import CATALOGUE, Candidate, Scene, Term
 from mlg_troubleshoot.diagnosis.causes.convention import as_meant
@@ -19,16 +17,12 @@ from mlg_troubleshoot.diagnosis.diagnose import _interval as interval_of
 from mlg_troubleshoot.diagnosis.extension import adjustment_of
 from mlg_troubleshoot.diagnosis.faults import DataFault
 from mlg_troubleshoot.diagnosis.gain import _interval
-from mlg_troubleshoot.diagnosis.inference import RULED_OUT, Inference
-from mlg_troubleshoot.diagnosis.model_choice import CLASS_APART
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, measured_uncertainty, robust_scale
 from mlg_troubleshoot.diagnosis.scene import build_scene
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.misfit.chance import Chance
-from mlg_troubleshoot.misfit.verdict import ALARM, NAME, REMAINS
 
 from .conftest import fleet
 
@@ -64,42 +58,6 @@ def test_two_causes_that_scale_one_length_multiply(gear: Gear, scene: Scene) -> 
 def test_a_healthy_fleet_reads_less_than_the_bound_by_what_pins_scatter() -> None:
     angles = np.radians(np.random.default_rng(3).normal(0.0, 6.0, 100_000))
     assert pytest.approx(float(np.mean(np.cos(angles))) - 1.0, abs=0.002) == EXPECTED_SLOPE
-
-
-def test_the_smallest_effect_would_be_found_four_times_in_five() -> None:
-    # An estimate of a size of t standard errors exceeds the bar, here 0, four times in five if t is
-    # this quantile.
-    bare = cast(Any, SimpleNamespace(penalty=np.zeros(3), misfit=np.zeros(100)))
-    assert Inference._smallest(bare, Chance(np.zeros(50)), 1.0) * 10.0 == pytest.approx(
-        float(norm.ppf(0.8)), abs=0.005
-    )
-
-
-def test_a_rival_is_ruled_out_only_at_odds_of_ten_to_one() -> None:
-    assert np.exp(RULED_OUT) > 10.0
-
-
-def test_directions_and_linkage_are_told_apart_only_at_odds_of_a_hundred_to_one() -> None:
-    assert np.exp(CLASS_APART) > 100.0
-
-
-def test_a_chance_counts_each_of_many_equals_once() -> None:
-    # One of 40 data sets that are alike is as large as the k-th largest of them with a chance of k
-    # in 40.
-    values = np.random.default_rng(4).standard_normal(40)
-    chances = sorted(Chance(np.delete(values, k)).of(values[k]) for k in range(40))
-    assert chances[10:] == pytest.approx(np.arange(11, 41) / 40.0)
-
-
-def test_a_chance_beyond_all_draws_is_that_of_the_largest_of_many() -> None:
-    drawn = gumbel_r.rvs(3.0, 0.8, size=2000, random_state=2)
-    assert Chance(drawn).of(gumbel_r.isf(1e-5, 3.0, 0.8)) == pytest.approx(1e-5, rel=0.5)
-
-
-@pytest.mark.parametrize("chance", [0.3, 0.012, 1e-5])
-def test_a_bar_is_cleared_with_its_chance(chance: float) -> None:
-    at_random = Chance(np.random.default_rng(1).gumbel(3.0, 0.8, 199))
-    assert at_random.of(at_random.bar(chance)) == pytest.approx(chance, rel=0.1)
 
 
 def test_the_robust_scale_is_the_standard_deviation_of_a_normal_distribution() -> None:
@@ -138,7 +96,7 @@ def test_the_share_removed_has_an_interval_of_95_percent_over_tails() -> None:
     after = before * rng.uniform(0.2, 0.6, 400)
     share = np.sum(after**2) / np.sum(before**2)
     error = float(np.std(after**2 - share * before**2) / np.sqrt(400) / np.mean(before**2))
-    low, high = _interval(before, after, tails, rng)
+    low, high = _interval(before, after, tails)
     assert (low, high) == pytest.approx(norm.interval(0.95, 1.0 - share, error), abs=0.3 * error)
 
 
@@ -222,28 +180,6 @@ def test_what_is_written_twice_as_large_has_twice_the_error(plain: DiagnosisTabl
     meant = as_meant(plain, {"column": "technician_id", "value": "T-2", "written_factor": 2.0})
     assert meant.gauge_u_in == pytest.approx(np.where(rows, 0.5, 1.0) * plain.gauge_u_in)
     assert meant.clearance_in[rows] == pytest.approx(0.5 * plain.clearance_in[rows])
-
-
-def test_healthy_fleets_alarm_at_most_twice_in_a_hundred_and_a_name_needs_more() -> None:
-    assert ALARM + REMAINS <= 0.02
-    assert NAME <= ALARM / 4.0
-
-
-def test_a_cause_with_two_targets_pays_for_both_and_what_pins_scatter_is_expected() -> None:
-    predicted = np.linspace(0.0, 0.05, 9)
-    causes = [BY_NAME[name] for name in ("calibration_rate", "gauge_bias", "gauge_bias")]
-    rows = cast(Any, SimpleNamespace(predicted_in=predicted))
-    found = Inference(
-        EXPECTED_SLOPE * predicted,
-        rows,
-        [Candidate(c) for c in causes],
-        np.empty((9, 3)),
-        cast(Any, None),
-        9,
-        np.random.default_rng(1),
-    )
-    assert found.prior == pytest.approx(np.log([1.0, 2.0, 2.0]))
-    assert found.misfit == pytest.approx(np.zeros(9))
 
 
 @pytest.mark.parametrize(("wrong", "refused"), [(15, False), (30, True)])

@@ -158,7 +158,7 @@ def settings(desk: Desk) -> Case:
             ["history", "N1", "LH", "--no-forecast", "--store", "kept.sqlite"],
             ["fleet", "--no-forecast", "--store", "kept.sqlite"],
             ["template", "new.xlsx"],
-            ["diagnose", "in.csv", "--permutations", "99"],
+            ["diagnose", "in.csv"],
             ["diagnose", "in.csv", "--remember", "--show", "mm"],
             ["gear"],
         )

@@ -73,7 +73,7 @@ OUTPUTS = (
     Output(["template"], (), ""),
     Output(["gear", "survey", "template"], (), ""),
     Output(
-        ["diagnose", "far.csv", "-q", "--permutations", "99", "--write-extension"],
+        ["diagnose", "far.csv", "-q", "--write-extension"],
         ("far.csv",),
         rare=True,
     ),

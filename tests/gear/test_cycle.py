@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mlg_troubleshoot.gear.cycle import RetractionCycle
-from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear import Gear, RetractionCycle
 
 
 @pytest.fixture

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.errors import GearFileError, MechanismError, UsageError
-from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.gear_file import DEFAULT_GEAR, load_gear, shipped_gears
-from mlg_troubleshoot.gear.sources import SourceKind
+from mlg_troubleshoot.gear import DEFAULT_GEAR
+from mlg_troubleshoot.gear.gear import Gear, SourceKind
+from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
 
 Edit = Callable[[str, str], Path]
 
@@ -220,12 +220,12 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
         (
             "new_part = 0.0005\n",
             "new_part = -1\n",
-            r"joints\[actuator rod end\]\.new_part: expected a number of 0",
+            r"joints\[actuator rod end\]\.new_part: expected a number from 0 to 10000",
         ),
         ("sign = +1\ndriven", "sign = 2\ndriven", r"steps\[1\]\.sign: expected \+1 or -1"),
         # wrong types
         ("schema = 1\n", "schema = 2\n", r"schema: expected 1, found 2"),
-        ("schema = 1\n", 'schema = "1"\n', r"schema: expected a whole number"),
+        ("schema = 1\n", 'schema = "1"\n', r"schema: expected 1, found '1'"),
         ("driven = true", 'driven = "yes"', r"steps\[1\]\.driven: expected true or false"),
         (
             "virtual_links = [1]",
@@ -240,10 +240,14 @@ def test_an_unknown_gear_is_refused_with_the_names_that_exist() -> None:
         (
             'type = "slot"',
             'type = "groove"',
-            r"steps\[3\]\.type: expected crank, dyad, lever, slot or slider",
+            r"steps\[3\]\.type: expected crank, dyad, lever, slider or slot",
         ),
-        ('kind = "position"', 'kind = "speed"', r"output\.kind: expected position or angle"),
-        ('id = "hawker-800xp"', "id = 800", r"id: expected a text, found 800"),
+        ('kind = "position"', 'kind = "speed"', r"output\.kind: expected angle or position"),
+        (
+            'id = "hawker-800xp"',
+            "id = 800",
+            r"id: expected a name of 1 to 40 .*found 800",
+        ),
         ("stages = [", "stages = 4\nstates = [", r"cycle\.stages: expected an array of tables"),
         (
             'plunger = "in", flow',
@@ -296,6 +300,50 @@ def test_a_mistake_in_the_ensemble_is_named_with_the_ensemble_file(edited: Edit)
     )
     with pytest.raises(GearFileError, match=r"hawker-800xp-ensemble\.toml: steps\[1\]\.sign"):
         load_gear(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            "dihedral_deg = 48.656",
+            'dihedral_deg = "flat"',
+            "members.B.planes.link_assembly.dihedral",
+        ),
+        ("reference = 0.576\n", "", "members.B.reference: expected a number, found nothing"),
+        ('"F" = [-1.243', '"Z" = [-1.243', "members.B.points.Z: expected a name of the gear file"),
+        ("[members.B.steps]", "[members.B.stepps]", "members.B.steps: expected a table"),
+        ("source = ", "spurce = ", "source: expected a text, found nothing"),
+    ],
+)
+def test_what_is_wrong_with_an_ensemble_is_named_with_its_member(
+    edited: Edit, old: str, new: str, words: str
+) -> None:
+    path = edited("schema = 1", "schema = 1 ")
+    ensemble = path.with_name("hawker-800xp-ensemble.toml")
+    text = ensemble.read_text(encoding="utf-8")
+    assert old in text
+    ensemble.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(GearFileError) as caught:
+        load_gear(path)
+    assert f"hawker-800xp-ensemble.toml: {words}" in caught.value.message
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('hinge_point = "6"\n', "", "hinge_point: expected the name of a point"),
+        ("dihedral_deg = 48.92\n", "", "dihedral_deg: expected a number"),
+        ('= 48.92\nsource = "reconstruction"\n', "= 48.92\n", "source: expected a text"),
+        ('parent = "sidestay"\n', "", "hinge_point: expected it with a parent only"),
+    ],
+)
+def test_a_plane_says_how_it_is_hinged_if_it_has_a_parent_and_only_then(
+    edited: Edit, old: str, new: str, words: str
+) -> None:
+    with pytest.raises(GearFileError) as caught:
+        load_gear(edited(old, new))
+    assert f"planes[link_assembly].{words}" in caught.value.message
 
 
 def test_a_gear_file_without_an_ensemble_predicts_with_its_reference_alone(edited: Edit) -> None:
@@ -355,3 +403,14 @@ def test_a_cause_that_would_change_no_number_of_the_linkage_is_refused(
 ) -> None:
     with pytest.raises(GearFileError, match=r"a number of the linkage instead of 'length\.1-F'"):
         load_gear(edited(f'"{name}"', '"length.1-F"'))
+
+
+def test_a_gear_that_is_given_in_place_of_a_name_is_returned_as_it_is() -> None:
+    gear = load_gear()
+    assert load_gear(gear) is gear
+
+
+def test_a_joint_that_a_gear_does_not_have_is_named_with_the_option_that_gave_it() -> None:
+    with pytest.raises(UsageError, match=r"^--joint 11: .* has no joint 11$") as refused:
+        load_gear().require_joints([3, 11], "--joint")
+    assert refused.value.remedy == "Its joints are 1, 2, 3, 4, 5, 6, 7, 8, 9, 10."

@@ -62,7 +62,7 @@ def outcome(spec: CurveSpec, without: tuple[str, ...], right: str | None, seed: 
     with TemporaryDirectory() as folder:
         file = Path(folder) / "curve.csv"
         write_csv({name: cells for name, cells in table.items() if name not in without}, file)
-        found = diagnose_files([file], DiagnoseOptions(permutations=199)).diagnosis
+        found = diagnose_files([file], DiagnoseOptions()).diagnosis
     named = [c.candidate.cause.name for c in found.causes]
     if named:
         return "right" if named == [right] else "wrong"

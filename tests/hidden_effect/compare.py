@@ -92,7 +92,7 @@ def _diagnosed(table: DiagnosisTable, train: np.ndarray, test: np.ndarray) -> np
     """Correction of the test rows by what the training rows name; nothing if they name nothing."""
     gear = load_gear()
     try:
-        found = diagnose(gear.model, table.take(train), gear.discrepancies, permutations=199)
+        found = diagnose(gear.model, table.take(train), gear.discrepancies)
     except InconclusiveDataError:
         return np.zeros(int(test.sum()))
     unseen = table.take(test)
@@ -147,7 +147,7 @@ def _own_formula(seed: int) -> dict[str, float | bool]:
     gear = load_gear()
     hidden = simulator.draw_fleet(seed, kind="single", cause=cause, strength=25.0, faults=False)
     table = as_table(hidden.table)
-    found = diagnose(gear.model, table, gear.discrepancies, permutations=199)
+    found = diagnose(gear.model, table, gear.discrepancies)
     result: dict[str, float | bool] = {
         "independent_named": any(c.candidate.cause.name == cause for c in found.causes)
     }
@@ -165,9 +165,7 @@ def _own_formula(seed: int) -> dict[str, float | bool]:
 
     readings = np.full_like(found.used.readings_in, np.nan)
     readings[:, 0] = values
-    again = diagnose(
-        gear.model, replace(found.used, readings_in=readings), gear.discrepancies, permutations=199
-    )
+    again = diagnose(gear.model, replace(found.used, readings_in=readings), gear.discrepancies)
     result["own_named"] = any(c.candidate.cause.name == cause for c in again.causes)
     if result["own_named"] and len(again.used) == len(own):
         fitted = next(c for c in again.causes if c.candidate.cause.name == cause)

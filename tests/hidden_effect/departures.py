@@ -121,7 +121,6 @@ def run(task: tuple[str, int, int]) -> Record:
             table,
             gear.discrepancies,
             ensemble=gear.ensemble_models[1:],
-            permutations=study.PERMUTATIONS,
         )
     except InconclusiveDataError as error:
         return {
@@ -147,6 +146,7 @@ def run(task: tuple[str, int, int]) -> Record:
         "variables": list(found.unlisted_variables),
         "truth": list(fleet.label.causes),
         "linkage": fleet.spec.geometry,
+        **study.stated(found),
         **_regression(found.used, found.predicted_in),
         "after": None if gain is None else gain.rms_after_in,
         "before": None if gain is None else gain.rms_before_in,

@@ -31,11 +31,12 @@ from tests.hidden_effect import simulator
 from tests.hidden_effect.as_table import as_table
 
 FIRST_SEED = 1_000_000
-PERMUTATIONS = 199
 RESULT = Path(__file__).with_name("study_result.json")
 
 # Strengths at which the part of an effect that differs from row to row is looked at on its own.
 VARYING = (10.0, 7.0, 5.0)
+# Probability below which what is said of a cause is not kept.
+_TRACE = 0.01
 
 Task = dict[str, Any]
 Record = dict[str, Any]
@@ -95,7 +96,6 @@ def run(task: Task) -> Record:
             table,
             gear.discrepancies,
             ensemble=gear.ensemble_models[1:],
-            permutations=PERMUTATIONS,
         )
     except InconclusiveDataError:
         found = None
@@ -105,6 +105,16 @@ def run(task: Task) -> Record:
         "seed": task["seed"],
         "seconds": seconds,
         **_compare(fleet, found),
+    }
+
+
+def stated(found: Diagnosis) -> Record:
+    """How likely each cause was said to be, and nothing, and something on no list."""
+    return {
+        "probabilities": [(*key, p) for key, p in found.probabilities.items() if p > _TRACE],
+        "p_nothing": found.p_nothing,
+        "p_unlisted": found.p_unlisted,
+        "written": bool(found.terms),
     }
 
 
@@ -148,6 +158,9 @@ def _compare(fleet: simulator.Fleet, found: Diagnosis | None) -> Record:
         (c.candidate.cause.name, c.candidate.target) for c in (*found.also_possible, *found.beside)
     ]
     record["named"] = names
+    record["truth"] = truth
+    record["also"] = also
+    record |= stated(found)
     if listed and truth:
         told = not found.beside and len(names) == len(truth)
         record["right"] = told and all(any(_same(n, t) for n in names) for t in truth)
@@ -351,7 +364,6 @@ def study(
     return {
         "fleets": len(records),
         "first_seed": first_seed,
-        "permutations": PERMUTATIONS,
         "plan": plan,
         **summarise(records),
     }

@@ -130,9 +130,9 @@ def test_a_pin_that_rests_far_off_its_worst_direction_is_not_named_beside_anothe
     assert rate("load directions: something else named", one) == 0.0
 
 
-def test_directions_are_named_where_one_joint_loses_much_and_the_others_little() -> None:
-    one = run(("loads:40", 25, 6_201_025))
-    assert [name for name, _target in one["named"]] == ["load_directions"]
+def test_directions_are_likeliest_where_one_joint_loses_much_and_the_others_little() -> None:
+    (name, _target, chance), *_others = run(("loads:40", 25, 6_201_025))["probabilities"]
+    assert (name, chance > 0.8) == ("load_directions", True)
 
 
 def test_readings_smaller_than_a_rate_is_ever_off_are_directions_before_one_scale() -> None:

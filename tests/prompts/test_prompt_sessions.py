@@ -461,7 +461,7 @@ def test_two_windows_on_one_entry_keep_the_answers_of_both(gear: Gear, store: Se
     terminal = Meanwhile([".002", ".003"])
     with pytest.raises(EntryInterruptedError):
         ask_inspection(gear, terminal, SessionStore(store.place), NOTHING, saved=saved)
-    assert "another window has gone on with" in terminal.screen
+    assert "another window has continued" in terminal.screen
     kept = {tuple(read_session(draft).answers.radial_in.values()) for draft in drafts(store)}
     assert kept == {(0.001, 0.007), (0.001, 0.002, 0.003)}
 

@@ -12,10 +12,12 @@ from pathlib import Path
 import pytest
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
-from mlg_troubleshoot.decision.order import latest_of_each_gear, worst_first
+from mlg_troubleshoot.decision.ranking import latest_of_each_gear, worst_first
 from mlg_troubleshoot.errors import OutputError, Problem
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting import ReportProvenance, WrittenReport, batch_document, publish
+from mlg_troubleshoot.reporting.inspection_report import batch_document
+from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.reporting.publish import WrittenReport, publish
 
 from .conftest import FAILURE, SOUND, WORN, Judge, readable, write_reports
 from .test_pdf import opened

@@ -12,8 +12,7 @@ from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.decision.judge_rows import assess
 from mlg_troubleshoot.decision.sentences import rigging_sentence
 from mlg_troubleshoot.errors import Problem
-from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.gear.sources import SourceKind
+from mlg_troubleshoot.gear.gear import Gear, SourceKind
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.units import LengthUnit
 
@@ -264,7 +263,7 @@ def test_a_sound_gear_needs_no_repair(judge: Judge, make: Make) -> None:
 
 def test_unread_joints_are_named_where_they_keep_a_repair_from_being_sure(failure: Made) -> None:
     section = failure.text.replace("\u00a0", " ").split("Repair sets")[1]
-    assert "No set is sure to hold while #1, #2, #4" in section
+    assert "No repair set is certain while #1, #2, #4" in section
 
 
 def test_the_report_says_of_re_rigging_what_the_screen_says(judge: Judge, make: Make) -> None:
@@ -296,7 +295,7 @@ def test_a_sound_gear_measured_outside_is_not_shown_as_within(judge: Judge, make
     text = make(judge(SOUND, readings_in=(0.06,)), formats=("html",)).text.replace("\u00a0", " ")
     assert "WITHIN MARGIN" not in text
     assert "MEASURED: the plunger stands 0.0600 in beyond mid-position, outside its margin" in text
-    assert re.search(r"They cannot explain 0\.0\d+ in", text)
+    assert re.search(r"Not explained by the joints 0\.0\d+ in", text)
 
 
 def test_what_follows_is_the_plan_to_its_end(judge: Judge, failure: Made) -> None:

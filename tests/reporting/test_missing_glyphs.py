@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting import ReportProvenance
 from mlg_troubleshoot.reporting.engine import check_fonts
 from mlg_troubleshoot.reporting.glyphs import font_coverage, missing_characters, spell_out
 from mlg_troubleshoot.reporting.pdf import PdfEngine
+from mlg_troubleshoot.reporting.provenance import ReportProvenance
 
 from .conftest import FAILURE, Judge, Made, write_inspection_report
 from .test_pdf import NOW, opened, page_of, text_of

@@ -22,10 +22,11 @@ import pytest
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.reporting import ReportProvenance, pdf, provenance_of
+from mlg_troubleshoot.reporting import pdf
 from mlg_troubleshoot.reporting.engine import check_fonts
 from mlg_troubleshoot.reporting.glyphs import font_faces
 from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError, sections_of
+from mlg_troubleshoot.reporting.provenance import ReportProvenance, provenance_of
 
 from .conftest import FAILURE, Judge, Made, write_inspection_report
 

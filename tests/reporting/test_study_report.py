@@ -19,7 +19,8 @@ from mlg_troubleshoot.paper.study import (
     run_study,
 )
 from mlg_troubleshoot.paper.worst_search import WorstSearch
-from mlg_troubleshoot.reporting import ReportProvenance, publish
+from mlg_troubleshoot.reporting.provenance import ReportProvenance
+from mlg_troubleshoot.reporting.publish import publish
 from mlg_troubleshoot.reporting.study_report import study_document
 
 from .conftest import readable

@@ -10,8 +10,8 @@ from scipy.stats import norm
 from typer.testing import CliRunner
 
 from mlg_troubleshoot.cli.app import app
-from mlg_troubleshoot.diagnosis.inference import RULED_OUT
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.workflows.separable import _APART, CausePlanned, separable
 
 TWO_JOINTS = ("tail_no", "side", "clearance_3_in", "clearance_5_in")
@@ -81,7 +81,7 @@ def test_causes_that_physics_lets_push_apart_only_are_no_rivals() -> None:
 def test_at_the_stated_distance_the_wrong_cause_is_ruled_out_four_times_in_five() -> None:
     # The difference of the log likelihoods has a mean of half the squared distance, and the
     # distance as its scatter.
-    assert norm.sf(RULED_OUT, _APART**2 / 2.0, _APART) == pytest.approx(0.8, abs=0.001)
+    assert norm.sf(Beliefs().odds, _APART**2 / 2.0, _APART) == pytest.approx(0.8, abs=0.001)
 
 
 def test_what_is_told_apart_is_no_smaller_than_what_is_found() -> None:

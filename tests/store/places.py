@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, RowSource, Side
-from mlg_troubleshoot.store import Kind, Record, inspection_record, packed
+from mlg_troubleshoot.store import Record, RecordKind, inspection_record, packed
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 INSTALLED = (
@@ -53,7 +53,13 @@ def records(first: int, last: int) -> list[Record]:
         found += [
             kept,
             Record(
-                Kind.ASSESSMENT, kept.record_id, kept.tail_no, kept.side, kept.day, body, identity
+                RecordKind.ASSESSMENT,
+                kept.record_id,
+                kept.tail_no,
+                kept.side,
+                kept.day,
+                body,
+                identity,
             ),
         ]
     return found

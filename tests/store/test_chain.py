@@ -14,8 +14,8 @@ import pytest
 from mlg_troubleshoot.decision.inspection import Outcome, Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.store import (
-    Kind,
     Record,
+    RecordKind,
     Store,
     StoreError,
     inspection_from,
@@ -41,7 +41,7 @@ def store(place: Path) -> Store:
 
 
 def kept_inspections(store: Store) -> list[Record]:
-    return [record for record in store.all() if record.kind is Kind.INSPECTION]
+    return [record for record in store.all() if record.kind is RecordKind.INSPECTION]
 
 
 def test_an_inspection_comes_back_as_it_was_kept(store: Store) -> None:
@@ -86,7 +86,8 @@ def test_the_same_identity_with_other_content_is_refused_and_nothing_of_the_call
     other = [*places.records(20, 22), inspection_record(places.inspection(3, clearance_in=0.009))]
     with pytest.raises(StoreError, match=r"R3 \(N3 LH 2026-01-04\).*nothing of this was kept"):
         store.add(
-            other, lambda kept, new: new.kind is not Kind.INSPECTION or same_inspection(kept, new)
+            other,
+            lambda kept, new: new.kind is not RecordKind.INSPECTION or same_inspection(kept, new),
         )
     assert len(store.all()) == 10
 
@@ -237,7 +238,7 @@ def test_a_store_of_each_schema_version_can_be_read_and_added_to(
 
 
 def test_a_repair_kept_twice_is_one(store: Store) -> None:
-    repair = Record(Kind.REPAIR, "", "N1", "LH", "2026-03-01", places.packed({"joints": [3]}))
+    repair = Record(RecordKind.REPAIR, "", "N1", "LH", "2026-03-01", places.packed({"joints": [3]}))
     assert [store.add([repair]).new for _ in range(2)] == [1, 0]
 
 

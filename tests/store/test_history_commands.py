@@ -18,7 +18,7 @@ import scipy.stats
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear import gear_file
 from mlg_troubleshoot.reporting.fleet_report import interval_bar
-from mlg_troubleshoot.store import Kind, Record, Store, inspection_record, packed
+from mlg_troubleshoot.store import Record, RecordKind, Store, inspection_record, packed
 from mlg_troubleshoot.units import ClearanceConvention
 from tests.cli.conftest import Run, mlg, row
 
@@ -78,7 +78,7 @@ def seeded(*visits: tuple[int, float]) -> None:
         }
         found.append(inspection_record(seen))
         found.append(
-            replace(found[-1], kind=Kind.ASSESSMENT, packed=packed(body), identity=(f"{n}",))
+            replace(found[-1], kind=RecordKind.ASSESSMENT, packed=packed(body), identity=(f"{n}",))
         )
     Store().add(found)
 

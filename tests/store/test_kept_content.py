@@ -17,8 +17,8 @@ import pytest
 
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.store import (
-    Kind,
     Record,
+    RecordKind,
     Store,
     StoreError,
     database,
@@ -67,30 +67,33 @@ WRONG_INSPECTIONS = {
         "inspection": {k: v for k, v in SOUND.body["inspection"].items() if k != "tail_no"}
     },
 }
-OTHERS: dict[str, tuple[Kind, Any]] = {
-    "a correction of nothing": (Kind.CORRECTION, with_field()),
-    "an assessment without a result": (Kind.ASSESSMENT, {"verdict": "WITHIN_MARGIN"}),
+OTHERS: dict[str, tuple[RecordKind, Any]] = {
+    "a correction of nothing": (RecordKind.CORRECTION, with_field()),
+    "an assessment without a result": (RecordKind.ASSESSMENT, {"verdict": "WITHIN_MARGIN"}),
     "an assessment with a verdict that is none": (
-        Kind.ASSESSMENT,
+        RecordKind.ASSESSMENT,
         {"result": {**NUMBER, "verdict": "FINE"}},
     ),
     "an assessment with joints that are none": (
-        Kind.ASSESSMENT,
+        RecordKind.ASSESSMENT,
         {"result": {**NUMBER, "joints": [3]}},
     ),
     "an assessment whose advice is a text": (
-        Kind.ASSESSMENT,
+        RecordKind.ASSESSMENT,
         {"result": {**NUMBER, "next_action": "3"}},
     ),
-    "a repair without joints": (Kind.REPAIR, {"landings": None}),
-    "a repair of a joint that is none": (Kind.REPAIR, {"joints": [99], "landings": None}),
-    "a repair of a joint that is true": (Kind.REPAIR, {"joints": [True], "landings": None}),
-    "a repair at endless landings": (Kind.REPAIR, {"joints": [3], "landings": 1e308}),
-    "a re-rigging at endless landings": (Kind.RERIG, {"landings": 1e308}),
-    "a void of nothing": (Kind.VOID, {"why": "x"}),
-    "an outcome without a joint": (Kind.OUTCOME, {"of": "0" * 64, "found": "x"}),
+    "a repair without joints": (RecordKind.REPAIR, {"landings": None}),
+    "a repair of a joint that is none": (RecordKind.REPAIR, {"joints": [99], "landings": None}),
+    "a repair of a joint that is true": (RecordKind.REPAIR, {"joints": [True], "landings": None}),
+    "a repair at endless landings": (RecordKind.REPAIR, {"joints": [3], "landings": 1e308}),
+    "a re-rigging at endless landings": (RecordKind.RERIG, {"landings": 1e308}),
+    "a void of nothing": (RecordKind.VOID, {"why": "x"}),
+    "an outcome without a joint": (RecordKind.OUTCOME, {"of": "0" * 64, "found": "x"}),
 }
-EVIL = {**{name: (Kind.INSPECTION, body) for name, body in WRONG_INSPECTIONS.items()}, **OTHERS}
+EVIL = {
+    **{name: (RecordKind.INSPECTION, body) for name, body in WRONG_INSPECTIONS.items()},
+    **OTHERS,
+}
 
 
 def evil(name: str) -> Record:
@@ -226,7 +229,7 @@ def test_every_kind_of_record_that_the_program_keeps_is_read_again(
         "history", "correct", "W1", places.table(tmp_path, row(record_id="W1", gear_landings="810"))
     )
     mlg("history", "void", "R2", "--why", "another aircraft")
-    assert {record.kind for record in Store(place).all()} == set(Kind)
+    assert {record.kind for record in Store(place).all()} == set(RecordKind)
     assert mlg("history", "verify").code == 0
 
 

@@ -17,10 +17,15 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear_file import load_gear
-from mlg_troubleshoot.store import Kind, Record, Store, inspection_record, packed
+from mlg_troubleshoot.life.folding import life_of, lives
+from mlg_troubleshoot.life.forecast import fit_fleet, forecast
+from mlg_troubleshoot.life.looking_back import side_by_side
+from mlg_troubleshoot.life.unrecorded_work import suggestions
+from mlg_troubleshoot.life.wear_paths import wear_paths
+from mlg_troubleshoot.reporting.life_json import fleet_as_json, life_as_json
+from mlg_troubleshoot.store import Record, RecordKind, Store, inspection_record, packed
 from mlg_troubleshoot.units import ClearanceConvention
 from mlg_troubleshoot.wear import Samples, WearModel, WearPath
-from mlg_troubleshoot.workflows import history as task
 from tests.cli.conftest import mlg, row
 
 View = Callable[[], Mapping[str, Any]]
@@ -227,7 +232,7 @@ def test_a_repair_whose_landings_contradict_the_inspections_is_named(tmp_path: P
 
 def test_a_life_that_contradicts_itself_teaches_the_fleet_nothing(tmp_path: Path) -> None:
     kept(tmp_path, SLIP)
-    assert task.fit_fleet(task.lives(Store()).values(), load_gear()) is None
+    assert fit_fleet(lives(Store()).values(), load_gear()) is None
 
 
 def test_of_two_inspections_neither_is_called_the_right_one(tmp_path: Path) -> None:
@@ -258,7 +263,7 @@ def inspection(n: int, day: str, landings: float | None, worn_in: float = 0.001)
 def test_an_undated_inspection_is_placed_by_its_landings() -> None:
     seen = [("2024-01-01", 100), ("2025-01-01", 900), ("", 400), ("", 1500)]
     Store().add([inspection_record(inspection(n, *each)) for n, each in enumerate(seen)])
-    found = task.life_of(Store(), "N507", "LH")
+    found = life_of(Store(), "N507", "LH")
     assert [each.inspection.gear_landings for each in found.inspections] == [100, 400, 900, 1500]
 
 
@@ -277,20 +282,20 @@ def test_an_undated_inspection_between_others_does_not_repeat_what_was_restored_
         "--landings",
         "500",
     )
-    steps = task.side_by_side(task.life_of(Store(), "N507", "LH"))
-    assert [step["restored"] for step in steps] == [[], [3], [], []]
+    steps = side_by_side(life_of(Store(), "N507", "LH"))
+    assert [step.restored for step in steps] == [(), (3,), (), ()]
 
 
 def test_the_last_four_inspections_stand_side_by_side() -> None:
     add([[inspection(n, f"2024-0{n}-01", 100.0 * n) for n in range(1, 7)]])
-    steps = task.side_by_side(task.life_of(Store(), "N507", "LH"))
-    assert [step["record_id"] for step in steps] == ["R3", "R4", "R5", "R6"]
+    steps = side_by_side(life_of(Store(), "N507", "LH"))
+    assert [step.record_id for step in steps] == ["R3", "R4", "R5", "R6"]
 
 
 def test_the_higher_landings_of_one_date_are_the_later_ones() -> None:
     seen = [("2024-01-01", 802), ("2024-01-01", 800)]
     Store().add([inspection_record(inspection(n, *each)) for n, each in enumerate(seen)])
-    found = task.life_of(Store(), "N507", "LH")
+    found = life_of(Store(), "N507", "LH")
     assert found.latest is not None
     assert found.latest.inspection.gear_landings == 802
     assert found.warnings == ()
@@ -299,7 +304,7 @@ def test_the_higher_landings_of_one_date_are_the_later_ones() -> None:
 def test_a_repair_that_states_no_landings_has_those_of_its_day_between_the_inspections() -> None:
     add([[inspection(1, "2024-01-01", 100.0), inspection(2, "2024-01-21", 300.0)]])
     assert mlg("history", "repair", "N507", "LH", "--joint", "3", "--date", "2024-01-06").code == 0
-    _paths, begun = task.wear_paths(task.life_of(Store(), "N507", "LH"), [3])[3]
+    _paths, begun = wear_paths(life_of(Store(), "N507", "LH"), [3])[3]
     assert begun == pytest.approx(150.0)
 
 
@@ -457,7 +462,7 @@ def suggested(*gears: tuple[float, float], tails: str = "AA", days: str = "11") 
     ]
     add(own)
     model = cast(WearModel, Steady())
-    return task.suggestions(list(task.lives(Store()).values()), model, load_gear("hawker-800xp"))
+    return suggestions(list(lives(Store()).values()), model, load_gear("hawker-800xp"))
 
 
 @pytest.mark.parametrize(("deviations", "told"), [(3.0, 0), (5.0, 1)])
@@ -501,7 +506,7 @@ def assessment(of: Record, verdict: str, basis: str = "PREDICTED") -> Record:
     }
     body = {"result": result, "program_version": "0", "geometry_sha256": "0", "extension": None}
     return replace(
-        of, kind=Kind.ASSESSMENT, packed=packed(body), identity=(of.identity_hash.hex(),)
+        of, kind=RecordKind.ASSESSMENT, packed=packed(body), identity=(of.identity_hash.hex(),)
     )
 
 
@@ -532,18 +537,13 @@ def test_a_gear_that_is_due_now_shows_no_landings_left_in_200_lives() -> None:
             verdict = "OUTSIDE_MARGIN" if outside and each is own[-1] else "WITHIN_MARGIN"
             records.append(assessment(records[-1], verdict, "MEASURED" if n % 2 else "PREDICTED"))
     Store().add(records)
-    gear, lives = load_gear(), task.lives(Store())
-    model = task.fit_fleet(list(lives.values())[:5], gear)
-    fleet = task.fleet_as_json(
-        list(lives.values()), task.forecast(list(lives.values()), model, gear)
-    )["gears"]
-    found = [
-        task.life_as_json(lives[key], task.forecast([lives[key]], model, gear)[key], gear)
-        for key in lives
-    ]
-    assert len(fleet) == len(found) == 200
-    assert max(value for told in (*fleet, *found) for value in shown(told)) == 0.0
-    assert {told["next_inspection_landings"] for told in (*fleet, *found)} == {0.0}
+    gear, found = load_gear(), list(lives(Store()).values())
+    model = fit_fleet(found[:5], gear)
+    fleet = fleet_as_json(found, forecast(found, model, gear))["gears"]
+    pages = [life_as_json(life, forecast([life], model, gear)[life.key], gear) for life in found]
+    assert len(fleet) == len(pages) == 200
+    assert max(value for told in (*fleet, *pages) for value in shown(told)) == 0.0
+    assert {told["next_inspection_landings"] for told in (*fleet, *pages)} == {0.0}
     assert all(line["due_date"] == line["inspection_date"] for line in fleet)
 
 

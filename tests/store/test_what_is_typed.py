@@ -11,9 +11,9 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.life.folding import life_of
 from mlg_troubleshoot.records import made_record_id
 from mlg_troubleshoot.store import Record, Store, inspection_from, inspection_record
-from mlg_troubleshoot.workflows import history
 from tests.cli.conftest import Run, mlg, row
 
 from . import places
@@ -41,7 +41,7 @@ def test_a_side_is_the_same_gear_in_a_flag_and_as_an_argument(place: Path, side:
     assert len(mlg("history", "N1", side, "--no-forecast", "--json").json["events"]) == 4
     assert mlg("history", "repair", "N1", side, "--joint", "3", "--date", "2026-02-01").code == 0
     assert mlg("history", "rerig", "N1", side, "--date", "2026-02-01").code == 0
-    assert history.life_of(Store(place), "N1", side).key == ("N1", "LH")
+    assert life_of(Store(place), "N1", side).key == ("N1", "LH")
 
 
 @pytest.mark.parametrize("side", ["XX", "middle", "", "\udcff"])

@@ -13,7 +13,7 @@ from mlg_troubleshoot.indices.estimators import group_indices
 from mlg_troubleshoot.indices.given_data import given_data_indices
 from mlg_troubleshoot.indices.inputs import DISTRIBUTIONS, Inputs, beyond_margin
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
-from mlg_troubleshoot.paper.statements import Outcome, Statement, check_statements
+from mlg_troubleshoot.paper.statements import ClaimOutcome, Statement, check_statements
 
 
 @pytest.mark.parametrize("distribution", DISTRIBUTIONS)
@@ -119,17 +119,17 @@ def statements(gear: Gear) -> dict[str, Statement]:
 @pytest.mark.parametrize(
     ("words", "outcome"),
     [
-        ("#2, #3, #4 and #5 each", Outcome.HOLDS),
-        ("#1 to #5 together", Outcome.HOLDS),
-        ("convex", Outcome.HOLDS),
-        ("From LHS to CCD", Outcome.READING),
-        ("gives #2 a higher", Outcome.READING),
-        ("near the input", Outcome.HOLDS),
-        ("large enough to be seen", Outcome.FAILS),
+        ("#2, #3, #4 and #5 each", ClaimOutcome.HOLDS),
+        ("#1 to #5 together", ClaimOutcome.HOLDS),
+        ("convex", ClaimOutcome.HOLDS),
+        ("From LHS to CCD", ClaimOutcome.READING),
+        ("gives #2 a higher", ClaimOutcome.READING),
+        ("near the input", ClaimOutcome.HOLDS),
+        ("large enough to be seen", ClaimOutcome.FAILS),
     ],
 )
 def test_a_statement_of_section_4_3_has_its_outcome_on_all_ten_linkages(
-    statements: dict[str, Statement], words: str, outcome: Outcome
+    statements: dict[str, Statement], words: str, outcome: ClaimOutcome
 ) -> None:
     found = [statement for claim, statement in statements.items() if words in claim]
     assert [statement.outcome for statement in found] == [outcome]

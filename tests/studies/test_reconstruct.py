@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 import tomli_w
@@ -46,11 +47,12 @@ def test_a_start_is_polished_until_every_printed_number_is_met_and_most_of_it_st
 def test_a_true_number_that_is_added_narrows_what_is_free(
     gear: Gear, targets: tuple[Target, ...], shifted: Reconstruction
 ) -> None:
-    known = replace(
+    known = msgspec.structs.replace(
         next(t for t in targets if t.measure == "end_rate"),
-        low=2.0,
-        high=2.1,
-        tolerance="2.05 ± 0.05",
+        value=2.05,
+        tolerance=0.05,
+        at_least=None,
+        at_most=None,
         search=True,
     )
     more = reconstruct(
@@ -102,11 +104,11 @@ def test_a_target_that_moves_with_nothing_determines_nothing(
     gear: Gear, targets: tuple[Target, ...]
 ) -> None:
     case = next(t for t in targets if t.clearance_in)
-    nothing = replace(
+    nothing = msgspec.structs.replace(
         case,
         clearance_in=dict.fromkeys(case.clearance_in, 0.0),
-        low=-0.001,
-        high=0.001,
+        value=0.0,
+        tolerance=0.001,
         search=True,
     )
     found = reconstruct(
@@ -119,9 +121,8 @@ def test_a_file_without_numbers_to_search_is_refused(
     gear: Gear, targets: tuple[Target, ...]
 ) -> None:
     with pytest.raises(UsageError):
-        reconstruct(
-            gear, tuple(replace(t, search=False) for t in targets), np.random.default_rng(0), 0
-        )
+        free = tuple(msgspec.structs.replace(t, search=False) for t in targets)
+        reconstruct(gear, free, np.random.default_rng(0), 0)
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ import pytest
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
-from mlg_troubleshoot.paper.study import Design, Directions, StudyOptions, run_study
+from mlg_troubleshoot.paper.study import Directions, StudyDesign, StudyOptions, run_study
 
 
 def test_the_fast_study_agrees_with_the_shipped_table_on_every_joint(
@@ -41,7 +41,9 @@ def test_directions_fixed_by_a_load_need_one_for_each_joint(gear: Gear) -> None:
 
 
 def test_the_papers_design_reports_plain_and_corrected_indices(gear: Gear) -> None:
-    found = run_study(gear, StudyOptions(design=Design.LHS, n1=10, n2=100, iterations=2, workers=1))
+    found = run_study(
+        gear, StudyOptions(design=StudyDesign.LHS, n1=10, n2=100, iterations=2, workers=1)
+    )
     assert found.plain is not None
     assert found.plain.min() > found.table.first_order.min()
     assert "bias" in found.indices.note
@@ -49,13 +51,13 @@ def test_the_papers_design_reports_plain_and_corrected_indices(gear: Gear) -> No
 
 
 def test_a_design_with_composite_points_gives_no_total_order(gear: Gear) -> None:
-    found = run_study(gear, StudyOptions(design=Design.CCD, n1=10, iterations=2))
+    found = run_study(gear, StudyOptions(design=StudyDesign.CCD, n1=10, iterations=2))
     assert np.all(np.isnan(found.table.total_order))
 
 
 def test_a_paper_design_with_random_directions_is_refused(gear: Gear) -> None:
     with pytest.raises(UsageError, match="random"):
-        run_study(gear, StudyOptions(design=Design.LHS, directions=Directions.RANDOM))
+        run_study(gear, StudyOptions(design=StudyDesign.LHS, directions=Directions.RANDOM))
 
 
 def test_limits_at_which_the_linkage_does_not_close_are_shown_and_not_hidden(gear: Gear) -> None:

@@ -13,7 +13,7 @@ from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.surveying.plan import planned, suggested, suggested_early
-from mlg_troubleshoot.surveying.readings import Kind, Reading, SurveyedLinkage
+from mlg_troubleshoot.surveying.readings import ReadingKind, SurveyedLinkage, SurveyReading
 from mlg_troubleshoot.surveying.survey import Fitting, Prior, Survey, fit
 
 FOUR_BAR = Path(__file__).parents[1] / "geometry" / "data" / "four-bar.toml"
@@ -57,10 +57,12 @@ def index_of(numbers: Sequence[float] | np.ndarray) -> float:
     return float(1.0 / (rocker * np.sqrt(1.0 - cosine**2)))
 
 
-def readings_of(places: Sequence[tuple[str, str, float | None]], u: float) -> tuple[Reading, ...]:
+def readings_of(
+    places: Sequence[tuple[str, str, float | None]], u: float
+) -> tuple[SurveyReading, ...]:
     values = four_bar_distances((CRANK, COUPLER, ROCKER, GROUND), TURN)
     return tuple(
-        Reading(Kind.DISTANCE, *place[:2], values[place], u, place[2], row)
+        SurveyReading(ReadingKind.DISTANCE, *place[:2], values[place], u, place[2], row)
         for row, place in enumerate(places, start=2)
     )
 
@@ -180,7 +182,7 @@ SLIDER = (2.1, 5.2, 1.1, 0.05)
 
 def slider_readings(
     numbers: Sequence[float] | np.ndarray,
-) -> dict[tuple[Kind, str, str, float | None], float]:
+) -> dict[tuple[ReadingKind, str, str, float | None], float]:
     """Distances, and positions of the slider from its place at the reference, by the textbook
     formula.
     """
@@ -192,13 +194,13 @@ def slider_readings(
             + np.sqrt(rod**2 - (crank * np.sin(turn + angle) + offset) ** 2)
         )
 
-    found: dict[tuple[Kind, str, str, float | None], float] = {
-        (Kind.DISTANCE, "O2", "A", None): float(crank),
-        (Kind.DISTANCE, "A", "C", None): float(rod),
+    found: dict[tuple[ReadingKind, str, str, float | None], float] = {
+        (ReadingKind.DISTANCE, "O2", "A", None): float(crank),
+        (ReadingKind.DISTANCE, "A", "C", None): float(rod),
     }
     for angle in (0.25, 0.5, 0.75, 1.0):
-        found[Kind.DISTANCE, "O2", "C", angle] = float(np.hypot(place(angle), offset))
-        found[Kind.PLUNGER, "", "", angle] = place(angle) - place(0.0)
+        found[ReadingKind.DISTANCE, "O2", "C", angle] = float(np.hypot(place(angle), offset))
+        found[ReadingKind.PLUNGER, "", "", angle] = place(angle) - place(0.0)
     return found
 
 
@@ -211,10 +213,10 @@ def secant(numbers: Sequence[float] | np.ndarray) -> float:
 
 
 def test_the_slider_crank_has_the_amplification_and_the_uncertainty_of_its_closed_form() -> None:
-    u = {Kind.DISTANCE: 2e-3, Kind.PLUNGER: 5e-4}
+    u = {ReadingKind.DISTANCE: 2e-3, ReadingKind.PLUNGER: 5e-4}
     values = slider_readings(SLIDER)
     readings = tuple(
-        Reading(kind, a, b, value, u[kind], at, row, driven_in="rad")
+        SurveyReading(kind, a, b, value, u[kind], at, row, driven_in="rad")
         for row, ((kind, a, b, at), value) in enumerate(values.items(), start=2)
     )
     found = fit(load_gear(SLIDER_CRANK), readings, np.random.default_rng(0))
@@ -242,7 +244,7 @@ def linkage_between(linkage: SurveyedLinkage, first: int, second: int, share: fl
 
 
 @pytest.fixture(scope="module")
-def plan(gear: Gear) -> tuple[tuple[Reading, bool], ...]:
+def plan(gear: Gear) -> tuple[tuple[SurveyReading, bool], ...]:
     return planned(gear)
 
 
@@ -253,8 +255,8 @@ def truth(gear: Gear) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def read(
-    gear: Gear, truth: np.ndarray, plan: tuple[tuple[Reading, bool], ...]
-) -> tuple[Reading, ...]:
+    gear: Gear, truth: np.ndarray, plan: tuple[tuple[SurveyReading, bool], ...]
+) -> tuple[SurveyReading, ...]:
     """A full survey of a linkage, with the noise that it states."""
     linkage, rng = SurveyedLinkage(gear), np.random.default_rng(3)
     reach = truth[linkage.names.index("extension")] / gear.reference.stroke[1]
@@ -271,7 +273,7 @@ def read(
 
 
 def test_a_fit_that_is_held_up_is_freed_by_fitting_again_from_around_it(
-    gear: Gear, read: tuple[Reading, ...]
+    gear: Gear, read: tuple[SurveyReading, ...]
 ) -> None:
     linkage = SurveyedLinkage(gear)
     prior = Prior(linkage)
@@ -285,10 +287,12 @@ def test_a_fit_that_is_held_up_is_freed_by_fitting_again_from_around_it(
 
 @pytest.fixture(scope="module")
 def slipped(
-    gear: Gear, read: tuple[Reading, ...], plan: tuple[tuple[Reading, bool], ...]
+    gear: Gear, read: tuple[SurveyReading, ...], plan: tuple[tuple[SurveyReading, bool], ...]
 ) -> tuple[Survey, int]:
     """A full survey in which one distance was read in millimetres and entered as inches."""
-    place = next(i for i, (r, checked) in enumerate(plan) if checked and r.kind is Kind.DISTANCE)
+    place = next(
+        i for i, (r, checked) in enumerate(plan) if checked and r.kind is ReadingKind.DISTANCE
+    )
     slip = replace(read[place], value=read[place].value * 25.4)
     row = slip.row
     assert row is not None
@@ -313,7 +317,9 @@ def test_the_slip_alone_is_named_with_the_unit_that_would_fit(slipped: tuple[Sur
     assert not found.contradicts
 
 
-def named(gear: Gear, read: tuple[Reading, ...], wrong: dict[int, float]) -> dict[int | None, str]:
+def named(
+    gear: Gear, read: tuple[SurveyReading, ...], wrong: dict[int, float]
+) -> dict[int | None, str]:
     """What a survey says of each misfit, with other values in these rows."""
     rows = tuple(replace(r, value=wrong.get(r.row or 0, r.value)) for r in read)
     return {m.reading.row: m.suggestion for m in fit(gear, rows, np.random.default_rng(1)).misfits}
@@ -321,7 +327,7 @@ def named(gear: Gear, read: tuple[Reading, ...], wrong: dict[int, float]) -> dic
 
 @pytest.mark.parametrize(("one", "other"), [(29, 33), (24, 30)])
 def test_a_swapped_pair_in_a_full_survey_is_named_and_nothing_else(
-    gear: Gear, read: tuple[Reading, ...], one: int, other: int
+    gear: Gear, read: tuple[SurveyReading, ...], one: int, other: int
 ) -> None:
     value = {r.row: r.value for r in read}
     found = named(gear, read, {one: value[other], other: value[one]})
@@ -348,7 +354,7 @@ def test_every_draw_moves_over_the_whole_stroke(slipped: tuple[Survey, int]) -> 
 
 
 def test_a_few_readings_leave_many_linkages_all_of_which_move(
-    gear: Gear, read: tuple[Reading, ...]
+    gear: Gear, read: tuple[SurveyReading, ...]
 ) -> None:
     found = fit(gear, read[:7], np.random.default_rng(1))
     assert found.misfits == ()
@@ -363,7 +369,7 @@ def test_predictions_in_a_batch_are_those_of_the_calibrated_linkage(gear: Gear) 
     models = gear.ensemble_models[:4]
     indices = np.array([m.plunger_amplification() for m in models])
     assert linkage.amplification(vectors) == pytest.approx(indices, rel=1e-4)
-    reading = (Reading(Kind.PLUNGER, extension=0.3),)
+    reading = (SurveyReading(ReadingKind.PLUNGER, extension=0.3),)
     moved = [float(m.plunger(0.3) - m.plunger(m.stroke[1])) for m in models]
     assert linkage.predicted(reading, vectors)[:, 0] == pytest.approx(moved, abs=1e-4)
 
@@ -377,10 +383,18 @@ def test_a_displacement_in_a_batch_is_the_worst_of_the_calibrated_linkage(gear: 
 
 
 def test_the_template_reads_what_narrows_the_indices_and_says_what_nothing_checks(
-    plan: tuple[tuple[Reading, bool], ...],
+    plan: tuple[tuple[SurveyReading, bool], ...],
 ) -> None:
     kinds = [r.kind for r, _ in plan]
-    assert [kinds.count(k) for k in (Kind.DISTANCE, Kind.ANGLE, Kind.EXTENSION, Kind.PLUNGER)] == [
+    assert [
+        kinds.count(k)
+        for k in (
+            ReadingKind.DISTANCE,
+            ReadingKind.ANGLE,
+            ReadingKind.EXTENSION,
+            ReadingKind.PLUNGER,
+        )
+    ] == [
         24,
         3,
         1,
@@ -396,7 +410,7 @@ def test_the_next_reading_is_the_one_that_tells_most(four_bar: Gear) -> None:
     drawn = linkage.vector(four_bar.reference) + 0.1 * rng.standard_normal(
         (300, len(linkage.names))
     )
-    length = linkage.predicted((Reading(Kind.DISTANCE, "A", "B"),), drawn)
+    length = linkage.predicted((SurveyReading(ReadingKind.DISTANCE, "A", "B"),), drawn)
     found = suggested(linkage, drawn, length, ())
     assert found is not None
     assert {found.reading.start, found.reading.end} == {"A", "B"}
@@ -404,12 +418,12 @@ def test_the_next_reading_is_the_one_that_tells_most(four_bar: Gear) -> None:
 
 
 def test_following_the_next_reading_from_an_empty_survey_tells_more_than_the_template_s_order(
-    gear: Gear, truth: np.ndarray, plan: tuple[tuple[Reading, bool], ...]
+    gear: Gear, truth: np.ndarray, plan: tuple[tuple[SurveyReading, bool], ...]
 ) -> None:
     linkage = SurveyedLinkage(gear)
     root = Prior(linkage).root
 
-    def left_open(readings: tuple[Reading, ...]) -> float:
+    def left_open(readings: tuple[SurveyReading, ...]) -> float:
         """Variances of the logarithms of the indices, added, by the linear estimate at the true
         linkage.
         """
@@ -421,7 +435,7 @@ def test_following_the_next_reading_from_an_empty_survey_tells_more_than_the_tem
             np.trace(wanted @ np.linalg.inv(np.eye(len(root)) + slopes.T @ slopes) @ wanted.T)
         )
 
-    asked: tuple[Reading, ...] = ()
+    asked: tuple[SurveyReading, ...] = ()
     while len(asked) < 12:
         found = suggested_early(linkage, asked, linkage.amplification)
         assert found is not None

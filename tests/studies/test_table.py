@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -18,7 +19,7 @@ from mlg_troubleshoot.indices.index_table import (
     ranks,
     write_index_table,
 )
-from mlg_troubleshoot.paper.study import Design, StudyOptions, run_study
+from mlg_troubleshoot.paper.study import StudyDesign, StudyOptions, run_study
 
 
 @pytest.fixture
@@ -34,10 +35,10 @@ def _changed(gear: Gear, **values: object) -> None:
 
 
 def test_the_shipped_table_is_what_the_study_gives(gear: Gear, table: IndexTable) -> None:
-    again = run_study(gear, StudyOptions(design=Design.TENSOR)).table
+    again = run_study(gear, StudyOptions(design=StudyDesign.TENSOR)).table
     assert again.first_order == pytest.approx(table.first_order, abs=1e-10)
     assert again.total_order == pytest.approx(table.total_order, abs=1e-10)
-    assert replace(again, joints=()) == replace(table, joints=())
+    assert msgspec.structs.replace(again, joints=()) == msgspec.structs.replace(table, joints=())
 
 
 def test_a_written_table_reads_back(elsewhere: Gear, table: IndexTable) -> None:

@@ -9,8 +9,14 @@ import pytest
 from scipy import stats
 
 from mlg_troubleshoot.wear import Samples, WearPath
-from mlg_troubleshoot.wear.filtering import Draws, State, follow
-from mlg_troubleshoot.wear.model import _Ends, _gamma_passage, _integrated_passage, _wiener_passage
+from mlg_troubleshoot.wear.filtering import Draws, FilterState, follow
+from mlg_troubleshoot.wear.model import _Ends
+from mlg_troubleshoot.wear.passage import (
+    first_passage,
+    gamma_passage,
+    integrated_passage,
+    wiener_passage,
+)
 from mlg_troubleshoot.wear.paths import Scale, grid_step, lay_out
 from mlg_troubleshoot.wear.posterior import members
 
@@ -75,19 +81,19 @@ def test_a_longer_unit_beside_it_changes_nothing_for_a_unit() -> None:
 
 def test_a_wiener_path_passes_when_the_inverse_gaussian_distribution_says() -> None:
     away, drift, sd = (np.full((20_000, 1, 1), v) for v in (0.8, 0.5, 0.6))
-    times = _wiener_passage(away, drift, sd, np.random.default_rng(1)).ravel()
+    times = wiener_passage(away, drift, sd, np.random.default_rng(1)).ravel()
     mean, shape = 0.8 / 0.5, (0.8 / 0.6) ** 2
     assert stats.kstest(times, stats.invgauss(mean / shape, scale=shape).cdf).pvalue > 0.01
 
 
 def test_against_its_drift_a_wiener_path_passes_with_the_known_chance() -> None:
     away, drift, sd = (np.full((20_000, 1, 1), v) for v in (0.3, -0.5, 0.6))
-    times = _wiener_passage(away, drift, sd, np.random.default_rng(1))
+    times = wiener_passage(away, drift, sd, np.random.default_rng(1))
     assert np.isfinite(times).mean() == pytest.approx(np.exp(-2.0 * 0.3 * 0.5 / 0.36), abs=0.015)
 
 
 def test_a_gamma_path_passes_when_the_gamma_distribution_says() -> None:
-    shapes = _gamma_passage(np.full(20_000, 6.0), np.random.default_rng(1))
+    shapes = gamma_passage(np.full(20_000, 6.0), np.random.default_rng(1))
     for q in (0.05, 0.5, 0.95):
         # Passed by shape k: a gamma variable of that shape is above 6.
         assert stats.gamma(np.quantile(shapes, q)).sf(6.0) == pytest.approx(q, abs=0.015)
@@ -95,7 +101,7 @@ def test_a_gamma_path_passes_when_the_gamma_distribution_says() -> None:
 
 def test_a_wandering_drift_passes_when_fine_simulated_steps_do() -> None:
     away, drift, sd = (np.full((4000, 1, 1), v) for v in (0.8, 0.5, 0.4))
-    times = _integrated_passage(away, drift, sd, np.random.default_rng(1)).ravel()
+    times = integrated_passage(away, drift, sd, np.random.default_rng(1)).ravel()
     rng, dt = np.random.default_rng(2), 0.01
     rate = 0.5 + 0.4 * np.cumsum(np.sqrt(dt) * rng.standard_normal((4000, 1500)), axis=1)
     over = np.cumsum(rate * dt, axis=1) >= 0.8
@@ -128,7 +134,7 @@ def test_gamma_increments_scatter_as_simulated_ones_whose_drift_is_not_known() -
 
 def test_level_and_drift_are_sampled_together() -> None:
     one = np.ones((1, 1))
-    state = State(one, one, one, 0.8 * one, one)
+    state = FilterState(one, one, one, 0.8 * one, one)
     ends = _Ends.drawn(parameters(), state, 200_000, np.random.default_rng(1))
     assert np.cov(ends.level.ravel(), ends.drift.ravel()) == pytest.approx(
         np.array([[1.0, 0.8], [0.8, 1.0]]), abs=0.02
@@ -138,7 +144,9 @@ def test_level_and_drift_are_sampled_together() -> None:
 def test_beyond_what_any_unit_has_reached_the_pace_is_a_quarter_uncertain() -> None:
     zero, one = np.zeros((1, 1)), np.ones((1, 1))
     sharp = parameters(increment_sd=0.0, power=1.0)
-    ends = _Ends.drawn(sharp, State(one, one, zero, zero, zero), 50_000, np.random.default_rng(1))
+    ends = _Ends.drawn(
+        sharp, FilterState(one, one, zero, zero, zero), 50_000, np.random.default_rng(1)
+    )
     rng = np.random.default_rng(2)
     found = ends.follow(
         np.array([[1.0, 3.0]]), np.array([0.5]), np.array([0.0]), rng, reading=False
@@ -215,3 +223,14 @@ def test_quantiles_of_samples_are_those_of_numpy() -> None:
     assert Samples(samples).quantile(chances) == pytest.approx(
         np.quantile(samples, chances, axis=1).T
     )
+
+
+def test_a_simulated_path_passes_a_limit_between_two_usages_in_proportion_or_never() -> None:
+    paths = np.array([[0.0, 5.0, 0.0], [2.0, 6.0, 0.5], [4.0, 7.0, 1.0]])
+    passed = first_passage(np.array([0.0, 100.0, 300.0]), paths, 3.0)
+    assert passed.tolist() == [200.0, 0.0, np.inf]
+
+
+def test_a_path_without_a_finite_level_passes_at_the_usage_where_it_is_lost() -> None:
+    paths = np.array([[0.0], [1.0], [np.inf]])
+    assert first_passage(np.array([0.0, 100.0, 300.0]), paths, 3.0).tolist() == [300.0]

@@ -9,6 +9,18 @@ from datetime import datetime, timedelta
 from types import MappingProxyType
 
 from mlg_troubleshoot.cli.prompts.lines import Line, Tone, line
+from mlg_troubleshoot.decision.columns import (
+    CLEARANCE,
+    COLUMNS,
+    CONVENTION,
+    MARGIN,
+    OUTCOME,
+    PLUNGER_DISPLACEMENT,
+    RECORD_ID,
+    SIDE,
+    SMALL_READINGS_TRUE,
+    TAIL_NO,
+)
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
@@ -16,14 +28,17 @@ from mlg_troubleshoot.units import (
     MINUS,
     ClearanceConvention,
     LengthUnit,
+    Sentence,
     WrittenLength,
     parse_length,
 )
 
 # Columns that an entry may have in addition to its heading and its clearances, in the order in
 # which they are shown.
-LENGTHS = ("plunger_displacement", "margin")
-SIGN_OFF = ("technician_id", "work_order", "gauge_id", "inspection_date")
+LENGTHS = (PLUNGER_DISPLACEMENT.name, MARGIN.name)
+_SIGNED = sorted((column for column in COLUMNS if column.sign_off), key=lambda c: c.sign_off)
+SIGN_OFF = tuple(column.name for column in _SIGNED)
+# What was repaired and what the day allows, by the letters that are typed for it.
 DAY = {
     "n": "restored_joints",
     "g": "rigging_checked",
@@ -32,10 +47,10 @@ DAY = {
     "o": "open_areas",
     "t": "minutes_available",
 }
-_DATES = {"outcome": "outcome_date", "plunger_displacement": "plunger_date"}
+_DATES = {OUTCOME.name: "outcome_date", PLUNGER_DISPLACEMENT.name: "plunger_date"}
 MORE = (
-    *("outcome", *LENGTHS, *DAY.values(), "repair_date", *_DATES.values()),
-    *(*SIGN_OFF, "small_readings_true"),
+    *(OUTCOME.name, *LENGTHS, *DAY.values(), "repair_date", *_DATES.values()),
+    *(*SIGN_OFF, SMALL_READINGS_TRUE.name),
 )
 
 
@@ -140,16 +155,16 @@ class Answers:
     def _row(self, gear: Gear, record_id: str) -> dict[str, object]:
         """The answers as the cells of a row."""
         values: dict[str, object] = {
-            "record_id": self.record_id or record_id,
-            "tail_no": self.tail_no,
-            "side": self.side,
-            "clearance_convention": self.convention,
+            RECORD_ID.name: self.record_id or record_id,
+            TAIL_NO.name: self.tail_no,
+            SIDE.name: self.side,
+            CONVENTION.name: self.convention,
             **self.more,
         }
         for number in gear.joint_numbers:
             reading = self.reading(number)
             if reading is not None:
-                values[f"clearance_{number}_{reading.unit}"] = reading.written.text
+                values[CLEARANCE.header(number, reading.unit)] = reading.written.text
         return values
 
 
@@ -173,7 +188,7 @@ class Reading:
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class JudgedReading:
     """What the gate says of a reading, empty if nothing, and the number it takes; what it said is
     to be confirmed.
     """
@@ -185,21 +200,21 @@ class Judged:
 
 def judge(
     typed: str, number: int, unit: LengthUnit, convention: ClearanceConvention, gear: Gear
-) -> Judged:
+) -> JudgedReading:
     """Let the gate that judges the cells of tables say whether a reading is taken, asked again or
     refused.
     """
     from mlg_troubleshoot.records import ReadOptions, judge_length
 
     options = ReadOptions.of(gear, unit=unit, convention=convention, asks=True)
-    read, problems = judge_length(f"clearance_{number}", typed, options)
+    read, problems = judge_length(CLEARANCE.header(number), typed, options)
     if problems or not isinstance(read, Inspection):
-        return Judged(
+        return JudgedReading(
             " ".join(f"expected {p.expected}. {p.remedy}" for p in problems), refused=True
         )
     if number not in read.entered:
-        return Judged()
-    return Judged(" ".join(read.warnings), parse_length(read.entered[number].text))
+        return JudgedReading()
+    return JudgedReading(Sentence.joined(read.warnings), parse_length(read.entered[number].text))
 
 
 def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> Inspection:
@@ -320,9 +335,9 @@ def read_more(answers: Answers, typed: str, gear: Gear) -> tuple[Answers, tuple[
 
 
 def plunger_in(answers: Answers, gear: Gear) -> float | None:
-    typed = answers.more.get("plunger_displacement")
+    typed = answers.more.get(PLUNGER_DISPLACEMENT.name)
     return (
         None
         if typed is None
-        else judge_more("plunger_displacement", typed, answers.unit, gear).readings_in[0]
+        else judge_more(PLUNGER_DISPLACEMENT.name, typed, answers.unit, gear).readings_in[0]
     )

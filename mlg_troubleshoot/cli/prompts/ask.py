@@ -117,7 +117,7 @@ def ask_inspection(
     advice: Advice | None = None,
     now: Callable[[], datetime] = datetime.now,
 ) -> Entry:
-    """Ask for one inspection, joint by joint; a saved one is gone on with, or corrected from its
+    """Ask for one inspection, joint by joint; a saved one is continued, or corrected from its
     review.
     """
     if given.tail_no is not None and not (given.tail_no.strip() and given.tail_no.isprintable()):

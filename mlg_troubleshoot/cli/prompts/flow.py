@@ -27,6 +27,7 @@ from mlg_troubleshoot.cli.prompts.answers import (
 from mlg_troubleshoot.cli.prompts.conversation import Effect, Page, Turn, again
 from mlg_troubleshoot.cli.prompts.lines import Line, Tone, line
 from mlg_troubleshoot.cli.prompts.store import Session
+from mlg_troubleshoot.decision.columns import DATE, PLUNGER_DISPLACEMENT
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.directions import worst_case
@@ -308,8 +309,8 @@ class Flow:
         except UsageError as error:
             return again(state, f"{error.message}. {error.remedy}")
         stands = plunger_in(answers, self.gear)
-        new = answers.more.get("plunger_displacement") != state.answers.more.get(
-            "plunger_displacement"
+        new = answers.more.get(PLUNGER_DISPLACEMENT.name) != state.answers.more.get(
+            PLUNGER_DISPLACEMENT.name
         )
         if new and stands is not None and abs(stands) > self._most_in:
             return Turn(replace(state, ask=Ask.CONFIRM_MORE, pending=answers), told)
@@ -338,7 +339,7 @@ class Flow:
         column, answers = str(state.at), state.answers
         if (
             not typed
-            and column == "inspection_date"
+            and column == DATE.name
             and column not in answers.more
             and self.today is not None
         ):

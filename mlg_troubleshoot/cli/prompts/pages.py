@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from datetime import date
 
-from mlg_troubleshoot.cli.prompts.answers import DAY, Answers, Reading, judge
+from mlg_troubleshoot.cli.prompts.answers import DAY, SIGN_OFF, Answers, Reading, judge
 from mlg_troubleshoot.cli.prompts.conversation import Page
 from mlg_troubleshoot.cli.prompts.lines import BLANK, Line, Tone, keys, line
 from mlg_troubleshoot.cli.prompts.sketch import sketch
 from mlg_troubleshoot.cli.prompts.store import Session
+from mlg_troubleshoot.decision.columns import BY_NAME, DATE, MARGIN, PLUNGER_DISPLACEMENT
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, in_unit
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, said_in
 
 CONVENTION_NAMES = {
     convention: convention.lower().replace("_", " ") for convention in ClearanceConvention
@@ -35,7 +36,7 @@ JOINT_KEYS = keys(
 )
 FACTOR_TWO = line(
     ("DIAMETRAL and TOTAL PLAY are twice RADIAL. ", Tone.WARN),
-    "The wrong one is wrong by a factor of 2 and can turn the verdict around.",
+    "The wrong one is off by a factor of 2 and can reverse the verdict.",
 )
 
 
@@ -187,10 +188,11 @@ def confirm_page(gear: Gear, reading: Reading, number: int, unit: LengthUnit | N
     above = f"is far beyond the limit of {length(joint.limit.value, unit)}"
     below = f"is less than new parts have ({length(joint.new_part.value, unit)})"
     what = above if joint.is_over_limit(reading.radial_in) else below
-    said = judge(reading.written.text, number, reading.unit, reading.convention, gear).said
+    judged = judge(reading.written.text, number, reading.unit, reading.convention, gear)
+    said = said_in(judged.said, reading.unit)
     shown = (
         line((f"#{number}  {length(reading.radial_in, unit)} radial {what}.", Tone.WARN)),
-        line(in_unit(f"{said[:1].upper()}{said[1:]}", reading.unit), indent=3),
+        line(f"{said[:1].upper()}{said[1:]}", indent=3),
         choice(
             "y",
             f"yes, it is really {length(reading.as_read_in, unit)}"
@@ -291,13 +293,13 @@ def more_page(answers: Answers, gear: Gear, width: int) -> Page:
             "p",
             plunger,
             "plunger off mid-position, + over-travel",
-            answers.more.get("plunger_displacement"),
+            answers.more.get(PLUNGER_DISPLACEMENT.name),
         ),
         row(
             "m",
             margin,
             f"this gear's own margin, else {length(gear.margin.value, unit)}",
-            answers.more.get("margin"),
+            answers.more.get(MARGIN.name),
         ),
         *(
             row(key, example, meaning, answers.more.get(DAY[key]))
@@ -323,14 +325,14 @@ def confirm_more_page(most_in: float, unit: LengthUnit | None) -> Page:
                 Tone.WARN,
             )
         ),
-        line(("y", Tone.KEY), " yes, it was read so   ", ("n", Tone.KEY), " no", indent=3),
+        line(("y", Tone.KEY), " yes, that is the reading   ", ("n", Tone.KEY), " no", indent=3),
     )
     return Page(shown, " y, n, or p with the displacement again > ")
 
 
 CONFIRM_UNIT_HELP = (
     line(
-        "A pin hardly has less play than in new parts. The unit of the numbers may be another one.",
+        "Even new parts have more play than this. The unit of the numbers may be another one.",
         indent=3,
     ),
     line(
@@ -351,21 +353,10 @@ def confirm_unit_page(answers: Answers, question: str) -> Page:
 
 
 # What stands on the sign-off page: the word that leads back to it from the review, and its column.
-DETAILS = {
-    "name": "technician_id",
-    "order": "work_order",
-    "gauge": "gauge_id",
-    "date": "inspection_date",
-}
-_DETAIL_PROMPTS = {
-    "technician_id": "Measured by",
-    "work_order": "Work order",
-    "gauge_id": "Gauge",
-    "inspection_date": "Date of the inspection",
-}
+DETAILS = {BY_NAME[name].prompt_word: name for name in SIGN_OFF}
 DETAIL_HELP = (
     line(
-        "Printed on the sign-off page of the report. Enter leaves it empty; x takes it away.",
+        "Printed on the sign-off page of the report. Enter leaves it empty; x removes it.",
         indent=3,
     ),
     line("A date as 2026-03-04 or 4-Mar-2026.", indent=3),
@@ -375,9 +366,9 @@ DETAIL_HELP = (
 def detail_page(answers: Answers, column: str, today: date | None) -> Page:
     kept = answers.more.get(column)
     enter = _keeps(kept) or " (Enter: not stated)"
-    if kept is None and column == "inspection_date" and today is not None:
+    if kept is None and column == DATE.name and today is not None:
         enter = f" (Enter: {today.isoformat()})"
-    return Page((), f" {_DETAIL_PROMPTS[column]}{enter} > ")
+    return Page((), f" {BY_NAME[column].prompt}{enter} > ")
 
 
 MORE_HELP = (
@@ -394,7 +385,7 @@ MORE_HELP = (
         "n: they are as after the repair. What you type after n is later: p, f and r count again.",
         indent=3,
     ),
-    line("All on one line is fine: f p .041 m .028 n 3 5. x takes all of them away.", indent=3),
+    line("All on one line is fine: f p .041 m .028 n 3 5. x removes them all.", indent=3),
 )
 
 

@@ -7,22 +7,25 @@ from __future__ import annotations
 import json
 import os
 import secrets
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
+
+import msgspec
 
 from mlg_troubleshoot.cli.prompts.answers import MORE, NOT_MEASURED, Answers, JointAnswer
+from mlg_troubleshoot.datafile import walk
+from mlg_troubleshoot.decision.columns import MARGIN, PLUNGER_DISPLACEMENT
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import OutputError, TroubleshootError, UsageError
 from mlg_troubleshoot.store import Draft, Drafts, Store, own_file
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, parse_length
 
-_SCHEMA = 2
+_SCHEMA: Literal[2] = 2
 _KEPT_COMPLETE = 20
 # How long an answer waits for another writer before the next question comes. [s]
 _PATIENCE_S = 3
@@ -37,7 +40,7 @@ class DamagedSessionError(SessionFileError):
 
 
 class SessionTakenError(TroubleshootError):
-    """A session that another run has gone on with since this one read or wrote it."""
+    """A session that another run has continued since this one read or wrote it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,8 +100,8 @@ class SessionStore:
             raise OutputError(f"answers cannot be saved: {error.message}", error.remedy) from error
         if not saved:
             raise SessionTakenError(
-                f"another window has gone on with {session.id}",
-                "This entry goes on as one of its own.",
+                f"another window has continued {session.id}",
+                "This entry continues as a separate one.",
             )
         return ours
 
@@ -193,8 +196,11 @@ def read_session(draft: Draft) -> Session:
     try:
         session = replace(_from_json(raw), writer=draft.writer, complete=draft.complete)
         if session.id != draft.id:
-            raise ValueError(f"it holds the session {session.id!r}")
-    except (KeyError, TypeError, ValueError, OverflowError, AttributeError, UsageError) as error:
+            raise ValueError(f"it contains the session {session.id!r}")
+    except (
+        *(KeyError, TypeError, ValueError, OverflowError, AttributeError),
+        *(UsageError, msgspec.ValidationError),
+    ) as error:
         raise _damaged(draft.id, f"{type(error).__name__}: {error}") from error
     return session
 
@@ -206,73 +212,85 @@ def _damaged(session_id: str, why: str) -> DamagedSessionError:
     )
 
 
+class JointDraft(msgspec.Struct, frozen=True):
+    """What was answered for a joint; an answer that it was not measured has no text."""
+
+    text: str
+    unit: LengthUnit | None
+    confirmed: bool
+
+
+class EntryDraft(msgspec.Struct, frozen=True):
+    """An entry as the store holds it; what was not answered yet is null."""
+
+    schema_version: Literal[2]
+    program: str
+    id: str
+    gear: str
+    started: datetime
+    record_id: str | None
+    tail_no: str | None
+    side: Side | None
+    unit: LengthUnit | None
+    convention: ClearanceConvention | None
+    joints: dict[int, JointDraft | None]
+    more: dict[str, str | None]
+
+
 def _as_json(session: Session) -> dict[str, Any]:
-    joints = sorted(session.answers.joints.items())
-    return {
-        "schema_version": _SCHEMA,
-        "program": version("mlg-troubleshoot"),
-        "id": session.id,
-        "gear": session.gear_id,
-        "started": session.started.isoformat(timespec="seconds"),
-        **{name: getattr(session.answers, name) for name in _HEADING},
-        "joints": {str(number): _joint_as_json(answer) for number, answer in joints},
-        "more": dict(session.answers.more),
-    }
-
-
-def _joint_as_json(answer: JointAnswer) -> dict[str, Any] | None:
-    written = answer.written
-    return (
-        None
-        if written is None
-        else {"text": written.text, "unit": written.unit, "confirmed": answer.confirmed}
+    answers = session.answers
+    joints: dict[int, JointDraft | None] = {}
+    for number, answer in sorted(answers.joints.items()):
+        w = answer.written
+        joints[number] = None if w is None else JointDraft(w.text, w.unit, answer.confirmed)
+    draft = EntryDraft(
+        _SCHEMA,
+        version("mlg-troubleshoot"),
+        session.id,
+        session.gear_id,
+        session.started.replace(microsecond=0),
+        answers.record_id,
+        answers.tail_no,
+        answers.side,
+        answers.unit,
+        answers.convention,
+        joints,
+        dict(answers.more),
     )
+    plain: dict[str, Any] = msgspec.to_builtins(draft, str_keys=True)
+    return plain
 
 
 def _from_json(raw: Any) -> Session:
     if raw["schema_version"] == 1:
-        lengths = {"plunger_displacement": raw["plunger_in"], "margin": raw["margin_in"]}
+        lengths = {PLUNGER_DISPLACEMENT.name: raw["plunger_in"], MARGIN.name: raw["margin_in"]}
         more = {
             "outcome": raw["outcome"],
             **{n: f"{float(v)!r} in" for n, v in lengths.items() if v is not None},
         }
-    elif raw["schema_version"] == _SCHEMA:
-        more = dict(raw["more"])
-    else:
-        raise ValueError(f"schema_version {_SCHEMA} was expected")
-    if not set(more) <= set(MORE):
-        raise ValueError(f"{sorted(set(more) - set(MORE))[0]!r} is not a column of an entry")
-    heading: dict[str, Any] = {
-        n: None if raw[n] is None else read(raw[n]) for n, read in _HEADING.items()
-    }
+        raw = {"program": "", **raw, "schema_version": _SCHEMA, "more": more}
+    for _, value in walk(raw):
+        if isinstance(value, str) and not value.isprintable():
+            raise TypeError(f"{value!r} is not a text")
+    draft = msgspec.convert(raw, EntryDraft, str_keys=True)
+    if not set(draft.more) <= set(MORE):
+        raise ValueError(f"{sorted(set(draft.more) - set(MORE))[0]!r} is not a column of an entry")
+    joints = MappingProxyType({n: _answer(joint) for n, joint in draft.joints.items()})
     answers = Answers(
-        **heading,
-        joints=MappingProxyType(
-            {int(n): _joint_from_json(answer) for n, answer in dict(raw["joints"]).items()}
-        ),
-    ).with_more(**{name: _text(text) for name, text in more.items()})
-    started = datetime.fromisoformat(raw["started"])
-    return Session(_text(raw["id"]) or "", _text(raw["gear"]) or "", started, answers)
+        record_id=draft.record_id,
+        tail_no=draft.tail_no,
+        side=draft.side,
+        unit=draft.unit,
+        convention=draft.convention,
+        joints=joints,
+    ).with_more(**draft.more)
+    return Session(draft.id, draft.gear, draft.started, answers)
 
 
-def _joint_from_json(raw: Any) -> JointAnswer:
-    if raw is None:
+def _answer(draft: JointDraft | None) -> JointAnswer:
+    if draft is None:
         return NOT_MEASURED
-    written = parse_length(str(_text(raw["text"])))
-    unit = None if raw["unit"] is None else LengthUnit(raw["unit"])
-    if written.unit not in (None, unit):
-        raise ValueError(f"{written.text!r} does not agree with its unit {unit}")
-    return JointAnswer(replace(written, unit=unit), bool(raw["confirmed"]))
-
-
-def _text(raw: Any) -> str | None:
-    if raw is not None and not (isinstance(raw, str) and raw.isprintable()):
-        raise TypeError(f"{raw!r} is not a text")
-    return raw
-
-
-# The heading of an entry: a text or a choice, or nothing yet.
-_HEADING: dict[str, Callable[[Any], Any]] = {
-    **dict.fromkeys(("record_id", "tail_no"), _text),
-    **{"side": Side, "unit": LengthUnit, "convention": ClearanceConvention},
-}
+    written = parse_length(draft.text)
+    if written.unit not in (None, draft.unit):
+        raise ValueError(f"{written.text!r} does not agree with its unit {draft.unit}")
+    return JointAnswer(replace(written, unit=draft.unit), draft.confirmed)

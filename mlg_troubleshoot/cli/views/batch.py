@@ -17,7 +17,7 @@ from mlg_troubleshoot.cli.views.tables import (
     measured_outside,
 )
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Verdict
-from mlg_troubleshoot.decision.order import latest_of_each_gear, worst_first
+from mlg_troubleshoot.decision.ranking import latest_of_each_gear, worst_first
 from mlg_troubleshoot.decision.sentences import percent
 from mlg_troubleshoot.workflows.check import CheckResult
 

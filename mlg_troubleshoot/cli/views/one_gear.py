@@ -21,11 +21,12 @@ from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.decision.sentences import (
     chance_wrong_sentence,
     confidence_words,
+    joint_list,
     percent,
     rigging_sentence,
 )
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.units import in_unit
+from mlg_troubleshoot.units import Length, Sentence, said_in
 
 _JOINTS, _NOTES = 5, 4
 _DISCLAIMER = "Troubleshooting aid, not maintenance data; not an approval for return to service"
@@ -51,7 +52,7 @@ def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool)
         screen.print(_short_table(judgement, screen))
     notes = judgement.warnings if detail else judgement.warnings[:_NOTES]
     for note in notes:
-        screen.sentence(f"* {note}")
+        screen.sentence(Sentence.of("* {}", note))
     if not detail:
         more = len(judgement.warnings) - len(notes)
         screen.print(
@@ -79,7 +80,7 @@ def _body(judgement: Judgement, screen: DataConsole, *, detail: bool) -> Text:
         advice = (judgement.measuring, judgement.posterior) if detail else (judgement.posterior,)
         lines += [(said.text, "") for said in advice if said is not None]
     for said, style in lines:
-        body.append_text(text(("\n" if body else "") + in_unit(said, screen.unit), style))
+        body.append_text(text(("\n" if body else "") + said_in(said, screen.unit), style))
     return body
 
 
@@ -87,20 +88,22 @@ def _numbers(a: Assessment) -> Iterator[str]:
     """What stands with the prediction: probability, spread over the linkages, unmeasured joints."""
     if a.geometry_spread_in is not None and a.probability_within_margin is not None:
         low, high = a.geometry_spread_in
-        yield (
-            f"Probability that {'the plunger' if a.as_loaded else 'the worst case'} is within the"
-            f" margin: {percent(a.probability_within_margin)}{confidence_words(a.confidence)}. The"
-            f" ensemble of reconstructed linkages gives {low:.4f} to {high:.4f} in."
+        yield Sentence.of(
+            "Probability that {} is within the margin: {}{}. The ensemble of reconstructed linkages"
+            " gives {} to {}.",
+            "the plunger" if a.as_loaded else "the worst case",
+            percent(a.probability_within_margin),
+            confidence_words(a.confidence),
+            Length(low, named=False),
+            Length(high),
         )
     if any(f.clearance_in is None for f in a.joints):
-        upper = (
+        yield Sentence.of(
+            "Unmeasured joints count as tight in these numbers; with them at their limit the worst"
+            " case is: {}.",
             "the linkage does not close"
             if a.predicted_upper_in is None
-            else f"{a.predicted_upper_in:.4f} in"
-        )
-        yield (
-            "Unmeasured joints count as tight in these numbers; with them at their limit the worst"
-            f" case is: {upper}."
+            else Length(a.predicted_upper_in),
         )
 
 
@@ -138,22 +141,28 @@ def _show_detail(a: Assessment, gear: Gear, screen: DataConsole) -> None:
     if a.repair_sets:
         screen.print(_repair_table(a, screen))
         parts = sorted({gear.joint(n).new_part.value for s in a.repair_sets for n in s.joints})
-        listed = " to ".join(f"{value:.4f}" for value in dict.fromkeys((parts[0], parts[-1])))
-        screen.sentence(f"A restored joint counts with the {listed} in radial of a new part.")
+        listed = " to ".join(screen.length(each) for each in dict.fromkeys((parts[0], parts[-1])))
+        screen.print(
+            f"A restored joint counts with the radial clearance of a new part, {listed}"
+            f" {screen.unit}."
+        )
     if a.rigging is not None:
         screen.sentence(rigging_sentence(a.rigging))
     if a.budget is not None:
         shares = ", ".join(
-            f"{name} {u:.4f} in ({percent(share)})" for name, u, share in a.budget.lines
+            f"{name} {screen.length(u)} {screen.unit} ({percent(share)})"
+            for name, u, share in a.budget.lines
         )
         screen.sentence(
-            f"Standard uncertainty, with shares: {shares}. Model: {a.budget.model_source}."
+            Sentence.of(
+                "Standard uncertainty, with shares: {}. Model: {}.", shares, a.budget.model_source
+            )
         )
     wrong = chance_wrong_sentence(a)
     if wrong is not None:
         screen.print(wrong)
     what = (
-        "As loaded is an expectation, the worst case a bound."
+        "The displacement as loaded is an expectation; the worst case is a bound."
         if a.as_loaded
         else "The worst case is a bound."
     )
@@ -214,7 +223,7 @@ def _repair_table(a: Assessment, screen: DataConsole) -> Table:
     table = plain_table(None, "restore", "kind", *numbers, right=numbers, title=title)
     for s in a.repair_sets or ():
         table.add_row(
-            ", ".join(f"#{n}" for n in s.joints),
+            joint_list(s.joints),
             str(s.kind),
             f"{s.minutes:.0f}",
             screen.length(s.predicted_displacement_in),

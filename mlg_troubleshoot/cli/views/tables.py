@@ -9,6 +9,7 @@ from rich.text import Text
 from mlg_troubleshoot.cli.output import word
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Verdict
 from mlg_troubleshoot.decision.plan import Action, Basis, End
+from mlg_troubleshoot.units import Sentence
 
 STYLES = {
     Verdict.INVALID: "bold magenta",
@@ -42,7 +43,8 @@ _ENDS = {
 def next_words(judgement: Judgement) -> str:
     """Say what to do next, and how long it takes where it takes any time."""
     step = judgement.next_action
-    return f"NEXT{f' ({step.minutes:.0f} min)' if step.minutes else ''}: {step.text}"
+    minutes = f" ({step.minutes:.0f} min)" if step.minutes else ""
+    return Sentence.of("NEXT{}: {}", minutes, step.text)
 
 
 def few_words(judgement: Judgement) -> str:
@@ -65,7 +67,9 @@ def what_follows(a: Assessment) -> str | None:
         step.words + f" ({step.minutes:.0f} min)" * bool(step.minutes)
         for step in a.plan.steps[1:-1]
     ]
-    return f"Then, as expected: {', '.join(rest)}{'. ' if rest else ''}{a.plan.steps[-1].text}"
+    return Sentence.of(
+        "Then, as expected: {}{}{}", ", ".join(rest), ". " if rest else "", a.plan.steps[-1].text
+    )
 
 
 def measured_outside(judgement: Judgement) -> bool:

@@ -119,6 +119,10 @@ class Cause(ABC):
     """Name of the parameter, its unit as the last word."""
     trial: ClassVar[float]
     """A small typical value of the parameter, at which the effect is computed."""
+    plausible: ClassVar[float | None] = None
+    """How large the parameter plausibly is where the cause acts, as one standard deviation; None if
+    nothing is known but how far a row scatters.
+    """
     sign: ClassVar[int] = 0
     """+1 or −1 where physics allows one sign of the parameter only, else 0."""
     of_joints: ClassVar[bool] = False

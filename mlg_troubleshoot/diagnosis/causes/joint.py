@@ -10,7 +10,7 @@ import numpy as np
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.gear.adjustment import Adjustment
 
-_ROOM_QUANTILES = (0.05, 0.3, 0.6, 0.8)
+_ROOM_QUANTILES = (0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97)
 
 
 class _JointShare(Cause):
@@ -18,6 +18,7 @@ class _JointShare(Cause):
 
     of_joints: ClassVar[bool] = True
     parameter: ClassVar[str] = "contribution_change"
+    plausible: ClassVar[float | None] = 1.0 / 3.0
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield one candidate for each joint that was measured with some wear."""
@@ -75,6 +76,7 @@ class JointContact(Cause):
     of_joints: ClassVar[bool] = True
     parameter: ClassVar[str] = "share_not_taken_up"
     trial: ClassVar[float] = 0.2
+    plausible: ClassVar[float | None] = 0.5
     sign: ClassVar[int] = 1
     sentence: ClassVar[str] = "The neighbouring {target} cannot both take up their clearances"
     inspect: ClassVar[str] = "Contact marks between the two joints"

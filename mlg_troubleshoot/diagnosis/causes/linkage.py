@@ -32,6 +32,7 @@ class OutOfPlaneTilt(Cause):
     needs: ClassVar[tuple[str, ...]] = ("axial_float",)
     parameter: ClassVar[str] = "inverse_span_squared_per_in2"
     trial: ClassVar[float] = 1.0 / 1.5**2
+    plausible: ClassVar[float | None] = 1.0 / 1.5**2
     sign: ClassVar[int] = 1
     sentence: ClassVar[str] = "End float lets links tilt out of their plane, which shortens them"
     inspect: ClassVar[str] = (
@@ -72,6 +73,7 @@ class ElasticCompliance(Cause):
     needs: ClassVar[tuple[str, ...]] = ("hydraulic_pressure_psi",)
     parameter: ClassVar[str] = "stretch_in_per_psi"
     trial: ClassVar[float] = 1e-6
+    plausible: ClassVar[float | None] = 2e-6
     sentence: ClassVar[str] = "Actuator and short link stretch with hydraulic pressure"
     inspect: ClassVar[str] = (
         "Hydraulic pressure at the reading; actuator rod and short link for cracks and bending"
@@ -101,6 +103,7 @@ class ThermalGrowth(Cause):
     needs: ClassVar[tuple[str, ...]] = ("temperature_c",)
     parameter: ClassVar[str] = "expansion_difference_per_c"
     trial: ClassVar[float] = 1e-5
+    plausible: ClassVar[float | None] = 1.1e-5
     sentence: ClassVar[str] = (
         "Aluminium airframe pivots and steel links grow differently with temperature"
     )
@@ -132,6 +135,7 @@ class UnlistedWear(Cause):
     needs: ClassVar[tuple[str, ...]] = ("gear_landings",)
     parameter: ClassVar[str] = "lever_shift_per_1000_landings"
     trial: ClassVar[float] = 1e-3
+    plausible: ClassVar[float | None] = 1e-3
     sentence: ClassVar[str] = (
         "A part outside the listed joints wears with landings and shifts the lever"
     )
@@ -176,6 +180,7 @@ class CalibrationRate(Cause):
     one_scale: ClassVar[bool] = True
     parameter: ClassVar[str] = "rate_change"
     trial: ClassVar[float] = 0.01
+    plausible: ClassVar[float | None] = 0.02
     sentence: ClassVar[str] = "The calibration rate of the model is off: every prediction is scaled"
     inspect: ClassVar[str] = (
         "Plunger travel from Down Lock to mid-position (technical order: 0.45 in)"

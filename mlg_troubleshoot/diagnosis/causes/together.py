@@ -43,7 +43,7 @@ ALONE = 0.03
 NEAR = 0.01
 # Changes of one joint that stand for all; rounds that settle the evidence to 0.02, but of a spread
 # far behind another.
-_LIKELY, _ROUNDS = 1000, 8
+_LIKELY, _ROUNDS = 250, 8
 # Degree of the polynomials in the extension that stand for the curves of linkages between those of
 # the ensemble.
 _DEGREE = 6
@@ -56,19 +56,17 @@ class Block:
     cause: `LoadDirections` or `OtherGeometry`. joints: joints that were read. columns, shape (n,
     k): what each of them contributes: the effect of a change of its factor by one; then further
         effects. [in]
-    covariance, shape (k, k): covariance of the changes of the factors about none. [1] penalty:
-    logarithm of the number of blocks of the same cause that are tried. [1] uncalibrated: True if
-    all joints may also count more or less alike. changes, shape (m,): equally likely changes of a
-    joint, skewed: most lose little, a few lose much. [1] model: the linkage that they are the way
-    to, if they are the way to a certain one.
+    covariance, shape (k, k): covariance of the changes of the factors about none. [1] share:
+    how likely it is of the blocks of its cause. [1] changes, shape (m,): equally likely changes
+    of a joint, skewed: most lose little, a few lose much. [1] model: the linkage that they are the
+    way to, if they are the way to a certain one.
     """
 
     cause: JointFactors
     joints: tuple[int, ...]
     columns: Array
     covariance: Array
-    penalty: float
-    uncalibrated: bool = False
+    share: float
     changes: Array | None = None
     model: LinkageModel | None = None
 
@@ -151,7 +149,6 @@ class JointFactors(Cause):
         ]
         joints = tuple(scene.joints[j] for j in used)
         found = self.covariances(scene.model, ensemble)
-        penalty = float(np.log(max(len(found), 1)))
         # What each adds is taken so that together they are the displacement: with all at nothing
         # nothing moves.
         total, at_mid = np.sum(scene.contribution_in, axis=1), ~scene.table.along
@@ -159,7 +156,8 @@ class JointFactors(Cause):
             scene.over_in, total, out=np.ones_like(total), where=at_mid & (total > 0.0)
         )
         columns = scene.contribution_in[:, used] * whole[:, None]
-        return [Block(self, joints, columns, k[np.ix_(used, used)], penalty) for k in found]
+        share = 1.0 / max(len(found), 1)
+        return [Block(self, joints, columns, k[np.ix_(used, used)], share) for k in found]
 
     def factors(self, joints: Sequence[int], candidate: Candidate, value: float) -> Array:
         """Factor of each joint, shape (n_joints,). [1]"""
@@ -260,9 +258,9 @@ class OtherGeometry(JointFactors):
                 block,
                 columns=columns,
                 covariance=block_diag(block.covariance, share**2 * even),
-                uncalibrated=alike > 0.0,
+                share=0.5 / len(found),
             )
-            for block, (share, alike) in zip(found, LINKAGES, strict=True)
+            for block, (share, _alike) in zip(found, LINKAGES, strict=True)
         ]
         members = [
             replace(
@@ -270,7 +268,7 @@ class OtherGeometry(JointFactors):
                 columns=np.column_stack([found[0].columns, bend]),
                 covariance=np.outer([*own, 1.0], [*own, 1.0])
                 + np.diag([NEAR**2] * len(own) + [1e-9]),
-                penalty=float(np.log(len(bent))),
+                share=0.5 / len(bent),
                 model=other,
             )
             for bend, own, other in zip(bent, apart, closing, strict=True)

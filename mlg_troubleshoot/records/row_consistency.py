@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from statistics import median
 
-from mlg_troubleshoot.decision.chronology import Moment, contradictions
+from mlg_troubleshoot.decision.columns import DATE, LANDINGS
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Side
-from mlg_troubleshoot.records.columns import Kind
+from mlg_troubleshoot.life.chronology import Moment, contradictions
 from mlg_troubleshoot.records.duplicates import cell_of, where
 from mlg_troubleshoot.records.model import SheetLayout
 from mlg_troubleshoot.units import SLIPS
@@ -27,17 +27,17 @@ _SCALES: tuple[tuple[float, str], ...] = tuple(
     for factor, words in ((slip.factor, slip.too_large), (1.0 / slip.factor, slip.too_small))
 )
 
-Gear = tuple[str, Side]
+GearKey = tuple[str, Side]
 Clearances = Mapping[int, float]
 
 
 def history_warnings(rows: Sequence[Inspection | InvalidRow]) -> dict[int, tuple[str, ...]]:
     """Suggest slips for rows that do not fit the gear's other inspections."""
-    gears: dict[Gear, list[int]] = {}
+    gears: dict[GearKey, list[int]] = {}
     for place, row in enumerate(rows):
         if isinstance(row, Inspection) and row.clearance_in:
             gears.setdefault((row.tail_no, row.side), []).append(place)
-    usual: dict[Gear, Clearances] = {}
+    usual: dict[GearKey, Clearances] = {}
     found: dict[int, tuple[str, ...]] = {}
     for gear, places in gears.items():
         if len(places) <= _FEWEST:
@@ -71,7 +71,7 @@ def order_warnings(
     """Name the rows of one gear whose landings run backwards as its dates go on, each with its
     cell.
     """
-    gears: dict[Gear, list[tuple[int, Inspection]]] = {}
+    gears: dict[GearKey, list[tuple[int, Inspection]]] = {}
     for place, row in enumerate(rows):
         if isinstance(row, Inspection):
             gears.setdefault((row.tail_no, row.side), []).append((place, row))
@@ -81,9 +81,7 @@ def order_warnings(
         def name(n: int, seen: list[tuple[int, Inspection]] = seen) -> str:
             source = seen[n][1].source
             cells = [
-                cell
-                for kind in (Kind.LANDINGS, Kind.DATE)
-                if (cell := cell_of(source, layouts, kind)[1])
+                cell for column in (LANDINGS, DATE) if (cell := cell_of(source, layouts, column)[1])
             ]
             return ", ".join([where(source), *cells])
 

@@ -1,4 +1,4 @@
-"""The cheap forms of the screen's algebra against the plain ones."""
+"""Fits and gains against the plain algebra."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mlg_troubleshoot.diagnosis.gain import Gain, measure_gain
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
 from mlg_troubleshoot.misfit.covariance import NoiseModel
-from mlg_troubleshoot.misfit.screen import Screen, fit, shrunk
+from mlg_troubleshoot.misfit.fitting import fit, shrunk
 
 from .conftest import Array
 
@@ -41,49 +41,6 @@ def test_the_inverse_covariance_is_that_of_the_whole_matrix(ratio: float) -> Non
     product, log_determinant = NOISE.precision_times(columns, ratio)
     assert product == pytest.approx(np.linalg.solve(dense(ratio), columns))
     assert log_determinant == pytest.approx(np.linalg.slogdet(dense(ratio))[1])
-
-
-def likelihood(columns: Array, data: Array) -> float:
-    """Largest log-likelihood of a least-squares fit over the tail ratios, by the whole matrix."""
-    found = []
-    for ratio in NOISE.tail_ratios:
-        root = np.linalg.inv(np.linalg.cholesky(dense(ratio)))
-        left = root @ data
-        if columns.shape[1]:
-            left -= root @ columns @ np.linalg.lstsq(root @ columns, left, rcond=None)[0]
-        found.append(-0.5 * N * np.log(left @ left / N) - 0.5 * np.linalg.slogdet(dense(ratio))[1])
-    return float(max(found))
-
-
-def test_the_gain_of_a_candidate_beside_a_fixed_one_is_that_of_least_squares() -> None:
-    fixed, columns, data = (
-        RNG.standard_normal((N, 1)),
-        RNG.standard_normal((N, 4)),
-        RNG.standard_normal((N, 1)),
-    )
-    gain = Screen(NOISE, columns, np.zeros(4), fixed).run(data)[0][:, 0]
-    both = [likelihood(np.column_stack([fixed, column]), data[:, 0]) for column in columns.T]
-    assert gain == pytest.approx(np.array(both) - likelihood(fixed, data[:, 0]), abs=1e-9)
-
-
-def test_the_largest_gain_is_that_of_all_candidates_less_their_penalties() -> None:
-    columns, sets = RNG.standard_normal((N, 6)), RNG.standard_normal((N, 20))
-    penalty = np.array([0.0, 1.5, 0.7, 1.5, np.inf, 0.0])
-    screen = Screen(NOISE, columns, np.array([0, 1, -1, 0, 0, 1]))
-    assert screen.largest(sets, penalty) == pytest.approx(
-        np.max(screen.run(sets)[0] - penalty[:, None], axis=0)
-    )
-
-
-@pytest.mark.parametrize(("sign", "explains"), [(0, True), (-1, True), (1, False)])
-def test_a_candidate_explains_nothing_with_a_sign_that_it_cannot_have(
-    sign: int, explains: bool
-) -> None:
-    column = RNG.standard_normal((N, 1))
-    gain = Screen(NOISE, column, np.array([sign])).run(-column + 0.1 * RNG.standard_normal((N, 1)))[
-        0
-    ][0, 0]
-    assert bool(gain > 1.0) is explains
 
 
 def test_a_fit_is_that_of_generalised_least_squares_with_its_errors() -> None:
@@ -117,21 +74,6 @@ def test_what_is_known_beforehand_shrinks_a_fit_as_bayes_says() -> None:
     assert values == pytest.approx(np.linalg.solve(precision, both.T @ inverse @ data))
 
 
-def test_the_gain_of_two_candidates_together_is_that_of_least_squares() -> None:
-    columns, data = RNG.standard_normal((N, 4)), RNG.standard_normal(N)
-    found = Screen(NOISE, columns, np.zeros(4)).pairs(data, np.array([1, 3]))
-    none = likelihood(np.empty((N, 0)), data)
-    for partner, k in ((0, 1), (1, 3)):
-        assert found[0, partner] == pytest.approx(
-            likelihood(columns[:, [0, k]], data) - none, abs=1e-9
-        )
-
-
-def test_data_sets_with_nothing_wrong_have_the_whole_covariance() -> None:
-    drawn = NOISE.draw(RNG.standard_normal(4096), 0.4, 2.0, 40_000, np.random.default_rng(2))
-    assert np.cov(drawn) == pytest.approx(4.0 * dense(0.4), abs=0.5)
-
-
 def test_effects_of_unknown_size_explain_what_is_expected_of_them_given_the_data() -> None:
     effects, data = 0.6 * RNG.standard_normal((N, 2)), RNG.standard_normal(N)
     wide = replace(NOISE, scale_in=1.5).beside(effects)
@@ -151,7 +93,7 @@ def gained(predicted: Array, misfit: Array, column: Array, tails: np.ndarray) ->
     table = DiagnosisTable(
         none[:, None], none[:, None], names, np.arange(n), none + 0.03, none, {}, {"tail_no": tail}
     )
-    return measure_gain(noise, column[:, None], misfit, predicted, table, np.random.default_rng(1))
+    return measure_gain(noise, column[:, None], misfit, predicted, table)
 
 
 def test_decisions_after_are_those_of_the_extended_prediction_in_both_senses() -> None:

@@ -1,0 +1,336 @@
+"""One posterior over what may explain the misfit of a table, and what follows from it.
+
+An explanation is a set of effects, each a candidate of a listed cause, a shape of the bank or a
+slip of one row, in one context: none, or all-joint effects. How often each is expected and how
+large stands in `Beliefs` and with each cause; the rest is arithmetic.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.diagnosis.bank import Bank
+from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
+from mlg_troubleshoot.diagnosis.causes.together import Block
+from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, Rows, build_noise
+from mlg_troubleshoot.gear.model import LinkageModel
+from mlg_troubleshoot.misfit.beliefs import Beliefs
+from mlg_troubleshoot.misfit.covariance import NoiseModel
+from mlg_troubleshoot.misfit.explanation import Context, Effects, Explanation, Key
+from mlg_troubleshoot.misfit.posterior import MisfitPosterior, posterior
+from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
+
+# The noise is estimated again from what is left as long as that changes the likeliest explanation,
+# so often at most.
+_ROUNDS = 3
+# What moves with a variable that no list has goes by this name.
+UNLISTED = "unlisted"
+_BY = " × "
+
+
+@dataclass(frozen=True)
+class MisfitProblem:
+    """The data of one table with all that may explain them.
+
+    misfit, shape (n,): measured less predicted. [in] columns, shape (n, n_candidates): effects of
+    the candidates. [in / unit] blocks: all-joint effects. causes: all causes, those that the table
+    cannot test included. columns_in: effects of the candidates in another linkage. [in / unit]
+    """
+
+    misfit: Array
+    rows: Rows
+    candidates: Sequence[Candidate]
+    columns: Array
+    bank: Bank
+    blocks: Sequence[Block]
+    causes: Sequence[Cause]
+    columns_in: Callable[[LinkageModel], Array]
+    beliefs: Beliefs
+
+    @property
+    def expected(self) -> Array:
+        """Misfit less what pins scatter. [in]"""
+        return self.misfit - EXPECTED_SLOPE * self.rows.predicted_in
+
+    def candidate(self, key: Key, found: MisfitPosterior | None = None) -> Candidate:
+        """The likeliest candidate of a name, or all-joint effects."""
+        own = [k for k, c in enumerate(self.candidates) if c.key == key]
+        if not own:
+            return Candidate(next(b.cause for b in self.blocks if b.cause.name == key[0]))
+        best = own[0] if found is None else max(own, key=lambda k: found.of_effect[k])
+        return self.candidates[best]
+
+    def effects(self, noise: NoiseModel) -> Effects:
+        """All that may act alone, with how often and how large it is expected."""
+        n, beliefs, scale = len(self.misfit), self.beliefs, noise.scale_in
+        shares = self._shares()
+        targets = Counter(name for name, _target in {c.key for c in self.candidates})
+        variants = Counter(c.key for c in self.candidates)
+        often = [
+            shares[c.cause.name] / (targets[c.cause.name] * variants[c.key])
+            for c in self.candidates
+        ]
+        acting = np.sqrt(
+            np.sum(self.columns**2, axis=0) / np.maximum(np.sum(self.columns != 0.0, axis=0), 1)
+        )
+        exact = np.array([c.cause.exact or 0.0 for c in self.candidates])
+        usual = beliefs.shape_size * scale / acting
+        stated = [c.cause.plausible for c in self.candidates]
+        plausible = np.where(stated == np.array(None), usual, np.array(stated, float))
+        listed = Effects(
+            self.columns,
+            [c.key for c in self.candidates],
+            np.ones(len(often), bool),
+            np.log(np.array(often)) if often else np.empty(0),
+            np.where(exact != 0.0, beliefs.exact * np.abs(exact), plausible),
+            exact == 0.0,
+            np.where(exact == 0.0, usual * min(beliefs.sizes), 0.0),
+            np.array(
+                [0.0 if e else c.cause.sign for c, e in zip(self.candidates, exact, strict=True)]
+            ),
+            exact,
+        )
+        shapes = np.column_stack([self.bank.columns, np.ones(n)])
+        shapes = shapes / np.sqrt(
+            np.sum(shapes**2, axis=0) / np.maximum(np.sum(shapes != 0.0, axis=0), 1)
+        )
+        named = [(UNLISTED, _BY.join(names)) for names in (*self.bank.variables, ("all rows",))]
+        share = float(np.log(shares[UNLISTED] / shapes.shape[1]))
+        free = Effects.free(shapes, named, share, beliefs.shape_size * scale)
+        slip = float(np.log(beliefs.slips / n))
+        slips = Effects.free(np.eye(n), [None] * n, slip, beliefs.slip_size * scale)
+        return Effects.joined([listed, free, slips])
+
+    def contexts(self) -> list[Context]:
+        """Nothing, or all-joint effects."""
+        shares = self._shares()
+        return [
+            Context.none(len(self.misfit)),
+            *(
+                Context(
+                    (b.cause.name, None),
+                    float(np.log(shares[b.cause.name] * b.share)),
+                    b.effects_in,
+                    None if b.model is None else partial(self.columns_in, b.model),
+                    None if b.changes is None else b.skew,
+                    None if b.changes is None else b.columns,
+                )
+                for b in self.blocks
+            ),
+        ]
+
+    def _shares(self) -> dict[str, float]:
+        """How often each cause is expected in a table; one that it cannot test looks like none that
+        is listed.
+        """
+        beliefs = self.beliefs
+        weight = {cause.name: beliefs.rarer.get(cause.name, 1.0) for cause in self.causes}
+        told = {c.cause.name for c in self.candidates} | {b.cause.name for b in self.blocks}
+        listed = beliefs.expected * (1.0 - beliefs.unlisted) / sum(weight.values())
+        shares = {name: listed * weight[name] for name in told}
+        return shares | {UNLISTED: beliefs.expected - sum(shares.values())}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What the posterior says.
+
+    verdict: NONE, NAMED, AMBIGUOUS or UNLISTED. said: names that are sure. open: names of which
+    something acts, or something more than what is sure. aliases: what these data cannot tell
+    from a sure all-joint effect. best: the explanation that is reported. variables: what an
+    unlisted effect moves with. unlisted_rms_in: its root mean square. [in] ruled_out: names
+    that would explain something alone, but hardly act, likeliest first. noise: the noise under
+    which all are compared. smallest_rms_in: root mean square of the smallest effect that is
+    detected with 80 % power. [in] left: probability that something else acts beside what is
+    sure.
+    """
+
+    verdict: Verdict
+    posterior: MisfitPosterior
+    noise: NoiseModel
+    best: Explanation
+    said: tuple[Key, ...]
+    open: tuple[Key, ...]
+    aliases: tuple[Key, ...]
+    ruled_out: tuple[Key, ...]
+    variables: tuple[str, ...]
+    unlisted_rms_in: float
+    smallest_rms_in: float
+    left: float
+
+    def probability(self, key: Key) -> float:
+        """Probability that something of this name acts, its look-alikes counted with it."""
+        blocks = {context.name for context in self.posterior.contexts}
+        aliases = self.aliases if key in self.said and key in blocks else ()
+        return min(_any(self.posterior, {key, *aliases}), 1.0)
+
+    @property
+    def probabilities(self) -> dict[Key, float]:
+        """Probability of every listed cause, the likeliest first."""
+        listed = ((n, p) for n, p in self.posterior.names.items() if n[0] != UNLISTED)
+        return dict(sorted(listed, key=lambda item: (-item[1], str(item[0]))))
+
+    @property
+    def ten_times(self) -> dict[Key, float]:
+        """Probability of the likeliest cause if its likeliest rival were ten times likelier."""
+        order = list(self.probabilities)[:2]
+        if len(order) < 2:
+            return {}
+        first, rival = order
+        whole = with_first = 0.0
+        for names, p in self.posterior.together.items():
+            weighed = p * (10.0 if rival in names else 1.0)
+            whole += weighed
+            with_first += weighed if first in names else 0.0
+        return {rival: with_first / whole}
+
+
+def explain(problem: MisfitProblem) -> Finding:
+    """Say how likely each explanation of a table is, and what follows."""
+    data, rows = problem.expected, problem.rows
+    noise, contexts = build_noise(data, rows), problem.contexts()
+    found = posterior(noise, data, problem.effects(noise), contexts, problem.beliefs)
+    for _ in range(_ROUNDS - 1):
+        left = _noise_beside(problem, found.expected_in)
+        again = posterior(
+            left, data, problem.effects(left), contexts, problem.beliefs, found.likeliest[:1]
+        )
+        settled = _same(found, again)
+        found, noise = again, left
+        if settled:
+            break
+    return _said(problem, found, noise)
+
+
+def _same(one: MisfitPosterior, other: MisfitPosterior) -> bool:
+    """Tell whether two posteriors have one likeliest explanation."""
+    first, second = one.likeliest[0], other.likeliest[0]
+    return (first.context, set(first.members)) == (second.context, set(second.members))
+
+
+def _noise_beside(problem: MisfitProblem, explained: Array) -> NoiseModel:
+    """Noise when what is expected to act is taken out; how its form may be wrong is part of it."""
+    noise = build_noise(problem.expected, problem.rows, explained)
+    smooth = problem.bank.smooth
+    if not smooth:
+        return noise
+    bent = explained[:, None] * np.column_stack(list(smooth.values()))
+    return noise.beside(problem.beliefs.form * bent / np.sqrt(len(smooth)))
+
+
+def _said(problem: MisfitProblem, found: MisfitPosterior, noise: NoiseModel) -> Finding:
+    """What is sure, what is open, and what is ruled out."""
+    beliefs, chance = problem.beliefs, found.names
+    rivals_only = {c.key for c in problem.candidates if c.stands_in}
+    blocks = {(b.cause.name, None) for b in problem.blocks}
+    listed = {n: p for n, p in chance.items() if n[0] != UNLISTED}
+    order = sorted(listed, key=lambda name: (-listed[name], str(name)))
+    said = [n for n in order if listed[n] >= beliefs.sure and n not in rivals_only]
+    aliases: tuple[Key, ...] = ()
+    either = [n for n in order if n in blocks]
+    if len(either) > 1 and not set(said) & blocks and _any(found, set(either)) >= beliefs.sure:
+        said, aliases = [*said, either[0]], tuple(either[1:])
+    alike = _alike(problem, found, said)
+    said = [n for n in said if n not in alike]
+    verdict = Verdict.NAMED if said else Verdict.AMBIGUOUS
+    if found.nothing >= 0.5:
+        verdict = Verdict.NONE
+    elif found.unlisted >= 0.5 or not listed:
+        verdict = Verdict.UNLISTED
+    if verdict in {Verdict.NONE, Verdict.UNLISTED}:
+        said, aliases, alike = [], (), set()
+    counted = {*said, *aliases}
+    rest = [n for n in order if n not in counted]
+    further, open_ = _any(found, set(rest)), list[Key]()
+    if verdict is Verdict.AMBIGUOUS or (verdict is Verdict.NAMED and further >= 0.5):
+        # At least one of the set acts, as sure as anything that is said.
+        for name in rest:
+            unsure = _any(found, set(open_)) < beliefs.sure * further
+            if listed[name] > 1.0 - beliefs.sure or unsure:
+                open_.append(name)
+    open_ += [n for n in rest if n in alike and n not in open_]
+    best = _reported(found, set(said), verdict)
+    variables, size = _unlisted(found, verdict)
+    alone: dict[Key, float] = {}
+    for k, candidate in enumerate(problem.candidates):
+        alone[candidate.key] = max(alone.get(candidate.key, -np.inf), found.over_nothing[k])
+    hardly = [n for n in alone if alone[n] > 0.0 and n not in {*counted, *open_}]
+    return Finding(
+        verdict,
+        found,
+        noise,
+        best,
+        tuple(said),
+        tuple(open_),
+        aliases,
+        tuple(sorted(hardly, key=lambda n: -alone[n])),
+        variables,
+        size,
+        _smallest(problem, found, noise),
+        _any(found, set(chance) - counted),
+    )
+
+
+def _any(found: MisfitPosterior, names: set[Key]) -> float:
+    """Probability that something of these names acts."""
+    return float(sum(p for own, p in found.together.items() if own & names))
+
+
+def _alike(problem: MisfitProblem, found: MisfitPosterior, said: Sequence[Key]) -> set[Key]:
+    """Names that these rows cannot tell from each other, one of which is sure: what is believed of
+    them beforehand must not decide.
+    """
+    names = [c.key for c in problem.candidates]
+    within, size = problem.beliefs.odds, problem.columns
+    prior, chance = found.effects.log_prior, np.maximum(found.of_effect, 1e-300)
+    unit = size / np.linalg.norm(size, axis=0)
+    alike: set[Key] = set()
+    for name in said:
+        own = [k for k, other in enumerate(names) if other == name]
+        if not own:
+            continue
+        best = max(own, key=lambda k: chance[k])
+        near = np.abs(unit.T @ unit[:, best]) > problem.beliefs.alike
+        evidence = np.log(chance[: len(names)]) - prior[: len(names)]
+        near &= evidence > evidence[best] - within
+        others = {names[k] for k in np.flatnonzero(near)} - {name}
+        alike |= others | ({name} if others else set())
+    return alike
+
+
+def _reported(found: MisfitPosterior, said: set[Key], verdict: Verdict) -> Explanation:
+    """The likeliest explanation with all that is sure, or with something."""
+    for explanation in found.likeliest:
+        names = found.names_of(explanation)
+        some = bool(names) or verdict is Verdict.NONE
+        if some and said <= names:
+            return explanation
+    return found.likeliest[0]
+
+
+def _unlisted(found: MisfitPosterior, verdict: Verdict) -> tuple[tuple[str, ...], float]:
+    """Variables of an effect that is on no list, and its root mean square. [in]"""
+    if verdict is not Verdict.UNLISTED:
+        return (), 0.0
+    chances = {name: p for name, p in found.names.items() if name[0] == UNLISTED}
+    name = max(chances, key=lambda n: chances[n])
+    variables = tuple(str(name[1]).split(_BY))
+    for explanation in found.likeliest:
+        for k, value in zip(explanation.members, explanation.values, strict=True):
+            if found.effects.names[k] == name:
+                column = found.effects.columns[:, k]
+                return variables, float(abs(value) * np.sqrt(np.mean(column**2)))
+    return variables, 0.0
+
+
+def _smallest(problem: MisfitProblem, found: MisfitPosterior, noise: NoiseModel) -> float:
+    """Root mean square of an effect that is likelier than nothing with 80 % power. [in]"""
+    n, prior = len(problem.misfit), found.effects.log_prior[found.effects.listed]
+    often = float(np.exp(np.median(prior))) if len(prior) else problem.beliefs.expected
+    return problem.beliefs.seen_from(often, n) * noise.scale_in / float(np.sqrt(n))

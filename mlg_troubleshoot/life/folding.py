@@ -1,0 +1,244 @@
+"""The life of each gear, folded from its records: what was corrected or voided does not count."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from mlg_troubleshoot.decision.inspection import Inspection, Side
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.life.chronology import Moment, contradictions, in_order
+from mlg_troubleshoot.store import Record, RecordKind, Store, StoreError, inspection_from
+
+GearKey = tuple[str, str]
+# Letters of a hash by which a record may be named. [1]
+LEAST_OF_A_HASH = 6
+# Of more gears than this, the whole store is read at once. [1]
+_GEARS_ONE_BY_ONE = 100
+
+
+@dataclass(frozen=True)
+class KeptInspection:
+    """An inspection as it stands after corrections, with its last assessment; unpacked when it is
+    asked for.
+    """
+
+    record: Record
+    assessed: Record | None = None
+
+    @cached_property
+    def inspection(self) -> Inspection:
+        return inspection_from(self.record)
+
+    @cached_property
+    def result(self) -> Mapping[str, Any]:
+        """What the check said, in the form of its JSON; empty if it was never judged."""
+        return {} if self.assessed is None else self.assessed.body["result"]
+
+    @property
+    def worst_joint(self) -> int | None:
+        """The joint to look at first."""
+        joints = self.result.get("joints", ())
+        return next((joint["joint"] for joint in joints if joint["rank"] == 1), None)
+
+    @property
+    def moment(self) -> Moment:
+        return Moment.of(self.inspection)
+
+
+@dataclass(frozen=True)
+class GearLife:
+    """What stands of one gear: inspections and repairs in the order of time, outcomes, and every
+    record as it came.
+
+    warnings: the records whose dates and landings disagree, and how to correct them; with any there
+    is no forecast.
+    """
+
+    key: GearKey
+    records: tuple[Record, ...]
+    events: tuple[KeptInspection | Record, ...]
+    outcomes: tuple[Record, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        return " ".join(self.key)
+
+    @cached_property
+    def inspections(self) -> tuple[KeptInspection, ...]:
+        return tuple(event for event in self.events if isinstance(event, KeptInspection))
+
+    @cached_property
+    def repairs(self) -> tuple[Record, ...]:
+        """Restorations of joints and re-riggings."""
+        return tuple(event for event in self.events if isinstance(event, Record))
+
+    @property
+    def latest(self) -> KeptInspection | None:
+        return self.inspections[-1] if self.inspections else None
+
+
+def lives(
+    store: Store, tail: str | None = None, side: str | None = None
+) -> dict[GearKey, GearLife]:
+    """Every gear's life, or those of one aircraft."""
+    by_gear: dict[GearKey, list[Record]] = {}
+    for record in store.all() if tail is None else store.of_gear(tail, side):
+        by_gear.setdefault((record.tail_no, record.side), []).append(record)
+    return {key: _life(key, records) for key, records in sorted(by_gear.items())}
+
+
+def life_of(store: Store, tail: str, side: str) -> GearLife:
+    """One gear's life; a gear without records is a usage error that names near spellings."""
+    side = Side.parse(side).value
+    life = lives(store, tail, side).get((tail, side))
+    if life is None:
+        near = [f"{t} {s}" for t, s in store.gears() if without_dashes(t) == without_dashes(tail)]
+        raise UsageError(
+            f"no records of {tail} {side} in {store.place}",
+            f"There is {', '.join(near)}." if near else "See which gears are kept: mlg history",
+        )
+    for kept in life.inspections:
+        # What stands there and cannot be read is named before anything is added to it.
+        _ = kept.inspection
+    return life
+
+
+def without_dashes(tail: str) -> str:
+    """A tail number without what people write differently: case, blanks and dashes."""
+    return re.sub(r"[\s_‐-―−-]+", "", tail).casefold()
+
+
+def warnings_of(store: Store, keys: Collection[GearKey]) -> list[str]:
+    """The records of some gears whose dates and landings disagree."""
+    if len(keys) > _GEARS_ONE_BY_ONE:
+        found = lives(store)
+    else:
+        found = {key: life for wanted in keys for key, life in lives(store, *wanted).items()}
+    return [warning for key, life in found.items() if key in keys for warning in life.warnings]
+
+
+def find(store: Store, record_id: str) -> Record:
+    """Find the record that a command names: by its id, or by the first letters of its hash where an
+    id is not one.
+    """
+    live = [
+        record
+        for life in lives(store).values()
+        for record in (*(s.record for s in life.inspections), *life.repairs, *life.outcomes)
+    ]
+    inspections = (RecordKind.INSPECTION, RecordKind.CORRECTION)
+    found = [r for r in live if r.record_id == record_id and r.kind in inspections]
+    if not found and len(record_id) >= LEAST_OF_A_HASH:
+        found = [r for r in live if r.digest.startswith(record_id.lower())]
+    if len(found) == 1:
+        return found[0]
+    if not found:
+        raise UsageError(
+            f"no record {record_id!r} stands in {store.place}",
+            "See the records: mlg history TAIL SIDE",
+        )
+    named = ", ".join(
+        f"{r.digest[:10]} ({r.tail_no} {r.side} {r.day or 'no date'})" for r in found[:6]
+    )
+    raise UsageError(
+        f"{len(found)} records are called {record_id!r}: {named}",
+        "Name one by the start of its hash.",
+    )
+
+
+def is_readable(record: Record) -> bool:
+    try:
+        return bool(record.body)
+    except StoreError:
+        return False
+
+
+def _life(key: GearKey, records: Sequence[Record]) -> GearLife:
+    kept: dict[str, KeptInspection] = {}
+    others: dict[str, Record] = {}
+    records = _readable_or_not_void(records)
+    for record in records:
+        if record.kind is RecordKind.INSPECTION:
+            kept[record.digest] = KeptInspection(record)
+        elif record.kind is RecordKind.CORRECTION:
+            wrong = record.body["supersedes"]
+            first = next((k for k, s in kept.items() if wrong in (k, s.record.digest)), None)
+            if first is not None:
+                kept[first] = KeptInspection(record)
+        elif record.kind is RecordKind.VOID:
+            gone = record.body["voids"]
+            kept = {k: s for k, s in kept.items() if gone not in (k, s.record.digest)}
+            others.pop(gone, None)
+        elif record.kind is RecordKind.ASSESSMENT:
+            assessed = (record.record_id, record.day)
+            same = [k for k, s in kept.items() if (s.record.record_id, s.record.day) == assessed]
+            if same:
+                kept[same[-1]] = replace(kept[same[-1]], assessed=record)
+        else:
+            others[record.digest] = record
+    repairs = [r for r in others.values() if r.kind in (RecordKind.REPAIR, RecordKind.RERIG)]
+    events: list[KeptInspection | Record] = [*kept.values(), *repairs]
+    events.sort(key=lambda event: _record_of(event).seq)
+    moments = [_moment(event) for event in events]
+    return GearLife(
+        key,
+        tuple(records),
+        tuple(events[place] for place in in_order(moments)),
+        tuple(r for r in others.values() if r.kind is RecordKind.OUTCOME),
+        _disagreements(key, events, moments),
+    )
+
+
+def _readable_or_not_void(records: Sequence[Record]) -> list[Record]:
+    """Leave out what is void and cannot be read: that is how such a record is put aside."""
+    void: set[str] = set()
+    kept = []
+    # A record is void by a later one.
+    for record in reversed(records):
+        if record.digest not in void or is_readable(record):
+            kept.append(record)
+            if record.kind is RecordKind.VOID:
+                void.add(record.body["voids"])
+    return kept[::-1]
+
+
+def _record_of(event: KeptInspection | Record) -> Record:
+    return event.record if isinstance(event, KeptInspection) else event
+
+
+def _moment(event: KeptInspection | Record) -> Moment:
+    if isinstance(event, KeptInspection):
+        return event.moment
+    return Moment(event.day, event.body.get("landings"))
+
+
+def _disagreements(
+    key: GearKey, events: Sequence[KeptInspection | Record], moments: Sequence[Moment]
+) -> tuple[str, ...]:
+    """Name the records whose dates and landings disagree, each with how to correct it."""
+
+    def name(place: int) -> str:
+        record = _record_of(events[place])
+        what = "" if isinstance(events[place], KeptInspection) else f"{record.kind} "
+        return f"{what}{record.record_id}, ".lstrip(", ") + record.digest[:10]
+
+    by_sentence: dict[str, list[int]] = {}
+    for place, sentence in contradictions(moments, name).items():
+        by_sentence.setdefault(sentence, []).append(place)
+    warnings = []
+    for sentence, places in by_sentence.items():
+        record = _record_of(events[places[0]]).digest[:10] if len(places) == 1 else "RECORD"
+        remedy = f"mlg history void {record} --why TEXT"
+        if any(isinstance(events[place], Record) for place in places):
+            remedy += ", then mlg history repair"
+        else:
+            remedy = f"mlg history correct {record} FILE, or {remedy}"
+        warnings.append(
+            f"{' '.join(key)}: {sentence}. No forecast until this is corrected: {remedy}"
+        )
+    return tuple(warnings)

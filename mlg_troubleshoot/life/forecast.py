@@ -1,0 +1,195 @@
+"""How many landings gears have left: to a joint's limit, to the margin, to the next inspection."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.decision.assessment import Verdict
+from mlg_troubleshoot.decision.sentences import joint_list
+from mlg_troubleshoot.gear.directions import worst_case
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.life.folding import GearKey, GearLife
+from mlg_troubleshoot.life.wear_paths import stretches, unit_of, wear_paths
+from mlg_troubleshoot.wear import Samples, WearModel, first_passage, fit_wear
+
+# Where a forecast looks between the last inspection and the horizon: now, and from 1/800 of the
+# horizon (25 of 20,000 landings, about a week) on in equal ratios. [1]
+_AHEAD = np.concatenate([[0.0], np.geomspace(1 / 800, 1, 28)])
+# At which of these the model itself is asked for the worst case, which departs slowly from the sum
+# of amplified clearances.
+_ASKED = np.array([0, 8, 14, 18, 22, 25, 28])
+_GEARS_AT_ONCE = 100
+# Stands for the worst case of a linkage that does not close: beyond any margin. [in]
+_NOT_CLOSING_IN = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """Landings that remain from a gear's last inspection, of the joints ever read; infinite beyond
+    the horizon.
+
+    limit_joint: the joint that most often is the first at its limit.
+    due_now: why nothing remains, in words; empty where something may.
+    """
+
+    joints: Mapping[int, Samples] = field(default_factory=dict)
+    limit: Samples | None = None
+    limit_joint: int | None = None
+    margin: Samples | None = None
+    next_inspection: float | None = None
+    due_now: str = ""
+
+
+def fit_fleet(lives: Iterable[GearLife], gear: Gear) -> WearModel | None:
+    """Learn the wear of all joints of all gears whose dates and landings agree; None if none states
+    its landings.
+    """
+    paths = [
+        path
+        for life in lives
+        if not life.warnings
+        for own, _begun in wear_paths(life, gear.joint_numbers).values()
+        for path in own
+        if len(own) > 1 or len(np.asarray(path.usage))
+    ]
+    return fit_wear(paths) if any(len(np.asarray(path.usage)) for path in paths) else None
+
+
+def forecast(
+    lives: Sequence[GearLife],
+    model: WearModel | None,
+    gear: Gear,
+    progress: Callable[[str, int, int], None] = lambda _name, _done, _total: None,
+) -> dict[GearKey, Forecast]:
+    """Forecast gears from their last inspection on.
+
+    Nothing remains to one that is due now, whatever else is wrong with its records. Another one
+    without landings, or whose dates and landings disagree, has no forecast.
+    """
+    forecasts = {life.key: _due_now(life, gear) or Forecast() for life in lives if life.latest}
+    known = [
+        life
+        for life in lives
+        if life.key in forecasts
+        and not (forecasts[life.key].due_now or life.warnings)
+        and life.inspections[-1].inspection.gear_landings is not None
+    ]
+    if model is not None:
+        done = 0
+        parts = [known[at : at + _GEARS_AT_ONCE] for at in range(0, len(known), _GEARS_AT_ONCE)]
+        # NumPy lets others work meanwhile.
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            found = pool.map(lambda part: [*_forecast_part(part, model, gear)], parts)
+            for part, of_part in zip(parts, found, strict=True):
+                forecasts.update(zip((life.key for life in part), of_part, strict=True))
+                done += len(part)
+                progress("Looking ahead", done, len(known))
+    return {life.key: forecasts.get(life.key, Forecast()) for life in lives}
+
+
+def _due_now(life: GearLife, gear: Gear) -> Forecast | None:
+    """The forecast of a gear that is outside its margin or has a joint over its limit: nothing
+    remains of anything.
+    """
+    newest = {n: s[-1].readings[-1:] for n, s in stretches(life, gear.joint_numbers).items()}
+    over = _over_limit({n: read[0][1] for n, read in newest.items() if read}, gear)
+    reasons = []
+    if life.inspections[-1].result.get("verdict") == Verdict.OUTSIDE_MARGIN.value:
+        reasons.append("outside the margin at the last inspection")
+    # Nobody can say that an inspection without a date is an earlier one, unless the gear was
+    # restored after it.
+    restored = max((record.seq for record in life.repairs), default=-1)
+    for kept in life.inspections[:-1]:
+        if kept.record.day or kept.record.seq <= restored:
+            continue
+        read_over = _over_limit(kept.inspection.clearance_in, gear)
+        over |= read_over
+        if read_over or kept.result.get("verdict") == Verdict.OUTSIDE_MARGIN.value:
+            reasons.append(
+                f"inspection {kept.record.record_id} has no date and may be the last one"
+            )
+    if over:
+        reasons.append(f"{joint_list(list(over))} over the limit when last read")
+    if not reasons:
+        return None
+    nothing = Samples(np.zeros(1))
+    worst = max(over, key=lambda n: over[n] / gear.joint(n).limit.value, default=None)
+    why = ", and ".join(reasons)
+    return Forecast(dict.fromkeys(over, nothing), nothing, worst, nothing, 0.0, why)
+
+
+def _over_limit(clearance_in: Mapping[int, float], gear: Gear) -> dict[int, float]:
+    return {n: c for n, c in clearance_in.items() if gear.joint(n).is_over_limit(c)}
+
+
+def _forecast_part(part: Sequence[GearLife], model: WearModel, gear: Gear) -> Iterator[Forecast]:
+    numbers = gear.joint_numbers
+    ahead = gear.horizon.value * _AHEAD
+    read = np.array(
+        [
+            [any(n in kept.inspection.clearance_in for kept in life.inspections) for n in numbers]
+            for life in part
+        ]
+    )
+    # A joint that was never read counts as it does in the prediction: not at all.
+    wear = np.where(read[:, :, None, None], _wear_ahead(part, model, gear, ahead), 0.0)
+    displacement = _worst_case_of(wear, gear)
+    for g, life in enumerate(part):
+        margin = life.inspections[-1].inspection.margin_in
+        to_limit = np.stack(
+            [first_passage(ahead, wear[g, j], limit) for j, limit in enumerate(gear.limits_in)]
+        )
+        to_any = to_limit.min(axis=0)
+        to_margin = first_passage(
+            ahead, displacement[g], gear.margin.value if margin is None else margin
+        )
+        due = float(Samples(np.minimum(to_any, to_margin)).quantile(gear.accepted_chance.value))
+        first = to_limit.argmin(axis=0)[np.isfinite(to_any)]
+        yield Forecast(
+            {number: Samples(to_limit[j]) for j, number in enumerate(numbers) if read[g, j]},
+            Samples(to_any),
+            numbers[int(np.bincount(first).argmax())] if len(first) else None,
+            Samples(to_margin),
+            due if np.isfinite(due) else None,
+        )
+
+
+def _wear_ahead(part: Sequence[GearLife], model: WearModel, gear: Gear, ahead: Array) -> Array:
+    """Simulated clearances (gears, joints, ahead, samples). [in]
+
+    Gear by gear, each from the model's seed: the forecast of a gear is the same whoever else is
+    asked for.
+    """
+    found = []
+    for life in part:
+        now = life.inspections[-1].inspection.gear_landings or 0.0
+        begun = [start for _own, start in wear_paths(life, gear.joint_numbers).values()]
+        usage = np.maximum(now + ahead - np.array(begun)[:, None], 0.0)
+        units = [unit_of(life.key, number) for number in gear.joint_numbers]
+        found.append(model.forecast(units, usage, reading=False).samples)
+    return np.maximum(np.stack(found), 0.0)
+
+
+def _worst_case_of(wear: Array, gear: Gear) -> Array:
+    """Worst-case displacement (gears, ahead, samples) of simulated clearances. [in]
+
+    The sum of amplified clearances, times how far the model's worst case of the median clearances
+    departs from their sum.
+    """
+    amplification = gear.model.plunger_amplification()
+    straight = np.einsum("j,gjts->gts", amplification, wear)
+    middle = np.median(wear[:, :, _ASKED, :], axis=3)
+    clearances = np.moveaxis(middle, 1, 2)
+    predicted = worst_case(gear.model, clearances.reshape(-1, clearances.shape[-1])).magnitude_in
+    predicted = np.where(np.isnan(predicted), _NOT_CLOSING_IN, predicted)
+    summed = np.einsum("j,gjt->gt", amplification, middle)
+    departure = predicted.reshape(summed.shape) / np.maximum(summed, 1e-12)
+    along = np.array([np.interp(_AHEAD, _AHEAD[_ASKED], of_gear) for of_gear in departure])
+    displacement: Array = straight * along[:, :, None]
+    return displacement

@@ -1,0 +1,127 @@
+"""What the records say about the past: how often the advice was right, inspections in a row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Rejected
+from mlg_troubleshoot.life.folding import GearLife, life_of
+from mlg_troubleshoot.store import RecordKind, Store
+
+# Inspections that stand side by side on a page.
+_SIDE_BY_SIDE = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """How often the joint that was found stood in the advice, with a 90 % interval (Jeffreys)."""
+
+    right: int
+    outcomes: int
+
+    @classmethod
+    def of(cls, lives: Iterable[GearLife]) -> Advice:
+        """Count outcomes that name a joint, and those whose joint was advised first."""
+        right = outcomes = 0
+        for life in lives:
+            for record in life.outcomes:
+                joint = record.body["joint"]
+                kept = next(
+                    (k for k in life.inspections if k.record.record_id == record.record_id), None
+                )
+                if joint is not None and kept is not None and kept.result:
+                    advised = (kept.result.get("next_action") or {}).get("joints") or ()
+                    outcomes += 1
+                    right += joint in (kept.worst_joint, *advised)
+        return cls(right, outcomes)
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """None where no outcome names a joint."""
+        from scipy.special import betaincinv
+
+        if not self.outcomes:
+            return None
+        wrong = self.outcomes - self.right
+        low, high = (float(betaincinv(self.right + 0.5, wrong + 0.5, p)) for p in (0.05, 0.95))
+        return low if self.right else 0.0, high if wrong else 1.0
+
+    @property
+    def sentence(self) -> str:
+        if self.interval is None:
+            return "No outcome was recorded against the advice yet."
+        low, high = self.interval
+        return (
+            f"The advice was right in {self.right} of {self.outcomes} outcomes that name a joint "
+            f"({low:.0%} to {high:.0%} with 90 % confidence)."
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class PastInspection:
+    """One inspection of a gear, and what was restored since the one before."""
+
+    record_id: str
+    date: str
+    gear_landings: float | None
+    clearance_in: Mapping[int, float]
+    restored: tuple[int, ...]
+    rerigged: bool
+    worst_in: float | None
+    verdict: str | None
+
+
+def side_by_side(life: GearLife, now: Assessment | None = None) -> list[PastInspection]:
+    """The last inspections of a gear, up to one that is not kept yet; nothing where that one has
+    none before it.
+    """
+    rows = [
+        (
+            kept.inspection,
+            (kept.record.day, kept.record.seq),
+            kept.result.get("predicted_displacement_in"),
+            kept.result.get("verdict"),
+        )
+        for kept in life.inspections
+    ]
+    if now is not None:
+        found = now.inspection
+        day = found.inspection_date.isoformat() if found.inspection_date else ""
+        at = (day or "9999", life.records[-1].seq + 1)
+        rows = [r for r in rows if r[0].record_id != found.record_id and r[1] < at]
+        rows += [(found, at, now.predicted_displacement_in, now.verdict.value)] if rows else []
+    steps: list[PastInspection] = []
+    before: tuple[str, int] | None = None
+    for inspection, at, worst_in, verdict in rows:
+        since = [r for r in life.repairs if before and before < (r.day, r.seq) < at]
+        day = inspection.inspection_date.isoformat() if inspection.inspection_date else ""
+        steps.append(
+            PastInspection(
+                inspection.record_id,
+                day,
+                inspection.gear_landings,
+                inspection.clearance_in,
+                restored=tuple(sorted({n for r in since for n in r.body.get("joints", ())})),
+                rerigged=any(r.kind is RecordKind.RERIG for r in since),
+                worst_in=worst_in,
+                verdict=verdict,
+            )
+        )
+        before = max(before or at, at)
+    return steps[-_SIDE_BY_SIDE:]
+
+
+def seen_before(judgements: Sequence[Judgement], store: Store) -> list[list[PastInspection]]:
+    """What each judged gear was like before, side by side with what it is now; empty for one that
+    is new.
+    """
+    known = set(store.gears())
+
+    def of(judgement: Judgement) -> list[PastInspection]:
+        if isinstance(judgement, Rejected):
+            return []
+        key = (judgement.inspection.tail_no, judgement.inspection.side.value)
+        return side_by_side(life_of(store, *key), judgement) if key in known else []
+
+    return [of(judgement) for judgement in judgements]

@@ -1,0 +1,88 @@
+"""What was read of each joint between its restorations, as paths of wear over landings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import date
+
+import numpy as np
+
+from mlg_troubleshoot.life.folding import GearKey, GearLife, KeptInspection
+from mlg_troubleshoot.store import Record, RecordKind
+from mlg_troubleshoot.wear import WearPath
+
+
+@dataclass(slots=True)
+class Stretch:
+    """What was read of a joint between two restorations: landings (None: not stated), clearance and
+    its uncertainty.
+    """
+
+    begun: float
+    readings: list[tuple[float | None, float, float]]
+
+    @property
+    def placed(self) -> list[tuple[float, float, float]]:
+        """The readings whose landings are known."""
+        return [(at, value, u) for at, value, u in self.readings if at is not None]
+
+
+def stretches(life: GearLife, joints: Sequence[int]) -> dict[int, list[Stretch]]:
+    """Readings of each joint between its restorations, in the order of time."""
+    found = {joint: [Stretch(0.0, [])] for joint in joints}
+    for event in life.events:
+        if isinstance(event, KeptInspection):
+            read = event.inspection
+            for joint in found.keys() & read.clearance_in.keys():
+                reading = (read.gear_landings, read.clearance_in[joint], read.gauge_u_of(joint))
+                found[joint][-1].readings.append(reading)
+        elif event.kind is RecordKind.REPAIR:
+            at = _landings_of(event, life)
+            for joint in found.keys() & set(event.body["joints"]):
+                found[joint].append(Stretch(found[joint][-1].begun if at is None else at, []))
+    return found
+
+
+def wear_paths(life: GearLife, joints: Sequence[int]) -> dict[int, tuple[list[WearPath], float]]:
+    """Paths of each joint between its restorations, and the landings at which the current one
+    began.
+    """
+    found = {}
+    for joint, between in stretches(life, joints).items():
+        paths = []
+        reading_u: float | None = None
+        for stretch in between:
+            placed = stretch.placed
+            reading_u = placed[-1][2] if placed else reading_u
+            usage = [max(at - stretch.begun, 0.0) for at, _value, _u in placed]
+            value = [value for _at, value, _u in placed]
+            paths.append(WearPath(unit_of(life.key, joint), usage, value, reading_u))
+        found[joint] = paths, between[-1].begun
+    return found
+
+
+def unit_of(key: GearKey, joint: int) -> str:
+    """Name of a joint of a gear for the forecasts."""
+    return f"{key[0]} {key[1]} #{joint}"
+
+
+def placed_in_time(life: GearLife) -> list[tuple[int, float]]:
+    """Day and landings of the inspections that state both."""
+    return [
+        (date.fromisoformat(kept.record.day).toordinal(), kept.inspection.gear_landings)
+        for kept in life.inspections
+        if kept.record.day and kept.inspection.gear_landings is not None
+    ]
+
+
+def _landings_of(record: Record, life: GearLife) -> float | None:
+    """Landings at a repair: as recorded, else between the inspections about it, by their days."""
+    stated = record.body.get("landings")
+    if stated is not None:
+        return float(stated)
+    dated = placed_in_time(life)
+    if not dated or not record.day:
+        return None
+    days, landings = zip(*dated, strict=True)
+    return float(np.interp(date.fromisoformat(record.day).toordinal(), days, landings))

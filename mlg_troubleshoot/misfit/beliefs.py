@@ -1,0 +1,71 @@
+"""What is believed before a measured value is looked at: one table of numbers, each with its
+meaning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Beliefs:
+    """What is believed beforehand, and from which probability on something is said.
+
+    Parameters
+    ----------
+    expected : float
+        Things wrong in a set of data on average; with ln 2 nothing is wrong in one of two. [1]
+    unlisted : float
+        Share of what goes wrong that no list has. [1]
+    slips : float
+        Entry errors in a table that the screening for data faults leaves. [1]
+    slip_size : float
+        How far such a row lies off, over the scatter of a row. [1]
+    shape_size : float
+        How large an effect is that no list has, where it acts, over the scatter of a row. [1]
+    sizes : tuple of float
+        Sizes over the plausible one of a cause that are equally likely, shared by all that acts.
+        [1]
+    form : float
+        Error of a cause's form, as a share of its effect. [1]
+    exact : float
+        The same of a value that can only be one. [1]
+    rarer : mapping of str to float
+        How often a cause is what is wrong, over how often any other one is; 1 where it is not
+        named. [1]
+    sure : float
+        Probability from which something is said: of ten causes named at 0.9 nine are right. [1]
+    alike : float
+        Cosine from which two effects are one to these rows. [1]
+    """
+
+    expected: float = float(np.log(2.0))
+    unlisted: float = 0.1
+    slips: float = 0.5
+    slip_size: float = 5.0
+    shape_size: float = 1.2
+    sizes: tuple[float, ...] = (1.0 / 3.0, 1.0, 3.0)
+    form: float = 0.1
+    exact: float = 0.1
+    rarer: Mapping[str, float] = field(default_factory=dict)
+    sure: float = 0.9
+    alike: float = 0.985
+
+    @property
+    def odds(self) -> float:
+        """Logarithm of the odds from which something is said. [1]"""
+        return float(np.log(self.sure / (1.0 - self.sure)))
+
+    def seen_from(self, often: float, n: int) -> float:
+        """Size of an effect over the error of its mean, from which n rows make it likelier than
+        nothing with 80 % power, if it is expected so often in a table. [1]
+        """
+        bar = np.log1p(n * self.shape_size**2) - 2.0 * np.log(often)
+        return float(np.sqrt(max(bar, 0.0)) + _SHORT)
+
+
+# Standard errors by which an estimate falls short once in five. [1]
+_SHORT = 0.84

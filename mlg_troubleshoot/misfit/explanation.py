@@ -1,0 +1,115 @@
+"""What may explain a misfit: effects, each a column, and contexts that change many rows at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mlg_troubleshoot.arrays import Array, Wholes
+
+# What is wrong, and in what: a cause with its target.
+Key = tuple[str, str | None]
+
+
+@dataclass(frozen=True)
+class Effects:
+    """Effects that may act, several variants under one name; each has a size that is not known.
+
+    columns, shape (n, p): effect of each per unit of its size. names: what each is a variant of,
+    None where it is an entry error, nothing that anybody has to correct. listed, shape (p,): True
+    if it stands on the list of causes. log_prior, shape (p,): logarithm of how often each is
+    expected in a set of data. size, shape (p,): standard deviation of its size. scales, shape (p,):
+    True where that is one of several. least, shape (p,): what is smaller does not matter. sign,
+    shape (p,): +1 or −1 where it can have one sign only, else 0. mean, shape (p,): the only size
+    that it can have, 0 where it is free.
+    """
+
+    columns: Array
+    names: Sequence[Key | None]
+    listed: Array
+    log_prior: Array
+    size: Array
+    scales: Array
+    least: Array
+    sign: Array
+    mean: Array
+
+    @staticmethod
+    def joined(parts: Sequence[Effects]) -> Effects:
+        """All effects of several lists in one."""
+        return Effects(
+            np.hstack([e.columns for e in parts]),
+            [name for e in parts for name in e.names],
+            *(
+                np.concatenate([getattr(e, what) for e in parts])
+                for what in ("listed", "log_prior", "size", "scales", "least", "sign", "mean")
+            ),
+        )
+
+    @staticmethod
+    def free(columns: Array, names: Sequence[Key | None], log_prior: float, size: float) -> Effects:
+        """Effects that are on no list and may have any sign, each equally likely."""
+        p = columns.shape[1]
+        none = np.zeros(p)
+        return Effects(
+            columns,
+            names,
+            none.astype(bool),
+            np.full(p, log_prior),
+            np.full(p, size),
+            np.array([name is not None for name in names], bool),
+            none,
+            none,
+            none,
+        )
+
+    @property
+    def numbered(self) -> tuple[list[Key | None], Wholes]:
+        """Each name once, None first, and the place of each effect's name among them."""
+        once: dict[Key | None, int] = {None: 0}
+        places = [once.setdefault(name, len(once)) for name in self.names]
+        return list(once), np.array(places, np.int64)
+
+
+@dataclass(frozen=True)
+class Context:
+    """Effects that act all together or not at all, with what is known of them beforehand.
+
+    name: what is wrong if it acts, None where nothing does. log_prior: logarithm of how often it is
+    expected. shared_in, shape (n, k): independent effects of one standard deviation each. columns:
+    the effects of an `Effects` where it acts, if they differ there; asked for only where it is
+    likely. correction: what its true prior adds to the log-likelihood of the normal one, given what
+    rows say of its own columns, aᵀx − xᵀQx / 2; raw_in, shape (n, j): those columns.
+    """
+
+    name: Key | None
+    log_prior: float
+    shared_in: Array
+    columns: Callable[[], Array] | None = None
+    correction: Callable[[Array, Array], float] | None = None
+    raw_in: Array | None = None
+
+    @staticmethod
+    def none(n: int) -> Context:
+        """Nothing acts in all rows at once."""
+        return Context(None, 0.0, np.empty((n, 0)))
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A context with some effects in it, by their places, and how likely it is.
+
+    log_posterior: up to a constant that all explanations of the same data share. values, shape
+    (k,): expected size of each member.
+    """
+
+    context: int
+    members: tuple[int, ...]
+    log_posterior: float
+    values: Array
+
+    def with_posterior(self, log_posterior: float) -> Explanation:
+        """The same, as likely as is said."""
+        return replace(self, log_posterior=log_posterior)

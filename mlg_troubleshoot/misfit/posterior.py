@@ -1,0 +1,278 @@
+"""How likely each explanation of data is: the likeliest ones searched, all near them summed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.misfit.beliefs import Beliefs
+from mlg_troubleshoot.misfit.covariance import NoiseModel
+from mlg_troubleshoot.misfit.explanation import Context, Effects, Explanation, Key
+from mlg_troubleshoot.misfit.marginal import Marginal, Products, log_sum
+
+# Computing only: more of each must not change what is said. Effects that act together at most; sets
+# that are extended with a context and without; log-likelihood behind the likeliest one from which a
+# set is not extended, and from which a context's own effects are not asked for.
+MOST, BEAM = 4, 16
+REACH, OWN = 9.0, 4.6
+_LEADING, _TRACE = 6, 1e-7
+
+
+@dataclass(frozen=True)
+class MisfitPosterior:
+    """How likely explanations of one set of data are.
+
+    likeliest: explanations that were looked at as a whole, likeliest first, with their
+    logarithmic probability. names: probability that something of each name acts. nothing: that
+    nothing of any name does. unlisted: that something acts that is on no list. together:
+    probability of each set of names. of_effect, shape (p,): of each effect. over_nothing, shape
+    (p,): logarithm of the odds of each alone against nothing at all. expected_in, shape (n,):
+    expected effect on each row of all that acts but slips.
+    """
+
+    effects: Effects
+    contexts: Sequence[Context]
+    likeliest: tuple[Explanation, ...]
+    names: dict[Key, float]
+    together: dict[frozenset[Key], float]
+    of_effect: Array
+    over_nothing: Array
+    nothing: float
+    unlisted: float
+    expected_in: Array
+
+    def names_of(self, found: Explanation) -> frozenset[Key]:
+        """Names of what an explanation has, slips left out."""
+        own = [self.effects.names[k] for k in found.members]
+        return frozenset(
+            name for name in (*own, self.contexts[found.context].name) if name is not None
+        )
+
+
+def posterior(
+    noise: NoiseModel,
+    data: Array,
+    effects: Effects,
+    contexts: Sequence[Context],
+    beliefs: Beliefs,
+    start: Sequence[Explanation] = (),
+) -> MisfitPosterior:
+    """Search the likeliest sets of effects in all contexts, and sum the probability of all near
+    them.
+    """
+    search = _Search(noise, data, effects, contexts, beliefs)
+    search.run(start)
+    return search.summed()
+
+
+@dataclass
+class _Extended:
+    """A set in a context with every further effect: logarithmic posteriors and expected sizes."""
+
+    own: Explanation
+    further: Array
+    values: Array
+    leading: tuple[int, ...]
+
+
+@dataclass
+class _Search:
+    noise: NoiseModel
+    data: Array
+    effects: Effects
+    contexts: Sequence[Context]
+    beliefs: Beliefs
+    extended: dict[tuple[int, frozenset[int]], _Extended] = field(default_factory=dict)
+    _marginals: dict[int, Marginal] = field(default_factory=dict)
+    _alone: dict[tuple[int, frozenset[int]], Explanation] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.products = Products(self.noise, self.effects.columns, self.data)
+        self.once, self.number = self.effects.numbered
+
+    def marginal(self, context: int) -> Marginal:
+        """The likelihoods in a context, with the effects that it changes."""
+        if context not in self._marginals:
+            self._marginals[context] = Marginal(
+                self.products, self.effects, self.contexts[context], self.beliefs
+            )
+        return self._marginals[context]
+
+    def alone(self, context: int, members: frozenset[int]) -> Explanation:
+        """One set on its own, exactly."""
+        key = context, members
+        if key not in self._alone:
+            places = tuple(sorted(members))
+            self._alone[key] = self.marginal(context).explanation(context, places)
+        return self._alone[key]
+
+    def extend(self, context: int, members: frozenset[int]) -> None:
+        """Ask for every further effect beside a set; one variant of a name acts, not two."""
+        key = context, members
+        if key in self.extended:
+            return
+        further, values = self.marginal(context).further(tuple(sorted(members)))
+        taken = {int(self.number[k]) for k in members} - {0}
+        further[np.isin(self.number, list(taken))] = -np.inf
+        further[list(members)] = -np.inf
+        if len(members) >= MOST:
+            further[:] = -np.inf
+        leading = tuple(np.argsort(-further)[: BEAM + 1].tolist())
+        self.extended[key] = _Extended(self.alone(context, members), further, values, leading)
+
+    @property
+    def best(self) -> float:
+        """Logarithmic posterior of the likeliest set so far."""
+        return max(found.own.log_posterior for found in self.extended.values())
+
+    def run(self, start: Sequence[Explanation]) -> None:
+        """Extend the likeliest sets, with a context and without, then take every step from the
+        leading ones.
+        """
+        none = frozenset[int]()
+        for context in range(len(self.contexts)):
+            self.extend(context, none)
+        for found in start:
+            self.extend(found.context, frozenset(found.members))
+        self._own_columns()
+        for _ in range(MOST):
+            self._beams()
+            if not self._neighbours():
+                break
+
+    def _own_columns(self) -> None:
+        """Where a context that changes the effects themselves is likely, look again with these."""
+        for context, about in enumerate(self.contexts):
+            found = self.extended[context, frozenset[int]()]
+            likely = max(found.own.log_posterior, float(np.max(found.further, initial=-np.inf)))
+            top = max(
+                float(np.max(other.further, initial=other.own.log_posterior))
+                for other in self.extended.values()
+            )
+            if about.columns is None or likely < top - OWN:
+                continue
+            columns, other = self.effects.columns.copy(), about.columns()
+            columns[:, : other.shape[1]] = other
+            own = self.products.replaced(columns)
+            self._marginals[context] = Marginal(own, self.effects, about, self.beliefs)
+            stale = [key for key in (*self.extended, *self._alone) if key[0] == context]
+            for key in stale:
+                self.extended.pop(key, None)
+                self._alone.pop(key, None)
+            self.extend(context, frozenset())
+
+    def _beams(self) -> None:
+        """Extend the likeliest sets that are not yet, those in a context and those in none."""
+        for kind in (False, True):
+            for _ in range(BEAM):
+                nearest = self._nearest(kind)
+                if nearest is None:
+                    break
+                self.extend(*nearest)
+
+    def _nearest(self, kind: bool) -> tuple[int, frozenset[int]] | None:
+        """The likeliest set that was not extended itself, in a context or in none."""
+        top, found = self.best - REACH, None
+        for (context, members), at in self.extended.items():
+            if bool(context) != kind:
+                continue
+            for k in at.leading:
+                if at.further[k] <= top:
+                    break
+                both = members | {k}
+                if (context, both) not in self.extended:
+                    top, found = float(at.further[k]), (context, both)
+                    break
+        return found
+
+    def _neighbours(self) -> bool:
+        """Take every leading set into every context, leave each of its parts away, and put any
+        other in its place; True if there was something new to look at.
+        """
+        order = sorted(self.extended.values(), key=lambda e: -e.own.log_posterior)[:_LEADING]
+        before = len(self.extended)
+        for at in order:
+            context, members = at.own.context, frozenset(at.own.members)
+            for other in range(len(self.contexts)):
+                if self.alone(other, members).log_posterior > self.best - REACH:
+                    self.extend(other, members)
+            for k in members:
+                self.extend(context, members - {k})
+        return len(self.extended) > before
+
+    def _masked(self) -> Iterator[tuple[int, frozenset[int], _Extended]]:
+        """Each extended set with what no other one has as well: no set is counted twice."""
+        counted: dict[int, list[frozenset[int]]] = {}
+        for (context, members), at in sorted(self.extended.items(), key=lambda e: len(e[0][1])):
+            known = {key[1] for key in self.extended if key[0] == context}
+            for other in known:
+                if len(other) == len(members) + 1 and members < other:
+                    at.further[list(other - members)] = -np.inf
+            for other in counted.get(context, []):
+                if len(other) == len(members) and len(other - members) == 1:
+                    at.further[list(other - members)] = -np.inf
+            counted.setdefault(context, []).append(members)
+            yield context, members, at
+
+    def summed(self) -> MisfitPosterior:
+        """Probabilities of everything, from all sets that were looked at."""
+        alone = self.extended[0, frozenset[int]()]
+        over_nothing = alone.further - alone.own.log_posterior
+        parts = list(self._masked())
+        whole = float(
+            log_sum(
+                np.concatenate([np.append(at.further, at.own.log_posterior) for *_k, at in parts])
+            )
+        )
+        names: dict[Key, float] = {}
+        together: dict[frozenset[Key], float] = {}
+        of_effect, size = np.zeros(len(self.number)), np.zeros(len(self.number))
+        expected = np.zeros(len(self.data))
+        listed = {
+            name for name, own in zip(self.effects.names, self.effects.listed, strict=True) if own
+        }
+        for context, _members, at in parts:
+            chance, own = np.exp(at.further - whole), float(np.exp(at.own.log_posterior - whole))
+            total = own + float(chance.sum())
+            places = list(at.own.members)
+            of_effect += chance
+            of_effect[places] += total
+            size += chance * at.values
+            size[places] += total * at.own.values
+            about = self.contexts[context]
+            own_names = [*(self.effects.names[k] for k in places), about.name]
+            held = frozenset(name for name in own_names if name is not None)
+            by_name = np.bincount(self.number, chance, len(self.once))
+            sets = {held: own + float(by_name[0])}
+            for place in np.flatnonzero(by_name[1:] > _TRACE) + 1:
+                name = self.once[place]
+                sets[held | ({name} if name else set())] = float(by_name[place])
+            for key, likely in sets.items():
+                together[key] = together.get(key, 0.0) + likely
+                for name in key:
+                    names[name] = names.get(name, 0.0) + likely
+            if about.shared_in.shape[1] and total > 1e-3:
+                left = self.data - self.effects.columns[:, places] @ at.own.values
+                wide = self.noise.beside(about.shared_in)
+                expected += total * wide.share_of(about.shared_in, left)
+        acting = np.array([name is not None for name in self.effects.names], bool)
+        expected += self.effects.columns[:, acting] @ size[acting]
+        context_names = {context.name for context in self.contexts}
+        nothing = together.get(frozenset(), 0.0)
+        unlisted = sum(p for own, p in together.items() if own - listed - context_names)
+        order = sorted((at.own for *_k, at in parts), key=lambda e: -e.log_posterior)
+        return MisfitPosterior(
+            self.effects,
+            self.contexts,
+            tuple(e.with_posterior(e.log_posterior - whole) for e in order),
+            names,
+            together,
+            of_effect,
+            over_nothing,
+            nothing,
+            unlisted,
+            expected,
+        )

@@ -1,0 +1,703 @@
+"""What the commands write with ``--json``: lengths in inches, numbers not rounded, null where not
+known.
+
+The order of the keys is that of the output. Records that are written whole are those of the model.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, NotRequired, TypedDict
+
+from msgspec import Meta
+
+from mlg_troubleshoot.decision.assessment import (
+    Confidence,
+    MeasuringAdvice,
+    Posterior,
+    RepairSet,
+    Rigging,
+    Verdict,
+)
+from mlg_troubleshoot.decision.inspection import Side
+from mlg_troubleshoot.decision.plan import Basis, End, Step
+from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.gear.gear import Sourced
+
+Version = Literal[1]
+Probability = Annotated[float, Meta(ge=0, le=1)]
+Size = Annotated[float, Meta(ge=0)]
+Positive = Annotated[float, Meta(gt=0)]
+Count = Annotated[int, Meta(ge=0)]
+JointNumber = Annotated[int, Meta(ge=1)]
+Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+Interval = tuple[float, float]
+# What a study could not compute is null.
+Ends = tuple[float | None, float | None]
+
+
+class GearIdentity(TypedDict):
+    """The gear that was used."""
+
+    id: str
+    geometry_sha256: Sha256
+    provenance: str
+
+
+class CheckedJoint(TypedDict):
+    """One joint of an inspection.
+
+    clearance_in: radial, null if not measured. contribution_in: plunger_amplification ×
+    clearance_in. first_order, total_order: fractions of the variance (Eqs. 1 and 2).
+    plunger_amplification: A_iP of Eq. 8 at mid-position in the limit of small clearance. rank:
+    order in which to inspect; rank_range: over the ensemble of geometries. allowance_in: how much
+    further this joint alone may wear until the worst case reaches the margin or it its limit.
+    acts_like: joints at the other end of the same link, which the plunger cannot distinguish.
+    """
+
+    joint: JointNumber
+    name: str
+    clearance_in: Size | None
+    over_limit: bool | None
+    contribution_in: Size | None
+    first_order: float | None
+    total_order: float | None
+    plunger_amplification: Size | None
+    rank: JointNumber | None
+    rank_range: tuple[int, int] | None
+    allowance_in: Size | None
+    acts_like: list[JointNumber] | None
+
+
+class CheckedInspection(TypedDict):
+    """One data row of the input; of an INVALID one every number is null.
+
+    predicted_displacement_in: worst case, the larger of the two senses in magnitude; null where the
+    linkage does not close. over_travel_in, under_travel_in: signed worst case of each sense.
+    predicted_upper_in: with unmeasured joints at their limit. bound_in: over all directions,
+    whatever an extension predicts. remaining_in: margin_in − predicted_displacement_in.
+    standard_uncertainty_in: of the prediction against the margin. probability_within_margin: that
+    the worst-case bound is within the margin. probability_exceed_random_directions: chance of
+    exceeding the margin with uniformly random directions. geometry_spread_in: least and largest
+    prediction over the ensemble. explained_at_most_in, unexplained_in: of a measured displacement,
+    by the joints' worst case; null without a reading. basis: MEASURED only with OUTSIDE_MARGIN,
+    when the mean reading is beyond the margin. next_action: the first step of the plan, of which
+    only that binds. open_question: what the day does not allow to settle. repair_sets: null where
+    the linkage does not close. measuring, confidence: null in a batch. posterior: null in a batch
+    or where nothing was measured.
+    """
+
+    record_id: str | None
+    tail_no: str | None
+    side: Side | None
+    verdict: Verdict
+    headline: str
+    predicted_displacement_in: float | None
+    over_travel_in: float | None
+    under_travel_in: float | None
+    predicted_upper_in: float | None
+    bound_in: Size | None
+    margin_in: Positive | None
+    remaining_in: float | None
+    standard_uncertainty_in: Size | None
+    probability_within_margin: Probability | None
+    probability_exceed_random_directions: Probability | None
+    geometry_spread_in: Interval | None
+    explained_at_most_in: Size | None
+    unexplained_in: Size | None
+    measured_displacement_in: float | None
+    joints: list[CheckedJoint]
+    basis: Basis | None
+    next_action: Step
+    plan: Annotated[list[Step], Meta(min_length=1)]
+    end: End
+    open_question: str | None
+    repair_sets: list[RepairSet] | None
+    rigging: Rigging | None
+    measuring: MeasuringAdvice | None
+    confidence: Confidence | None
+    posterior: Posterior | None
+    warnings: list[str]
+
+
+class CheckOutput(TypedDict):
+    """Output of mlg check --json: every data row of the input appears exactly once.
+
+    seed: of the Monte Carlo draws. problems: errors only. warnings: notes on the input as a whole.
+    """
+
+    schema_version: Version
+    seed: Count
+    gear: GearIdentity
+    inspections: list[CheckedInspection]
+    problems: list[Problem]
+    warnings: list[str]
+
+
+class RowCounts(TypedDict):
+    """Rows of the table that a diagnosis read, used and set aside."""
+
+    read: Count
+    used: Count
+    set_aside: Count
+
+
+class SuspectCell(TypedDict):
+    """A cell that is likely wrong; suggested is used in the analysis only."""
+
+    row: JointNumber
+    record_id: str
+    column: str
+    kind: Literal["mm_as_in", "factor_10", "swapped_joints", "swapped_side", "implausible"]
+    value: str
+    suggested: str | None
+
+
+class MisfitSize(TypedDict):
+    """Measured − predicted, and the repeatability of one reading."""
+
+    mean_in: float
+    rms_in: float
+    repeatability_in: Size | None
+    repeatability_source: str
+
+
+class TargetedCause(TypedDict):
+    """A cause and what it acts on: joint 4, tail N123, gauge G-03; null if it has no target."""
+
+    cause: Annotated[str, Meta(min_length=1)]
+    target: str | None
+
+
+class PossibleCause(TargetedCause):
+    """A cause that the data do not rule out, and the reading that would."""
+
+    separating_reading: str
+
+
+class LikelyCause(PossibleCause):
+    """A cause of a set, and how likely it is."""
+
+    probability: Probability
+
+
+class RivalTenTimesLikelier(TargetedCause):
+    """What the first cause would be worth if this rival were ten times as likely beforehand."""
+
+    probability_of_first: Probability
+
+
+class NamedCauseOutput(TargetedCause):
+    """A cause that the data name; aliases: what these rows cannot tell from it."""
+
+    effect_rms_in: Size
+    probability: Probability
+    parameters: dict[str, float]
+    interval_95: dict[str, Interval]
+    aliases: list[PossibleCause]
+
+
+class NotTestable(TypedDict):
+    """A cause that the columns of the table cannot show."""
+
+    cause: str
+    missing_column: str
+
+
+class FittedTerm(TargetedCause):
+    """One named cause with its fitted parameter."""
+
+    parameter: str
+    value: float
+    interval_95: Interval
+
+
+class FittedExtension(TypedDict):
+    """What the model is extended by."""
+
+    geometry_sha256: Sha256
+    data_sha256: list[Sha256]
+    residual_u_in: Size
+    terms: Annotated[list[FittedTerm], Meta(min_length=1)]
+
+
+class ExtensionGain(TypedDict):
+    """What the extension is worth on held-out rows; without one, after is as before."""
+
+    held_out_rms_before_in: Size
+    held_out_rms_after_in: Size
+    share_removed_interval_95: Interval
+    held_out_by: str | None
+    false_within_before: Count
+    false_within_after: Count
+    false_outside_before: Count
+    false_outside_after: Count
+    verdicts_changed: list[str]
+
+
+class Remainder(TypedDict):
+    """What no named cause explains."""
+
+    p_something_else: Probability
+    looks_like_noise: bool
+    rms_in: Size
+    expected_from_gauges_in: Size | None
+
+
+class DiagnoseOutput(TypedDict):
+    """Output of mlg diagnose --json.
+
+    causes: NAMED: by effect; else empty. also_possible: AMBIGUOUS: the whole set that the data
+    cannot separate; else empty. beside: NAMED: causes of which one or more act in addition to what
+    is named; the data cannot tell which. cannot_say: statements that so few rows or aircraft cannot
+    carry.
+    """
+
+    schema_version: Version
+    rows: RowCounts
+    data_faults: list[SuspectCell]
+    misfit: MisfitSize
+    verdict: Literal["NONE", "NAMED", "AMBIGUOUS", "UNLISTED"]
+    causes: list[NamedCauseOutput]
+    also_possible: list[LikelyCause]
+    beside: list[LikelyCause]
+    p_nothing: Probability
+    p_unlisted: Probability
+    sure: Probability
+    if_ten_times_likelier: list[RivalTenTimesLikelier]
+    unlisted_variables: list[str]
+    unlisted_rms_in: Size | None
+    not_testable: list[NotTestable]
+    cannot_say: list[str]
+    ruled_out: list[TargetedCause]
+    smallest_detectable_rms_in: Size | None
+    extension: FittedExtension | None
+    gain: ExtensionGain
+    remainder: Remainder
+    warnings: list[str]
+
+
+class NotConcluded(TypedDict):
+    """Output of mlg diagnose --json where nothing can be concluded (exit code 3)."""
+
+    schema_version: Version
+    verdict: None
+    reason: str
+    remedy: str
+
+
+class StudiedGear(TypedDict):
+    """The gear that was studied, with the hash of its ensemble."""
+
+    id: str
+    geometry_sha256: Sha256
+    ensemble_sha256: Sha256
+    provenance: str
+
+
+class StudiedJoint(TypedDict):
+    """Indices of one joint, fractions of the variance and not normalised to 1.
+
+    limit_in: upper end of its clearance's distribution. plunger_amplification: A_iP of Eq. 8 at
+    mid-position in the limit of small clearance. max_amplification_index: largest stage-wise index
+    over the release (section 4.3). rank_range, first_order_spread, total_order_spread: over the
+    ensemble of geometries.
+    """
+
+    joint: JointNumber
+    limit_in: Positive
+    first_order: float | None
+    first_order_interval: Ends
+    total_order: float | None
+    total_order_interval: Ends
+    plunger_amplification: float
+    max_amplification_index: float
+    rank: JointNumber
+    rank_range: tuple[int, int]
+    first_order_spread: Ends
+    total_order_spread: Ends
+
+
+class StudiedAmplification(TypedDict):
+    """Amplification of each joint by stage and to the plunger (Eqs. 7 to 10)."""
+
+    local_stage: list[float]
+    max_stage: list[float]
+    local_plunger: list[float]
+    max_plunger: list[float]
+    exact_plunger: list[float]
+
+
+class StudiedGroup(TypedDict):
+    """Both ends of one link taken as one joint."""
+
+    joints: list[JointNumber]
+    closed: float | None
+    total: float | None
+
+
+class StudiedEvidence(TypedDict):
+    """A number that bears on a statement, on every linkage."""
+
+    quantity: str
+    accepted: str
+    unit: str
+    values: list[float | None]
+    holds: list[bool]
+    why: str
+
+
+class StudiedStatement(TypedDict):
+    """A statement of the paper and what the linkages say to it."""
+
+    claim: str
+    section: str
+    outcome: Literal[
+        "holds", "holds only under a reading", "holds on some linkages", "does not hold"
+    ]
+    linkages: list[str]
+    evidence: list[StudiedEvidence]
+    paragraph: str
+
+
+class StudiedBound(TypedDict):
+    """The worst displacement of one sense: by the paper's rule, by search, and proved."""
+
+    sense: Literal["over-travel", "under-travel"]
+    sequential_in: float
+    searched_in: float
+    found_in: float
+    bound_in: float | None
+    stroke_in: float
+    directions_rad: list[float]
+
+
+class GivenJoint(TypedDict):
+    """First-order index of one joint from measured inspections."""
+
+    joint: JointNumber
+    first_order: float | None
+    first_order_interval: Ends
+    rows: Count
+
+
+class GivenData(TypedDict):
+    """Indices of measured inspections, without a model."""
+
+    file: str
+    rows_read: Count
+    rows_used: Count
+    joints: list[GivenJoint]
+
+
+class StudyOutput(TypedDict):
+    """Output of mlg study --json, and, up to joints, the table of indices that ships with a gear.
+
+    failed: solutions that did not close; they are counted, not dropped.
+    """
+
+    schema_version: Version
+    gear: StudiedGear
+    seed: Count
+    design: str
+    evaluations: Count
+    failed: Count
+    joints: Annotated[list[StudiedJoint], Meta(min_length=1)]
+    directions: NotRequired[str]
+    distribution: NotRequired[str]
+    of: NotRequired[str]
+    accuracy: NotRequired[float]
+    finished: NotRequired[bool]
+    note: NotRequired[str]
+    mean: NotRequired[float | None]
+    variance: NotRequired[float | None]
+    first_order_plain: NotRequired[list[float | None] | None]
+    second_order: NotRequired[list[list[float | None]] | None]
+    groups: NotRequired[list[StudiedGroup]]
+    ensemble: NotRequired[list[str]]
+    amplification: NotRequired[StudiedAmplification]
+    statements: NotRequired[list[StudiedStatement]]
+    bounds: NotRequired[list[StudiedBound]]
+    given_data: NotRequired[GivenData]
+
+
+class Landings(TypedDict):
+    """The 5, 50 and 95 % quantiles of landings; null beyond the horizon."""
+
+    p05: float | None
+    p50: float | None
+    p95: float | None
+
+
+class HitRate(TypedDict):
+    """In how many outcomes that name a joint the advice was right, with a 90 % interval."""
+
+    right: Count
+    outcomes: Count
+    p05: Probability | None
+    p95: Probability | None
+
+
+class FleetGear(TypedDict):
+    """One gear of a fleet: its last inspection, and the landings that it has left."""
+
+    tail_no: str
+    side: Side
+    record_id: str
+    inspection_date: str | None
+    gear_landings: float | None
+    verdict: Verdict | None
+    worst_joint: JointNumber | None
+    landings_to_limit: Landings | None
+    limit_joint: JointNumber | None
+    landings_to_margin: Landings | None
+    next_inspection_landings: float | None
+    due_date: str | None
+    repairs: Count
+
+
+class FleetOutput(TypedDict):
+    """Output of mlg fleet --json and, without forecasts, mlg history --json: worst gear first."""
+
+    schema_version: Version
+    gears: list[FleetGear]
+    advice: HitRate
+    warnings: list[str]
+
+
+class LifeEvent(TypedDict):
+    """One record of a gear, in the order of the chain; further keys by its kind."""
+
+    kind: Literal["inspection", "assessment", "repair", "rerig", "correction", "void", "outcome"]
+    record_id: str | None
+    date: str | None
+    gear_landings: float | None
+    hash: Sha256
+    verdict: NotRequired[Verdict | None]
+    predicted_displacement_in: NotRequired[float | None]
+    margin_in: NotRequired[float | None]
+    program_version: NotRequired[str | None]
+    geometry_sha256: NotRequired[Sha256 | None]
+    extension: NotRequired[Any]
+    counts: NotRequired[bool]
+    supersedes: NotRequired[Sha256 | None]
+    clearance_in: NotRequired[dict[str, float]]
+    work_order: NotRequired[str | None]
+    joints: NotRequired[list[JointNumber]]
+    voids: NotRequired[Sha256]
+    why: NotRequired[str]
+    of: NotRequired[Sha256]
+    found: NotRequired[str]
+    joint: NotRequired[JointNumber | None]
+
+
+class LifeJoint(TypedDict):
+    """A joint's readings (landings, radial clearance) since it was last restored."""
+
+    joint: JointNumber
+    limit_in: Positive
+    readings: list[Interval]
+    landings_to_limit: Landings | None
+
+
+class LifeOutput(TypedDict):
+    """Output of mlg history TAIL SIDE --json."""
+
+    schema_version: Version
+    tail_no: str
+    side: Side
+    events: list[LifeEvent]
+    joints: list[LifeJoint]
+    landings_to_limit: Landings | None
+    limit_joint: JointNumber | None
+    landings_to_margin: Landings | None
+    next_inspection_landings: float | None
+    due_date: str | None
+    advice: HitRate
+    warnings: list[str]
+
+
+class ShownJoint(TypedDict):
+    """A joint as the gear file describes it."""
+
+    joint: JointNumber
+    name: str
+    location: str
+    limit: Sourced
+    new_part: Sourced
+    access: Sourced
+    area: str
+    critical: bool
+    acts_like: list[JointNumber]
+
+
+class ShownPoint(TypedDict):
+    """A point of the linkage at mid-position."""
+
+    plane: str
+    at_in: Interval
+    fixed: bool
+
+
+class GearOutput(TypedDict):
+    """Output of mlg gear --json."""
+
+    id: str
+    name: str
+    provenance: str
+    geometry_sha256: Sha256
+    ensemble: list[str]
+    calibration_rate: float
+    margin: Sourced
+    release_stroke_in: float
+    joints: list[ShownJoint]
+    points: dict[str, ShownPoint]
+    numbers: list[Sourced]
+
+
+class VerifiedNumber(TypedDict):
+    """A number that the paper prints beside what the model gives."""
+
+    quantity: str
+    section: str
+    printed: str
+    computed: float
+    unit: str
+    tolerance: str
+    status: str
+    holds: bool
+    should_hold: bool
+
+
+class VerifyOutput(TypedDict):
+    """Output of mlg gear verify --json."""
+
+    gear: str
+    numbers: list[VerifiedNumber]
+
+
+class SurveyedJoint(TypedDict):
+    """Amplification of a joint with its 90 % interval, after the survey and before."""
+
+    joint: JointNumber
+    plunger_amplification: float
+    interval_90: Interval
+    before: Interval
+
+
+NextReading = TypedDict(
+    "NextReading",
+    {
+        "kind": Literal["DISTANCE", "PLUNGER", "ANGLE", "EXTENSION"],
+        "from": str | None,
+        "to": str | None,
+        "extension_in": float,
+        "expected_narrowing": float,
+    },
+)
+
+
+class MisfittingReading(TypedDict):
+    """A reading that does not fit; of an angle the lengths are null."""
+
+    row: JointNumber
+    value_in: float | None
+    expected_in: float | None
+    value_deg: NotRequired[float]
+    expected_deg: NotRequired[float]
+    suggestion: str
+
+
+class SurveyedInspection(TypedDict):
+    """The displacement of an inspected gear over the linkages that the survey leaves."""
+
+    record_id: str
+    displacement_in: float
+    interval_90: Interval
+    probability_within_margin: Probability
+
+
+class SurveyOutput(TypedDict):
+    """Output of mlg gear survey --json; next: the reading that narrows most, if any would."""
+
+    schema_version: Version
+    gear_file: str | None
+    joints: list[SurveyedJoint]
+    next: Annotated[list[NextReading], Meta(max_length=1)]
+    misfits: list[MisfittingReading]
+    chi2: float | None
+    degrees_of_freedom: float | None
+    warnings: list[str]
+    problems: list[Problem]
+    inspections: NotRequired[list[SurveyedInspection]]
+
+
+class SeparableCause(TypedDict):
+    """What the planned columns could say about one cause; a size that is never reached is null."""
+
+    cause: str
+    target: str | None
+    found_from_in: float | None
+    missing_column: str | None
+    nearest: str | None
+    told_apart_from_in: float | None
+    further_column: str | None
+    separating_reading: str
+
+
+class SeparableOutput(TypedDict):
+    """Output of mlg gear separable --json."""
+
+    schema_version: Version
+    columns: list[str] | None
+    causes: list[SeparableCause]
+
+
+class LoosePart(TypedDict):
+    """A number of the linkage and which part of its range stays free."""
+
+    number: str
+    free_part: float
+
+
+class MetTarget(TypedDict):
+    """A target of a reconstruction and what was found for it."""
+
+    quantity: str
+    printed: str
+    unit: str
+    accepted: str
+    computed: float
+    holds: bool
+    binds: bool
+
+
+class ReconstructOutput(TypedDict):
+    """Output of mlg gear reconstruct --json."""
+
+    schema_version: Version
+    seed: Count
+    linkages_tried: Count
+    meets_all: bool
+    numbers: Count
+    determined: Count
+    free: Count
+    loosest: list[LoosePart]
+    targets: list[MetTarget]
+    member_toml: str
+
+
+class CheckedAbility(TypedDict):
+    """One thing that an installation can do, or cannot."""
+
+    ability: str
+    detail: str
+    works: bool
+    needed: bool
+    remedy: str
+
+
+class DoctorOutput(TypedDict):
+    """Output of mlg doctor --json."""
+
+    schema_version: Version
+    abilities: list[CheckedAbility]

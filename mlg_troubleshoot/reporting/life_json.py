@@ -1,0 +1,96 @@
+"""The JSON of a fleet and of one gear's life."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.life.folding import GearKey, GearLife
+from mlg_troubleshoot.life.forecast import Forecast
+from mlg_troubleshoot.life.looking_back import Advice
+from mlg_troubleshoot.life.outlook import FleetLine, LandingsLeft, fleet_lines, quantiles
+from mlg_troubleshoot.life.wear_paths import stretches
+from mlg_troubleshoot.outputs import SCHEMA_VERSION
+from mlg_troubleshoot.store import Record, RecordKind
+
+
+def fleet_as_json(
+    lives: Sequence[GearLife], forecasts: Mapping[GearKey, Forecast]
+) -> dict[str, Any]:
+    """One line per gear, worst first: verdict, then landings to its next inspection."""
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "gears": [fleet_line_as_json(line) for line in fleet_lines(lives, forecasts)],
+        "advice": _advice(lives),
+        "warnings": [warning for life in lives for warning in life.warnings],
+    }
+
+
+def fleet_line_as_json(line: FleetLine) -> dict[str, Any]:
+    return {
+        "tail_no": line.life.key[0],
+        "side": line.life.key[1],
+        "record_id": line.latest.record.record_id,
+        "inspection_date": line.latest.record.day or None,
+        "gear_landings": line.latest.inspection.gear_landings,
+        "verdict": line.verdict,
+        "worst_joint": line.latest.worst_joint,
+        **asdict(line.outlook),
+        "repairs": len(line.life.repairs),
+    }
+
+
+def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
+    """One gear's events in the order of the chain, and each joint's readings since it was last
+    restored.
+    """
+    counting = {kept.record.digest for kept in life.inspections}
+    joints = [
+        {
+            "joint": number,
+            "limit_in": gear.joint(number).limit.value,
+            "readings": [[landings, clearance] for landings, clearance, _u in between[-1].placed],
+            "landings_to_limit": quantiles(ahead.joints.get(number)),
+        }
+        for number, between in stretches(life, gear.joint_numbers).items()
+    ]
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "tail_no": life.key[0],
+        "side": life.key[1],
+        "events": [_event(record, counts=record.digest in counting) for record in life.records],
+        "joints": joints,
+        **asdict(LandingsLeft.of(life, ahead)),
+        "advice": _advice([life]),
+        "warnings": list(life.warnings),
+    }
+
+
+def _event(record: Record, *, counts: bool) -> dict[str, Any]:
+    body = record.body
+    inspection = body.get("inspection", {})
+    event = {
+        "kind": record.kind.value,
+        "record_id": record.record_id or None,
+        "date": record.day or None,
+        "gear_landings": body.get("landings", inspection.get("gear_landings")),
+        "hash": record.digest,
+    }
+    if record.kind is RecordKind.ASSESSMENT:
+        result, by = body["result"], ("program_version", "geometry_sha256", "extension")
+        for name in ("verdict", "predicted_displacement_in", "margin_in"):
+            event[name] = result.get(name)
+        return event | {name: body.get(name) for name in by}
+    if record.kind in (RecordKind.INSPECTION, RecordKind.CORRECTION):
+        event |= {"counts": counts, "supersedes": body.get("supersedes")}
+        return event | {"clearance_in": inspection.get("clearance_in", {})}
+    return event | {name: value for name, value in body.items() if name != "landings"}
+
+
+def _advice(lives: Sequence[GearLife]) -> dict[str, int | float | None]:
+    """The hit rate; its interval is null where no outcome names a joint."""
+    advice = Advice.of(lives)
+    low, high = advice.interval or (None, None)
+    return {"right": advice.right, "outcomes": advice.outcomes, "p05": low, "p95": high}

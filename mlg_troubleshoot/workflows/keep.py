@@ -1,0 +1,165 @@
+"""Keep what a check found: inspections with their assessments, and corrections."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from mlg_troubleshoot.decision.assessment import Assessment
+from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.life.folding import GearKey, find, warnings_of, without_dashes
+from mlg_troubleshoot.records.rows import place_in_file
+from mlg_troubleshoot.store import (
+    Added,
+    Record,
+    RecordKind,
+    Store,
+    StoreError,
+    inspection_record,
+    packed,
+    same_inspection,
+)
+from mlg_troubleshoot.workflows.check import CheckOptions, CheckResult
+
+
+@dataclass(frozen=True, slots=True)
+class Kept(Added):
+    """What was added, and which records of these gears now disagree in dates and landings."""
+
+    warnings: tuple[str, ...]
+
+
+def keep(
+    result: CheckResult,
+    options: CheckOptions,
+    store: Store,
+    same_tail: Callable[[str, str], bool] | None = None,
+) -> Kept:
+    """Add the judged inspections of a check and their assessments, all or none.
+
+    ``same_tail`` answers whether two spellings of a tail number mean one aircraft; without it they
+    are refused.
+    """
+    judged = [j for j in result.judgements if isinstance(j, Assessment)]
+    tails = _settled_tails(judged, store, same_tail)
+    written = [
+        replace(j.inspection, tail_no=tails.get(j.inspection.tail_no, j.inspection.tail_no))
+        for j in judged
+    ]
+    inspections = [inspection_record(each) for each in _under_first_ids(written, store)]
+    known = store.known([record.identity_hash for record in inspections])
+    records: list[Record] = []
+    for assessment, record in zip(judged, inspections, strict=True):
+        # Wherever an inspection was entered again, it is the first entry that was assessed.
+        first = known.setdefault(record.identity_hash, record)
+        records += [record, assessment_record(result.gear, options, assessment, record, first)]
+    added = store.add(
+        records,
+        lambda kept, new: new.kind is not RecordKind.INSPECTION or _agrees(store, kept, new),
+    )
+    gears = {(record.tail_no, record.side) for record in records}
+    return Kept(added.new, added.known, tuple(warnings_of(store, gears)))
+
+
+def correct(store: Store, record_id: str, result: CheckResult, options: CheckOptions) -> Record:
+    """Append the right inspection for a wrong one; the wrong one stays readable in the chain."""
+    wrong = find(store, record_id)
+    judged = [j for j in result.judgements if isinstance(j, Assessment)]
+    if len(judged) != 1 or len(result.judgements) != 1:
+        raise UsageError(
+            f"a correction is one inspection, and the file holds {len(result.judgements)}"
+            f" ({len(judged)} sound)",
+            "Give a file with the one right row.",
+        )
+    right = judged[0].inspection
+    if (right.tail_no, right.side.value) != (wrong.tail_no, wrong.side):
+        raise UsageError(
+            f"the correction is of {right.tail_no} {right.side}, the record of {wrong.tail_no}"
+            f" {wrong.side}",
+            "Void the record (mlg history void) and keep the right one: mlg check FILE --keep",
+        )
+    record = inspection_record(right, RecordKind.CORRECTION, supersedes=wrong.digest)
+    store.add([record, assessment_record(result.gear, options, judged[0], record, record)])
+    return record
+
+
+def assessment_record(
+    gear: Gear, options: CheckOptions, assessment: Assessment, of: Record, first: Record
+) -> Record:
+    """An assessment as a record: of an inspection, which is known by its first entry."""
+    from mlg_troubleshoot.reporting.json_form import kept_as_json
+    from mlg_troubleshoot.reporting.provenance import program_version
+
+    by = {
+        "program_version": program_version(),
+        "geometry_sha256": gear.geometry_sha256,
+        "extension": None if options.extension is None else options.extension.describe(),
+    }
+    return replace(
+        of,
+        kind=RecordKind.ASSESSMENT,
+        packed=packed({**by, "result": kept_as_json(assessment)}),
+        identity=(of.identity_hash.hex(), *map(str, by.values()), first.packed.hex()),
+    )
+
+
+def _under_first_ids(inspections: Sequence[Inspection], store: Store) -> list[Inspection]:
+    """The same row of a renamed file has another made id: it is the inspection that was kept
+    first.
+    """
+    gears: set[GearKey] = set()
+    first: dict[tuple[str, ...], Record] = {}
+
+    def under_first_id(inspection: Inspection) -> Inspection:
+        row, key = place_in_file(inspection.record_id), (inspection.tail_no, inspection.side.value)
+        if not row:
+            return inspection
+        if key not in gears:
+            gears.add(key)
+            for kept in store.of_gear(*key):
+                if kept.kind is RecordKind.INSPECTION:
+                    first.setdefault((*key, kept.day, place_in_file(kept.record_id)), kept)
+        record = inspection_record(inspection)
+        kept = first.setdefault((*key, record.day, row), record)
+        renamed = replace(inspection, record_id=kept.record_id)
+        return renamed if same_inspection(kept, inspection_record(renamed)) else inspection
+
+    return [under_first_id(inspection) for inspection in inspections]
+
+
+def _agrees(store: Store, kept: Record, new: Record) -> bool:
+    """The same as kept, or as what the kept one was corrected to."""
+    return same_inspection(kept, new) or any(
+        record.kind is RecordKind.CORRECTION
+        and record.body["supersedes"] == kept.digest
+        and same_inspection(record, new)
+        for record in store.of_gear(kept.tail_no, kept.side)
+    )
+
+
+def _settled_tails(
+    judged: Sequence[Assessment], store: Store, same_tail: Callable[[str, str], bool] | None
+) -> dict[str, str]:
+    """Spellings that differ only in case, blanks or dashes: never one aircraft without being
+    asked.
+    """
+    known = dict.fromkeys(tail for tail, _side in store.gears())
+    by_spelling: dict[str, str] = {}
+    for tail in known:
+        by_spelling.setdefault(without_dashes(tail), tail)
+    settled: dict[str, str] = {}
+    for tail in dict.fromkeys(a.inspection.tail_no for a in judged):
+        other = by_spelling.setdefault(without_dashes(tail), tail)
+        if tail in known or other == tail:
+            continue
+        if same_tail is None:
+            raise StoreError(
+                f"tail {tail!r} differs from {other!r} only in case, blanks or dashes; nothing was"
+                " kept",
+                "Correct it, or say --tails same (one aircraft) or --tails apart (two).",
+            )
+        if same_tail(tail, other):
+            settled[tail] = other
+    return settled

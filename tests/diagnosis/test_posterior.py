@@ -1,0 +1,229 @@
+"""The posterior against Bayes' rule written out, and what must not change what it says."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import fields, replace
+from itertools import combinations, product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from mlg_troubleshoot.diagnosis import CATALOGUE, Cause
+from mlg_troubleshoot.diagnosis.causes.together import JointFactors
+from mlg_troubleshoot.misfit.beliefs import Beliefs
+from mlg_troubleshoot.misfit.covariance import NoiseModel
+from mlg_troubleshoot.misfit.explanation import Context, Effects, Key
+from mlg_troubleshoot.misfit.marginal import Marginal, Products
+from mlg_troubleshoot.misfit.posterior import MisfitPosterior, posterior
+from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions
+
+PAGE = Path(__file__).parents[2] / "docs/explanation/diagnosis.md"
+Array = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+
+N, P = 40, 6
+RNG = np.random.default_rng(3)
+COLUMNS = RNG.standard_normal((N, P))
+NAMES: list[Key | None] = [("a", None), ("b", None), ("b", None), ("c", None), ("d", None), None]
+NOISE = NoiseModel(
+    relative=RNG.uniform(0.8, 1.4, N),
+    tails=np.arange(N) % 5,
+    gears=np.arange(N) % 10,
+    loadings=0.2 * RNG.standard_normal((N, 1)),
+    floor_in=0.0,
+    gear_ratio=0.3,
+    tail_ratios=(0.0, 0.5),
+    scale_in=1.3,
+)
+BELIEFS = Beliefs(sizes=(0.5, 2.0))
+SIGN = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def effects(columns: Array = COLUMNS, mean: float = 0.0) -> Effects:
+    none = np.zeros(P)
+    exact = np.array([0.0, 0.0, 0.0, mean, 0.0, 0.0])
+    return Effects(
+        columns=columns,
+        names=NAMES,
+        listed=np.array([True, True, True, True, False, False]),
+        log_prior=np.log(np.array([0.1, 0.05, 0.05, 0.08, 0.02, 0.01])),
+        size=np.full(P, 0.8),
+        scales=np.array([True, True, True, mean == 0.0, True, False]),
+        least=none,
+        sign=SIGN,
+        mean=exact,
+    )
+
+
+CONTEXTS = (Context.none(N), Context(("all", None), -2.0, 0.7 * RNG.standard_normal((N, 3))))
+DATA = COLUMNS[:, 1] * 0.9 + np.linalg.cholesky(
+    1.69 * (np.diag(NOISE.relative**2) + NOISE.factors(0.5) @ NOISE.factors(0.5).T)
+) @ RNG.standard_normal(N)
+
+
+def brute(members: tuple[int, ...], context: Context, given: Effects) -> float:
+    """Logarithmic posterior of a set by whole matrices, up to the constant of the data.
+
+    The scale is integrated over a fine grid of its logarithm; signs are drawn.
+    """
+    whole = []
+    grid = np.linspace(-1.5, 1.5, 241)
+    for level, ratio in product(BELIEFS.sizes, NOISE.tail_ratios):
+        low = np.hstack([NOISE.factors(ratio), context.shared_in / NOISE.scale_in])
+        spread = [
+            (level if given.scales[k] else 1.0) * given.size[k] / NOISE.scale_in for k in members
+        ]
+        held = given.columns[:, list(members)] * spread
+        covariance = np.diag(NOISE.relative**2) + low @ low.T + held @ held.T
+        mean = given.columns[:, list(members)] @ given.mean[list(members)]
+        found = multivariate_normal(np.zeros(N), covariance)
+        each = [found.logpdf((DATA - mean) / np.exp(s)) - N * s for s in grid]
+        whole.append(np.logaddexp.reduce(each) - np.log(len(BELIEFS.sizes)))
+    prior = context.log_prior + float(np.sum(given.log_prior[list(members)]))
+    return float(np.logaddexp.reduce(whole)) + prior
+
+
+def alone(members: tuple[int, ...], context: int, given: Effects) -> float:
+    products = Products(NOISE, given.columns, DATA)
+    found = Marginal(products, given, CONTEXTS[context], BELIEFS)
+    return found.explanation(context, members).log_posterior
+
+
+FREE = replace(effects(), sign=np.zeros(P))
+SETS = [(), (0,), (5,), (0, 3), (1, 3, 4)]
+
+
+@pytest.mark.parametrize("context", [0, 1])
+@pytest.mark.parametrize("members", SETS[1:])
+def test_a_set_is_as_likely_as_bayes_rule_written_out_says(
+    members: tuple[int, ...], context: int
+) -> None:
+    expected = brute(members, CONTEXTS[context], FREE) - brute((), CONTEXTS[0], FREE)
+    found = alone(members, context, FREE) - alone((), 0, FREE)
+    assert found == pytest.approx(expected, abs=0.01)
+
+
+def test_an_effect_of_only_one_size_counts_with_that() -> None:
+    given = replace(effects(mean=0.7), sign=np.zeros(P), size=np.full(P, 0.1))
+    expected = brute((3,), CONTEXTS[0], given) - brute((), CONTEXTS[0], given)
+    assert alone((3,), 0, given) - alone((), 0, given) == pytest.approx(expected, abs=0.01)
+
+
+@pytest.mark.parametrize("members", SETS)
+def test_a_further_effect_makes_a_set_as_likely_as_both_together(members: tuple[int, ...]) -> None:
+    marginal = Marginal(Products(NOISE, COLUMNS, DATA), FREE, CONTEXTS[1], BELIEFS)
+    further, _values = marginal.further(members)
+    for k in set(range(P)) - set(members):
+        both = tuple(sorted({*members, k}))
+        assert further[k] == pytest.approx(marginal.explanation(1, both).log_posterior, abs=1e-8)
+
+
+def test_a_sign_that_an_effect_has_makes_it_twice_as_likely_and_the_other_impossible() -> None:
+    right, wrong = effects(), replace(effects(), sign=-SIGN)
+    bare = alone((1,), 0, FREE)
+    assert alone((1,), 0, right) - bare == pytest.approx(np.log(2.0), abs=0.01)
+    assert alone((1,), 0, wrong) < bare - 4.0
+
+
+def search(
+    given: Effects | None = None, contexts: tuple[Context, ...] = CONTEXTS
+) -> MisfitPosterior:
+    return posterior(NOISE, DATA, given or FREE, contexts, BELIEFS)
+
+
+def every_set() -> dict[tuple[int, tuple[int, ...]], float]:
+    """Each set of up to four effects, no name twice, in each context, as likely as it is."""
+    found = {}
+    for context, count in product(range(2), range(5)):
+        for members in combinations(range(P), count):
+            if not {1, 2} <= set(members):
+                found[context, members] = alone(members, context, FREE)
+    whole = float(np.logaddexp.reduce(list(found.values())))
+    return {key: float(np.exp(value - whole)) for key, value in found.items()}
+
+
+def test_probabilities_are_sums_over_all_sets_each_counted_once() -> None:
+    found, truth = search(), every_set()
+    nothing = sum(
+        p for (context, members), p in truth.items() if not context and set(members) <= {5}
+    )
+    second = sum(p for (_context, members), p in truth.items() if {1, 2} & set(members))
+    free = sum(p for (_context, members), p in truth.items() if 4 in members)
+    assert sum(found.together.values()) == pytest.approx(1.0)
+    assert found.nothing == pytest.approx(nothing, abs=2e-3)
+    assert found.names["b", None] == pytest.approx(second, abs=2e-3)
+    assert found.unlisted == pytest.approx(free, abs=2e-3)
+
+
+def test_no_set_within_one_step_is_likelier_than_the_one_that_is_found() -> None:
+    best, truth = search().likeliest[0], every_set()
+    members = set(best.members)
+    steps = [(context, members) for context in range(2)]
+    steps += [(best.context, members ^ {k}) for k in range(P)]
+    steps += [(best.context, (members - {k}) | {j}) for k in members for j in range(P)]
+    for context, near in steps:
+        chance = truth.get((context, tuple(sorted(near))), 0.0)
+        assert chance <= truth[best.context, best.members] + 1e-12
+
+
+def test_two_that_only_explain_together_are_found() -> None:
+    rng, n = np.random.default_rng(4), 60
+    first, rest = rng.standard_normal(n), rng.standard_normal(n)
+    second = 0.97 * first + 0.1 * rest
+    others = rng.standard_normal((n, 3))
+    columns = np.column_stack([first, second, others])
+    data = 8.0 * (first - second) + rng.standard_normal(n)
+    names: list[Key | None] = [(name, None) for name in "abcde"]
+    listed = Effects.free(columns, names, -3.0, 5.0)
+    found = posterior(NoiseModel.white(n), data, listed, (Context.none(n),), Beliefs())
+    assert set(found.likeliest[0].members) == {0, 1}
+
+
+def test_a_slip_of_the_pen_is_nothing_that_is_wrong() -> None:
+    slip = replace(FREE, columns=np.column_stack([COLUMNS[:, :5], np.eye(N)[:, 7]]))
+    data = DATA - 0.9 * COLUMNS[:, 1]
+    data[7] += 40.0
+    found = posterior(NOISE, data, replace(slip, size=np.full(P, 9.0)), CONTEXTS, BELIEFS)
+    assert found.likeliest[0].members == (5,)
+    assert found.nothing > 0.5
+
+
+def test_what_is_rarer_beforehand_is_rarer_afterwards_by_as_much() -> None:
+    rarer = replace(FREE, log_prior=FREE.log_prior - np.log(10.0) * (np.arange(P) == 0))
+    usual, less = (search(given).together for given in (FREE, rarer))
+    odds = [p[frozenset({("a", None)})] / p[frozenset()] for p in (usual, less)]
+    assert odds[0] == pytest.approx(10.0 * odds[1], rel=1e-3)
+
+
+def test_twice_as_much_searching_says_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = search().names
+    monkeypatch.setattr("mlg_troubleshoot.misfit.posterior.BEAM", 40)
+    monkeypatch.setattr("mlg_troubleshoot.misfit.posterior.REACH", 14.0)
+    assert search().names == pytest.approx(before, abs=2e-3)
+
+
+def test_what_a_probability_is_said_from_is_odds_of_nine_to_one() -> None:
+    assert np.exp(Beliefs().odds) == pytest.approx(9.0)
+
+
+@pytest.mark.parametrize("name", [field.name for field in fields(Beliefs)])
+def test_the_page_of_the_diagnosis_states_what_is_believed(name: str) -> None:
+    row = re.search(rf"^\| `{name}` \| ([^|]+) \|", PAGE.read_text(encoding="utf-8"), re.M)
+    value = getattr(Beliefs(), name)
+    assert row is not None
+    if isinstance(value, float):
+        assert float(row[1]) == pytest.approx(value, abs=5e-4)
+
+
+@pytest.mark.parametrize("cause", CATALOGUE, ids=lambda cause: cause.name)
+def test_the_page_of_the_diagnosis_states_how_large_each_cause_plausibly_is(cause: Cause) -> None:
+    said = PAGE.read_text(encoding="utf-8").split("What counts as noise")[0]
+    assert (f"`{cause.name}`" in said) == (
+        cause.plausible is not None or isinstance(cause, JointFactors)
+    )
+
+
+def test_the_command_says_what_the_beliefs_say_from_the_same_probability() -> None:
+    assert DiagnoseOptions().sure == Beliefs().sure

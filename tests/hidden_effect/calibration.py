@@ -1,0 +1,99 @@
+"""Whether what is said at 90 % is right nine times in ten: a mixture of fleets of both studies.
+
+    python -m tests.hidden_effect.calibration --fleets 300
+
+The fleets are mixed, so that the first of them are as good a sample as all. Their seeds, 18,000,000
+and following, were used for no constant of the program.
+"""
+
+from __future__ import annotations
+
+import argparse
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from tests.hidden_effect import departures, study
+
+# The studies set one thread a worker before numpy is loaded.
+import numpy as np  # isort: skip
+
+from tests.hidden_effect import simulator
+
+FIRST_SEED = 18_000_000
+OF_STUDY = {
+    **{f"null:{name}": 10 for name in simulator.NULLS},
+    "single:10": 140,
+    "single:15": 112,
+    "off_catalogue": 40,
+    "double": 40,
+    "triple": 24,
+    "aliased": 10,
+    "missing_column": 12,
+}
+OF_DEPARTURES = {
+    "loads:40": 24,
+    "loads:90": 20,
+    "loads:180": 16,
+    "loads and gauge_bias": 10,
+    "linkage, nothing hidden": 36,
+    "linkage, one cause": 42,
+    "read #2-#5, nothing hidden": 20,
+    "read #2-#5, one cause": 18,
+    "blank 50 %": 20,
+    "convention": 10,
+    "one group": 18,
+}
+EDGES = (0.05, 0.2, 0.4, 0.6, 0.8, 0.95, 0.99, 1.0)
+
+
+def tasks(first_seed: int = FIRST_SEED) -> list[tuple[int, Any]]:
+    """Fleets of both studies in mixed order, each with its seed."""
+    listed: list[tuple[int, Any]] = [(t["seed"], t) for t in study.tasks(OF_STUDY, first_seed)]
+    listed += [(t[2], t) for t in departures.tasks(OF_DEPARTURES, first_seed + 500_000)]
+    return [listed[int(k)] for k in np.random.default_rng(first_seed).permutation(len(listed))]
+
+
+def run(task: Any) -> dict[str, Any]:
+    """Simulate and diagnose one fleet, then compare."""
+    return study.run(task) if isinstance(task, dict) else departures.run(task)
+
+
+def bins(records: list[dict[str, Any]]) -> list[tuple[float, float, int, float, int]]:
+    """Of each bin: its edges, how many causes were stated in it, their mean, and how many act.
+
+    Fleets of another linkage are left out: whether it shows in their rows is not known.
+    """
+    said = [
+        (float(p), any(study._same((cause, target), tuple(t)) for t in r["truth"]))
+        for r in records
+        if r.get("linkage", "A") == "A"
+        for cause, target, p in r.get("probabilities", ())
+    ]
+    found = []
+    for low, high in pairwise(EDGES):
+        own = [(p, acts) for p, acts in said if low <= p < high or (high == 1.0 and p >= high)]
+        mean = float(np.mean([p for p, _acts in own])) if own else float("nan")
+        found.append((low, high, len(own), mean, sum(acts for _p, acts in own)))
+    return found
+
+
+def main() -> None:
+    """Print the bins."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--fleets", type=int, default=300, help="how many of the mixed fleets")
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
+    parser.add_argument("--keep", type=Path, help="file to keep records in, to go on after a stop")
+    given = parser.parse_args()
+    listed = tasks(given.first_seed)[: given.fleets]
+    records = study.mapped(run, listed, given.workers, given.keep)
+    print("| stated | causes | mean stated | act |\n|---|---|---|---|")
+    for low, high, count, mean, acting in bins(records):
+        rate = study._rate(acting, count)
+        band = f"{rate['low']:.2f}–{rate['high']:.2f}"
+        print(f"| {low:.2f}–{high:.2f} | {count} | {mean:.3f} | {rate['rate']:.3f} ({band}) |")
+
+
+if __name__ == "__main__":
+    main()

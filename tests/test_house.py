@@ -1,0 +1,76 @@
+"""The rooms of the house: doors, names, layers, and the picture of them in docs/contributing.md."""
+
+from __future__ import annotations
+
+import ast
+from collections import Counter
+
+import pytest
+
+from . import house
+
+# The picture shows it; the types and the layers themselves are tests of test_project.py.
+
+
+def test_the_picture_of_the_house_is_current() -> None:
+    assert house.page() == house.PAGE.read_text(encoding="utf-8"), "run: python tests/house.py"
+
+
+def test_nobody_reaches_past_the_door_of_a_room() -> None:
+    past = [
+        f"{found.file}:{found.line} takes {'.'.join((*found.module, found.name))}"
+        for found in house.past_a_door()
+    ]
+    assert past == []
+
+
+@pytest.mark.parametrize("room", house.rooms())
+def test_a_room_says_what_it_is_and_names_its_doors(room: str) -> None:
+    assert house.first_line(house.trees()[f"{room}/__init__.py"])
+    assert house.doors(room)
+
+
+# Rooms that scripts use, whose names nobody in the package needs to take.
+FOR_SCRIPTS = {"diagnosis", "records", "schemas", "wear", "cli"}
+
+
+@pytest.mark.parametrize("room", sorted({*house.rooms()} - FOR_SCRIPTS))
+def test_every_door_is_used(room: str) -> None:
+    taken = {
+        (*found.module, found.name)[1]
+        for found in house.imports()
+        if found.other == room != found.room and len((*found.module, found.name)) > 1
+    }
+    assert set(house.doors(room)) - taken == set()
+
+
+def test_no_private_name_is_taken_from_another_file() -> None:
+    private = [
+        f"{found.file}:{found.line} takes {found.name}"
+        for found in house.imports()
+        if found.name.startswith("_") and not found.name.startswith("__")
+    ]
+    assert private == []
+
+
+def test_a_public_class_name_stands_once_in_the_package() -> None:
+    names = Counter(
+        node.name
+        for tree in house.trees().values()
+        for node in tree.body
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+    )
+    assert [name for name, count in names.items() if count > 1] == []
+
+
+@pytest.mark.parametrize("title", house.WAYS)
+def test_every_step_of_a_way_is_taken_by_the_imports(title: str) -> None:
+    """A file of the way is imported by a file that was passed before."""
+    steps = [file for file, _name in house.WAYS[title]]
+    taken = {(found.file, house.file_of(found)) for found in house.imports()}
+    lost = [
+        file
+        for n, file in enumerate(steps[1:], 1)
+        if not any((before, file) in taken for before in steps[:n])
+    ]
+    assert lost == []
