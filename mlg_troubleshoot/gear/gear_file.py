@@ -411,24 +411,7 @@ def _read(path: Path) -> Gear:
         ensemble_path = path.with_name(found.ensemble)
         members = _members(file.values, ensemble_path)
     calibration, down_lock_range = _calibration(found.calibration, numbers)
-    plunger, forecast, entry = found.plunger, found.forecast, found.entry
-    plunger_reading = numbers.or_assumed("read_min", plunger.read_min, "min", plunger.source)
-    rigging, repair = found.rigging_check, found.repair
-    rigging_check = numbers.or_assumed("minutes", rigging.minutes, "min", rigging.source)
-    second_repair, retraction = (
-        numbers.or_assumed(key, value, unit, repair.source)
-        for key, value, unit in (
-            ("second_repair_chance", repair.second_repair_chance, "1"),
-            ("retraction_min", repair.retraction_min, "min"),
-        )
-    )
-    horizon, accepted = (
-        numbers.or_assumed(key, value, unit, forecast.source)
-        for key, value, unit in (
-            ("horizon_landings", forecast.horizon_landings, "landings"),
-            ("accepted_chance", forecast.accepted_chance, "1"),
-        )
-    )
+    entry = found.entry
     indices_file = path.with_name(found.indices or f"{path.stem}-indices.json")
     gear = Gear(
         id=found.id,
@@ -447,12 +430,7 @@ def _read(path: Path) -> Gear:
             Area(a.name, a.description, numbers.add(a.access_min, "min", a.source))
             for a in found.areas
         ),
-        plunger_reading=plunger_reading,
-        rigging_check=rigging_check,
-        retraction=retraction,
-        second_repair_chance=second_repair,
-        horizon=horizon,
-        accepted_chance=accepted,
+        **_of_the_workshop(found, numbers),
         calibration=calibration,
         margin=numbers.add(found.margin.value, "in", found.margin.source),
         bearing_span=numbers.add(found.bearing_span.value, "in", found.bearing_span.source),
@@ -474,6 +452,35 @@ def _read(path: Path) -> Gear:
     )
     _check_joints(gear, path)
     return gear
+
+
+def _of_the_workshop(found: GearFile, numbers: _Numbers) -> dict[str, Sourced]:
+    """What a workshop decides, by the names of a gear; what the file does not state is assumed."""
+    plunger, rigging, repair = found.plunger, found.rigging_check, found.repair
+    forecast = found.forecast
+    return {
+        name: numbers.or_assumed(key, value, unit, source)
+        for name, key, value, unit, source in (
+            ("plunger_reading", "read_min", plunger.read_min, "min", plunger.source),
+            ("rigging_check", "minutes", rigging.minutes, "min", rigging.source),
+            ("retraction", "retraction_min", repair.retraction_min, "min", repair.source),
+            (
+                "second_repair_chance",
+                "second_repair_chance",
+                repair.second_repair_chance,
+                "1",
+                repair.source,
+            ),
+            (
+                "horizon",
+                "horizon_landings",
+                forecast.horizon_landings,
+                "landings",
+                forecast.source,
+            ),
+            ("accepted_chance", "accepted_chance", forecast.accepted_chance, "1", forecast.source),
+        )
+    }
 
 
 def _sha256(value: Any) -> str:
