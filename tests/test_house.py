@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
+from importlib import import_module
 
 import pytest
 
@@ -28,6 +29,15 @@ def test_nobody_reaches_past_the_door_of_a_room() -> None:
 def test_a_room_says_what_it_is_and_names_its_doors(room: str) -> None:
     assert house.first_line(house.trees()[f"{room}/__init__.py"])
     assert house.doors(room)
+
+
+@pytest.mark.parametrize("room", house.rooms())
+def test_every_door_leads_into_its_room(room: str) -> None:
+    named = import_module(f"mlg_troubleshoot.{room}")
+    files = {path.stem for path in (house.PACKAGE / room).iterdir()}
+    assert [
+        door for door in house.doors(room) if door not in files and not hasattr(named, door)
+    ] == []
 
 
 # Rooms that scripts use, whose names nobody in the package needs to take.

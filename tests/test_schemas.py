@@ -253,7 +253,7 @@ def test_an_extension_that_was_written_fits_the_schema_of_its_kind(tmp_path: Pat
     data = tmp_path / "measured.csv"
     write_csv(draw_fleet(3, rows=60, **FLEETS["one cause"]), data)
     extension = tmp_path / "e.toml"
-    mlg("diagnose", data, "--permutations", "99", "--write-extension", extension)
+    mlg("diagnose", data, "--write-extension", extension)
     assert complain("extension", as_read(extension)) == []
 
 

@@ -125,7 +125,7 @@ def _read(file: Path, gear: str) -> Settings:
 
 
 def _judged(file: Path, found: SettingsFile, gear: str) -> Settings:
-    """Nothing that is remembered may turn a verdict."""
+    """Nothing that is remembered may change a verdict."""
     for header, column in found.headers.items():
         if _TURNS_A_VERDICT.search(column):
             raise UsageError(

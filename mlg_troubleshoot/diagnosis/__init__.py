@@ -12,16 +12,14 @@ from mlg_troubleshoot.diagnosis.extension import (
     write_extension,
 )
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
-from mlg_troubleshoot.misfit import (
+from mlg_troubleshoot.misfit.search import diagnose_simulation
+from mlg_troubleshoot.misfit.simulation_result import (
     HeldOutGain,
     SimulationDiagnosis,
     Suspect,
     SuspectFound,
-    diagnose_simulation,
 )
-from mlg_troubleshoot.misfit import (
-    MisfitVerdict as Verdict,
-)
+from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 
 __all__ = [
     "CATALOGUE",
@@ -44,10 +42,8 @@ __all__ = [
     "diagnose_simulation",
     "extension",
     "faults",
-    "inference",
     "load_causes",
     "load_extension",
-    "model_choice",
     "noise",
     "scene",
     "table",

@@ -1,29 +1,17 @@
 """How likely each explanation of a misfit is, for any simulation: noise, evidence, held-out rows.
 Knows no gear.
+
+Its modules are its doors: a check needs the beliefs of a diagnosis, and not scipy.
 """
 
-from mlg_troubleshoot.misfit.search import diagnose_simulation
-from mlg_troubleshoot.misfit.simulation_result import (
-    HeldOutGain,
-    SimulationDiagnosis,
-    Suspect,
-    SuspectFound,
-)
-from mlg_troubleshoot.misfit.verdict import MisfitVerdict
-
 __all__ = [
-    "HeldOutGain",
-    "MisfitVerdict",
-    "SimulationDiagnosis",
-    "Suspect",
-    "SuspectFound",
-    "chance",
+    "beliefs",
     "covariance",
-    "diagnose_simulation",
+    "explanation",
+    "fitting",
     "held_out",
-    "one_by_one",
-    "rivals",
-    "screen",
+    "posterior",
     "search",
+    "simulation_result",
     "verdict",
 ]
