@@ -81,8 +81,9 @@ class CheckedInspection(TypedDict):
     prediction over the ensemble. explained_at_most_in, unexplained_in: of a measured displacement,
     by the joints' worst case; null without a reading. basis: MEASURED only with OUTSIDE_MARGIN,
     when the mean reading is beyond the margin. next_action: the first step of the plan, of which
-    only that binds. repair_sets: null where the linkage does not close. measuring, confidence: null
-    in a batch. posterior: null in a batch or where nothing was measured.
+    only that binds. open_question: what the day does not allow to settle. repair_sets: null where
+    the linkage does not close. measuring, confidence: null in a batch. posterior: null in a batch
+    or where nothing was measured.
     """
 
     record_id: str | None
@@ -109,6 +110,7 @@ class CheckedInspection(TypedDict):
     next_action: Step
     plan: Annotated[list[Step], Meta(min_length=1)]
     end: End
+    open_question: str | None
     repair_sets: list[RepairSet] | None
     rigging: Rigging | None
     measuring: MeasuringAdvice | None

@@ -70,6 +70,21 @@ def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
     return replace(read, record_id=flags.record_id or made)
 
 
+def _day(flags: Flags) -> dict[str, str | None]:
+    """What the flags say of repairs and of the day, by column."""
+    return {
+        "restored_joints": flags.restored,
+        "repair_date": flags.repair_date,
+        "plunger_date": flags.plunger_date,
+        "outcome_date": flags.outcome_date,
+        "rigging_checked": flags.rigging_checked,
+        "cannot_reach": flags.cannot_reach,
+        "no_spare": flags.no_spare,
+        "open_areas": flags.open_areas,
+        "minutes_available": flags.minutes,
+    }
+
+
 def _judged(
     values: Mapping[str, object],
     labels: Mapping[str, str],
@@ -83,6 +98,7 @@ def _judged(
         OUTCOME.name: flags.outcome,
         PLUNGER_DISPLACEMENT.name: flags.measured,
         MARGIN.name: flags.margin,
+        **_day(flags),
     }
     typed = {
         RECORD_ID.name: flags.record_id,
@@ -90,7 +106,13 @@ def _judged(
         SIDE.name: flags.side,
         **more,
     }
-    names = {TAIL_NO.name: "tail", PLUNGER_DISPLACEMENT.name: "measured"}
+    names = {
+        TAIL_NO.name: "tail",
+        PLUNGER_DISPLACEMENT.name: "measured",
+        "restored_joints": "restored",
+        "open_areas": "open",
+        "minutes_available": "minutes",
+    }
     named = {
         column: f"--{names.get(column, column).replace('_', '-')} {text!r}"
         for column, text in typed.items()
@@ -132,6 +154,7 @@ def ask(
         record_id=flags.record_id,
     ).with_more(
         outcome=judged.outcome,
+        **_day(flags),
         **{
             name: text if text is None or text[-1:].isalpha() else f"{text} {unit}"
             for name, text in lengths.items()

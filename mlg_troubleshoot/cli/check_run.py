@@ -80,12 +80,14 @@ class Run:
     def _judged(self) -> task.CheckResult:
         if self._files and any(astuple(self._flags)):
             raise UsageError(
-                "--set, --tail, --side, --record-id, --outcome, --measured and --margin describe"
-                " one gear entered by hand, and a FILE was given as well",
+                "--set, --tail, --side, --record-id, --outcome, --measured, --margin and the flags"
+                " of repairs and of the day (--restored … --minutes) describe one gear entered by"
+                " hand, and a FILE was given as well",
                 "Give either a FILE or the values of one gear.",
             )
         if not self._files:
-            return task.check_inspection(by_hand.from_flags(self._flags, self._asked), self._asked)
+            typed = by_hand.from_flags(self._flags, self._asked)
+            return task.check_inspection(typed, self._asked, self._place)
         with stages(quiet=self._wanted.quiet) as bar:
             files = [Path(name) for name in self._files]
             return task.check_files(
@@ -93,6 +95,7 @@ class Run:
                 self._asked,
                 on_read=partial(bar, "Reading"),
                 on_judged=partial(bar, "Judging"),
+                store=self._place,
             )
 
     def _ask(self) -> task.CheckResult:
@@ -104,7 +107,7 @@ class Run:
             )
 
         def publish(inspection: Inspection, entered_in: LengthUnit) -> by_hand.Ending:
-            result = task.check_inspection(inspection, self._asked)
+            result = task.check_inspection(inspection, self._asked, self._place)
             self._publish(result, entered_in)
             if self._wanted.report is not None or self._wanted.as_json:
                 return by_hand.Ending(result, None)

@@ -43,6 +43,46 @@ class Flags:
         str | None,
         typer.Option("--margin", metavar="VALUE", help="This gear's own margin, e.g. 0.028in."),
     ] = None
+    restored: Annotated[
+        str | None,
+        typer.Option("--restored", metavar="JOINTS", help="Joints restored since, e.g. 3,5."),
+    ] = None
+    repair_date: Annotated[
+        str | None,
+        typer.Option("--repair-date", metavar="DATE", help="When, e.g. '2026-03-04 14:30'."),
+    ] = None
+    plunger_date: Annotated[
+        str | None,
+        typer.Option("--plunger-date", metavar="DATE", help="When the plunger was read."),
+    ] = None
+    outcome_date: Annotated[
+        str | None,
+        typer.Option("--outcome-date", metavar="DATE", help="When the outcome was seen."),
+    ] = None
+    rigging_checked: Annotated[
+        str | None,
+        typer.Option(
+            "--rigging-checked",
+            metavar="no|yes|corrected",
+            help="Rigging and lock roller: looked at, or set right.",
+        ),
+    ] = None
+    cannot_reach: Annotated[
+        str | None,
+        typer.Option("--cannot-reach", metavar="JOINTS", help="Joints out of reach today, e.g. 4."),
+    ] = None
+    no_spare: Annotated[
+        str | None,
+        typer.Option("--no-spare", metavar="JOINTS", help="Joints without a spare part, e.g. 3."),
+    ] = None
+    open_areas: Annotated[
+        str | None,
+        typer.Option("--open", metavar="AREAS", help="Areas that are open, e.g. sidestay."),
+    ] = None
+    minutes: Annotated[
+        str | None,
+        typer.Option("--minutes", metavar="MIN", help="Minutes left for the work today."),
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -61,12 +61,21 @@ class JointFinding:
     allowance_in: float | None = None
 
 
+class RepairKind(StrEnum):
+    """Whether a repair holds in the worst case, or is to be tried: expected to be quicker, the
+    plunger read again after it.
+    """
+
+    SURE = "sure"
+    TRY = "try"
+
+
 @dataclass(frozen=True, slots=True)
 class RepairSet:
-    """A set of joints which, restored, brings the worst case within the margin; both numbers are
-    those afterwards.
+    """Joints to restore, with what is predicted of the gear afterwards.
 
     access_minutes, minutes: time to reach them; to open their areas and restore them. [min]
+    second_repair_probability: chance that the plunger stays outside and more must be restored. [1]
     """
 
     joints: tuple[int, ...]
@@ -74,6 +83,8 @@ class RepairSet:
     probability_within_margin: float
     access_minutes: float
     minutes: float
+    kind: RepairKind
+    second_repair_probability: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
-from mlg_troubleshoot.decision.inspection import Inspection, Outcome
+from mlg_troubleshoot.decision.inspection import Inspection, Outcome, RiggingCheck
 from mlg_troubleshoot.decision.prediction import (
     DEFAULT_PLUNGER_U_IN,
     DIRECTION_SETS,
@@ -46,6 +46,8 @@ class Cases:
     mean_u_in: Array
     failed: Mask
     retracted: Mask
+    reachable: Mask
+    restorable: Mask
 
     @classmethod
     def of(
@@ -70,8 +72,12 @@ class Cases:
             margin_u_in=np.array([i.margin_u_in for i in rows]),
             mean_in=np.array([math.nan if mean is None else mean for mean in means]),
             mean_u_in=np.array([plunger_u(i) for i in rows]),
-            failed=np.array([i.outcome is Outcome.FAILED for i in rows]),
-            retracted=np.array([i.outcome is Outcome.RETRACTED for i in rows]),
+            failed=np.array([i.standing_outcome is Outcome.FAILED for i in rows]),
+            retracted=np.array([i.standing_outcome is Outcome.RETRACTED for i in rows]),
+            reachable=np.array([[n not in i.cannot_reach for n in numbers] for i in rows]),
+            restorable=np.array(
+                [[n not in (*i.cannot_reach, *i.no_spare) for n in numbers] for i in rows]
+            ),
         )
 
     def __len__(self) -> int:
@@ -94,6 +100,21 @@ class Cases:
     def critical_missing(self) -> Mask:
         """True for a gear with a critical joint that was not measured."""
         return np.asarray((~self.measured & self.gear.critical).any(axis=1))
+
+    @property
+    def complained(self) -> Mask:
+        """True for a gear that failed before it was repaired, and was not tried since.
+
+        A corrected rigging stands for a failure: nobody sets it right without one.
+        """
+        return np.array(
+            [
+                i.standing_outcome is None
+                and i.is_repaired
+                and (i.outcome is Outcome.FAILED or i.rigging_checked is RiggingCheck.CORRECTED)
+                for i in self.inspections
+            ]
+        )
 
     @property
     def joints_done(self) -> Mask:
@@ -134,7 +155,7 @@ def _disagreement(inspection: Inspection, margin_in: float) -> str:
     """Plunger readings with one outside the margin although their mean is not."""
     mean, one_u = inspection.measured_displacement_in, inspection.plunger_gauge_u_in
     beyond = margin_in + 2.0 * (DEFAULT_PLUNGER_U_IN if one_u is None else one_u)
-    far = [reading for reading in inspection.readings_in if abs(reading) > beyond]
+    far = [reading for reading in inspection.standing_readings_in if abs(reading) > beyond]
     if mean is None or not far or abs(mean) > margin_in:
         return ""
     return Sentence.of(
@@ -153,12 +174,14 @@ def plunger_u(inspection: Inspection) -> float:
         if inspection.plunger_gauge_u_in is None
         else inspection.plunger_gauge_u_in
     )
-    return one / math.sqrt(max(len(inspection.readings_in), 1))
+    return one / math.sqrt(max(len(inspection.standing_readings_in), 1))
 
 
-def predict_batch(cases: Cases) -> BatchPrediction:
+def predict_batch(cases: Cases, exceeds: Array | None = None) -> BatchPrediction:
     """Predict with unmeasured joints at 0 and at their limit, and the chance with random
     directions.
+
+    exceeds: that chance with unmeasured joints by their wear; None takes them at 0. [1]
     """
     at_zero = cases.filled(0.0)
     lower = upper = cases.predict(at_zero)
@@ -166,7 +189,12 @@ def predict_batch(cases: Cases) -> BatchPrediction:
     if len(open_rows):
         some = cases.take(open_rows)
         upper = with_rows(lower, some.predict(some.filled(cases.gear.limits_in)), open_rows)
-    return BatchPrediction(lower, upper, _chance(cases, at_zero))
+    if exceeds is None or cases.extension is not None:
+        return BatchPrediction(lower, upper, _chance(cases, at_zero))
+    chance, rows = exceeds.copy(), np.flatnonzero(cases.measured.all(axis=1))
+    if len(rows):
+        chance[rows] = _chance(cases.take(rows), at_zero[rows])
+    return BatchPrediction(lower, upper, chance)
 
 
 def _chance(cases: Cases, clearance_in: Array) -> Array:

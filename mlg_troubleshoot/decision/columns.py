@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 
-from mlg_troubleshoot.decision.inspection import Approach, Outcome, Side
+from mlg_troubleshoot.decision.inspection import Approach, Outcome, RiggingCheck, Side
 from mlg_troubleshoot.units import UNIT_SPELLINGS, ClearanceConvention, LengthUnit
 
 
@@ -25,6 +25,9 @@ class Holds(StrEnum):
     CHOICE = "choice"
     YES_NO = "yes or no"
     DATE = "date"
+    MOMENT = "date and time"
+    JOINTS = "joints"
+    AREAS = "areas"
 
 
 class Need(StrEnum):
@@ -473,6 +476,68 @@ AXIAL_FLOAT = Column(
     effort=11,
 )
 
+# What was repaired, and what the day allows.
+RESTORED_JOINTS = Column(
+    name="restored_joints",
+    holds=Holds.JOINTS,
+    meaning=(
+        "Joints restored since the failure, for example 3 5. Their clearances in this row are those"
+        " after the repair; outcome and plunger reading count as older."
+    ),
+    bears_verdict=True,
+)
+RIGGING_CHECKED = Column(
+    name="rigging_checked",
+    holds=Holds.CHOICE,
+    meaning="Rigging and lock roller: no, yes (looked at) or corrected (set right).",
+    choices=RiggingCheck,
+    spelt=lambda text: {"y": RiggingCheck.YES, "n": RiggingCheck.NO}.get(text.lower()),
+    bears_verdict=True,
+    blank_by_word=False,
+)
+OF_THE_DAY: tuple[Column, ...] = (
+    RESTORED_JOINTS,
+    Column(
+        name="repair_date",
+        holds=Holds.MOMENT,
+        meaning="When they were restored: year-month-day, with the time if known.",
+    ),
+    Column(
+        name="plunger_date",
+        holds=Holds.MOMENT,
+        meaning="When the plunger was read, if that was after the repair.",
+    ),
+    Column(
+        name="outcome_date",
+        holds=Holds.MOMENT,
+        meaning="When the outcome was seen, if that was after the repair.",
+    ),
+    RIGGING_CHECKED,
+    Column(
+        name="cannot_reach",
+        holds=Holds.JOINTS,
+        meaning="Joints that cannot be reached today, for example 4.",
+    ),
+    Column(
+        name="no_spare",
+        holds=Holds.JOINTS,
+        meaning="Joints for which there is no spare part today.",
+    ),
+    Column(
+        name="open_areas",
+        holds=Holds.AREAS,
+        meaning="Areas that are open already, for example sidestay.",
+    ),
+    Column(
+        name="minutes_available",
+        holds=Holds.NUMBER,
+        meaning="Minutes left for the work today.",
+        high=1e5,
+        unit="min",
+        expected="minutes, {low:g} or more",
+    ),
+)
+
 # In the order of the template.
 COLUMNS: tuple[Column, ...] = (
     RECORD_ID,
@@ -531,6 +596,7 @@ COLUMNS: tuple[Column, ...] = (
         blank_by_word=False,
     ),
     REMARKS,
+    *OF_THE_DAY,
     AXIAL_FLOAT,
 )
 BY_NAME: Mapping[str, Column] = {column.name: column for column in COLUMNS}

@@ -7,7 +7,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import date
+from datetime import date, datetime
 from enum import StrEnum
 from typing import Any
 
@@ -66,6 +66,25 @@ class Approach(StrEnum):
 
     EXTENDING = "EXTENDING"
     RETRACTING = "RETRACTING"
+
+
+class RiggingCheck(StrEnum):
+    """Whether rigging and lock roller were looked at; set right counts as a repair."""
+
+    NO = "no"
+    YES = "yes"
+    CORRECTED = "corrected"
+
+
+def surely_later(one: date | None, other: date | None) -> bool:
+    """Whether a moment is after another: by the day, and within a day by the time if both state
+    one.
+    """
+    if one is None or other is None:
+        return False
+    if isinstance(one, datetime) and isinstance(other, datetime):
+        return one > other
+    return (one.year, one.month, one.day) > (other.year, other.month, other.day)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +155,19 @@ class Inspection:
         Who measured with what.
     axial_float_in : mapping of int to float
         End float of a joint along its pin. [in]
+    restored_joints : tuple of int
+        Joints that were restored since the failure: their clearances are those after the repair.
+    repair_date, plunger_date, outcome_date : datetime.date or None
+        When they were restored, the plunger was read and the outcome was seen; a `datetime` states
+        the time.
+    rigging_checked : RiggingCheck or None
+        Whether rigging and lock roller were looked at, or set right on `repair_date`.
+    cannot_reach, no_spare : tuple of int
+        Joints that cannot be reached today, and those for which there is no spare part.
+    open_areas : tuple of str
+        Areas that are open already.
+    minutes_available : float or None
+        Time left for the work today. [min]
     small_readings_true : bool
         True if somebody confirmed that readings below the play of new parts were read in the stated
         unit.
@@ -178,6 +210,15 @@ class Inspection:
     gauge_id: str | None = None
     technician_id: str | None = None
     axial_float_in: Mapping[int, float] = field(default_factory=dict)
+    restored_joints: tuple[int, ...] = ()
+    repair_date: date | None = None
+    plunger_date: date | None = None
+    outcome_date: date | None = None
+    rigging_checked: RiggingCheck | None = None
+    cannot_reach: tuple[int, ...] = ()
+    no_spare: tuple[int, ...] = ()
+    open_areas: tuple[str, ...] = ()
+    minutes_available: float | None = None
     small_readings_true: bool = False
     unit_question: str = ""
     other_columns: Mapping[str, object] = field(default_factory=dict)
@@ -194,9 +235,27 @@ class Inspection:
         )
 
     @property
+    def is_repaired(self) -> bool:
+        """Whether joints were restored, or the rigging set right, since the failure."""
+        return bool(self.restored_joints) or self.rigging_checked is RiggingCheck.CORRECTED
+
+    @property
+    def standing_readings_in(self) -> tuple[float, ...]:
+        """The plunger readings that still count: none that may be older than a repair. [in]"""
+        old = self.is_repaired and not surely_later(self.plunger_date, self.repair_date)
+        return () if old else self.readings_in
+
+    @property
+    def standing_outcome(self) -> Outcome | None:
+        """The outcome that still counts: none that may be older than a repair."""
+        old = self.is_repaired and not surely_later(self.outcome_date, self.repair_date)
+        return None if old else self.outcome
+
+    @property
     def measured_displacement_in(self) -> float | None:
-        """Mean of the plunger readings, over-travel positive; None if there is none. [in]"""
-        return sum(self.readings_in) / len(self.readings_in) if self.readings_in else None
+        """Mean of the plunger readings that count, over-travel positive; None without one. [in]"""
+        readings = self.standing_readings_in
+        return sum(readings) / len(readings) if readings else None
 
     def gauge_u_of(self, joint: int) -> float:
         """Standard uncertainty of the radial clearance of one joint. [in]"""

@@ -19,13 +19,15 @@ from mlg_troubleshoot.decision.assessment import (
     Verdict,
 )
 from mlg_troubleshoot.decision.case import Cases, predict_batch
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
+from mlg_troubleshoot.decision.causes import believed
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.decision.likely_worn import explain
 from mlg_troubleshoot.decision.monte_carlo import check_probability
-from mlg_troubleshoot.decision.next_joint import advise
+from mlg_troubleshoot.decision.next_joint import advise, in_one_voice
 from mlg_troubleshoot.decision.plan import Basis, Plan
 from mlg_troubleshoot.decision.planner import Judged, correct, plans
 from mlg_troubleshoot.decision.prediction import (
+    DEFAULT_PLUNGER_U_IN,
     PROVISIONAL_U_IN,
     PROVISIONAL_U_SHARE,
     BatchPrediction,
@@ -79,12 +81,14 @@ def assess(
 
 
 def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Assessment]:
-    batch = predict_batch(cases)
+    causes = believed(cases)
+    batch = predict_batch(cases, causes.exceeds)
     p_lower = batch.lower.probability_within(cases.margin_in, cases.margin_u_in)
     p_upper = batch.upper.probability_within(cases.margin_in, cases.margin_u_in)
     plunger = plunger_reading.compare(cases, batch.upper)
     # A gear whose entry leaves a question cannot be cleared either.
-    absent = cases.critical_missing | np.array([bool(question) for question in cases.questions])
+    questions = cases.questions
+    absent = cases.critical_missing | np.array([bool(question) for question in questions])
     verdicts = [
         (
             Verdict.OUTSIDE_MARGIN
@@ -99,7 +103,13 @@ def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Ass
     )
     wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in verdicts]) & closes
     sets = repair_sets(cases, found, wanted)
-    findings = rank_joints(cases.gear, table, cases.clearance_in, allowances(cases, batch.lower))
+    findings = rank_joints(
+        cases.gear,
+        table,
+        cases.clearance_in,
+        allowances(cases, batch.lower),
+        cases.gauge_u_in,
+    )
     order = np.array([[f.rank for f in row] for row in findings]).argsort(axis=1)
     judged = Judged(
         verdicts,
@@ -108,11 +118,12 @@ def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Ass
         order,
         p_lower,
         batch.lower.standard_uncertainty(cases.margin_u_in),
+        questions,
+        cases.joints_done,
     )
-    courses = plans(cases, judged, found, sets)
+    planned = plans(cases, judged, causes, causes.with_chances(sets))
     return [
-        _assessment(cases, judged, i, findings[i], courses[i], sets[i], seed)
-        for i in range(len(cases))
+        _assessment(cases, judged, i, findings[i], *planned[i], seed) for i in range(len(cases))
     ]
 
 
@@ -143,7 +154,9 @@ def _assessment(
     worst = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
     budget = _budget(judged.batch, cases, i) if known else None
     beyond = bool(plunger.beyond[i])
-    detail = _detail(cases, i, found, worst, budget, seed) if seed is not None and closes else {}
+    detail = (
+        _detail(cases, i, found, plan, worst, budget, seed) if seed is not None and closes else {}
+    )
     return Assessment(
         inspection=inspection,
         verdict=found,
@@ -177,7 +190,7 @@ def _assessment(
         headline=_headline(cases, judged, i),
         measured_statement=(
             None
-            if beyond or not inspection.readings_in
+            if beyond or not inspection.standing_readings_in
             else sentences.measured(float(cases.mean_in[i]), margin, "within")
         ),
         repair_sets=sets if closes else None,
@@ -218,18 +231,19 @@ def _detail(
     cases: Cases,
     i: int,
     found: Verdict,
+    plan: Plan,
     worst_in: tuple[float, float],
     budget: UncertaintyBudget | None,
     seed: int,
 ) -> dict[str, Any]:
     """What is worked out for a gear that is looked at alone."""
     one, rng = cases.take(np.array([i])), np.random.default_rng(seed)
-    detail: dict[str, Any] = {"measuring": advise(one)}
+    detail: dict[str, Any] = {"measuring": in_one_voice(advise(one), plan)}
     if budget is not None:
         detail["confidence"] = check_probability(one, worst_in, budget, rng)
         if found in (Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE):
             detail["rigging"] = rigging_alternative(one, worst_in, budget)
-    detail["posterior"] = explain(one, rng)
+    detail["posterior"] = explain(one, rng, causes=believed(one))
     return detail
 
 
@@ -242,7 +256,11 @@ def _headline(cases: Cases, judged: Judged, i: int) -> str:
     )
     # Adding zero turns a minus zero into zero.
     said = sentences.Predicted(
-        float(lower.displacement_in[i]) + 0.0, float(lower.bound_in[i]) + 0.0, chance
+        float(lower.displacement_in[i]) + 0.0,
+        float(lower.bound_in[i]) + 0.0,
+        chance,
+        read=int(cases.measured[i].sum()),
+        unread=int((~cases.measured[i]).sum()),
     )
     closes = np.isfinite(said.displacement_in)
     if plunger.beyond[i]:
@@ -263,7 +281,7 @@ def _headline(cases: Cases, judged: Judged, i: int) -> str:
             for n, read in zip(cases.gear.joint_numbers, cases.measured[i], strict=True)
             if not read
         ]
-        (question,) = cases.take(np.array([i])).questions
+        question = judged.questions[i]
         return (
             sentences.entry_in_question(question, said)
             if question
@@ -272,8 +290,10 @@ def _headline(cases: Cases, judged: Judged, i: int) -> str:
     if found is Verdict.OUTSIDE_MARGIN:
         return sentences.outside(margin, said)
     if found is Verdict.WITHIN_MARGIN:
-        done = bool(cases.take(np.array([i])).joints_done[0])
-        return sentences.within(margin, said, failed=bool(cases.failed[i]), joints_done=done)
+        done = bool(judged.joints_done[i])
+        failed = bool(cases.failed[i])
+        clears = bool(plunger.clears[i])
+        return sentences.within(margin, said, failed=failed, clears=clears, joints_done=done)
     return sentences.inconclusive(margin, said, float(judged.p_within[i]))
 
 
@@ -336,10 +356,12 @@ def _warnings(
                 Length(inspection.gauge_u_in, 5),
             )
         )
-    if inspection.outcome is Outcome.FAILED and inspection.measured_displacement_in is None:
+    if inspection.standing_readings_in and inspection.plunger_gauge_u_in is None:
         warnings.append(
-            "The gear failed and no plunger displacement was measured: measure it at mid-position."
+            "Standard uncertainty of the plunger reading not stated:"
+            f" {DEFAULT_PLUNGER_U_IN:.4f} in taken as the default."
         )
+    warnings += sentences.older_than_the_repair(inspection)
     return tuple(warnings)
 
 

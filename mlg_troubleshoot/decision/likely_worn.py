@@ -1,11 +1,9 @@
 """Which joints explain a measured plunger displacement: importance sampling over wear, clearances
 and directions.
 
-Before the plunger is read each joint is worn beyond its limit with a small chance; a joint that is
-not worn has a clearance that grows rarer towards its limit, a worn one any clearance up to twice
-its limit. Measured joints have their reading with its uncertainty. Every clearance takes a
-uniformly random direction, and with a small chance something other than clearance moves the plunger
-as well. All of this is assumed: no fleet of this gear is public.
+Wear before the plunger is read, and the chance that rigging moved it, are those of the plan
+(`causes`). Measured joints have their reading with its uncertainty. Every clearance takes a
+uniformly random direction.
 """
 
 from __future__ import annotations
@@ -17,6 +15,13 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.decision.assessment import ClearanceInterval, GroupChance, Posterior
 from mlg_troubleshoot.decision.case import Cases
+from mlg_troubleshoot.decision.causes import (
+    SHARES,
+    Causes,
+    believed,
+    level_chances_of,
+    share_densities,
+)
 from mlg_troubleshoot.decision.prediction import model_uncertainty
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.sentences import percent
@@ -25,17 +30,15 @@ from mlg_troubleshoot.gear.gear import Gear
 _QUANTILES = (0.05, 0.5, 0.95)
 # Below this chance no joint is named as likely worn. [1]
 _WORTH_SAYING = 0.05
-# Assumed before the plunger is read: chance that one link or pivot is worn beyond its limit, either
-# end of a link being as likely. [1]
-_WORN = 0.05
-# Largest clearance of a worn joint in units of its limit. [1]
-_MOST_WORN = 2.0
-# Chance that something other than clearance moves the plunger, and the standard deviation of what
-# it adds, in units of the gear's margin. [1]
-_OTHER_CAUSE, _OTHER_CAUSE_U = 0.05, 2.0
+# Standard deviation of what a wrong rigging adds, in units of the gear's margin. [1]
+_OFFSET_U = 2.0
+# A worn joint is drawn at least this often, and weighed accordingly. [1]
+_DRAWN_WORN = 0.1
 
 
-def explain(one: Cases, rng: np.random.Generator, draws: int = 32768) -> Posterior | None:
+def explain(
+    one: Cases, rng: np.random.Generator, draws: int = 32768, causes: Causes | None = None
+) -> Posterior | None:
     gear, reading = one.gear, float(one.mean_in[0])
     if not np.isfinite(reading):
         return None
@@ -45,42 +48,40 @@ def explain(one: Cases, rng: np.random.Generator, draws: int = 32768) -> Posteri
     links[:, 0::2], links[:, 1::2] = drawn * np.cos(turns), drawn * np.sin(turns)
     predicted = responses(gear)[0].displacement(links)
     u = np.hypot(model_uncertainty(predicted, one.residual_u_in), one.mean_u_in[0])
-    wide = np.hypot(u, _OTHER_CAUSE_U * gear.margin.value)
-    plain = np.log1p(-_OTHER_CAUSE) - np.log(u) - 0.5 * ((reading - predicted) / u) ** 2
-    other = np.log(_OTHER_CAUSE) - np.log(wide) - 0.5 * ((reading - predicted) / wide) ** 2
-    top = float(np.max(np.maximum(plain, other) + log_weight))
-    by_clearance, by_other = np.exp(plain + log_weight - top), np.exp(other + log_weight - top)
-    weight = by_clearance + by_other
-    total = float(weight.sum())
-    weight = weight / total
+    wide = np.hypot(u, _OFFSET_U * gear.margin.value)
+    plain = log_weight - np.log(u) - 0.5 * ((reading - predicted) / u) ** 2
+    other = log_weight - np.log(wide) - 0.5 * ((reading - predicted) / wide) ** 2
+    by_joints, by_rigging = (np.exp(each - each.max()) for each in (plain, other))
+    rigging = float((causes or believed(one)).rigging[0])
+    weight = (1.0 - rigging) * by_joints / by_joints.sum() + rigging * by_rigging / by_rigging.sum()
     worn = drawn > gear.limits_in
-    return _summary(gear, drawn, worn, weight, float(by_other.sum()) / total)
+    return _summary(gear, drawn, worn, weight, rigging)
 
 
 def _draw_clearances(one: Cases, rng: np.random.Generator, n: int) -> tuple[Array, Array]:
     """Clearances, and the log of prior over proposal: worn joints are drawn more often than they
     occur. [in, 1]
     """
-    gear, found, limits = one.gear, one.clearance_in[0], one.gear.limits_in
-    drawn = np.empty((n, len(found)))
-    log_weight = np.zeros(n)
-    for group in gear.link_groups:
-        for number in group:
-            j = gear.joint_numbers.index(number)
-            if np.isfinite(found[j]):
-                drawn[:, j] = _reading_with_error(
-                    float(found[j]), float(one.gauge_u_in[0, j]), rng, n
-                )
-                continue
-            chance = _WORN / len(group)
-            often = 0.2 / len(group)
-            is_worn = rng.random(n) < often
-            log_weight += np.where(
-                is_worn, np.log(chance / often), np.log((1.0 - chance) / (1.0 - often))
-            )
-            within = 1.0 - np.sqrt(1.0 - rng.random(n))
-            beyond = 1.0 + (_MOST_WORN - 1.0) * rng.random(n)
-            drawn[:, j] = limits[j] * np.where(is_worn, beyond, within)
+    found, limits = one.clearance_in[0], one.gear.limits_in
+    shares, densities = SHARES, share_densities()
+    level = rng.choice(len(densities), n, p=level_chances_of(one)[0])
+    beyond = np.where(shares > 1.0, densities, 0.0)
+    chance = beyond.sum(axis=1)[level]
+    often = np.maximum(chance, _DRAWN_WORN)
+    drawn, log_weight = np.empty((n, len(found))), np.zeros(n)
+    for j in range(len(found)):
+        if np.isfinite(found[j]):
+            drawn[:, j] = _reading_with_error(float(found[j]), float(one.gauge_u_in[0, j]), rng, n)
+            continue
+        is_worn = rng.random(n) < often
+        log_weight += np.where(is_worn, np.log(chance / often), np.log((1 - chance) / (1 - often)))
+        for k in range(len(densities)):
+            for part, rows in ((beyond[k], is_worn), (densities[k] - beyond[k], ~is_worn)):
+                here = np.flatnonzero(rows & (level == k))
+                width = shares[1] - shares[0]
+                drawn[here, j] = rng.choice(shares, len(here), p=part / part.sum())
+                drawn[here, j] += width * (rng.random(len(here)) - 0.5)
+        drawn[:, j] *= limits[j]
     return drawn, log_weight
 
 
@@ -146,11 +147,11 @@ def _text(
         f"{' or '.join(f'#{n}' for n in chance.joints)} ({percent(chance.probability)})"
         for chance in likely
     )
-    # Not one minus the chances of the joints: both can be true at once.
-    also = f" Chance that something else also moved the plunger: {percent(not_clearance)}."
+    # Another chance than those of the joints: both can be so at once.
+    also = f" Chance that rigging or lock roller moved the plunger: {percent(not_clearance)}."
     if not_clearance > 0.8:
         return (
-            "Something other than joint clearance likely moved the plunger"
+            "Rigging or lock roller, not joint clearance, likely moved the plunger"
             f" ({percent(not_clearance)})."
         )
     if called:

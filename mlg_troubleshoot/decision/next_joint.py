@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.assessment import MeasuringAdvice, ReadingWorth, Verdict
 from mlg_troubleshoot.decision.case import Cases
-from mlg_troubleshoot.decision.plan import minutes_to_measure
+from mlg_troubleshoot.decision.plan import Action, Plan, minutes_to_measure
 from mlg_troubleshoot.decision.prediction import model_uncertainty
 from mlg_troubleshoot.decision.second_order import Response, responses
 from mlg_troubleshoot.decision.sentences import percent
@@ -201,6 +201,19 @@ def advise(one: Cases) -> MeasuringAdvice:
         expected=ahead.enough,
         text=_settled(low) if settled else _text(one, ahead),
     )
+
+
+def in_one_voice(advice: MeasuringAdvice, plan: Plan) -> MeasuringAdvice:
+    """What measuring is worth, in the order and the words of the plan."""
+    first = plan.steps[0]
+    if first.action is Action.CORRECT:
+        return advice
+    if first.action is not Action.MEASURE:
+        text = f"Nothing is to be measured now. Next: {first.words}."
+        return replace(advice, stop=True, text=text)
+    order = {joint: place for place, joint in enumerate(first.joints)}
+    worth = tuple(sorted(advice.worth, key=lambda w: order.get(w.joint, len(order))))
+    return replace(advice, worth=worth, stop=False, text=f"Next: {first.words}.")
 
 
 def _settled(verdict_then: Verdict) -> str:

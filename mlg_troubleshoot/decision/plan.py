@@ -15,13 +15,21 @@ class Action(StrEnum):
     MEASURE = "MEASURE"
     MEASURE_AGAIN = "MEASURE_AGAIN"
     READ_PLUNGER = "READ_PLUNGER"
+    CHECK_RIGGING = "CHECK_RIGGING"
     RESTORE = "RESTORE"
+    RETRACT = "RETRACT"
     CONTINUE = "CONTINUE"
+    DONE = "DONE"
     CORRECT = "CORRECT"
 
     @property
     def words(self) -> str:
-        words = {"READ_PLUNGER": "read the plunger", "CONTINUE": "go on"}
+        words = {
+            "READ_PLUNGER": "read the plunger",
+            "CHECK_RIGGING": "check the rigging",
+            "RETRACT": "retract the gear",
+            "CONTINUE": "go on",
+        }
         return words.get(self.value, self.value.replace("_", " ").lower())
 
 
@@ -31,6 +39,7 @@ class End(StrEnum):
     TOO_CLOSE = "TOO_CLOSE"
     OUTSIDE_NO_COMPLAINT = "OUTSIDE_NO_COMPLAINT"
     CANNOT_CLEAR = "CANNOT_CLEAR"
+    DONE = "DONE"
     CORRECT = "CORRECT"
 
 
@@ -65,10 +74,13 @@ class Step:
 class Plan:
     """The expected course from what is known now to an end; never empty, and only its first step
     binds.
+
+    open_question: what the day does not allow to settle.
     """
 
     steps: tuple[Step, ...]
     end: End
+    open_question: str | None = None
 
 
 def minutes_to_measure(

@@ -1,23 +1,24 @@
 """The plan of each gear: the quickest way in expected minutes from what is known now to an end.
 
-The first step follows from the verdict by the rule of the design ("The advice, and where it ends");
-where it leaves a choice, expected minutes decide. What comes after the first step is the expected
-course: joints that are not measured yet are taken at what is expected of them (`wear_levels`),
-levels of wear by what was measured on the same gear.
+A gear that failed is followed by what is believed of it (`causes`): the joints, the rigging or
+something else. A gear without a complaint is read until there is a verdict, and what is over its
+limit is restored, nothing else. What comes after the first step is the expected course.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision import sentences
-from mlg_troubleshoot.decision.assessment import RepairSet, Verdict
+from mlg_troubleshoot.decision.assessment import RepairKind, RepairSet, Verdict
 from mlg_troubleshoot.decision.case import Cases
-from mlg_troubleshoot.decision.inspection import InvalidRow
+from mlg_troubleshoot.decision.causes import Causes
+from mlg_troubleshoot.decision.inspection import InvalidRow, RiggingCheck
 from mlg_troubleshoot.decision.plan import (
     Action,
     End,
@@ -28,21 +29,32 @@ from mlg_troubleshoot.decision.plan import (
 )
 from mlg_troubleshoot.decision.plunger_reading import Compared
 from mlg_troubleshoot.decision.prediction import BatchPrediction, model_uncertainty
-from mlg_troubleshoot.decision.repair import SCORE, Search, search, subsets_of
+from mlg_troubleshoot.decision.repair import SCORE, removable
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import verdict
 from mlg_troubleshoot.decision.wear_levels import level_chances, moments, tabled_normal_cdf
-from mlg_troubleshoot.gear.gear import Gear
 
 # Standard uncertainties that a better gauge can reach: those of bore gauges and micrometers. [in]
 BETTER_GAUGES_IN = (0.0004, 0.0003)
 # Readings of one round are read together until the verdict is settled with this chance. [1]
 _SETTLED = 0.35
-# Chance with random directions from which a failure is attributed to clearance: as large as the
-# assumed chance of another cause. [1]
-_OTHER_CAUSE = 0.05
-# Standard scores of 10, 25, 37.5, 50, 62.5, 75 and 90 %: what a round of readings may show. [1]
-_POINTS = np.array([-1.2816, -0.6745, -0.3186, 0.0, 0.3186, 0.6745, 1.2816])
+# A cause counts as excluded below this chance. [1]
+_EXCLUDED = 0.05
+# Joints read in one round of a gear that failed: until this share of what may be worn in the area
+# is read, two at least. [1]
+_TOGETHER = 0.6
+# Chance that a joint that reads over its limit by less than its uncertainty is within it. [1]
+_EDGE_IS_SOUND = 0.35
+# Joints beyond those over their limit that a repair to be tried may hold. [1]
+_MOST_EXTRA = 2
+# They are chosen among as many joints, those that move the plunger most.
+_MOST_TRIED = 6
+# A repair that leaves the plunger outside with more than this chance is not worth its minutes. [1]
+_HOPELESS = 0.5
+# Chance that the joints are the cause from which a sound one is restored. [1]
+_SURE_ENOUGH = 0.75
+# What one repair may be above the chance that the shop accepts over all: most are far below it. [1]
+_FOR_ONE_REPAIR = 3.0
 
 
 def correct(row: InvalidRow) -> Plan:
@@ -58,7 +70,8 @@ class Judged:
     """What the verdict found about n gears.
 
     order: places of the joints in the order of their rank. p_within, u_in: chance that the worst
-    case is within the margin, its uncertainty against the margin. [1, in]
+    case is within the margin, its uncertainty against the margin. [1, in] questions, joints_done:
+    as `Cases` says them, found once.
     """
 
     verdicts: Sequence[Verdict]
@@ -67,86 +80,285 @@ class Judged:
     order: Places
     p_within: Array
     u_in: Array
+    questions: Sequence[str]
+    joints_done: Mask
 
 
 def plans(
-    cases: Cases, judged: Judged, found: Search, sets: Sequence[tuple[RepairSet, ...]]
-) -> list[Plan]:
-    """The expected course of each gear, step by step to its end."""
-    facts = _BatchContext(cases, judged, found)
-    return [_PlanBuilder(facts, i, sets[i]).plan() for i in range(len(cases))]
+    cases: Cases, judged: Judged, causes: Causes, sets: Sequence[tuple[RepairSet, ...]]
+) -> list[tuple[Plan, tuple[RepairSet, ...]]]:
+    """The plan of each gear, and the repairs that it chose from."""
+    facts = _BatchContext(cases, judged, causes)
+    courses = [_PlanBuilder(facts, i, sets[i]) for i in range(len(cases))]
+    planned = [course.plan() for course in courses]
+    _predict_tried(cases, courses)
+    return [(plan, course.sets) for plan, course in zip(planned, courses, strict=True)]
+
+
+def _predict_tried(cases: Cases, courses: Sequence[_PlanBuilder]) -> None:
+    """Predict the gears after the repairs to be tried, all at once: the plans need no more than
+    their chances.
+    """
+    rows = [i for i, course in enumerate(courses) if course.tried is not None]
+    if not rows:
+        return
+    some, numbers = cases.take(np.array(rows)), np.array(cases.gear.joint_numbers)
+    tried = [course.tried for course in courses if course.tried is not None]
+    members = np.array([np.isin(numbers, each.joints) for each in tried])
+    now = some.filled(cases.gear.limits_in)
+    after = some.predict(np.where(members, np.minimum(now, cases.gear.new_parts_in), now))
+    within = after.probability_within(some.margin_in, some.margin_u_in)
+    for k, row in enumerate(rows):
+        found = replace(
+            tried[k],
+            predicted_displacement_in=float(after.displacement_in[k]),
+            probability_within_margin=float(within[k]),
+        )
+        courses[row].sets = (*courses[row].sets, found)
 
 
 class _BatchContext:
     """What the plans of a batch are made from, worked out for all gears at once."""
 
-    def __init__(self, cases: Cases, judged: Judged, found: Search) -> None:
-        gear, measured, over = cases.gear, cases.measured, cases.over_limit
-        plunger, ahead = judged.plunger, _UnreadJoints(cases, judged)
-        self.cases, self.judged = cases, judged
-        self.joints_done, self.questions = cases.joints_done, cases.questions
-        self.complaint = cases.failed | ((plunger.beyond | over.any(axis=1)) & ~cases.retracted)
-        open_critical = ~measured & gear.critical
-        missing = np.asarray(open_critical.any(axis=1))
-        candidates = np.where(missing[:, None], open_critical, ~measured)
-        self.group = np.where(self.complaint[:, None], candidates, ahead.group(candidates))
-        self.rest = ~measured & ~self.group
-        self.read_first = _reading_is_quicker(gear, found, ahead, self.rest | self.group) | missing
-        self.settled_by_plunger = (cases.failed & plunger.clears) | ~plunger.explained
-        self.by_clearance = (judged.batch.chance_random > _OTHER_CAUSE) | plunger.beyond | missing
+    def __init__(self, cases: Cases, judged: Judged, causes: Causes) -> None:
+        gear = cases.gear
+        ahead = _UnreadJoints(cases, judged)
+        self.cases, self.judged, self.causes = cases, judged, causes
+        self.numbers = gear.joint_numbers
+        self.restore_min = np.array([joint.restore.value for joint in gear.joints])
+        self.access_min = np.array([area.access.value for area in gear.areas])
+        self.inside = np.array(
+            [[joint.area == area.name for joint in gear.joints] for area in gear.areas]
+        )
+        self.questions, self.complained = judged.questions, cases.complained
+        self.over, self.removable = cases.over_limit & cases.restorable, removable(cases)
+        self.open: Mask = np.asarray(~cases.measured & cases.reachable)
+        critical = self.open & gear.critical
+        missing = np.asarray(critical.any(axis=1))
+        self.candidates = np.where(missing[:, None], critical, self.open)
+        self.group = ahead.group(self.candidates)
+        self.rest = self.open & ~self.group
+        excess = cases.filled(0.0) - gear.limits_in
+        self.edge = (
+            cases.over_limit & cases.reachable & ~cases.own_gauge & (excess <= cases.gauge_u_in)
+        )
         self.after_limits = _verdicts_after_limits(cases, judged)
         self.again, self.again_u_in = _measure_again(cases, judged)
-        self.expected_set, self.expected_end = _expected(cases, judged, ahead, self.complaint)
+        self.expected_end = _expected(cases, judged, ahead)
+        u = np.hypot(cases.mean_u_in, cases.margin_u_in)
+        apart = np.abs(np.abs(cases.mean_in) - cases.margin_in)
+        self.at_edge: Mask = np.asarray(apart < 2.0 * u)
 
 
 class _PlanBuilder:
+    """The course of one gear: each branch appends its steps and ends."""
+
     def __init__(self, facts: _BatchContext, row: int, sets: tuple[RepairSet, ...]) -> None:
         self.facts, self.row, self.sets = facts, row, sets
         self.cases, self.judged, self.gear = facts.cases, facts.judged, facts.cases.gear
+        self.numbers = facts.numbers
+        self.inspection = self.cases.inspections[row]
         self.steps: list[Step] = []
-        self.opened: frozenset[str] = frozenset()
-        self.over = self._joints(self.cases.over_limit[row])
+        self.tried: RepairSet | None = None
+        self.opened: frozenset[str] = frozenset(self.inspection.open_areas)
+        self.over = self._joints(facts.over[row])
+        self.read_plunger = bool(np.isfinite(self.cases.mean_in[row]))
+        self.looked = self.inspection.rigging_checked not in (None, RiggingCheck.NO)
 
     def plan(self) -> Plan:
-        """The steps in their order; each branch ends."""
+        """The steps in their order, within what the day allows."""
         f, i = self.facts, self.row
         if not np.isfinite(self.judged.batch.lower.displacement_in[i]):
             return NOT_CLOSING
         if f.questions[i] and not self.judged.plunger.beyond[i]:
             return CONFIRM
-        if f.settled_by_plunger[i]:
-            return self._restore_over_limit().end(End.NOT_EXPLAINED)
-        failed = self.cases.failed[i]
-        if self.judged.verdicts[i] is Verdict.WITHIN_MARGIN:
-            return self._restore_over_limit().end(End.NOT_EXPLAINED if failed else End.WITHIN)
-        if failed and not np.isfinite(self.cases.mean_in[i]):
-            minutes = self.gear.plunger_reading.value
-            self.steps.append(Step(Action.READ_PLUNGER, (), minutes, None, sentences.READ_PLUNGER))
-            if not f.by_clearance[i]:
-                return self._restore_over_limit().end(End.NOT_EXPLAINED)
-        return self._to_repair() if f.complaint[i] else self._to_verdict()
+        failed, complained = bool(self.cases.failed[i]), bool(f.complained[i])
+        found = self._course(failed=failed, complained=complained)
+        return self._within_the_day(replace(found, open_question=self._open_question(found)))
 
-    def _to_repair(self) -> Plan:
-        """A gear with a complaint: read until a repair is certain, restore, end."""
+    def _course(self, *, failed: bool, complained: bool) -> Plan:
+        if failed:
+            return self._failed()
+        if complained:
+            return self._repaired()
+        if self.inspection.is_repaired and not self.over:
+            return self._done()
+        if not self.judged.plunger.explained[self.row]:
+            return self._restore_over_limit()._check_rigging()._end(End.NOT_EXPLAINED)
+        if self.judged.verdicts[self.row] is Verdict.WITHIN_MARGIN:
+            return self._settled(End.WITHIN)
+        return self._to_verdict()
+
+    def _repaired(self) -> Plan:
+        """A gear that failed and was repaired: the plunger says whether the repair holds."""
+        beyond = self.judged.plunger.beyond[self.row]
+        if self.over:
+            return self._try(self.over)
+        if self.read_plunger and beyond and not self._again():
+            return self._failed()
+        if not self.read_plunger or beyond:
+            self._step(Action.READ_PLUNGER, self.gear.plunger_reading.value, sentences.READ_PLUNGER)
+        return self._retract()
+
+    def _again(self) -> bool:
+        """Whether the plunger is read again: at the edge of its margin, and read only once."""
+        readings = self.inspection.standing_readings_in
+        return bool(self.facts.at_edge[self.row]) and len(readings) < 2
+
+    def _failed(self) -> Plan:
+        """A gear that failed: the plunger first, then whatever is likeliest per minute."""
+        causes, i = self.facts.causes, self.row
+        joints, rigging = float(causes.joints[i]), float(causes.rigging[i])
+        if not self.read_plunger or self._again():
+            self._step(Action.READ_PLUNGER, self.gear.plunger_reading.value, sentences.READ_PLUNGER)
+        if not self.read_plunger:
+            if causes.exceeds[i] < causes.expected_elsewhere:
+                return self._restore_over_limit()._end(End.NOT_EXPLAINED)
+            return self._to_repair(joints, rigging)
+        if joints + rigging < _EXCLUDED:
+            return self._elsewhere()
+        return self._to_repair(joints, rigging)
+
+    def _elsewhere(self) -> Plan:
+        """The joints are not the cause; what is over its limit is restored nevertheless."""
+        if self.over:
+            return self._try(self.over)
+        return self._end(End.NOT_EXPLAINED)
+
+    def _to_repair(self, joints: float, rigging: float) -> Plan:
         f, i = self.facts, self.row
-        unread = not self.cases.measured[i].all()
-        if self.sets and not f.read_first[i]:
-            best = self.sets[0]
-            ranked = self._joints(np.isin(self.gear.joint_numbers, best.joints))
-            return self._restore(ranked, best.predicted_displacement_in, unread).end(End.WITHIN)
-        if not unread:
-            return self._restore_over_limit().end(End.CANNOT_CLEAR)
-        self._measure(self._joints(f.group[i]))
-        if f.rest[i].any():
-            self._measure(self._joints(f.rest[i]))
-        expected = self._joints(f.expected_set[i])
-        if expected:
-            self._restore(expected, None, unread)
-        return self.end(
-            End.WITHIN
-            if expected or f.expected_end[i] is Verdict.WITHIN_MARGIN
-            else End.CANNOT_CLEAR
+        best = self._repair()
+        unread = self._joints(f.open[i])
+        following = self._worth_reading(best) if unread else ()
+        if following:
+            minutes = minutes_to_measure(self.gear, unread, self.opened)
+        elif best is not None:
+            sound = [n for n in best.joints if n not in self.over]
+            minutes = minutes_to_restore(self.gear, sound, self.opened) if sound else 0.0
+        else:
+            minutes = np.inf
+        if not self.looked and self.read_plunger:
+            check = self.gear.rigging_check.value
+            # No sound joint is restored before the rigging was looked at, unless it is excluded.
+            tears = not following and best is not None and set(best.joints) > set(self.over)
+            if rigging > _EXCLUDED and (tears or rigging * minutes > joints * check):
+                self._check_rigging()
+                if rigging > 0.5:
+                    return self._restore_over_limit()._end(End.NOT_EXPLAINED)
+        if following:
+            return self._read_and_restore(following)
+        if best is not None and (joints >= _SURE_ENOUGH or set(best.joints) <= set(self.over)):
+            return self._try(best.joints, best)
+        if best is not None:
+            return self._elsewhere()
+        if joints < 0.5 or not self.over:
+            explained = joints >= 0.5
+            return self._end(End.CANNOT_CLEAR if explained else End.NOT_EXPLAINED)
+        return self._try(self.over)
+
+    def _read_and_restore(self, following: tuple[int, ...]) -> Plan:
+        """Read joints, then the expected repair."""
+        self._measure(following)
+        worn = self.facts.causes.worn[self.row] * self.facts.causes.leverage
+        numbers = self.numbers
+        likely = sorted(following, key=lambda n: -worn[numbers.index(n)])
+        # What is over its limit already does not suffice, or there would be nothing to read. Where
+        # nobody read any joint, two are restored on average.
+        more = 1 if self.cases.measured[self.row].any() else 2
+        return self._try((*self.over, *likely[:more]), expected=True)
+
+    def _repair(self) -> RepairSet | None:
+        """The quickest repair after which a second one is at most as likely as the shop accepts;
+        None without one.
+
+        Offered are what is over its limit with the fewest more, and what holds in the worst case.
+        """
+        f, i = self.facts, self.row
+        over = np.flatnonzero(f.over[i])
+        more = np.flatnonzero(f.removable[i] & ~f.over[i])
+        more = more[np.argsort(-f.causes.reach_in[i, more], kind="stable")][:_MOST_TRIED]
+        chosen = [
+            (*over, *extra)
+            for count in range(_MOST_EXTRA + 1)
+            for extra in combinations(more, count)
+        ]
+        chosen = [places for places in chosen if places]
+        if not chosen:
+            return None
+        members = np.zeros((len(chosen), len(self.gear.joints)), bool)
+        for row, places in enumerate(chosen):
+            members[row, list(places)] = True
+        second = f.causes.second_repair(i, members)
+        shut = [k for k, area in enumerate(self.gear.areas) if area.name not in self.opened]
+        opened = (members[:, None, :] & f.inside[shut]).any(axis=2)
+        minutes = members @ f.restore_min + opened @ f.access_min[shut]
+        accepted = _FOR_ONE_REPAIR * self.gear.second_repair_chance.value
+        sure = [s for s in self.sets if (s.second_repair_probability or 0.0) <= accepted]
+        enough = np.flatnonzero(second <= accepted)
+        if len(enough):
+            best = enough[np.lexsort((second[enough], np.round(minutes[enough], 6)))[0]]
+        elif sure or not len(over):
+            return sure[0] if sure else None
+        elif f.open[i].any():
+            return None
+        else:
+            # Nothing is left to read: what is over its limit is restored, and the plunger decides.
+            best = 0
+        if second[best] > _HOPELESS and not len(over):
+            return None
+        tried = self._try_set(members[best], float(second[best]))
+        quicker = [s for s in sure if s.minutes < tried.minutes]
+        if all(set(s.joints) != set(tried.joints) for s in self.sets):
+            self.tried = tried
+        return quicker[0] if quicker else tried
+
+    def _try_set(self, members: Mask, second: float) -> RepairSet:
+        joints = tuple(np.array(self.numbers)[members].tolist())
+        return RepairSet(
+            joints,
+            np.nan,
+            np.nan,
+            minutes_to_measure(self.gear, joints),
+            minutes_to_restore(self.gear, joints),
+            RepairKind.TRY,
+            second,
         )
+
+    def _worth_reading(self, best: RepairSet | None) -> tuple[int, ...]:
+        """The joints to read next; none where a repair is quicker than what reading may save."""
+        f, i = self.facts, self.row
+        # A worn joint that hardly moves the plunger is hardly the cause.
+        worn = f.causes.worn[i] * f.causes.leverage
+        chosen: tuple[int, ...] = ()
+        most = -1.0
+        for area in self.gear.areas:
+            inside = [
+                j
+                for j, joint in enumerate(self.gear.joints)
+                if f.open[i, j] and joint.area == area.name
+            ]
+            inside.sort(key=lambda j: -worn[j] / self.gear.joints[j].access.value)
+            total, taken = sum(worn[j] for j in inside), 0.0
+            group: list[int] = []
+            for j in inside:
+                group.append(j)
+                taken += worn[j]
+                if len(group) > 1 and taken >= _TOGETHER * total:
+                    break
+            numbers = tuple(self.numbers[j] for j in group)
+            if not group:
+                continue
+            rate = taken / minutes_to_measure(self.gear, numbers, self.opened)
+            if rate > most:
+                chosen, most = numbers, rate
+        if best is None or not chosen:
+            return chosen
+        sound = [n for n in best.joints if n not in self.over]
+        places = [self.numbers.index(n) for n in chosen]
+        worn = f.causes.worn[i]
+        saved = minutes_to_restore(self.gear, sound, self.opened) if sound else 0.0
+        saved *= 1.0 - float(np.prod(1.0 - worn[places]))
+        return chosen if saved > minutes_to_measure(self.gear, chosen, self.opened) else ()
 
     def _to_verdict(self) -> Plan:
         """A gear without a complaint: read until there is a verdict, restore what is over its
@@ -154,61 +366,171 @@ class _PlanBuilder:
         """
         f, i = self.facts, self.row
         found = f.after_limits[i]
-        if found is Verdict.INCOMPLETE:
+        if found is Verdict.INCOMPLETE and f.group[i].any():
             self._measure(self._joints(f.group[i]))
             if f.rest[i].any() and f.expected_end[i] is not Verdict.OUTSIDE_MARGIN:
                 self._measure(self._joints(f.rest[i]))
             found = f.expected_end[i]
-        elif found is Verdict.INCONCLUSIVE and f.again[i].any():
-            joints = self._joints(f.again[i])
-            needed = float(f.again_u_in[i])
-            minutes = self._open(minutes_to_measure(self.gear, joints, self.opened), joints)
-            self.steps.append(
-                Step(
-                    Action.MEASURE_AGAIN,
-                    joints,
-                    minutes,
-                    needed,
-                    sentences.measure_again(joints, needed),
-                )
-            )
+        elif found is Verdict.INCOMPLETE:
+            return self._settled(End.CANNOT_CLEAR)
+        elif found is Verdict.INCONCLUSIVE and f.again[i].any() and not self.over:
+            self._measure_again(self._joints(f.again[i]), float(f.again_u_in[i]))
             inside = self.judged.batch.lower.displacement_in[i] <= self.cases.margin_in[i]
             found = Verdict.WITHIN_MARGIN if inside else Verdict.OUTSIDE_MARGIN
         ends = {Verdict.WITHIN_MARGIN: End.WITHIN, Verdict.OUTSIDE_MARGIN: End.OUTSIDE_NO_COMPLAINT}
-        return self._restore_over_limit().end(ends.get(found, End.TOO_CLOSE))
+        return self._settled(ends.get(found, End.TOO_CLOSE))
 
-    def end(self, where: End) -> Plan:
+    def _settled(self, where: End) -> Plan:
+        """Restore what is over its limit, and end; the joints are done with where some were, or
+        where all were read on a gear that retracted.
+        """
+        if self.over:
+            self._restore_over_limit()
+            return self._done()
+        done = bool(self.judged.joints_done[self.row]) and where is End.WITHIN
+        return self._done() if done else self._end(where)
+
+    def _try(
+        self, joints: Sequence[int], best: RepairSet | None = None, *, expected: bool = False
+    ) -> Plan:
+        """Restore, read the plunger, retract the gear: done."""
+        ranked = self._joints(np.array([n in joints for n in self.numbers]))
+        self._restore(ranked, best, expected=expected)
+        self._step(Action.READ_PLUNGER, self.gear.plunger_reading.value, sentences.READ_PLUNGER)
+        return self._retract()
+
+    def _retract(self) -> Plan:
+        self._step(Action.RETRACT, self.gear.retraction.value, sentences.RETRACT)
+        return self._done()
+
+    def _done(self) -> Plan:
+        repaired = self.inspection.is_repaired or any(
+            step.action is Action.RESTORE for step in self.steps
+        )
+        self._step(Action.DONE, 0.0, sentences.done(repaired=repaired))
+        return Plan(tuple(self.steps), End.DONE)
+
+    def _check_rigging(self) -> _PlanBuilder:
+        if not self.looked:
+            beyond = bool(self.judged.plunger.beyond[self.row])
+            as_new = self._joints(
+                self.cases.measured[self.row]
+                & (self.cases.filled(0.0)[self.row] <= 2.0 * self.gear.new_parts_in)
+            )
+            text = sentences.check_rigging(
+                float(self.cases.mean_in[self.row]) if beyond else None,
+                () if self.inspection.is_repaired or not self.cases.failed[self.row] else as_new,
+            )
+            self._step(Action.CHECK_RIGGING, self.gear.rigging_check.value, text)
+        return self
+
+    def _end(self, where: End) -> Plan:
         """Go on: the plan ends."""
-        failed, done = bool(self.cases.failed[self.row]), bool(self.facts.joints_done[self.row])
-        text = sentences.go_on(where, failed=failed, joints_done=done)
-        self.steps.append(Step(Action.CONTINUE, (), 0.0, None, text))
+        text = sentences.go_on(
+            where,
+            failed=bool(self.cases.failed[self.row]),
+            beyond=bool(self.judged.plunger.beyond[self.row]),
+            looked=self.looked,
+            look_again=self._look_again(where),
+        )
+        self._step(Action.CONTINUE, 0.0, text)
         return Plan(tuple(self.steps), where)
+
+    def _look_again(self, where: End) -> str:
+        """By when a gear that is too close is looked at again."""
+        if where is not End.TOO_CLOSE:
+            return ""
+        return sentences.look_again(self.inspection)
+
+    def _step(
+        self,
+        action: Action,
+        minutes: float,
+        text: str,
+        joints: tuple[int, ...] = (),
+        gauge_u_needed_in: float | None = None,
+    ) -> None:
+        self.steps.append(Step(action, joints, minutes, gauge_u_needed_in, text))
 
     def _measure(self, joints: tuple[int, ...]) -> None:
         minutes = self._open(minutes_to_measure(self.gear, joints, self.opened), joints)
-        self.steps.append(
-            Step(Action.MEASURE, joints, minutes, None, sentences.measure(self.gear, joints))
-        )
+        self._step(Action.MEASURE, minutes, sentences.measure(self.gear, joints), joints)
+
+    def _measure_again(self, joints: tuple[int, ...], needed: float) -> None:
+        minutes = self._open(minutes_to_measure(self.gear, joints, self.opened), joints)
+        text = sentences.measure_again(joints, needed)
+        self._step(Action.MEASURE_AGAIN, minutes, text, joints, needed)
 
     def _restore(
-        self, joints: tuple[int, ...], worst_in: float | None, unread: bool
+        self, joints: tuple[int, ...], best: RepairSet | None, *, expected: bool
     ) -> _PlanBuilder:
+        """Restore joints; those whose reading is over the limit by less than its uncertainty are
+        read again first, if that is expected to be quicker.
+        """
+        edge = tuple(n for n in joints if self.facts.edge[self.row, self._place(n)])
+        if edge and not expected:
+            saved = _EDGE_IS_SOUND * sum(self.gear.joint(n).restore.value for n in edge)
+            if minutes_to_measure(self.gear, edge, self.opened) < saved + 1e-9:
+                self._measure_again(edge, BETTER_GAUGES_IN[-1])
         minutes = minutes_to_restore(self.gear, joints, self.opened)
-        expected = bool(self.steps) and worst_in is None and joints != self.over
-        text = sentences.restore(joints, self.over, worst_in, unread=unread, expected=expected)
-        self.steps.append(Step(Action.RESTORE, joints, minutes, None, text))
+        unread = not self.cases.measured[self.row].all()
+        text = sentences.restore(joints, self.over, best, unread=unread, expected=expected)
+        self._step(Action.RESTORE, minutes, text, joints)
+        self.opened = frozenset()
         return self
 
     def _restore_over_limit(self) -> _PlanBuilder:
-        return self._restore(self.over, None, False) if self.over else self
+        return self._restore(self.over, None, expected=False) if self.over else self
 
     def _open(self, minutes: float, joints: tuple[int, ...]) -> float:
         self.opened |= {self.gear.joint(n).area for n in joints}
         return minutes
 
+    def _place(self, number: int) -> int:
+        return self.numbers.index(number)
+
     def _joints(self, places: Mask) -> tuple[int, ...]:
         """Numbers of joints in the order of their rank."""
-        return tuple(self.gear.joint_numbers[j] for j in self.judged.order[self.row] if places[j])
+        order = self.judged.order[self.row].tolist()
+        return tuple(self.numbers[j] for j in order if places[j]) if places.any() else ()
+
+    def _open_question(self, found: Plan) -> str | None:
+        """What cannot be settled because of the day."""
+        if found.end in (End.WITHIN, End.CORRECT):
+            return None
+        cases, i = self.cases, self.row
+        asked = {n for step in found.steps for n in step.joints}
+        unread = self._joints(~cases.measured[i] & ~cases.reachable[i])
+        over = self._joints(cases.over_limit[i] & ~cases.restorable[i])
+        return sentences.open_question([n for n in unread if n not in asked], over)
+
+    def _within_the_day(self, found: Plan) -> Plan:
+        """The plan as far as the minutes of the day reach; its first step is one that fits."""
+        left = self.inspection.minutes_available
+        first = found.steps[0]
+        if left is None or first.minutes <= left:
+            return found
+        joints = first.joints
+        if first.action is Action.MEASURE:
+            while joints and minutes_to_measure(self.gear, joints, self._at_first) > left:
+                joints = joints[:-1]
+            if joints:
+                minutes = minutes_to_measure(self.gear, joints, self._at_first)
+                step = replace(
+                    first,
+                    joints=joints,
+                    minutes=minutes,
+                    text=sentences.measure(self.gear, joints),
+                )
+                return replace(found, steps=(step, *found.steps[1:]))
+        question = sentences.does_not_fit(first, left, found.open_question)
+        self.steps = []
+        ended = self._end(End.CANNOT_CLEAR)
+        return replace(ended, open_question=question)
+
+    @property
+    def _at_first(self) -> frozenset[str]:
+        return frozenset(self.inspection.open_areas)
 
 
 class _UnreadJoints:
@@ -271,38 +593,6 @@ class _UnreadJoints:
         return chosen
 
 
-def _reading_is_quicker(gear: Gear, found: Search, ahead: _UnreadJoints, unread: Mask) -> Mask:
-    """Whether reading all that is unread and then restoring is expected to be quicker than
-    restoring now.
-    """
-    table = subsets_of(gear)
-    minutes = np.append(table.minutes, table.minutes[-1])
-    now = found.quickest()
-    mean, spread = ahead.total(unread)
-    at_limit = np.sum(np.where(unread, ahead.slopes * gear.limits_in, 0.0), axis=1)
-    # Mean and scatter over the levels together, taken as one normal distribution at seven equally
-    # likely points.
-    centre = np.sum(ahead.weight * mean, axis=1)
-    scatter = np.sqrt(np.sum(ahead.weight * (spread**2 + (mean - centre[:, None]) ** 2), axis=1))
-    after = np.mean(
-        [
-            minutes[found.quickest(at_limit - np.clip(centre + z * scatter, 0.0, at_limit))]
-            for z in _POINTS
-        ],
-        axis=0,
-    )
-    areas = [
-        (area, np.array([joint.area == area.name for joint in gear.joints])) for area in gear.areas
-    ]
-    to_read = unread @ gear.access_minutes
-    for area, inside in areas:
-        shared = np.where(now >= 0, (table.members[now] & inside).any(axis=1), False)
-        to_read = to_read + np.where(
-            (unread & inside).any(axis=1) & ~shared, area.access.value, 0.0
-        )
-    return np.asarray(unread.any(axis=1) & ((now < 0) | (to_read + after < minutes[now])))
-
-
 def _verdicts_after_limits(cases: Cases, judged: Judged) -> list[Verdict]:
     """The verdicts that stand once what is over its limit is restored."""
     verdicts = list(judged.verdicts)
@@ -363,40 +653,24 @@ def _measure_again(cases: Cases, judged: Judged) -> tuple[Mask, Array]:
     return chosen, needed
 
 
-def _expected(
-    cases: Cases, judged: Judged, ahead: _UnreadJoints, complaint: Mask
-) -> tuple[Mask, list[Verdict]]:
-    """What will be restored, and the verdict, if every unmeasured joint is as worn as expected."""
+def _expected(cases: Cases, judged: Judged, ahead: _UnreadJoints) -> list[Verdict]:
+    """The verdict if every unmeasured joint is as worn as expected."""
     full = cases.filled((ahead.weight @ moments()[0])[:, None] * cases.gear.limits_in)
-    sets, ends = np.zeros_like(cases.measured), list(judged.verdicts)
+    ends = list(judged.verdicts)
     rows = np.flatnonzero(
         ~cases.measured.all(axis=1) & np.isfinite(judged.batch.upper.displacement_in)
     )
-    if not len(rows):
-        return sets, ends
-    some = cases.take(rows)
-    read = replace(some, clearance_in=full[rows])
     reference = responses(cases.gear)[0]
     worst = (
         judged.batch.lower.displacement_in[rows]
         + reference.magnitude(full[rows])
-        - reference.magnitude(some.filled(0.0))
+        - reference.magnitude(cases.filled(0.0)[rows])
     )
     for k, row in enumerate(rows):
-        within = worst[k] <= ahead.within_in[row]
-        between = worst[k] < ahead.outside_in[row]
-        ends[row] = (
-            Verdict.WITHIN_MARGIN
-            if within
-            else Verdict.INCONCLUSIVE
-            if between
-            else Verdict.OUTSIDE_MARGIN
-        )
-    needed = np.flatnonzero(complaint[rows])
-    if len(needed):
-        u_readings = judged.batch.upper.u_clearances_in[rows[needed]]
-        best = search(read.take(needed), worst[needed], u_readings).quickest()
-        sets[rows[needed]] = np.where(
-            (best >= 0)[:, None], subsets_of(cases.gear).members[best], False
-        )
-    return sets, ends
+        if worst[k] <= ahead.within_in[row]:
+            ends[row] = Verdict.WITHIN_MARGIN
+        elif worst[k] < ahead.outside_in[row]:
+            ends[row] = Verdict.INCONCLUSIVE
+        else:
+            ends[row] = Verdict.OUTSIDE_MARGIN
+    return ends

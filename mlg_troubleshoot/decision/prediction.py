@@ -18,11 +18,11 @@ from mlg_troubleshoot.gear.gear import Gear
 
 # Sets of random directions behind the chance of exceeding the margin. [1]
 DIRECTION_SETS = 4096
-# Standard uncertainty of a plunger reading that states none. [in]
-DEFAULT_PLUNGER_U_IN = 0.0005
+# What a hand-held gauge reads the plunger to. [in]
+DEFAULT_PLUNGER_U_IN = 0.0015
 # The model's standard uncertainty until a diagnosis gives it: the larger of a length and a share of
 # the prediction.
-PROVISIONAL_U_IN, PROVISIONAL_U_SHARE = 0.003, 0.10
+PROVISIONAL_U_IN, PROVISIONAL_U_SHARE = 0.0005, 0.02
 
 
 class Extension(Protocol):

@@ -14,6 +14,9 @@ from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 
+# Two readings differ for sure where they do by this many standard uncertainties of the difference:
+# 90 % intervals. [1]
+_SURELY = 1.645
 WORST_FIRST = (
     *(Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE, Verdict.INCOMPLETE),
     *(Verdict.INVALID, Verdict.WITHIN_MARGIN),
@@ -21,13 +24,18 @@ WORST_FIRST = (
 
 
 def rank_joints(
-    gear: Gear, table: IndexTable, clearance_in: Array, allowance_in: Array | None = None
+    gear: Gear,
+    table: IndexTable,
+    clearance_in: Array,
+    allowance_in: Array | None = None,
+    gauge_u_in: Array | None = None,
 ) -> list[tuple[JointFinding, ...]]:
     """Rank the joints of each gear in the order in which to inspect them; NaN where nothing was
     measured or found.
 
     Joints over their limit come first, then by contribution; an unmeasured joint counts with half
-    its limit, ties go to the larger total-order index.
+    its limit, ties go to the larger total-order index. The range of a rank is over the ensemble of
+    geometries and over the errors of the readings.
     """
     measured = np.isfinite(clearance_in)
     over = gear.over_limit(clearance_in)
@@ -36,7 +44,15 @@ def rank_joints(
         np.array([linkage.amplification for linkage in responses(gear)]) * assumed[:, None, :]
     )
     places = _places(over[:, None, :], contribution, table.total_order)
-    best, worst = places.min(axis=1).tolist(), places.max(axis=1).tolist()
+    first, last = places.min(axis=1), places.max(axis=1)
+    if gauge_u_in is not None:
+        u = np.where(measured, gauge_u_in, 0.0)
+        above = _surely_above(
+            contribution[:, 0], u * responses(gear)[0].amplification, assumed, u, gear
+        )
+        first = np.minimum(first, 1 + above.sum(axis=1))
+        last = np.maximum(last, above.shape[1] - above.sum(axis=2))
+    best, worst = first.tolist(), last.tolist()
     # There are few ranges: a large batch holds each of them once.
     ranges: dict[tuple[int, int], tuple[int, int]] = {}
     ranks, known, above = places[:, 0].tolist(), clearance_in.tolist(), over.tolist()
@@ -65,6 +81,21 @@ def rank_joints(
         )
 
     return [tuple(finding(i, j) for j in range(len(gear.joints))) for i in range(len(clearance_in))]
+
+
+def _surely_above(
+    contribution: Array, u_in: Array, clearance_in: Array, gauge_u_in: Array, gear: Gear
+) -> Mask:
+    """Whether a joint ranks before another whatever the errors of both readings, (n, joint, other).
+
+    A joint over its limit comes first; one whose reading is at its limit may or may not be.
+    """
+    apart = contribution[:, :, None] - contribution[:, None, :]
+    differ = apart > _SURELY * np.hypot(u_in[:, :, None], u_in[:, None, :]) + 1e-12
+    sure = gear.over_limit(clearance_in - _SURELY * gauge_u_in)
+    may_be = gear.over_limit(clearance_in + _SURELY * gauge_u_in)
+    rejected = sure[:, :, None] & ~may_be[:, None, :]
+    return np.asarray(rejected | (differ & (sure[:, :, None] | ~may_be[:, None, :])))
 
 
 def _places(over: Mask, contribution: Array, total_order: Array) -> Places:

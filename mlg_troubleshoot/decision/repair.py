@@ -12,7 +12,7 @@ from statistics import NormalDist
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array, Mask, Places
-from mlg_troubleshoot.decision.assessment import RepairSet, Rigging, UncertaintyBudget
+from mlg_troubleshoot.decision.assessment import RepairKind, RepairSet, Rigging, UncertaintyBudget
 from mlg_troubleshoot.decision.case import Cases, exact_chance
 from mlg_troubleshoot.decision.plan import minutes_to_measure, minutes_to_restore
 from mlg_troubleshoot.decision.prediction import Prediction, model_uncertainty
@@ -110,7 +110,11 @@ def _surest(table: Subsets, slack_in: Array, among: Mask) -> Places:
 
 def removable(cases: Cases) -> Mask:
     """Joints that can be restored with a gain: measured, and worn beyond a new part."""
-    return cases.measured & (cases.filled(0.0) > cases.gear.new_parts_in + _AS_NEW_IN)
+    return (
+        cases.measured
+        & cases.restorable
+        & (cases.filled(0.0) > cases.gear.new_parts_in + _AS_NEW_IN)
+    )
 
 
 def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
@@ -120,7 +124,7 @@ def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
     table, linkages = subsets_of(cases.gear), responses(cases.gear)
     worn, now = removable(cases), cases.filled(cases.gear.limits_in)
     less = np.where(worn, now - cases.gear.new_parts_in, 0.0)
-    over = cases.over_limit
+    over = cases.over_limit & cases.restorable
     # A subset must contain every joint over its limit, and no joint that gains nothing.
     barred = (~worn).astype(float) @ table.weights.T + over.astype(float) @ (
         1.0 - table.weights.T
@@ -245,7 +249,7 @@ def repair_sets(cases: Cases, found: Search, wanted: Mask) -> list[tuple[RepairS
         which = sets[k]
         minutes = table.to_measure[which], float(table.minutes[which])
         result[rows[k]].append(
-            RepairSet(table.joints[which], float(moved[k]), float(p[k]), *minutes)
+            RepairSet(table.joints[which], float(moved[k]), float(p[k]), *minutes, RepairKind.SURE)
         )
     return [tuple(sets) for sets in result]
 
@@ -269,13 +273,20 @@ def _quickest_sets(table: Subsets, slack_in: Array) -> Sequence[Places]:
 def rigging_alternative(
     one: Cases, worst_in: tuple[float, float], budget: UncertaintyBudget
 ) -> Rigging:
-    """Shift the plunger so that the worst cases of both senses are equally far.
+    """Shift the plunger back by what was measured, else so that the worst cases of both senses are
+    equally far.
 
     Re-rigging moves the range of the plunger and cannot narrow it: what remains is half the
-    distance between both worst cases. The uncertainties of the decision rule stay as they are.
+    distance between both worst cases, or, where a measured offset is taken out, the worst case of
+    the joints. The uncertainties of the decision rule stay as they are.
     """
     over, under = worst_in
-    shift, left = -0.5 * (over + under), 0.5 * (over - under)
-    chance = exact_chance(one, one.filled(0.0), shift)
+    measured = float(one.mean_in[0])
+    if np.isfinite(measured):
+        shift, left = -measured, max(over, -under)
+        chance = exact_chance(one, one.filled(0.0))
+    else:
+        shift, left = -0.5 * (over + under), 0.5 * (over - under)
+        chance = exact_chance(one, one.filled(0.0), shift)
     within = float(normal_cdf((one.margin_in - left) / budget.combined_in)[0])
     return Rigging(shift, left, within, float(chance[0]))

@@ -6,9 +6,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import date
 
-from mlg_troubleshoot.decision.assessment import Assessment, Confidence, Rigging
-from mlg_troubleshoot.decision.plan import End
+from mlg_troubleshoot.decision.assessment import (
+    Assessment,
+    Confidence,
+    RepairKind,
+    RepairSet,
+    Rigging,
+)
+from mlg_troubleshoot.decision.inspection import Inspection
+from mlg_troubleshoot.decision.plan import End, Step
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import Length, Sentence
@@ -29,10 +37,7 @@ GO_ON = {
         "Joint clearances do not explain it: check rigging, lock roller, reversing valve,"
         " hydraulics, doors."
     ),
-    End.TOO_CLOSE: (
-        "Go on: too close to the margin for the model to decide. Look again at the next inspection;"
-        " record its date or landings."
-    ),
+    End.TOO_CLOSE: "Go on: too close to the margin for the model to decide.",
     End.OUTSIDE_NO_COMPLAINT: (
         "Go on: clearances could contribute, but no failure is recorded. Engineering decides."
     ),
@@ -47,6 +52,20 @@ JOINTS_DONE = (
 FAILED_BUT_WITHIN = (
     "Joint clearances do not explain this failure: check hydraulics, reversing valve, doors."
 )
+FAILED_AND_UNREAD = (
+    "Joint clearances do not explain this failure: check rigging and lock roller first, unless the"
+    " plunger is read within its margin."
+)
+_BEYOND_NOT_EXPLAINED = (
+    "Joint clearances do not explain where the plunger stands: the cause is rigging or the lock"
+    " roller first, then the plunger gauge and parts outside the listed joints."
+)
+_BEYOND_AND_LOOKED = (
+    "Joint clearances do not explain where the plunger stands, and the rigging was looked at: go on"
+    " to engineering."
+)
+_REPAIRED_DONE = "Joints are within limits; record the repair. This is not a release to service."
+RETRACT = "Retract the gear (trial retraction). Enter the outcome with its date and time."
 
 
 def percent(share: float) -> str:
@@ -59,11 +78,74 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.{1 if near_an_end else 0}f} %"
 
 
-def go_on(end: End, *, failed: bool, joints_done: bool) -> str:
-    """Step CONTINUE."""
-    if joints_done and end is End.WITHIN:
-        return JOINTS_DONE
-    return FAILED_BUT_WITHIN if failed and end is End.NOT_EXPLAINED else GO_ON[end]
+def go_on(end: End, *, failed: bool, beyond: bool, looked: bool, look_again: str) -> str:
+    """Step CONTINUE: where to look depends on where the plunger stands."""
+    if end is End.NOT_EXPLAINED and beyond:
+        return _BEYOND_AND_LOOKED if looked else _BEYOND_NOT_EXPLAINED
+    if end is End.NOT_EXPLAINED and failed:
+        return FAILED_BUT_WITHIN
+    return f"{GO_ON[end]} {look_again}".rstrip()
+
+
+def done(*, repaired: bool) -> str:
+    """Step DONE."""
+    return _REPAIRED_DONE if repaired else JOINTS_DONE
+
+
+def check_rigging(stands_in: float | None, as_new: Sequence[int]) -> Sentence:
+    """Step CHECK_RIGGING; `as_new`: joints that read like new parts on a gear that failed."""
+    stands = (
+        ""
+        if stands_in is None
+        else Sentence.of(" The plunger stands {} off.", Length(stands_in, sign=True))
+    )
+    said = Sentence.of(
+        "Check rigging and lock roller.{} Enter rigging_checked: yes or corrected.", stands
+    )
+    if not as_new:
+        return said
+    asked = (
+        f" If {joint_list(as_new)} were restored after the failure, enter them in restored_joints"
+        " and read the plunger again instead."
+    )
+    return Sentence.of("{}{}", said, asked)
+
+
+# Landings and months after which a gear that is too close is looked at again: half of what most
+# operators leave between inspections of this kind; assumed. [landings, months]
+_AGAIN_LANDINGS, _AGAIN_MONTHS = 300, 6
+
+
+def look_again(inspection: Inspection) -> str:
+    """By when a gear that is too close to its margin is looked at again."""
+    day, landings = inspection.inspection_date, inspection.gear_landings
+    if landings is not None:
+        by = f"at {landings + _AGAIN_LANDINGS:.0f} landings"
+    else:
+        by = f"within {_AGAIN_LANDINGS} landings"
+    if day is None:
+        return f"Look again {by} or {_AGAIN_MONTHS} months, whichever comes first."
+    month = day.month + _AGAIN_MONTHS
+    until = date(day.year + (month - 1) // 12, (month - 1) % 12 + 1, min(day.day, 28))
+    return f"Look again {by} or by {until.isoformat()}, whichever comes first."
+
+
+def open_question(unread: Sequence[int], over: Sequence[int]) -> str | None:
+    """What the day does not allow to settle."""
+    said = []
+    if unread:
+        are = "cannot be reached and is" if len(unread) == 1 else "cannot be reached and are"
+        said.append(f"{joint_list(unread)} {are} not read.")
+    if over:
+        are = "is" if len(over) == 1 else "are"
+        said.append(f"{joint_list(over)} {are} over the limit and cannot be restored today.")
+    return " ".join(said) or None
+
+
+def does_not_fit(step: Step, left: float, before: str | None) -> str:
+    """What stays open because the minutes of the day do not reach."""
+    said = f"To {step.words} takes {step.minutes:.0f} min; {left:.0f} min are left today."
+    return f"{said} {before}" if before else said
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +157,8 @@ class Predicted:
     displacement_in: float
     bound_in: float
     chance: float
+    read: int = 1
+    unread: int = 0
 
     @property
     def loaded(self) -> bool:
@@ -84,10 +168,17 @@ class Predicted:
     @property
     def words(self) -> Sentence:
         chance = f"chance with random directions {percent(self.chance)}"
+        if self.unread:
+            chance += ", unread joints by their usual wear"
+        if not self.read:
+            return Sentence(f"no joint was read; {chance}")
         displacement, bound = Length(self.displacement_in), Length(self.bound_in)
+        alone = " from the measured joints alone" if self.unread else ""
         if self.loaded:
-            return Sentence.of("as loaded {}, worst case {}, {}", displacement, bound, chance)
-        return Sentence.of("worst case {}, {}", displacement, chance)
+            return Sentence.of(
+                "as loaded {}, worst case {}{}, {}", displacement, bound, alone, chance
+            )
+        return Sentence.of("worst case {}{}, {}", displacement, alone, chance)
 
 
 def outside(margin_in: float, said: Predicted) -> Sentence:
@@ -129,9 +220,13 @@ def explained(explained_in: float, unexplained_in: float) -> Sentence:
     )
 
 
-def within(margin_in: float, said: Predicted, *, failed: bool, joints_done: bool) -> Sentence:
+def within(
+    margin_in: float, said: Predicted, *, failed: bool, clears: bool, joints_done: bool
+) -> Sentence:
     """Headline of WITHIN_MARGIN."""
-    then = FAILED_BUT_WITHIN if failed else "Continue fault isolation; not a release."
+    then = "Continue fault isolation; not a release."
+    if failed:
+        then = FAILED_BUT_WITHIN if clears else FAILED_AND_UNREAD
     then = ALL_WITHIN_LIMITS if joints_done else then
     if not said.loaded:
         return Sentence.of(
@@ -152,11 +247,7 @@ def within(margin_in: float, said: Predicted, *, failed: bool, joints_done: bool
 
 def incomplete(open_joints: Sequence[int], said: Predicted) -> Sentence:
     """Headline of INCOMPLETE."""
-    return Sentence.of(
-        "Cannot clear: not measured {} ({} from the measured joints alone).",
-        joint_list(open_joints),
-        said.words,
-    )
+    return Sentence.of("Cannot clear: not measured {} ({}).", joint_list(open_joints), said.words)
 
 
 def entry_in_question(question: str, said: Predicted) -> Sentence:
@@ -203,7 +294,7 @@ READ_PLUNGER = "Read the plunger displacement at mid-position."
 def restore(
     joints: Sequence[int],
     over: Sequence[int],
-    worst_in: float | None,
+    best: RepairSet | None,
     *,
     unread: bool,
     expected: bool,
@@ -218,12 +309,15 @@ def restore(
     )
     if over:
         said += f" Above its limit, reject to the manual: {joint_list(over)}."
-    if worst_in is None:
+    if best is None:
         return said
+    if best.kind is RepairKind.TRY:
+        chance = percent(best.second_repair_probability or 0.0)
+        return f"{said} Then read the plunger again; chance of a second repair {chance}."
     return Sentence.of(
         "{} The worst case is then {}{}.",
         said,
-        Length(worst_in),
+        Length(best.predicted_displacement_in),
         ", unmeasured joints at their limit" if unread else "",
     )
 
@@ -275,6 +369,26 @@ def no_repair_set(a: Assessment) -> str:
             " joints count at their limit here."
         )
     return f"No {_SET_THAT_HOLDS}"
+
+
+def older_than_the_repair(inspection: Inspection) -> list[str]:
+    """Ask about what stands in a row and may be older than the repair."""
+    if not inspection.is_repaired:
+        return []
+    said = []
+    if inspection.outcome is not None and inspection.standing_outcome is None:
+        said.append(
+            f"The outcome {inspection.outcome} counts as older than the repair. Is it newer? Then"
+            " enter outcome_date, on the day of the repair with both times."
+        )
+    if inspection.readings_in and not inspection.standing_readings_in:
+        said.append(
+            "The plunger reading counts as older than the repair. Is it newer? Then enter"
+            " plunger_date, on the day of the repair with both times."
+        )
+    if inspection.repair_date is None:
+        said.append("The repair has no date: enter repair_date, with the time if known.")
+    return said
 
 
 def rigging_sentence(rigging: Rigging) -> Sentence:

@@ -191,6 +191,10 @@ class Gear:
         Down Lock displacement and travel. [in]
     plunger_reading : Sourced
         Time to read the plunger displacement at mid-position. [min]
+    rigging_check, retraction : Sourced
+        Time to check rigging and lock roller, and for a trial retraction. [min]
+    second_repair_chance : Sourced
+        The chance of a second repair that the shop accepts. [1]
     horizon, accepted_chance : Sourced
         How far forecasts look ahead, and the chance of being over a limit or outside the margin at
         which the next inspection is due. [landings, 1]
@@ -227,6 +231,9 @@ class Gear:
     joints: tuple[JointSpec, ...]
     areas: tuple[Area, ...]
     plunger_reading: Sourced
+    rigging_check: Sourced
+    retraction: Sourced
+    second_repair_chance: Sourced
     horizon: Sourced
     accepted_chance: Sourced
     calibration: Calibration

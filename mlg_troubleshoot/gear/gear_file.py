@@ -64,6 +64,9 @@ _UNSTATED = {
     "read_min": 12.0,
     "horizon_landings": 20_000.0,
     "accepted_chance": 0.05,
+    "second_repair_chance": 0.02,
+    "minutes": 30.0,
+    "retraction_min": 15.0,
 }
 
 # Nothing of a landing gear is longer, and no angle needs more than two turns; far beyond, formulas
@@ -229,6 +232,27 @@ class PlungerTable(Table):
         _need_source(self, "source", self.read_min)
 
 
+class RiggingCheckTable(Table):
+    """How long it takes to check rigging and lock roller."""
+
+    minutes: Minutes | None = None
+    source: str | None = None
+
+    def __post_init__(self) -> None:
+        _need_source(self, "source", self.minutes)
+
+
+class RepairTable(Table):
+    """Which chance of a second repair is accepted, and how long a trial retraction takes."""
+
+    second_repair_chance: Annotated[float, Meta(gt=0, le=0.5)] | None = None
+    retraction_min: Minutes | None = None
+    source: str | None = None
+
+    def __post_init__(self) -> None:
+        _need_source(self, "source", self.second_repair_chance, self.retraction_min)
+
+
 class ForecastTable(Table):
     """How far forecasts look ahead, and which chance is accepted."""
 
@@ -293,6 +317,8 @@ class GearFile(GeometryTable, kw_only=True):
     ensemble: Sibling | None = None
     indices: Sibling | None = None
     plunger: PlungerTable = PlungerTable()
+    rigging_check: RiggingCheckTable = RiggingCheckTable()
+    repair: RepairTable = RepairTable()
     forecast: ForecastTable = ForecastTable()
     diagnosis: DiscrepancyTable | None = None
     cycle: RetractionCycle | None = None
@@ -385,15 +411,7 @@ def _read(path: Path) -> Gear:
         ensemble_path = path.with_name(found.ensemble)
         members = _members(file.values, ensemble_path)
     calibration, down_lock_range = _calibration(found.calibration, numbers)
-    plunger, forecast, entry = found.plunger, found.forecast, found.entry
-    plunger_reading = numbers.or_assumed("read_min", plunger.read_min, "min", plunger.source)
-    horizon, accepted = (
-        numbers.or_assumed(key, value, unit, forecast.source)
-        for key, value, unit in (
-            ("horizon_landings", forecast.horizon_landings, "landings"),
-            ("accepted_chance", forecast.accepted_chance, "1"),
-        )
-    )
+    entry = found.entry
     indices_file = path.with_name(found.indices or f"{path.stem}-indices.json")
     gear = Gear(
         id=found.id,
@@ -412,9 +430,7 @@ def _read(path: Path) -> Gear:
             Area(a.name, a.description, numbers.add(a.access_min, "min", a.source))
             for a in found.areas
         ),
-        plunger_reading=plunger_reading,
-        horizon=horizon,
-        accepted_chance=accepted,
+        **_of_the_workshop(found, numbers),
         calibration=calibration,
         margin=numbers.add(found.margin.value, "in", found.margin.source),
         bearing_span=numbers.add(found.bearing_span.value, "in", found.bearing_span.source),
@@ -436,6 +452,35 @@ def _read(path: Path) -> Gear:
     )
     _check_joints(gear, path)
     return gear
+
+
+def _of_the_workshop(found: GearFile, numbers: _Numbers) -> dict[str, Sourced]:
+    """What a workshop decides, by the names of a gear; what the file does not state is assumed."""
+    plunger, rigging, repair = found.plunger, found.rigging_check, found.repair
+    forecast = found.forecast
+    return {
+        name: numbers.or_assumed(key, value, unit, source)
+        for name, key, value, unit, source in (
+            ("plunger_reading", "read_min", plunger.read_min, "min", plunger.source),
+            ("rigging_check", "minutes", rigging.minutes, "min", rigging.source),
+            ("retraction", "retraction_min", repair.retraction_min, "min", repair.source),
+            (
+                "second_repair_chance",
+                "second_repair_chance",
+                repair.second_repair_chance,
+                "1",
+                repair.source,
+            ),
+            (
+                "horizon",
+                "horizon_landings",
+                forecast.horizon_landings,
+                "landings",
+                forecast.source,
+            ),
+            ("accepted_chance", "accepted_chance", forecast.accepted_chance, "1", forecast.source),
+        )
+    }
 
 
 def _sha256(value: Any) -> str:

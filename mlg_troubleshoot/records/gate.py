@@ -171,6 +171,10 @@ def _cell(value: object) -> Cell:
         return None
     if isinstance(value, str):
         return str(value)
+    if isinstance(value, tuple | list):
+        return "; ".join(map(str, value)) or None
+    if isinstance(value, datetime):
+        return value.isoformat(sep=" ")
     if isinstance(value, bool) or not isinstance(value, Real | date):
         return OddCell(OddKind.BOOLEAN, str(value))
     return iso_date_cell(value.isoformat()) if isinstance(value, date) else float(value)

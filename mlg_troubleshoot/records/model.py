@@ -81,8 +81,8 @@ class ReadOptions(TableOptions):
     """What is declared about tables, and what the gear says of the values in them.
 
     joint_names: names of the gear's joints, by which a header's number is checked; empty takes the
-    reference gear's. clearance_hard_max_in, clearance_confirm_above_in: a radial clearance above
-    the one is refused, above the other
+    reference gear's. areas: names of the areas to open. clearance_hard_max_in,
+    clearance_confirm_above_in: a radial clearance above the one is refused, above the other
         accepted with a warning. [in]
     plunger_hard_max_in: a measured plunger displacement beyond this, either way, is refused. [in]
     new_part_in, limit_in: radial clearance of a new part, and the largest one allowed, by joint;
@@ -94,6 +94,7 @@ class ReadOptions(TableOptions):
 
     joint_numbers: tuple[int, ...] = tuple(range(1, 11))
     joint_names: Mapping[int, str] = field(default_factory=dict)
+    areas: tuple[str, ...] = ("sidestay", "link assembly")
     clearance_hard_max_in: float = 0.050
     clearance_confirm_above_in: float = 0.015
     plunger_hard_max_in: float = 0.5
@@ -123,6 +124,7 @@ class ReadOptions(TableOptions):
             joint_numbers=gear.joint_numbers,
             joint_names={joint.number: joint.name for joint in gear.joints},
             new_part_in={joint.number: joint.new_part.value for joint in gear.joints},
+            areas=tuple(area.name for area in gear.areas),
             margin_in=gear.margin.value,
             limit_in={joint.number: joint.limit.value for joint in gear.joints},
             clearance_hard_max_in=gear.hard_limit.value,

@@ -61,8 +61,11 @@ from mlg_troubleshoot.records.values import (
     AmbiguousDateError,
     CellFaultError,
     plain_text,
+    read_areas,
     read_date,
+    read_joints,
     read_length,
+    read_moment,
     read_value,
     says_failed,
 )
@@ -323,6 +326,12 @@ class RowReader:
         if cell is not None:
             if column is DATE:
                 return self._read_date(cell)
+            if column.holds is Holds.MOMENT:
+                return read_moment(cell, self._options.dates, self._latest)
+            if column.holds is Holds.JOINTS:
+                return read_joints(cell, self._options.joint_numbers)
+            if column.holds is Holds.AREAS:
+                return read_areas(cell, self._options.areas)
             return read_value(
                 column,
                 cell,

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
-from datetime import date
+from collections.abc import Collection, Mapping
+from datetime import date, datetime, time
 from enum import StrEnum
 from typing import Any
 
@@ -439,6 +439,51 @@ def read_date(
     if day > latest:
         raise CellFaultError("date_in_the_future", f"{expected}, not after {latest.isoformat()}")
     return day
+
+
+def read_moment(
+    cell: str | float | OddCell, order: DateOrder | None = None, latest: date = date.max
+) -> date:
+    """Read a day, with its time where the cell states one; an ambiguous day is a fault."""
+    try:
+        day = read_date(cell, order, latest)
+    except AmbiguousDateError as fault:
+        raise CellFaultError("date_ambiguous", fault.expected) from None
+    clock = re.search(r"[T ](\d{2}:\d{2}(?::\d{2}(?:\.\d{1,6})?)?)", show(cell))
+    if clock is None:
+        return day
+    try:
+        return datetime.combine(day, time.fromisoformat(clock[1]))
+    except ValueError:
+        remedy = "Enter the time as hours and minutes, for example 2026-03-04 14:30."
+        expected = "a time from 00:00 to 23:59 after the date"
+        raise CellFaultError("date_invalid", expected, remedy) from None
+
+
+def read_joints(cell: str | float | OddCell, numbers: Collection[int]) -> tuple[int, ...]:
+    """Read joint numbers in any of the ways people list them: ``3 5``, ``#3, #5``, ``3;5``."""
+    expected = f"numbers of joints from {min(numbers)} to {max(numbers)}, for example 3 5"
+    words = re.split(r"[\s,;#]+|\band\b", plain_text(show(cell)))
+    found = [word for word in words if word]
+    unknown = [word for word in found if not word.isdecimal() or int(word) not in numbers]
+    if isinstance(cell, OddCell) and cell.kind is not OddKind.PADDED:
+        raise odd_cell_fault(cell, expected)
+    if unknown:
+        remedy = f"{unknown[0]!r} is not a joint of this gear. Enter numbers with blanks between."
+        raise CellFaultError("joints_unknown", expected, remedy)
+    return tuple(sorted({int(word) for word in found}))
+
+
+def read_areas(cell: str | float | OddCell, areas: Collection[str]) -> tuple[str, ...]:
+    """Read names of areas, with commas or semicolons between."""
+    expected = f"areas of this gear: {'; '.join(areas)}"
+    by_name = {name.casefold(): name for name in areas}
+    found = [part.strip() for part in re.split(r"[,;]", plain_text(show(cell))) if part.strip()]
+    unknown = [part for part in found if part.casefold() not in by_name]
+    if unknown:
+        remedy = f"{unknown[0]!r} is not an area of this gear. Enter {' or '.join(areas)}."
+        raise CellFaultError("area_unknown", expected, remedy)
+    return tuple(dict.fromkeys(by_name[part.casefold()] for part in found))
 
 
 def _written_day(text: str, order: DateOrder | None, expected: str) -> date:

@@ -163,6 +163,7 @@ def _course(row: Any, judgement: Judgement) -> dict[str, Any]:
         "next_action": steps[0],
         "plan": steps,
         "end": judgement.end.value,
+        "open_question": judgement.plan.open_question,
     }
 
 

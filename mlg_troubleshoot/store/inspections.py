@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from datetime import date
+from datetime import date, datetime
 from enum import Enum
 from typing import Any
 
@@ -61,6 +61,11 @@ def inspection_record(
     )
 
 
+def _moment(text: str) -> date:
+    """A day, or a day with its time."""
+    return datetime.fromisoformat(text) if "T" in text else date.fromisoformat(text)
+
+
 # How a field is read back where it does not stand in JSON as it is.
 _READ: dict[str, Callable[[Any], Any]] = {
     **dict.fromkeys(
@@ -71,7 +76,9 @@ _READ: dict[str, Callable[[Any], Any]] = {
     },
     "source": lambda found: RowSource(*found),
     **{column.filled: date.fromisoformat for column in COLUMNS if column.holds is Holds.DATE},
+    **{column.filled: _moment for column in COLUMNS if column.holds is Holds.MOMENT},
     **{column.filled: column.choices for column in COLUMNS if column.choices is not None},
+    **{c.filled: tuple for c in COLUMNS if c.holds in (Holds.JOINTS, Holds.AREAS)},
     **dict.fromkeys(("readings_in", "warnings"), tuple),
 }
 

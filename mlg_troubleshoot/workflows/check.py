@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.life.looking_back import PastInspection
     from mlg_troubleshoot.records import ReadResult
     from mlg_troubleshoot.reporting.publish import WrittenReport
+    from mlg_troubleshoot.store import Store
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,6 +105,7 @@ def check_files(
     options: CheckOptions,
     on_read: Callable[[int, int | None], None] | None = None,
     on_judged: Callable[[int, int], None] | None = None,
+    store: Store | None = None,
 ) -> CheckResult:
     """Judge every inspection of the given files.
 
@@ -117,6 +119,8 @@ def check_files(
         Called with rows read and, if known, their number.
     on_judged : callable, optional
         Called with rows judged and their number.
+    store : Store, optional
+        What is kept: rows older than a repair that stands there count as older.
 
     Returns
     -------
@@ -138,11 +142,13 @@ def check_files(
         "inputs_sha256": read.inputs_sha256,
         "read": read,
     }
-    return _judge(gear, read.rows, options, on_judged, **told)
+    return _judge(gear, read.rows, options, on_judged, store=store, **told)
 
 
-def check_inspection(inspection: Inspection, options: CheckOptions) -> CheckResult:
-    return _judge(load_gear(options.gear), (inspection,), options)
+def check_inspection(
+    inspection: Inspection, options: CheckOptions, store: Store | None = None
+) -> CheckResult:
+    return _judge(load_gear(options.gear), (inspection,), options, store=store)
 
 
 def check(
@@ -251,11 +257,25 @@ def _judge(
     rows: Sequence[Inspection | InvalidRow],
     options: CheckOptions,
     on_judged: Callable[[int, int], None] | None = None,
+    store: Store | None = None,
     **told: Any,
 ) -> CheckResult:
     advice = len(rows) == 1 if options.advice is None else options.advice
     asked: dict[str, Any] = {"advice": advice, "seed": options.seed, "extension": options.extension}
-    judgements = assess(rows, gear, load_index_table(gear), **asked, progress=on_judged)
+    as_they_count = rows
+    if store is not None:
+        from mlg_troubleshoot.workflows.since_repairs import since_kept_repairs
+
+        as_they_count = since_kept_repairs(rows, store, gear)
+    judgements = assess(as_they_count, gear, load_index_table(gear), **asked, progress=on_judged)
+    if store is not None:
+        # What is shown and kept of an inspection is what was found, whatever counts no more.
+        judgements = tuple(
+            replace(judged, inspection=row)
+            if isinstance(judged, Assessment) and isinstance(row, Inspection)
+            else judged
+            for judged, row in zip(judgements, rows, strict=True)
+        )
     return CheckResult(gear=gear, judgements=judgements, seed=options.seed, **told)
 
 

@@ -27,7 +27,13 @@ from mlg_troubleshoot.decision.columns import (
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records import ReadOptions
-from mlg_troubleshoot.records.values import CellFaultError, read_date, read_text, read_value
+from mlg_troubleshoot.records.values import (
+    CellFaultError,
+    read_date,
+    read_moment,
+    read_text,
+    read_value,
+)
 from mlg_troubleshoot.store import Record, RecordKind
 from mlg_troubleshoot.units import LengthUnit
 
@@ -93,6 +99,12 @@ class KeptGate:
             yield column.filled, _flag
         elif column.holds is Holds.DATE:
             yield column.filled, _cell(read_date)
+        elif column.holds is Holds.MOMENT:
+            yield column.filled, _moment
+        elif column.holds is Holds.JOINTS:
+            yield column.filled, _each(self._joint)
+        elif column.holds is Holds.AREAS:
+            yield column.filled, _each(_text)
         elif not column.carried:
             yield column.filled, _cell(partial(read_value, column))
 
@@ -268,6 +280,15 @@ def _cell(read: Callable[[Any], object]) -> _Check:
             raise _WrongError(column, value, f"written as it was kept ({found})")
 
     return check
+
+
+def _moment(column: str, value: Any) -> None:
+    try:
+        if isinstance(value, str) and read_moment(value).isoformat() == value:
+            return
+    except CellFaultError:
+        pass
+    raise _WrongError(column, value, "a date, with its time if known")
 
 
 def _each(check: _Check) -> _Check:

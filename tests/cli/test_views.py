@@ -146,7 +146,7 @@ def test_a_gear_measured_outside_is_never_shown_as_within(table: Table) -> None:
 def test_a_batch_counts_its_verdicts(fleet: Run) -> None:
     counts = " ".join(fleet.out.split())
     assert counts.startswith(
-        "46 inspections: 8 outside margin · 9 incomplete · 22 within margin · 7 inconclusive"
+        "46 inspections: 8 outside margin · 8 incomplete · 25 within margin · 5 inconclusive"
     )
 
 
@@ -197,7 +197,7 @@ def test_an_unmeasured_joint_is_called_so_and_not_zero(failure: Run) -> None:
         ({"clearance_3_in": "0.013"}, "restore #3"),
         ({"clearance_4_in": ""}, "measure #4"),
         ({"side": ""}, "correct: side"),
-        ({"outcome": "FAILED"}, "go on: look elsewhere"),
+        ({"outcome": "FAILED"}, "read the plunger"),
         ({}, "go on: within its margin"),
     ],
 )
@@ -211,7 +211,9 @@ def test_a_line_of_a_batch_ends_with_its_next_action(
 
 
 def test_a_failure_within_the_margin_is_not_put_on_the_joints(table: Table) -> None:
-    found = mlg("check", table(row(outcome="FAILED")), "--json").one
+    found = mlg(
+        "check", table(row(outcome="FAILED", plunger_displacement_in="0.002")), "--json"
+    ).one
     assert "check hydraulics, reversing valve, doors" in found["next_action"]["text"]
 
 

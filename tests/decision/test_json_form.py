@@ -91,13 +91,15 @@ def test_a_step_has_its_five_keys(form: dict) -> None:
     assert all(step.keys() == keys for row in form["inspections"] for step in row["plan"])
 
 
-def test_a_repair_set_has_its_five_keys(gear: Gear, judge: Judge) -> None:
+def test_a_repair_set_has_its_seven_keys(gear: Gear, judge: Judge) -> None:
     keys = {
         "joints",
         "predicted_displacement_in",
         "probability_within_margin",
         "access_minutes",
         "minutes",
+        "kind",
+        "second_repair_probability",
     }
     (row,) = check_as_json(gear, [judge(every_joint(0.004))], [], [])["inspections"]
     assert row["repair_sets"][0].keys() == keys

@@ -63,7 +63,7 @@ def test_without_a_reading_nothing_is_explained(judge: Judge) -> None:
 
 def test_a_displacement_beyond_what_the_joints_explain_is_not_explained(judge: Judge) -> None:
     found = judge(every_joint(0.001), readings_in=(0.060,))
-    assert [step.action for step in found.plan.steps] == [Action.CONTINUE]
+    assert [step.action for step in found.plan.steps] == [Action.CHECK_RIGGING, Action.CONTINUE]
     assert found.end is End.NOT_EXPLAINED
 
 
@@ -73,6 +73,7 @@ def test_a_joint_over_its_limit_is_restored_before_a_displacement_counts_as_unex
     found = judge(every_joint(0.001, j7=0.008), readings_in=(0.060,))
     assert [(step.action, step.joints) for step in found.plan.steps] == [
         (Action.RESTORE, (7,)),
+        (Action.CHECK_RIGGING, ()),
         (Action.CONTINUE, ()),
     ]
 
@@ -94,19 +95,19 @@ def test_the_next_action_of_the_json_is_the_first_step_of_its_plan(
 def test_joints_are_measured_again_where_a_better_gauge_likely_settles_the_verdict(
     judge: Judge,
 ) -> None:
-    found = judge(every_joint(0.0018))
+    found = judge(every_joint(0.0020))
     assert found.verdict is Verdict.INCONCLUSIVE
     first = found.next_action
     assert (first.action, first.joints, first.gauge_u_needed_in) == (
         Action.MEASURE_AGAIN,
-        (2, 4, 3, 5),
+        (2, 4, 3, 5, 1),
         0.0003,
     )
     assert found.end is End.WITHIN
 
 
 def test_far_from_both_verdicts_nothing_is_measured_again(judge: Judge) -> None:
-    found = judge(every_joint(0.0019))
+    found = judge(every_joint(0.0022))
     assert (found.verdict, found.next_action.action, found.end) == (
         Verdict.INCONCLUSIVE,
         Action.CONTINUE,
@@ -117,29 +118,28 @@ def test_far_from_both_verdicts_nothing_is_measured_again(judge: Judge) -> None:
 def test_a_joint_whose_own_uncertainty_is_stated_is_not_measured_again(
     gear: Gear, table: IndexTable
 ) -> None:
-    read = inspected(every_joint(0.0018), gauge_u_by_joint_in=dict.fromkeys(range(1, 11), 0.0005))
+    read = inspected(every_joint(0.0020), gauge_u_by_joint_in=dict.fromkeys(range(1, 11), 0.0005))
     (found,) = assess([read], gear, table)
     assert found.next_action.action is Action.CONTINUE
 
 
 def test_an_area_counts_once_and_again_after_a_repair_closed_it(judge: Judge) -> None:
     steps = judge({3: 0.013, 5: 0.007}, outcome=Outcome.FAILED).plan.steps
-    # Sidestay 15 min with #2, #4, #1; link assembly 20 min with five joints; then 120 min a joint,
-    # all open.
-    assert [step.minutes for step in steps] == [12.0, 50.0, 56.0, 120.0 * len(steps[3].joints), 0.0]
+    # Sidestay 15 min with two joints of 10 min, still open for two restorations of 120 min each.
+    assert [step.minutes for step in steps[:3]] == [12.0, 35.0, 240.0]
 
 
 def test_a_gear_that_retracts_has_only_the_joint_over_its_limit_restored(judge: Judge) -> None:
     found = judge(every_joint(0.004, j7=0.008), outcome=Outcome.RETRACTED)
     assert (found.next_action.action, found.next_action.joints) == (Action.RESTORE, (7,))
-    assert found.end is End.OUTSIDE_NO_COMPLAINT
+    assert found.end is End.DONE
 
 
 @pytest.mark.parametrize(("apart", "clears"), [(1.9, False), (2.1, True)])
 def test_a_reading_clears_a_gear_from_two_standard_uncertainties_within_its_margin_on(
     gear: Gear, apart: float, clears: bool
 ) -> None:
-    u_in = math.hypot(0.0005, 0.002)
+    u_in = math.hypot(0.0015, 0.002)
     cases = Cases.of(gear, [inspected({}, readings_in=(apart * u_in - 0.03,), margin_u_in=0.002)])
     assert compare(cases, predict_batch(cases).upper).clears == [clears]
 
@@ -149,7 +149,7 @@ def test_the_joints_explain_a_displacement_up_to_two_standard_uncertainties_beyo
     gear: Gear, judge: Judge, apart: float, explained: bool
 ) -> None:
     found = judge(every_joint(0.0005))
-    u_in = math.hypot(found.standard_uncertainty_in or 0.0, 0.0005)
+    u_in = math.hypot(found.standard_uncertainty_in or 0.0, 0.0015)
     read = inspected(
         every_joint(0.0005), readings_in=((found.over_travel_in or 0.0) + apart * u_in,)
     )
@@ -163,9 +163,11 @@ def test_a_failure_that_clearances_likely_caused_is_expected_to_be_repaired(judg
     assert [step.action for step in found.plan.steps] == [
         Action.READ_PLUNGER,
         Action.RESTORE,
-        Action.CONTINUE,
+        Action.READ_PLUNGER,
+        Action.RETRACT,
+        Action.DONE,
     ]
-    assert (set(found.plan.steps[1].joints), found.end) == ({3, 5}, End.WITHIN)
+    assert (3 in found.plan.steps[1].joints, found.end) == (True, End.DONE)
 
 
 def test_a_failure_that_clearances_hardly_cause_is_expected_to_have_another_cause(
@@ -183,11 +185,12 @@ def test_a_failure_that_clearances_hardly_cause_is_expected_to_have_another_caus
 @pytest.mark.parametrize(
     ("outcome", "first", "end"),
     [
-        (None, Action.RESTORE, End.WITHIN),
+        (Outcome.FAILED, Action.CHECK_RIGGING, End.DONE),
+        (None, Action.CONTINUE, End.OUTSIDE_NO_COMPLAINT),
         (Outcome.RETRACTED, Action.CONTINUE, End.OUTSIDE_NO_COMPLAINT),
     ],
 )
-def test_a_plunger_beyond_its_margin_is_a_complaint_unless_the_gear_retracted(
+def test_a_plunger_beyond_its_margin_is_a_complaint_only_of_a_gear_that_failed(
     judge: Judge, outcome: Outcome | None, first: Action, end: End
 ) -> None:
     found = judge(every_joint(0.004), readings_in=(0.035,), outcome=outcome)
@@ -196,8 +199,8 @@ def test_a_plunger_beyond_its_margin_is_a_complaint_unless_the_gear_retracted(
 
 
 def test_no_better_gauge_is_asked_for_than_is_needed(judge: Judge) -> None:
-    coarse = judge(every_joint(0.0017), gauge_u_in=0.001).next_action
-    fine = judge(every_joint(0.0018), gauge_u_in=0.0005).next_action
+    coarse = judge(every_joint(0.0018), gauge_u_in=0.001).next_action
+    fine = judge(every_joint(0.0020), gauge_u_in=0.0005).next_action
     assert coarse.action is fine.action is Action.MEASURE_AGAIN
     assert (coarse.gauge_u_needed_in or 0.0) > (fine.gauge_u_needed_in or 0.0)
 
@@ -212,14 +215,7 @@ def test_what_tells_least_is_left_for_a_second_round_of_readings(judge: Judge) -
     rounds = [
         step.joints for step in judge(dict.fromkeys(range(1, 6), 0.0015)).plan.steps if step.joints
     ]
-    assert [set(joints) for joints in rounds] == [{6, 7, 9, 10}, {8}]
-
-
-def test_nothing_is_read_first_that_hardly_spares_a_restoration(judge: Judge) -> None:
-    read = {1: 0.0019, 2: 0.0057, 3: 0.0038, 4: 0.0044, 5: 0.0047, 8: 0.0023, 9: 0.0055}
-    # Three readings take 38 minutes; the same four joints would be restored after them.
-    first = judge(read, readings_in=(0.035,), outcome=Outcome.FAILED).next_action
-    assert (first.action, set(first.joints)) == (Action.RESTORE, {2, 3, 4, 5})
+    assert [set(joints) for joints in rounds] == [{6, 9, 10}, {7, 8}]
 
 
 def test_reading_in_an_area_that_the_repair_opens_anyway_costs_the_reading_alone(

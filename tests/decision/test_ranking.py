@@ -83,8 +83,7 @@ def test_indices_come_from_the_precomputed_table(judge: Judge, table: IndexTable
 
 
 def test_the_rank_range_covers_the_rank_on_every_linkage(gear: Gear, judge: Judge) -> None:
-    clearance = every_joint(0.002)
-    found = judge(clearance)
+    found = judge(every_joint(0.002), gauge_u_in=1e-9)
     for j, finding in enumerate(found.joints):
         places = [
             1 + sum(row > row[j] + 1e-9)
@@ -97,10 +96,28 @@ def test_the_rank_range_covers_the_rank_on_every_linkage(gear: Gear, judge: Judg
 def test_two_to_five_lead_on_every_linkage_with_one_next_and_the_link_assembly_last(
     judge: Judge,
 ) -> None:
-    ranges = {finding.joint: finding.rank_range for finding in judge(every_joint(0.002)).joints}
+    found = judge(every_joint(0.002), gauge_u_in=1e-9)
+    ranges = {finding.joint: finding.rank_range for finding in found.joints}
     assert all(ranges[j][1] <= 4 for j in (2, 3, 4, 5))
     assert ranges[1] == (5, 5)
     assert all(ranges[j][0] >= 6 for j in (6, 7, 8, 9, 10))
+
+
+def test_the_rank_range_holds_the_rank_of_another_reading_as_often_as_it_should(
+    gear: Gear, table: IndexTable
+) -> None:
+    rng = np.random.default_rng(4)
+    true = rng.uniform(0.0, 0.007, (200, 10))
+    once, again = (np.maximum(true + rng.normal(0.0, 0.0005, true.shape), 0.0) for _ in "ab")
+    u = np.full(true.shape, 0.0005)
+    said = rank_joints(gear, table, once, gauge_u_in=u)
+    then = rank_joints(gear, table, again, gauge_u_in=u)
+    inside = [
+        a.rank_range[0] <= b.rank <= a.rank_range[1]
+        for one, other in zip(said, then, strict=True)
+        for a, b in zip(one, other, strict=True)
+    ]
+    assert np.mean(inside) > 0.88
 
 
 def test_a_joint_that_acts_like_another_names_it(judge: Judge) -> None:

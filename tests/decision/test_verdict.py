@@ -146,7 +146,8 @@ def test_the_prediction_is_the_larger_of_both_senses_as_a_positive_number(judge:
 
 
 def test_the_chance_with_random_directions_stands_beside_the_bound(judge: Judge) -> None:
-    assert judge(FAILURE).probability_exceed_random_directions == pytest.approx(0.25, abs=0.01)
+    alone = judge(dict.fromkeys(range(1, 11), 0.0) | FAILURE)
+    assert alone.probability_exceed_random_directions == pytest.approx(0.25, abs=0.01)
 
 
 def test_an_invalid_row_is_rejected_with_what_to_correct(gear: Gear, table: IndexTable) -> None:
@@ -292,16 +293,16 @@ def shares(gear: Gear, largest: float) -> dict[Verdict, float]:
 
 def test_gears_worn_up_to_the_limit_are_mostly_outside_and_some_inconclusive(gear: Gear) -> None:
     found = shares(gear, 0.0075)
-    assert found[Verdict.OUTSIDE_MARGIN] == pytest.approx(0.87, abs=0.03)
-    assert found[Verdict.INCONCLUSIVE] == pytest.approx(0.12, abs=0.03)
+    assert found[Verdict.OUTSIDE_MARGIN] == pytest.approx(0.92, abs=0.03)
+    assert found[Verdict.INCONCLUSIVE] == pytest.approx(0.07, abs=0.03)
 
 
 def test_gears_worn_up_to_three_thou_are_mostly_within_and_the_others_inconclusive(
     gear: Gear,
 ) -> None:
     found = shares(gear, 0.003)
-    assert found[Verdict.WITHIN_MARGIN] == pytest.approx(0.79, abs=0.03)
-    assert found[Verdict.INCONCLUSIVE] == pytest.approx(0.21, abs=0.03)
+    assert found[Verdict.WITHIN_MARGIN] == pytest.approx(0.89, abs=0.03)
+    assert found[Verdict.INCONCLUSIVE] == pytest.approx(0.11, abs=0.03)
     assert found[Verdict.OUTSIDE_MARGIN] == 0.0
 
 

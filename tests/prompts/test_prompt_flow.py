@@ -13,7 +13,7 @@ from mlg_troubleshoot.cli.prompts.answers import judge, plunger_in
 from mlg_troubleshoot.cli.prompts.conversation import Effect, Turn, answer
 from mlg_troubleshoot.cli.prompts.flow import Ask, Flow
 from mlg_troubleshoot.cli.prompts.sketch import sketch
-from mlg_troubleshoot.decision.inspection import Outcome, Side
+from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck, Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.geometry.mechanism import Lever, Output, Step
@@ -892,3 +892,27 @@ def test_a_small_reading_is_asked_again(flow: Flow) -> None:
 def test_no_flag_is_named_at_a_prompt(flow: Flow) -> None:
     turn = play(flow, [".004"], replace(RADIAL_INCHES, unit=LengthUnit.MILLIMETRE))
     assert "--" not in shown(flow, turn.state)
+
+
+def test_joints_restored_at_the_prompt_make_what_was_typed_before_older(flow: Flow) -> None:
+    before = play(flow, [*TEN, "f p .041", "n 3 5"]).state.answers.inspection(flow.gear, "R1")
+    after = play(flow, [*TEN, "f", "n 3 5", "p .002", "r"]).state.answers.inspection(
+        flow.gear, "R1"
+    )
+    assert before.restored_joints == (3, 5)
+    assert (before.standing_outcome, before.standing_readings_in) == (None, ())
+    assert (after.standing_outcome, len(after.standing_readings_in)) == (Outcome.RETRACTED, 1)
+
+
+def test_the_day_is_taken_on_one_line(flow: Flow) -> None:
+    typed = "c 4, w 3 o sidestay; link assembly"
+    answers = play(flow, [*TEN, typed, "t 180 g yes"]).state.answers
+    read = answers.inspection(flow.gear, "R1")
+    assert (read.cannot_reach, read.no_spare, read.minutes_available) == ((4,), (3,), 180.0)
+    assert read.open_areas == ("sidestay", "link assembly")
+    assert read.rigging_checked is RiggingCheck.YES
+
+
+def test_a_joint_that_does_not_exist_is_not_taken_as_restored(flow: Flow) -> None:
+    turn = play(flow, [*TEN, "n 3 14"])
+    assert "restored_joints" not in turn.state.answers.more

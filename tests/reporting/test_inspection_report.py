@@ -53,7 +53,8 @@ def test_the_chance_with_random_directions_stands_beside_the_worst_case(failure:
         failure.text.replace("\u00a0", " "),
     )
     assert found is not None
-    assert 20 <= int(found[1]) <= 30
+    # One in four of the two measured joints alone, and what unread joints add by their wear.
+    assert 25 <= int(found[1]) <= 40
 
 
 def test_the_worst_case_is_called_a_bound(failure: Made) -> None:
@@ -301,8 +302,9 @@ def test_a_sound_gear_measured_outside_is_not_shown_as_within(judge: Judge, make
 def test_what_follows_is_the_plan_to_its_end(judge: Judge, failure: Made) -> None:
     text = failure.text.replace("\u00a0", " ")
     steps = judge(FAILURE).plan.steps
-    places = [text.index(step.text) for step in steps]
-    assert places == sorted(places)
+    at = 0
+    for step in steps:
+        at = text.index(step.text, at) + 1
     for step in steps[1:]:
         if step.minutes:
             assert f"{step.text} ({step.minutes:.0f} min)" in text
@@ -328,7 +330,7 @@ def test_the_first_page_says_date_and_manual_reference(judge: Judge, make: Make)
     text = make(
         judge(FAILURE, carried={"manual_ref": "32-10-05", "manual_rev": "12"}), formats=("html",)
     ).text
-    front = text[: text.index("Joints, in the order")]
+    front = text[: text.index("Joints, by contribution")]
     assert "Inspected on 2024-05-17" in front
     assert "Manual 32-10-05 rev. 12" in front
     assert "report made 2024-05-17" in front

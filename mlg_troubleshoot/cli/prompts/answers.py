@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from datetime import datetime, timedelta
 from types import MappingProxyType
 
 from mlg_troubleshoot.cli.prompts.lines import Line, Tone, line
@@ -37,7 +38,20 @@ from mlg_troubleshoot.units import (
 LENGTHS = (PLUNGER_DISPLACEMENT.name, MARGIN.name)
 _SIGNED = sorted((column for column in COLUMNS if column.sign_off), key=lambda c: c.sign_off)
 SIGN_OFF = tuple(column.name for column in _SIGNED)
-MORE = (OUTCOME.name, *LENGTHS, *SIGN_OFF, SMALL_READINGS_TRUE.name)
+# What was repaired and what the day allows, by the letters that are typed for it.
+DAY = {
+    "n": "restored_joints",
+    "g": "rigging_checked",
+    "c": "cannot_reach",
+    "w": "no_spare",
+    "o": "open_areas",
+    "t": "minutes_available",
+}
+_DATES = {OUTCOME.name: "outcome_date", PLUNGER_DISPLACEMENT.name: "plunger_date"}
+MORE = (
+    *(OUTCOME.name, *LENGTHS, *DAY.values(), "repair_date", *_DATES.values()),
+    *(*SIGN_OFF, SMALL_READINGS_TRUE.name),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,6 +244,54 @@ _ITEM = re.compile(
 )
 
 
+# What was repaired, and what the day allows, on the same line.
+_DAY_ITEM = re.compile(
+    r"""\s*[,;]?\s*(?:
+        (?P<joints>n|new|c|cannot\s+reach|w|no\s+spare)\s*[=:]?\s*
+        (?P<numbers>\#?\d{1,3}(?![.\d])(?:(?:\s*[,;]\s*|\s+)\#?\d{1,3}(?![.\d]))*)
+      | (?P<rigging>g|rigging)\s+(?P<looked>yes|no|corrected)
+      | (?P<open>o|open)\s+(?P<areas>[a-z][a-z ;]*)
+      | (?P<time>t|minutes)\s*(?P<minutes>\d+)
+    )\s*""",
+    re.VERBOSE | re.IGNORECASE,
+)
+
+
+def _read_day(item: re.Match[str], answers: Answers, gear: Gear) -> tuple[Answers, Line]:
+    """Take one answer about repairs or the day; a repair is dated by the clock."""
+    groups = ("joints", "rigging", "open", "time")
+    values = ("numbers", "looked", "areas", "minutes")
+    word, text = next(
+        (item[word], item[value])
+        for word, value in zip(groups, values, strict=True)
+        if item[word] is not None
+    )
+    key = "w" if word.lower().startswith("no") else word[0].lower()
+    column = DAY[key]
+    judge_more(column, text.strip(), answers.unit, gear)
+    answers = answers.with_more(**{column: text.strip()})
+    if key == "n" or text.strip().lower() == "corrected":
+        answers = answers.with_more(repair_date=datetime.now().isoformat(" "))
+    return answers, line((f"✓ {column.replace('_', ' ')} {text.strip()}", Tone.GOOD))
+
+
+def _dated(answers: Answers, column: str) -> Answers:
+    """Date what is typed after a repair: it counts, what was typed before does not."""
+    repaired = answers.more.get("repair_date")
+    if repaired is None:
+        return answers
+    now = datetime.now()
+    later = max(now, _moment(repaired) + timedelta(microseconds=1))
+    return answers.with_more(**{_DATES[column]: later.isoformat(" ")})
+
+
+def _moment(text: str) -> datetime:
+    try:
+        return datetime.fromisoformat(text)
+    except ValueError:
+        return datetime.min
+
+
 def read_more(answers: Answers, typed: str, gear: Gear) -> tuple[Answers, tuple[Line, ...]]:
     """Read the optional answers; each is kept as it was typed, with the unit that it was typed
     in.
@@ -237,11 +299,17 @@ def read_more(answers: Answers, typed: str, gear: Gear) -> tuple[Answers, tuple[
     told: list[Line] = []
     at = 0
     while at < len(typed):
+        day = _DAY_ITEM.match(typed, at)
+        if day is not None:
+            at = day.end()
+            answers, said = _read_day(day, answers, gear)
+            told.append(said)
+            continue
         item = _ITEM.match(typed, at)
         if item is None:
             raise UsageError(
                 f"{typed[at:].strip()!r} is not understood",
-                "Type f, r, p .041 or m .028, or Enter alone.",
+                "Type f, r, p .041, m .028 or n 3 5, or Enter alone.",
             )
         at = item.end()
         if item["outcome"] is None:
@@ -250,14 +318,18 @@ def read_more(answers: Answers, typed: str, gear: Gear) -> tuple[Answers, tuple[
             written = f"{sign}{item['number']} {item['unit'] or answers.unit or LengthUnit.INCH}"
             judge_more(column, written, answers.unit, gear)
             answers = answers.with_more(**{column: written})
+            answers = _dated(answers, column) if column in _DATES else answers
             told.append(line((f"✓ {column.partition('_')[0]} {written}", Tone.GOOD)))
         elif item["outcome"].lower() == "x":
-            answers = answers.with_more(outcome=None, **dict.fromkeys(LENGTHS))
-            told.append(line(("– outcome, plunger, margin: none", Tone.GOOD)))
+            dates = ("repair_date", *_DATES.values())
+            gone = dict.fromkeys((*LENGTHS, *DAY.values(), *dates))
+            answers = answers.with_more(outcome=None, **gone)
+            told.append(line(("– outcome, plunger, margin, repairs, the day: none", Tone.GOOD)))
         else:
             answers = answers.with_more(
                 outcome="FAILED" if item["outcome"][0].lower() == "f" else "RETRACTED"
             )
+            answers = _dated(answers, "outcome")
             told.append(line((f"✓ outcome {answers.more['outcome']}", Tone.GOOD)))
     return answers, tuple(told)
 

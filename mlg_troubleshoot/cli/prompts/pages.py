@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import date
 
-from mlg_troubleshoot.cli.prompts.answers import SIGN_OFF, Answers, Reading, judge
+from mlg_troubleshoot.cli.prompts.answers import DAY, SIGN_OFF, Answers, Reading, judge
 from mlg_troubleshoot.cli.prompts.conversation import Page
 from mlg_troubleshoot.cli.prompts.lines import BLANK, Line, Tone, keys, line
 from mlg_troubleshoot.cli.prompts.sketch import sketch
@@ -301,8 +301,19 @@ def more_page(answers: Answers, gear: Gear, width: int) -> Page:
             f"this gear's own margin, else {length(gear.margin.value, unit)}",
             answers.more.get(MARGIN.name),
         ),
+        *(
+            row(key, example, meaning, answers.more.get(DAY[key]))
+            for key, example, meaning in (
+                ("n", "3 5", "I have restored these joints since"),
+                ("g", "yes", "rigging and roller looked at (or: g corrected)"),
+                ("c", "4", "these joints cannot be reached today"),
+                ("w", "3", "without a spare part for these joints"),
+                ("o", "", f"these areas are open: {'; '.join(a.name for a in gear.areas)}"),
+                ("t", "180", "minutes left for the work today"),
+            )
+        ),
     )
-    return Page(shown, " f, r, p, m, or Enter to go on > ")
+    return Page(shown, " f, r, p, m, n, g, c, w, o, t, or Enter to go on > ")
 
 
 def confirm_more_page(most_in: float, unit: LengthUnit | None) -> Page:
@@ -370,7 +381,11 @@ MORE_HELP = (
         indent=3,
     ),
     line("m: the displacement that this gear allows, as found at rigging.", indent=3),
-    line("All on one line is fine: f p .041 m .028. x removes them all.", indent=3),
+    line(
+        "n: they are as after the repair. What you type after n is later: p, f and r count again.",
+        indent=3,
+    ),
+    line("All on one line is fine: f p .041 m .028 n 3 5. x removes them all.", indent=3),
 )
 
 

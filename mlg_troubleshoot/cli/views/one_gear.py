@@ -17,6 +17,7 @@ from mlg_troubleshoot.cli.views.tables import (
     what_follows,
 )
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding, Judgement
+from mlg_troubleshoot.decision.plan import Action
 from mlg_troubleshoot.decision.sentences import (
     chance_wrong_sentence,
     confidence_words,
@@ -74,6 +75,8 @@ def _body(judgement: Judgement, screen: DataConsole, *, detail: bool) -> Text:
     if isinstance(judgement, Assessment):
         follows = what_follows(judgement)
         lines += [(follows, "")] if follows is not None else []
+        question = judgement.plan.open_question
+        lines += [(f"OPEN: {question}", "bold")] if question is not None else []
         advice = (judgement.measuring, judgement.posterior) if detail else (judgement.posterior,)
         lines += [(said.text, "") for said in advice if said is not None]
     for said, style in lines:
@@ -106,17 +109,20 @@ def _numbers(a: Assessment) -> Iterator[str]:
 
 def _short_table(a: Assessment, screen: DataConsole) -> Table:
     table = plain_table(screen)
+    first = a.next_action
+    to_read = first.joints if first.action in (Action.MEASURE, Action.MEASURE_AGAIN) else ()
+    joint = "inspect in this order" if to_read else "joints, by contribution"
     for heading in (
         "",
-        "inspect in this order",
+        joint,
         f"clearance {screen.unit}",
         f"limit {screen.unit}",
         "contributes",
     ):
-        table.add_column(
-            heading, justify="left" if heading.startswith("inspect") else "right", no_wrap=True
-        )
-    for f in a.ranked[:_JOINTS]:
+        table.add_column(heading, justify="left" if heading == joint else "right", no_wrap=True)
+    order = {number: place for place, number in enumerate(to_read)}
+    listed = sorted(a.ranked, key=lambda f: order.get(f.joint, len(order)))
+    for f in listed[:_JOINTS]:
         table.add_row(*_joint_cells(f, screen)[:5], style="bold" if f.over_limit else "")
     return table
 
@@ -212,14 +218,16 @@ def _joint_cells(f: JointFinding, screen: DataConsole) -> tuple[str, ...]:
 
 
 def _repair_table(a: Assessment, screen: DataConsole) -> Table:
-    title = Text("Repairs that would bring it within")
-    numbers = ("minutes", f"worst case {screen.unit}", "probability within")
-    table = plain_table(None, "restore", *numbers, right=numbers, title=title)
+    title = Text("Repairs: sure in the worst case, or to try and read the plunger again")
+    numbers = ("minutes", f"worst case {screen.unit}", "within", "second repair")
+    table = plain_table(None, "restore", "kind", *numbers, right=numbers, title=title)
     for s in a.repair_sets or ():
         table.add_row(
             joint_list(s.joints),
+            str(s.kind),
             f"{s.minutes:.0f}",
             screen.length(s.predicted_displacement_in),
             percent(s.probability_within_margin),
+            "-" if s.second_repair_probability is None else percent(s.second_repair_probability),
         )
     return table

@@ -36,6 +36,7 @@ _ENDS = {
     End.TOO_CLOSE: "go on: too close to say",
     End.OUTSIDE_NO_COMPLAINT: "go on: engineering decides",
     End.CANNOT_CLEAR: "engineering: cannot clear",
+    End.DONE: "done: record the repair",
 }
 
 

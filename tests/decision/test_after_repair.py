@@ -1,0 +1,178 @@
+"""After a repair: what is older than it counts no more, and the plan comes to DONE."""
+
+from __future__ import annotations
+
+from datetime import date, datetime
+
+import pytest
+
+from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck, surely_later
+from mlg_troubleshoot.decision.plan import Action, End
+from tests.decision.conftest import Judge, every_joint
+
+MORNING, NOON = datetime(2026, 3, 4, 8, 0), datetime(2026, 3, 4, 12, 0)
+REPAIRED = {
+    "outcome": Outcome.FAILED,
+    "readings_in": (0.041,),
+    "restored_joints": (3, 5),
+    "repair_date": MORNING,
+}
+RESTORED = every_joint(0.002, j3=0.0005, j5=0.0005)
+
+
+def test_what_stands_beside_a_repair_is_older_and_the_plunger_is_read_next(judge: Judge) -> None:
+    found = judge(RESTORED, **REPAIRED)
+    assert [step.action for step in found.plan.steps] == [
+        Action.READ_PLUNGER,
+        Action.RETRACT,
+        Action.DONE,
+    ]
+
+
+def test_an_old_reading_is_no_longer_the_measured_displacement(judge: Judge) -> None:
+    assert judge(RESTORED, **REPAIRED).inspection.measured_displacement_in is None
+
+
+def test_a_plunger_read_within_its_margin_after_the_repair_leads_to_the_retraction(
+    judge: Judge,
+) -> None:
+    found = judge(RESTORED, **REPAIRED | {"readings_in": (0.002,), "plunger_date": NOON})
+    assert found.next_action.action is Action.RETRACT
+
+
+def test_a_gear_that_retracts_after_the_repair_is_done(judge: Judge) -> None:
+    tried = {"outcome": Outcome.RETRACTED, "outcome_date": NOON}
+    found = judge(RESTORED, **REPAIRED | tried)
+    assert (found.next_action.action, found.end) == (Action.DONE, End.DONE)
+    assert "Joints are within limits; record the repair" in found.next_action.text
+
+
+def test_a_gear_that_fails_again_after_the_repair_with_its_plunger_within_has_another_cause(
+    judge: Judge,
+) -> None:
+    again = {"outcome_date": NOON, "readings_in": (0.002,), "plunger_date": NOON}
+    assert judge(RESTORED, **REPAIRED | again).end is End.NOT_EXPLAINED
+
+
+def test_a_failure_that_may_be_older_than_the_repair_is_asked_about(judge: Judge) -> None:
+    warnings = judge(RESTORED, **REPAIRED).warnings
+    assert any("FAILED counts as older than the repair. Is it newer?" in w for w in warnings)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "later"),
+    [
+        (NOON, MORNING, True),
+        (MORNING, NOON, False),
+        (date(2026, 3, 5), MORNING, True),
+        (date(2026, 3, 4), MORNING, False),
+        (NOON, None, False),
+    ],
+)
+def test_one_day_is_later_only_with_both_times(one: date, other: date | None, later: bool) -> None:
+    assert surely_later(one, other) is later
+
+
+def test_a_gear_without_a_complaint_is_done_after_its_repair(judge: Judge) -> None:
+    found = judge(every_joint(0.002, j7=0.0005), restored_joints=(7,), repair_date=MORNING)
+    assert found.next_action.action is Action.DONE
+
+
+def test_a_rigging_set_right_counts_as_a_repair(judge: Judge) -> None:
+    right = {"rigging_checked": RiggingCheck.CORRECTED, "repair_date": MORNING}
+    found = judge(every_joint(0.002), outcome=Outcome.FAILED, readings_in=(0.06,), **right)
+    assert found.next_action.action is Action.READ_PLUNGER
+
+
+def test_joints_that_read_like_new_on_a_gear_that_failed_are_asked_about(judge: Judge) -> None:
+    found = judge(every_joint(0.002, j3=0.0005), outcome=Outcome.FAILED, readings_in=(0.06,))
+    assert found.next_action.action is Action.CHECK_RIGGING
+    assert "If #3 were restored after the failure" in found.next_action.text
+
+
+def test_a_blank_outcome_is_no_complaint(judge: Judge) -> None:
+    found = judge(every_joint(0.002, j10=0.0085))
+    assert [(s.action, s.joints) for s in found.plan.steps] == [
+        (Action.RESTORE, (10,)),
+        (Action.DONE, ()),
+    ]
+
+
+def test_what_the_joints_cannot_explain_names_rigging_and_lock_roller_first(judge: Judge) -> None:
+    found = judge(every_joint(0.002), outcome=Outcome.FAILED, readings_in=(0.085,))
+    assert found.next_action.action is Action.CHECK_RIGGING
+    assert "rigging or the lock roller first" in found.plan.steps[-1].text
+
+
+def test_a_rigging_that_was_looked_at_is_not_checked_again(judge: Judge) -> None:
+    found = judge(
+        every_joint(0.002),
+        outcome=Outcome.FAILED,
+        readings_in=(0.085,),
+        rigging_checked=RiggingCheck.YES,
+    )
+    assert [step.action for step in found.plan.steps] == [Action.CONTINUE]
+
+
+def test_sound_joints_are_not_restored_while_the_rigging_is_likelier(judge: Judge) -> None:
+    found = judge(every_joint(0.003), outcome=Outcome.FAILED, readings_in=(0.036,))
+    assert found.next_action.action is Action.CHECK_RIGGING
+
+
+def test_re_rigging_takes_out_what_was_measured(judge: Judge) -> None:
+    found = judge(every_joint(0.002), advice=True, readings_in=(0.085,))
+    assert found.rigging is not None
+    assert found.rigging.shift_in == pytest.approx(-0.085)
+
+
+def test_a_plunger_at_the_edge_of_its_margin_is_read_again_once(judge: Judge) -> None:
+    once = judge({}, outcome=Outcome.FAILED, readings_in=(0.0305,))
+    twice = judge({}, outcome=Outcome.FAILED, readings_in=(0.0305, 0.0305))
+    assert once.next_action.action is Action.READ_PLUNGER
+    assert twice.next_action.action is Action.MEASURE
+
+
+def test_a_joint_over_its_limit_by_less_than_its_uncertainty_is_read_again(judge: Judge) -> None:
+    edge = judge(every_joint(0.001, j10=0.0078), gauge_u_in=0.0005)
+    clear = judge(every_joint(0.001, j10=0.0081), gauge_u_in=0.0005)
+    assert (edge.next_action.action, edge.next_action.joints) == (Action.MEASURE_AGAIN, (10,))
+    assert clear.next_action.action is Action.RESTORE
+
+
+def test_a_repair_is_to_be_tried_where_fewer_joints_likely_hold(judge: Judge) -> None:
+    found = judge(
+        every_joint(0.003, j3=0.014),
+        outcome=Outcome.FAILED,
+        readings_in=(0.036,),
+    )
+    sets = {s.kind: s for s in found.repair_sets or ()}
+    assert found.next_action.joints == sets["try"].joints == (3,)
+    assert len(sets["sure"].joints) > 1
+    assert (sets["try"].second_repair_probability or 0.0) <= 0.02
+
+
+def test_a_default_plunger_uncertainty_is_announced(judge: Judge) -> None:
+    default = judge(every_joint(0.001), readings_in=(0.01,)).warnings
+    stated = judge(every_joint(0.001), readings_in=(0.01,), plunger_gauge_u_in=0.001).warnings
+    words = "plunger reading not stated: 0.0015 in"
+    assert any(words in w for w in default)
+    assert not any(words in w for w in stated)
+
+
+def test_a_gear_that_is_too_close_is_looked_at_again_by_a_date_and_landings(judge: Judge) -> None:
+    found = judge(every_joint(0.0022), gear_landings=1200.0, inspection_date=date(2026, 3, 4))
+    assert found.end is End.TOO_CLOSE
+    assert "1500 landings or by 2026-09-04" in found.next_action.text
+
+
+def test_measuring_says_what_next_says(judge: Judge) -> None:
+    found = judge({3: 0.005}, advice=True, outcome=Outcome.FAILED, readings_in=(0.036,))
+    assert found.next_action.action is Action.MEASURE
+    assert found.measuring is not None
+    assert found.measuring.joint == found.next_action.joints[0]
+
+
+def test_no_worst_case_is_stated_of_a_gear_of_which_nothing_was_read(judge: Judge) -> None:
+    headline = judge({}, readings_in=(0.041,)).headline
+    assert "0.0000" not in headline
+    assert "no joint was read" in headline

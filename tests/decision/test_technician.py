@@ -1,0 +1,42 @@
+"""NEXT followed to its end by a technician who knows the truth: a few gears of two worlds."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.decision.technician import CLEARANCE, NONE, OTHER, WORLDS, Hangar, counted
+
+_BY_NAME = {world.name: world for world in WORLDS}
+
+
+@pytest.fixture(scope="module")
+def worked(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, Hangar, tuple, tuple]:
+    folder = tmp_path_factory.mktemp("hangar")
+    found, hangar = counted(_BY_NAME["A mis-rigged"], 54, 1900, folder)
+    return found.figures, hangar, found.minutes, found.against
+
+
+def test_every_gear_comes_to_an_end(worked: tuple) -> None:
+    assert worked[0]["ended"] == 1.0
+
+
+def test_failures_by_clearance_are_cured_in_fewer_minutes_than_by_measuring_everything(
+    worked: tuple,
+) -> None:
+    assert worked[0]["cured"] == 1.0
+    assert worked[2][CLEARANCE] <= 0.82 * worked[3][CLEARANCE]
+
+
+def test_other_failures_cost_little_and_no_sound_joint(worked: tuple) -> None:
+    assert worked[2][OTHER] <= 0.2 * worked[3][OTHER]
+    assert worked[0]["other, sound restored"] == 0.0
+
+
+def test_gears_that_did_not_fail_keep_their_sound_joints(worked: tuple) -> None:
+    assert worked[2][NONE] <= 0.95 * worked[3][NONE]
+    assert worked[0]["not failed, sound restored"] == 0.0
+
+
+def test_a_repaired_failure_by_clearance_ends_done(worked: tuple) -> None:
+    ends = {g.end for g in worked[1].gears if g.kind == CLEARANCE and g.repairs}
+    assert ends == {"DONE"}

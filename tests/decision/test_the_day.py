@@ -1,0 +1,69 @@
+"""What the day allows: joints out of reach, missing spares, open areas, the minutes left."""
+
+from __future__ import annotations
+
+import pytest
+
+from mlg_troubleshoot.decision.inspection import Outcome
+from mlg_troubleshoot.decision.plan import Action, End
+from tests.decision.conftest import Judge, every_joint
+
+FAILED = {"outcome": Outcome.FAILED, "readings_in": (0.036,), "plunger_gauge_u_in": 0.001}
+BUT_FOUR = {n: 0.001 for n in range(1, 11) if n != 4}
+SIDESTAY, LINKS = (1, 2, 3, 4, 5), (6, 7, 8, 9, 10)
+
+
+def asked(found: object) -> set[int]:
+    return {n for step in found.plan.steps for n in step.joints}  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("more", [{}, FAILED])
+@pytest.mark.parametrize("out_of_reach", [(4,), SIDESTAY, LINKS])
+def test_no_plan_asks_for_what_cannot_be_reached(
+    judge: Judge, more: dict, out_of_reach: tuple[int, ...]
+) -> None:
+    found = judge({3: 0.002} if 3 not in out_of_reach else {}, **more, cannot_reach=out_of_reach)
+    assert not asked(found) & set(out_of_reach)
+
+
+def test_what_cannot_be_reached_stays_open_and_is_named(judge: Judge) -> None:
+    found = judge(BUT_FOUR, cannot_reach=(4,))
+    assert (found.next_action.action, found.end) == (Action.CONTINUE, End.CANNOT_CLEAR)
+    assert "#4 cannot be reached" in (found.plan.open_question or "")
+
+
+def test_sound_joints_are_not_restored_for_one_that_cannot_be_reached(judge: Judge) -> None:
+    found = judge(BUT_FOUR, **FAILED, cannot_reach=(4,))
+    assert Action.RESTORE not in {step.action for step in found.plan.steps}
+
+
+def test_a_joint_over_its_limit_is_restored_although_an_area_is_shut(judge: Judge) -> None:
+    found = judge(dict.fromkeys(SIDESTAY, 0.002) | {3: 0.013}, **FAILED, cannot_reach=LINKS)
+    assert (found.next_action.action, found.next_action.joints) == (Action.RESTORE, (3,))
+    assert found.plan.steps[1].action is Action.READ_PLUNGER
+
+
+def test_a_joint_without_a_spare_is_not_restored(judge: Judge) -> None:
+    found = judge(every_joint(0.001, j3=0.013), **FAILED, no_spare=(3,))
+    assert 3 not in asked(found)
+    assert "#3 is over the limit and cannot be restored today" in (found.plan.open_question or "")
+
+
+def test_an_open_area_costs_no_access(judge: Judge) -> None:
+    shut = judge(every_joint(0.001, j3=0.013), **FAILED).next_action
+    opened = judge(every_joint(0.001, j3=0.013), **FAILED, open_areas=("sidestay",)).next_action
+    assert shut.minutes - opened.minutes == 15.0
+
+
+def test_no_more_joints_are_read_than_the_minutes_allow(judge: Judge) -> None:
+    whole = judge({}).next_action
+    some = judge({}, minutes_available=whole.minutes - 1.0).next_action
+    assert some.action is Action.MEASURE
+    assert some.minutes < whole.minutes
+    assert set(some.joints) < set(whole.joints)
+
+
+def test_what_does_not_fit_the_minutes_is_said(judge: Judge) -> None:
+    found = judge(every_joint(0.001, j3=0.013), **FAILED, minutes_available=60.0)
+    assert found.next_action.action is Action.CONTINUE
+    assert "restore #3 takes 135 min; 60 min are left today" in (found.plan.open_question or "")
