@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from tests.decision.technician import CLEARANCE, NONE, OTHER, WORLDS, Hangar, counted
