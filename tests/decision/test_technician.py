@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from tests.decision.technician import CLEARANCE, NONE, OTHER, WORLDS, Hangar, counted
@@ -40,3 +42,18 @@ def test_gears_that_did_not_fail_keep_their_sound_joints(worked: tuple) -> None:
 def test_a_repaired_failure_by_clearance_ends_done(worked: tuple) -> None:
     ends = {g.end for g in worked[1].gears if g.kind == CLEARANCE and g.repairs}
     assert ends == {"DONE"}
+
+
+def test_nothing_is_done_twice_without_new_information(worked: tuple) -> None:
+    for gear in worked[1].gears:
+        measured = [joints for action, joints in gear.done if action == "MEASURE"]
+        assert len(measured) == len(set(measured))
+
+
+def test_one_gear_is_told_alone_what_it_is_told_in_a_batch(worked: tuple, tmp_path: Path) -> None:
+    fresh = Hangar(_BY_NAME["A mis-rigged"], 18, 1901)
+    together = fresh.judged(fresh.gears, tmp_path)
+    for gear, among_others in zip(fresh.gears, together, strict=True):
+        (alone,) = fresh.judged([gear], tmp_path)
+        assert alone["plan"] == among_others["plan"]
+        assert (alone["end"], alone["verdict"]) == (among_others["end"], among_others["verdict"])
