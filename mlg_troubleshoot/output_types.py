@@ -89,6 +89,7 @@ class CheckedInspection(TypedDict):
     record_id: str | None
     tail_no: str | None
     side: Side | None
+    outcome: Literal["RETRACTED", "FAILED"] | None
     verdict: Verdict
     headline: str
     predicted_displacement_in: float | None
@@ -175,9 +176,12 @@ class PossibleCause(TargetedCause):
 
 
 class LikelyCause(PossibleCause):
-    """A cause of a set, and how likely it is."""
+    """A cause of a set, and how likely it is; class_probability: it or one that these rows cannot
+    tell from it.
+    """
 
     probability: Probability
+    class_probability: Probability
 
 
 class RivalTenTimesLikelier(TargetedCause):
@@ -191,6 +195,7 @@ class NamedCauseOutput(TargetedCause):
 
     effect_rms_in: Size
     probability: Probability
+    class_probability: Probability
     parameters: dict[str, float]
     interval_95: dict[str, Interval]
     aliases: list[PossibleCause]
@@ -237,6 +242,7 @@ class ExtensionGain(TypedDict):
 class Remainder(TypedDict):
     """What no named cause explains."""
 
+    p_value: Probability
     p_something_else: Probability
     looks_like_noise: bool
     rms_in: Size

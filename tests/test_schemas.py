@@ -103,6 +103,25 @@ def test_every_diagnosis_fits_its_schema(fleet: str, tmp_path: Path) -> None:
     assert complain("diagnose", mlg("diagnose", path, "--json").json) == []
 
 
+def test_causes_that_rows_cannot_tell_apart_share_the_probability_of_their_class(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "measured.csv"
+    write_csv(draw_fleet(3, rows=60, **FLEETS["aliased"]), path)
+    found = mlg("diagnose", path, "--json").json["also_possible"]
+    first, second = (each["probability"] for each in found[:2])
+    assert found[0]["class_probability"] == pytest.approx(found[1]["class_probability"])
+    assert found[0]["class_probability"] > max(first, second) + 0.2
+
+
+@pytest.mark.parametrize(("outcome", "said"), [("failed to retract", "FAILED"), ("", None)])
+def test_the_json_of_a_check_has_what_the_gear_did(outcome: str, said: str | None) -> None:
+    row = (
+        f"tail_no,side,clearance_3_in,clearance_convention,outcome\nN1,LH,0.003,RADIAL,{outcome}\n"
+    )
+    assert mlg("check", "-", "--json", stdin=row.encode()).one["outcome"] == said
+
+
 def test_the_shipped_table_of_indices_fits_the_schema_of_a_study(gear: Gear) -> None:
     assert complain("study", json.loads(gear.indices_file.read_text(encoding="utf-8"))) == []
 

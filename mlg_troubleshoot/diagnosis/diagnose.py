@@ -20,7 +20,7 @@ from mlg_troubleshoot.diagnosis.causes import CATALOGUE
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
-from mlg_troubleshoot.diagnosis.explain import Finding, MisfitProblem, explain
+from mlg_troubleshoot.diagnosis.explain import Finding, MisfitProblem, explain, p_value_of
 from mlg_troubleshoot.diagnosis.extension import Term
 from mlg_troubleshoot.diagnosis.faults import LEAST_ALONG, DataFault, screen_faults
 from mlg_troubleshoot.diagnosis.gain import LEAST_TAILS, Gain, measure_gain
@@ -73,6 +73,8 @@ class NamedCause(Term):
         Its effect in each row used. [in]
     probability : float
         Probability that something of its name acts. [1]
+    class_probability : float
+        Probability that it acts, or something that these rows cannot tell from it. [1]
     aliases : tuple of Candidate
         What these rows cannot tell from it, one cause or two together: the class is named by its
         likeliest member.
@@ -80,6 +82,7 @@ class NamedCause(Term):
 
     effect_in: Array
     probability: float
+    class_probability: float
     aliases: tuple[Candidate, ...] = ()
 
     @property
@@ -148,6 +151,9 @@ class Diagnosis:
         Probability that nothing is wrong, and that something is that no list has. [1]
     p_left : float
         Probability that something else acts in addition to what is named. [1]
+    remainder_p : float
+        p-value of the residual: of the shape of the bank that stands out most, as one of all of
+        them (Bonferroni). [1]
     ten_times : mapping of (str, str or None) to float
         The probability of what is named, or likeliest, if its likeliest rival, by its name and
         target, were ten times as likely beforehand. [1]
@@ -198,6 +204,7 @@ class Diagnosis:
     p_nothing: float
     p_unlisted: float
     p_left: float
+    remainder_p: float
     ten_times: Mapping[Key, float]
     not_testable: tuple[tuple[str, str], ...]
     unsaid: tuple[str, ...]
@@ -587,6 +594,9 @@ def _report(
         p_nothing=chances.nothing,
         p_unlisted=chances.unlisted,
         p_left=finding.left,
+        remainder_p=p_value_of(
+            case.problem, left - case.problem.misfit + case.problem.expected, finding.noise
+        ),
         ten_times=finding.ten_times,
         not_testable=not_testable,
         unsaid=_unsaid(table),
@@ -674,6 +684,7 @@ def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
             _interval(value, error),
             case.effect(place),
             finding.probability(key),
+            finding.class_probability(key),
         )
     if case.block is not None:
         k, key = len(case.chosen), (case.block.cause.name, None)
@@ -685,13 +696,15 @@ def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
             (1.0, 1.0),
             case.block.columns @ change,
             finding.probability(key),
+            finding.class_probability(key),
             tuple(case.problem.candidate(other) for other in finding.aliases),
         )
     none = np.zeros(len(case.problem.misfit))
 
     def found(key: Key) -> NamedCause:
         rival = case.problem.candidate(key, finding.posterior)
-        return fitted.get(key) or NamedCause(rival, 0.0, (0.0, 0.0), none, finding.probability(key))
+        chances = (finding.probability(key), finding.class_probability(key))
+        return fitted.get(key) or NamedCause(rival, 0.0, (0.0, 0.0), none, *chances)
 
     named = sorted((found(key) for key in finding.said), key=lambda cause: -cause.effect_rms_in)
     return tuple(named), tuple(found(key) for key in finding.open)

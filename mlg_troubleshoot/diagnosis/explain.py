@@ -8,9 +8,10 @@ large stands in `Beliefs` and with each cause; the rest is arithmetic.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from math import erfc, sqrt
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.covariance import NoiseModel
 from mlg_troubleshoot.misfit.explanation import Context, Effects, Explanation, Key
+from mlg_troubleshoot.misfit.fitting import fit
 from mlg_troubleshoot.misfit.posterior import MisfitPosterior, posterior
 from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 
@@ -148,7 +150,7 @@ class Finding:
     that would explain something alone, but hardly act, likeliest first. noise: the noise under
     which all are compared. smallest_rms_in: root mean square of the smallest effect that is
     detected with 80 % power. [in] left: probability that something else acts beside what is
-    sure.
+    sure. classes: names that these rows cannot tell from a name.
     """
 
     verdict: Verdict
@@ -163,6 +165,11 @@ class Finding:
     unlisted_rms_in: float
     smallest_rms_in: float
     left: float
+    classes: Mapping[Key, frozenset[Key]]
+
+    def class_probability(self, key: Key) -> float:
+        """Probability that something of this name acts, or what these rows cannot tell from it."""
+        return max(self.probability(key), _any(self.posterior, {key, *self.classes.get(key, ())}))
 
     def probability(self, key: Key) -> float:
         """Probability that something of this name acts, its look-alikes counted with it."""
@@ -274,6 +281,7 @@ def _said(problem: MisfitProblem, found: MisfitPosterior, noise: NoiseModel) -> 
         size,
         _smallest(problem, found, noise),
         _any(found, set(chance) - counted),
+        _classes(problem, found, [*said, *open_]),
     )
 
 
@@ -302,6 +310,38 @@ def _alike(problem: MisfitProblem, found: MisfitPosterior, said: Sequence[Key]) 
         others = {names[k] for k in np.flatnonzero(near)} - {name}
         alike |= others | ({name} if others else set())
     return alike
+
+
+def _classes(
+    problem: MisfitProblem, found: MisfitPosterior, names: Sequence[Key]
+) -> dict[Key, frozenset[Key]]:
+    """Names whose likeliest effects have the direction of a name's own, by that name."""
+    keys = [c.key for c in problem.candidates]
+    unit = problem.columns / np.linalg.norm(problem.columns, axis=0)
+    best = {
+        key: max((k for k, own in enumerate(keys) if own == key), key=found.of_effect.item)
+        for key in dict.fromkeys(keys)
+    }
+    near = problem.beliefs.alike
+    return {
+        name: frozenset(
+            other for other, k in best.items() if abs(unit[:, k] @ unit[:, best[name]]) > near
+        )
+        for name in names
+        if name in best
+    }
+
+
+def p_value_of(problem: MisfitProblem, left: Array, noise: NoiseModel) -> float:
+    """p-value of the shape of the bank that stands out most in a residual, as one of all of them
+    (Bonferroni).
+    """
+    shapes = np.column_stack([problem.bank.columns, np.ones(len(left))])
+    fitted = fit(noise, shapes[:, -1:], left)
+    product, _log = noise.precision_times(shapes, fitted.tail_ratio)
+    spread = fitted.scale * np.sqrt(np.sum(shapes * product, axis=0))
+    largest = float(np.max(np.abs(left @ product) / spread))
+    return float(min(1.0, shapes.shape[1] * erfc(largest / sqrt(2.0))))
 
 
 def _reported(found: MisfitPosterior, said: set[Key], verdict: Verdict) -> Explanation:

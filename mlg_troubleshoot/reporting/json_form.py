@@ -93,7 +93,8 @@ def kept_as_json(assessment: Assessment) -> dict[str, Any]:
     """
     joints = [_joint(finding) for finding in assessment.joints]
     kept = [{n: each for n, each in j.items() if n not in _OF_GEOMETRY} for j in joints]
-    return _assessment(assessment, kept)
+    # What the gear did is kept with the inspection.
+    return {n: each for n, each in _assessment(assessment, kept).items() if n != "outcome"}
 
 
 def check_json_pieces(
@@ -159,6 +160,7 @@ def _course(row: Any, judgement: Judgement) -> dict[str, Any]:
     steps = plain(judgement.plan.steps)
     return {
         **{name: plain(getattr(row, name)) for name in ("record_id", "tail_no", "side")},
+        "outcome": plain(getattr(row, "outcome", None)),
         "verdict": judgement.verdict.value,
         "next_action": steps[0],
         "plan": steps,
@@ -199,6 +201,7 @@ def diagnosis_as_json(
         extension=None if extension is None else _extension(extension),
         gain=_gain(d),
         remainder={
+            "p_value": d.remainder_p,
             "p_something_else": d.p_left,
             "looks_like_noise": d.remainder_is_noise,
             "rms_in": d.residual_u_in,
@@ -217,7 +220,11 @@ def _possible(candidate: Any) -> dict[str, Any]:
 
 
 def _rival(c: NamedCause) -> dict[str, Any]:
-    return {**_possible(c.candidate), "probability": plain(c.probability)}
+    return {
+        **_possible(c.candidate),
+        "probability": plain(c.probability),
+        "class_probability": plain(c.class_probability),
+    }
 
 
 def _cause(c: NamedCause) -> dict[str, Any]:

@@ -46,6 +46,11 @@ def test_the_puzzle_does_not_give_the_answer_away() -> None:
     )
 
 
+def test_the_p_value_of_the_residual_tells_an_effect_on_no_list_from_noise() -> None:
+    assert diagnosis("measured_frozen_grease.csv").remainder_p < 0.001
+    assert diagnosis("measured_nothing_wrong.csv").remainder_p > 0.1
+
+
 def test_the_command_makes_the_data_sets_again_byte_for_byte(tmp_path: Path) -> None:
     assert data_sets.main([str(tmp_path)]) == 0
     assert {f.name: f.read_bytes() for f in tmp_path.iterdir()} == {
