@@ -87,7 +87,6 @@ class _Tables:
     worn: Array
     worn_chance: Array
     share_mean: Array
-    share_square: Array
     bend: Array
     exceeds: float
 
@@ -111,7 +110,6 @@ def _tables(gear: Gear) -> _Tables:
         worn,
         over.sum(axis=1),
         chances @ SHARES,
-        chances @ SHARES**2,
         bend,
         exceeds,
     )

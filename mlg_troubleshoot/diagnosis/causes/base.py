@@ -125,14 +125,8 @@ class Cause(ABC):
     """
     sign: ClassVar[int] = 0
     """+1 or −1 where physics allows one sign of the parameter only, else 0."""
-    of_joints: ClassVar[bool] = False
-    """True if it changes what joints contribute: it is a special case of all-joint effects."""
-    one_scale: ClassVar[bool] = False
-    """True if it scales what all joints contribute alike."""
     exact: ClassVar[float | None] = None
     """The only value that the parameter can have, if there is one."""
-    acts_in: ClassVar[str | None] = None
-    """Column of the group of rows that it acts on: what it leaves there must look like noise."""
     extends: ClassVar[bool] = True
     """False if it is about what was written and not about the model: it is taken out of the
     analysis only.

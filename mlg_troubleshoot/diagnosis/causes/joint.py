@@ -16,7 +16,6 @@ _ROOM_QUANTILES = (0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97)
 class _JointShare(Cause):
     """A joint contributes more or less than its measured clearance in the worst direction."""
 
-    of_joints: ClassVar[bool] = True
     parameter: ClassVar[str] = "contribution_change"
     plausible: ClassVar[float | None] = 1.0 / 3.0
 
@@ -73,7 +72,6 @@ class JointContact(Cause):
     """
 
     name: ClassVar[str] = "joint_contact"
-    of_joints: ClassVar[bool] = True
     parameter: ClassVar[str] = "share_not_taken_up"
     trial: ClassVar[float] = 0.2
     plausible: ClassVar[float | None] = 0.5

@@ -176,8 +176,6 @@ class CalibrationRate(Cause):
     """The calibration rate is wrong: all predictions are scaled."""
 
     name: ClassVar[str] = "calibration_rate"
-    of_joints: ClassVar[bool] = True
-    one_scale: ClassVar[bool] = True
     parameter: ClassVar[str] = "rate_change"
     trial: ClassVar[float] = 0.01
     plausible: ClassVar[float | None] = 0.02

@@ -85,7 +85,6 @@ class GaugeBias(_Level):
 
     name: ClassVar[str] = "gauge_bias"
     needs: ClassVar[tuple[str, ...]] = ("gauge_id",)
-    acts_in: ClassVar[str | None] = "gauge_id"
     sentence: ClassVar[str] = "Readings with {target} are shifted"
     inspect: ClassVar[str] = "Calibration of that gauge"
     separates: ClassVar[str] = (
@@ -98,7 +97,6 @@ class TechnicianBias(_Level):
 
     name: ClassVar[str] = "technician_bias"
     needs: ClassVar[tuple[str, ...]] = ("technician_id",)
-    acts_in: ClassVar[str | None] = "technician_id"
     sentence: ClassVar[str] = "Readings by {target} are shifted"
     inspect: ClassVar[str] = "How that technician seats and zeroes the gauge"
     separates: ClassVar[str] = (
@@ -185,7 +183,6 @@ class RiggingOffset(Cause):
     """The plunger rod of one aircraft, or of one of its gears, was re-rigged."""
 
     name: ClassVar[str] = "rigging_offset"
-    acts_in: ClassVar[str | None] = "tail_no"
     needs: ClassVar[tuple[str, ...]] = ("tail_no",)
     parameter: ClassVar[str] = "offset_in"
     trial: ClassVar[float] = 0.001

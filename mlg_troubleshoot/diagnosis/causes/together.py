@@ -122,13 +122,7 @@ class JointFactors(Cause):
 
     parameter: ClassVar[str] = "share_of_change"
     trial: ClassVar[float] = 1.0
-    of_joints: ClassVar[bool] = True
     bounds: ClassVar[tuple[float, float]]
-
-    @property
-    def bounded(self) -> bool:
-        """True if no joint can contribute more than the worst direction gives."""
-        return self.bounds[1] <= 1.0
 
     def candidates(self, scene: Scene) -> Iterator[Candidate]:
         """Yield nothing: the all-joint effects are fitted together."""
