@@ -12,7 +12,11 @@ from mlg_troubleshoot.decision.assessment import Assessment, UncertaintyBudget, 
 from mlg_troubleshoot.decision.case import Cases, predict_batch
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.judge_rows import assess
-from mlg_troubleshoot.decision.prediction import predict
+from mlg_troubleshoot.decision.prediction import (
+    PROVISIONAL_U_IN,
+    PROVISIONAL_U_SHARE,
+    predict,
+)
 from mlg_troubleshoot.gear.adjustment import Adjustment
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
@@ -280,7 +284,9 @@ def test_the_stated_chance_of_the_other_side_is_how_often_a_gear_lies_there(
     # stated.
     each = np.stack([worst_case(model, true).magnitude_in for model in gear.ensemble_models])
     bound = each[rng.integers(0, len(each), n), np.arange(n)]
-    bound = bound + rng.standard_normal(n) * np.maximum(0.003, 0.1 * bound)
+    bound = bound + rng.standard_normal(n) * np.maximum(
+        PROVISIONAL_U_IN, PROVISIONAL_U_SHARE * bound
+    )
     read = np.maximum(true + 0.0005 * rng.standard_normal((n, 10)), 0.0)
     seen = [inspected(dict(enumerate(row.tolist(), 1)), gauge_u_in=0.0005) for row in read]
     judged = assess(seen, gear, table, advice=False)
