@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from mlg_troubleshoot.arrays import Array, Places
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.wear.filtering import Draws, FilterState, clock, follow
-from mlg_troubleshoot.wear.passage import gamma_passage, integrated_passage, wiener_passage
 from mlg_troubleshoot.wear.paths import Scale, WearPath, lay_out, scale_of
 from mlg_troubleshoot.wear.posterior import members, posterior
 
@@ -25,6 +24,9 @@ _LEARN_FROM, _LEARN_FROM_OTHERS = 160, 40
 # Standard deviation of the pace of wear beyond the usage that any unit has reached: no reading so
 # far can show a curve that bends later. [1]
 _DOUBT = 0.25
+# Usages at which a path is asked whether it has passed a limit, from the last reading on, per usage
+# that any unit has reached. [1]
+_TO_LIMIT = np.concatenate([[0], np.geomspace(1 / 50, 40, 44)])
 # The clock of a simulated path never stops. [1]
 _SLOWEST = 0.1
 # Least drift of gamma increments, as a share of the fleet's typical one. [1]
@@ -115,7 +117,7 @@ class WearModel:
 
     def usage_to_limit(self, unit: str | Sequence[str], limit: ArrayLike) -> Samples:
         """Forecast the usage at which the wear itself of one unit or n, not a reading of it,
-        crosses a limit.
+        crosses a limit, along simulated paths.
 
         limit, one for all or shape (n,): the limit. [value] Returns samples of shape (n_samples,)
         or (n, n_samples): usage since the last restoration at the crossing,
@@ -123,17 +125,14 @@ class WearModel:
           [usage]
         """
         units = [unit] if isinstance(unit, str) else list(unit)
-        limits = np.broadcast_to(
-            (np.asarray(limit, float) - self.scale.start) / self.scale.value, (len(units),)
-        )
-        rng = np.random.default_rng(self.seed)
-        parts = []
-        for chosen, count in self._chunks(len(units)):
-            last = self._last([units[i] for i in chosen])
-            ends = self._ends([units[i] for i in chosen], count, rng)
-            found = np.concatenate([end.crossing(limits[chosen], last, rng) for end in ends])
-            parts.append(np.moveaxis(found, 1, 0).reshape(len(chosen), -1))
-        samples = np.concatenate(parts) * self.scale.usage
+        limits = np.broadcast_to(limit, (len(units),))
+        last = self._last(units)[:, None] * self.scale.usage
+        ahead = self.scale.usage * _TO_LIMIT
+        wear = self.forecast(units, last + ahead, reading=False).samples
+        # Wear that falls passes its limit from above.
+        up = np.sign(self.scale.value)
+        passed = [first_passage(ahead, up * w, up * c) for w, c in zip(wear, limits, strict=True)]
+        samples = last + np.stack(passed)
         return Samples(samples[0] if isinstance(unit, str) else samples)
 
     def _chunks(self, units: int) -> Iterator[tuple[Places, int]]:
@@ -248,23 +247,34 @@ class _Ends:
                 out[..., j] += sd * rng.standard_normal(x.shape)
         return out
 
-    def crossing(self, limit: Array, last: Array, rng: np.random.Generator) -> Array:
-        """Usage at which each path crosses its limit, (draws, units, repeats)."""
-        away = limit[None, :, None] - self.level
-        power, s, v = self._column("power"), self._column("increment_sd"), self._column("wander_sd")
-        ahead = np.maximum(away, 1e-12)
-        if self.draws.gamma.any():
-            time = gamma_passage(ahead / (self.drift * s**2), rng) * s**2
-        else:
-            wanders = v[:, 0, 0] > 0.0
-            time = np.empty(away.shape)
-            time[~wanders] = wiener_passage(ahead[~wanders], self.drift[~wanders], s[~wanders], rng)
-            time[wanders] = integrated_passage(ahead[wanders], self.drift[wanders], v[wanders], rng)
-        start = clock(last[None, :, None], power)
-        within = np.maximum(1.0 - start, 0.0)
-        at = start + np.minimum(time, within) + np.maximum(time - within, 0.0) / self.pace
-        usage = at ** (1.0 / power)
-        return np.where(away <= 0.0, last[None, :, None], np.maximum(usage, last[None, :, None]))
+
+def first_passage(at: Array, paths: Array, limit: float) -> Array:
+    """Find where each simulated path first passes a limit; between two usages it is interpolated.
+
+    Parameters
+    ----------
+    at : ndarray, shape (m,)
+        Ascending usages. [usage]
+    paths : ndarray, shape (m, n_samples)
+        The wear of each path at these usages. [value]
+    limit : float
+        The limit. [value]
+
+    Returns
+    -------
+    ndarray, shape (n_samples,)
+        Usage of each first passage, infinite beyond the last usage. [usage]
+    """
+    over = paths > limit
+    k = np.argmax(over, axis=0)
+    before = np.maximum(k - 1, 0)
+    sample = np.arange(paths.shape[1])
+    high, low = paths[k, sample], paths[before, sample]
+    with np.errstate(invalid="ignore"):
+        rise = np.where(high > low, high - low, 1.0)
+        share = np.where(np.isfinite(high), (limit - low) / rise, 1.0)
+    passed = at[before] + share * (at[k] - at[before])
+    return np.where(over.any(axis=0), np.where(k == 0, 0.0, passed), np.inf)
 
 
 def fit_wear(paths: Sequence[WearPath], *, seed: int = 0) -> WearModel:

@@ -8,15 +8,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from mlg_troubleshoot.wear import Samples, WearPath
+from mlg_troubleshoot.wear import Samples, WearPath, first_passage
 from mlg_troubleshoot.wear.filtering import Draws, FilterState, follow
 from mlg_troubleshoot.wear.model import _Ends
-from mlg_troubleshoot.wear.passage import (
-    first_passage,
-    gamma_passage,
-    integrated_passage,
-    wiener_passage,
-)
 from mlg_troubleshoot.wear.paths import Scale, grid_step, lay_out
 from mlg_troubleshoot.wear.posterior import members
 
@@ -77,37 +71,6 @@ def test_a_longer_unit_beside_it_changes_nothing_for_a_unit() -> None:
     assert follow(lay_out([short, long], AS_IT_IS), draws)[0][0, 0] == pytest.approx(
         alone, abs=1e-12
     )
-
-
-def test_a_wiener_path_passes_when_the_inverse_gaussian_distribution_says() -> None:
-    away, drift, sd = (np.full((20_000, 1, 1), v) for v in (0.8, 0.5, 0.6))
-    times = wiener_passage(away, drift, sd, np.random.default_rng(1)).ravel()
-    mean, shape = 0.8 / 0.5, (0.8 / 0.6) ** 2
-    assert stats.kstest(times, stats.invgauss(mean / shape, scale=shape).cdf).pvalue > 0.01
-
-
-def test_against_its_drift_a_wiener_path_passes_with_the_known_chance() -> None:
-    away, drift, sd = (np.full((20_000, 1, 1), v) for v in (0.3, -0.5, 0.6))
-    times = wiener_passage(away, drift, sd, np.random.default_rng(1))
-    assert np.isfinite(times).mean() == pytest.approx(np.exp(-2.0 * 0.3 * 0.5 / 0.36), abs=0.015)
-
-
-def test_a_gamma_path_passes_when_the_gamma_distribution_says() -> None:
-    shapes = gamma_passage(np.full(20_000, 6.0), np.random.default_rng(1))
-    for q in (0.05, 0.5, 0.95):
-        # Passed by shape k: a gamma variable of that shape is above 6.
-        assert stats.gamma(np.quantile(shapes, q)).sf(6.0) == pytest.approx(q, abs=0.015)
-
-
-def test_a_wandering_drift_passes_when_fine_simulated_steps_do() -> None:
-    away, drift, sd = (np.full((4000, 1, 1), v) for v in (0.8, 0.5, 0.4))
-    times = integrated_passage(away, drift, sd, np.random.default_rng(1)).ravel()
-    rng, dt = np.random.default_rng(2), 0.01
-    rate = 0.5 + 0.4 * np.cumsum(np.sqrt(dt) * rng.standard_normal((4000, 1500)), axis=1)
-    over = np.cumsum(rate * dt, axis=1) >= 0.8
-    fine = np.where(over.any(axis=1), (np.argmax(over, axis=1) + 1) * dt, np.inf)
-    ours, theirs = (np.sort(t)[[200, 2000, 3000]] for t in (times, fine))
-    assert ours == pytest.approx(theirs, rel=0.06)
 
 
 @pytest.mark.parametrize(
@@ -194,20 +157,6 @@ def test_a_gamma_path_follows_the_moments_of_its_increments_and_the_error_of_a_r
     assert np.mean(wear) == pytest.approx(0.3 + 0.8 * 2.0, abs=0.02)
     assert np.var(wear) == pytest.approx(0.8**2 * 0.6**2 * 2.0, rel=0.02)
     assert np.var(read) == pytest.approx(np.var(wear) + 0.5**2, rel=0.02)
-
-
-def test_what_never_goes_back_has_crossed_its_limit_where_it_stands_above_it() -> None:
-    draws = replace(parameters(increment_sd=0.6, power=1.5), gamma=np.array([[True]]))
-    level = np.zeros((1, 1, 100_000))
-    pace = np.maximum(1.0 + 0.25 * np.random.default_rng(3).standard_normal(level.shape), 0.1)
-    paths = _Ends(draws, level, np.full(level.shape, 0.8), pace)
-    last, usage = np.array([0.5]), np.array([[0.9, 1.6, 2.5]])
-    wear = paths.follow(usage, last, np.array([0.0]), np.random.default_rng(1), reading=False)
-    crossed = paths.crossing(np.array([1.2]), last, np.random.default_rng(2))
-    for k in range(3):
-        assert np.mean(crossed <= usage[0, k]) == pytest.approx(
-            np.mean(wear[..., k] >= 1.2), abs=0.015
-        )
 
 
 def test_no_reading_is_better_than_the_rounding_to_its_resolution() -> None:
