@@ -42,7 +42,7 @@ class Stroke(TypedDict, total=False):
     colour: str | None
     width: float
     dash: str | None
-    cap: str
+    cap: str | None
 
 
 def _stroke(style: Stroke) -> dict[str, Any]:

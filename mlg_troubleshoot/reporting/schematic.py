@@ -4,11 +4,12 @@ exaggerated.
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
 import numpy as np
 from markupsafe import Markup
@@ -25,7 +26,7 @@ from mlg_troubleshoot.reporting.figures import (
     SOFT,
     Anchor,
     Canvas,
-    Place,
+    Stroke,
     text_width,
 )
 from mlg_troubleshoot.reporting.formats import Lengths
@@ -67,9 +68,9 @@ _TURNS = np.arange(24) * np.pi / 12 + 1e-6
 _COSINES, _SINES = np.cos(_TURNS), np.sin(_TURNS)
 _RINGS = np.array([0, 5, 10, 16, 24, 34, 46], float)
 
+# Points and directions of a drawing are complex numbers: x to the right, y downward. [canvas units]
+Segment = tuple[complex, complex]
 Box = tuple[float, float, float, float]
-Segment = tuple[Place, Place]
-_At = Callable[[str], Place]
 
 
 def schematic(
@@ -101,23 +102,20 @@ def _drawn(
     lengths: Lengths,
     width: float,
 ) -> Schematic:
-    drawings = [
-        d
-        for d in (_PlaneDrawing(gear, plane.name) for plane in gear.reference.mechanism.planes)
-        if d.points
-    ]
+    planes = (_PlaneDrawing(gear, plane.name) for plane in gear.reference.mechanism.planes)
+    drawings = [drawing for drawing in planes if drawing.points]
     gap, side = 6.0, 74.0
     free = width - gap * (len(drawings) - 1) - 2 * side * len(drawings)
-    scale = free / sum(d.extent()[2] - d.extent()[0] for d in drawings)
+    scale = free / sum(drawing.size.real for drawing in drawings)
     largest = max([0.0, *(f.clearance_in or 0.0 for f in findings)])
     exaggeration = None
     if largest > 0.0 and directions:
         exaggeration = min(_LARGEST_EXAGGERATION, _one_digit(_LONGEST_ARROW / (largest * scale)))
-    height = max(d.extent()[3] - d.extent()[1] for d in drawings) * scale + _ABOVE + _BELOW
+    height = max(drawing.size.imag for drawing in drawings) * scale + _ABOVE + _BELOW
     shown = _Shown(
         {finding.joint: finding for finding in findings},
         dict(zip(gear.joint_numbers, directions, strict=True)) if exaggeration else {},
-        exaggeration or 0,
+        (exaggeration or 0) * scale,
         lengths,
     )
     return Schematic(
@@ -127,13 +125,13 @@ def _drawn(
 
 @dataclass(frozen=True, slots=True)
 class _Shown:
-    """What is shown at the joints: findings, directions of their clearances and how these are
-    drawn.
+    """What is shown at the joints: findings, directions of their clearances, and how long an inch
+    of clearance is drawn.
     """
 
     findings: dict[int, JointFinding]
     angles: dict[int, float]
-    exaggeration: int
+    per_inch: float
     lengths: Lengths
 
     def state(self, joint: int) -> str:
@@ -143,25 +141,24 @@ class _Shown:
         over = " over its limit" if finding.over_limit else ""
         return f"{self.lengths.full(finding.clearance_in)}{over}"
 
-    def arrow(self, joint: int, place: Place, scale: float) -> Segment | None:
+    def arrow(self, joint: int, place: complex) -> Segment | None:
         """The joint's clearance as an arrow from the edge of its marker; None if it would be too
         short to see.
         """
-        length = (self.findings[joint].clearance_in or 0.0) * scale * self.exaggeration
+        length = (self.findings[joint].clearance_in or 0.0) * self.per_inch
         if joint not in self.angles or length <= _SHORTEST_ARROW:
             return None
-        c, s = math.cos(self.angles[joint]), -math.sin(self.angles[joint])
-        start = (place[0] + _MARKER * c, place[1] + _MARKER * s)
-        return start, (start[0] + length * c, start[1] + length * s)
+        along = cmath.rect(1.0, -self.angles[joint])
+        start = place + _MARKER * along
+        return start, start + length * along
 
     def label(self, joint: int, name: str, *, strong: bool) -> list[_Line]:
         finding = self.findings[joint]
         lines = [_Line(part, 8.5, False) for part in ([name] if strong else _two_lines(name))]
         if finding.clearance_in is not None:
             mark = " OVER LIMIT" if strong else " OVER" if finding.over_limit else ""
-            lines.append(
-                _Line(self.lengths.bare(finding.clearance_in) + mark, 10.5 if strong else 9.5, True)
-            )
+            size = 10.5 if strong else 9.5
+            lines.append(_Line(self.lengths.bare(finding.clearance_in) + mark, size, True))
         return lines
 
 
@@ -178,36 +175,35 @@ class _PlaneDrawing:
 
     def __init__(self, gear: Gear, plane: str) -> None:
         self.gear = gear
-        self.mechanism: Mechanism = gear.reference.mechanism
         self.plane = plane
-        self.steps = [
-            s for s in self.mechanism.steps if self.mechanism.point(s.joint).plane == plane
-        ]
-        names = {name for step in self.steps for name in (step.joint, *needs(step))}
+        self.mechanism: Mechanism = gear.reference.mechanism
+        steps = self.mechanism.steps
+        self.steps = [s for s in steps if self.mechanism.point(s.joint).plane == plane]
         # Points of another plane are drawn where they stand above this one.
         origin, axes = self.mechanism.frame(plane)
-        self.points: dict[str, Place] = {}
-        for name in sorted(names):
+        self.points: dict[str, complex] = {}
+        for name in sorted({name for step in self.steps for name in (step.joint, *needs(step))}):
             offset = self.mechanism.reference_in_space(name) - origin
-            self.points[name] = (float(offset @ axes[0]), float(offset @ axes[1]))
+            self.points[name] = complex(offset @ axes[0], offset @ axes[1])
         self.cut = {s.upstream: s.joint for s in self.steps if isinstance(s, Dyad) and s.driven}
         self._shorten()
+        places = self.points.values()
+        if places:
+            low, high = (
+                complex(end(p.real for p in places), end(p.imag for p in places))
+                for end in (min, max)
+            )
+            self.low, self.size = low, high - low
 
     def _shorten(self) -> None:
         """Draw only the near end of the actuator: its anchor lies far from everything else."""
-        others = [p for name, p in self.points.items() if name not in self.cut]
-        if not others:
+        others = np.array([p for name, p in self.points.items() if name not in self.cut])
+        if not others.size:
             return
-        span = max(max(v) - min(v) for v in zip(*others, strict=True))
+        span = max(np.ptp(others.real), np.ptp(others.imag))
         for anchor, joint in self.cut.items():
-            (x0, y0), (x1, y1) = self.points[joint], self.points[anchor]
-            length = math.hypot(x1 - x0, y1 - y0)
-            part = min(1.0, 0.34 * span / length)
-            self.points[anchor] = (x0 + part * (x1 - x0), y0 + part * (y1 - y0))
-
-    def extent(self) -> tuple[float, float, float, float]:
-        xs, ys = zip(*self.points.values(), strict=True)
-        return min(xs), min(ys), max(xs), max(ys)
+            run = self.points[anchor] - self.points[joint]
+            self.points[anchor] = self.points[joint] + min(1.0, 0.34 * span / abs(run)) * run
 
     def draw(
         self, scale: float, side: float, height: float, shown: _Shown
@@ -215,50 +211,43 @@ class _PlaneDrawing:
         """Draw the plane: links and supports, then joints with their clearances, then their
         names.
         """
-        x0, y0, x1, y1 = self.extent()
-        width = (x1 - x0) * scale + 2 * side
+        width = self.size.real * scale + 2 * side
         name = self.plane.replace("_", " ") + " plane"
-        said = ", ".join(
-            f"joint {j.number} {shown.state(j.number)}"
-            for j in self.gear.joints
-            if j.point in self.points
-        )
+        joints = [j for j in self.gear.joints if j.point in self.points]
+        said = ", ".join(f"joint {j.number} {shown.state(j.number)}" for j in joints)
         canvas = Canvas(width, height, f"Linkage schematic, {name}", said)
-        lift = (height - _ABOVE - _BELOW - (y1 - y0) * scale) / 2
-
-        def at(point: str) -> Place:
-            x, y = self.points[point]
-            return side + (x - x0) * scale, _ABOVE + lift + (y1 - y) * scale
+        # Upward in the plane is to lower numbers on the canvas.
+        corner = complex(side, (height + _ABOVE - _BELOW + self.size.imag * scale) / 2)
+        at = {n: corner + scale * (p - self.low).conjugate() for n, p in self.points.items()}
 
         canvas.text(2, 11, name, size=10.5, bold=True, colour=SOFT)
         segments = self._links(canvas, at)
         boxes = self._obstacles(at)
-        self._plain_points(canvas, at)
-        markers = self._without_overlap(at)
-        here = [j for j in self.gear.joints if self._home(j.point)]
-        states = {number: joint_state(finding) for number, finding in shown.findings.items()}
-        for joint in self.gear.joints:
-            if joint.point in self.points and not self._home(joint.point):
-                _mark(
-                    canvas,
-                    *markers[joint.number],
-                    str(joint.number),
-                    states[joint.number],
-                    faded=True,
-                )
+        for point, place in at.items():
+            if point not in self.cut:
+                if self.mechanism.point(point).fixed:
+                    _ground(canvas, place)
+                if all(joint.point != point for joint in joints):
+                    canvas.marker("circle", place.real, place.imag, 3.0)
+        markers = _without_overlap({j.number: at[j.point] for j in joints})
+        here = [j for j in joints if self.mechanism.point(j.point).plane == self.plane]
+        for joint in joints:
+            if joint not in here:
+                state = joint_state(shown.findings[joint.number])
+                _mark(canvas, markers[joint.number], str(joint.number), state, faded=True)
         for joint in here:
-            arrow = shown.arrow(joint.number, at(joint.point), scale)
+            place, marker = at[joint.point], markers[joint.number]
+            arrow = shown.arrow(joint.number, place)
             if arrow is not None:
                 _arrow(canvas, *arrow)
                 segments.append(arrow)
-                (ax, ay), (bx, by) = arrow
-                boxes.append((min(ax, bx), min(ay, by), max(ax, bx), max(ay, by)))
-            if markers[joint.number] != at(joint.point):
-                canvas.line(*at(joint.point), *markers[joint.number], colour=SOFT, width=1.2)
-                canvas.marker("circle", *at(joint.point), 2.5)
-                x, y = markers[joint.number]
-                boxes.append((x - 11.0, y - 11.0, x + 11.0, y + 11.0))
-            _mark(canvas, *markers[joint.number], str(joint.number), states[joint.number])
+                boxes.append(_box(*arrow))
+            if marker != place:
+                _line(canvas, place, marker, colour=SOFT, width=1.2)
+                canvas.marker("circle", place.real, place.imag, 2.5)
+                boxes.append(_box(marker, around=11 + 11j))
+            state = joint_state(shown.findings[joint.number])
+            _mark(canvas, marker, str(joint.number), state)
         framed = sum(shown.findings[j.number].over_limit for j in here) <= _MOST_FRAMES
         for joint in sorted(here, key=lambda j: not shown.findings[j.number].over_limit):
             strong = framed and shown.findings[joint.number].over_limit
@@ -266,97 +255,68 @@ class _PlaneDrawing:
             _callout(canvas, markers[joint.number], lines, boxes, segments, strong)
         return name, canvas.svg("figure panel"), width
 
-    def _plain_points(self, canvas: Canvas, at: _At) -> None:
-        numbered = {j.point for j in self.gear.joints if j.point in self.points}
-        for point in self.points:
-            if point not in self.cut:
-                if self.mechanism.point(point).fixed:
-                    _ground(canvas, *at(point))
-                if point not in numbered:
-                    canvas.marker("circle", *at(point), 3.0)
-
-    def _without_overlap(self, at: _At) -> dict[int, Place]:
-        """Places of the joints' markers: at the joints, or next to them where two would overlap."""
-        places = {j.number: at(j.point) for j in self.gear.joints if j.point in self.points}
-        least = 2.0 * _MARKER + 2.0
-        for _ in range(30):
-            moved = False
-            for one, other in combinations(sorted(places), 2):
-                (x0, y0), (x1, y1) = places[one], places[other]
-                away = math.hypot(x1 - x0, y1 - y0)
-                if away < least - 1e-6:
-                    ux, uy = _unit((x0, y0), (x1, y1)) if away > 1e-6 else (1.0, 0.0)
-                    push = (least - away) / 2
-                    places[one] = (x0 - push * ux, y0 - push * uy)
-                    places[other] = (x1 + push * ux, y1 + push * uy)
-                    moved = True
-            if not moved:
-                break
-        return places
-
-    def _obstacles(self, at: _At) -> list[Box]:
+    def _obstacles(self, at: Mapping[str, complex]) -> list[Box]:
         """Boxes of what labels must not cover: markers, supports, the slot, actuator and plunger
         with their names.
         """
         boxes: list[Box] = [(0.0, 0.0, 130.0, 14.0)]
         pins = {s.pin for s in self.steps if isinstance(s, Slot)}
-        for point in self.points:
-            x, y = at(point)
+        for point, place in at.items():
             fixed = self.mechanism.point(point).fixed and point not in self.cut
             reach = 27.0 if point in pins or fixed else _MARKER
             half = 15.0 if fixed else 11.0
             # A support hidden by a label would be missed most: it counts three times.
-            boxes += [(x - half, y - 11.0, x + half, y + reach)] * (3 if fixed else 1)
+            box = _box(place - complex(half, 11.0), place + complex(half, reach))
+            boxes += [box] * (3 if fixed else 1)
         for step in self.steps:
-            x, y = at(step.joint)
+            place = at[step.joint]
             if isinstance(step, Slider):
-                ux, uy = math.cos(step.axis), -math.sin(step.axis)
-                ends = (x + 20 * ux, x + 60 * ux), (y + 20 * uy, y + 60 * uy)
-                boxes.append(
-                    (min(ends[0]) - 60, min(ends[1]) - 6, max(ends[0]) + 10, max(ends[1]) + 6)
-                )
+                along = cmath.rect(1.0, -step.axis)
+                left, top, right, bottom = _box(place + 20 * along, place + 60 * along)
+                boxes.append((left - 60, top - 6, right + 10, bottom + 6))
             if isinstance(step, Dyad) and step.driven:
-                fx, fy = at(step.upstream)
-                boxes.append((min(x, fx) - 62, (y + fy) / 2 - 12, max(x, fx) + 8, max(y, fy)))
+                far = at[step.upstream]
+                left, _top, right, bottom = _box(place, far)
+                boxes.append((left - 62, (place + far).imag / 2 - 12, right + 8, bottom))
         return boxes
 
-    def _home(self, point: str) -> bool:
-        return point in self.points and self.mechanism.point(point).plane == self.plane
-
-    def _links(self, canvas: Canvas, at: _At) -> list[Segment]:
+    def _links(self, canvas: Canvas, at: Mapping[str, complex]) -> list[Segment]:
         """Draw the rigid parts below, the links above; return the segments for the placing of
         labels.
         """
         segments = self._rigid_parts(canvas, at)
         for step in self.steps:
-            place = at(step.joint)
+            place = at[step.joint]
             match step:
-                case Dyad(upstream=upstream, downstream=downstream):
-                    (_actuator if step.driven else _bar)(canvas, at(upstream), place)
-                    if not self._rigid(step.joint, downstream):
-                        _bar(canvas, place, at(downstream))
-                    segments += [(at(upstream), place), (place, at(downstream))]
-                case Crank(pivot=pivot):
-                    _bar(canvas, at(pivot), place)
-                    segments.append((at(pivot), place))
-                case Slider(upstream=upstream, axis=axis):
-                    segments += [_plunger(canvas, place, axis), (at(upstream), place)]
-                    _bar(canvas, at(upstream), place)
+                case Dyad():
+                    ends = at[step.upstream], at[step.downstream]
+                    (_actuator if step.driven else _bar)(canvas, ends[0], place)
+                    if not self._rigid(step.joint, step.downstream):
+                        _bar(canvas, place, ends[1])
+                    segments += [(ends[0], place), (place, ends[1])]
+                case Crank():
+                    _bar(canvas, at[step.pivot], place)
+                    segments.append((at[step.pivot], place))
+                case Slider():
+                    segments += [_plunger(canvas, place, step.axis), (at[step.upstream], place)]
+                    _bar(canvas, at[step.upstream], place)
         return segments
 
-    def _rigid_parts(self, canvas: Canvas, at: _At) -> list[Segment]:
+    def _rigid_parts(self, canvas: Canvas, at: Mapping[str, complex]) -> list[Segment]:
         """Draw levers as plates, and the slot in its lever."""
         segments: list[Segment] = []
         for step in self.steps:
             if isinstance(step, (Lever, Slot)):
                 first = step.follows if isinstance(step, Lever) else step.pin
-                a, b, c = at(first), at(step.pivot), at(step.joint)
-                canvas.polyline([a, b, c], fill=PALE, colour=RULE, width=7.0, closed=True)
-                canvas.polyline([a, b, c], fill=PALE, colour=PALE, width=4.0, closed=True)
-                segments += [(a, b), (b, c), (a, c)]
+                corners = at[first], at[step.pivot], at[step.joint]
+                _polygon(canvas, *corners, fill=PALE, colour=RULE, width=7.0)
+                _polygon(canvas, *corners, fill=PALE, colour=PALE, width=4.0)
+                segments += combinations(corners, 2)
         for step in self.steps:
             if isinstance(step, Slot):
-                _slot(canvas, at(step.pivot), at(step.pin))
+                pivot, pin = at[step.pivot], at[step.pin]
+                along = _unit(pin - pivot)
+                _tube(canvas, pin - 13 * along, pin + 9 * along, 25, PAPER, cap="round")
         return segments
 
     def _rigid(self, joint: str, pivot: str) -> bool:
@@ -367,70 +327,90 @@ class _PlaneDrawing:
         )
 
 
-def _bar(canvas: Canvas, a: Place, b: Place) -> None:
-    canvas.line(*a, *b, colour=INK, width=7, cap="round")
-    canvas.line(*a, *b, colour=PAPER, width=4, cap="round")
+def _without_overlap(markers: Mapping[int, complex]) -> dict[int, complex]:
+    """Places of the joints' markers: at the joints, or next to them where two would overlap."""
+    places = dict(markers)
+    least = 2.0 * _MARKER + 2.0
+    for _ in range(30):
+        moved = False
+        for one, other in combinations(sorted(places), 2):
+            apart = places[other] - places[one]
+            if abs(apart) < least - 1e-6:
+                push = (least - abs(apart)) / 2 * (_unit(apart) if abs(apart) > 1e-6 else 1.0)
+                places[one] -= push
+                places[other] += push
+                moved = True
+        if not moved:
+            break
+    return places
 
 
-def _unit(a: Place, b: Place) -> Place:
-    length = math.hypot(b[0] - a[0], b[1] - a[1]) or 1.0
-    return (b[0] - a[0]) / length, (b[1] - a[1]) / length
+def _unit(run: complex) -> complex:
+    return run / (abs(run) or 1.0)
 
 
-def _actuator(canvas: Canvas, far: Place, joint: Place) -> None:
+def _box(*points: complex, around: complex = 0) -> Box:
+    """The box about some points, with room around it."""
+    xs, ys = [p.real for p in points], [p.imag for p in points]
+    return (
+        min(xs) - around.real,
+        min(ys) - around.imag,
+        max(xs) + around.real,
+        max(ys) + around.imag,
+    )
+
+
+def _line(canvas: Canvas, start: complex, end: complex, **stroke: Unpack[Stroke]) -> None:
+    canvas.line(start.real, start.imag, end.real, end.imag, **stroke)
+
+
+def _polygon(canvas: Canvas, *corners: complex, fill: str, **stroke: Unpack[Stroke]) -> None:
+    canvas.polyline([(p.real, p.imag) for p in corners], fill=fill, closed=True, **stroke)
+
+
+def _tube(
+    canvas: Canvas, start: complex, end: complex, width: float, fill: str, cap: str | None = None
+) -> None:
+    """A thick line with an outline."""
+    _line(canvas, start, end, width=width, cap=cap)
+    _line(canvas, start, end, width=width - 3, cap=cap, colour=fill)
+
+
+def _bar(canvas: Canvas, start: complex, end: complex) -> None:
+    _tube(canvas, start, end, 7, PAPER, cap="round")
+
+
+def _actuator(canvas: Canvas, far: complex, joint: complex) -> None:
     """A cylinder towards its anchor, broken off, and its rod."""
-    ux, uy = _unit(joint, far)
-    length = math.hypot(far[0] - joint[0], far[1] - joint[1])
-    neck = (joint[0] + 0.42 * length * ux, joint[1] + 0.42 * length * uy)
-    canvas.line(*joint, *neck, width=5)
-    canvas.line(*neck, *far, width=15)
-    canvas.line(*neck, *far, colour=PALE, width=12)
-    for k in (-1, 1):
-        x, y = far[0] + 3 * k * ux, far[1] + 3 * k * uy
-        canvas.line(
-            x - 10 * uy - 3 * ux, y + 10 * ux - 3 * uy, x + 10 * uy + 3 * ux, y - 10 * ux + 3 * uy
-        )
-    outside = -1.0 if neck[0] < canvas.width / 2 else 1.0
-    anchor: Anchor = "end" if outside < 0 else "start"
-    canvas.text(
-        neck[0] + 12 * outside,
-        neck[1] + 16,
-        "actuator",
-        size=9,
-        bold=True,
-        colour=SOFT,
-        anchor=anchor,
-    )
+    along = _unit(far - joint)
+    neck = joint + 0.42 * (far - joint)
+    _line(canvas, joint, neck, width=5)
+    _tube(canvas, neck, far, 15, PALE)
+    across = (3 - 10j) * along
+    for break_at in (far - 3 * along, far + 3 * along):
+        _line(canvas, break_at - across, break_at + across)
+    left = neck.real < canvas.width / 2
+    _named(canvas, neck + complex(-12 if left else 12, 16), "actuator", "end" if left else "start")
 
 
-def _slot(canvas: Canvas, pivot: Place, pin: Place) -> None:
-    ux, uy = _unit(pivot, pin)
-    a, b = (pin[0] - 13 * ux, pin[1] - 13 * uy), (pin[0] + 9 * ux, pin[1] + 9 * uy)
-    canvas.line(*a, *b, width=25, cap="round", colour=INK)
-    canvas.line(*a, *b, width=22, cap="round", colour=PAPER)
-
-
-def _plunger(canvas: Canvas, joint: Place, axis: float) -> Segment:
+def _plunger(canvas: Canvas, joint: complex, axis: float) -> Segment:
     """The plunger beyond its pin, entering the valve."""
-    ux, uy = math.cos(axis), -math.sin(axis)
-    tip = (joint[0] + 30 * ux, joint[1] + 30 * uy)
-    end = (joint[0] + 52 * ux, joint[1] + 52 * uy)
-    canvas.line(*joint, *tip, width=6)
-    canvas.line(*tip, *end, width=24)
-    canvas.line(*tip, *end, width=21, colour=PALE)
-    x = (tip[0] + end[0]) / 2
-    canvas.text(
-        x - 18, (tip[1] + end[1]) / 2 - 7, "plunger", size=9, bold=True, colour=SOFT, anchor="end"
-    )
+    along = cmath.rect(1.0, -axis)
+    tip, end = joint + 30 * along, joint + 52 * along
+    _line(canvas, joint, tip, width=6)
+    _tube(canvas, tip, end, 24, PALE)
+    _named(canvas, (tip + end) / 2 - (18 + 7j), "plunger", "end")
     return joint, end
 
 
-def _ground(canvas: Canvas, x: float, y: float) -> None:
-    canvas.polyline(
-        [(x, y), (x + 12, y + 19), (x - 12, y + 19)], fill=PAPER, width=1.4, closed=True
-    )
+def _named(canvas: Canvas, place: complex, name: str, anchor: Anchor) -> None:
+    canvas.text(place.real, place.imag, name, size=9, bold=True, colour=SOFT, anchor=anchor)
+
+
+def _ground(canvas: Canvas, place: complex) -> None:
+    _polygon(canvas, place, place + (12 + 19j), place + (-12 + 19j), fill=PAPER, width=1.4)
     for k in range(-2, 3):
-        canvas.line(x + 5 * k + 1, y + 19, x + 5 * k - 3, y + 24)
+        _line(canvas, place + complex(5 * k + 1, 19), place + complex(5 * k - 3, 24))
 
 
 def joint_state(finding: JointFinding) -> JointState:
@@ -439,44 +419,36 @@ def joint_state(finding: JointFinding) -> JointState:
     return "over" if finding.over_limit else "fine"
 
 
-def _mark(canvas: Canvas, x: float, y: float, text: str, state: str, faded: bool = False) -> None:
-    size = _MARKER
-    if state == "over":
-        canvas.rectangle(
-            x - size, y - size, 2 * size, 2 * size, fill=SOFT if faded else INK, colour=PAPER
-        )
-        canvas.text(x, y + 4, text, bold=True, colour=PAPER, anchor="middle")
-        return
+def _mark(canvas: Canvas, at: complex, text: str, state: str, faded: bool = False) -> None:
+    x, y, size = at.real, at.imag, _MARKER
     missing, pale = state == "missing", state == "missing" or faded
-    colour, dash = SOFT if pale else INK, "3 2.2" if missing else None
-    outline: dict[str, Any] = {
-        "stroke": colour,
-        "stroke_width": 1.3 if pale else 2.2,
-        "stroke_dasharray": dash,
-    }
-    canvas.add("circle", cx=x, cy=y, r=size, fill=PAPER, **outline)
+    colour = SOFT if pale else INK
+    if state == "over":
+        canvas.rectangle(x - size, y - size, 2 * size, 2 * size, fill=colour, colour=PAPER)
+        colour = PAPER
+    else:
+        outline: dict[str, Any] = {
+            "stroke": colour,
+            "stroke_width": 1.3 if pale else 2.2,
+            "stroke_dasharray": "3 2.2" if missing else None,
+        }
+        canvas.add("circle", cx=x, cy=y, r=size, fill=PAPER, **outline)
     canvas.text(x, y + 4, text, bold=not missing, colour=colour, anchor="middle")
 
 
 def joint_mark(text: str, state: JointState) -> Markup:
     words = JOINT_STATES[state]
     canvas = Canvas(22, 22, f"joint {text}, {words}" if text else words)
-    _mark(canvas, 11, 11, text, state)
+    _mark(canvas, 11 + 11j, text, state)
     return canvas.svg("mark")
 
 
-def _arrow(canvas: Canvas, start: Place, end: Place) -> None:
-    ux, uy = _unit(start, end)
-    head = min(8.0, math.hypot(end[0] - start[0], end[1] - start[1]))
-    base = (end[0] - head * ux, end[1] - head * uy)
-    canvas.line(*start, *end, colour=PAPER, width=5.5)
-    canvas.line(*start, *base, width=2.4)
-    corners = [
-        end,
-        (base[0] - 4.2 * uy, base[1] + 4.2 * ux),
-        (base[0] + 4.2 * uy, base[1] - 4.2 * ux),
-    ]
-    canvas.polyline(corners, fill=INK, width=0.5, closed=True)
+def _arrow(canvas: Canvas, start: complex, end: complex) -> None:
+    along = _unit(end - start)
+    base = end - min(8.0, abs(end - start)) * along
+    _line(canvas, start, end, colour=PAPER, width=5.5)
+    _line(canvas, start, base, width=2.4)
+    _polygon(canvas, end, base + 4.2j * along, base - 4.2j * along, fill=INK, width=0.5)
 
 
 @dataclass(frozen=True, slots=True)
@@ -488,7 +460,7 @@ class _Line:
 
 def _callout(
     canvas: Canvas,
-    joint: Place,
+    joint: complex,
     lines: list[_Line],
     boxes: list[Box],
     segments: list[Segment],
@@ -504,38 +476,31 @@ def _callout(
     with np.errstate(divide="ignore"):
         clears = np.minimum(width / 2 / np.abs(_COSINES), height / 2 / np.abs(_SINES))
     reach = _MARKER + 2 + _RINGS[:, None] + clears
-    x, y = (joint[0] + _COSINES * reach).ravel(), (joint[1] + _SINES * reach).ravel()
+    x, y = (joint.real + _COSINES * reach).ravel(), (joint.imag + _SINES * reach).ravel()
     tried = np.column_stack([x - width / 2, y - height / 2, x + width / 2, y + height / 2])
+    outside = np.any(tried < [0, 14, 0, 0], axis=1) | np.any(
+        tried > [np.inf, np.inf, canvas.width, canvas.height], axis=1
+    )
     cost = (
         np.repeat(1.1 * _RINGS, len(_COSINES))
         + _overlap(tried, np.array(boxes))
         + _covered(tried, segments)
+        + 2000.0 * outside
     )
-    outside = (
-        (tried[:, 0] < 0)
-        | (tried[:, 2] > canvas.width)
-        | (tried[:, 1] < 14)
-        | (tried[:, 3] > canvas.height)
-    )
-    box: Box = tuple(tried[int(np.argmin(np.round(cost + 2000.0 * outside, 6)))].tolist())
+    box: Box = tuple(tried[int(np.argmin(np.round(cost, 6)))].tolist())
     boxes.append(box)
-    edge = (min(max(joint[0], box[0]), box[2]), min(max(joint[1], box[1]), box[3]))
-    away = math.hypot(edge[0] - joint[0], edge[1] - joint[1])
-    if away > _MARKER + 14:
-        ux, uy = _unit(joint, edge)
-        canvas.line(
-            joint[0] + (_MARKER + 1) * ux,
-            joint[1] + (_MARKER + 1) * uy,
-            *edge,
-            colour=SOFT,
-            width=0.8,
-        )
+    edge = complex(
+        min(max(joint.real, box[0]), box[2]),
+        min(max(joint.imag, box[1]), box[3]),
+    )
+    if abs(edge - joint) > _MARKER + 14:
+        start = joint + (_MARKER + 1) * _unit(edge - joint)
+        _line(canvas, start, edge, colour=SOFT, width=0.8)
     if framed:
         canvas.rectangle(box[0], box[1], width, height, fill=PAPER, colour=INK, width=1.4)
     base, middle = box[1] + 0.5, (box[0] + box[2]) / 2
     for line in lines:
         base += line.size + 2.0
-        colour = INK if line.bold else SOFT
         canvas.text(
             middle,
             base - 1.5,
@@ -543,7 +508,7 @@ def _callout(
             size=line.size,
             bold=line.bold,
             anchor="middle",
-            colour=colour,
+            colour=INK if line.bold else SOFT,
         )
 
 
@@ -567,7 +532,7 @@ def _covered(tried: Array, segments: list[Segment]) -> Array:
     """Cost of laying each tried box, a little widened, over lines: by the length it covers."""
     if not segments:
         return np.zeros(len(tried))
-    ends = np.array(segments)
+    ends = np.array([[(p.real, p.imag) for p in segment] for segment in segments])
     start, run = ends[:, 0], ends[:, 1] - ends[:, 0]
     run = np.where(np.abs(run) < 1e-9, 1e-9, run)
     # The part of each line between the box's sides, as in Liang and Barsky's clipping.
