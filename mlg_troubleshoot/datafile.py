@@ -108,6 +108,20 @@ def decode(path: Path, values: dict[str, Any], kind: type[T]) -> T:
         raise _error(path, values, *_refusal(values, kind)) from None
 
 
+def refusal(values: Any, kind: Any) -> tuple[Place, str, str] | None:
+    """Return which of some values is not of a kind: where it stands, how it is shown, and what was
+    expected there; None if all are.
+    """
+    if _why(values, kind) is None:
+        return None
+    place, expected = _refusal(values, kind)
+    found = values
+    for key in place:
+        known = isinstance(found, list) or (isinstance(found, dict) and key in found)
+        found = found[key] if known else msgspec.UNSET
+    return place, "nothing" if found is msgspec.UNSET else _shown(found), expected
+
+
 def _parsed_toml(text: str) -> Any:
     longest = max(map(len, text.splitlines()), default=0)
     if longest > LONGEST_LINE:

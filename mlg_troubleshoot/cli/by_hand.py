@@ -11,9 +11,7 @@ from mlg_troubleshoot.cli.flags import Flags
 from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
     CONVENTION,
-    MARGIN,
     OUTCOME,
-    PLUNGER_DISPLACEMENT,
     RECORD_ID,
     SIDE,
     TAIL_NO,
@@ -40,19 +38,19 @@ class Ending:
 def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
     from mlg_troubleshoot.records import made_record_id
 
-    needed = (("--tail", flags.tail), ("--side", flags.side), ("--convention", declared.convention))
+    needed = (
+        ("--tail", flags.typed.get(TAIL_NO.name)),
+        ("--side", flags.typed.get(SIDE.name)),
+        ("--convention", declared.convention),
+    )
     missing = [flag for flag, value in needed if value is None]
-    if missing or flags.side is None:
+    if missing:
         raise UsageError(
             f"--set needs {', '.join(missing)}",
             "Say which gear (--tail N123 --side LH) and what a clearance reading is (--convention"
             " RADIAL, DIAMETRAL or TOTAL_PLAY): there is no default.",
         )
-    values: dict[str, object] = {
-        RECORD_ID.name: flags.record_id or "-",
-        TAIL_NO.name: flags.tail,
-        SIDE.name: flags.side,
-    }
+    values: dict[str, object] = {RECORD_ID.name: "-", **flags.typed}
     labels: dict[str, str] = {}
     for text in flags.values or ():
         name, sign, written = text.partition("=")
@@ -67,22 +65,7 @@ def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
         values[column], labels[column] = written, f"--set {text!r}"
     read = _judged(values, labels, flags, declared)
     made = made_record_id(read.tail_no, read.side, datetime.now())
-    return replace(read, record_id=flags.record_id or made)
-
-
-def _day(flags: Flags) -> dict[str, str | None]:
-    """What the flags say of repairs and of the day, by column."""
-    return {
-        "restored_joints": flags.restored,
-        "repair_date": flags.repair_date,
-        "plunger_date": flags.plunger_date,
-        "outcome_date": flags.outcome_date,
-        "rigging_checked": flags.rigging_checked,
-        "cannot_reach": flags.cannot_reach,
-        "no_spare": flags.no_spare,
-        "open_areas": flags.open_areas,
-        "minutes_available": flags.minutes,
-    }
+    return replace(read, record_id=flags.typed.get(RECORD_ID.name) or made)
 
 
 def _judged(
@@ -94,31 +77,8 @@ def _judged(
     """Let the judge of table rows judge the flags; a refusal names the flag."""
     from mlg_troubleshoot.records import ReadOptions, admit
 
-    more = {
-        OUTCOME.name: flags.outcome,
-        PLUNGER_DISPLACEMENT.name: flags.measured,
-        MARGIN.name: flags.margin,
-        **_day(flags),
-    }
-    typed = {
-        RECORD_ID.name: flags.record_id,
-        TAIL_NO.name: flags.tail,
-        SIDE.name: flags.side,
-        **more,
-    }
-    names = {
-        TAIL_NO.name: "tail",
-        PLUNGER_DISPLACEMENT.name: "measured",
-        "restored_joints": "restored",
-        "open_areas": "open",
-        "minutes_available": "minutes",
-    }
-    named = {
-        column: f"--{names.get(column, column).replace('_', '-')} {text!r}"
-        for column, text in typed.items()
-    }
     options = ReadOptions.of(load_gear(declared.gear), declared)
-    return admit({**values, **more}, options, {**named, **labels})
+    return admit(values, options, {**flags.labels(), **labels})
 
 
 def ask(
@@ -132,42 +92,35 @@ def ask(
 ) -> task.CheckResult:
     """Ask on the terminal and show the result; the entry stays open until it was shown and kept."""
     from mlg_troubleshoot.cli.prompts import Answers, RichTerminal, SessionStore, ask_inspection
+    from mlg_troubleshoot.cli.prompts.answers import LENGTHS
 
     store, terminal, gear = SessionStore(place), RichTerminal(), load_gear(declared.gear)
     saved = store.latest() if resume else None
     if resume and saved is None:
         raise UsageError("there is no unfinished entry to resume", "Start a new one: mlg check")
-    nobody = {
-        RECORD_ID.name: "-",
-        TAIL_NO.name: "-",
-        SIDE.name: flags.side or "LH",
-        CONVENTION.name: "RADIAL",
+    typed, unit = flags.typed, declared.unit or LengthUnit.INCH
+    nobody = {RECORD_ID.name: "-", TAIL_NO.name: "-", CONVENTION.name: "RADIAL"}
+    judged = _judged({SIDE.name: "LH", **typed, **nobody}, {}, flags, declared)
+    with_unit = {
+        name: text if text[-1:].isalpha() else f"{text} {unit}"
+        for name, text in typed.items()
+        if name in LENGTHS
     }
-    judged = _judged(nobody, {}, flags, declared)
-    unit = declared.unit or LengthUnit.INCH
-    lengths = {PLUNGER_DISPLACEMENT.name: flags.measured, MARGIN.name: flags.margin}
     given = Answers(
-        tail_no=flags.tail,
-        side=None if flags.side is None else judged.side,
+        tail_no=typed.get(TAIL_NO.name),
+        side=judged.side if SIDE.name in typed else None,
         unit=declared.unit,
         convention=declared.convention,
-        record_id=flags.record_id,
-    ).with_more(
-        outcome=judged.outcome,
-        **_day(flags),
-        **{
-            name: text if text is None or text[-1:].isalpha() else f"{text} {unit}"
-            for name, text in lengths.items()
-        },
-    )
+        record_id=typed.get(RECORD_ID.name),
+    ).with_more(**{**typed, **with_unit, OUTCOME.name: judged.outcome})
     entry = ask_inspection(gear, terminal, store, given, saved=saved, advice=_advice(gear))
     while True:
         ending = publish(entry.inspection, entry.session.answers.unit or unit)
-        typed = "" if ending.report is None else _what_now(terminal)
-        if typed == "c":
+        now = "" if ending.report is None else _what_now(terminal)
+        if now == "c":
             entry = ask_inspection(gear, terminal, store, given, saved=entry.session, correct=True)
             continue
-        if typed == "r" and ending.report is not None:
+        if now == "r" and ending.report is not None:
             ending.report()
         keep(ending.result)
         store.finish(entry.session)

@@ -10,10 +10,9 @@ from functools import partial
 from pathlib import Path
 
 from mlg_troubleshoot.cli import by_hand, history, options, output
-from mlg_troubleshoot.cli.claims import claim
 from mlg_troubleshoot.cli.flags import Flags, Wanted
 from mlg_troubleshoot.cli.progress import stages
-from mlg_troubleshoot.cli.remembered import Settings, settings
+from mlg_troubleshoot.cli.remembered import Settings
 from mlg_troubleshoot.cli.views import batch, notes, one_gear
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.errors import UsageError
@@ -44,16 +43,11 @@ class Run:
             from mlg_troubleshoot.records.annotate import ANNOTATED
 
             outputs.append(OutputFile("--annotate", wanted.annotate, ANNOTATED))
-        claim(
-            tables.gear,
-            [*files, *extensions, *causes],
-            outputs,
-            wanted.report or (_ASKED_FOR if self._asks else None),
-            store=wanted.store,
-            force=wanted.force,
-        )
-        self._shown = settings(
-            tables.gear, wanted.show, wanted.page, tables.columns, keep=wanted.remember
+        # The prompts may write a report that was not asked for by a flag.
+        written = replace(wanted, report=_ASKED_FOR) if self._asks and not wanted.report else wanted
+        inputs = [*files, *extensions, *causes]
+        self._shown = written.begin(
+            tables.gear, inputs, outputs, store=wanted.store, tables=tables, keep=wanted.remember
         )
         self._asked = task.CheckOptions(
             **tables.declared(self._shown.headers),
@@ -62,7 +56,7 @@ class Run:
             extension=load_model_extension(extensions, tables.gear, causes),
         )
         self._place = (
-            history.kept_in(wanted.store, tables.gear) if wanted.keep or self._asks else None
+            options.Records(wanted.store, tables.gear).kept if wanted.keep or self._asks else None
         )
 
     def run(self) -> int:

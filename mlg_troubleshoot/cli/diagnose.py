@@ -36,8 +36,6 @@ def diagnose(
             "--write-extension", metavar="EXT.toml", help="Write the extended model to this file."
         ),
     ] = None,
-    report: options.Report = None,
-    page: options.Paper = None,
     causes: options.Causes = None,
     sure: Annotated[
         float,
@@ -49,20 +47,15 @@ def diagnose(
         ),
     ] = 0.9,
     tables: options.Tables,
-    force: options.Force = False,
-    show: options.Show = None,
+    shown: options.Output,
     remember: options.Remember = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
     _version: options.Version = False,
 ) -> None:
     """Compare measured with predicted: what is wrong, the cause by name, the extension, the gain.
 
     Exit codes: 0 nothing found · 1 something found · 3 this table allows no conclusion · 2 usage.
     """
-    from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.progress import stages
-    from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.cli.views.notes import show_notes, show_problems
     from mlg_troubleshoot.diagnosis import EXTENSION
     from mlg_troubleshoot.diagnosis import write_extension as keep_extension
@@ -71,34 +64,34 @@ def diagnose(
     from mlg_troubleshoot.workflows import diagnose as task
 
     written = OutputFile("--write-extension", write_extension, EXTENSION)
-    claim(tables.gear, [*files, *(causes or ())], [written], report, force=force)
-    shown = settings(tables.gear, show, page, tables.columns, keep=remember)
+    inputs = [*files, *(causes or ())]
+    settings = shown.begin(tables.gear, inputs, [written], tables=tables, keep=remember)
     asked = task.DiagnoseOptions(
-        **tables.declared(shown.headers),
-        remembered=shown.note or None,
+        **tables.declared(settings.headers),
+        remembered=settings.note or None,
         cause_files=tuple(causes or ()),
         sure=sure,
     )
     try:
-        with stages(quiet=quiet) as bar:
+        with stages(quiet=shown.quiet) as bar:
             result = task.diagnose_files(
                 [Path(name) for name in files],
                 asked,
                 progress=lambda share: bar("Diagnosing", int(100 * share), 100),
             )
     except InconclusiveDataError as error:
-        if as_json:
+        if shown.as_json:
             reason = {"reason": error.message, "remedy": error.remedy}
             output.write_json({"schema_version": SCHEMA_VERSION, "verdict": None, **reason})
         raise
-    if as_json:
+    if shown.as_json:
         warnings = (*filter(None, [asked.remembered]), *result.notes)
         output.write_json(diagnosis_as_json(result.diagnosis, result.extension, warnings))
     else:
-        if not quiet:
+        if not shown.quiet:
             show_notes(result.notes)
         show_problems(result.problems)
-        _show(result.diagnosis, shown.show)
+        _show(result.diagnosis, settings.show)
     if write_extension is not None and result.extension is None:
         output.say(_unwritten(result.diagnosis))
     elif write_extension is not None and result.extension is not None:
@@ -106,9 +99,11 @@ def diagnose(
         output.say(
             f"Extension: {write_extension}. Use it: mlg check FILE --extension {write_extension}"
         )
-    if report is not None:
-        made = task.write_diagnosis_report(result, asked, report, str(shown.page), unit=shown.show)
-        output.say_written([made], quiet=quiet)
+    if shown.report is not None:
+        made = task.write_diagnosis_report(
+            result, asked, shown.report, str(settings.page), unit=settings.show
+        )
+        output.say_written([made], quiet=shown.quiet)
     nothing = result.diagnosis.verdict == "NONE" and not result.diagnosis.faults
     raise typer.Exit(ExitCode.FINE if nothing else ExitCode.ATTENTION)
 

@@ -2,94 +2,74 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mlg_troubleshoot.cli import history, options
+from mlg_troubleshoot.cli import options
 from mlg_troubleshoot.cli.options import ReportFormat
+from mlg_troubleshoot.decision.columns import (
+    MARGIN,
+    OUTCOME,
+    PLUNGER_DISPLACEMENT,
+    RECORD_ID,
+    SIDE,
+    TAIL_NO,
+)
 from mlg_troubleshoot.gear import DEFAULT_GEAR
+
+# Flags of one gear entered by hand: what each gives to its column as it is typed, and its help.
+_OF_ONE_GEAR: options.ColumnFlags = {
+    TAIL_NO.name: ("--tail", None, "Tail number, with --set or the prompts."),
+    SIDE.name: ("--side", "LH|RH", "Which gear."),
+    RECORD_ID.name: ("--record-id", None, "Identifier of the record."),
+    OUTCOME.name: ("--outcome", "RETRACTED|FAILED", "What the gear did."),
+    PLUNGER_DISPLACEMENT.name: (
+        "--measured",
+        "VALUE",
+        "Measured plunger displacement at mid-position, e.g. 0.041in.",
+    ),
+    MARGIN.name: ("--margin", "VALUE", "This gear's own margin, e.g. 0.028in."),
+    "restored_joints": ("--restored", "JOINTS", "Joints restored since, e.g. 3,5."),
+    "repair_date": ("--repair-date", "DATE", "When, e.g. '2026-03-04 14:30'."),
+    "plunger_date": ("--plunger-date", "DATE", "When the plunger was read."),
+    "outcome_date": ("--outcome-date", "DATE", "When the outcome was seen."),
+    "rigging_checked": (
+        "--rigging-checked",
+        "no|yes|corrected",
+        "Rigging and lock roller: looked at, or set right.",
+    ),
+    "cannot_reach": ("--cannot-reach", "JOINTS", "Joints out of reach today, e.g. 4."),
+    "no_spare": ("--no-spare", "JOINTS", "Joints without a spare part, e.g. 3."),
+    "open_areas": ("--open", "AREAS", "Areas that are open, e.g. sidestay."),
+    "minutes_available": ("--minutes", "MIN", "Minutes left for the work today."),
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Flags:
-    """What the flags say of one gear, as it was typed."""
+    """What the flags say of one gear, as it was typed: clearances by joint, the rest by column."""
 
     values: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="JOINT=VALUE", help="One clearance, e.g. 3=0.013in."),
     ] = None
-    tail: Annotated[
-        str | None, typer.Option("--tail", help="Tail number, with --set or the prompts.")
-    ] = None
-    side: Annotated[str | None, typer.Option("--side", metavar="LH|RH", help="Which gear.")] = None
-    record_id: Annotated[
-        str | None, typer.Option("--record-id", help="Identifier of the record.")
-    ] = None
-    outcome: Annotated[
-        str | None, typer.Option("--outcome", metavar="RETRACTED|FAILED", help="What the gear did.")
-    ] = None
-    measured: Annotated[
-        str | None,
-        typer.Option(
-            "--measured",
-            metavar="VALUE",
-            help="Measured plunger displacement at mid-position, e.g. 0.041in.",
-        ),
-    ] = None
-    margin: Annotated[
-        str | None,
-        typer.Option("--margin", metavar="VALUE", help="This gear's own margin, e.g. 0.028in."),
-    ] = None
-    restored: Annotated[
-        str | None,
-        typer.Option("--restored", metavar="JOINTS", help="Joints restored since, e.g. 3,5."),
-    ] = None
-    repair_date: Annotated[
-        str | None,
-        typer.Option("--repair-date", metavar="DATE", help="When, e.g. '2026-03-04 14:30'."),
-    ] = None
-    plunger_date: Annotated[
-        str | None,
-        typer.Option("--plunger-date", metavar="DATE", help="When the plunger was read."),
-    ] = None
-    outcome_date: Annotated[
-        str | None,
-        typer.Option("--outcome-date", metavar="DATE", help="When the outcome was seen."),
-    ] = None
-    rigging_checked: Annotated[
-        str | None,
-        typer.Option(
-            "--rigging-checked",
-            metavar="no|yes|corrected",
-            help="Rigging and lock roller: looked at, or set right.",
-        ),
-    ] = None
-    cannot_reach: Annotated[
-        str | None,
-        typer.Option("--cannot-reach", metavar="JOINTS", help="Joints out of reach today, e.g. 4."),
-    ] = None
-    no_spare: Annotated[
-        str | None,
-        typer.Option("--no-spare", metavar="JOINTS", help="Joints without a spare part, e.g. 3."),
-    ] = None
-    open_areas: Annotated[
-        str | None,
-        typer.Option("--open", metavar="AREAS", help="Areas that are open, e.g. sidestay."),
-    ] = None
-    minutes: Annotated[
-        str | None,
-        typer.Option("--minutes", metavar="MIN", help="Minutes left for the work today."),
-    ] = None
+    typed: Annotated[Mapping[str, str], _OF_ONE_GEAR] = field(default_factory=dict)
+
+    def labels(self) -> dict[str, str]:
+        """What a refusal calls each column."""
+        return {
+            column: f"{_OF_ONE_GEAR[column][0]} {text!r}" for column, text in self.typed.items()
+        }
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class Wanted(options.Output):
     """What ``mlg check`` predicts with, shows, writes and keeps."""
 
-    report: options.Report = None
     formats: Annotated[
         list[ReportFormat] | None,
         typer.Option(
@@ -99,7 +79,6 @@ class Wanted:
             help="Report format, may repeat; default html and pdf. HTML is the accessible form.",
         ),
     ] = None
-    page: options.Paper = None
     extension: Annotated[
         list[Path] | None,
         typer.Option(
@@ -128,7 +107,7 @@ class Wanted:
         bool,
         typer.Option("--keep", help="Add the inspections to the store; the prompts always do."),
     ] = False
-    store: history.Place = None
+    store: options.Place = None
     tails: Annotated[
         str | None,
         typer.Option(
@@ -146,19 +125,15 @@ class Wanted:
             "--all", help="In a batch, every inspection instead of the latest of each gear."
         ),
     ] = False
-    force: options.Force = False
-    show: options.Show = None
     remember: options.Remember = False
     seed: Annotated[
         int,
         typer.Option("--seed", min=0, help="Seed of the Monte Carlo check of a single gear."),
     ] = 1
-    as_json: options.Json = False
-    quiet: options.Quiet = False
 
 
 @dataclass(frozen=True, slots=True)
-class StudyFlags:
+class StudyFlags(options.Output):
     """What ``mlg study`` computes, shows and writes."""
 
     gear: options.Gear = DEFAULT_GEAR
@@ -273,16 +248,3 @@ class StudyFlags:
             help="Also estimate indices from measured inspections, without a model.",
         ),
     ] = None
-    report: Annotated[
-        Path | None,
-        typer.Option(
-            "--report",
-            metavar="DIR",
-            help="Write a printable report with figures, statements and bound.",
-        ),
-    ] = None
-    page: options.Paper = None
-    force: options.Force = False
-    show: options.Show = None
-    as_json: options.Json = False
-    quiet: options.Quiet = False

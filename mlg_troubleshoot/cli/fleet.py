@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mlg_troubleshoot.cli import history, options, output
-from mlg_troubleshoot.gear import DEFAULT_GEAR
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
@@ -16,41 +15,29 @@ EPILOG = "Example: [b]mlg fleet[/b] · [b]mlg fleet --json[/b]"
 _LINES = 60
 
 
+@options.flat
 def fleet(
-    store: history.Place = None,
-    gear: options.Gear = DEFAULT_GEAR,
-    no_forecast: history.NoForecast = False,
-    report: options.Report = None,
-    page: options.Paper = None,
-    force: options.Force = False,
-    show: options.Show = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
+    *, records: options.Records, no_forecast: options.NoForecast = False, shown: options.Output
 ) -> None:
     """Show every gear in the store: verdict, landings left, next inspection due; worst first."""
-    from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.cli.progress import stages
-    from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.life.unrecorded_work import suggestions
     from mlg_troubleshoot.reporting.life_json import fleet_as_json
     from mlg_troubleshoot.workflows.history import show_fleet
 
-    known = load_gear(gear)
-    claim(gear, (), (), report, store=store, force=force)
-    shown = settings(gear, show, page)
-    with stages(quiet=quiet) as bar:
-        place = history.kept_in(store, gear)
-        found = show_fleet(place, known, ahead=not no_forecast, progress=bar)
-    if not quiet:
+    known = load_gear(records.gear)
+    settings = shown.begin(records.gear, store=records.store)
+    with stages(quiet=shown.quiet) as bar:
+        found = show_fleet(records.kept, known, ahead=not no_forecast, progress=bar)
+    if not shown.quiet:
         for line in suggestions(found.lives, found.model, known):
             output.say(f"Note: {line}")
-    if as_json:
+    if shown.as_json:
         output.write_json(fleet_as_json(found.lives, found.forecasts))
     else:
         _show(found)
-    if report is not None:
-        history.write_pages(found, report, shown, fleet=True, quiet=quiet)
+    history.write_pages(found, shown, settings, fleet=True)
 
 
 def _show(found: Lives) -> None:

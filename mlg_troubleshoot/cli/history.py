@@ -12,7 +12,6 @@ from typer.core import TyperGroup
 
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import ExitCode, UsageError
-from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.units import Length, LengthUnit
 
 if TYPE_CHECKING:
@@ -30,14 +29,6 @@ EPILOG = (
 )
 _SHOW = "show"
 
-Place = Annotated[
-    str | None,
-    typer.Option(
-        "--store",
-        metavar="PATH|URL",
-        help="Store of the records; else MLG_STORE, else a file of your own.",
-    ),
-]
 Tail = Annotated[str, typer.Argument(metavar="TAIL", help="Tail number.")]
 Side = Annotated[str, typer.Argument(metavar="LH|RH", help="Which gear.")]
 RecordId = Annotated[
@@ -49,9 +40,6 @@ Landings = Annotated[
 ]
 WorkOrder = Annotated[str | None, typer.Option("--work-order", help="Work order.")]
 Chain = Annotated[Path, typer.Argument(metavar="FILE", help="JSON Lines, one record per line.")]
-NoForecast = Annotated[
-    bool, typer.Option("--no-forecast", help="Records only, without a forecast: faster.")
-]
 
 
 class HistoryGroup(TyperGroup):
@@ -63,86 +51,70 @@ class HistoryGroup(TyperGroup):
         return super().parse_args(ctx, args)
 
 
-def kept_in(place: str | None, gear: str) -> Store:
-    """The store, in which every content is judged as it is read."""
-    from mlg_troubleshoot.gear.gear_file import load_gear
-    from mlg_troubleshoot.store import Store
-    from mlg_troubleshoot.workflows.kept import KeptGate
-
-    return Store(place, judge=KeptGate(load_gear(gear)))
-
-
+@options.flat
 def show(
+    *,
     tail: Annotated[
         str | None, typer.Argument(metavar="[TAIL]", help="Tail number; without it all gears.")
     ] = None,
     side: Annotated[
         str | None, typer.Argument(metavar="[LH|RH]", help="Which gear; without it both.")
     ] = None,
-    store: Place = None,
-    gear: options.Gear = DEFAULT_GEAR,
-    no_forecast: NoForecast = False,
-    report: options.Report = None,
-    page: options.Paper = None,
-    force: options.Force = False,
-    show_in: options.Show = None,
-    as_json: options.Json = False,
+    records: options.Records,
+    no_forecast: options.NoForecast = False,
+    shown: options.Output,
 ) -> None:
     """Show the records: the gears and their latest state, or one gear's life with the forecast of
     each joint.
     """
-    from mlg_troubleshoot.cli.claims import claim
-    from mlg_troubleshoot.cli.remembered import settings
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.life.folding import lives
     from mlg_troubleshoot.reporting import life_json
     from mlg_troubleshoot.workflows import history
 
-    place, known = kept_in(store, gear), load_gear(gear)
-    claim(gear, (), (), report, store=store, force=force)
-    shown = settings(gear, show_in, page)
+    place, known = records.kept, load_gear(records.gear)
+    settings = shown.begin(records.gear, store=records.store)
     if tail is None:
-        if report is not None:
+        if shown.report is not None:
             raise UsageError(
                 "--report needs a gear",
                 "Give TAIL, or write the page of all gears: mlg fleet --report DIR",
             )
         everything = list(lives(place).values())
-        if as_json:
+        if shown.as_json:
             output.write_json(life_json.fleet_as_json(everything, {}))
         else:
             _show_gears(everything, place.place)
         return
     found = history.show_lives(place, known, tail, side, ahead=not no_forecast)
-    if as_json and len(found.lives) != 1:
+    if shown.as_json and len(found.lives) != 1:
         tail = found.lives[0].key[0]
         raise UsageError(
             f"{tail} has two gears here, and JSON shows one", f"Run: mlg history {tail} LH --json"
         )
     for life in found.lives:
-        if as_json:
+        if shown.as_json:
             output.write_json(life_json.life_as_json(life, found.forecasts[life.key], known))
         else:
-            _show_life(life, found.forecasts[life.key], known, shown.show)
-    if report is not None:
-        write_pages(found, report, shown, fleet=False)
+            _show_life(life, found.forecasts[life.key], known, settings.show)
+    write_pages(found, shown, settings, fleet=False)
 
 
-def write_pages(
-    found: Lives, report: Path, shown: Settings, *, fleet: bool, quiet: bool = False
-) -> None:
-    """Write the pages of gears, and name them on stderr."""
+def write_pages(found: Lives, shown: options.Output, settings: Settings, *, fleet: bool) -> None:
+    """Write the pages of gears if they are asked for, and name them on stderr."""
     from mlg_troubleshoot.workflows import history
 
+    if shown.report is None:
+        return
     written = history.write_pages(
         found,
-        report,
+        shown.report,
         fleet=fleet,
-        page=shown.page.value,
-        unit=shown.show,
-        remembered=shown.note or None,
+        page=settings.page.value,
+        unit=settings.show,
+        remembered=settings.note or None,
     )
-    output.say_written(written, quiet=quiet)
+    output.say_written(written, quiet=shown.quiet)
 
 
 def _show_gears(found: Sequence[GearLife], place: str) -> None:
@@ -282,7 +254,9 @@ def _say_added(place: Store, what: str, record: Record) -> None:
         output.say(f"Warning: {warning}")
 
 
+@options.flat
 def repair(
+    *,
     tail: Tail,
     side: Side,
     joints: Annotated[
@@ -292,8 +266,7 @@ def repair(
     day: Day,
     landings: Landings = None,
     work_order: WorkOrder = None,
-    store: Place = None,
-    gear: options.Gear = DEFAULT_GEAR,
+    records: options.Records,
 ) -> None:
     """Record joints that were restored: their wear starts again."""
     from mlg_troubleshoot.decision.sentences import joint_list
@@ -301,10 +274,9 @@ def repair(
     from mlg_troubleshoot.store import RecordKind
     from mlg_troubleshoot.workflows import history
 
-    known = load_gear(gear)
-    known.require_joints(joints, "--joint")
+    load_gear(records.gear).require_joints(joints, "--joint")
     restored = sorted(set(joints))
-    place = kept_in(store, gear)
+    place = records.kept
     record = history.work(
         place, RecordKind.REPAIR, (tail, side), day, work_order, landings, restored
     )
@@ -312,31 +284,33 @@ def repair(
     _say_added(place, f"repair of {record.tail_no} {record.side}, {listed}", record)
 
 
+@options.flat
 def rerig(
+    *,
     tail: Tail,
     side: Side,
     day: Day,
     landings: Landings = None,
     work_order: WorkOrder = None,
-    store: Place = None,
-    gear: options.Gear = DEFAULT_GEAR,
+    records: options.Records,
 ) -> None:
     """Record that the reversing valve was re-rigged; the wear of the joints continues."""
     from mlg_troubleshoot.store import RecordKind
     from mlg_troubleshoot.workflows import history
 
-    place = kept_in(store, gear)
+    place = records.kept
     record = history.work(place, RecordKind.RERIG, (tail, side), day, work_order, landings)
     _say_added(place, f"re-rigging of {record.tail_no} {record.side}", record)
 
 
+@options.flat
 def correct(
+    *,
     record: RecordId,
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="A table with the one corrected inspection.")
     ],
-    store: Place = None,
-    gear: options.Gear = DEFAULT_GEAR,
+    records: options.Records,
     unit: options.Unit = None,
     convention: options.Convention = None,
     sheet: options.Sheet = None,
@@ -346,50 +320,53 @@ def correct(
     from mlg_troubleshoot.workflows import keep
     from mlg_troubleshoot.workflows.check import CheckOptions, check_files
 
-    asked = CheckOptions(gear=gear, unit=unit, convention=convention, sheet=sheet)
+    asked = CheckOptions(gear=records.gear, unit=unit, convention=convention, sheet=sheet)
     result = check_files([file], asked)
     notes.show_problems(result.problems)
-    place = kept_in(store, gear)
+    place = records.kept
     added = keep.correct(place, record, result, asked)
     _say_added(place, f"correction of {record} ({added.tail_no} {added.side})", added)
 
 
+@options.flat
 def void(
+    *,
     record: RecordId,
     why: Annotated[
         str, typer.Option("--why", metavar="TEXT", help="Why the record does not count.")
     ],
-    store: Place = None,
-    gear: options.Gear = DEFAULT_GEAR,
+    records: options.Records,
 ) -> None:
     """Void a record: it stays in the chain but does not count."""
     from mlg_troubleshoot.workflows import history
 
-    added = history.void(kept_in(store, gear), record, why)
+    added = history.void(records.kept, record, why)
     output.say(f"Kept: {record} ({added.tail_no} {added.side}) does not count.")
 
 
+@options.flat
 def outcome(
+    *,
     record: RecordId,
     found: Annotated[str, typer.Option("--found", metavar="TEXT", help="What was found.")],
     joint: Annotated[
         int | None, typer.Option("--joint", metavar="N", help="The joint that was the cause.")
     ] = None,
-    store: Place = None,
-    gear: options.Gear = DEFAULT_GEAR,
+    records: options.Records,
 ) -> None:
     """Record what was found after the advice; mlg history then shows how often it was right."""
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.workflows import history
 
     if joint is not None:
-        load_gear(gear).require_joints([joint], "--joint")
-    added = history.outcome(kept_in(store, gear), record, found, joint)
+        load_gear(records.gear).require_joints([joint], "--joint")
+    added = history.outcome(records.kept, record, found, joint)
     output.say(f"Kept: outcome of {record} ({added.tail_no} {added.side}).")
 
 
+@options.flat
 def verify(
-    store: Place = None,
+    *,
     expect: Annotated[
         str | None,
         typer.Option(
@@ -398,7 +375,7 @@ def verify(
             help="A last hash noted earlier; it must still be in the chain.",
         ),
     ] = None,
-    gear: options.Gear = DEFAULT_GEAR,
+    records: options.Records,
 ) -> None:
     """Check the chain and name the first record that does not fit (exit code 1). It does not prove
     who wrote a record.
@@ -414,7 +391,7 @@ def verify(
             f"--expect {expect!r} is not a hash",
             "Give the 64 letters and digits that verify printed.",
         )
-    found = history.verify(kept_in(store, gear), noted)
+    found = history.verify(records.kept, noted)
     if found.broken is None:
         output.write(f"{found.count} records fit the chain.")
     else:
@@ -452,31 +429,28 @@ def _expected(found: Verified) -> str:
     )
 
 
-def export(
-    file: Chain,
-    store: Place = None,
-    gear: options.Gear = DEFAULT_GEAR,
-    force: options.Force = False,
-) -> None:
+@options.flat
+def export(*, file: Chain, records: options.Records, force: options.Force = False) -> None:
     """Write the whole chain as JSON Lines."""
     from mlg_troubleshoot.cli.claims import claim
     from mlg_troubleshoot.outputs import OutputFile, OutputKind, write_text
 
-    lines = list(kept_in(store, gear).export())
+    lines = list(records.kept.export())
     # An export of another store may be all that is left of it.
     own = OutputKind.marked("is not an export of this store", lines[0] if lines else "")
-    claim(None, (), [OutputFile("the export", file, own)], store=store, force=force)
+    claim(None, (), [OutputFile("the export", file, own)], store=records.store, force=force)
     write_text(file, "".join(lines))
     output.say(f"Written: {file}, {len(lines)} records.")
 
 
-def import_chain(file: Chain, store: Place = None, gear: options.Gear = DEFAULT_GEAR) -> None:
+@options.flat
+def import_chain(*, file: Chain, records: options.Records) -> None:
     """Read an exported chain into an empty store, or the rest of it into a store that contains its
     beginning.
     """
     from mlg_troubleshoot.workflows import history
 
-    added = history.import_file(kept_in(store, gear), file)
+    added = history.import_file(records.kept, file)
     output.say(f"Imported: {added.new} records; {added.known} were there already.")
 
 

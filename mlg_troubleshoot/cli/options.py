@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from enum import StrEnum
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+
+if TYPE_CHECKING:
+    from mlg_troubleshoot.cli.remembered import Settings
+    from mlg_troubleshoot.outputs import OutputFile
+    from mlg_troubleshoot.store import Store
 
 
 class ReportFormat(StrEnum):
@@ -137,6 +142,72 @@ Json = Annotated[bool, typer.Option("--json", help="Write the result as JSON to 
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no notes.")]
 
 
+Place = Annotated[
+    str | None,
+    typer.Option(
+        "--store",
+        metavar="PATH|URL",
+        help="Store of the records; else MLG_STORE, else a file of your own.",
+    ),
+]
+# The flag of a column, what it takes and its help.
+ColumnFlags = Mapping[str, tuple[str, str | None, str]]
+
+
+NoForecast = Annotated[
+    bool, typer.Option("--no-forecast", help="Records only, without a forecast: faster.")
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """What a command writes in addition to its screen, and how it shows lengths."""
+
+    report: Report = None
+    page: Paper = None
+    force: Force = False
+    show: Show = None
+    as_json: Json = False
+    quiet: Quiet = False
+
+    def begin(
+        self,
+        gear: str,
+        inputs: Iterable[str | Path | None] = (),
+        outputs: Sequence[OutputFile] = (),
+        *,
+        store: str | None = None,
+        tables: Tables | None = None,
+        keep: bool = False,
+    ) -> Settings:
+        """Claim what will be written before anything is read; return how it is shown, and how the
+        headers of tables are read.
+        """
+        from mlg_troubleshoot.cli.claims import claim
+        from mlg_troubleshoot.cli.remembered import settings
+
+        claim(gear, inputs, outputs, self.report, store=store, force=self.force)
+        columns = {} if tables is None else tables.columns
+        return settings(gear, self.show, self.page, columns, keep=keep)
+
+
+@dataclass(frozen=True, slots=True)
+class Records:
+    """Where records are kept, and the gear that says what their joints are."""
+
+    store: Place = None
+    gear: Gear = DEFAULT_GEAR
+
+    @property
+    def kept(self) -> Store:
+        """The store, in which every content is judged as it is read."""
+        from mlg_troubleshoot.gear.gear_file import load_gear
+        from mlg_troubleshoot.store import Store
+        from mlg_troubleshoot.workflows.kept import KeptGate
+
+        return Store(self.store, judge=KeptGate(load_gear(self.gear)))
+
+
 @dataclass(frozen=True, slots=True)
 class Tables:
     """The gear, and what is declared about the tables that are read."""
@@ -175,24 +246,36 @@ class Tables:
 
 def flat(command: Callable[..., None]) -> Callable[..., None]:
     """Let a command take options as dataclasses: on the command line each field of one is an
-    option.
+    option, and a field with flags of columns is one option per column.
     """
     hints = get_type_hints(command, include_extras=True)
     groups: dict[str, Any] = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
     shown: list[Parameter] = []
+    columns: dict[str, ColumnFlags] = {}
+
+    def show(name: str, default: Any, hint: Any) -> None:
+        shown.append(Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=hint))
+
     for name, parameter in signature(command).parameters.items():
-        if name in groups:
-            own, named = get_type_hints(groups[name], include_extras=True), Parameter.KEYWORD_ONLY
-            options = [(each.name, each.default) for each in fields(groups[name])]
-            shown += [
-                Parameter(name, named, default=default, annotation=own[name])
-                for name, default in options
-            ]
-        else:
-            shown.append(parameter.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[name]))
+        if name not in groups:
+            show(name, parameter.default, hints[name])
+            continue
+        own = get_type_hints(groups[name], include_extras=True)
+        for each in fields(groups[name]):
+            (flags, *_) = getattr(own[each.name], "__metadata__", ((),))
+            if not isinstance(flags, Mapping):
+                show(each.name, each.default, own[each.name])
+                continue
+            columns[each.name] = flags
+            for column, (flag, takes, said) in flags.items():
+                option = typer.Option(flag, metavar=takes, help=said)
+                show(column, None, Annotated[str | None, option])
 
     @wraps(command)
     def run(**given: Any) -> None:
+        for name, flags in columns.items():
+            typed = {column: given.pop(column) for column in flags}
+            given[name] = {column: text for column, text in typed.items() if text is not None}
         for name, group in groups.items():
             given[name] = group(**{each.name: given.pop(each.name) for each in fields(group)})
         command(**given)

@@ -16,8 +16,7 @@ EPILOG = (
 def study(flags: StudyFlags, _version: options.Version = False) -> None:
     """Recompute the sensitivity and amplification indices of every joint."""
     from mlg_troubleshoot.cli import study_run
-    from mlg_troubleshoot.cli.claims import WRITE_TABLE, claim
-    from mlg_troubleshoot.cli.remembered import settings
+    from mlg_troubleshoot.cli.claims import WRITE_TABLE
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.indices.index_table import INDEX_TABLE
     from mlg_troubleshoot.outputs import CONTINUED, OutputFile
@@ -29,7 +28,6 @@ def study(flags: StudyFlags, _version: options.Version = False) -> None:
     ]
     if flags.write_table:
         outputs.append(OutputFile(WRITE_TABLE, load_gear(flags.gear).indices_file, INDEX_TABLE))
-    claim(flags.gear, [flags.given], outputs, flags.report, force=flags.force)
-    shown = settings(flags.gear, flags.show, flags.page)
+    shown = flags.begin(flags.gear, [flags.given], outputs)
     with study_run.asked(flags) as (known, wanted):
         study_run.run(known, wanted, flags, shown)

@@ -24,7 +24,9 @@ EPILOG = (
 )
 
 
+@options.flat
 def survey(
+    *,
     context: typer.Context,
     file: Annotated[
         str,
@@ -55,12 +57,7 @@ def survey(
         ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the starts and draws.")] = 0,
-    force: options.Force = False,
-    report: options.Report = None,
-    page: options.Paper = None,
-    show: options.Show = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
+    wanted: options.Output,
     _version: options.Version = False,
 ) -> None:
     """A geometry from measurements: your own gear in place of the reconstructed one.
@@ -74,14 +71,14 @@ def survey(
     from mlg_troubleshoot.workflows import survey as task
 
     gear = context.obj or DEFAULT_GEAR
-    shown = settings(gear, show, page)
+    shown = settings(gear, wanted.show, wanted.page)
     if file in ("template", "ask") and template is None and not Path(file).exists():
         raise UsageError(
             f"{file} needs the name of a file",
             f"Give for example: mlg gear survey {file} survey.csv",
         )
     if file == "template" and template is not None:
-        claim(gear, (), [OutputFile("the template", template, TO_FILL_IN)], force=force)
+        claim(gear, (), [OutputFile("the template", template, TO_FILL_IN)], force=wanted.force)
         task.write_survey_template(template, gear, shown.show)
         output.write(
             f"Written: {template}. Fill in what you read, then: mlg gear survey {template} --write"
@@ -96,8 +93,8 @@ def survey(
             "Give one survey, or: mlg gear survey template FILE.csv",
         )
     outputs = () if write is None else task.written_with(write)
-    claim(gear, [file, inspections], outputs, report, force=force)
-    with stages(quiet=quiet) as bar:
+    claim(gear, [file, inspections], outputs, wanted.report, force=wanted.force)
+    with stages(quiet=wanted.quiet) as bar:
         result = task.survey_gear(
             file,
             gear,
@@ -106,19 +103,19 @@ def survey(
             seed=seed,
             on_progress=partial(bar, "Fitting"),
         )
-    if as_json:
+    if wanted.as_json:
         from mlg_troubleshoot.reporting.model_json import survey_as_json
 
         output.write_json(survey_as_json(result))
     else:
         _show(result, output.console(unit=shown.show))
     written = None
-    if report is not None:
+    if wanted.report is not None:
         written = task.write_survey_report(
-            result, Path(file), report, shown.page, shown.show, remembered=shown.note or None
+            result, Path(file), wanted.report, shown.page, shown.show, remembered=shown.note or None
         )
     if written is not None:
-        output.say_written([written], quiet=quiet)
+        output.say_written([written], quiet=wanted.quiet)
     raise typer.Exit(result.exit_code)
 
 

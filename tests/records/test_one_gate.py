@@ -109,7 +109,7 @@ def by_cell(gear: Gear, value: object, margin: str, convention: Convention) -> F
 
 
 def by_flag(gear: Gear, value: str, margin: str, convention: Convention) -> Found:
-    flags = Flags([f"3={value}"], "N1", "LH", "R1", margin=margin)
+    flags = Flags([f"3={value}"], {"tail_no": "N1", "side": "LH", "record_id": "R1", "margin": margin})
     asked = CheckOptions(unit=LengthUnit.INCH, convention=convention)
     try:
         row = from_flags(flags, asked)
