@@ -547,6 +547,7 @@ class ShownPoint(TypedDict):
 class GearOutput(TypedDict):
     """Output of mlg gear --json."""
 
+    schema_version: Version
     id: str
     name: str
     provenance: str
@@ -577,6 +578,7 @@ class VerifiedNumber(TypedDict):
 class VerifyOutput(TypedDict):
     """Output of mlg gear verify --json."""
 
+    schema_version: Version
     gear: str
     numbers: list[VerifiedNumber]
 

@@ -216,6 +216,14 @@ def test_an_empty_store_fits_its_schema(tmp_path: Path, monkeypatch: pytest.Monk
     assert complain("fleet", mlg("fleet", "--json", "-q").json) == []
 
 
+@pytest.mark.parametrize("name", schemas.NAMES)
+def test_every_output_states_the_version_of_its_schema(name: str) -> None:
+    kinds = schemas.schema(name)["$defs"].values()
+    outputs = [k for k in kinds if k.get("description", "").startswith("Output of")]
+    assert outputs
+    assert all("schema_version" in kind["required"] for kind in outputs)
+
+
 @pytest.mark.parametrize(
     ("name", "arguments"),
     [

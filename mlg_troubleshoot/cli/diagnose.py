@@ -32,15 +32,12 @@ def diagnose(
     ],
     write_extension: Annotated[
         Path | None,
-        typer.Option(
-            "--write-extension", metavar="EXT.toml", help="Write the extended model to this file."
-        ),
+        typer.Option(metavar="EXT.toml", help="Write the extended model to this file."),
     ] = None,
     causes: options.Causes = None,
     sure: Annotated[
         float,
         typer.Option(
-            "--sure",
             min=0.5,
             max=0.999,
             help="Probability from which a cause is named: of ten named at 0.9 nine are right.",
@@ -59,13 +56,14 @@ def diagnose(
     from mlg_troubleshoot.cli.views.notes import show_notes, show_problems
     from mlg_troubleshoot.diagnosis import EXTENSION
     from mlg_troubleshoot.diagnosis import write_extension as keep_extension
-    from mlg_troubleshoot.outputs import SCHEMA_VERSION, OutputFile
-    from mlg_troubleshoot.reporting.json_form import diagnosis_as_json
+    from mlg_troubleshoot.output_types import NotConcluded
+    from mlg_troubleshoot.outputs import OutputFile
+    from mlg_troubleshoot.reporting.json_form import diagnosis_as_json, written
     from mlg_troubleshoot.workflows import diagnose as task
 
-    written = OutputFile("--write-extension", write_extension, EXTENSION)
+    outputs = [OutputFile("--write-extension", write_extension, EXTENSION)]
     inputs = [*files, *(causes or ())]
-    settings = shown.begin(tables.gear, inputs, [written], tables=tables, keep=remember)
+    settings = shown.begin(tables.gear, inputs, outputs, tables=tables, keep=remember)
     asked = task.DiagnoseOptions(
         **tables.declared(settings.headers),
         remembered=settings.note or None,
@@ -82,7 +80,7 @@ def diagnose(
     except InconclusiveDataError as error:
         if shown.as_json:
             reason = {"reason": error.message, "remedy": error.remedy}
-            output.write_json({"schema_version": SCHEMA_VERSION, "verdict": None, **reason})
+            output.write_json(written(NotConcluded, verdict=None, **reason))
         raise
     if shown.as_json:
         warnings = (*filter(None, [asked.remembered]), *result.notes)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-
 import typer
 
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import ExitCode
 from mlg_troubleshoot.gear import DEFAULT_GEAR
-from mlg_troubleshoot.outputs import SCHEMA_VERSION
 
 
 def doctor(
@@ -24,9 +21,10 @@ def doctor(
 
     findings = task.examine_installation(gear)
     if as_json:
-        output.write_json(
-            {"schema_version": SCHEMA_VERSION, "abilities": [asdict(f) for f in findings]}
-        )
+        from mlg_troubleshoot.output_types import DoctorOutput
+        from mlg_troubleshoot.reporting.json_form import written
+
+        output.write_json(written(DoctorOutput, abilities=findings))
     else:
         console = output.console()
         for finding in findings:

@@ -82,7 +82,6 @@ class Wanted(options.Output):
     extension: Annotated[
         list[Path] | None,
         typer.Option(
-            "--extension",
             metavar="TOML",
             help="Predict with an extension of the model; may repeat.",
         ),
@@ -91,14 +90,13 @@ class Wanted(options.Output):
     annotate: Annotated[
         Path | None,
         typer.Option(
-            "--annotate",
             metavar="OUT.xlsx",
             help="Your workbook with bad cells marked and verdicts added.",
         ),
     ] = None
     csv: Annotated[
         Path | None,
-        typer.Option("--csv", metavar="OUT.csv", help="Verdicts as a CSV, one line per gear."),
+        typer.Option(metavar="OUT.csv", help="Verdicts as a CSV, one line per gear."),
     ] = None
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue the last unfinished entry.")
@@ -111,7 +109,6 @@ class Wanted(options.Output):
     tails: Annotated[
         str | None,
         typer.Option(
-            "--tails",
             metavar="same|apart",
             help="Whether tails that differ only in case, blanks or dashes are one aircraft.",
         ),
@@ -128,7 +125,7 @@ class Wanted(options.Output):
     remember: options.Remember = False
     seed: Annotated[
         int,
-        typer.Option("--seed", min=0, help="Seed of the Monte Carlo check of a single gear."),
+        typer.Option(min=0, help="Seed of the Monte Carlo check of a single gear."),
     ] = 1
 
 
@@ -140,7 +137,6 @@ class StudyFlags(options.Output):
     design: Annotated[
         str,
         typer.Option(
-            "--design",
             metavar="fast|sampled|tensor|lhs|lhs+ccd|ccd",
             help=(
                 "fast = polynomial chaos that checks itself; sampled = Sobol points; tensor = exact"
@@ -148,26 +144,19 @@ class StudyFlags(options.Output):
             ),
         ),
     ] = "fast"
-    accuracy: Annotated[float, typer.Option("--accuracy", help="Maximum error of every index.")] = (
-        1e-3
-    )
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all random draws.")] = 0
+    accuracy: Annotated[float, typer.Option(help="Maximum error of every index.")] = 1e-3
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all random draws.")] = 0
     directions: Annotated[
         str,
-        typer.Option(
-            "--directions", metavar="worst|over|under|random", help="Direction of the clearances."
-        ),
+        typer.Option(metavar="worst|over|under|random", help="Direction of the clearances."),
     ] = "worst"
     fixed: Annotated[
         str | None,
-        typer.Option(
-            "--fixed", metavar="DEG,DEG,…", help="Directions set by a load, one per joint."
-        ),
+        typer.Option(metavar="DEG,DEG,…", help="Directions set by a load, one per joint."),
     ] = None
     distribution: Annotated[
         str,
         typer.Option(
-            "--distribution",
             metavar="uniform|falling|rising|half-normal",
             help="Distribution of the clearances.",
         ),
@@ -175,7 +164,6 @@ class StudyFlags(options.Output):
     limit: Annotated[
         float | None,
         typer.Option(
-            "--limit",
             metavar="IN",
             help="One limit in inches for all joints, instead of the gear's.",
         ),
@@ -200,40 +188,28 @@ class StudyFlags(options.Output):
             help="Worst displacement at the limits: sequential rule, global search, proved bound.",
         ),
     ] = False
-    most: Annotated[int, typer.Option("--most", min=1, help="Maximum number of evaluations.")] = (
-        1 << 24
-    )
+    most: Annotated[int, typer.Option(min=1, help="Maximum number of evaluations.")] = 1 << 24
     n1: Annotated[
-        int | None, typer.Option("--n1", help="Repetitions of a paper design; 100 if not given.")
+        int | None, typer.Option(help="Repetitions of a paper design; 100 if not given.")
     ] = None
     n2: Annotated[
         int | None,
-        typer.Option(
-            "--n2", help="Levels of a paper design; 1000 (lhs) or 862 (lhs+ccd) if not given."
-        ),
+        typer.Option(help="Levels of a paper design; 1000 (lhs) or 862 (lhs+ccd) if not given."),
     ] = None
     iterations: Annotated[
         int | None,
-        typer.Option("--iterations", help="Iterations of a paper design; 10 if not given."),
+        typer.Option(help="Iterations of a paper design; 10 if not given."),
     ] = None
-    workers: Annotated[
-        int, typer.Option("--workers", min=1, help="Cores for the total order of lhs.")
-    ] = 2
+    workers: Annotated[int, typer.Option(min=1, help="Cores for the total order of lhs.")] = 2
     state: Annotated[
         Path | None,
-        typer.Option(
-            "--state", metavar="FILE", help="Keep finished blocks here and resume from them."
-        ),
+        typer.Option(metavar="FILE", help="Keep finished blocks here and resume from them."),
     ] = None
     scheduler: Annotated[
         str | None,
-        typer.Option(
-            "--scheduler", metavar="ADDRESS", help="Dask cluster for the total order of lhs."
-        ),
+        typer.Option(metavar="ADDRESS", help="Dask cluster for the total order of lhs."),
     ] = None
-    csv: Annotated[
-        Path | None, typer.Option("--csv", metavar="OUT.csv", help="One line per joint.")
-    ] = None
+    csv: Annotated[Path | None, typer.Option(metavar="OUT.csv", help="One line per joint.")] = None
     write_table: Annotated[
         bool,
         typer.Option(
@@ -243,7 +219,6 @@ class StudyFlags(options.Output):
     given: Annotated[
         Path | None,
         typer.Option(
-            "--given",
             metavar="FILE",
             help="Also estimate indices from measured inspections, without a model.",
         ),

@@ -109,7 +109,12 @@ def verify(
     numbers = verification.verify(gear)
     failed = [n for n in numbers if n.target.expected and not n.holds]
     if as_json:
-        output.write_json({"gear": gear.id, "numbers": [_number(n) for n in numbers]})
+        from mlg_troubleshoot.output_types import VerifyOutput
+        from mlg_troubleshoot.reporting.json_form import written
+
+        output.write_json(
+            written(VerifyOutput, gear=gear.id, numbers=[_number(n) for n in numbers])
+        )
         raise typer.Exit(ExitCode.ATTENTION if failed else ExitCode.FINE)
     console = output.console()
     console.print(f"{gear.name}: geometry {gear.provenance}", style="bold")

@@ -332,9 +332,7 @@ def correct(
 def void(
     *,
     record: RecordId,
-    why: Annotated[
-        str, typer.Option("--why", metavar="TEXT", help="Why the record does not count.")
-    ],
+    why: Annotated[str, typer.Option(metavar="TEXT", help="Why the record does not count.")],
     records: options.Records,
 ) -> None:
     """Void a record: it stays in the chain but does not count."""
@@ -348,9 +346,9 @@ def void(
 def outcome(
     *,
     record: RecordId,
-    found: Annotated[str, typer.Option("--found", metavar="TEXT", help="What was found.")],
+    found: Annotated[str, typer.Option(metavar="TEXT", help="What was found.")],
     joint: Annotated[
-        int | None, typer.Option("--joint", metavar="N", help="The joint that was the cause.")
+        int | None, typer.Option(metavar="N", help="The joint that was the cause.")
     ] = None,
     records: options.Records,
 ) -> None:
@@ -370,7 +368,6 @@ def verify(
     expect: Annotated[
         str | None,
         typer.Option(
-            "--expect",
             metavar="HASH",
             help="A last hash noted earlier; it must still be in the chain.",
         ),

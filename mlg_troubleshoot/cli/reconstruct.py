@@ -27,29 +27,25 @@ def reconstruct(
     targets: Annotated[
         Path | None,
         typer.Option(
-            "--targets",
             metavar="TOML",
             help="Numbers to meet; those printed in the paper if not given.",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random linkages.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random linkages.")] = 0,
     start: Annotated[
         str | None,
         typer.Option(
-            "--start",
             metavar="NAME",
             help="Start from this linkage of the gear (A, B, …); if not given, from random ones.",
         ),
     ] = None,
-    name: Annotated[str, typer.Option("--name", help="Name of the new linkage.")] = "N",
+    name: Annotated[str, typer.Option(help="Name of the new linkage.")] = "N",
     minutes: Annotated[
-        float, typer.Option("--minutes", min=0.01, help="Minutes after which to give up.")
+        float, typer.Option(min=0.01, help="Minutes after which to give up.")
     ] = 15.0,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out", metavar="OUT.toml", help="Write the linkage as a member of an ensemble."
-        ),
+        typer.Option(metavar="OUT.toml", help="Write the linkage as a member of an ensemble."),
     ] = None,
     force: options.Force = False,
     as_json: options.Json = False,

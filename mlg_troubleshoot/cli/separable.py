@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Annotated
 
 import typer
 
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.gear import DEFAULT_GEAR
-from mlg_troubleshoot.outputs import SCHEMA_VERSION
 
 EPILOG = (
     "Example: [b]mlg gear separable --columns"
@@ -22,7 +20,6 @@ def separable(
     columns: Annotated[
         str | None,
         typer.Option(
-            "--columns",
             metavar="A,B,…",
             help="Columns that will be recorded, as in a table; all if not given.",
         ),
@@ -41,13 +38,10 @@ def separable(
     gear = context.obj or DEFAULT_GEAR
     causes = planned(gear, names)
     if as_json:
-        output.write_json(
-            {
-                "schema_version": SCHEMA_VERSION,
-                "columns": names,
-                "causes": [asdict(cause) for cause in causes],
-            }
-        )
+        from mlg_troubleshoot.output_types import SeparableOutput
+        from mlg_troubleshoot.reporting.json_form import written
+
+        output.write_json(written(SeparableOutput, columns=names, causes=causes))
         return
     console = output.console()
     console.print(

@@ -44,9 +44,7 @@ def survey(
     ] = None,
     write: Annotated[
         Path | None,
-        typer.Option(
-            "--write", metavar="GEAR.toml", help="Write the surveyed gear, ensemble and table."
-        ),
+        typer.Option(metavar="GEAR.toml", help="Write the surveyed gear, ensemble and table."),
     ] = None,
     inspections: Annotated[
         Path | None,
@@ -56,7 +54,7 @@ def survey(
             help="Inspections whose displacement to narrow, instead of the indices.",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the starts and draws.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the starts and draws.")] = 0,
     wanted: options.Output,
     _version: options.Version = False,
 ) -> None:

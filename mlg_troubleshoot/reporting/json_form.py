@@ -67,10 +67,10 @@ def _field_names(kind: type) -> tuple[str, ...]:
 
 def written(kind: Any, record: Any = None, /, **given: Any) -> dict[str, Any]:
     """Return a record in the form of an output: each key as it is given, or as the record has
-    it.
+    it. The version of the schema stands in every output that has one.
     """
-    names = kind.__annotations__
-    return {n: plain(given[n] if n in given else getattr(record, n)) for n in names}
+    known = {"schema_version": SCHEMA_VERSION, **given}
+    return {n: plain(known[n] if n in known else getattr(record, n)) for n in kind.__annotations__}
 
 
 def check_as_json(
@@ -180,7 +180,6 @@ def diagnosis_as_json(
     return written(
         DiagnoseOutput,
         d,
-        schema_version=SCHEMA_VERSION,
         rows={"read": d.rows_read, "used": d.rows_used, "set_aside": d.rows_read - d.rows_used},
         data_faults=[written(SuspectCell, fault) for fault in d.faults],
         misfit=written(MisfitSize, d),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import Any
 
 from mlg_troubleshoot.gear.gear import Gear
@@ -12,7 +11,8 @@ from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.looking_back import Advice
 from mlg_troubleshoot.life.outlook import FleetLine, LandingsLeft, fleet_lines, quantiles
 from mlg_troubleshoot.life.wear_paths import stretches
-from mlg_troubleshoot.outputs import SCHEMA_VERSION
+from mlg_troubleshoot.output_types import FleetGear, FleetOutput, LifeOutput
+from mlg_troubleshoot.reporting.json_form import written
 from mlg_troubleshoot.store import Record, RecordKind
 
 
@@ -20,26 +20,28 @@ def fleet_as_json(
     lives: Sequence[GearLife], forecasts: Mapping[GearKey, Forecast]
 ) -> dict[str, Any]:
     """One line per gear, worst first: verdict, then landings to its next inspection."""
-    return {
-        "schema_version": SCHEMA_VERSION,
-        "gears": [fleet_line_as_json(line) for line in fleet_lines(lives, forecasts)],
-        "advice": _advice(lives),
-        "warnings": [warning for life in lives for warning in life.warnings],
-    }
+    return written(
+        FleetOutput,
+        gears=[fleet_line_as_json(line) for line in fleet_lines(lives, forecasts)],
+        advice=_advice(lives),
+        warnings=[warning for life in lives for warning in life.warnings],
+    )
 
 
 def fleet_line_as_json(line: FleetLine) -> dict[str, Any]:
-    return {
-        "tail_no": line.life.key[0],
-        "side": line.life.key[1],
-        "record_id": line.latest.record.record_id,
-        "inspection_date": line.latest.record.day or None,
-        "gear_landings": line.latest.inspection.gear_landings,
-        "verdict": line.verdict,
-        "worst_joint": line.latest.worst_joint,
-        **asdict(line.outlook),
-        "repairs": len(line.life.repairs),
-    }
+    tail_no, side = line.life.key
+    return written(
+        FleetGear,
+        line.outlook,
+        tail_no=tail_no,
+        side=side,
+        record_id=line.latest.record.record_id,
+        inspection_date=line.latest.record.day or None,
+        gear_landings=line.latest.inspection.gear_landings,
+        verdict=line.verdict,
+        worst_joint=line.latest.worst_joint,
+        repairs=len(line.life.repairs),
+    )
 
 
 def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
@@ -47,25 +49,25 @@ def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
     restored.
     """
     counting = {kept.record.digest for kept in life.inspections}
-    joints = [
-        {
-            "joint": number,
-            "limit_in": gear.joint(number).limit.value,
-            "readings": [[landings, clearance] for landings, clearance, _u in between[-1].placed],
-            "landings_to_limit": quantiles(ahead.joints.get(number)),
-        }
-        for number, between in stretches(life, gear.joint_numbers).items()
-    ]
-    return {
-        "schema_version": SCHEMA_VERSION,
-        "tail_no": life.key[0],
-        "side": life.key[1],
-        "events": [_event(record, counts=record.digest in counting) for record in life.records],
-        "joints": joints,
-        **asdict(LandingsLeft.of(life, ahead)),
-        "advice": _advice([life]),
-        "warnings": list(life.warnings),
-    }
+    tail_no, side = life.key
+    return written(
+        LifeOutput,
+        LandingsLeft.of(life, ahead),
+        tail_no=tail_no,
+        side=side,
+        events=[_event(record, counts=record.digest in counting) for record in life.records],
+        joints=[
+            {
+                "joint": number,
+                "limit_in": gear.joint(number).limit.value,
+                "readings": [reading[:2] for reading in between[-1].placed],
+                "landings_to_limit": quantiles(ahead.joints.get(number)),
+            }
+            for number, between in stretches(life, gear.joint_numbers).items()
+        ],
+        advice=_advice([life]),
+        warnings=life.warnings,
+    )
 
 
 def _event(record: Record, *, counts: bool) -> dict[str, Any]:

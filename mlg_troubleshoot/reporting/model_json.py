@@ -13,12 +13,15 @@ from mlg_troubleshoot.output_types import (
     StudiedAmplification,
     StudiedBound,
     StudiedStatement,
+    SurveyedInspection,
+    SurveyOutput,
 )
-from mlg_troubleshoot.outputs import SCHEMA_VERSION
 from mlg_troubleshoot.paper.reconstruct import Reconstruction
 from mlg_troubleshoot.paper.study import StudyFindings
 from mlg_troubleshoot.reporting.json_form import plain, written
+from mlg_troubleshoot.surveying.plan import Suggested
 from mlg_troubleshoot.surveying.result import SurveyResult
+from mlg_troubleshoot.surveying.survey import Misfit
 
 
 def study_as_json(findings: StudyFindings, given: GivenDataResult | None = None) -> dict[str, Any]:
@@ -74,69 +77,61 @@ def study_as_json(findings: StudyFindings, given: GivenDataResult | None = None)
 def survey_as_json(result: SurveyResult) -> dict[str, Any]:
     """Return a survey as plain values, as the JSON contract has it."""
     found, suggestion = result.survey, result.suggestion
-    mode = None if found is None else found.modes[0]
     rows = zip(
         result.gear.joints, result.amplification, result.interval, result.before, strict=True
     )
-    values: dict[str, Any] = {
-        "schema_version": SCHEMA_VERSION,
-        "gear_file": None if result.gear_file is None else str(result.gear_file),
-        "joints": [
+    values = written(
+        SurveyOutput,
+        result,
+        gear_file=None if result.gear_file is None else str(result.gear_file),
+        joints=[
             {
                 "joint": joint.number,
-                "plunger_amplification": float(a),
-                "interval_90": after.tolist(),
-                "before": before.tolist(),
+                "plunger_amplification": a,
+                "interval_90": after,
+                "before": before,
             }
             for joint, a, after, before in rows
         ],
-        "next": (
-            []
-            if suggestion is None
-            else [
-                {
-                    "kind": suggestion.reading.kind.value,
-                    "from": suggestion.reading.start or None,
-                    "to": suggestion.reading.end or None,
-                    "extension_in": suggestion.reading.extension,
-                    "expected_narrowing": suggestion.narrowing,
-                }
-            ]
-        ),
-        "misfits": [
-            {
-                "row": m.reading.row,
-                "value_in": None if m.reading.is_angle else m.reading.value,
-                "expected_in": None if m.reading.is_angle else m.expected,
-                **({k: m.reading.in_units(v) for k, v in angles} if m.reading.is_angle else {}),
-                "suggestion": m.words,
-            }
-            for m in (() if found is None else found.misfits)
-            for angles in [(("value_deg", m.reading.value), ("expected_deg", m.expected))]
-        ],
-        "chi2": None if mode is None else mode.chi2,
-        "degrees_of_freedom": None if found is None else found.degrees_of_freedom,
-        "warnings": list(result.warnings),
-        "problems": [problem.as_dict() for problem in result.problems],
-    }
-    if result.inspections:
-        values["inspections"] = [
-            {
-                "record_id": each.record_id,
-                "displacement_in": each.displacement_in,
-                "interval_90": list(each.interval_in),
-                "probability_within_margin": each.probability_within_margin,
-            }
+        next=[] if suggestion is None else [_next(suggestion)],
+        misfits=[] if found is None else [_misfit(each) for each in found.misfits],
+        chi2=None if found is None else found.modes[0].chi2,
+        degrees_of_freedom=None if found is None else found.degrees_of_freedom,
+        problems=[problem.as_dict() for problem in result.problems],
+        inspections=[
+            written(SurveyedInspection, each, interval_90=each.interval_in)
             for each in result.inspections
-        ]
+        ],
+    )
+    if not result.inspections:
+        del values["inspections"]
     return values
+
+
+def _next(suggestion: Suggested) -> dict[str, Any]:
+    reading = suggestion.reading
+    return {
+        "kind": reading.kind,
+        "from": reading.start or None,
+        "to": reading.end or None,
+        "extension_in": reading.extension,
+        "expected_narrowing": suggestion.narrowing,
+    }
+
+
+def _misfit(misfit: Misfit) -> dict[str, Any]:
+    """A reading that does not fit, lengths in inches or angles in degrees."""
+    reading = misfit.reading
+    ends = {"value": reading.value, "expected": misfit.expected}
+    lengths = {f"{k}_in": None if reading.is_angle else v for k, v in ends.items()}
+    angles = {f"{k}_deg": reading.in_units(v) for k, v in ends.items() if reading.is_angle}
+    return {"row": reading.row, **lengths, **angles, "suggestion": misfit.words}
 
 
 def reconstruction_as_json(found: Reconstruction, text: str) -> dict[str, object]:
     return written(
         ReconstructOutput,
         found,
-        schema_version=SCHEMA_VERSION,
         linkages_tried=found.evaluations,
         free=found.numbers - found.determined,
         loosest=[{"number": name, "free_part": part} for name, part in found.loosest],
