@@ -48,10 +48,8 @@ DAY = {
     "t": "minutes_available",
 }
 _DATES = {OUTCOME.name: "outcome_date", PLUNGER_DISPLACEMENT.name: "plunger_date"}
-MORE = (
-    *(OUTCOME.name, *LENGTHS, *DAY.values(), "repair_date", *_DATES.values()),
-    *(*SIGN_OFF, SMALL_READINGS_TRUE.name),
-)
+_REPLACEABLE = (OUTCOME.name, *LENGTHS, *DAY.values(), "repair_date", *_DATES.values())
+MORE = (*_REPLACEABLE, *SIGN_OFF, SMALL_READINGS_TRUE.name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,47 +230,24 @@ def judge_more(column: str, typed: str, unit: LengthUnit | None, gear: Gear) -> 
     return read
 
 
-# The optional answers at the end, typed on one line: what the gear did, the plunger, the margin.
+_JOINTS = r"\#?\d{1,3}(?![.\d])(?:(?:\s*[,;]\s*|\s+)\#?\d{1,3}(?![.\d]))*"
+# The optional answers at the end, typed on one line, by column: what was repaired, what the day
+# allows, what the gear did, the plunger, the margin.
 _ITEM = re.compile(
     rf"""\s*[,;]?\s*(?:
-        (?P<outcome>failed|fail|f|retracted|r|x)(?![a-z])
-      | (?P<name>plunger|margin|p|m)\s*[=:]?\s*(?P<sign>[{MINUS}+]?)\s*
+        (?:n|new)\s*[=:]?\s*(?P<restored_joints>{_JOINTS})
+      | (?:c|cannot\s+reach)\s*[=:]?\s*(?P<cannot_reach>{_JOINTS})
+      | (?:w|no\s+spare)\s*[=:]?\s*(?P<no_spare>{_JOINTS})
+      | (?:g|rigging)\s+(?P<rigging_checked>yes|no|corrected)
+      | (?:o|open)\s+(?P<open_areas>[a-z][a-z ;]*)
+      | (?:t|minutes)\s*(?P<minutes_available>\d+)
+      | (?P<did>failed|fail|f|retracted|r|x)(?![a-z])
+      | (?P<length>plunger|margin|p|m)\s*[=:]?\s*(?P<sign>[{MINUS}+]?)\s*
         (?P<number>\d+[.,]\d+|\d+\.|[.,]?\d+)
         \s*(?P<unit>(?:in|inch|inches|thou|thous|mils?|mm)(?![a-z])|["″”])?
     )\s*""",
     re.VERBOSE | re.IGNORECASE,
 )
-
-
-# What was repaired, and what the day allows, on the same line.
-_DAY_ITEM = re.compile(
-    r"""\s*[,;]?\s*(?:
-        (?P<joints>n|new|c|cannot\s+reach|w|no\s+spare)\s*[=:]?\s*
-        (?P<numbers>\#?\d{1,3}(?![.\d])(?:(?:\s*[,;]\s*|\s+)\#?\d{1,3}(?![.\d]))*)
-      | (?P<rigging>g|rigging)\s+(?P<looked>yes|no|corrected)
-      | (?P<open>o|open)\s+(?P<areas>[a-z][a-z ;]*)
-      | (?P<time>t|minutes)\s*(?P<minutes>\d+)
-    )\s*""",
-    re.VERBOSE | re.IGNORECASE,
-)
-
-
-def _read_day(item: re.Match[str], answers: Answers, gear: Gear) -> tuple[Answers, Line]:
-    """Take one answer about repairs or the day; a repair is dated by the clock."""
-    groups = ("joints", "rigging", "open", "time")
-    values = ("numbers", "looked", "areas", "minutes")
-    word, text = next(
-        (item[word], item[value])
-        for word, value in zip(groups, values, strict=True)
-        if item[word] is not None
-    )
-    key = "w" if word.lower().startswith("no") else word[0].lower()
-    column = DAY[key]
-    judge_more(column, text.strip(), answers.unit, gear)
-    answers = answers.with_more(**{column: text.strip()})
-    if key == "n" or text.strip().lower() == "corrected":
-        answers = answers.with_more(repair_date=datetime.now().isoformat(" "))
-    return answers, line((f"✓ {column.replace('_', ' ')} {text.strip()}", Tone.GOOD))
 
 
 def _dated(answers: Answers, column: str) -> Answers:
@@ -299,12 +274,6 @@ def read_more(answers: Answers, typed: str, gear: Gear) -> tuple[Answers, tuple[
     told: list[Line] = []
     at = 0
     while at < len(typed):
-        day = _DAY_ITEM.match(typed, at)
-        if day is not None:
-            at = day.end()
-            answers, said = _read_day(day, answers, gear)
-            told.append(said)
-            continue
         item = _ITEM.match(typed, at)
         if item is None:
             raise UsageError(
@@ -312,26 +281,34 @@ def read_more(answers: Answers, typed: str, gear: Gear) -> tuple[Answers, tuple[
                 "Type f, r, p .041, m .028 or n 3 5, or Enter alone.",
             )
         at = item.end()
-        if item["outcome"] is None:
-            column = LENGTHS[item["name"][0].lower() == "m"]
-            sign = "-" if item["sign"] and item["sign"] in MINUS else ""
-            written = f"{sign}{item['number']} {item['unit'] or answers.unit or LengthUnit.INCH}"
-            judge_more(column, written, answers.unit, gear)
-            answers = answers.with_more(**{column: written})
-            answers = _dated(answers, column) if column in _DATES else answers
-            told.append(line((f"✓ {column.partition('_')[0]} {written}", Tone.GOOD)))
-        elif item["outcome"].lower() == "x":
-            dates = ("repair_date", *_DATES.values())
-            gone = dict.fromkeys((*LENGTHS, *DAY.values(), *dates))
-            answers = answers.with_more(outcome=None, **gone)
-            told.append(line(("– outcome, plunger, margin, repairs, the day: none", Tone.GOOD)))
-        else:
-            answers = answers.with_more(
-                outcome="FAILED" if item["outcome"][0].lower() == "f" else "RETRACTED"
-            )
-            answers = _dated(answers, "outcome")
-            told.append(line((f"✓ outcome {answers.more['outcome']}", Tone.GOOD)))
+        answers, said = _taken(item, answers, gear)
+        told.append(line((said, Tone.GOOD)))
     return answers, tuple(told)
+
+
+def _taken(item: re.Match[str], answers: Answers, gear: Gear) -> tuple[Answers, str]:
+    """Take one answer; a repair, and what is typed after it, is dated by the clock."""
+    did, length = (item["did"] or "").lower(), item["length"]
+    if did == "x":
+        gone = answers.with_more(**dict.fromkeys(_REPLACEABLE))
+        return gone, "– outcome, plunger, margin, repairs, the day: none"
+    if did:
+        column, text = OUTCOME.name, "FAILED" if did[0] == "f" else "RETRACTED"
+    elif length:
+        sign = "-" if item["sign"] and item["sign"] in MINUS else ""
+        text = f"{sign}{item['number']} {item['unit'] or answers.unit or LengthUnit.INCH}"
+        column = LENGTHS[length[0].lower() == "m"]
+    else:
+        column = next(name for name in DAY.values() if item[name])
+        text = item[column].strip()
+    judge_more(column, text, answers.unit, gear)
+    answers = answers.with_more(**{column: text})
+    if column == DAY["n"] or text.lower() == "corrected":
+        answers = answers.with_more(repair_date=datetime.now().isoformat(" "))
+    if column in _DATES:
+        answers = _dated(answers, column)
+    name = column.partition("_")[0] if length else column.replace("_", " ")
+    return answers, f"✓ {name} {text}"
 
 
 def plunger_in(answers: Answers, gear: Gear) -> float | None:

@@ -27,7 +27,7 @@ from mlg_troubleshoot.cli.prompts.answers import (
 from mlg_troubleshoot.cli.prompts.conversation import Effect, Page, Turn, again
 from mlg_troubleshoot.cli.prompts.lines import Line, Tone, line
 from mlg_troubleshoot.cli.prompts.store import Session
-from mlg_troubleshoot.decision.columns import DATE, PLUNGER_DISPLACEMENT
+from mlg_troubleshoot.decision.columns import DATE
 from mlg_troubleshoot.decision.inspection import Side
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.directions import worst_case
@@ -89,7 +89,7 @@ class State:
         return self.at
 
 
-_YES, _NO = ("y", "yes"), ("n", "no")
+_YES_NO = {"y": True, "yes": True, "n": False, "no": False}
 _UNITS = {"i": LengthUnit.INCH, "t": LengthUnit.THOU, "m": LengthUnit.MILLIMETRE}
 _CONVENTIONS = {c.value[0].lower(): c for c in ClearanceConvention}
 
@@ -149,9 +149,7 @@ class Flow:
     def _tail(self, state: State, typed: str) -> Turn[State]:
         answers = state.answers
         if not typed and answers.tail_no is None:
-            return again(
-                state, "Enter alone enters nothing. Type the tail number, for example N123AB."
-            )
+            return again(state, _not_taken(typed, "Type the tail number, for example N123AB."))
         return self.begin(replace(answers, tail_no=typed or answers.tail_no), state.from_review)
 
     def _side(self, state: State, typed: str) -> Turn[State]:
@@ -181,16 +179,14 @@ class Flow:
         old = _known(state.old_unit)
 
         def in_old(answer: JointAnswer) -> JointAnswer:
-            written = answer.written
-            return (
-                answer
-                if written is None
-                else replace(answer, written=replace(written, unit=written.unit or old))
-            )
+            if answer.written is None:
+                return answer
+            return replace(answer, written=replace(answer.written, unit=answer.written.unit or old))
 
-        if typed.lower() not in (*_YES, *_NO):
+        yes = _YES_NO.get(typed.lower())
+        if yes is None:
             return again(state, _not_taken(typed, "Type y or n."))
-        change = _unconfirmed if typed.lower() in _YES else in_old
+        change = _unconfirmed if yes else in_old
         return self._read_anew(state.answers.with_each(change), state.from_review)
 
     def _convention(self, state: State, typed: str) -> Turn[State]:
@@ -209,15 +205,18 @@ class Flow:
 
     def _offer(self, state: State, typed: str) -> Turn[State]:
         saved = _known(state.saved)
-        if typed.lower() in _YES:
-            turn = self._read_anew(
-                saved.answers.beside(state.answers), told=self._resumed(saved.answers)
+        yes = _YES_NO.get(typed.lower())
+        if yes is None:
+            return again(
+                state, _not_taken(typed, "Type y to go on with it or n to begin a new one.")
             )
-            return replace(turn, state=replace(turn.state, saved=saved), effect=Effect.RESUME)
-        if typed.lower() in _NO:
+        if yes:
+            answers = saved.answers.beside(state.answers)
+            turn = self._read_anew(answers, told=self._resumed(saved.answers))
+        else:
             turn = self._go_on(state.answers)
-            return replace(turn, state=replace(turn.state, saved=saved), effect=Effect.PUT_AWAY)
-        return again(state, _not_taken(typed, "Type y to go on with it or n to begin a new one."))
+        effect = Effect.RESUME if yes else Effect.PUT_AWAY
+        return replace(turn, state=replace(turn.state, saved=saved), effect=effect)
 
     def _joint(self, state: State, typed: str) -> Turn[State]:
         number, answers = state.joint, state.answers
@@ -226,33 +225,27 @@ class Flow:
         jump = re.fullmatch(r"#\s*(\d{1,4})", typed)
         if jump is not None:
             return self._jump(state, int(jump[1]))
-        here = (
-            NOT_MEASURED
-            if typed.lower() in ("s", "skip")
-            else None
-            if typed
-            else answers.joints.get(number)
-        )
-        if here is not None:
-            return self._answered(state, number, here)
-        if not typed:
-            return again(
-                state,
-                "Enter alone enters nothing. Type the clearance, or s if it was not measured.",
-            )
-        if typed.lower() == "done":
-            return self._done(state)
+        if not typed and number in answers.joints:
+            return self._answered(state, number, answers.joints[number])
+        match typed.lower():
+            case "s" | "skip":
+                return self._answered(state, number, NOT_MEASURED)
+            case "done":
+                return self._done(state)
+            case "":
+                remedy = "Type the clearance, or s if it was not measured."
+                return again(state, _not_taken(typed, remedy))
         return self._value(state, number, typed)
 
     def _confirm(self, state: State, typed: str) -> Turn[State]:
         if not typed:
             return again(state, "Enter alone does not confirm it. Type y, or the value again.")
-        if typed.lower() in _YES:
-            return self._answered(
-                state, state.joint, JointAnswer(self._pending(state).written, confirmed=True)
-            )
-        if typed.lower() in _NO:
-            return self.back(state)
+        match _YES_NO.get(typed.lower()):
+            case True:
+                confirmed = JointAnswer(self._pending(state).written, confirmed=True)
+                return self._answered(state, state.joint, confirmed)
+            case False:
+                return self.back(state)
         return self._joint(state, typed)
 
     def _value(self, state: State, number: int, typed: str) -> Turn[State]:
@@ -286,10 +279,8 @@ class Flow:
     def _done(self, state: State) -> Turn[State]:
         answers = state.answers
         rest = self.open_joints(answers)
-        answers = replace(
-            answers,
-            joints=MappingProxyType({**answers.joints, **dict.fromkeys(rest, NOT_MEASURED)}),
-        )
+        for number in rest:
+            answers = answers.with_joint(number, NOT_MEASURED)
         names = ", ".join(f"#{number}" for number in rest)
         told = (line((f"– {names}  not measured", Tone.WARN)),) if rest else ()
         return self._go_on(answers, state.from_review, told)
@@ -308,18 +299,16 @@ class Flow:
             answers, told = read_more(state.answers, typed, self.gear)
         except UsageError as error:
             return again(state, f"{error.message}. {error.remedy}")
-        stands = plunger_in(answers, self.gear)
-        new = answers.more.get(PLUNGER_DISPLACEMENT.name) != state.answers.more.get(
-            PLUNGER_DISPLACEMENT.name
-        )
-        if new and stands is not None and abs(stands) > self._most_in:
+        stands, before = (plunger_in(each, self.gear) for each in (answers, state.answers))
+        if stands != before and stands is not None and abs(stands) > self._most_in:
             return Turn(replace(state, ask=Ask.CONFIRM_MORE, pending=answers), told)
         return Turn(replace(state, ask=Ask.MORE, answers=answers, pending=None), told)
 
     def _confirm_more(self, state: State, typed: str) -> Turn[State]:
-        if typed.lower() in _YES and isinstance(state.pending, Answers):
+        yes = _YES_NO.get(typed.lower())
+        if yes and isinstance(state.pending, Answers):
             return Turn(State(Ask.MORE, state.pending))
-        if typed.lower() in _NO:
+        if yes is False:
             return self.back(state)
         if not typed:
             return again(
@@ -337,13 +326,8 @@ class Flow:
 
     def _detail(self, state: State, typed: str) -> Turn[State]:
         column, answers = str(state.at), state.answers
-        if (
-            not typed
-            and column == DATE.name
-            and column not in answers.more
-            and self.today is not None
-        ):
-            typed = self.today.isoformat()
+        if column == DATE.name and column not in answers.more and self.today is not None:
+            typed = typed or self.today.isoformat()
         if typed.lower() == "x":
             answers = answers.with_more(**{column: None})
         elif typed:
@@ -384,13 +368,12 @@ class Flow:
         return Turn(state, effect=Effect.COMPUTE)
 
     def _confirm_unit(self, state: State, typed: str) -> Turn[State]:
-        if typed.lower() in _YES:
-            return Turn(
-                State(Ask.REVIEW, state.answers.with_more(small_readings_true="yes")),
-                effect=Effect.COMPUTE,
-            )
-        if typed.lower() in _NO:
-            return self.back(state)
+        match _YES_NO.get(typed.lower()):
+            case True:
+                answers = state.answers.with_more(small_readings_true="yes")
+                return Turn(State(Ask.REVIEW, answers), effect=Effect.COMPUTE)
+            case False:
+                return self.back(state)
         return again(state, _not_taken(typed, "Type y if the unit is right, or n to correct it."))
 
     def begin(self, answers: Answers, from_review: bool = False) -> Turn[State]:
@@ -399,22 +382,15 @@ class Flow:
         An unfinished inspection is offered as soon as tail and side are known.
         """
         begun = bool(answers.joints) or from_review
-        if (
-            self.find_saved is not None
-            and answers.tail_no
-            and answers.side is not None
-            and not begun
-        ):
+        saved = None
+        if self.find_saved and answers.tail_no and answers.side and not begun:
             saved = self.find_saved(answers.tail_no, answers.side)
-            if saved is not None and not _contradictions(saved.answers, answers):
-                return Turn(State(Ask.OFFER, answers, saved=saved))
-            if saved is not None:
-                told = line(
-                    ("An unfinished inspection is not offered: ", Tone.WARN),
-                    self._heading(saved.answers),
-                )
-                return self._go_on(answers, told=(told,))
-        return self._go_on(answers, from_review)
+        if saved is None:
+            return self._go_on(answers, from_review)
+        if not _contradictions(saved.answers, answers):
+            return Turn(State(Ask.OFFER, answers, saved=saved))
+        told = ("An unfinished inspection is not offered: ", Tone.WARN)
+        return self._go_on(answers, told=(line(told, self._heading(saved.answers)),))
 
     def _resumed(self, answers: Answers) -> tuple[Line, ...]:
         return (line((f"Resumed: {pages.identity(answers)}, ", Tone.GOOD), self._heading(answers)),)
@@ -465,14 +441,8 @@ class Flow:
                 continue
             if judged.refused:
                 told.extend(pages.refusal_lines(typed, number, judged.said))
-            told.append(
-                line(
-                    (
-                        f"#{number}  {typed} is {reading.radial_in:.4g} in radial: asked again.",
-                        Tone.WARN,
-                    )
-                )
-            )
+            said = f"#{number}  {typed} is {reading.radial_in:.4g} in radial: asked again."
+            told.append(line((said, Tone.WARN)))
         return replace(answers, joints=MappingProxyType(kept)), tuple(told)
 
     def back(self, state: State) -> Turn[State]:
@@ -489,11 +459,8 @@ class Flow:
             return Turn(State(ask, state.answers, at, from_review=inside, trail=state.trail[:-1]))
         course: list[Place] = [(ask, None) for ask in _HEADING]
         course += [(Ask.JOINT, number) for number in self.order]
-        course += [
-            (Ask.MORE, None),
-            *((Ask.DETAIL, column) for column in SIGN_OFF),
-            (Ask.REVIEW, None),
-        ]
+        course += [(Ask.MORE, None), *((Ask.DETAIL, column) for column in SIGN_OFF)]
+        course.append((Ask.REVIEW, None))
         place = course.index((state.ask, state.at))
         if place == 0:
             return again(state, "This is the first question.")
