@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import TYPE_CHECKING
 
-from mlg_troubleshoot.cli.flags import Flags
+from mlg_troubleshoot.cli.check import Flags
 from mlg_troubleshoot.decision.columns import (
     CLEARANCE,
     CONVENTION,

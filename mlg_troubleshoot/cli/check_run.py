@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from mlg_troubleshoot.cli import by_hand, history, options, output
-from mlg_troubleshoot.cli.flags import Flags, Wanted
+from mlg_troubleshoot.cli.check import Flags, Wanted
 from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.remembered import Settings
 from mlg_troubleshoot.cli.views import batch, notes, one_gear

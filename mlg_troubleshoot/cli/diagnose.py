@@ -44,7 +44,7 @@ def diagnose(
         ),
     ] = 0.9,
     tables: options.Tables,
-    shown: options.Output,
+    shown: options.OutputOptions,
     remember: options.Remember = False,
     _version: options.Version = False,
 ) -> None:

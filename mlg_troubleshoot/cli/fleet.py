@@ -17,7 +17,10 @@ _LINES = 60
 
 @options.flat
 def fleet(
-    *, records: options.Records, no_forecast: options.NoForecast = False, shown: options.Output
+    *,
+    records: options.Records,
+    no_forecast: options.NoForecast = False,
+    shown: options.OutputOptions,
 ) -> None:
     """Show every gear in the store: verdict, landings left, next inspection due; worst first."""
     from mlg_troubleshoot.cli.progress import stages

@@ -62,7 +62,7 @@ def show(
     ] = None,
     records: options.Records,
     no_forecast: options.NoForecast = False,
-    shown: options.Output,
+    shown: options.OutputOptions,
 ) -> None:
     """Show the records: the gears and their latest state, or one gear's life with the forecast of
     each joint.
@@ -100,7 +100,9 @@ def show(
     write_pages(found, shown, settings, fleet=False)
 
 
-def write_pages(found: Lives, shown: options.Output, settings: Settings, *, fleet: bool) -> None:
+def write_pages(
+    found: Lives, shown: options.OutputOptions, settings: Settings, *, fleet: bool
+) -> None:
     """Write the pages of gears if they are asked for, and name them on stderr."""
     from mlg_troubleshoot.workflows import history
 

@@ -160,7 +160,7 @@ NoForecast = Annotated[
 
 
 @dataclass(frozen=True, slots=True)
-class Output:
+class OutputOptions:
     """What a command writes in addition to its screen, and how it shows lengths."""
 
     report: Report = None

@@ -14,9 +14,9 @@ import typer
 from rich.table import Table
 
 from mlg_troubleshoot.cli import output
-from mlg_troubleshoot.cli.flags import StudyFlags
 from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.remembered import Settings
+from mlg_troubleshoot.cli.study import StudyFlags
 from mlg_troubleshoot.errors import ExitCode, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear

@@ -55,7 +55,7 @@ def survey(
         ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the starts and draws.")] = 0,
-    wanted: options.Output,
+    wanted: options.OutputOptions,
     _version: options.Version = False,
 ) -> None:
     """A geometry from measurements: your own gear in place of the reconstructed one.

@@ -4,7 +4,6 @@ __all__ = [
     "diagnosis_lines",
     "diagnosis_report",
     "fleet_report",
-    "form",
     "inspection_report",
     "json_form",
     "life_json",

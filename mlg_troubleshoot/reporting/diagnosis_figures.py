@@ -76,14 +76,14 @@ class Residuals:
 class ResidualAxis:
     """What residuals are drawn against.
 
-    values: a number for each row, NaN where missing.
-    groups: a name for each row, empty where missing; instead of numbers.
+    values: a number for each row, NaN where missing; of names the place of its own among them.
+    names: what the numbers stand for, where the column holds words.
     marked: rows that the cause acts on, where it acts on some only.
     """
 
     label: str
-    values: Array | None = None
-    groups: Texts | None = None
+    values: Array
+    names: tuple[str, ...] = ()
     marked: Mask | None = None
     marked_label: str = ""
 
@@ -120,22 +120,21 @@ def against_cause(residuals: Residuals, candidate: Candidate, effect_in: Array) 
 
 def against_column(residuals: Residuals, name: str) -> ResidualAxis:
     table, unit = residuals.diagnosis.used, residuals.unit
-    if name == "day" and "day" in table.quantities:
-        return ResidualAxis(_day_label(residuals), table.quantities["day"])
     if name in table.quantities:
         label = ", ".join(filter(None, (column_words(name), _UNITS.get(name))))
-        return ResidualAxis(label, table.quantities[name])
+        return ResidualAxis(
+            _day_label(residuals) if name == "day" else label, table.quantities[name]
+        )
     if name in table.factors:
-        return ResidualAxis(column_words(name), groups=table.factors[name])
+        names = sorted({str(each) for each in table.factors[name] if each})
+        places = [names.index(str(each)) if each else np.nan for each in table.factors[name]]
+        return ResidualAxis(column_words(name), np.array(places, float), tuple(names))
     kind, _, joint = name.rpartition("_")
-    if joint.isdigit() and int(joint) in residuals.joints:
-        if kind == CLEARANCE.name:
-            return ResidualAxis(
-                f"{column_words(name)}, {unit}", residuals.drawn(residuals.clearance(int(joint)))
-            )
-        if kind == AXIAL_FLOAT.name and table.axial_float_in is not None:
-            values = table.axial_float_in[:, residuals.joints.index(int(joint))]
-            return ResidualAxis(f"{column_words(name)}, {unit}", residuals.drawn(values))
+    by_joint = {CLEARANCE.name: table.clearance_in, AXIAL_FLOAT.name: table.axial_float_in}
+    lengths_in = by_joint.get(kind)
+    if lengths_in is not None and joint.isdigit() and int(joint) in residuals.joints:
+        lengths_in = lengths_in[:, residuals.joints.index(int(joint))]
+        return ResidualAxis(f"{column_words(name)}, {unit}", residuals.drawn(lengths_in))
     return ResidualAxis(
         f"predicted displacement, {unit}", residuals.drawn(residuals.diagnosis.predicted_in)
     )
@@ -143,47 +142,38 @@ def against_column(residuals: Residuals, name: str) -> ResidualAxis:
 
 def split_by(residuals: Residuals, name: str, other: ResidualAxis) -> tuple[Mask, str, str] | None:
     """Split the rows by a column, so that what moves with two columns together can be seen."""
-    column = against_column(residuals, name)
-    if column.values is not None:
+    column, x = against_column(residuals, name), other.values
+    if not column.names:
         known = np.isfinite(column.values)
         half = float(np.median(column.values[known])) if known.any() else np.nan
         words = column_words(name)
         shown = f"{half:.0f}" if abs(half) >= 100.0 else f"{half:.3g}"
-        return (
-            np.asarray(column.values >= half),
-            f"{words} {shown} and more",
-            f"{words} below {shown}",
-        )
-    if column.groups is None:
+        return column.values >= half, f"{words} {shown} and more", f"{words} below {shown}"
+    slopes = {}
+    for place, level in enumerate(column.names):
+        rows = (column.values == place) & np.isfinite(x)
+        if rows.sum() > 3 and np.std(x[rows]) > 0.0:
+            slope = float(np.polyfit(x[rows], residuals.before_in[rows], 1)[0])
+            slopes[level] = abs(slope) * np.sqrt(rows.sum())
+    if not slopes:
         return None
-    x = other.values
-    if x is None:
-        x = np.unique(np.asarray(other.groups, str), return_inverse=True)[1].astype(float)
-    best: tuple[float, str] | None = None
-    for level in np.unique(column.groups):
-        rows = (column.groups == level) & np.isfinite(x)
-        if level and rows.sum() > 3 and np.std(x[rows]) > 0.0:
-            slope = abs(float(np.polyfit(x[rows], residuals.before_in[rows], 1)[0])) * np.sqrt(
-                rows.sum()
-            )
-            if best is None or slope > best[0]:
-                best = (slope, str(level))
-    return (
-        None if best is None else (np.asarray(column.groups == best[1]), best[1], f"not {best[1]}")
-    )
+    level = max(slopes, key=lambda each: slopes[each])
+    return column.values == column.names.index(level), level, f"not {level}"
 
 
 def _most_correlated_float(
     residuals: Residuals, floats_in: Array, effect_in: Array
 ) -> ResidualAxis:
     """The end float with which the fitted effect goes most."""
-    best, place = -1.0, 0
-    for j in range(floats_in.shape[1]):
-        known = np.isfinite(floats_in[:, j])
-        if known.sum() > 2 and np.std(floats_in[known, j]) > 0 and np.std(effect_in[known]) > 0:
-            alike = abs(float(np.corrcoef(floats_in[known, j] ** 2, effect_in[known])[0, 1]))
-            if alike > best:
-                best, place = alike, j
+
+    def alike(place: int) -> float:
+        known = np.isfinite(floats_in[:, place])
+        both = floats_in[known, place], effect_in[known]
+        if known.sum() <= 2 or min(map(np.std, both)) == 0.0:
+            return -1.0
+        return abs(float(np.corrcoef(both[0] ** 2, both[1])[0, 1]))
+
+    place = max(range(floats_in.shape[1]), key=alike)
     label = f"end float of #{residuals.joints[place]}, {residuals.unit}"
     return ResidualAxis(label, residuals.drawn(floats_in[:, place]))
 
@@ -207,45 +197,39 @@ def residual_plot(
     y = residuals.drawn(residuals.after_in if after else residuals.before_in)
     if only is not None:
         y = np.where(only, y, np.nan)
-    axis = residuals.axis
-    groups = sorted({str(g) for g in against.groups if g}) if against.groups is not None else []
-    description = f"{axis.label}, against {against.label}"
-    canvas = Canvas(*_PLOT, title, description)
-    if against.groups is not None:
-        x = np.array([groups.index(str(g)) if g else np.nan for g in against.groups], float)
-        plot = Plot(canvas, Axis(against.label, -0.6, len(groups) - 0.4), axis, top=24)
+    axis, x, names = residuals.axis, against.values, against.names
+    canvas = Canvas(*_PLOT, title, f"{axis.label}, against {against.label}")
+    if names:
+        across = Axis(against.label, -0.6, len(names) - 0.4)
         # Points of one group stand side by side in the order of the rows, so that none hides
         # another.
         x = x + 0.5 * (np.arange(len(x)) * 0.618 % 1.0 - 0.5)
     else:
-        x = np.full(len(y), np.nan) if against.values is None else against.values
-        plot = Plot(
-            canvas, Axis.around(against.label, x[np.isfinite(x)].tolist(), 0.03), axis, top=24
-        )
-    plot.draw_axes(names=groups)
+        across = Axis.around(against.label, x.tolist(), 0.03)
+    plot = Plot(canvas, across, axis, top=24)
+    plot.draw_axes(names=names)
     canvas.text(plot.area[0], 12, title, size=11, bold=True)
     _, zero = plot.at(plot.x.low, 0.0)
     canvas.line(plot.area[0], zero, plot.area[2], zero, colour=SOFT, width=1.0)
     marked = np.zeros(len(y), bool) if against.marked is None else against.marked
     known = np.isfinite(x) & np.isfinite(y)
-    for place in (*np.flatnonzero(known & ~marked), *np.flatnonzero(known & marked)):
-        _point(
-            canvas,
-            *plot.at(float(x[place]), float(y[place])),
-            after=after,
-            marked=bool(marked[place]),
-        )
+    # What is marked stands on top.
+    for row in sorted(np.flatnonzero(known).tolist(), key=lambda row: bool(marked[row])):
+        at = plot.at(float(x[row]), float(y[row]))
+        _point(canvas, *at, after=after, marked=bool(marked[row]))
     rows = known & marked if against.marked is not None else known
-    if against.groups is None:
+    if names:
+        parts = [np.flatnonzero(known & (against.values == k)) for k in range(len(names))]
+        centres = [float(k) for k in range(len(names))]
+    else:
         # The mean of each stretch of the column that holds as many rows as the others.
         order = np.flatnonzero(rows)[np.argsort(x[rows], kind="stable")]
-        for part in np.array_split(order, max(1, min(_BINS, len(order) // _FEWEST_IN_A_BIN))):
-            if len(part) >= _FEWEST_IN_A_BIN:
-                _mean_mark(plot, float(np.mean(x[part])), y[part])
-    for k, name in enumerate(groups):
-        own = y[(against.groups == name) & known]
-        if len(own) >= 2:
-            _mean_mark(plot, float(k), own)
+        stretches = max(1, min(_BINS, len(order) // _FEWEST_IN_A_BIN))
+        parts = [p for p in np.array_split(order, stretches) if len(p) >= _FEWEST_IN_A_BIN]
+        centres = [float(np.mean(x[part])) for part in parts]
+    for centre, part in zip(centres, parts, strict=True):
+        if len(part) >= 2:
+            _mean_mark(plot, centre, y[part])
     if against.marked is not None:
         canvas.marker("triangle", plot.area[2] - 6, 8, 4.0)
         canvas.text(plot.area[2] - 14, 12, against.marked_label, size=10, anchor="end")

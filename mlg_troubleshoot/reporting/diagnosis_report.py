@@ -183,14 +183,10 @@ def _unlisted_plots(residuals: Residuals, variables: tuple[str, ...], scatter: M
     columns = [drawn.against_column(residuals, name) for name in variables]
     caption = f"Moves with {' and '.join(column_words(name) for name in variables)}"
     # A number makes the better axis, a name the better way to split.
-    first = (
-        1 if len(columns) > 1 and columns[0].values is None and columns[1].values is not None else 0
-    )
-    split = (
-        drawn.split_by(residuals, variables[1 - first], columns[first])
-        if len(columns) > 1
-        else None
-    )
+    first = int(len(columns) > 1 and bool(columns[0].names) and not columns[1].names)
+    split = None
+    if len(columns) > 1:
+        split = drawn.split_by(residuals, variables[1 - first], columns[first])
     if split is None:
         return drawn.residual_plot(residuals, columns[0], ""), scatter, caption
     rows, these, others = split

@@ -7,13 +7,30 @@ import re
 import struct
 import unicodedata
 from functools import cache
+from importlib.resources import files
+from pathlib import Path
 
-from mlg_troubleshoot.reporting.resources import FONT_FILES, templates_folder
+from mlg_troubleshoot.errors import OutputError
 
+FONT_FILES = {"normal": "fonts/DejaVuSans.ttf", "bold": "fonts/DejaVuSans-Bold.ttf"}
 _PLAIN_SPACE = {"\t", "\n", "\r"}
 _LONGEST_WORD = 64
 _LONG_WORD = re.compile(rf"\S{{{_LONGEST_WORD + 1},}}")
 _SOUNDS = re.compile(r"^(?:HANGUL SYLLABLE|HIRAGANA LETTER|KATAKANA LETTER) (?:SMALL )?(.+)$")
+
+
+@cache
+def templates_folder() -> Path:
+    package = Path(str(files("mlg_troubleshoot")))
+    candidates = (package / "templates", package.parent / "templates")
+    for folder in candidates:
+        if (folder / "base.html.j2").is_file():
+            return folder
+    raise OutputError(
+        f"the report templates are missing: neither {candidates[0]} nor {candidates[1]} holds"
+        " base.html.j2",
+        "Install the package again.",
+    )
 
 
 def breakable(text: str) -> str:

@@ -15,9 +15,8 @@ from jinja2.runtime import Context
 from markupsafe import Markup
 
 from mlg_troubleshoot.reporting import formats
-from mlg_troubleshoot.reporting.glyphs import breakable, font_faces
+from mlg_troubleshoot.reporting.glyphs import breakable, font_faces, templates_folder
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
-from mlg_troubleshoot.reporting.resources import templates_folder
 from mlg_troubleshoot.visible import visible
 
 

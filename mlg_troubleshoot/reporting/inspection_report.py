@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +18,24 @@ from mlg_troubleshoot.decision.sentences import (
     no_repair_set,
     rigging_sentence,
 )
-from mlg_troubleshoot.errors import Problem
+from mlg_troubleshoot.errors import OutputError, Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.looking_back import PastInspection
+from mlg_troubleshoot.outputs import write_bytes
 from mlg_troubleshoot.reporting import inspection_figures as drawn
 from mlg_troubleshoot.reporting.formats import Lengths, short
-from mlg_troubleshoot.reporting.html import Document
-from mlg_troubleshoot.reporting.provenance import Facts, ReportProvenance, head
+from mlg_troubleshoot.reporting.html import Document, render
+from mlg_troubleshoot.reporting.pdf import PdfEngine, PdfError
+from mlg_troubleshoot.reporting.provenance import Facts, ReportProvenance, head, provenance_of
 from mlg_troubleshoot.reporting.publish import safe_stem
-from mlg_troubleshoot.reporting.schematic import JOINT_STATES, joint_mark, joint_state, schematic
-from mlg_troubleshoot.units import LengthUnit
+from mlg_troubleshoot.reporting.schematic import (
+    JOINT_STATES,
+    blank_schematic,
+    joint_mark,
+    joint_state,
+    schematic,
+)
+from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 SIGNATORIES = ("Measured by", "Independently measured by", "Rectified by", "Inspected by")
 _SIDES = {Side.LH: "left-hand main landing gear", Side.RH: "right-hand main landing gear"}
@@ -231,3 +240,33 @@ def batch_document(
     }
     stem = safe_stem("batch", *(Path(name).name for name in provenance.input_sha256))
     return Document("batch.html.j2", context, stem, landscape=True)
+
+
+def write_form(
+    file: Path, gear: Gear, *, page: str = "A4", unit: LengthUnit = LengthUnit.INCH
+) -> None:
+    """Write the form as PDF or HTML, as the name ends; limits stand in `unit`."""
+    context = {
+        **head(
+            f"Joint clearances – {gear.name}",
+            gear.name,
+            gear,
+            provenance_of(gear, {}),
+            Lengths(unit),
+        ),
+        "conventions": tuple(ClearanceConvention),
+        "drawing": blank_schematic(gear),
+    }
+    document = Document("form.html.j2", context, file.stem)
+    if file.suffix.lower() == ".html":
+        write_bytes(file, render(document, page).encode("utf-8"))
+        return
+    try:
+        with closing(PdfEngine()) as engine:
+            made, _ = engine.convert(render(document, page, for_pdf=True), page, document.created)
+    except PdfError as error:
+        instead = file.with_suffix(".html").name
+        raise OutputError(
+            f"no PDF can be made: {error}", f"Write {instead} and print it from a browser."
+        ) from error
+    write_bytes(file, made)

@@ -71,37 +71,51 @@ def clock(usage: Array, power: Array) -> Array:
 def follow(steps: Steps, draws: Draws) -> tuple[Array, FilterState]:
     """Filter the readings of every unit; return log likelihood (draws, units) and the state at the
     end.
+
+    Mean of level x, drift b and the unit's own drift u; their covariances are named by the pair.
     """
     shape = (len(draws.start), steps.seen.shape[1])
-    x, b = np.broadcast_to(draws.start, shape), np.broadcast_to(draws.drift, shape)
-    unit = b
-    own, kept = (1.0 - draws.kept) * draws.drift_sd**2, draws.kept * draws.drift_sd**2
-    pxx, pxb, pxu = np.broadcast_to(draws.start_sd**2, shape), np.zeros(shape), np.zeros(shape)
-    pbb, pbu, puu = (np.broadcast_to(v, shape) for v in (own + kept, kept, kept))
-    total = np.zeros(shape)
-    before = np.zeros(shape)
+    own = (1.0 - draws.kept) * draws.drift_sd**2
+    kept = draws.kept * draws.drift_sd**2
+    x = np.broadcast_to(draws.start, shape)
+    b = u = np.broadcast_to(draws.drift, shape)
+    xx = np.broadcast_to(draws.start_sd**2, shape)
+    xb = xu = total = before = np.zeros(shape)
+    bb = np.broadcast_to(own + kept, shape)
+    bu = uu = np.broadcast_to(kept, shape)
     for begins, seen, usage, value, known in zip(
         steps.begins, steps.seen, steps.usage, steps.value, steps.known_r2, strict=True
     ):
         now = clock(usage, draws.power)
         if begins.any():
-            x, b = np.where(begins, draws.start, x), np.where(begins, unit, b)
-            pxx, pxb, pxu = (
-                np.where(begins, v, p)
-                for v, p in ((draws.start_sd**2, pxx), (0.0, pxb), (0.0, pxu))
-            )
-            pbb, pbu = np.where(begins, puu + own, pbb), np.where(begins, puu, pbu)
-        d, before = now - np.where(begins, 0.0, before), now
+            x = np.where(begins, draws.start, x)
+            b = np.where(begins, u, b)
+            xx = np.where(begins, draws.start_sd**2, xx)
+            xb = np.where(begins, 0.0, xb)
+            xu = np.where(begins, 0.0, xu)
+            bb = np.where(begins, uu + own, bb)
+            bu = np.where(begins, uu, bu)
+        d = now - np.where(begins, 0.0, before)
+        before = now
         x = x + b * d
-        w2, s2 = draws.wander_sd**2 * d, draws.increment_sd**2 * d
-        s2 = np.where(draws.gamma, s2 * (b * b + pbb), s2)
-        pxx = pxx + d * (2.0 * pxb + d * pbb) + s2 + w2 * d * d / 3.0
-        pxb, pbb, pxu = pxb + d * pbb + w2 * d / 2.0, pbb + w2, pxu + d * pbu
-        s = pxx + np.where(np.isnan(known), draws.reading_sd**2, known) + _LEAST_VARIANCE
+        w2 = draws.wander_sd**2 * d
+        s2 = draws.increment_sd**2 * d
+        s2 = np.where(draws.gamma, s2 * (b * b + bb), s2)
+        xx = xx + d * (2.0 * xb + d * bb) + s2 + w2 * d * d / 3.0
+        xb = xb + d * bb + w2 * d / 2.0
+        bb = bb + w2
+        xu = xu + d * bu
+        s = xx + np.where(np.isnan(known), draws.reading_sd**2, known) + _LEAST_VARIANCE
         g = seen / s
         off = value - x
         total = total - 0.5 * seen * (off * off / s + np.log(s) + _LOG_2PI)
-        x, b, unit = x + g * pxx * off, b + g * pxb * off, unit + g * pxu * off
-        pbb, pbu, puu = pbb - g * pxb * pxb, pbu - g * pxb * pxu, puu - g * pxu * pxu
-        pxb, pxu, pxx = pxb - g * pxx * pxb, pxu - g * pxx * pxu, pxx - g * pxx * pxx
-    return total, FilterState(x, b, pxx, pxb, pbb)
+        x = x + g * xx * off
+        b = b + g * xb * off
+        u = u + g * xu * off
+        bb = bb - g * xb * xb
+        bu = bu - g * xb * xu
+        uu = uu - g * xu * xu
+        xb = xb - g * xx * xb
+        xu = xu - g * xx * xu
+        xx = xx - g * xx * xx
+    return total, FilterState(x, b, xx, xb, bb)

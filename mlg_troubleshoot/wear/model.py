@@ -216,34 +216,32 @@ class _Ends:
         """Simulate the paths on to ascending usages (units, m); return (draws, units, repeats,
         m).
         """
-        power, s, v = self._column("power"), self._column("increment_sd"), self._column("wander_sd")
-        x, b, before = self.level, self.drift, np.zeros_like(self.level)
+        power = self._column("power")
+        s = self._column("increment_sd")
+        v = self._column("wander_sd")
+        known = known[None, :, None]
+        sd = np.where(np.isnan(known), self._column("reading_sd"), np.sqrt(known))
         start = clock(last[None, :, None], power)
+        x = self.level
+        b = self.drift
+        before = np.zeros_like(x)
         out = np.empty((*x.shape, usage.shape[1]))
         for j in range(usage.shape[1]):
             at = clock(usage[None, :, j, None], power)
             now = np.minimum(at, 1.0) - start + self.pace * np.maximum(at - 1.0, 0.0)
-            d, before = now - before, now
-            span = np.abs(d)
+            d = now - before
+            before = now
             if self.draws.gamma.any():
                 shape = np.maximum(d, 0.0) / s**2
                 x = x + np.where(d > 0.0, b * s**2 * rng.standard_gamma(shape), b * d)
             else:
+                span = np.abs(d)
                 one, two = rng.standard_normal((2, *x.shape))
-                x = (
-                    x
-                    + b * d
-                    + v * span**1.5 * one / 2.0
-                    + np.sqrt(v * v * span**3 / 12.0 + s * s * span) * two
-                )
+                sway = np.sqrt(v * v * span**3 / 12.0 + s * s * span)
+                x = x + b * d + v * span**1.5 * one / 2.0 + sway * two
                 b = b + v * np.sqrt(span) * one
             out[..., j] = x
             if reading:
-                sd = np.where(
-                    np.isnan(known)[None, :, None],
-                    self._column("reading_sd"),
-                    np.sqrt(known)[None, :, None],
-                )
                 out[..., j] += sd * rng.standard_normal(x.shape)
         return out
 

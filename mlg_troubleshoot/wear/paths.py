@@ -115,21 +115,19 @@ def scale_of(paths: Sequence[WearPath]) -> Scale:
     """Find the scales of usage and value, the common start, and which way the wear goes (the sign
     of the value).
     """
-    usages = [np.asarray(path.usage) for path in paths]
-    values = [np.asarray(path.value) for path in paths]
-    everything = np.concatenate([*values, np.empty(0)])
-    reach = max((float(u[-1]) for u in usages if len(u)), default=0.0) or 1.0
-    start = float(np.median([v[0] for v in values if len(v)])) if len(everything) else 0.0
-    pairs = [(u, v) for u, v in zip(usages, values, strict=True) if len(u) > 1 and u[-1] > u[0]]
-    rates = np.array([(v[-1] - v[0]) / (u[-1] - u[0]) for u, v in pairs])
+    read = [(np.asarray(path.usage), np.asarray(path.value)) for path in paths]
+    read = [(usage, value) for usage, value in read if len(usage)]
+    everything = np.concatenate([*(value for _usage, value in read), np.empty(0)])
+    reach = max((float(usage[-1]) for usage, _value in read), default=0.0) or 1.0
+    start = float(np.median([value[0] for _usage, value in read])) if read else 0.0
+    rates = np.array([(v[-1] - v[0]) / (u[-1] - u[0]) for u, v in read if u[-1] > u[0]])
     rise = float(np.median(rates)) * reach if len(rates) else 0.0
-    if not rise:
-        rise = float(np.std(everything)) if len(everything) > 1 else 0.0
+    if not rise and read:
+        rise = float(np.std(everything))
     known = [path.reading_u for path in paths if path.reading_u]
-    least = max(
-        2.0 * float(np.median(known)) if known else 0.0,
-        1e-3 * float(np.ptp(everything)) if pairs else 0.0,
-    )
+    least = 2.0 * float(np.median(known)) if known else 0.0
+    if len(rates):
+        least = max(least, 1e-3 * float(np.ptp(everything)))
     size = max(abs(rise), least) or max(abs(start), 1.0)
     # Wear grows unless most parts say otherwise.
     falls = len(rates) > 0 and float(np.mean(rates < 0.0)) >= _FALLING
@@ -142,21 +140,23 @@ def lay_out(groups: Sequence[Sequence[WearPath]], scale: Scale) -> Steps:
     """
     lengths = [sum(max(len(np.asarray(path.usage)), 1) for path in group) for group in groups]
     shape = (max(lengths, default=0), len(groups))
-    begins, seen = np.zeros(shape, bool), np.zeros(shape, bool)
-    usage, value, known = np.zeros(shape), np.zeros(shape), np.full(shape, np.nan)
+    steps = Steps(
+        begins=np.zeros(shape, bool),
+        seen=np.zeros(shape, bool),
+        usage=np.zeros(shape),
+        value=np.zeros(shape),
+        known_r2=np.full(shape, np.nan),
+    )
     for column, (group, length) in enumerate(zip(groups, lengths, strict=True)):
         row = shape[0] - length
         for path in group:
-            at, read = (
-                np.asarray(path.usage) / scale.usage,
-                (np.asarray(path.value) - scale.start) / scale.value,
-            )
-            rows = slice(row, row + max(len(at), 1))
-            begins[row, column] = True
-            if len(at):
-                seen[rows, column] = True
-                usage[rows, column], value[rows, column] = at, read
-                if path.reading_u is not None:
-                    known[rows, column] = (path.reading_u / scale.value) ** 2
-            row = rows.stop
-    return Steps(begins, seen, usage, value, known)
+            count = len(np.asarray(path.usage))
+            steps.begins[row, column] = True
+            rows = slice(row, row + count)
+            steps.seen[rows, column] = True
+            steps.usage[rows, column] = np.asarray(path.usage) / scale.usage
+            steps.value[rows, column] = (np.asarray(path.value) - scale.start) / scale.value
+            if path.reading_u is not None:
+                steps.known_r2[rows, column] = (path.reading_u / scale.value) ** 2
+            row += max(count, 1)
+    return steps

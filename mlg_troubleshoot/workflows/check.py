@@ -264,7 +264,7 @@ def _judge(
     asked: dict[str, Any] = {"advice": advice, "seed": options.seed, "extension": options.extension}
     as_they_count = rows
     if store is not None:
-        from mlg_troubleshoot.workflows.since_repairs import since_kept_repairs
+        from mlg_troubleshoot.life.looking_back import since_kept_repairs
 
         as_they_count = since_kept_repairs(rows, store, gear)
     judgements = assess(as_they_count, gear, load_index_table(gear), **asked, progress=on_judged)
@@ -360,7 +360,7 @@ def write_template(
     """
     loaded = load_gear(gear)
     if file.suffix.lower() != ".xlsx":
-        from mlg_troubleshoot.reporting.form import write_form
+        from mlg_troubleshoot.reporting.inspection_report import write_form
 
         write_form(file, loaded, page=page, unit=unit)
         return

@@ -14,7 +14,7 @@ from time import monotonic
 import pytest
 
 from mlg_troubleshoot.cli import by_hand
-from mlg_troubleshoot.cli.flags import Flags
+from mlg_troubleshoot.cli.check import Flags
 from mlg_troubleshoot.cli.prompts import (
     Answers,
     EntryInterruptedError,

@@ -13,7 +13,7 @@ import pytest
 
 from mlg_troubleshoot import Inspection, Side, TroubleshootError, check
 from mlg_troubleshoot.cli.by_hand import from_flags
-from mlg_troubleshoot.cli.flags import Flags
+from mlg_troubleshoot.cli.check import Flags
 from mlg_troubleshoot.cli.prompts.answers import Answers, JointAnswer, judge, read_more
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
@@ -109,7 +109,9 @@ def by_cell(gear: Gear, value: object, margin: str, convention: Convention) -> F
 
 
 def by_flag(gear: Gear, value: str, margin: str, convention: Convention) -> Found:
-    flags = Flags([f"3={value}"], {"tail_no": "N1", "side": "LH", "record_id": "R1", "margin": margin})
+    flags = Flags(
+        [f"3={value}"], {"tail_no": "N1", "side": "LH", "record_id": "R1", "margin": margin}
+    )
     asked = CheckOptions(unit=LengthUnit.INCH, convention=convention)
     try:
         row = from_flags(flags, asked)
