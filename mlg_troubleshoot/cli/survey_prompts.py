@@ -17,7 +17,7 @@ from mlg_troubleshoot.cli.prompts.conversation import (
     Turn,
     again,
 )
-from mlg_troubleshoot.cli.prompts.lines import BLANK, Line, Tone, keys, line
+from mlg_troubleshoot.cli.prompts.lines import BLANK, Line, Tone, keys, line, note
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.outputs import write_csv
@@ -88,7 +88,7 @@ class _Sheet:
     def help(self, state: int) -> tuple[Line, ...]:
         unit = _unit(self._row(state))
         return (
-            line(f"A number, as 7.15 or 181.6 mm, in {unit} where it has no unit.", indent=3),
+            note(f"A number, as 7.15 or 181.6 mm, in {unit} where it has no unit."),
             _KEYS,
         )
 

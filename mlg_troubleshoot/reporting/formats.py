@@ -68,10 +68,6 @@ def moment(value: datetime) -> str:
     return f"{value:%Y-%m-%d %H:%M}{f' {zone}' if zone else ''}"
 
 
-def digest(sha256: str | None, length: int = 12) -> str:
-    return sha256[:length] if sha256 else ABSENT
-
-
 def several(count: int, one: str, many: str | None = None) -> str:
     """Write a count with its noun: ``1 gear``, ``12 gears``."""
     return f"{count}\u00a0{one if count == 1 else many or one + 's'}"

@@ -12,7 +12,7 @@ from typing import Any
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear, SourceKind
-from mlg_troubleshoot.reporting.formats import Lengths, digest
+from mlg_troubleshoot.reporting.formats import Lengths
 
 Facts = list[tuple[str, str]]
 DISCLAIMER = (
@@ -101,9 +101,7 @@ def head(
 
 def _program_and_hashes(p: ReportProvenance) -> str:
     hashes = list(p.input_sha256.values())
-    parts = [f"mlg {p.program_version}", f"geometry {digest(p.geometry_sha256, 8)}"]
+    parts = [f"mlg {p.program_version}", f"geometry {p.geometry_sha256[:8]}"]
     if hashes:
-        parts.append(
-            f"input {digest(hashes[0], 8)}" if len(hashes) == 1 else f"{len(hashes)} inputs"
-        )
+        parts.append(f"input {hashes[0][:8]}" if len(hashes) == 1 else f"{len(hashes)} inputs")
     return " · ".join(parts)

@@ -10,7 +10,7 @@ from mlg_troubleshoot.cli.prompts import pages
 from mlg_troubleshoot.cli.prompts.answers import Answers
 from mlg_troubleshoot.cli.prompts.conversation import Conversation, Effect, Turn
 from mlg_troubleshoot.cli.prompts.flow import Advice, Ask, Flow, State
-from mlg_troubleshoot.cli.prompts.lines import BLANK, Tone, line
+from mlg_troubleshoot.cli.prompts.lines import BLANK, Tone, line, warning
 from mlg_troubleshoot.cli.prompts.store import Session, SessionStore, SessionTakenError, new_session
 from mlg_troubleshoot.cli.prompts.terminal import RichTerminal
 from mlg_troubleshoot.decision.inspection import Inspection, Side
@@ -175,7 +175,7 @@ def _stopped(terminal: RichTerminal, saver: _Saver) -> EntryInterruptedError:
         if saver.session.answers.radial_in
         else "Nothing was saved."
     )
-    terminal.say((BLANK, line((lost, Tone.WARN), " Begin again with:  ", ("mlg check", Tone.KEY))))
+    terminal.say((BLANK, warning(lost, " Begin again with:  ", ("mlg check", Tone.KEY))))
     return EntryInterruptedError(None)
 
 

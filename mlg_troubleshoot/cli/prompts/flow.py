@@ -25,7 +25,7 @@ from mlg_troubleshoot.cli.prompts.answers import (
     read_more,
 )
 from mlg_troubleshoot.cli.prompts.conversation import Effect, Page, Turn, again
-from mlg_troubleshoot.cli.prompts.lines import Line, Tone, line
+from mlg_troubleshoot.cli.prompts.lines import Line, Tone, line, warning
 from mlg_troubleshoot.cli.prompts.store import Session
 from mlg_troubleshoot.decision.columns import DATE
 from mlg_troubleshoot.decision.inspection import Side
@@ -199,7 +199,7 @@ class Flow:
         told: tuple[Line, ...] = ()
         if answers.convention is not None and answers.radial_in:
             name = pages.CONVENTION_NAMES[convention]
-            told = (line((f"The readings stay as typed and are now read as {name}.", Tone.WARN)),)
+            told = (warning(f"The readings stay as typed and are now read as {name}."),)
         changed = replace(answers, convention=convention).with_each(_unconfirmed)
         return self._read_anew(changed, state.from_review, told)
 
@@ -282,7 +282,7 @@ class Flow:
         for number in rest:
             answers = answers.with_joint(number, NOT_MEASURED)
         names = ", ".join(f"#{number}" for number in rest)
-        told = (line((f"– {names}  not measured", Tone.WARN)),) if rest else ()
+        told = (warning(f"– {names}  not measured"),) if rest else ()
         return self._go_on(answers, state.from_review, told)
 
     def _jump(self, state: State, number: int) -> Turn[State]:
@@ -426,9 +426,7 @@ class Flow:
                 judge_more(column, text, answers.unit, self.gear)
             except UsageError as error:
                 answers = answers.with_more(**{column: None})
-                told.append(
-                    line((f"{column.replace('_', ' ')}: {error.message}: left out.", Tone.WARN))
-                )
+                told.append(warning(f"{column.replace('_', ' ')}: {error.message}: left out."))
         for number, answer in answers.joints.items():
             reading = answers.reading(number)
             if reading is None:
@@ -442,7 +440,7 @@ class Flow:
             if judged.refused:
                 told.extend(pages.refusal_lines(typed, number, judged.said))
             said = f"#{number}  {typed} is {reading.radial_in:.4g} in radial: asked again."
-            told.append(line((said, Tone.WARN)))
+            told.append(warning(said))
         return replace(answers, joints=MappingProxyType(kept)), tuple(told)
 
     def back(self, state: State) -> Turn[State]:

@@ -42,6 +42,15 @@ def line(*parts: str | tuple[str, Tone], indent: int = 1, rigid: bool = False) -
     return Line(tuple((p, Tone.PLAIN) if isinstance(p, str) else p for p in parts), indent, rigid)
 
 
+def note(*parts: str | tuple[str, Tone]) -> Line:
+    """A line that stands below another."""
+    return line(*parts, indent=3)
+
+
+def warning(text: str, *more: str | tuple[str, Tone]) -> Line:
+    return line((text, Tone.WARN), *more)
+
+
 def keys(*pairs: tuple[str, str]) -> Line:
     parts: list[tuple[str, Tone]] = []
     for name, meaning in pairs:

@@ -6,7 +6,7 @@ from datetime import date
 
 from mlg_troubleshoot.cli.prompts.answers import DAY, SIGN_OFF, Answers, Reading, judge
 from mlg_troubleshoot.cli.prompts.conversation import Page
-from mlg_troubleshoot.cli.prompts.lines import BLANK, Line, Tone, keys, line
+from mlg_troubleshoot.cli.prompts.lines import BLANK, Line, Tone, keys, line, note, warning
 from mlg_troubleshoot.cli.prompts.sketch import sketch
 from mlg_troubleshoot.cli.prompts.store import Session
 from mlg_troubleshoot.decision.columns import BY_NAME, DATE, MARGIN, PLUNGER_DISPLACEMENT
@@ -34,24 +34,20 @@ _HOW = {
 JOINT_KEYS = keys(
     ("b", "back"), ("s", "not measured"), ("done", "no more"), ("?", "help"), ("q", "save and stop")
 )
-FACTOR_TWO = line(
-    ("DIAMETRAL and TOTAL PLAY are twice RADIAL. ", Tone.WARN),
+FACTOR_TWO = warning(
+    "DIAMETRAL and TOTAL PLAY are twice RADIAL. ",
     "The wrong one is off by a factor of 2 and can reverse the verdict.",
 )
 
 
-TAIL_HELP = (
-    line("The tail number as painted, for example N123AB. It names the report.", indent=3),
-)
-SIDE_HELP = (line("LH is the left gear as the pilot sees it, RH the right one.", indent=3),)
+TAIL_HELP = (note("The tail number as painted, for example N123AB. It names the report."),)
+SIDE_HELP = (note("LH is the left gear as the pilot sees it, RH the right one."),)
 UNIT_HELP = (
-    line("The unit of a number typed alone; 1 thou is 0.001 in.", indent=3),
-    line("One reading may carry another unit: 13 thou, 0.33 mm.", indent=3),
+    note("The unit of a number typed alone; 1 thou is 0.001 in."),
+    note("One reading may carry another unit: 13 thou, 0.33 mm."),
 )
-OFFER_HELP = (line("y goes on where you stopped. n begins with empty joints.", indent=3),)
-REREAD_HELP = (
-    line("Readings with their own unit, such as 13 thou, stay as they are either way.", indent=3),
-)
+OFFER_HELP = (note("y goes on where you stopped. n begins with empty joints."),)
+REREAD_HELP = (note("Readings with their own unit, such as 13 thou, stay as they are either way."),)
 
 
 def length(length_in: float, unit: LengthUnit | None) -> str:
@@ -60,7 +56,7 @@ def length(length_in: float, unit: LengthUnit | None) -> str:
 
 
 def choice(key: str, meaning: str) -> Line:
-    return line((key, Tone.KEY), f" {meaning}", indent=3)
+    return note((key, Tone.KEY), f" {meaning}")
 
 
 def rule(title: str, width: int) -> Line:
@@ -88,7 +84,7 @@ def welcome(gear: Gear, width: int, unfinished: tuple[Session, ...]) -> tuple[Li
             f"Unfinished: {identity(last.answers)}, begun {last.started:%Y-%m-%d %H:%M}. Go on with"
             " it:  "
         )
-        shown.append(line((told, Tone.WARN), ("mlg check --resume", Tone.KEY)))
+        shown.append(warning(told, ("mlg check --resume", Tone.KEY)))
     return tuple(shown)
 
 
@@ -127,7 +123,7 @@ def reread_page(answers: Answers, old: LengthUnit) -> Page:
     were, they = ("reading was", "it") if count == 1 else ("readings were", "they")
     shown = (
         BLANK,
-        line((f"{count} {were} typed as {old.words}, to be read as {new}?", Tone.WARN)),
+        warning(f"{count} {were} typed as {old.words}, to be read as {new}?"),
         choice("y", f"yes, {they} had {new} all along"),
         choice("n", f"no, {old.words} stay; only the next readings are {new}"),
     )
@@ -137,8 +133,8 @@ def reread_page(answers: Answers, old: LengthUnit) -> Page:
 def offer_page(saved: Session, gear: Gear) -> Page:
     shown = (
         BLANK,
-        line(
-            (f"An inspection of {identity(saved.answers)} is unfinished: ", Tone.WARN),
+        warning(
+            f"An inspection of {identity(saved.answers)} is unfinished: ",
             f"begun {saved.started:%Y-%m-%d %H:%M}, {len(saved.answers.radial_in)} of"
             f" {len(gear.joints)} joints measured.",
         ),
@@ -191,14 +187,14 @@ def confirm_page(gear: Gear, reading: Reading, number: int, unit: LengthUnit | N
     judged = judge(reading.written.text, number, reading.unit, reading.convention, gear)
     said = said_in(judged.said, reading.unit)
     shown = (
-        line((f"#{number}  {length(reading.radial_in, unit)} radial {what}.", Tone.WARN)),
-        line(f"{said[:1].upper()}{said[1:]}", indent=3),
+        warning(f"#{number}  {length(reading.radial_in, unit)} radial {what}."),
+        note(f"{said[:1].upper()}{said[1:]}"),
         choice(
             "y",
             f"yes, it is really {length(reading.as_read_in, unit)}"
             f" {CONVENTION_NAMES[reading.convention]}",
         ),
-        line(("or type the value again", Tone.QUIET), indent=3),
+        note(("or type the value again", Tone.QUIET)),
     )
     return Page(shown, f" #{number} y, or the value again > ")
 
@@ -238,21 +234,19 @@ def joint_help(gear: Gear, answers: Answers, number: int) -> tuple[Line, ...]:
     shown = [
         BLANK,
         line((joint.label, Tone.STRONG)),
-        line(f"Where: {joint.location}. Area: {joint.area} ({area}).", indent=3),
-        line(f"Limit: {_limit(gear, answers, number)}, {joint.limit.kind.value}.", indent=3),
+        note(f"Where: {joint.location}. Area: {joint.area} ({area})."),
+        note(f"Limit: {_limit(gear, answers, number)}, {joint.limit.kind.value}."),
     ]
     if answers.convention is not None:
-        shown.append(line(f"How: {_HOW[answers.convention]}", indent=3))
-    shown.append(line("Only play across the pin counts, not end float along it.", indent=3))
+        shown.append(note(f"How: {_HOW[answers.convention]}"))
+    shown.append(note("Only play across the pin counts, not end float along it."))
     alike = gear.alike.get(number, ())
     if alike:
         names = " and ".join(f"#{other}" for other in alike)
-        shown.append(
-            line(f"Moves the plunger like {names}: the other end of the same link.", indent=3)
-        )
+        shown.append(note(f"Moves the plunger like {names}: the other end of the same link."))
     shown += [
-        line("Make the gear safe as the maintenance manual says before you reach in.", indent=3),
-        line("Sketch: ═ lever  ─ link  △ fixed pivot  [n] this joint.", indent=3),
+        note("Make the gear safe as the maintenance manual says before you reach in."),
+        note("Sketch: ═ lever  ─ link  △ fixed pivot  [n] this joint."),
         line(
             ("Type", Tone.STRONG),
             f"  {example}   0.013 in   13 thou   0.33 mm   0 (measured, no play)",
@@ -269,8 +263,8 @@ def joint_help(gear: Gear, answers: Answers, number: int) -> tuple[Line, ...]:
 
 
 CONVENTION_HELP = (
-    *(line((CONVENTION_NAMES[c], Tone.STRONG), f": {how}", indent=3) for c, how in _HOW.items()),
-    line("Manual limits are usually diametral. The model uses the radial value.", indent=3),
+    *(note((CONVENTION_NAMES[c], Tone.STRONG), f": {how}") for c, how in _HOW.items()),
+    note("Manual limits are usually diametral. The model uses the radial value."),
     FACTOR_TWO,
 )
 
@@ -282,7 +276,7 @@ def more_page(answers: Answers, gear: Gear, width: int) -> Page:
 
     def row(name: str, example: str, meaning: str, given: str | None) -> Line:
         shown = ("   ✓ " + given, Tone.GOOD) if given else ("", Tone.PLAIN)
-        return line((f"{name} {example:<6}", Tone.KEY), f" {meaning}", shown, indent=3)
+        return note((f"{name} {example:<6}", Tone.KEY), f" {meaning}", shown)
 
     shown = (
         BLANK,
@@ -319,25 +313,20 @@ def more_page(answers: Answers, gear: Gear, width: int) -> Page:
 def confirm_more_page(most_in: float, unit: LengthUnit | None) -> Page:
     most = length(most_in, unit)
     shown = (
-        line(
-            (
-                f"That is farther than all joints at their limits could push the plunger ({most}).",
-                Tone.WARN,
-            )
+        warning(
+            f"That is farther than all joints at their limits could push the plunger ({most})."
         ),
-        line(("y", Tone.KEY), " yes, that is the reading   ", ("n", Tone.KEY), " no", indent=3),
+        note(("y", Tone.KEY), " yes, that is the reading   ", ("n", Tone.KEY), " no"),
     )
     return Page(shown, " y, n, or p with the displacement again > ")
 
 
 CONFIRM_UNIT_HELP = (
-    line(
+    note(
         "Even new parts have more play than this. The unit of the numbers may be another one.",
-        indent=3,
     ),
-    line(
+    note(
         "n goes back to the table: type unit there to change the unit, or a joint's number.",
-        indent=3,
     ),
 )
 
@@ -345,7 +334,7 @@ CONFIRM_UNIT_HELP = (
 def confirm_unit_page(answers: Answers, question: str) -> Page:
     shown = (
         BLANK,
-        line((f"{question[:1].upper()}{question[1:]}", Tone.WARN)),
+        warning(f"{question[:1].upper()}{question[1:]}"),
         choice("y", f"the readings are right in {(answers.unit or LengthUnit.INCH).words}"),
         choice("n", "no, back to correct them"),
     )
@@ -355,11 +344,10 @@ def confirm_unit_page(answers: Answers, question: str) -> Page:
 # What stands on the sign-off page: the word that leads back to it from the review, and its column.
 DETAILS = {BY_NAME[name].prompt_word: name for name in SIGN_OFF}
 DETAIL_HELP = (
-    line(
+    note(
         "Printed on the sign-off page of the report. Enter leaves it empty; x removes it.",
-        indent=3,
     ),
-    line("A date as 2026-03-04 or 4-Mar-2026.", indent=3),
+    note("A date as 2026-03-04 or 4-Mar-2026."),
 )
 
 
@@ -372,20 +360,17 @@ def detail_page(answers: Answers, column: str, today: date | None) -> Page:
 
 
 MORE_HELP = (
-    line(
+    note(
         "f or r: what the gear did. If clearances do not explain a failure, the result says so.",
-        indent=3,
     ),
-    line(
+    note(
         "p: plunger position minus mid-position with the Down Lock released; − is under-travel.",
-        indent=3,
     ),
-    line("m: the displacement that this gear allows, as found at rigging.", indent=3),
-    line(
+    note("m: the displacement that this gear allows, as found at rigging."),
+    note(
         "n: they are as after the repair. What you type after n is later: p, f and r count again.",
-        indent=3,
     ),
-    line("All on one line is fine: f p .041 m .028 n 3 5. x removes them all.", indent=3),
+    note("All on one line is fine: f p .041 m .028 n 3 5. x removes them all."),
 )
 
 
@@ -423,9 +408,7 @@ def review_page(gear: Gear, answers: Answers, width: int) -> Page:
     if missing:
         names = ", ".join(f"#{n}" for n in missing)
         them = "it" if len(missing) == 1 else "them"
-        shown.append(
-            line((f"Not measured: {names}. The gear cannot be cleared without {them}.", Tone.WARN))
-        )
+        shown.append(warning(f"Not measured: {names}. The gear cannot be cleared without {them}."))
     shown.append(
         keys(("1", "change joint 1"), ("b", "back"), ("?", "other changes"), ("q", "save and stop"))
     )
@@ -455,10 +438,9 @@ def _review_row(gear: Gear, answers: Answers, number: int, name_width: int, *, t
 
 
 REVIEW_HELP = (
-    line(
+    note(
         "A joint number changes that joint. OVER: beyond its limit. Nothing is computed before"
         " Enter.",
-        indent=3,
     ),
     keys(("tail", "tail number"), ("side", "LH or RH"), ("unit", "in, thou or mm")),
     keys(("reading", "radial, diametral, total play"), ("b", "back, to outcome, plunger, margin")),
