@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 from typing import TYPE_CHECKING
 
@@ -24,15 +24,7 @@ from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.cli.prompts import RichTerminal
-
-
-@dataclass(frozen=True, slots=True)
-class Ending:
-    """A result that was shown, and what writes its report if that was not asked for by a flag."""
-
-    result: task.CheckResult
-    report: Callable[[], None] | None
+    from mlg_troubleshoot.cli.prompts import Answers, RichTerminal
 
 
 def from_flags(flags: Flags, declared: task.CheckOptions) -> Inspection:
@@ -81,23 +73,10 @@ def _judged(
     return admit(values, options, {**flags.labels(), **labels})
 
 
-def ask(
-    flags: Flags,
-    declared: task.CheckOptions,
-    publish: Callable[[Inspection, LengthUnit], Ending],
-    keep: Callable[[task.CheckResult], None],
-    *,
-    resume: bool,
-    place: str | None = None,
-) -> task.CheckResult:
-    """Ask on the terminal and show the result; the entry stays open until it was shown and kept."""
-    from mlg_troubleshoot.cli.prompts import Answers, RichTerminal, SessionStore, ask_inspection
-    from mlg_troubleshoot.cli.prompts.answers import LENGTHS
+def answers_of(flags: Flags, declared: task.CheckOptions) -> Answers:
+    """What the flags answer already of the questions on a terminal, judged as a row would be."""
+    from mlg_troubleshoot.cli.prompts.answers import LENGTHS, Answers
 
-    store, terminal, gear = SessionStore(place), RichTerminal(), load_gear(declared.gear)
-    saved = store.latest() if resume else None
-    if resume and saved is None:
-        raise UsageError("there is no unfinished entry to resume", "Start a new one: mlg check")
     typed, unit = flags.typed, declared.unit or LengthUnit.INCH
     nobody = {RECORD_ID.name: "-", TAIL_NO.name: "-", CONVENTION.name: "RADIAL"}
     judged = _judged({SIDE.name: "LH", **typed, **nobody}, {}, flags, declared)
@@ -106,42 +85,28 @@ def ask(
         for name, text in typed.items()
         if name in LENGTHS
     }
-    given = Answers(
+    return Answers(
         tail_no=typed.get(TAIL_NO.name),
         side=judged.side if SIDE.name in typed else None,
         unit=declared.unit,
         convention=declared.convention,
         record_id=typed.get(RECORD_ID.name),
     ).with_more(**{**typed, **with_unit, OUTCOME.name: judged.outcome})
-    entry = ask_inspection(gear, terminal, store, given, saved=saved, advice=_advice(gear))
-    while True:
-        ending = publish(entry.inspection, entry.session.answers.unit or unit)
-        now = "" if ending.report is None else _what_now(terminal)
-        if now == "c":
-            entry = ask_inspection(gear, terminal, store, given, saved=entry.session, correct=True)
-            continue
-        if now == "r" and ending.report is not None:
-            ending.report()
-        keep(ending.result)
-        store.finish(entry.session)
-        return ending.result
 
 
-def _what_now(terminal: RichTerminal) -> str:
-    try:
-        while True:
-            typed = (
-                terminal.ask(" r = write the report, c = correct an answer, Enter = done > ")
-                .strip()
-                .lower()
-            )
-            if typed in ("", "r", "c"):
-                return typed
-    except EOFError:
-        return ""
+def what_now(terminal: RichTerminal) -> str:
+    """Ask what is to follow a result: its report, a correction, or nothing."""
+    typed = None
+    while typed not in ("", "r", "c"):
+        try:
+            asked = terminal.ask(" r = write the report, c = correct an answer, Enter = done > ")
+        except EOFError:
+            return ""
+        typed = asked.strip().lower()
+    return typed
 
 
-def _advice(
+def advice_for(
     gear: Gear,
 ) -> Callable[[Mapping[int, float], Sequence[int]], tuple[str, int | None] | None]:
     """Say after each critical joint which reading is most useful next, or that one may stop."""

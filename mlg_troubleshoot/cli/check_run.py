@@ -14,8 +14,8 @@ from mlg_troubleshoot.cli.check import Flags, Wanted
 from mlg_troubleshoot.cli.progress import stages
 from mlg_troubleshoot.cli.remembered import Settings
 from mlg_troubleshoot.cli.views import batch, notes, one_gear
-from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.outputs import OutputFile
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
@@ -100,19 +100,33 @@ class Run:
                 " --convention.",
             )
 
-        def publish(inspection: Inspection, entered_in: LengthUnit) -> by_hand.Ending:
-            result = task.check_inspection(inspection, self._asked, self._place)
-            self._publish(result, entered_in)
-            if self._wanted.report is not None or self._wanted.as_json:
-                return by_hand.Ending(result, None)
-            return by_hand.Ending(
-                result, partial(self._write_reports, result, _ASKED_FOR, self._seen(entered_in))
-            )
+        from mlg_troubleshoot.cli.prompts import RichTerminal, SessionStore, ask_inspection
 
-        wanted = self._wanted
-        return by_hand.ask(
-            self._flags, self._asked, publish, self._keep, resume=wanted.resume, place=wanted.store
-        )
+        wanted, gear = self._wanted, load_gear(self._asked.gear)
+        store, terminal = SessionStore(wanted.store), RichTerminal()
+        saved = store.latest() if wanted.resume else None
+        if wanted.resume and saved is None:
+            raise UsageError("there is no unfinished entry to resume", "Start a new one: mlg check")
+        given = by_hand.answers_of(self._flags, self._asked)
+        advice = by_hand.advice_for(gear)
+        entry = ask_inspection(gear, terminal, store, given, saved=saved, advice=advice)
+        # The entry stays open until its result was shown and kept.
+        while True:
+            unit = entry.session.answers.unit or self._asked.unit or LengthUnit.INCH
+            result = task.check_inspection(entry.inspection, self._asked, self._place)
+            self._publish(result, unit)
+            is_asked_for = wanted.report is not None or wanted.as_json
+            now = "" if is_asked_for else by_hand.what_now(terminal)
+            if now == "c":
+                entry = ask_inspection(
+                    gear, terminal, store, given, saved=entry.session, correct=True
+                )
+                continue
+            if now == "r":
+                self._write_reports(result, _ASKED_FOR, self._seen(unit))
+            self._keep(result)
+            store.finish(entry.session)
+            return result
 
     def _seen(self, entered_in: LengthUnit) -> Settings:
         """Lengths are shown in the unit that a flag or the memory says, or else in that of the

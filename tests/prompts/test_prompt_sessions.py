@@ -13,8 +13,9 @@ from time import monotonic
 
 import pytest
 
-from mlg_troubleshoot.cli import by_hand
-from mlg_troubleshoot.cli.check import Flags
+from mlg_troubleshoot.cli.check import Flags, Wanted
+from mlg_troubleshoot.cli.check_run import Run
+from mlg_troubleshoot.cli.options import Tables
 from mlg_troubleshoot.cli.prompts import (
     Answers,
     EntryInterruptedError,
@@ -30,7 +31,7 @@ from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.store import Draft, Drafts, Store, StoreError
 from mlg_troubleshoot.units import LengthUnit
-from mlg_troubleshoot.workflows.check import CheckOptions, CheckResult, check_inspection
+from mlg_troubleshoot.workflows.check import CheckResult
 from tests.prompts.scripted import (
     ENTERS,
     NOON,
@@ -523,19 +524,15 @@ def test_an_entry_whose_result_could_not_be_kept_stays_unfinished(
     terminal = ScriptedTerminal([*HEADING, *TEN, *ENTERS, ""])
     monkeypatch.setattr("mlg_troubleshoot.cli.prompts.RichTerminal", lambda: terminal)
 
-    def refused(_result: CheckResult) -> None:
+    monkeypatch.setattr("mlg_troubleshoot.cli.output.can_ask", lambda: True)
+
+    def refused(_run: Run, _result: CheckResult) -> None:
         raise StoreError("kept already with other content", "Give it its own record_id.")
 
-    asked = CheckOptions()
+    monkeypatch.setattr(Run, "_keep", refused)
+    wanted = Wanted(store=str(store.place), as_json=True)
     with pytest.raises(StoreError):
-        by_hand.ask(
-            Flags(),
-            asked,
-            lambda inspection, _unit: by_hand.Ending(check_inspection(inspection, asked), None),
-            refused,
-            resume=False,
-            place=str(store.place),
-        )
+        Run([], Flags(), Tables(), wanted).run()
     assert len(latest(store).answers.joints) == 10
 
 
