@@ -8,7 +8,7 @@ from mlg_troubleshoot.cli import history, options, output
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
-    from mlg_troubleshoot.life.outlook import Quantiles
+    from mlg_troubleshoot.life.forecast import Quantiles
     from mlg_troubleshoot.workflows.history import Lives
 
 EPILOG = "Example: [b]mlg fleet[/b] · [b]mlg fleet --json[/b]"
@@ -60,17 +60,16 @@ def _show(found: Lives) -> None:
     )
     table = output.plain_table(console, *headings, right=("to limit", "to margin", "next due"))
     for line in lines[:_LINES]:
-        ahead = line.outlook
-        first = "" if ahead.limit_joint is None else f" #{ahead.limit_joint}"
-        due = ahead.next_inspection_landings
+        first = "" if line.limit_joint is None else f" #{line.limit_joint}"
+        due = line.next_inspection_landings
         table.add_row(
-            output.word(line.life.key[0]),
-            line.life.key[1],
-            line.latest.record.day or "no date",
+            output.word(line.tail_no),
+            line.side,
+            line.inspection_date or "no date",
             str(line.verdict),
-            output.joint(line.latest.worst_joint),
-            _left(ahead.landings_to_limit, gear) + first,
-            _left(ahead.landings_to_margin, gear),
+            output.joint(line.worst_joint),
+            _left(line.landings_to_limit, gear) + first,
+            _left(line.landings_to_margin, gear),
             "-" if due is None else landings_shown(due, gear),
         )
     console.print(

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from datetime import date
 
 import numpy as np
 
@@ -15,18 +16,21 @@ from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
-from mlg_troubleshoot.life.wear_paths import stretches, unit_of, wear_paths
+from mlg_troubleshoot.life.wear_paths import placed_in_time, stretches, unit_of, wear_paths
 from mlg_troubleshoot.wear import Samples, WearModel, first_passage, fit_wear
 
 # Where a forecast looks between the last inspection and the horizon: now, and from 1/800 of the
 # horizon (25 of 20,000 landings, about a week) on in equal ratios. [1]
-_AHEAD = np.concatenate([[0.0], np.geomspace(1 / 800, 1, 28)])
+_AHEAD = np.concatenate([[0], np.geomspace(1 / 800, 1, 28)])
 # At which of these the model itself is asked for the worst case, which departs slowly from the sum
 # of amplified clearances.
 _ASKED = np.array([0, 8, 14, 18, 22, 25, 28])
 _GEARS_AT_ONCE = 100
 # Stands for the worst case of a linkage that does not close: beyond any margin. [in]
 _NOT_CLOSING_IN = 1000
+
+
+Quantiles = Mapping[str, float | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,14 +40,35 @@ class Forecast:
 
     limit_joint: the joint that most often is the first at its limit.
     due_now: why nothing remains, in words; empty where something may.
+    due_date: the day of the next inspection, None where it is not known.
     """
 
     joints: Mapping[int, Samples] = field(default_factory=dict)
     limit: Samples | None = None
     limit_joint: int | None = None
     margin: Samples | None = None
-    next_inspection: float | None = None
+    next_inspection_landings: float | None = None
     due_now: str = ""
+    due_date: str | None = None
+
+    @property
+    def landings_to_limit(self) -> Quantiles | None:
+        return quantiles(self.limit)
+
+    @property
+    def landings_to_margin(self) -> Quantiles | None:
+        return quantiles(self.margin)
+
+
+def quantiles(samples: Samples | None) -> Quantiles | None:
+    """The 5, 50 and 95 % quantiles; null beyond the horizon."""
+    if samples is None:
+        return None
+    ends = samples.quantile([0.05, 0.5, 0.95])
+    return {
+        name: float(end) if np.isfinite(end) else None
+        for name, end in zip(("p05", "p50", "p95"), ends, strict=True)
+    }
 
 
 def fit_fleet(lives: Iterable[GearLife], gear: Gear) -> WearModel | None:
@@ -85,12 +110,13 @@ def forecast(
         parts = [known[at : at + _GEARS_AT_ONCE] for at in range(0, len(known), _GEARS_AT_ONCE)]
         # NumPy lets others work meanwhile.
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            found = pool.map(lambda part: [*_forecast_part(part, model, gear)], parts)
-            for part, of_part in zip(parts, found, strict=True):
+            ahead = pool.map(lambda part: [*_forecast_part(part, model, gear)], parts)
+            for part, of_part in zip(parts, ahead, strict=True):
                 forecasts.update(zip((life.key for life in part), of_part, strict=True))
                 done += len(part)
                 progress("Looking ahead", done, len(known))
-    return {life.key: forecasts.get(life.key, Forecast()) for life in lives}
+    found = ((life, forecasts.get(life.key, Forecast())) for life in lives)
+    return {life.key: replace(ahead, due_date=_due_date(life, ahead)) for life, ahead in found}
 
 
 def _due_now(life: GearLife, gear: Gear) -> Forecast | None:
@@ -122,6 +148,29 @@ def _due_now(life: GearLife, gear: Gear) -> Forecast | None:
     worst = max(over, key=lambda n: over[n] / gear.joint(n).limit.value, default=None)
     why = ", and ".join(reasons)
     return Forecast(dict.fromkeys(over, nothing), nothing, worst, nothing, 0.0, why)
+
+
+def _due_date(life: GearLife, ahead: Forecast) -> str | None:
+    """The day on which the next inspection is due if the gear goes on landing as often as between
+    its inspections.
+    """
+    last = life.latest
+    if last is None or not last.record.day or ahead.next_inspection_landings is None:
+        return None
+    latest = date.fromisoformat(last.record.day).toordinal()
+    days = 0.0
+    if not ahead.due_now:
+        placed = placed_in_time(life)
+        if not placed:
+            return None
+        (first, least), (newest, most) = placed[0], placed[-1]
+        passed, flown = newest - first, most - least
+        if flown <= 0.0 or passed <= 0:
+            return None
+        days = ahead.next_inspection_landings * passed / flown
+    if latest + days >= date.max.toordinal():
+        return None
+    return date.fromordinal(latest + int(days)).isoformat()
 
 
 def _over_limit(clearance_in: Mapping[int, float], gear: Gear) -> dict[int, float]:

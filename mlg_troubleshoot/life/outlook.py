@@ -6,24 +6,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import date
-
-import numpy as np
 
 from mlg_troubleshoot.decision.ranking import WORST_FIRST
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife, KeptInspection
-from mlg_troubleshoot.life.forecast import Forecast
-from mlg_troubleshoot.life.wear_paths import placed_in_time
-from mlg_troubleshoot.wear import Samples
-
-Quantiles = Mapping[str, float | None]
+from mlg_troubleshoot.life.forecast import Forecast, Quantiles
 
 
 @dataclass(frozen=True, slots=True)
-class LandingsLeft:
-    """The landings that a gear has left from its last inspection: null beyond the horizon."""
+class FleetLine:
+    """One gear of a fleet as every output shows it: its latest inspection, and what is left."""
 
+    life: GearLife
+    tail_no: str
+    side: str
+    record_id: str
+    inspection_date: str | None
+    gear_landings: float | None
+    verdict: str | None
+    worst_joint: int | None
+    repairs: int
     landings_to_limit: Quantiles | None
     limit_joint: int | None
     landings_to_margin: Quantiles | None
@@ -31,34 +33,29 @@ class LandingsLeft:
     due_date: str | None
 
     @classmethod
-    def of(cls, life: GearLife, ahead: Forecast) -> LandingsLeft:
+    def of(cls, life: GearLife, latest: KeptInspection, ahead: Forecast) -> FleetLine:
         return cls(
-            quantiles(ahead.limit),
+            life,
+            *life.key,
+            latest.record.record_id,
+            latest.record.day or None,
+            latest.inspection.gear_landings,
+            latest.result.get("verdict"),
+            latest.worst_joint,
+            len(life.repairs),
+            ahead.landings_to_limit,
             ahead.limit_joint,
-            quantiles(ahead.margin),
-            ahead.next_inspection,
-            _due_date(life, ahead),
+            ahead.landings_to_margin,
+            ahead.next_inspection_landings,
+            ahead.due_date,
         )
-
-
-@dataclass(frozen=True, slots=True)
-class FleetLine:
-    """The latest inspection of a gear, and its outlook."""
-
-    life: GearLife
-    latest: KeptInspection
-    outlook: LandingsLeft
-
-    @property
-    def verdict(self) -> str | None:
-        return self.latest.result.get("verdict")
 
     @property
     def urgency(self) -> tuple[int, float, GearKey]:
         """By verdict, then by landings to the next inspection."""
         order = [verdict.value for verdict in WORST_FIRST]
         rank = order.index(self.verdict) if self.verdict in order else len(order)
-        due = self.outlook.next_inspection_landings
+        due = self.next_inspection_landings
         return rank, float("inf") if due is None else due, self.life.key
 
 
@@ -67,22 +64,11 @@ def fleet_lines(
 ) -> list[FleetLine]:
     """One line per gear, worst first."""
     lines = [
-        FleetLine(life, life.latest, LandingsLeft.of(life, forecasts.get(life.key, Forecast())))
+        FleetLine.of(life, life.latest, forecasts.get(life.key, Forecast()))
         for life in lives
         if life.latest is not None
     ]
     return sorted(lines, key=lambda line: line.urgency)
-
-
-def quantiles(samples: Samples | None) -> Quantiles | None:
-    """The 5, 50 and 95 % quantiles; null beyond the horizon."""
-    if samples is None:
-        return None
-    ends = samples.quantile([0.05, 0.5, 0.95])
-    return {
-        name: float(end) if np.isfinite(end) else None
-        for name, end in zip(("p05", "p50", "p95"), ends, strict=True)
-    }
 
 
 def span(ends: Quantiles | None, gear: Gear) -> str:
@@ -108,41 +94,15 @@ def outlook_sentence(life: GearLife, ahead: Forecast, gear: Gear) -> str:
         return "No forecast: the last inspection does not state its landings (gear_landings)."
     if ahead.limit is None:
         return ""
-    outlook = LandingsLeft.of(life, ahead)
-    joint = (
-        ""
-        if ahead.limit_joint is None
-        else f", where #{ahead.limit_joint} most likely reaches its limit first"
-    )
-    after = outlook.next_inspection_landings
+    joint = ""
+    if ahead.limit_joint is not None:
+        joint = f", where #{ahead.limit_joint} most likely reaches its limit first"
+    after = ahead.next_inspection_landings
     due = "beyond the horizon" if after is None else f"in {landings_shown(after, gear)} landings"
-    day = f", about {outlook.due_date}" if outlook.due_date else ""
+    day = f", about {ahead.due_date}" if ahead.due_date else ""
     return (
         "Landings left from the last inspection: to a joint's limit"
-        f" {span(outlook.landings_to_limit, gear)}{joint}; to the margin, by the worst-case bound,"
-        f" {span(outlook.landings_to_margin, gear)}. Next inspection due"
+        f" {span(ahead.landings_to_limit, gear)}{joint}; to the margin, by the worst-case bound,"
+        f" {span(ahead.landings_to_margin, gear)}. Next inspection due"
         f" {due}{day} (accepted chance {gear.accepted_chance.value:.0%})."
     )
-
-
-def _due_date(life: GearLife, ahead: Forecast) -> str | None:
-    """The day on which the next inspection is due if the gear goes on landing as often as between
-    its inspections.
-    """
-    last = life.latest
-    if last is None or not last.record.day or ahead.next_inspection is None:
-        return None
-    latest = date.fromisoformat(last.record.day).toordinal()
-    days = 0.0
-    if not ahead.due_now:
-        placed = placed_in_time(life)
-        if not placed:
-            return None
-        (first, least), (newest, most) = placed[0], placed[-1]
-        passed, flown = newest - first, most - least
-        if flown <= 0.0 or passed <= 0:
-            return None
-        days = ahead.next_inspection * passed / flown
-    if latest + days >= date.max.toordinal():
-        return None
-    return date.fromordinal(latest + int(days)).isoformat()

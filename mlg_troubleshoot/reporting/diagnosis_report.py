@@ -38,6 +38,8 @@ _WORDS = {
     "UNLISTED": ("REAL, BUT NOT ON THE LIST", "inconclusive"),
     "NONE": ("NOTHING FOUND", "within-margin"),
 }
+# What a page has room for: panels of rivals, causes ruled out, changed verdicts, and explanations;
+# one that is less likely than this is not drawn. [1]
 _MOST_PANELS = 2
 _MOST_RULED_OUT = 14
 _MOST_CHANGES = 40

@@ -12,11 +12,11 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
 from mlg_troubleshoot.life.forecast import Forecast
 from mlg_troubleshoot.life.looking_back import Advice, side_by_side
-from mlg_troubleshoot.life.outlook import FleetLine, fleet_lines, outlook_sentence
+from mlg_troubleshoot.life.outlook import fleet_lines, outlook_sentence
 from mlg_troubleshoot.reporting.figures import ACCENT, INK, SOFT, Canvas
 from mlg_troubleshoot.reporting.formats import ABSENT, Lengths, landings
 from mlg_troubleshoot.reporting.html import Document
-from mlg_troubleshoot.reporting.life_json import fleet_line_as_json, life_as_json
+from mlg_troubleshoot.reporting.life_json import life_as_json
 from mlg_troubleshoot.reporting.provenance import ReportProvenance, head
 from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.units import LengthUnit
@@ -88,12 +88,12 @@ def fleet_document(
     """
     lengths = Lengths(unit)
     lines = [
-        {
-            **fleet_line_as_json(line),
-            "left": interval_bar(line.outlook.landings_to_limit, gear.horizon.value),
-            "spark": _worst_cases(line, lengths),
-            "link": f"{safe_stem('life', *line.life.key)}.html",
-        }
+        (
+            line,
+            interval_bar(line.landings_to_limit, gear.horizon.value),
+            _worst_cases(line.life, lengths),
+            f"{safe_stem('life', *line.life.key)}.html",
+        )
         for line in fleet_lines(lives, forecasts)
     ]
     context = {
@@ -105,9 +105,10 @@ def fleet_document(
     return Document("fleet.html.j2", context, "fleet", landscape=True)
 
 
-def _worst_cases(line: FleetLine, lengths: Lengths) -> Markup:
-    worst_in = [kept.result.get("predicted_displacement_in") for kept in line.life.inspections]
-    return sparkline(worst_in, line.latest.result.get("margin_in"), lengths)
+def _worst_cases(life: GearLife, lengths: Lengths) -> Markup:
+    results = [kept.result for kept in life.inspections]
+    worst_in = [result.get("predicted_displacement_in") for result in results]
+    return sparkline(worst_in, results[-1].get("margin_in"), lengths)
 
 
 def life_document(

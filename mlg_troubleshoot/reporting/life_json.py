@@ -7,9 +7,9 @@ from typing import Any
 
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, GearLife
-from mlg_troubleshoot.life.forecast import Forecast
+from mlg_troubleshoot.life.forecast import Forecast, quantiles
 from mlg_troubleshoot.life.looking_back import Advice
-from mlg_troubleshoot.life.outlook import FleetLine, LandingsLeft, fleet_lines, quantiles
+from mlg_troubleshoot.life.outlook import fleet_lines
 from mlg_troubleshoot.life.wear_paths import stretches
 from mlg_troubleshoot.output_types import FleetGear, FleetOutput, LifeOutput
 from mlg_troubleshoot.reporting.json_form import written
@@ -22,25 +22,9 @@ def fleet_as_json(
     """One line per gear, worst first: verdict, then landings to its next inspection."""
     return written(
         FleetOutput,
-        gears=[fleet_line_as_json(line) for line in fleet_lines(lives, forecasts)],
+        gears=[written(FleetGear, line) for line in fleet_lines(lives, forecasts)],
         advice=_advice(lives),
         warnings=[warning for life in lives for warning in life.warnings],
-    )
-
-
-def fleet_line_as_json(line: FleetLine) -> dict[str, Any]:
-    tail_no, side = line.life.key
-    return written(
-        FleetGear,
-        line.outlook,
-        tail_no=tail_no,
-        side=side,
-        record_id=line.latest.record.record_id,
-        inspection_date=line.latest.record.day or None,
-        gear_landings=line.latest.inspection.gear_landings,
-        verdict=line.verdict,
-        worst_joint=line.latest.worst_joint,
-        repairs=len(line.life.repairs),
     )
 
 
@@ -52,7 +36,7 @@ def life_as_json(life: GearLife, ahead: Forecast, gear: Gear) -> dict[str, Any]:
     tail_no, side = life.key
     return written(
         LifeOutput,
-        LandingsLeft.of(life, ahead),
+        ahead,
         tail_no=tail_no,
         side=side,
         events=[_event(record, counts=record.digest in counting) for record in life.records],

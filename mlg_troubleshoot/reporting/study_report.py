@@ -26,7 +26,7 @@ from mlg_troubleshoot.reporting.study_figures import BarSeries
 from mlg_troubleshoot.units import LengthUnit
 
 # A possible reason is ruled out if the excess is more than this many times what it explains. [1]
-_CLEARLY = 3.0
+_CLEARLY = 3
 _DIRECTIONS = {
     Directions.WORST: (
         "in the directions that move the plunger farthest, in the worse of the two senses"

@@ -23,7 +23,7 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.wear.paths import Steps
 
-_LOG_2PI = float(np.log(2.0 * np.pi))
+_LOG_2PI = float(np.log(2 * np.pi))
 # Variance added to every reading, as if it were a thousandth of the whole rise worse than stated.
 # Without it the posterior is too narrow to sample where all parts begin at the same number. On
 # measured cracks (tests/wear/real.py) the probability of one kind was then 0.19 to 0.97, depending

@@ -19,19 +19,25 @@ from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.wear.filtering import Draws, follow
 from mlg_troubleshoot.wear.paths import Scale, Steps
 
-# Mean and standard deviation of the normal prior of each parameter, logarithms where it is a scale,
-# in units of the whole usage and the whole rise that was read: weak on purpose, and the same for
-# all kinds so that evidence compares.
+# Mean and standard deviation of the normal prior of each parameter: weak on purpose, and the same
+# for all kinds so that evidence compares. A scale by its logarithm, in units of the whole usage and
+# the whole rise that was read.
 _PRIOR = {
-    "start": (0.0, 2.0),
+    # Where paths begin, and how far apart they begin. [rise; log rise]
+    "start": (0, 2),
     "start_sd": (np.log(0.1), 1.5),
-    "drift": (1.0, 1.0),
-    "drift_sd": (np.log(0.25), 1.0),
+    # Pace of the population, and how far units differ from it. [rise per usage; its logarithm]
+    "drift": (1, 1),
+    "drift_sd": (np.log(0.25), 1),
+    # Wiener or gamma increments over the whole usage, and wandering of the drift. [log rise]
     "increment_sd": (np.log(0.15), 1.2),
     "wander_sd": (np.log(0.5), 1.2),
+    # Error of a reading. [log rise]
     "reading_sd": (np.log(0.05), 1.5),
-    "power": (0.0, 0.35),
-    "kept": (1.0, 1.5),
+    # Power of usage that wear follows; 0 is in proportion. [logarithm]
+    "power": (0, 0.35),
+    # Share of its pace that a restored unit keeps. [log odds]
+    "kept": (1, 1.5),
 }
 _KINDS = ("wiener", "integrated", "gamma")
 # Importance samples of each kind of increments, and the degrees of freedom of the Student

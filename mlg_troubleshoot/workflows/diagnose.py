@@ -61,8 +61,9 @@ class DiagnoseResult(TableResult):
     extension: ModelExtension | None
 
 
-# A check refuses an impossible length; a diagnosis keeps the row and looks for the entry error.
-_ANY_LENGTH_IN = 10.0
+# A check refuses an impossible length; a diagnosis keeps the row and looks for the entry error: any
+# number that a person may type for a clearance. [in]
+_ANY_LENGTH_IN = 10
 
 
 def diagnose_files(

@@ -47,10 +47,11 @@ from mlg_troubleshoot.units import LengthUnit
 # [in] (docs/explanation/diagnosis.md: a gauge that repeats to 1.5 thou, and what clearances and
 # pins add).
 TAILS, VISITS, ROW_IN = 20, 5, 0.0025
-# Expected distance in log-likelihood at which two are distinguished with 80 % power: d²/2 − 0.84 d
-# is the odds from which something is said.
 _BELIEFS = Beliefs()
-_APART = 0.84 + float(np.sqrt(0.84**2 + 2.0 * _BELIEFS.odds))
+# Quantile of the normal distribution for 80 % power, and the distance in log-likelihood at which
+# two are distinguished with it: d²/2 − 0.84 d is the odds from which something is said. [1]
+_POWER = 0.84
+_APART = _POWER + float(np.sqrt(_POWER**2 + 2 * _BELIEFS.odds))
 # Columns in addition to clearances, cheapest first: written down anyway, read off, to be measured.
 FURTHER = {
     column.variable: column
