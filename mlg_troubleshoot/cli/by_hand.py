@@ -77,7 +77,8 @@ def answers_of(flags: Flags, declared: task.CheckOptions) -> Answers:
     """What the flags answer already of the questions on a terminal, judged as a row would be."""
     from mlg_troubleshoot.cli.prompts.answers import LENGTHS, Answers
 
-    typed, unit = flags.typed, declared.unit or LengthUnit.INCH
+    typed = flags.typed
+    unit = declared.unit or LengthUnit.INCH
     nobody = {RECORD_ID.name: "-", TAIL_NO.name: "-", CONVENTION.name: "RADIAL"}
     judged = _judged({SIDE.name: "LH", **typed, **nobody}, {}, flags, declared)
     with_unit = {

@@ -35,7 +35,8 @@ class Run:
             raise UsageError("--annotate needs exactly one workbook", "Give one .xlsx FILE.")
         if wanted.formats and wanted.report is None:
             output.say("Note: --format is for reports: without --report DIR none is written.")
-        extensions, causes = wanted.extension or (), wanted.causes or ()
+        extensions = wanted.extension or ()
+        causes = wanted.causes or ()
         self._files, self._flags, self._wanted = files, flags, wanted
         self._asks = not (files or flags.values)
         outputs = [OutputFile("--csv", wanted.csv, task.VERDICTS)]
@@ -102,8 +103,10 @@ class Run:
 
         from mlg_troubleshoot.cli.prompts import RichTerminal, SessionStore, ask_inspection
 
-        wanted, gear = self._wanted, load_gear(self._asked.gear)
-        store, terminal = SessionStore(wanted.store), RichTerminal()
+        wanted = self._wanted
+        gear = load_gear(self._asked.gear)
+        store = SessionStore(wanted.store)
+        terminal = RichTerminal()
         saved = store.latest() if wanted.resume else None
         if wanted.resume and saved is None:
             raise UsageError("there is no unfinished entry to resume", "Start a new one: mlg check")
@@ -136,7 +139,8 @@ class Run:
         return self._shown if said else replace(self._shown, show=entered_in)
 
     def _publish(self, result: task.CheckResult, entered_in: LengthUnit) -> None:
-        wanted, seen = self._wanted, self._seen(entered_in)
+        wanted = self._wanted
+        seen = self._seen(entered_in)
         if wanted.as_json:
             from mlg_troubleshoot.reporting.json_form import check_as_json, check_json_pieces
 

@@ -46,7 +46,8 @@ def fleet(
 def _show(found: Lives) -> None:
     from mlg_troubleshoot.life.outlook import fleet_lines, landings_shown
 
-    console, gear = output.console(), found.gear
+    console = output.console()
+    gear = found.gear
     lines = fleet_lines(found.lives, found.forecasts)
     headings = (
         "tail",

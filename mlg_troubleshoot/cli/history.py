@@ -72,7 +72,8 @@ def show(
     from mlg_troubleshoot.reporting import life_json
     from mlg_troubleshoot.workflows import history
 
-    place, known = records.kept, load_gear(records.gear)
+    place = records.kept
+    known = load_gear(records.gear)
     settings = shown.begin(records.gear, store=records.store)
     if tail is None:
         if shown.report is not None:

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.reporting.publish import WrittenReport
 
 _WIDTH_ELSEWHERE = 80
-WIDE, WIDEST = 100, 120
+WIDE = 100
+WIDEST = 120
 _PLAIN = "mlg.plain"
 # A sign and what stands for it, one for one, so that drawings and tables keep their columns.
 _SIGNS = (

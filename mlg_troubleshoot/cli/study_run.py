@@ -83,10 +83,8 @@ def run(gear: Gear, options: StudyOptions, flags: StudyFlags, settings: Settings
             designs=wants_report,
             progress=progress,
         )
-    said, searched = (
-        findings.statements if flags.statements else (),
-        findings.searches if flags.bound else (),
-    )
+    said = findings.statements if flags.statements else ()
+    searched = findings.searches if flags.bound else ()
     shown = replace(findings, statements=said, searches=searched)
     if flags.as_json:
         from mlg_troubleshoot.reporting.model_json import study_as_json
@@ -141,7 +139,8 @@ def _client(address: str) -> Any:
 
 def _show(findings: StudyFindings, unit: LengthUnit) -> None:
     console = output.console(unit=unit, elsewhere=output.WIDEST)
-    gear, result = findings.gear, findings.result
+    gear = findings.gear
+    result = findings.result
     table = result.table
     what = (
         "exceeding the margin"

@@ -48,7 +48,8 @@ def ask_survey(file: Path, gear: Gear, terminal: Terminal) -> bool:
         )
     sheet = _Sheet(file, gear)
     terminal.say([_KEYS])
-    turn, conversation = Turn(sheet.first_open), Conversation(sheet, terminal)
+    turn = Turn(sheet.first_open)
+    conversation = Conversation(sheet, terminal)
     while turn.effect is Effect.NONE and turn.state < len(sheet.rows):
         turn = conversation.next(turn)
     return turn.effect is not Effect.STOP
@@ -135,7 +136,8 @@ class _Sheet:
     def _with(self, row: list[str], number: float, unit: str) -> list[str]:
         """The row with a value in the column of its unit alone; thou are kept in inches."""
         if unit == "thou":
-            number, unit = number / THOU_PER_IN, "in"
+            number = number / THOU_PER_IN
+            unit = "in"
         return [
             repr(number) if name == f"value_{unit}" else "" if name.startswith("value_") else text
             for name, text in zip(self.header, row, strict=False)

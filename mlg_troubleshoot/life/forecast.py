@@ -164,7 +164,8 @@ def _due_date(life: GearLife, ahead: Forecast) -> str | None:
         if not placed:
             return None
         (first, least), (newest, most) = placed[0], placed[-1]
-        passed, flown = newest - first, most - least
+        passed = newest - first
+        flown = most - least
         if flown <= 0.0 or passed <= 0:
             return None
         days = ahead.next_inspection_landings * passed / flown

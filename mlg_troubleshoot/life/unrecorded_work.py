@@ -110,7 +110,8 @@ def _departures(
     numbers = gear.joint_numbers
     paths: dict[str, tuple[WearPath, ...]] = {}
     at: list[tuple[int, int]] = []
-    ahead, read = [], []
+    ahead = []
+    read = []
     for n, (history, newest) in enumerate(pairs):
         last = newest.inspections[-1].inspection
         landings = last.gear_landings or 0.0

@@ -23,7 +23,8 @@ Texts = NDArray[np.str_]
 
 # Width and height of one plot of two side by side. [canvas units]
 _PLOT = (335, 236)
-_BAR, _BAR_HIGH = 150, 10
+_BAR = 150
+_BAR_HIGH = 10
 _BINS = 8
 _FEWEST_IN_A_BIN = 5
 MOST_TAILS = 36
@@ -92,7 +93,8 @@ def against_cause(residuals: Residuals, candidate: Candidate, effect_in: Array) 
     """Choose what to draw residuals against: the column that the cause lives on, else the
     prediction.
     """
-    table, setting = residuals.diagnosis.used, candidate.setting
+    table = residuals.diagnosis.used
+    setting = candidate.setting
     joints = [setting["joint"]] if "joint" in setting else list(setting.get("pair", ()))
     if joints:
         least = residuals.drawn(np.min([residuals.clearance(joint) for joint in joints], axis=0))
@@ -119,7 +121,8 @@ def against_cause(residuals: Residuals, candidate: Candidate, effect_in: Array) 
 
 
 def against_column(residuals: Residuals, name: str) -> ResidualAxis:
-    table, unit = residuals.diagnosis.used, residuals.unit
+    table = residuals.diagnosis.used
+    unit = residuals.unit
     if name in table.quantities:
         label = ", ".join(filter(None, (column_words(name), _UNITS.get(name))))
         return ResidualAxis(
@@ -142,7 +145,8 @@ def against_column(residuals: Residuals, name: str) -> ResidualAxis:
 
 def split_by(residuals: Residuals, name: str, other: ResidualAxis) -> tuple[Mask, str, str] | None:
     """Split the rows by a column, so that what moves with two columns together can be seen."""
-    column, x = against_column(residuals, name), other.values
+    column = against_column(residuals, name)
+    x = other.values
     if not column.names:
         known = np.isfinite(column.values)
         half = float(np.median(column.values[known])) if known.any() else np.nan
@@ -197,7 +201,9 @@ def residual_plot(
     y = residuals.drawn(residuals.after_in if after else residuals.before_in)
     if only is not None:
         y = np.where(only, y, np.nan)
-    axis, x, names = residuals.axis, against.values, against.names
+    axis = residuals.axis
+    x = against.values
+    names = against.names
     canvas = Canvas(*_PLOT, title, f"{axis.label}, against {against.label}")
     if names:
         across = Axis(against.label, -0.6, len(names) - 0.4)
@@ -246,7 +252,8 @@ def _point(canvas: Canvas, x: float, y: float, *, after: bool, marked: bool = Fa
 
 
 def _mean_mark(plot: Plot, x: float, values: Array) -> None:
-    mean, error = float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(len(values)))
+    mean = float(np.mean(values))
+    error = float(np.std(values, ddof=1) / np.sqrt(len(values)))
     px, py = plot.at(x, mean)
     ends = [plot.at(x, mean + side * 2.0 * error)[1] for side in (-1.0, 1.0)]
     plot.canvas.line(px, ends[0], px, ends[1], width=1.6)
@@ -266,7 +273,11 @@ def tail_strips(residuals: Residuals) -> Markup:
         np.unique(tails).tolist(), key=lambda name: -abs(float(np.mean(before[tails == name])))
     )
     shown = sorted(names[:MOST_TAILS])
-    width, row, top, left, gap = 690.0, 13.0, 22.0, 74.0, 16.0
+    width = 690.0
+    row = 13.0
+    top = 22.0
+    left = 74.0
+    gap = 16.0
     height = top + row * len(shown) + 34
     description = (
         "One line for each aircraft; every point is one inspection, the square is their mean"
@@ -292,8 +303,10 @@ def tail_strips(residuals: Residuals) -> Markup:
 
 
 def measured_against_predicted(residuals: Residuals) -> Markup:
-    d, unit = residuals.diagnosis, residuals.unit
-    predicted, measured = residuals.drawn(d.predicted_in), residuals.drawn(d.used.measured_in)
+    d = residuals.diagnosis
+    unit = residuals.unit
+    predicted = residuals.drawn(d.predicted_in)
+    measured = residuals.drawn(d.used.measured_in)
     extended = predicted + residuals.drawn(residuals.effect_in)
     description = (
         "Measured displacement of each inspection against the predicted one; on the line both are"
@@ -308,7 +321,8 @@ def measured_against_predicted(residuals: Residuals) -> Markup:
         top=24,
     )
     plot.draw_axes(x_ticks=8)
-    low, high = plot.x.low, plot.x.high
+    low = plot.x.low
+    high = plot.x.high
     canvas.line(*plot.at(low, low), *plot.at(high, high), colour=SOFT, dash="6 3")
     shown = [
         ("before", predicted, False),

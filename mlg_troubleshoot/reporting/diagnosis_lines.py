@@ -25,7 +25,8 @@ _VARIABLES = {c.variable: c.said for c in (*COVARIATES, AXIAL_FLOAT)}
 
 
 # What is less likely than this is not worth a word, and more than so many are not read.
-_LEAST_SAID, _MOST_SAID = 0.01, 3
+_LEAST_SAID = 0.01
+_MOST_SAID = 3
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,7 +43,8 @@ _WORDS = {
 _MOST_PANELS = 2
 _MOST_RULED_OUT = 14
 _MOST_CHANGES = 40
-_MOST_LIKELY, _LEAST_LIKELY = 8, 0.005
+_MOST_LIKELY = 8
+_LEAST_LIKELY = 0.005
 
 PlotPair = tuple[Markup, Markup, str]
 

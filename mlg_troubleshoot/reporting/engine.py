@@ -51,7 +51,8 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
             book.write_to_pdf_stream(stream)
             pdf, boxes = finished(stream.getvalue(), job["sections"], job["title"], job["created"])
         except (plutoprint.Error, PyPdfError, OSError, ValueError) as error:
-            answer, pdf = {"error": str(error) or type(error).__name__, "length": 0}, b""
+            answer = {"error": str(error) or type(error).__name__, "length": 0}
+            pdf = b""
         else:
             answer = {"error": None, "length": len(pdf), "boxes": boxes}
         answers.write(json.dumps(answer).encode("ascii") + b"\n" + pdf)

@@ -186,7 +186,8 @@ def nice_ticks(low: float, high: float, about: int = 5) -> list[float]:
     raw = span / max(about, 1)
     power = 10.0 ** math.floor(math.log10(raw))
     step = next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= raw * 0.999)
-    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    first = math.ceil(low / step - 1e-9)
+    last = math.floor(high / step + 1e-9)
     return [k * step for k in range(first, last + 1)]
 
 
@@ -207,7 +208,8 @@ class Axis:
     @classmethod
     def around(cls, label: str, values: Sequence[float], margin: float = 0.06) -> Axis:
         finite = [v for v in values if math.isfinite(v)] or [0.0, 1.0]
-        low, high = min(finite), max(finite)
+        low = min(finite)
+        high = max(finite)
         room = (high - low) * margin or abs(high) * 0.1 or 1.0
         return cls(label, low - room, high + room)
 
@@ -359,7 +361,9 @@ def draw_bar(
     canvas.rectangle(x, y, length, height, fill=fill, colour=edge, dash=dash)
     end = x + length
     if bar.low is not None and bar.high is not None:
-        low, high, middle = x + bar.low * per_value, x + bar.high * per_value, y + height / 2
+        low = x + bar.low * per_value
+        high = x + bar.high * per_value
+        middle = y + height / 2
         inside = PAPER if bar.style == "solid" else INK
         canvas.line(max(low, x), middle, min(high, x + length), middle, colour=inside, width=1.2)
         canvas.line(x + length, middle, max(high, x + length), middle, width=1.2)

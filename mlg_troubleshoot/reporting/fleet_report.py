@@ -22,7 +22,9 @@ from mlg_troubleshoot.reporting.publish import safe_stem
 from mlg_troubleshoot.units import LengthUnit
 
 # Length of the bar of landings left, of the line of worst cases, and height of both. [px]
-_BAR, _SPARK, _HIGH = 150, 90, 18
+_BAR = 150
+_SPARK = 90
+_HIGH = 18
 
 
 def interval_bar(ends: Mapping[str, float | None] | None, horizon: float) -> Markup:

@@ -24,10 +24,14 @@ def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
     a = assessment
     if a.predicted_displacement_in is None or a.over_travel_in is None or a.under_travel_in is None:
         return None
-    over, under, margin = a.over_travel_in, a.under_travel_in, a.margin_in
-    worst, sense = a.predicted_displacement_in, 1.0 if over >= -under else -1.0
+    over = a.over_travel_in
+    under = a.under_travel_in
+    margin = a.margin_in
+    worst = a.predicted_displacement_in
+    sense = 1.0 if over >= -under else -1.0
     u2 = 2.0 * (a.standard_uncertainty_in or 0.0)
-    measured, spread = a.inspection.measured_displacement_in, a.geometry_spread_in
+    measured = a.inspection.measured_displacement_in
+    spread = a.geometry_spread_in
     upper = a.predicted_upper_in
     if upper is not None and abs(upper - worst) <= 5e-5:
         upper = None
@@ -93,7 +97,9 @@ class _Gauge:
             "Margin gauge: plunger displacement from mid-position",
             description,
         )
-        top, bottom, header = self.top, self.bottom, self.top - 26
+        top = self.top
+        bottom = self.bottom
+        header = self.top - 26
         canvas.rectangle(
             self.px(-margin),
             top - 4,
@@ -173,7 +179,9 @@ def plunger_curve(
     Both worst cases, the margin at mid-position, and what was measured: at mid-position, at Down
     Lock and along the stroke.
     """
-    a, model, shown = assessment, gear.model, lengths or Lengths()
+    a = assessment
+    model = gear.model
+    shown = lengths or Lengths()
     per_inch = shown.unit.per_inch
     start, end = model.stroke
     strokes = np.linspace(start, end, 61)

@@ -81,7 +81,8 @@ def _identified(
 ) -> dict[str, Any]:
     """What every report of one row has: who, the verdict with its sign, title and footer."""
     row = j.row
-    side, tail = (row.side.value if row.side else "?"), row.tail_no or "tail not known"
+    side = row.side.value if row.side else "?"
+    tail = row.tail_no or "tail not known"
     record = row.record_id or "record not known"
     title = f"{tail} {side} – {j.verdict.words} – {record}"
     footer = f"{short(tail, 20)} {side} · {short(record, 34)}"

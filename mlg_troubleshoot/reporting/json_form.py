@@ -259,7 +259,8 @@ def _gain(d: Diagnosis) -> dict[str, Any]:
     outside = np.abs(d.used.measured_in) > d.used.margin_in
     said_within = np.abs(d.predicted_in) <= d.used.margin_in
     rms = float(np.sqrt(np.mean(d.misfit_in**2)))
-    within, beyond = int(np.sum(said_within & outside)), int(np.sum(~said_within & ~outside))
+    within = int(np.sum(said_within & outside))
+    beyond = int(np.sum(~said_within & ~outside))
     return {
         "held_out_rms_before_in": rms,
         "held_out_rms_after_in": rms,

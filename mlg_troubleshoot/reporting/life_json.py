@@ -65,7 +65,8 @@ def _event(record: Record, *, counts: bool) -> dict[str, Any]:
         "hash": record.digest,
     }
     if record.kind is RecordKind.ASSESSMENT:
-        result, by = body["result"], ("program_version", "geometry_sha256", "extension")
+        result = body["result"]
+        by = ("program_version", "geometry_sha256", "extension")
         for name in ("verdict", "predicted_displacement_in", "margin_in"):
             event[name] = result.get(name)
         return event | {name: body.get(name) for name in by}

@@ -26,7 +26,8 @@ from mlg_troubleshoot.surveying.survey import Misfit
 
 def study_as_json(findings: StudyFindings, given: GivenDataResult | None = None) -> dict[str, Any]:
     """Return the study as plain values, as the JSON contract has it; what is not known is null."""
-    result, options = findings.result, findings.options
+    result = findings.result
+    options = findings.options
     growth = result.growth
     values = {
         **msgspec.to_builtins(result.table),
@@ -76,7 +77,8 @@ def study_as_json(findings: StudyFindings, given: GivenDataResult | None = None)
 
 def survey_as_json(result: SurveyResult) -> dict[str, Any]:
     """Return a survey as plain values, as the JSON contract has it."""
-    found, suggestion = result.survey, result.suggestion
+    found = result.survey
+    suggestion = result.suggestion
     rows = zip(
         result.gear.joints, result.amplification, result.interval, result.before, strict=True
     )

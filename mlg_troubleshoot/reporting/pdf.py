@@ -90,7 +90,8 @@ class PdfEngine:
             )
             made = process.stdout.read(answer["length"])
         except (BrokenPipeError, ConnectionResetError, OSError) as error:
-            answer, made = {"error": str(error), "length": 0}, b""
+            answer = {"error": str(error), "length": 0}
+            made = b""
         finally:
             timer.cancel()
         if stopped.is_set():

@@ -27,8 +27,10 @@ PAGES = ("A4", "Letter")
 _NAME = re.compile(r"(mlg-.*|fleet)\.(html|pdf)", re.IGNORECASE)
 # How a report is known: base.html.j2 writes the one into the head of a page; the other stands as a
 # comment before the last lines of a PDF, and no longer there when another program has added to it.
-_IN_PAGE, _IN_PDF = b'<meta name="generator" content="mlg-troubleshoot">', b"%mlg-troubleshoot\n"
-_HEAD, _END = 1000, 64
+_IN_PAGE = b'<meta name="generator" content="mlg-troubleshoot">'
+_IN_PDF = b"%mlg-troubleshoot\n"
+_HEAD = 1000
+_END = 64
 
 
 def _is_report(file: BinaryIO) -> bool:
@@ -94,7 +96,8 @@ def publish(
             f"a report cannot be written as {asked!r}", f"Give one of {', '.join(known)}."
         )
     running = engine or PdfEngine()
-    wanted, notes = set(formats), []
+    wanted = set(formats)
+    notes = []
     made: dict[str, Path] = {}
     web = directory / f"{document.stem}.html"
     try:
@@ -160,7 +163,8 @@ def publish_all(
 ) -> list[WrittenReport]:
     """Write many documents, the PDFs in several child processes."""
     count = min(4, os.cpu_count() or 1)
-    own, started = threading.local(), list[PdfEngine]()
+    own = threading.local()
+    started = list[PdfEngine]()
 
     def start_engine() -> None:
         own.engine = PdfEngine()

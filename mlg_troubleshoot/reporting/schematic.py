@@ -53,19 +53,23 @@ class Schematic:
 
 # Lengths of the drawing: its width, half of a joint's marker, the longest and the shortest arrow of
 # a virtual link. [px]
-_WIDTH, _MARKER = 690, 9.5
-_LONGEST_ARROW, _SHORTEST_ARROW = 42, 2.5
+_WIDTH = 690
+_MARKER = 9.5
+_LONGEST_ARROW = 42
+_SHORTEST_ARROW = 2.5
 # One scale for most reports, so that their drawings compare.
 _LARGEST_EXAGGERATION = 100
 # With more joints over their limit, frames would cover the linkage.
 _MOST_FRAMES = 2
 # Room for labels, supports and the slot above and below the linkage. [px]
-_ABOVE, _BELOW = 44, 40
+_ABOVE = 44
+_BELOW = 40
 
 # Where a label is tried around a joint: every 15 degrees, none of them straight along a line, at
 # these distances from its marker. [rad, px]
 _TURNS = np.arange(24) * np.pi / 12 + 1e-6
-_COSINES, _SINES = np.cos(_TURNS), np.sin(_TURNS)
+_COSINES = np.cos(_TURNS)
+_SINES = np.sin(_TURNS)
 _RINGS = np.array([0, 5, 10, 16, 24, 34, 46], float)
 
 # Points and directions of a drawing are complex numbers: x to the right, y downward. [canvas units]
@@ -104,7 +108,8 @@ def _drawn(
 ) -> Schematic:
     planes = (_PlaneDrawing(gear, plane.name) for plane in gear.reference.mechanism.planes)
     drawings = [drawing for drawing in planes if drawing.points]
-    gap, side = 6.0, 74.0
+    gap = 6.0
+    side = 74.0
     free = width - gap * (len(drawings) - 1) - 2 * side * len(drawings)
     scale = free / sum(drawing.size.real for drawing in drawings)
     largest = max([0.0, *(f.clearance_in or 0.0 for f in findings)])
@@ -236,7 +241,8 @@ class _PlaneDrawing:
                 state = joint_state(shown.findings[joint.number])
                 _mark(canvas, markers[joint.number], str(joint.number), state, faded=True)
         for joint in here:
-            place, marker = at[joint.point], markers[joint.number]
+            place = at[joint.point]
+            marker = markers[joint.number]
             arrow = shown.arrow(joint.number, place)
             if arrow is not None:
                 _arrow(canvas, *arrow)
@@ -314,7 +320,8 @@ class _PlaneDrawing:
                 segments += combinations(corners, 2)
         for step in self.steps:
             if isinstance(step, Slot):
-                pivot, pin = at[step.pivot], at[step.pin]
+                pivot = at[step.pivot]
+                pin = at[step.pin]
                 along = _unit(pin - pivot)
                 _tube(canvas, pin - 13 * along, pin + 9 * along, 25, PAPER, cap="round")
         return segments
@@ -351,7 +358,8 @@ def _unit(run: complex) -> complex:
 
 def _box(*points: complex, around: complex = 0) -> Box:
     """The box about some points, with room around it."""
-    xs, ys = [p.real for p in points], [p.imag for p in points]
+    xs = [p.real for p in points]
+    ys = [p.imag for p in points]
     return (
         min(xs) - around.real,
         min(ys) - around.imag,
@@ -396,7 +404,8 @@ def _actuator(canvas: Canvas, far: complex, joint: complex) -> None:
 def _plunger(canvas: Canvas, joint: complex, axis: float) -> Segment:
     """The plunger beyond its pin, entering the valve."""
     along = cmath.rect(1.0, -axis)
-    tip, end = joint + 30 * along, joint + 52 * along
+    tip = joint + 30 * along
+    end = joint + 52 * along
     _line(canvas, joint, tip, width=6)
     _tube(canvas, tip, end, 24, PALE)
     _named(canvas, (tip + end) / 2 - (18 + 7j), "plunger", "end")
@@ -420,8 +429,11 @@ def joint_state(finding: JointFinding) -> JointState:
 
 
 def _mark(canvas: Canvas, at: complex, text: str, state: str, faded: bool = False) -> None:
-    x, y, size = at.real, at.imag, _MARKER
-    missing, pale = state == "missing", state == "missing" or faded
+    x = at.real
+    y = at.imag
+    size = _MARKER
+    missing = state == "missing"
+    pale = state == "missing" or faded
     colour = SOFT if pale else INK
     if state == "over":
         canvas.rectangle(x - size, y - size, 2 * size, 2 * size, fill=colour, colour=PAPER)
@@ -476,7 +488,8 @@ def _callout(
     with np.errstate(divide="ignore"):
         clears = np.minimum(width / 2 / np.abs(_COSINES), height / 2 / np.abs(_SINES))
     reach = _MARKER + 2 + _RINGS[:, None] + clears
-    x, y = (joint.real + _COSINES * reach).ravel(), (joint.imag + _SINES * reach).ravel()
+    x = (joint.real + _COSINES * reach).ravel()
+    y = (joint.imag + _SINES * reach).ravel()
     tried = np.column_stack([x - width / 2, y - height / 2, x + width / 2, y + height / 2])
     outside = np.any(tried < [0, 14, 0, 0], axis=1) | np.any(
         tried > [np.inf, np.inf, canvas.width, canvas.height], axis=1
@@ -498,7 +511,8 @@ def _callout(
         _line(canvas, start, edge, colour=SOFT, width=0.8)
     if framed:
         canvas.rectangle(box[0], box[1], width, height, fill=PAPER, colour=INK, width=1.4)
-    base, middle = box[1] + 0.5, (box[0] + box[2]) / 2
+    base = box[1] + 0.5
+    middle = (box[0] + box[2]) / 2
     for line in lines:
         base += line.size + 2.0
         canvas.text(
@@ -533,7 +547,8 @@ def _covered(tried: Array, segments: list[Segment]) -> Array:
     if not segments:
         return np.zeros(len(tried))
     ends = np.array([[(p.real, p.imag) for p in segment] for segment in segments])
-    start, run = ends[:, 0], ends[:, 1] - ends[:, 0]
+    start = ends[:, 0]
+    run = ends[:, 1] - ends[:, 0]
     run = np.where(np.abs(run) < 1e-9, 1e-9, run)
     # The part of each line between the box's sides, as in Liang and Barsky's clipping.
     first = (tried[:, None, :2] - 3.0 - start) / run

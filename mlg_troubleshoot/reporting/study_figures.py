@@ -31,8 +31,11 @@ from mlg_troubleshoot.reporting.formats import Lengths, number
 # Points of a curve. [1]
 _POINTS = 81
 # Bars: height of one, the gap below it, room above all, width of the chart and its labels. [px]
-_BAR_HEIGHT, _GAP, _TOP = 9, 7, 20
-_WIDTH, _LABEL_WIDTH = 430, 30
+_BAR_HEIGHT = 9
+_GAP = 7
+_TOP = 20
+_WIDTH = 430
+_LABEL_WIDTH = 30
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +105,8 @@ def release_curve(gear: Gear, lengths: Lengths) -> Markup:
         "Plunger position against the share of the release stroke, on the reference linkage and on"
         " the others; the margin around mid-position is marked",
     )
-    mid, margin = float(curves[0][-1]), gear.margin.value * lengths.unit.per_inch
+    mid = float(curves[0][-1])
+    margin = gear.margin.value * lengths.unit.per_inch
     values = [float(v) for curve in curves for v in (curve.min(), curve.max())]
     plot = Plot(
         canvas,

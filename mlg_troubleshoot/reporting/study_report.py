@@ -158,14 +158,16 @@ def _methods(f: StudyFindings) -> Markup | None:
 
 def _stage_that_leads(f: StudyFindings, lengths: Lengths) -> dict[str, Any]:
     """Why the amplification method is too high where it is: with the numbers of this gear."""
-    growth, first = f.result.growth, f.result.table.first_order
+    growth = f.result.growth
+    first = f.result.table.first_order
     by_maxima, local, exact = _shares(f)
     k = int(np.argmax(by_maxima - first))
     at = float(growth.stroke[int(np.argmax(growth.stage[k]))])
     start, end = f.gear.model.stroke
     numbers = zip(f.gear.joint_numbers, growth.stage, strict=True)
     largest_at_mid = [n for n, stage in numbers if int(np.argmax(stage)) == stage.size - 1]
-    excess, curvature = float(by_maxima[k] - first[k]), float(np.abs(exact - first).max())
+    excess = float(by_maxima[k] - first[k])
+    curvature = float(np.abs(exact - first).max())
     return {
         "joint": f.gear.joint_numbers[k],
         "place": (

@@ -21,7 +21,8 @@ from mlg_troubleshoot.surveying.survey import Survey
 from mlg_troubleshoot.units import LengthUnit
 
 # Width of a panel, and the room around what it shows. [px]
-_WIDTH, _EDGE = 330, 26
+_WIDTH = 330
+_EDGE = 26
 
 
 def survey_document(
@@ -38,7 +39,8 @@ def survey_document(
 def _context(
     result: SurveyResult, found: Survey, provenance: ReportProvenance, lengths: Lengths
 ) -> dict[str, Any]:
-    gear, mode = result.gear, found.modes[0]
+    gear = result.gear
+    mode = found.modes[0]
     fitted = found.linkage.predicted(found.read, mode.vector[None])[0]
     width = np.log(result.interval[:, 1] / result.interval[:, 0])
     return {
@@ -72,7 +74,8 @@ def _panels(before: Linkage, found: Survey) -> list[tuple[str, Markup]]:
         places = np.array([place for one in drawn for place in one.values()])
         if len(places) < 4:
             continue
-        low, high = places.min(axis=0), places.max(axis=0)
+        low = places.min(axis=0)
+        high = places.max(axis=0)
         scale = (_WIDTH - 2 * _EDGE) / max(*(high - low), 1e-9)
         height = float((high - low)[1] * scale + 2 * _EDGE)
         canvas = Canvas(

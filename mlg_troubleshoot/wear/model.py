@@ -17,10 +17,13 @@ from mlg_troubleshoot.wear.posterior import members, posterior
 # Posterior draws that every forecast is averaged over. [1]
 _DRAWS = 128
 # Simulated paths of a unit of a population of few units and of many. [1]
-_PATHS, _PATHS_OF_MANY, _MANY = 4096, 256, 64
+_PATHS = 4096
+_PATHS_OF_MANY = 256
+_MANY = 64
 # Units read twice or more, and other units, that the population is learnt from at most: more would
 # not narrow it. [1]
-_LEARN_FROM, _LEARN_FROM_OTHERS = 160, 40
+_LEARN_FROM = 160
+_LEARN_FROM_OTHERS = 40
 # Standard deviation of the pace of wear beyond the usage that any unit has reached: no reading so
 # far can show a curve that bends later. [1]
 _DOUBT = 0.25
@@ -105,7 +108,8 @@ class WearModel:
             names = [units[i] for i in chosen]
             order = np.argsort(wanted[chosen], axis=1)
             ascending = np.take_along_axis(wanted[chosen], order, axis=1) / self.scale.usage
-            last, known = self._last(names), self._known_reading(names)
+            last = self._last(names)
+            known = self._known_reading(names)
             ends = self._ends(names, count, rng)
             found = np.concatenate(
                 [end.follow(ascending, last, known, rng, reading=reading) for end in ends]
@@ -267,7 +271,8 @@ def first_passage(at: Array, paths: Array, limit: float) -> Array:
     k = np.argmax(over, axis=0)
     before = np.maximum(k - 1, 0)
     sample = np.arange(paths.shape[1])
-    high, low = paths[k, sample], paths[before, sample]
+    high = paths[k, sample]
+    low = paths[before, sample]
     with np.errstate(invalid="ignore"):
         rise = np.where(high > low, high - low, 1.0)
         share = np.where(np.isfinite(high), (limit - low) / rise, 1.0)

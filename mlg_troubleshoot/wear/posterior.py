@@ -42,7 +42,8 @@ _PRIOR = {
 _KINDS = ("wiener", "integrated", "gamma")
 # Importance samples of each kind of increments, and the degrees of freedom of the Student
 # distribution that they are drawn from: wider tails than the posterior's. [1]
-_SAMPLES, _FREEDOM = 800, 6
+_SAMPLES = 800
+_FREEDOM = 6
 # Readings times samples that are worked out at once: as many stay in the cache. [1]
 _CHUNK = 40_000
 
@@ -57,7 +58,8 @@ class Member:
     def draws(self, theta: Array, resolution: float) -> Draws:
         """Turn rows of transformed parameters into draws."""
         column = {name: theta[:, [i]] for i, name in enumerate(self.names)}
-        none, one = np.zeros((len(theta), 1)), np.ones((len(theta), 1))
+        none = np.zeros((len(theta), 1))
+        one = np.ones((len(theta), 1))
 
         def positive(name: str) -> Array:
             return np.exp(np.clip(column[name], -15.0, 8.0)) if name in column else none
@@ -136,7 +138,8 @@ def _mode(value: Callable[[Array], Array], start: Array) -> tuple[Array, Array]:
 def _student(centre: Array, root: Array, n: int, rng: np.random.Generator) -> tuple[Array, Array]:
     """Draw from a multivariate Student distribution; return the draws and their log density."""
     p = len(centre)
-    z, chi = rng.standard_normal((n, p)), rng.chisquare(_FREEDOM, n)
+    z = rng.standard_normal((n, p))
+    chi = rng.chisquare(_FREEDOM, n)
     theta = centre + (z * np.sqrt(_FREEDOM / chi)[:, None]) @ root.T
     return theta, _student_density(theta, centre, root)
 

@@ -329,7 +329,9 @@ def write_reports(
     from mlg_troubleshoot.reporting.provenance import provenance_of
     from mlg_troubleshoot.reporting.publish import publish, publish_all
 
-    gear, judgements, problems = result.gear, result.judgements, result.problems
+    gear = result.gear
+    judgements = result.judgements
+    problems = result.problems
     extension = None if options.extension is None else options.extension.describe()
     made = provenance_of(
         gear, result.inputs_sha256, extension=extension, remembered=options.remembered

@@ -35,7 +35,8 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.wear import WearModel
 
 # An exported chain, which is judged in 5 s, and its longest line. [bytes, characters]
-_MOST_BYTES, _LONGEST_LINE = 120_000_000, 4_000_000
+_MOST_BYTES = 120_000_000
+_LONGEST_LINE = 4_000_000
 # What a row must have besides what is to be judged.
 _ANY_ROW = {"record_id": "-", "tail_no": "-", "side": "LH", "clearance_convention": "RADIAL"}
 
@@ -235,7 +236,8 @@ def verify(store: Store, expect: str | None = None) -> Verified:
     """Walk the chain, read every content that is not void, and look whether a hash noted before
     still stands there.
     """
-    last, expected = "", None
+    last = ""
+    expected = None
     wrong: dict[str, str] = {}
 
     def visit(record: Record) -> None:

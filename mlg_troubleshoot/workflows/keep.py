@@ -113,7 +113,8 @@ def _under_first_ids(inspections: Sequence[Inspection], store: Store) -> list[In
     first: dict[tuple[str, ...], Record] = {}
 
     def under_first_id(inspection: Inspection) -> Inspection:
-        row, key = place_in_file(inspection.record_id), (inspection.tail_no, inspection.side.value)
+        row = place_in_file(inspection.record_id)
+        key = (inspection.tail_no, inspection.side.value)
         if not row:
             return inspection
         if key not in gears:

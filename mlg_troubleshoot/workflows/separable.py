@@ -46,7 +46,9 @@ from mlg_troubleshoot.units import LengthUnit
 # The planned fleet: two years of twenty aircraft (assumed), and what one row scatters, tail by tail
 # [in] (docs/explanation/diagnosis.md: a gauge that repeats to 1.5 thou, and what clearances and
 # pins add).
-TAILS, VISITS, ROW_IN = 20, 5, 0.0025
+TAILS = 20
+VISITS = 5
+ROW_IN = 0.0025
 _BELIEFS = Beliefs()
 # Quantile of the normal distribution for 80 % power, and the distance in log-likelihood at which
 # two are distinguished with it: d²/2 − 0.84 d is the odds from which something is said. [1]
@@ -170,7 +172,8 @@ class _Plan:
         def whitened(x: Array) -> Array:
             return np.asarray(np.linalg.solve(common, x), float)
 
-        white, level = whitened(effects), whitened(np.ones((len(table), 1)))
+        white = whitened(effects)
+        level = whitened(np.ones((len(table), 1)))
         left, seen = beside(white, level)
         size = np.linalg.norm(left, axis=0)
         self.sign = np.array([c.cause.sign for c in found])
@@ -213,7 +216,8 @@ class _Plan:
             rival = next(other for other in self.blocks if other != key)
             lead = partial(_divergence, true=self.blocks[key], other=self.blocks[rival])
             return rival[0], _size_of(lead, 0.5 * _APART**2)
-        best, name = 0.0, None
+        best = 0.0
+        name = None
         for other, places in self.keys.items():
             if other != key:
                 mine = self.keys[key]
@@ -222,7 +226,8 @@ class _Plan:
                 one_way = (self.sign[mine][:, None] * self.sign[places]) != 0
                 alike = float(np.max(np.where(one_way, np.maximum(cosine, 0.0), cosine) ** 2))
                 if alike > best:
-                    best, name = alike, " ".join(part for part in other if part)
+                    best = alike
+                    name = " ".join(part for part in other if part)
         apart = 1.0 - best
         return name, (
             float("inf") if apart < ALIKE else _APART * self._row(key) / float(np.sqrt(apart))

@@ -77,7 +77,8 @@ def survey_gear(
     known = load_gear(gear)
     if write is not None:
         claim_outputs(known.files, written_with(write), force=True)
-    linkage, rng = SurveyedLinkage(known), np.random.default_rng(seed)
+    linkage = SurveyedLinkage(known)
+    rng = np.random.default_rng(seed)
     cases = _clearances(inspections, known)
     readings, problems, digest = read_survey(Path(file), linkage)
     members = linkage.amplification(np.array([linkage.vector(each) for each in known.ensemble]))
@@ -87,9 +88,11 @@ def survey_gear(
     path = None
     if found is None:
         draws = Prior(linkage).closing(_UNREAD, rng)
-        middle, interval = linkage.vector(known.reference)[None], before
+        middle = linkage.vector(known.reference)[None]
+        interval = before
     else:
-        draws, middle = found.draws, found.modes[0].vector[None]
+        draws = found.draws
+        middle = found.modes[0].vector[None]
         interval = np.quantile(linkage.amplification(draws), [0.05, 0.95], axis=0).T
         warnings = assemblies(found)
         if write is not None and found.contradicts:

@@ -288,12 +288,14 @@ def read_more(answers: Answers, typed: str, gear: Gear) -> tuple[Answers, tuple[
 
 def _taken(item: re.Match[str], answers: Answers, gear: Gear) -> tuple[Answers, str]:
     """Take one answer; a repair, and what is typed after it, is dated by the clock."""
-    did, length = (item["did"] or "").lower(), item["length"]
+    did = (item["did"] or "").lower()
+    length = item["length"]
     if did == "x":
         gone = answers.with_more(**dict.fromkeys(_REPLACEABLE))
         return gone, "– outcome, plunger, margin, repairs, the day: none"
     if did:
-        column, text = OUTCOME.name, "FAILED" if did[0] == "f" else "RETRACTED"
+        column = OUTCOME.name
+        text = "FAILED" if did[0] == "f" else "RETRACTED"
     elif length:
         sign = "-" if item["sign"] and item["sign"] in MINUS else ""
         text = f"{sign}{item['number']} {item['unit'] or answers.unit or LengthUnit.INCH}"

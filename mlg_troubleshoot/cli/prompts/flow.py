@@ -219,7 +219,8 @@ class Flow:
         return replace(turn, state=replace(turn.state, saved=saved), effect=effect)
 
     def _joint(self, state: State, typed: str) -> Turn[State]:
-        number, answers = state.joint, state.answers
+        number = state.joint
+        answers = state.answers
         if not typed and number not in answers.joints and state.suggested not in (None, number):
             typed = f"#{state.suggested}"
         jump = re.fullmatch(r"#\s*(\d{1,4})", typed)
@@ -256,7 +257,8 @@ class Flow:
             return Turn(back, pages.refusal_lines(typed, number, judged.said))
         if judged.written is None:
             return self._answered(state, number, NOT_MEASURED)
-        unusual, written = bool(judged.said), judged.written
+        unusual = bool(judged.said)
+        written = judged.written
         radial_in = _known(answers.read(written)).radial_in
         same = state.pending is not None and self._pending(state).radial_in == radial_in
         if unusual and not same:
@@ -325,7 +327,8 @@ class Flow:
         return float(worst_case(self.gear.model, self.gear.limits_in[None]).magnitude_in[0])
 
     def _detail(self, state: State, typed: str) -> Turn[State]:
-        column, answers = str(state.at), state.answers
+        column = str(state.at)
+        answers = state.answers
         if column == DATE.name and column not in answers.more and self.today is not None:
             typed = typed or self.today.isoformat()
         if typed.lower() == "x":

@@ -58,15 +58,26 @@ def _chain(steps: tuple[Step, ...]) -> _Chain | None:
     for step in steps:
         match step:
             case Crank():
-                start, bar, rocker = step.pivot, _Bar("═", None), ""
+                start = step.pivot
+                bar = _Bar("═", None)
+                rocker = ""
             case Dyad():
-                start, bar, rocker = step.upstream, _Bar("─", None), step.downstream
+                start = step.upstream
+                bar = _Bar("─", None)
+                rocker = step.downstream
             case Lever():
-                start, bar, rocker = step.follows, _Bar("═", step.pivot), ""
+                start = step.follows
+                bar = _Bar("═", step.pivot)
+                rocker = ""
             case Slot():
-                start, bar, rocker = step.pin, _Bar("═", step.pivot), ""
+                start = step.pin
+                bar = _Bar("═", step.pivot)
+                rocker = ""
             case Slider():
-                start, bar, rocker, slides = step.upstream, _Bar("─", None), "", True
+                start = step.upstream
+                bar = _Bar("─", None)
+                rocker = ""
+                slides = True
         if not points:
             points.append(start)
         if points[-1] != start:

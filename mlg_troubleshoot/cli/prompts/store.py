@@ -141,7 +141,8 @@ class SessionStore:
         """Return the unfinished sessions of a gear, the last one first, and what could not be read
         on the way.
         """
-        found, damaged = [], []
+        found = []
+        damaged = []
         try:
             for draft in self._newest_first():
                 if draft.complete:

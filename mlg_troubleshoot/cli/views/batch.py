@@ -87,10 +87,8 @@ def _cells(judgement: Judgement, screen: DataConsole) -> dict[str, Cell]:
         **dict.fromkeys(("date", "worst", "margin", "chance"), "-"),
     }
     if isinstance(judgement, Assessment):
-        worst, chance = (
-            judgement.predicted_displacement_in,
-            judgement.probability_exceed_random_directions,
-        )
+        worst = judgement.predicted_displacement_in
+        chance = judgement.probability_exceed_random_directions
         day = _date(judgement)
         cells["date"] = "-" if day is None else day.isoformat()
         cells["worst"] = "open" if worst is None else screen.length(worst)

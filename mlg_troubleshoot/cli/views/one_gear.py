@@ -28,7 +28,8 @@ from mlg_troubleshoot.decision.sentences import (
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import Length, Sentence, said_in
 
-_JOINTS, _NOTES = 5, 4
+_JOINTS = 5
+_NOTES = 4
 _DISCLAIMER = "Troubleshooting aid, not maintenance data; not an approval for return to service"
 
 
