@@ -261,7 +261,8 @@ def flat(command: Callable[..., None]) -> Callable[..., None]:
             show(name, parameter.default, hints[name])
             continue
         own = get_type_hints(groups[name], include_extras=True)
-        for each in fields(groups[name]):
+        # What all commands share stands last.
+        for each in sorted(fields(groups[name]), key=lambda each: each in fields(OutputOptions)):
             (flags, *_) = getattr(own[each.name], "__metadata__", ((),))
             if not isinstance(flags, Mapping):
                 show(each.name, each.default, own[each.name])

@@ -22,6 +22,13 @@ EPILOG = (
 class StudyFlags(options.OutputOptions):
     """What ``mlg study`` computes, shows and writes."""
 
+    report: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Write a printable report with figures, statements and bound.",
+        ),
+    ] = None
     gear: options.Gear = DEFAULT_GEAR
     design: Annotated[
         str,
