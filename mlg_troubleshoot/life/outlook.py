@@ -15,7 +15,7 @@ from mlg_troubleshoot.life.forecast import Forecast, Quantiles
 
 @dataclass(frozen=True, slots=True)
 class FleetLine:
-    """One gear of a fleet as every output shows it: its latest inspection, and what is left."""
+    """One gear of a fleet as every output shows it: its latest inspection, and the landings that remain."""
 
     life: GearLife
     tail_no: str
