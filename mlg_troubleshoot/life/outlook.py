@@ -15,7 +15,7 @@ from mlg_troubleshoot.life.forecast import Forecast, Quantiles
 
 @dataclass(frozen=True, slots=True)
 class FleetLine:
-    """One gear of a fleet as every output shows it: its latest inspection, and the landings that remain."""
+    """One gear of a fleet as every output shows it: its latest inspection, its landings left."""
 
     life: GearLife
     tail_no: str
