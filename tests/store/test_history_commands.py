@@ -272,6 +272,12 @@ def test_a_re_rigging_is_an_event_of_a_life_and_the_joints_wear_on(
     assert "re-rigged" in next(tmp_path.glob("mlg-life-*.html")).read_text(encoding="utf-8")
 
 
+def test_a_quiet_history_writes_its_page_and_says_nothing(tmp_path: Path, place: Path) -> None:
+    seeded((1, 0.004))
+    run = mlg("history", "N123", "LH", "--no-forecast", "--report", tmp_path / "out", "--quiet")
+    assert (run.err, len(list((tmp_path / "out").glob("mlg-life-*.html")))) == ("", 1)
+
+
 def test_the_fleet_page_is_printed_on_the_paper_that_was_asked_for(
     tmp_path: Path, place: Path
 ) -> None:
