@@ -19,7 +19,7 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.gear.directions import worst_of_sense
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
-from mlg_troubleshoot.geometry.intervals import Box, Range, cosine_range
+from mlg_troubleshoot.geometry.intervals import Interval, Range, cosine_range, variables
 
 # Parts of the stroke that the search begins with, boxes contracted at once, and boxes examined at
 # most. [1]
@@ -54,36 +54,32 @@ def certified_bound(
     waiting = search.start()
     settled, examined = -np.inf, 0
     while waiting.low.size and examined < most_boxes:
-        count = min(_BATCH, waiting.low.shape[1])
-        boxes = Box(waiting.low[:, -count:], waiting.high[:, -count:])
-        waiting = Box(waiting.low[:, :-count], waiting.high[:, :-count])
-        examined += count
+        boxes, waiting = waiting[:, -_BATCH:], waiting[:, :-_BATCH]
+        examined += boxes.low.shape[1]
         boxes, bounds, smear = search.contract(boxes)
         within = bounds <= search.best + _GAP_IN
         settled = max(settled, float(np.max(bounds[within], initial=-np.inf)))
         if not np.all(within):
-            kept = Box(boxes.low[:, ~within], boxes.high[:, ~within])
-            halves = _halves(kept, smear[:, ~within])
             # The most promising box comes last and is taken next.
-            waiting = Box(
-                np.concatenate([waiting.low, halves.low], axis=1),
-                np.concatenate([waiting.high, halves.high], axis=1),
-            )
+            waiting = _joined(waiting, *_halves(boxes[:, ~within], smear[:, ~within]))
     bound = np.inf if waiting.low.size else max(settled, search.best)
     return CertifiedBound(sense, search.best, bound, search.directions, search.stroke, examined)
 
 
-def _halves(boxes: Box, smear: Array) -> Box:
+def _joined(*boxes: Interval) -> Interval:
+    ends = ([getattr(box, end) for box in boxes] for end in ("low", "high"))
+    return Interval(*(np.concatenate(parts, axis=1) for parts in ends))
+
+
+def _halves(boxes: Interval, smear: Array) -> tuple[Interval, Interval]:
     """Halve each box in the variable that widens its bound the most."""
     known = np.where(np.isfinite(smear), smear, -1.0)
     blind = ~np.any(known > 0.0, axis=0)
-    widest = np.where(blind, np.argmax(boxes.high - boxes.low, axis=0), np.argmax(known, axis=0))
-    row, column = widest, np.arange(boxes.low.shape[1])
-    middle = boxes.middle[row, column]
-    high, low = boxes.high.copy(), boxes.low.copy()
-    high[row, column] = middle
-    low[row, column] = middle
-    return Box(np.concatenate([boxes.low, low], axis=1), np.concatenate([high, boxes.high], axis=1))
+    widest = np.where(blind, np.argmax(boxes.width, axis=0), np.argmax(known, axis=0))
+    place = widest, np.arange(boxes.low.shape[1])
+    low, high = boxes.low.copy(), boxes.high.copy()
+    low[place] = high[place] = boxes.middle[place]
+    return Interval(boxes.low, high), Interval(low, boxes.high)
 
 
 class _Search:
@@ -108,14 +104,14 @@ class _Search:
         if not np.isfinite(self.best):
             self.best = -np.inf
 
-    def start(self) -> Box:
+    def start(self) -> Interval:
         """All directions, and the stroke in some parts."""
         reach = np.repeat(self.reach, 2)[:, None]
         edges = np.linspace(min(self.model.stroke), max(self.model.stroke), _STROKES + 1)
         all_ = np.tile(reach, _STROKES)
-        return Box(np.vstack([-all_, edges[:-1]]), np.vstack([all_, edges[1:]]))
+        return Interval(np.vstack([-all_, edges[:-1]]), np.vstack([all_, edges[1:]]))
 
-    def contract(self, boxes: Box) -> tuple[Box, Array, Array]:
+    def contract(self, boxes: Interval) -> tuple[Interval, Array, Array]:
         """Narrow boxes until they no longer shrink.
 
         Returns the boxes that may hold the greatest displacement, a bound of each, and how much
@@ -124,56 +120,50 @@ class _Search:
         bounds = np.full(boxes.low.shape[1], np.inf)
         while True:
             moved = self._displacement(boxes)
-            low, high = moved.slope
-            bounds = np.fmin(bounds, moved.value[1])
-            width = boxes.high - boxes.low
-            smear = np.maximum(np.abs(low), np.abs(high)) * width
-            narrower = self._narrowed(boxes, low, high)
-            possible = np.all(narrower.low <= narrower.high, axis=0)
-            boxes = Box(narrower.low[:, possible], narrower.high[:, possible])
-            bounds, smear = bounds[possible], smear[:, possible]
+            bounds = np.fmin(bounds, moved.value.high)
+            width = boxes.width
+            smear = moved.slope.magnitude * width
+            boxes = self._narrowed(boxes, moved.slope)
+            possible = np.all(boxes.low <= boxes.high, axis=0)
+            boxes, bounds = boxes[:, possible], bounds[possible]
             self._try(boxes)
             promising = ~(bounds <= self.best)
-            boxes = Box(boxes.low[:, promising], boxes.high[:, promising])
-            bounds, smear = bounds[promising], smear[:, promising]
-            shrunk = np.sum(boxes.high - boxes.low, axis=0)
-            before = np.sum(width[:, possible][:, promising], axis=0)
+            boxes, bounds = boxes[:, promising], bounds[promising]
+            width, smear = (each[:, possible][:, promising] for each in (width, smear))
+            shrunk, before = boxes.width.sum(axis=0), width.sum(axis=0)
             if not shrunk.size or np.all((shrunk > 0.7 * before) | (bounds <= self.best + 1e-12)):
                 return boxes, np.where(np.isnan(bounds), np.inf, bounds), smear
 
-    def _narrowed(self, boxes: Box, low: Array, high: Array) -> Box:
+    def _narrowed(self, boxes: Interval, slope: Interval) -> Interval:
         """Intersect boxes with what the gradients allow at a greatest displacement."""
-        bottom, top = boxes.low.copy(), boxes.high.copy()
+        low, high = boxes.low.copy(), boxes.high.copy()
         for k, length in enumerate(self.reach):
             rows = slice(2 * k, 2 * k + 2)
-            arc_low, arc_high = _arc(low[rows], high[rows], float(length))
-            bottom[rows] = np.fmax(bottom[rows], arc_low)
-            top[rows] = np.fmin(top[rows], arc_high)
-        bottom[-1] = np.where(low[-1] > 0.0, top[-1], bottom[-1])
-        top[-1] = np.where(high[-1] < 0.0, boxes.low[-1], top[-1])
+            arc = boxes[rows] & _arc(slope[rows], float(length))
+            low[rows], high[rows] = arc.low, arc.high
+        grows, falls = slope.low[-1] > 0.0, slope.high[-1] < 0.0
+        low[-1] = np.where(grows, high[-1], low[-1])
+        high[-1] = np.where(falls, boxes.low[-1], high[-1])
         # A part of the stroke that is not its end hands its own end to the next part.
         first, last = sorted(self.model.stroke)
-        inner = ((low[-1] > 0.0) & (boxes.high[-1] < last)) | (
-            (high[-1] < 0.0) & (boxes.low[-1] > first)
-        )
-        bottom[0] = np.where(inner, np.inf, bottom[0])
-        return Box(bottom, top)
+        inner = (grows & (boxes.high[-1] < last)) | (falls & (boxes.low[-1] > first))
+        low[0] = np.where(inner, np.inf, low[0])
+        return Interval(low, high)
 
-    def _displacement(self, boxes: Box) -> Range:
+    def _displacement(self, boxes: Interval) -> Range:
         kernel = self.model.kernel
-        variables = boxes.variables()
-        stroke = variables.pop()
+        *vectors, stroke = variables(boxes)
         links: list[Range | float] = list(kernel.no_clearance())
         for k, group in enumerate(self.groups):
             j = group[0]
-            links[2 * j : 2 * j + 2] = variables[2 * k : 2 * k + 2]
+            links[2 * j : 2 * j + 2] = vectors[2 * k : 2 * k + 2]
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             moved = kernel.enclose(stroke, links)
             still = kernel.enclose(stroke, kernel.no_clearance())
             result: Range = self.sense * self.model.rate * (moved - still)
         return result
 
-    def _try(self, boxes: Box) -> None:
+    def _try(self, boxes: Interval) -> None:
         """Solve the linkage with full-length links towards the middle of each box and keep the
         best.
         """
@@ -193,26 +183,21 @@ class _Search:
                 self.stroke = float(middle[-1, top])
 
 
-def _arc(low: Array, high: Array, length: float) -> tuple[Array, Array]:
+def _arc(slope: Interval, length: float) -> Interval:
     """Smallest box around the vectors of a length that point along a gradient, −∞ to ∞ if it may be
     zero.
     """
-    (left, bottom), (right, top) = low, high
-    usable = (left > 0.0) | (right < 0.0) | (bottom > 0.0) | (top < 0.0)
-    centre = np.arctan2(bottom + top, left + right)
+    usable = np.any((slope.low > 0.0) | (slope.high < 0.0), axis=0)
+    centre = np.arctan2(*(slope.low + slope.high)[::-1])
     half = np.zeros_like(centre)
-    for x in (left, right):
-        for y in (bottom, top):
+    for x in (slope.low[0], slope.high[0]):
+        for y in (slope.low[1], slope.high[1]):
             off = np.arctan2(y, x) - centre
             half = np.maximum(half, np.abs(np.remainder(off + np.pi, 2 * np.pi) - np.pi))
     usable &= np.isfinite(half)
-    centre, half = (
-        np.where(usable, centre, 0.0),
-        np.where(usable, half, np.pi) * (1.0 + 1e-12) + 1e-14,
-    )
-    across = cosine_range(centre - half, centre + half)
-    up = cosine_range(centre - half - np.pi / 2, centre + half - np.pi / 2)
-    return (
-        np.where(usable, np.nextafter(np.stack([across[0], up[0]]) * length, -np.inf), -np.inf),
-        np.where(usable, np.nextafter(np.stack([across[1], up[1]]) * length, np.inf), np.inf),
-    )
+    centre = np.where(usable, centre, 0.0)
+    half = np.where(usable, half, np.pi) * (1.0 + 1e-12) + 1e-14
+    quarter = np.array([[0.0], [np.pi / 2]])
+    unit = cosine_range(Interval(centre - half - quarter, centre + half - quarter))
+    arc = Interval(unit.low * length, unit.high * length).rounded()
+    return Interval(np.where(usable, arc.low, -np.inf), np.where(usable, arc.high, np.inf))
