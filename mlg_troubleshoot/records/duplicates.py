@@ -9,7 +9,7 @@ from mlg_troubleshoot.decision.columns import RECORD_ID, Column
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import column_letters
-from mlg_troubleshoot.records.model import SheetLayout
+from mlg_troubleshoot.records.model import SheetLayout, to_correct
 
 
 def settle_duplicates(
@@ -40,11 +40,7 @@ def settle_duplicates(
             others = [where(other.source) for other in found if other is not row]
             header, cell = cell_of(row.source, layouts, RECORD_ID)
             problems.append(_problem(record_id, row.source, others, header, cell))
-            correct = row.correct if isinstance(row, InvalidRow) else ()
-            columns = tuple(dict.fromkeys((header, *correct)))
-            rows[place] = InvalidRow(
-                row.record_id, row.tail_no, row.side, columns, row.warnings, row.source
-            )
+            rows[place] = to_correct(row, header)
     return problems
 
 

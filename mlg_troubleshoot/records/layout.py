@@ -26,7 +26,7 @@ from mlg_troubleshoot.records.headers import (
     recognise,
     tidy,
 )
-from mlg_troubleshoot.records.model import ReadOptions, TableInHand
+from mlg_troubleshoot.records.model import CellPlace, ReadOptions, TableInHand
 from mlg_troubleshoot.records.refusals import HEADER_SEARCH_ROWS
 from mlg_troubleshoot.records.rows import PlacedField
 from mlg_troubleshoot.records.source import MergedRange, NumberedRow
@@ -243,15 +243,15 @@ class ColumnReader:
         columns = Columns([])
         readings: list[tuple[Recognition, bool]] = []
         for index, text in enumerate(headers):
-            header_row, cell = (
-                places[index] if places is not None else (row, f"{column_letters(index)}{row}")
-            )
+            place = CellPlace.at(row, index, text)
+            if places is not None:
+                place = CellPlace(places[index][0], text, places[index][1])
             found, mapped = self._recognise(text, index)
             known = found.field
             if known is not None and index < len(units) and units[index] is not None:
                 known = replace(known, unit=known.unit or units[index])
             readings.append((found, mapped))
-            placed = PlacedField(index, text, known, bool(found.reason), cell, header_row, mapped)
+            placed = PlacedField(index, text, known, bool(found.reason), place, mapped)
             columns.placed.append(placed)
             if placed.refused:
                 self._doubt(placed, found)
@@ -286,15 +286,7 @@ class ColumnReader:
             columns.mapped.append(f'"{placed.header}" {placed.field.name}')
 
     def _tell(self, code: str, placed: PlacedField, expected: str, remedy: str) -> None:
-        self._table.tell(
-            code,
-            placed.header,
-            expected,
-            remedy,
-            placed.header_row,
-            placed.header,
-            placed.header_cell,
-        )
+        self._table.tell(code, placed.header, expected, remedy, placed.place)
 
     def _doubt(self, placed: PlacedField, found: Recognition) -> None:
         target = found.nearest or "clearance_3_in"
@@ -373,7 +365,7 @@ class ColumnReader:
                 columns,
                 placed,
                 "header_duplicate",
-                f"one column for {placed.field.name}; {first.header_cell} {first.header!r} is one"
+                f"one column for {placed.field.name}; {first.place.cell} {first.header!r} is one"
                 " already",
                 f"Remove one of the two, or pass --map {column_letters(placed.index)}=carry to use"
                 " the other.",
@@ -411,7 +403,7 @@ class ColumnReader:
             )
             like = f' If "{hint}" is meant, pass --map "{hint}={name}".' if hint else ""
             remedy = f"Add the column, or name the one that is meant with --map.{like}"
-            self._table.tell("column_missing", None, expected, remedy, row, name)
+            self._table.tell("column_missing", None, expected, remedy, CellPlace(row, name))
 
     def _unused_map(self, columns: Columns, row: int) -> None:
         for key in self._options.column_map:
@@ -422,4 +414,4 @@ class ColumnReader:
                 headers = ", ".join(p.header for p in columns.placed if p.header)
                 expected = f"one of the headers of the table: {headers[:200]}"
                 remedy = "Correct the header named in --map."
-                self._table.tell("map_header_unknown", key, expected, remedy, row, key)
+                self._table.tell("map_header_unknown", key, expected, remedy, CellPlace(row, key))

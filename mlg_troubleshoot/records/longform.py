@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 
 from mlg_troubleshoot.decision.columns import JOINT, RECORD_ID, Column
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
-from mlg_troubleshoot.records.cells import Cell, OddCell, column_letters, quote, show, stored
+from mlg_troubleshoot.records.cells import Cell, OddCell, column_letters, show, stored
 from mlg_troubleshoot.records.headers import tidy
-from mlg_troubleshoot.records.model import TableInHand
+from mlg_troubleshoot.records.model import CellPlace, TableInHand, to_correct
 from mlg_troubleshoot.records.rows import PlacedField, RowReader
-from mlg_troubleshoot.records.values import plain_text
+from mlg_troubleshoot.records.values import CellFaultError, plain_text
 
 _JOINT_TEXT = re.compile(r"(?:joint|jt|j)?\W*(?:no|nr|number|#)?\W*0?(\d{1,3})", re.ASCII)
 
@@ -152,10 +152,8 @@ class LongReader:
         p, row, cell = place
         if p.header not in group.bad:
             group.bad.append(p.header)
-        found = None if cell is None else quote(cell)
-        self._table.tell(
-            code, found, expected, remedy, row, p.header, f"{column_letters(p.index)}{row}"
-        )
+        fault = CellFaultError(code, expected, remedy)
+        self._table.tell_fault(fault, cell, CellPlace.at(row, p.index, p.header))
 
     def finish(self) -> list[Inspection | InvalidRow]:
         done: list[Inspection | InvalidRow] = []
@@ -163,8 +161,6 @@ class LongReader:
             read = self.reader.read(group.row, group.cells, group.places)
             warnings = (*read.warnings, *group.warnings)
             if group.bad:
-                correct = (*group.bad, *(read.correct if isinstance(read, InvalidRow) else ()))
-                named, source = tuple(dict.fromkeys(correct)), self._table.source(group.row)
-                read = InvalidRow(read.record_id, read.tail_no, read.side, named, source=source)
+                read = to_correct(read, *group.bad)
             done.append(replace(read, warnings=warnings))
         return done

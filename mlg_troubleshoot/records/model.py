@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 from mlg_troubleshoot.decision.columns import CLEARANCE, PLUNGER_DISPLACEMENT, Column
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.records.cells import Cell, column_letters, quote
 from mlg_troubleshoot.records.dates import DateOrder
+from mlg_troubleshoot.records.values import CellFaultError
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 Progress = Callable[[int, int | None], None]
@@ -132,6 +134,21 @@ class ReadOptions(TableOptions):
         )
 
 
+class CellPlace(NamedTuple):
+    """Where a problem stands, as far as it has a place."""
+
+    row: int | None = None
+    header: str | None = None
+    cell: str | None = None
+
+    @classmethod
+    def at(cls, row: int, index: int, header: str) -> CellPlace:
+        return cls(row, header, f"{column_letters(index)}{row}")
+
+
+NOWHERE = CellPlace()
+
+
 @dataclass(frozen=True, slots=True)
 class TableInHand:
     """The table or form that is being read: how, where it stands, and who is told of its
@@ -148,18 +165,20 @@ class TableInHand:
         return RowSource(self.file, self.sheet, row)
 
     def tell(
-        self,
-        code: str,
-        value: str | None,
-        expected: str,
-        remedy: str,
-        row: int | None = None,
-        column: str | None = None,
-        cell: str | None = None,
+        self, code: str, value: str | None, expected: str, remedy: str, place: CellPlace
     ) -> None:
-        self.report(
-            Problem(code, self.file, self.sheet, row, column, cell, value, expected, remedy)
-        )
+        self.report(Problem(code, self.file, self.sheet, *place, value, expected, remedy))
+
+    def tell_fault(self, fault: CellFaultError, raw: Cell, place: CellPlace) -> None:
+        found = None if raw is None else quote(raw)
+        self.tell(fault.code, found, fault.expected, fault.remedy, place)
+
+
+def to_correct(row: Inspection | InvalidRow, *headers: str) -> InvalidRow:
+    """A row that cannot be judged before these columns of it are corrected."""
+    known = row.correct if isinstance(row, InvalidRow) else ()
+    named = tuple(dict.fromkeys((*headers, *known)))
+    return InvalidRow(row.record_id, row.tail_no, row.side, named, row.warnings, row.source)
 
 
 @dataclass(frozen=True, slots=True)

@@ -48,7 +48,7 @@ from mlg_troubleshoot.records.cells import (
 )
 from mlg_troubleshoot.records.dates import DateOrder, readings
 from mlg_troubleshoot.records.headers import Field
-from mlg_troubleshoot.records.model import TableInHand
+from mlg_troubleshoot.records.model import NOWHERE, CellPlace, TableInHand
 from mlg_troubleshoot.records.refusals import FileRefusedError
 from mlg_troubleshoot.records.unit_fit import (
     UnitFit,
@@ -94,14 +94,8 @@ def place_in_file(record_id: str) -> str:
     return "" if made is None else made[0]
 
 
-class _CellPlace(NamedTuple):
-    row: int
-    header: str
-    cell: str
-
-
 class _WaitingDate(NamedTuple):
-    place: _CellPlace
+    place: CellPlace
     raw: Cell
     fault: AmbiguousDateError
 
@@ -112,8 +106,7 @@ class PlacedField:
     header: str
     field: Field | None
     refused: bool = False
-    header_cell: str | None = None
-    header_row: int | None = None
+    place: CellPlace = NOWHERE
     is_mapped: bool = False
 
     @property
@@ -392,30 +385,19 @@ class RowReader:
         )
         first = cells[0] if self._at.get(RECORD_ID) == 0 and cells else None
         record_id = plain_text(first) or None if isinstance(first, str) else None
-        told = (
+        why = FileRefusedError(
             "row_field_count",
             f"{len(cells)} fields",
             f"{expected} fields, as in the header",
             remedy,
         )
-        return self._refused_row(row, cells, record_id, *told)
+        return self.faulty(row, cells, why, record_id)
 
-    def faulty(self, row: int, cells: Sequence[Cell], why: FileRefusedError) -> InvalidRow:
-        told = why.problem
-        return self._refused_row(row, cells, None, told.code, str(why), told.expected, told.remedy)
-
-    def _refused_row(
-        self,
-        row: int,
-        cells: Sequence[Cell],
-        record_id: str | None,
-        code: str,
-        found: str,
-        expected: str,
-        remedy: str,
+    def faulty(
+        self, row: int, cells: Sequence[Cell], why: FileRefusedError, record_id: str | None = None
     ) -> InvalidRow:
-        shown = quote(",".join(show(c) for c in cells), 80)
-        self._table.tell(code, f"{found}: {shown}", expected, remedy, row)
+        shown, told = quote(",".join(map(show, cells)), 80), why.problem
+        self._table.tell(told.code, f"{why}: {shown}", told.expected, told.remedy, CellPlace(row))
         return InvalidRow(record_id, None, None, ("row",), (), self._table.source(row))
 
     def _begin(
@@ -465,7 +447,10 @@ class RowReader:
         elif declared is None:
             self._bad.add(-1)
             self._table.tell(
-                "convention_missing", None, *_MISSING_CONVENTION, self._row, CONVENTION.name
+                "convention_missing",
+                None,
+                *_MISSING_CONVENTION,
+                CellPlace(self._row, CONVENTION.name),
             )
         return declared
 
@@ -581,31 +566,19 @@ class RowReader:
 
     def _tell(self, index: int, fault: CellFaultError) -> None:
         placed = self._placed[index]
-        if fault.code == "unit_missing":
-            if placed.header_cell in self._without_unit:
-                return
-            self._without_unit.add(placed.header_cell)
-            where = placed.header_row, placed.header, placed.header_cell
-            self._table.tell(
-                fault.code, placed.header, "a unit: in, thou or mm", fault.remedy, *where
-            )
-            return
-        self._tell_cell(self._place(index), self._cells[index], fault)
+        if fault.code != "unit_missing":
+            self._table.tell_fault(fault, self._cells[index], self._place(index))
+        elif placed.place.cell not in self._without_unit:
+            self._without_unit.add(placed.place.cell)
+            expected = "a unit: in, thou or mm"
+            self._table.tell(fault.code, placed.header, expected, fault.remedy, placed.place)
 
-    def _place(self, index: int) -> _CellPlace:
-        placed = self._placed[index]
-        row, cell = (
-            (self._row, f"{column_letters(index)}{self._row}")
-            if self._places is None
-            else self._places[index]
-        )
-        return _CellPlace(row, placed.header, cell)
-
-    def _tell_cell(self, place: _CellPlace, raw: Cell, fault: CellFaultError) -> None:
-        found = None if raw is None else quote(raw)
-        self._table.tell(
-            fault.code, found, fault.expected, fault.remedy, place.row, place.header, place.cell
-        )
+    def _place(self, index: int) -> CellPlace:
+        header = self._placed[index].header
+        if self._places is None:
+            return CellPlace.at(self._row, index, header)
+        row, cell = self._places[index]
+        return CellPlace(row, header, cell)
 
     def _read_date(self, cell: str | float | OddCell) -> date:
         if isinstance(cell, str):
@@ -626,7 +599,7 @@ class RowReader:
         order = next(iter(self._date_orders)) if len(self._date_orders) == 1 else None
         for waiting in self._waiting.values():
             if order is None:
-                self._tell_cell(waiting.place, waiting.raw, waiting.fault)
+                self._table.tell_fault(waiting.fault, waiting.raw, waiting.place)
         for place, row in enumerate(rows):
             if order is not None and row.source in self._waiting and isinstance(row, Inspection):
                 rows[place] = replace(
