@@ -89,9 +89,7 @@ def header_score(cells: Sequence[Cell], options: ReadOptions) -> int:
     for index, cell in enumerate(cells):
         if isinstance(cell, str):
             mapped = _mapped(cell, index, options)
-            found = (
-                UNKNOWN if mapped else recognise(cell, options.joint_numbers, options.joint_names)
-            )
+            found = UNKNOWN if mapped else recognise(cell, options.joints)
             known |= set() if found.field is None else {found.field.quantity}
             doubtful += mapped or bool(found.reason)
     columns = {column for column, _ in known}
@@ -183,11 +181,7 @@ def _unit_row(
     ):
         return None
     for text, word in zip(header.texts, words, strict=False):
-        known = (
-            recognise(text, options.joint_numbers, options.joint_names).field
-            if word in UNIT_SPELLINGS
-            else None
-        )
+        known = recognise(text, options.joints).field if word in UNIT_SPELLINGS else None
         if known is not None and not known.column.is_length:
             return None
     units = [UNIT_SPELLINGS.get(word) for word in words[: len(header.texts)]]
@@ -203,7 +197,7 @@ def why_not_remembered(header: str, column: str, options: ReadOptions) -> str:
     if found.field is not None:
         return f"is read as {found.field.name}"
     if found.reason:
-        target = parse_target(column, options.joint_numbers)
+        target = parse_target(column, options.joints)
         if target is None or not (target.column.bears_verdict or target.column.needs_joint):
             return f"is doubtful: {found.reason}"
     return ""
@@ -211,8 +205,8 @@ def why_not_remembered(header: str, column: str, options: ReadOptions) -> str:
 
 def _understood(header: str, options: ReadOptions) -> Recognition:
     """Return what a header is understood as by itself, with no mapping."""
-    found = recognise(header, options.joint_numbers, options.joint_names)
-    return near_miss(header, options.joint_numbers) if found is UNKNOWN and header else found
+    found = recognise(header, options.joints)
+    return near_miss(header, options.joints) if found is UNKNOWN and header else found
 
 
 class ColumnReader:
@@ -229,7 +223,7 @@ class ColumnReader:
             # Letters name a place in this table: nothing that was remembered from another knows it.
             placed = key == column_letters(index) and key in options.column_map
             if tidy(key) == tidy(text) or placed:
-                return Recognition(parse_target(target, options.joint_numbers)), True
+                return Recognition(parse_target(target, options.joints)), True
         return _understood(text, options), False
 
     def place(
@@ -291,8 +285,7 @@ class ColumnReader:
     def _doubt(self, placed: PlacedField, found: Recognition) -> None:
         target = found.nearest or "clearance_3_in"
         if found.code == "joint_unknown":
-            joints = self._options.joint_numbers
-            expected = f"a joint from {min(joints)} to {max(joints)}"
+            expected = f"a joint from {self._options.joints.span}"
             remedy = f"{found.reason[:1].upper()}{found.reason[1:]}."
             if not self._by_hand:
                 remedy += f' The nearest names are {target}: pass --map "{placed.header}=COLUMN".'

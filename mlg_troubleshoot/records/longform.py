@@ -45,12 +45,13 @@ class LongReader:
         # them.
         self._slots: dict[tuple[int, int], int] = {}
         for p in self._per_joint:
-            for joint in options.joint_numbers:
+            for joint in options.joints.numbers:
                 self._slots[p.index, joint] = len(wide)
                 own_field = None if p.field is None else replace(p.field, number=joint)
                 wide.append(replace(p, index=len(wide), field=own_field))
         self._width = len(wide)
-        self._names = {tidy(name): number for number, name in options.joint_names.items()}
+        joints = options.joints
+        self._names = dict(zip(map(tidy, joints.names), joints.numbers, strict=False))
         self._groups: dict[str | int, _Group] = {}
         self.reader = RowReader(wide, table)
 
@@ -104,9 +105,8 @@ class LongReader:
             return
         joint = self._joint_number(cell)
         if joint is None:
-            joints = self._table.options.joint_numbers
             code = "joint_missing" if cell is None else "joint_unknown"
-            expected = f"a joint number from {min(joints)} to {max(joints)}"
+            expected = f"a joint number from {self._table.options.joints.span}"
             self._fault(
                 group, (self._joint, row, cell), code, expected, "Enter the joint's number."
             )
@@ -139,7 +139,7 @@ class LongReader:
             text = tidy(plain_text(cell))
             match = _JOINT_TEXT.fullmatch(text)
             number = int(match[1]) if match is not None else self._names.get(text)
-        return number if number in self._table.options.joint_numbers else None
+        return number if number in self._table.options.joints.numbers else None
 
     def _fault(
         self,

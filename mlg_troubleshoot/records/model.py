@@ -13,6 +13,7 @@ from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.records.cells import Cell, column_letters, quote
 from mlg_troubleshoot.records.dates import DateOrder
+from mlg_troubleshoot.records.headers import Joints
 from mlg_troubleshoot.records.values import CellFaultError
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
@@ -82,20 +83,18 @@ class TableResult:
 class ReadOptions(TableOptions):
     """What is declared about tables, and what the gear says of the values in them.
 
-    joint_names: names of the gear's joints, by which a header's number is checked; empty takes the
-    reference gear's. areas: names of the areas to open. clearance_hard_max_in,
-    clearance_confirm_above_in: a radial clearance above the one is refused, above the other
-        accepted with a warning. [in]
+    joints: numbers and names of the joints, by which headers are understood. areas: names of the
+    areas to open.
+    clearance_hard_max_in, clearance_confirm_above_in: a radial clearance above the one is refused,
+    above the other accepted with a warning. [in]
     plunger_hard_max_in: a measured plunger displacement beyond this, either way, is refused. [in]
     new_part_in, limit_in: radial clearance of a new part, and the largest one allowed, by joint;
-    empty where no gear
-        says them. [in]
+    empty where no gear says them. [in]
     margin_in: largest displacement that the gear allows; infinite where no gear says it. [in]
     asks: a person is there to confirm what is unusual.
     """
 
-    joint_numbers: tuple[int, ...] = tuple(range(1, 11))
-    joint_names: Mapping[int, str] = field(default_factory=dict)
+    joints: Joints = field(default_factory=Joints)
     areas: tuple[str, ...] = ("sidestay", "link assembly")
     clearance_hard_max_in: float = 0.050
     clearance_confirm_above_in: float = 0.015
@@ -123,8 +122,7 @@ class ReadOptions(TableOptions):
         return cls(
             **told,
             **declared,
-            joint_numbers=gear.joint_numbers,
-            joint_names={joint.number: joint.name for joint in gear.joints},
+            joints=Joints.of(gear),
             new_part_in={joint.number: joint.new_part.value for joint in gear.joints},
             areas=tuple(area.name for area in gear.areas),
             margin_in=gear.margin.value,

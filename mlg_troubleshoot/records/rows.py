@@ -322,7 +322,7 @@ class RowReader:
             if column.holds is Holds.MOMENT:
                 return read_moment(cell, self._options.dates, self._latest)
             if column.holds is Holds.JOINTS:
-                return read_joints(cell, self._options.joint_numbers)
+                return read_joints(cell, self._options.joints.numbers)
             if column.holds is Holds.AREAS:
                 return read_areas(cell, self._options.areas)
             return read_value(

@@ -61,7 +61,7 @@ class KeptGate:
 
     def __init__(self, gear: Gear) -> None:
         options = ReadOptions.of(gear)
-        self._joints = options.joint_numbers
+        self._joints = options.joints.numbers
         self._fields: dict[str, _Check] = {
             **{field.name: _anything for field in fields(Inspection)},
             **{name: check for column in COLUMNS for name, check in self._checks(column, options)},

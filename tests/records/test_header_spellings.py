@@ -6,6 +6,7 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.records.headers import Joints
 
 HEADER = ("record_id", "tail_no", "side", "clearance_convention")
 GOOD = ("R1", "N1", "LH", "RADIAL")
@@ -161,7 +162,7 @@ def test_two_columns_of_remarks_of_one_name_are_both_kept(read, table):
 def test_the_names_of_another_gear_are_known_when_given(read, table):
     text = table((*HEADER, "Clearance #3 – drag strut knuckle (in)"), [(*GOOD, 0.013)])
     assert read(text).problems
-    assert not read(text, joint_names={3: "drag strut knuckle"}).problems
+    assert not read(text, joints=Joints(names=("", "", "drag strut knuckle"))).problems
 
 
 def test_a_header_cell_in_a_csv_file_is_named_by_its_letter(read, table):
