@@ -17,7 +17,7 @@ from mlg_troubleshoot.decision.columns import (
     TAIL_NO,
     Column,
 )
-from mlg_troubleshoot.records.cells import Cell, column_letters, show, writable
+from mlg_troubleshoot.records.cells import Cell, Cells, column_letters, show, writable
 from mlg_troubleshoot.records.headers import (
     UNKNOWN,
     Recognition,
@@ -83,7 +83,7 @@ def _mapped(text: str, index: int, options: ReadOptions) -> bool:
     )
 
 
-def header_score(cells: Sequence[Cell], options: ReadOptions) -> int:
+def header_score(cells: Cells, options: ReadOptions) -> int:
     known: set[tuple[Column, int | None]] = set()
     doubtful = 0
     for index, cell in enumerate(cells):
@@ -146,7 +146,7 @@ def _two_row_header(
     return best
 
 
-def _may_be_upper(above: Sequence[Cell], below: Sequence[Cell]) -> bool:
+def _may_be_upper(above: Cells, below: Cells) -> bool:
     texts = [c for c in above if c is not None]
     return (
         bool(texts)
@@ -155,9 +155,7 @@ def _may_be_upper(above: Sequence[Cell], below: Sequence[Cell]) -> bool:
     )
 
 
-def _joined(
-    upper: int, above: Sequence[Cell], below: Sequence[Cell], ranges: Sequence[MergedRange]
-) -> list[str]:
+def _joined(upper: int, above: Cells, below: Cells, ranges: Sequence[MergedRange]) -> list[str]:
     """Return each header of two rows; none if nothing is merged across columns."""
     across = [
         (first, last)
@@ -172,7 +170,7 @@ def _joined(
 
 
 def _unit_row(
-    header: Header, cells: Sequence[Cell], options: ReadOptions
+    header: Header, cells: Cells, options: ReadOptions
 ) -> tuple[LengthUnit | None, ...] | None:
     """Read a row of units below the header; None if it is something else."""
     words = [_text(c).strip("()[]").lower() for c in cells]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from mlg_troubleshoot.decision.columns import JOINT, RECORD_ID, Column
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
-from mlg_troubleshoot.records.cells import Cell, OddCell, column_letters, show, stored
+from mlg_troubleshoot.records.cells import Cell, Cells, OddCell, column_letters, show, stored
 from mlg_troubleshoot.records.headers import tidy
 from mlg_troubleshoot.records.model import CellPlace, TableInHand, to_correct
 from mlg_troubleshoot.records.rows import PlacedField, RowReader
@@ -65,7 +65,7 @@ class LongReader:
             None,
         )
 
-    def add(self, row: int, cells: Sequence[Cell]) -> None:
+    def add(self, row: int, cells: Cells) -> None:
         width = len(self._placed)
         filled = [*cells[:width], *[None] * (width - len(cells))]
         record = filled[self._record.index] if self._record is not None else None
@@ -82,7 +82,7 @@ class LongReader:
             self._same_elsewhere(group, row, filled)
         self._take_reading(group, row, filled)
 
-    def _same_elsewhere(self, group: _Group, row: int, filled: Sequence[Cell]) -> None:
+    def _same_elsewhere(self, group: _Group, row: int, filled: Cells) -> None:
         """Check that what belongs to the whole inspection is the same in each of its rows."""
         for p in self._placed:
             here, there = filled[p.index], group.cells[p.index]
@@ -96,7 +96,7 @@ class LongReader:
                 remedy = "All rows of one record must agree. Correct one of them, or the record id."
                 self._fault(group, (p, row, here), "record_contradicts", expected, remedy)
 
-    def _take_reading(self, group: _Group, row: int, filled: Sequence[Cell]) -> None:
+    def _take_reading(self, group: _Group, row: int, filled: Cells) -> None:
         if self._joint is None:
             return
         cell = filled[self._joint.index]

@@ -39,7 +39,8 @@ from mlg_troubleshoot.decision.inspection import (
 )
 from mlg_troubleshoot.records.cells import (
     Cell,
-    OddCell,
+    Cells,
+    Filled,
     column_letters,
     quote,
     show,
@@ -192,7 +193,7 @@ class RowReader:
         self._without_unit: set[str | None] = set()
         self._row = 0
         self._places: Sequence[tuple[int, str]] | None = None
-        self._cells: Sequence[Cell] = ()
+        self._cells: Cells = ()
         self._bad: set[int] = set()
         self._faults: list[tuple[int, CellFaultError]] = []
         # Somewhere it is tomorrow already.
@@ -216,7 +217,7 @@ class RowReader:
         return named
 
     def read(
-        self, row: int, cells: Sequence[Cell], places: Sequence[tuple[int, str]] | None = None
+        self, row: int, cells: Cells, places: Sequence[tuple[int, str]] | None = None
     ) -> Inspection | InvalidRow:
         """Read one row; every bad cell is reported once."""
         self._begin(row, cells, places)
@@ -372,7 +373,7 @@ class RowReader:
                 " joint has no reading"
             )
 
-    def ragged(self, row: int, cells: Sequence[Cell], expected: int) -> InvalidRow:
+    def ragged(self, row: int, cells: Cells, expected: int) -> InvalidRow:
         """Refuse a row that does not have as many fields as the header."""
         comma = len(cells) > expected and any(
             isinstance(c, str) and c.strip() == "0" for c in cells
@@ -394,15 +395,13 @@ class RowReader:
         return self.faulty(row, cells, why, record_id)
 
     def faulty(
-        self, row: int, cells: Sequence[Cell], why: FileRefusedError, record_id: str | None = None
+        self, row: int, cells: Cells, why: FileRefusedError, record_id: str | None = None
     ) -> InvalidRow:
         shown, told = quote(",".join(map(show, cells)), 80), why.problem
         self._table.tell(told.code, f"{why}: {shown}", told.expected, told.remedy, CellPlace(row))
         return InvalidRow(record_id, None, None, ("row",), (), self._table.source(row))
 
-    def _begin(
-        self, row: int, cells: Sequence[Cell], places: Sequence[tuple[int, str]] | None
-    ) -> None:
+    def _begin(self, row: int, cells: Cells, places: Sequence[tuple[int, str]] | None) -> None:
         """Take up a row: fill it to the width of the header, and leave out what was not
         measured.
         """
@@ -495,7 +494,7 @@ class RowReader:
         kind: _LengthKind,
         row_unit: LengthUnit | None,
         scale: ClearanceConvention,
-        cell: str | float | OddCell,
+        cell: Filled,
     ) -> tuple[float, EnteredClearance]:
         """Read a length that its column can hold; a clearance is radial. [in]"""
         column, unit, above_zero = kind
@@ -580,7 +579,7 @@ class RowReader:
         row, cell = self._places[index]
         return CellPlace(row, header, cell)
 
-    def _read_date(self, cell: str | float | OddCell) -> date:
+    def _read_date(self, cell: Filled) -> date:
         if isinstance(cell, str):
             orders = set(readings(plain_text(cell)) or ())
             # A year first says nothing of the order of day and month in other cells.

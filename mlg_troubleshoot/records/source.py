@@ -7,10 +7,10 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from mlg_troubleshoot.records.cells import Cell
+from mlg_troubleshoot.records.cells import Cells
 from mlg_troubleshoot.records.refusals import FileRefusedError
 
-NumberedRow = tuple[int, Sequence[Cell]]
+NumberedRow = tuple[int, Cells]
 MergedRange = tuple[int, int, int, int]
 # Said of a workbook that holds some.
 MACROS = "the workbook holds macros: they are ignored, the values are read"

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from openpyxl.worksheet.worksheet import Worksheet
 from mlg_troubleshoot.decision.columns import Column, Holds
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.outputs import write_csv
-from mlg_troubleshoot.records.cells import Cell, column_letters, stored
+from mlg_troubleshoot.records.cells import Cell, Cells, column_letters, stored
 from mlg_troubleshoot.records.model import CellPlace, ReadOptions, TableInHand
 from mlg_troubleshoot.records.read import load_bytes, open_book
 from mlg_troubleshoot.records.refusals import FileRefusedError
@@ -191,7 +191,7 @@ def read_survey(
         return (), (replace(refusal.problem, file=label),), ""
 
 
-def _names(cells: Sequence[Cell]) -> list[str]:
+def _names(cells: Cells) -> list[str]:
     return [cell.strip().lower() if isinstance(cell, str) else "" for cell in cells]
 
 
@@ -208,7 +208,7 @@ class _Rows:
                 again = "each column once", "Remove one of the columns."
                 self._tell(1, name, CellFaultError("header_duplicate", *again))
 
-    def read(self, number: int, cells: Sequence[Cell]) -> SurveyReading | None:
+    def read(self, number: int, cells: Cells) -> SurveyReading | None:
         """Read one row; None if it has no value, or a cell that is wrong."""
         named = zip(self.header, cells, strict=False)
         self.row = {name: cell for name, cell in named if name and cell is not None}

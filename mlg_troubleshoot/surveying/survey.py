@@ -27,6 +27,7 @@ from mlg_troubleshoot.surveying import tuned
 from mlg_troubleshoot.surveying.readings import (
     DEFAULT_U,
     ReadingKind,
+    Readings,
     SurveyedLinkage,
     SurveyReading,
 )
@@ -85,13 +86,13 @@ class Survey:
     """
 
     linkage: SurveyedLinkage
-    readings: tuple[SurveyReading, ...]
+    readings: Readings
     misfits: tuple[Misfit, ...]
     modes: tuple[Mode, ...]
     draws: Array
 
     @property
-    def read(self) -> tuple[SurveyReading, ...]:
+    def read(self) -> Readings:
         """The readings of the table."""
         return tuple(r for r in self.readings if r.row is not None)
 
@@ -156,7 +157,7 @@ class Prior:
         """Draws of it, whether they close or not."""
         return np.asarray(self.mean + rng.standard_normal((n, len(self.mean))) @ self.root.T)
 
-    def closing(self, n: int, rng: Generator, readings: tuple[SurveyReading, ...] = ()) -> Array:
+    def closing(self, n: int, rng: Generator, readings: Readings = ()) -> Array:
         """Draws of it that close, about so many, as the readings have it that speak of one variable
         each.
         """
@@ -212,9 +213,7 @@ class Fits:
 class Fitting:
     """The readings of one survey against one prior."""
 
-    def __init__(
-        self, linkage: SurveyedLinkage, prior: Prior, readings: tuple[SurveyReading, ...]
-    ) -> None:
+    def __init__(self, linkage: SurveyedLinkage, prior: Prior, readings: Readings) -> None:
         self.linkage, self.prior, self.readings = linkage, prior, readings
         self.value = np.array([r.value for r in readings])
         self.u = np.array([r.u for r in readings])
@@ -697,7 +696,7 @@ def _robust(r: Array) -> tuple[Array, Array]:
 
 def fit(
     gear: Gear,
-    readings: tuple[SurveyReading, ...],
+    readings: Readings,
     rng: Generator,
     told: Callable[[int, int], None] = lambda *_: None,
 ) -> Survey:
