@@ -18,7 +18,7 @@ from numpy.random import Generator
 
 from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.indices.displacement import Response
-from mlg_troubleshoot.indices.estimators import Indices, failed_note, without_numbers
+from mlg_troubleshoot.indices.estimators import Indices, without_numbers
 
 # Points held out inside the range and at its corners to judge an expansion by. [1]
 _HELD_OUT, _CORNERS = 48, 16
@@ -90,12 +90,7 @@ def chaos_indices(
             f"polynomial chaos, {len(values)} points for the fit and {len(checks)} for its check"
         )
         if failed:
-            return (
-                without_numbers(
-                    design, seed, n, used, failed, failed_note(failed, used), (np.nan, np.nan)
-                ),
-                None,
-            )
+            return without_numbers(design, seed, n, used, failed=failed), None
         before = np.inf if best is None else best.residual
         best = _best_fit(points, values, checks, check_values, best)
         if best is not None:
@@ -106,10 +101,8 @@ def chaos_indices(
         if not gains or used + len(values) > most:
             residual = "undefined" if best is None else f"{best.residual:.2g} of the variance"
             note = f"not smooth: a polynomial leaves {residual} unexplained"
-            return (
-                without_numbers(design, seed, n, used, 0, note, (float(values.mean()), np.nan)),
-                None,
-            )
+            mean = float(values.mean())
+            return without_numbers(design, seed, n, used, note, mean=mean), None
         more = _latin(rng, len(values), n)
         points, values = np.concatenate([points, more]), np.concatenate([values, response(more)])
 

@@ -77,10 +77,9 @@ class Columns:
         return "; ".join(read), carried if self.carried else ""
 
 
-def _mapped(text: str, index: int, options: ReadOptions) -> bool:
-    return any(
-        tidy(key) == tidy(text) or key == column_letters(index) for key in options.column_map
-    )
+def _names(key: str, text: str, index: int) -> bool:
+    """Whether a key of a mapping is this header, or the letters of its column."""
+    return tidy(key) == tidy(text) or key == column_letters(index)
 
 
 def header_score(cells: Cells, options: ReadOptions) -> int:
@@ -88,7 +87,7 @@ def header_score(cells: Cells, options: ReadOptions) -> int:
     doubtful = 0
     for index, cell in enumerate(cells):
         if isinstance(cell, str):
-            mapped = _mapped(cell, index, options)
+            mapped = any(_names(key, cell, index) for key in options.column_map)
             found = UNKNOWN if mapped else recognise(cell, options.joints)
             known |= set() if found.field is None else {found.field.quantity}
             doubtful += mapped or bool(found.reason)
@@ -135,7 +134,10 @@ def _two_row_header(
     pairs = [
         (upper, above, below)
         for (upper, above), (lower, below) in pairwise(near)
-        if lower == upper + 1 and _may_be_upper(above, below)
+        if lower == upper + 1
+        and any(c is not None for c in above)
+        and all(c is None or isinstance(c, str) for c in above)
+        and sum(c is not None for c in below) >= 2
     ]
     ranges = merged() if pairs else ()
     for upper, above, below in pairs:
@@ -144,15 +146,6 @@ def _two_row_header(
         if score > single:
             single, best = score, Header(upper + 1, tuple(texts), (upper, upper + 1))
     return best
-
-
-def _may_be_upper(above: Cells, below: Cells) -> bool:
-    texts = [c for c in above if c is not None]
-    return (
-        bool(texts)
-        and all(isinstance(c, str) for c in texts)
-        and sum(c is not None for c in below) >= 2
-    )
 
 
 def _joined(upper: int, above: Cells, below: Cells, ranges: Sequence[MergedRange]) -> list[str]:
@@ -219,8 +212,7 @@ class ColumnReader:
         options = self._options
         for key, target in (*options.column_map.items(), *options.remembered_map.items()):
             # Letters name a place in this table: nothing that was remembered from another knows it.
-            placed = key == column_letters(index) and key in options.column_map
-            if tidy(key) == tidy(text) or placed:
+            if tidy(key) == tidy(text) or (key in options.column_map and _names(key, text, index)):
                 return Recognition(parse_target(target, options.joints)), True
         return _understood(text, options), False
 
@@ -398,10 +390,7 @@ class ColumnReader:
 
     def _unused_map(self, columns: Columns, row: int) -> None:
         for key in self._options.column_map:
-            if not any(
-                tidy(key) == tidy(p.header) or key == column_letters(p.index)
-                for p in columns.placed
-            ):
+            if not any(_names(key, p.header, p.index) for p in columns.placed):
                 headers = ", ".join(p.header for p in columns.placed if p.header)
                 expected = f"one of the headers of the table: {headers[:200]}"
                 remedy = "Correct the header named in --map."

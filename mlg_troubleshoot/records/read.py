@@ -398,11 +398,10 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
         source: content for _, found in results for source, content in found.invalid_content.items()
     }
     problems += settle_duplicates(rows, layouts, contents)
-    for place, warnings in history_warnings(rows).items():
-        rows[place] = replace(rows[place], warnings=(*rows[place].warnings, *warnings))
-    backwards = order_warnings(rows, layouts)
-    for place, warning in backwards.items():
-        rows[place] = replace(rows[place], warnings=(*rows[place].warnings, warning))
+    slips, backwards = history_warnings(rows), order_warnings(rows, layouts)
+    for place in {*slips, *backwards}:
+        said = filter(None, (slips.get(place), backwards.get(place)))
+        rows[place] = replace(rows[place], warnings=(*rows[place].warnings, *said))
     problems.sort(key=_places(results))
     return ReadResult(
         tuple(rows),

@@ -31,14 +31,14 @@ GearKey = tuple[str, Side]
 Clearances = Mapping[int, float]
 
 
-def history_warnings(rows: Sequence[Inspection | InvalidRow]) -> dict[int, tuple[str, ...]]:
+def history_warnings(rows: Sequence[Inspection | InvalidRow]) -> dict[int, str]:
     """Suggest slips for rows that do not fit the gear's other inspections."""
     gears: dict[GearKey, list[int]] = {}
     for place, row in enumerate(rows):
         if isinstance(row, Inspection) and row.clearance_in:
             gears.setdefault((row.tail_no, row.side), []).append(place)
     usual: dict[GearKey, Clearances] = {}
-    found: dict[int, tuple[str, ...]] = {}
+    found: dict[int, str] = {}
     for gear, places in gears.items():
         if len(places) <= _FEWEST:
             continue
@@ -61,7 +61,7 @@ def history_warnings(rows: Sequence[Inspection | InvalidRow]) -> dict[int, tuple
                 )
             slip = _slip(clearances[at], expected, usual[other], other[1])
             if slip:
-                found[place] = (slip,)
+                found[place] = slip
     return found
 
 

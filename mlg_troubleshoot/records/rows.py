@@ -37,6 +37,7 @@ from mlg_troubleshoot.decision.inspection import (
     InvalidRow,
     RowSource,
 )
+from mlg_troubleshoot.gear.gear import ROUNDING_IN
 from mlg_troubleshoot.records.cells import (
     Cell,
     Cells,
@@ -72,7 +73,6 @@ from mlg_troubleshoot.records.values import (
 )
 from mlg_troubleshoot.units import ClearanceConvention, Length, LengthUnit, Sentence
 
-_EPS_IN = 1e-9
 _REMEMBERED = 20_000
 _NO_FLOATS: Mapping[int, float] = MappingProxyType({})
 _MISSING_CONVENTION = (
@@ -226,7 +226,11 @@ class RowReader:
         found = self._read_cells(convention, unit, warnings)
         question = self._unit_question(found, convention, warnings)
         source = self._table.source(row)
-        self._report_faults(source)
+        for place, fault in sorted(self._faults, key=lambda fault: fault[0]):
+            if isinstance(fault, AmbiguousDateError):
+                self._waiting[source] = _WaitingDate(self._place(place), self._cells[place], fault)
+            else:
+                self._tell(place, fault)
         record_id, tail_no, side = (found.values.pop(column, None) for column in IDENTITY)
         if self._bad or record_id is None or tail_no is None or side is None or convention is None:
             return InvalidRow(record_id, tail_no, side, self._correct(), tuple(warnings), source)
@@ -310,7 +314,7 @@ class RowReader:
             found.lengths.setdefault(kind.column, {})[number] = length
             if kind.column is CLEARANCE:
                 found.entered[number] = entered
-                if length > self._options.clearance_confirm_above_in + _EPS_IN:
+                if length > self._options.clearance_confirm_above_in + ROUNDING_IN:
                     warnings.append(self._confirm_text(number, length, entered, scale))
             elif kind.column is PLUNGER_DISPLACEMENT:
                 found.plunger.append((length, entered.unit))
@@ -340,13 +344,6 @@ class RowReader:
             else f"Enter {column.asked}; there is no default."
         )
         raise CellFaultError(f"{column.name}_missing", column.asked, remedy)
-
-    def _report_faults(self, source: RowSource) -> None:
-        for place, fault in sorted(self._faults, key=lambda fault: fault[0]):
-            if isinstance(fault, AmbiguousDateError):
-                self._waiting[source] = _WaitingDate(self._place(place), self._cells[place], fault)
-            else:
-                self._tell(place, fault)
 
     def _warn(self, found: _Found, warnings: list[str]) -> None:
         """Say what of a good row is of no use, or unusual."""
@@ -524,7 +521,7 @@ class RowReader:
             if is_clearance and fault.code == "length_negative":
                 fault.code = "clearance_negative"
             raise
-        beyond = not low - _EPS_IN <= value_in / factor <= high + _EPS_IN
+        beyond = not low - ROUNDING_IN <= value_in / factor <= high + ROUNDING_IN
         if beyond or (above_zero and value_in <= 0.0):
             if is_clearance:
                 usual = self._options.clearance_confirm_above_in

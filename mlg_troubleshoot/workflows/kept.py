@@ -25,7 +25,7 @@ from mlg_troubleshoot.decision.columns import (
     Holds,
 )
 from mlg_troubleshoot.decision.inspection import Inspection
-from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
 from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.records.values import (
     CellFaultError,
@@ -38,7 +38,6 @@ from mlg_troubleshoot.store import Record, RecordKind
 from mlg_troubleshoot.units import LengthUnit
 
 _Check = Callable[[str, Any], None]
-_EPS_IN = 1e-9
 _SHOWN = 60
 _HASH = re.compile(r"[0-9a-f]{64}")
 # Of the program's own making: neither is read back as more than a text, a list or nothing.
@@ -239,7 +238,11 @@ def _number(low: float = -1e12, high: float = 1e12, *, above: bool = False) -> _
 
     def check(column: str, value: Any) -> None:
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not low - _EPS_IN <= value <= high + _EPS_IN or (above and value <= low):
+        if (
+            not number
+            or not low - ROUNDING_IN <= value <= high + ROUNDING_IN
+            or (above and value <= low)
+        ):
             raise _WrongError(column, value, expected)
 
     return check
