@@ -17,8 +17,8 @@ import numpy as np
 from numpy.random import Generator
 
 from mlg_troubleshoot.arrays import Array, Wholes
-from mlg_troubleshoot.indices.displacement import Response
 from mlg_troubleshoot.indices.estimators import Indices, without_numbers
+from mlg_troubleshoot.indices.inputs import Response
 
 # Points held out inside the range and at its corners to judge an expansion by. [1]
 _HELD_OUT, _CORNERS = 48, 16

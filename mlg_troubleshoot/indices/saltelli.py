@@ -16,8 +16,8 @@ from numpy.random import Generator
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.indices.chaos import ChaosFit, chaos_indices
-from mlg_troubleshoot.indices.displacement import Response
 from mlg_troubleshoot.indices.estimators import Indices, student_half, without_numbers
+from mlg_troubleshoot.indices.inputs import Response
 
 # Independent scrambles of the Sobol points: their spread gives the interval. [1]
 SCRAMBLES = 8

@@ -30,7 +30,7 @@ from mlg_troubleshoot.errors import OutputError, Problem, UsageError
 from mlg_troubleshoot.outputs import OutputKind, write_bytes
 from mlg_troubleshoot.records.cells import column_letters, writable
 from mlg_troubleshoot.records.model import ReadResult, SheetLayout
-from mlg_troubleshoot.records.refusals import FileRefusedError
+from mlg_troubleshoot.records.source import FileRefusedError
 from mlg_troubleshoot.records.template import FONT, HEADER_FILL
 from mlg_troubleshoot.records.xlsx import XlsxFile, XlsxSheet
 from mlg_troubleshoot.units import LengthUnit

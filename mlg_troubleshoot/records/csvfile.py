@@ -10,8 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 
 from mlg_troubleshoot.records.cells import MAX_COLUMNS, MAX_ROWS, Cell, Cells
-from mlg_troubleshoot.records.refusals import FileRefusedError
-from mlg_troubleshoot.records.source import NumberedRow, Sheet, Workbook
+from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet, Workbook
 
 # A quoted field may be as long as a line; the module's own limit would make it a fault.
 csv.field_size_limit(1_000_000)

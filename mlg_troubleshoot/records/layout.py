@@ -27,9 +27,8 @@ from mlg_troubleshoot.records.headers import (
     tidy,
 )
 from mlg_troubleshoot.records.model import CellPlace, ReadOptions, TableInHand
-from mlg_troubleshoot.records.refusals import HEADER_SEARCH_ROWS
 from mlg_troubleshoot.records.rows import PlacedField
-from mlg_troubleshoot.records.source import MergedRange, NumberedRow
+from mlg_troubleshoot.records.source import HEADER_SEARCH_ROWS, MergedRange, NumberedRow
 from mlg_troubleshoot.units import UNIT_SPELLINGS, LengthUnit
 
 

@@ -15,13 +15,15 @@ from typing import BinaryIO
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import writable
 from mlg_troubleshoot.records.csvfile import csv_book
-from mlg_troubleshoot.records.duplicates import settle_duplicates
 from mlg_troubleshoot.records.forms import Form, find_form, read_form
 from mlg_troubleshoot.records.layout import Header, find_header, header_score
 from mlg_troubleshoot.records.model import FileRead, Progress, ReadOptions, ReadResult
-from mlg_troubleshoot.records.refusals import FileRefusedError
-from mlg_troubleshoot.records.row_consistency import history_warnings, order_warnings
-from mlg_troubleshoot.records.source import NumberedRow, Sheet, Workbook
+from mlg_troubleshoot.records.row_consistency import (
+    history_warnings,
+    order_warnings,
+    settle_duplicates,
+)
+from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet, Workbook
 from mlg_troubleshoot.records.tables import Collected, read_table
 
 MAX_FILE_BYTES = 50_000_000

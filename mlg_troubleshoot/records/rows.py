@@ -51,7 +51,7 @@ from mlg_troubleshoot.records.cells import (
 from mlg_troubleshoot.records.dates import DateOrder, readings
 from mlg_troubleshoot.records.headers import Field
 from mlg_troubleshoot.records.model import NOWHERE, CellPlace, TableInHand
-from mlg_troubleshoot.records.refusals import FileRefusedError
+from mlg_troubleshoot.records.source import FileRefusedError
 from mlg_troubleshoot.records.unit_fit import (
     UnitFit,
     judge_unit,

@@ -23,7 +23,7 @@ from mlg_troubleshoot.outputs import write_csv
 from mlg_troubleshoot.records.cells import Cell, Cells, column_letters, stored
 from mlg_troubleshoot.records.model import CellPlace, ReadOptions, TableInHand
 from mlg_troubleshoot.records.read import load_bytes, open_book
-from mlg_troubleshoot.records.refusals import FileRefusedError
+from mlg_troubleshoot.records.source import FileRefusedError
 from mlg_troubleshoot.records.template import write_book
 from mlg_troubleshoot.records.values import CellFaultError, read_number, read_text, read_value
 from mlg_troubleshoot.surveying.readings import (
