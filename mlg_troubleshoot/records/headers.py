@@ -84,8 +84,9 @@ class Joints:
         return f"this gear has no joint {number}: its joints are {self.span}"
 
     @cached_property
-    def _words(self) -> dict[int, frozenset[str]]:
-        words = (frozenset(_TOKEN.findall(name.casefold())) for name in self.names)
+    def _words(self) -> dict[int, set[str]]:
+        # Whatever it is called, a joint is a bearing and a joint.
+        words = ({*_TOKEN.findall(name.casefold()), "bearing", "joint"} for name in self.names)
         return dict(zip(self.numbers, words, strict=False))
 
     @cached_property
