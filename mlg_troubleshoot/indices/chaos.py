@@ -180,23 +180,9 @@ def legendre_terms(unit: Array, exponents: Wholes) -> Array:
     [1]
     """
     degree = int(exponents.max(initial=0))
-    values = np.moveaxis(np.polynomial.legendre.legvander(2.0 * unit.T - 1.0, degree), -1, 0)
-    flat = (values * np.sqrt(2.0 * np.arange(degree + 1) + 1.0)[:, None, None]).reshape(
-        -1, len(unit)
-    )
-    places = _factors(exponents.tobytes(), exponents.shape)
-    matrix = flat[places[0]]
-    for factor in places[1:]:
-        matrix *= flat[factor]
-    return np.ascontiguousarray(matrix.T)
-
-
-@lru_cache(maxsize=64)
-def _factors(raw: bytes, shape: tuple[int, int]) -> list[Wholes]:
-    """Rows of the table of one-variable polynomials that each term multiplies; absent ones are
-    constant.
-    """
-    exponents = np.frombuffer(raw, dtype=np.int64).reshape(shape)
-    most = max(1, int((exponents > 0).sum(axis=1).max(initial=0)))
-    present = np.argsort(exponents == 0, axis=1, kind="stable")[:, :most]
-    return list((np.take_along_axis(exponents, present, axis=1) * shape[1] + present).T)
+    values = np.polynomial.legendre.legvander(2.0 * unit.T - 1.0, degree)
+    values *= np.sqrt(2.0 * np.arange(degree + 1) + 1.0)
+    matrix = np.ones((len(unit), len(exponents)))
+    for own, powers in zip(values, exponents.T, strict=True):
+        matrix *= own[:, powers]
+    return matrix
