@@ -10,10 +10,11 @@ and in any order add up to the same bits.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
+from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -178,9 +179,17 @@ def total_order_study(
     blocks = study.blocks
     done = {} if state is None else _resumed(study, state)
     missing = [block for block in blocks if block not in done]
-    runner: Iterable[tuple[StudyBlock, BlockSums]]
-    if scheduler is not None or (workers > 1 and len(missing) > 1):
-        runner = _spread(study, missing, workers, scheduler)
+    runner: Iterator[tuple[StudyBlock, BlockSums]]
+    if scheduler is not None:
+        waiting = {
+            scheduler.submit(compute_block, study, block, pure=False): block for block in missing
+        }
+        distributed: Any = import_module("distributed")
+        runner = (
+            (waiting[future], future.result()) for future in distributed.as_completed(list(waiting))
+        )
+    elif workers > 1 and len(missing) > 1:
+        runner = _on_this_machine(study, missing, workers)
     else:
         runner = ((block, compute_block(study, block)) for block in missing)
     try:
@@ -195,17 +204,13 @@ def total_order_study(
     return _summed(study, done)
 
 
-def _spread(
-    study: BlockStudy, blocks: list[StudyBlock], workers: int, scheduler: Any
+def _on_this_machine(
+    study: BlockStudy, blocks: list[StudyBlock], workers: int
 ) -> Iterator[tuple[StudyBlock, BlockSums]]:
-    if scheduler is not None:
-        pool: Executor = scheduler.get_executor(pure=False)
-    elif numba_is_installed():
-        # The compiled loop runs without the interpreter's lock: threads share its memory.
-        pool = ThreadPoolExecutor(workers)
-    else:
-        # Forking a process that has threads of its own can hang; a fresh interpreter cannot.
-        pool = ProcessPoolExecutor(workers, get_context("spawn"))
+    # The compiled loop runs without the interpreter's lock: threads share its memory. Forking a
+    # process that has threads of its own can hang; a fresh interpreter cannot.
+    fresh = partial(ProcessPoolExecutor, mp_context=get_context("spawn"))
+    pool: Executor = (ThreadPoolExecutor if numba_is_installed() else fresh)(workers)
     try:
         waiting = {pool.submit(compute_block, study, block): block for block in blocks}
         yield from ((waiting[future], future.result()) for future in as_completed(waiting))

@@ -20,7 +20,7 @@ from openpyxl.worksheet.worksheet import Worksheet
 from mlg_troubleshoot.decision.columns import Column, Holds
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.outputs import write_csv
-from mlg_troubleshoot.records.cells import Cell, Cells, column_letters, stored
+from mlg_troubleshoot.records.cells import Cells, Filled, column_letters, stored
 from mlg_troubleshoot.records.model import CellPlace, ReadOptions, TableInHand
 from mlg_troubleshoot.records.read import load_bytes, open_book
 from mlg_troubleshoot.records.source import FileRefusedError
@@ -201,7 +201,7 @@ class _Rows:
     def __init__(self, table: TableInHand, header: list[str], linkage: SurveyedLinkage) -> None:
         self.table, self.header, self.linkage = table, header, linkage
         self.points = [p.name for p in linkage.space.mechanism.points]
-        self.row: dict[str, Cell] = {}
+        self.row: dict[str, Filled] = {}
         self.column = ""
         for i, name in enumerate(header):
             if name and header.index(name) != i:
@@ -286,7 +286,7 @@ class _Rows:
     ) -> float:
         """Read a number, which may be followed by the unit of its column."""
         self.column, comma = column, self.table.decimal_comma
-        cell = self.row.get(column) or ""
+        cell = self.row[column]
         return read_number(cell, low, most, decimal_comma=comma, expected=expected, units=units)
 
     def _ends(self, kind: ReadingKind) -> tuple[str, str]:
