@@ -38,34 +38,31 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.decision.assessment import Assessment as Assessment
-    from mlg_troubleshoot.decision.assessment import Verdict as Verdict
-    from mlg_troubleshoot.decision.inspection import Inspection as Inspection
-    from mlg_troubleshoot.decision.inspection import Outcome as Outcome
-    from mlg_troubleshoot.decision.inspection import Side as Side
-    from mlg_troubleshoot.diagnosis.extension import write_extension as write_extension
-    from mlg_troubleshoot.errors import TroubleshootError as TroubleshootError
-    from mlg_troubleshoot.gear.gear import Gear as Gear
-    from mlg_troubleshoot.gear.gear_file import load_gear as load_gear
-    from mlg_troubleshoot.gear.gear_file import shipped_gears as shipped_gears
-    from mlg_troubleshoot.indices.index_table import load_index_table as load_index_table
-    from mlg_troubleshoot.paper.study import StudyFindings as StudyFindings
-    from mlg_troubleshoot.paper.study import StudyOptions as StudyOptions
-    from mlg_troubleshoot.schemas import schema as schema
-    from mlg_troubleshoot.units import ClearanceConvention as ClearanceConvention
-    from mlg_troubleshoot.units import LengthUnit as LengthUnit
-    from mlg_troubleshoot.units import parse_length as parse_length
-    from mlg_troubleshoot.workflows.check import CheckOptions as CheckOptions
-    from mlg_troubleshoot.workflows.check import CheckResult as CheckResult
-    from mlg_troubleshoot.workflows.check import check as check
-    from mlg_troubleshoot.workflows.check import check_files as check_files
-    from mlg_troubleshoot.workflows.check import predict as predict
-    from mlg_troubleshoot.workflows.check import write_reports as write_reports
-    from mlg_troubleshoot.workflows.diagnose import DiagnoseOptions as DiagnoseOptions
-    from mlg_troubleshoot.workflows.diagnose import DiagnoseResult as DiagnoseResult
-    from mlg_troubleshoot.workflows.diagnose import diagnose_files as diagnose_files
-    from mlg_troubleshoot.workflows.diagnose import load_model_extension as load_model_extension
-    from mlg_troubleshoot.workflows.study import run_study as run_study
+    from mlg_troubleshoot.decision.assessment import Assessment, Verdict
+    from mlg_troubleshoot.decision.inspection import Inspection, Outcome, Side
+    from mlg_troubleshoot.diagnosis.extension import write_extension
+    from mlg_troubleshoot.errors import TroubleshootError
+    from mlg_troubleshoot.gear.gear import Gear
+    from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
+    from mlg_troubleshoot.indices.index_table import load_index_table
+    from mlg_troubleshoot.paper.study import StudyFindings, StudyOptions
+    from mlg_troubleshoot.schemas import schema
+    from mlg_troubleshoot.units import ClearanceConvention, LengthUnit, parse_length
+    from mlg_troubleshoot.workflows.check import (
+        CheckOptions,
+        CheckResult,
+        check,
+        check_files,
+        predict,
+        write_reports,
+    )
+    from mlg_troubleshoot.workflows.diagnose import (
+        DiagnoseOptions,
+        DiagnoseResult,
+        diagnose_files,
+        load_model_extension,
+    )
+    from mlg_troubleshoot.workflows.study import run_study
 
 _HOME = {
     "decision.assessment": "Assessment Verdict",
@@ -84,7 +81,36 @@ _HOME = {
 }
 _MODULES = {name: module for module, names in _HOME.items() for name in names.split()}
 
-__all__ = tuple(sorted(_MODULES))
+__all__ = [
+    "Assessment",
+    "CheckOptions",
+    "CheckResult",
+    "ClearanceConvention",
+    "DiagnoseOptions",
+    "DiagnoseResult",
+    "Gear",
+    "Inspection",
+    "LengthUnit",
+    "Outcome",
+    "Side",
+    "StudyFindings",
+    "StudyOptions",
+    "TroubleshootError",
+    "Verdict",
+    "check",
+    "check_files",
+    "diagnose_files",
+    "load_gear",
+    "load_index_table",
+    "load_model_extension",
+    "parse_length",
+    "predict",
+    "run_study",
+    "schema",
+    "shipped_gears",
+    "write_extension",
+    "write_reports",
+]
 
 
 def __getattr__(name: str) -> object:

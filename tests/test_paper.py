@@ -15,8 +15,8 @@ from mlg_troubleshoot.gear.directions import chance_beyond, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import links_from
 from mlg_troubleshoot.indices.amplification import Amplification, amplification
-from mlg_troubleshoot.indices.displacement import worst_directions
 from mlg_troubleshoot.indices.index_table import IndexTable
+from mlg_troubleshoot.indices.inputs import worst_directions
 from mlg_troubleshoot.indices.tensor import tensor_indices
 
 from .geometry.vectors import locate_joint

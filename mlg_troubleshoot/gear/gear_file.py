@@ -58,16 +58,17 @@ from mlg_troubleshoot.geometry.mechanism import (
 from mlg_troubleshoot.geometry.program import write_program
 
 _DATA = Path(str(files("mlg_troubleshoot.gear"))) / "data"
-# What a gear file need not state, and what stands for it, assumed.
-_UNSTATED = {
-    "restore_min": 120.0,
-    "read_min": 12.0,
-    "horizon_landings": 20_000.0,
-    "accepted_chance": 0.05,
-    "second_repair_chance": 0.02,
-    "minutes": 30.0,
-    "retraction_min": 15.0,
+# What a gear file need not state and what is assumed for it, by the names of a gear: its table and
+# key, the number and its unit.
+_ASSUMED = {
+    "plunger_reading": ("plunger", "read_min", 12.0, "min"),
+    "rigging_check": ("rigging_check", "minutes", 30.0, "min"),
+    "retraction": ("repair", "retraction_min", 15.0, "min"),
+    "second_repair_chance": ("repair", "second_repair_chance", 0.02, "1"),
+    "horizon": ("forecast", "horizon_landings", 20_000.0, "landings"),
+    "accepted_chance": ("forecast", "accepted_chance", 0.05, "1"),
 }
+_RESTORE_MIN = 120.0
 
 # Nothing of a landing gear is longer, and no angle needs more than two turns; far beyond, formulas
 # overflow.
@@ -222,46 +223,42 @@ class EntryTable(Table):
     source: str
 
 
-class PlungerTable(Table):
+class WorkshopTable(Table):
+    """What a workshop decides, and need not state; a number that is stated has a source."""
+
+    def __post_init__(self) -> None:
+        numbers = (name for name in self.__struct_fields__ if name != "source")
+        _need_source(self, "source", *(getattr(self, name) for name in numbers))
+
+
+class PlungerTable(WorkshopTable):
     """How long it takes to read the plunger."""
 
     read_min: Minutes | None = None
     source: str | None = None
 
-    def __post_init__(self) -> None:
-        _need_source(self, "source", self.read_min)
 
-
-class RiggingCheckTable(Table):
+class RiggingCheckTable(WorkshopTable):
     """How long it takes to check rigging and lock roller."""
 
     minutes: Minutes | None = None
     source: str | None = None
 
-    def __post_init__(self) -> None:
-        _need_source(self, "source", self.minutes)
 
-
-class RepairTable(Table):
+class RepairTable(WorkshopTable):
     """Which chance of a second repair is accepted, and how long a trial retraction takes."""
 
     second_repair_chance: Annotated[float, Meta(gt=0, le=0.5)] | None = None
     retraction_min: Minutes | None = None
     source: str | None = None
 
-    def __post_init__(self) -> None:
-        _need_source(self, "source", self.second_repair_chance, self.retraction_min)
 
-
-class ForecastTable(Table):
+class ForecastTable(WorkshopTable):
     """How far forecasts look ahead, and which chance is accepted."""
 
     horizon_landings: Annotated[float, Meta(gt=0, le=1e6)] | None = None
     accepted_chance: Annotated[float, Meta(gt=0, le=0.5)] | None = None
     source: str | None = None
-
-    def __post_init__(self) -> None:
-        _need_source(self, "source", self.horizon_landings, self.accepted_chance)
 
 
 class JointTable(Table):
@@ -456,30 +453,10 @@ def _read(path: Path) -> Gear:
 
 def _of_the_workshop(found: GearFile, numbers: _Numbers) -> dict[str, Sourced]:
     """What a workshop decides, by the names of a gear; what the file does not state is assumed."""
-    plunger, rigging, repair = found.plunger, found.rigging_check, found.repair
-    forecast = found.forecast
+    read = {name: (getattr(found, table), *rest) for name, (table, *rest) in _ASSUMED.items()}
     return {
-        name: numbers.or_assumed(key, value, unit, source)
-        for name, key, value, unit, source in (
-            ("plunger_reading", "read_min", plunger.read_min, "min", plunger.source),
-            ("rigging_check", "minutes", rigging.minutes, "min", rigging.source),
-            ("retraction", "retraction_min", repair.retraction_min, "min", repair.source),
-            (
-                "second_repair_chance",
-                "second_repair_chance",
-                repair.second_repair_chance,
-                "1",
-                repair.source,
-            ),
-            (
-                "horizon",
-                "horizon_landings",
-                forecast.horizon_landings,
-                "landings",
-                forecast.source,
-            ),
-            ("accepted_chance", "accepted_chance", forecast.accepted_chance, "1", forecast.source),
-        )
+        name: numbers.or_assumed(getattr(table, key), table.source, assumed, unit)
+        for name, (table, key, assumed, unit) in read.items()
     }
 
 
@@ -509,13 +486,15 @@ class _Numbers:
         self.found.append(number)
         return number
 
-    def or_assumed(self, key: str, value: float | None, unit: str, source: str | None) -> Sourced:
+    def or_assumed(
+        self, value: float | None, source: str | None, assumed: float, unit: str
+    ) -> Sourced:
         """Add a number that a gear file need not state: it is then assumed, and says so."""
         if value is not None and source is not None:
             return self.add(value, unit, source)
-        shown = f"{_UNSTATED[key]:g}{'' if unit == '1' else f' {unit}'}"
+        shown = f"{assumed:g}{'' if unit == '1' else f' {unit}'}"
         text = f"Not stated in the gear file: {shown} is assumed by the authors of this tool."
-        return self.add(_UNSTATED[key], unit, Source(kind=SourceKind.ASSUMED, text=text))
+        return self.add(assumed, unit, Source(kind=SourceKind.ASSUMED, text=text))
 
 
 def _add_numbers(table: GeometryTable, numbers: _Numbers) -> None:
@@ -601,7 +580,7 @@ def _joint(table: JointTable, numbers: _Numbers) -> JointSpec:
         limit=numbers.add(table.limit, "in", table.limit_source),
         new_part=numbers.add(table.new_part, "in", table.new_part_source),
         access=numbers.add(table.access_min, "min", table.access_source),
-        restore=numbers.or_assumed("restore_min", table.restore_min, "min", table.restore_source),
+        restore=numbers.or_assumed(table.restore_min, table.restore_source, _RESTORE_MIN, "min"),
         area=table.area,
         critical=table.critical,
     )

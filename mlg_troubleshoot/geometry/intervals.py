@@ -17,9 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.arrays import Array
 
-Pair = tuple[Array, Array]
 # Rounds in which both boxes of a dyad narrow each other. [1]
 _ROUNDS = 2
 # A box is guessed as so many times the first-order one, the widest first, and proved or not by
@@ -29,75 +28,81 @@ _GUESSES = (4, 2, 1.4, 1.15)
 _BULGE = 0.15
 
 
-def _rounded_outward(low: Array, high: Array) -> Pair:
-    return np.nextafter(low, -np.inf), np.nextafter(high, np.inf)
-
-
-def _times(a: Pair, b: Pair) -> Pair:
-    products = (a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1])
-    low = np.minimum(np.minimum(products[0], products[1]), np.minimum(products[2], products[3]))
-    high = np.maximum(np.maximum(products[0], products[1]), np.maximum(products[2], products[3]))
-    return _rounded_outward(low, high)
-
-
-def _plus(a: Pair, b: Pair) -> Pair:
-    return _rounded_outward(a[0] + b[0], a[1] + b[1])
-
-
-def _minus(a: Pair, b: Pair) -> Pair:
-    return _rounded_outward(a[0] - b[1], a[1] - b[0])
-
-
-def _negated(a: Pair) -> Pair:
-    return -a[1], -a[0]
-
-
-def _intersection(a: Pair, b: Pair) -> Pair:
-    """Intersection; a bound that is not known gives way to one that is."""
-    return np.fmax(a[0], b[0]), np.fmin(a[1], b[1])
-
-
-def _outer(a: Pair, b: Pair) -> Pair:
-    return _times((a[0][:, None], a[1][:, None]), (b[0][None], b[1][None]))
-
-
-def _along(slopes: Pair, offsets: Pair) -> Pair:
-    """Sum of slope times offset over the variables, the last axis but one."""
-    low, high = _times(slopes, offsets)
-    # Twenty additions round by no more than this.
-    slack = 1e-14 * np.maximum(np.abs(low), np.abs(high)).sum(axis=-2)
-    return low.sum(axis=-2) - slack, high.sum(axis=-2) + slack
-
-
-@dataclass(frozen=True, slots=True)
-class Box:
-    """Ranges of all variables, for many boxes at once.
-
-    low, high, shape (n_variables, n_boxes): ranges. [in or rad]
-    """
+@dataclass(frozen=True, slots=True, eq=False)
+class Interval:
+    """Bounds of many numbers at once, such as a box of variables; operations round them outward."""
 
     low: Array
     high: Array
 
+    @classmethod
+    def exactly(cls, number: Any) -> Interval:
+        """A number, or numbers, without any width."""
+        return cls(np.asarray(number), np.asarray(number))
+
     @property
     def middle(self) -> Array:
-        """Middles, shape (n_variables, n_boxes)."""
         return np.asarray(0.5 * (self.low + self.high))
 
-    def offsets(self) -> Pair:
-        return _rounded_outward(self.low - self.middle, self.high - self.middle)
+    @property
+    def width(self) -> Array:
+        return self.high - self.low
 
-    def variables(self) -> list[Range]:
-        count, boxes = self.low.shape
-        offsets, middle = self.offsets(), self.middle
-        flat = np.zeros((count, count, boxes))
-        found = []
-        for i in range(count):
-            slope = np.zeros((count, boxes))
-            slope[i] = 1.0
-            at, own = (middle[i], middle[i]), (slope, slope)
-            found.append(Range((self.low[i], self.high[i]), own, (flat, flat), at, own, offsets))
-        return found
+    @property
+    def magnitude(self) -> Array:
+        return np.maximum(np.abs(self.low), np.abs(self.high))
+
+    def __getitem__(self, places: Any) -> Interval:
+        return Interval(self.low[places], self.high[places])
+
+    def rounded(self) -> Interval:
+        return Interval(np.nextafter(self.low, -np.inf), np.nextafter(self.high, np.inf))
+
+    def __neg__(self) -> Interval:
+        return Interval(-self.high, -self.low)
+
+    def __add__(self, other: Interval) -> Interval:
+        return Interval(self.low + other.low, self.high + other.high).rounded()
+
+    def __sub__(self, other: Interval) -> Interval:
+        return self + -other
+
+    def __mul__(self, other: Interval) -> Interval:
+        ends = [a * b for a in (self.low, self.high) for b in (other.low, other.high)]
+        low = np.minimum(np.minimum(ends[0], ends[1]), np.minimum(ends[2], ends[3]))
+        high = np.maximum(np.maximum(ends[0], ends[1]), np.maximum(ends[2], ends[3]))
+        return Interval(low, high).rounded()
+
+    def __and__(self, other: Interval) -> Interval:
+        """Intersection; a bound that is not known gives way to one that is."""
+        return Interval(np.fmax(self.low, other.low), np.fmin(self.high, other.high))
+
+    def inverse(self) -> Interval:
+        """NaN where it may be zero."""
+        unknown = ~((self.low > 0.0) | (self.high < 0.0))
+        ends = (np.where(unknown, np.nan, 1.0 / end) for end in (self.high, self.low))
+        return Interval(*ends).rounded()
+
+    def along(self, offsets: Interval) -> Interval:
+        """Sum of slope times offset over the variables, the last axis but one."""
+        parts = self * offsets
+        # Twenty additions round by no more than this.
+        slack = 1e-14 * parts.magnitude.sum(axis=-2)
+        return Interval(parts.low.sum(axis=-2) - slack, parts.high.sum(axis=-2) + slack)
+
+
+def variables(box: Interval) -> list[Range]:
+    """The variables of a box, shape (n_variables, n_boxes): each its own gradient. [in or rad]"""
+    count, boxes = box.low.shape
+    middle = box.middle
+    offsets = Interval(box.low - middle, box.high - middle).rounded()
+    flat = Interval.exactly(np.zeros((count, count, boxes)))
+    found = []
+    for i in range(count):
+        own = Interval.exactly(np.zeros((count, boxes)))
+        own.low[i] = 1.0
+        found.append(Range(box[i], own, flat, Interval.exactly(middle[i]), own, offsets))
+    return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,92 +118,78 @@ class Range:
     [in]
     """
 
-    value: Pair
-    slope: Pair
-    bend: Pair
-    at_middle: Pair
-    slope_at_middle: Pair
-    offsets: Pair
+    value: Interval
+    slope: Interval
+    bend: Interval
+    at_middle: Interval
+    slope_at_middle: Interval
+    offsets: Interval
 
-    def _each(self, function: Callable[..., Pair], *others: Range) -> Range:
+    def _each(self, function: Callable[..., Interval], *others: Range) -> Range:
         parts = (self, *others)
         return replace(
             self, **{name: function(*(getattr(part, name) for part in parts)) for name in _ENCLOSED}
         )
 
     def _narrowed(self) -> Range:
-        slope = _intersection(
-            self.slope, _plus(self.slope_at_middle, _along(self.bend, self.offsets))
-        )
-        value = _intersection(self.value, _plus(self.at_middle, _along(slope, self.offsets)))
+        slope = self.slope & self.slope_at_middle + self.bend.along(self.offsets)
+        value = self.value & self.at_middle + slope.along(self.offsets)
         return replace(self, slope=slope, value=value)
 
-    def _plus(self, other: Any) -> Range:
+    def __add__(self, other: Any) -> Range:
         if isinstance(other, Range):
-            return self._each(_plus, other)._narrowed()
-        number = (other, other)
-        return replace(
-            self, value=_plus(self.value, number), at_middle=_plus(self.at_middle, number)
-        )
+            return self._each(Interval.__add__, other)._narrowed()
+        number = Interval.exactly(other)
+        return replace(self, value=self.value + number, at_middle=self.at_middle + number)
 
-    __add__ = __radd__ = _plus
+    __radd__ = __add__
 
     def __neg__(self) -> Range:
-        return self._each(_negated)
+        return self._each(Interval.__neg__)
 
     def __sub__(self, other: Any) -> Range:
-        return self._plus(-other)
+        return self.__add__(-other)
 
     def __rsub__(self, other: Any) -> Range:
-        return (-self)._plus(other)
+        return (-self).__add__(other)
 
     def __mul__(self, other: Any) -> Range:
-        twice = other is self
-        if twice:
+        is_square = other is self
+        if is_square:
             return self._through(_squared)
-        if isinstance(other, Range):
-            crossed = _outer(self.slope, other.slope)
-            turned = crossed[0].swapaxes(0, 1), crossed[1].swapaxes(0, 1)
-            bend = _plus(
-                _plus(_times(self.bend, other.value), _times(other.bend, self.value)),
-                _plus(crossed, turned),
-            )
-            return Range(
-                _times(self.value, other.value),
-                _plus(_times(self.slope, other.value), _times(other.slope, self.value)),
-                bend,
-                _times(self.at_middle, other.at_middle),
-                _plus(
-                    _times(self.slope_at_middle, other.at_middle),
-                    _times(other.slope_at_middle, self.at_middle),
-                ),
-                self.offsets,
-            )._narrowed()
-        number = (np.asarray(other), np.asarray(other))
-        return self._each(lambda bounds: _times(bounds, number))
+        if not isinstance(other, Range):
+            number = Interval.exactly(other)
+            return self._each(lambda bounds: bounds * number)
+        crossed = self.slope[:, None] * other.slope[None]
+        turned = Interval(crossed.low.swapaxes(0, 1), crossed.high.swapaxes(0, 1))
+        return Range(
+            self.value * other.value,
+            self.slope * other.value + other.slope * self.value,
+            self.bend * other.value + other.bend * self.value + (crossed + turned),
+            self.at_middle * other.at_middle,
+            self.slope_at_middle * other.at_middle + other.slope_at_middle * self.at_middle,
+            self.offsets,
+        )._narrowed()
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> Range:
-        if isinstance(other, Range):
-            return self.__mul__(other.__rtruediv__(1.0))
         return self.__mul__(1.0 / other)
 
     def __rtruediv__(self, other: Any) -> Range:
         result = self._through(_inverse)
         return result if other == 1.0 else result.__mul__(other)
 
-    def _through(self, function: Callable[[Pair], tuple[Pair, Pair, Pair]]) -> Range:
+    def _through(self, function: Callable[[Interval], tuple[Interval, ...]]) -> Range:
         """Apply a function that gives enclosures of itself and its two derivatives over a range."""
         value, rate, curvature = function(self.value)
         middle, middle_rate, _ = function(self.at_middle)
-        bend = _plus(_times(self.bend, rate), _times(_outer(self.slope, self.slope), curvature))
         return Range(
             value,
-            _times(self.slope, rate),
-            bend,
+            self.slope * rate,
+            self.bend * rate + self.slope[:, None] * self.slope[None] * curvature,
             middle,
-            _times(self.slope_at_middle, middle_rate),
+            self.slope_at_middle * middle_rate,
             self.offsets,
         )._narrowed()
 
@@ -210,11 +201,14 @@ class Range:
         return self._through(_cos)
 
     def sin(self) -> Range:
-        return self._through(_sin)
+        return self._through(lambda x: _cos(_quarter_before(x)))
 
 
 _ENCLOSED = ("value", "slope", "bend", "at_middle", "slope_at_middle")
 Joint = tuple[Any, Any]
+# The two coordinates of a vector or of a point.
+Bounds = Sequence[Interval]
+Place = Sequence[Range]
 
 
 def narrowed_by_links(joint: Joint, start: Joint, end: Joint, square: Any, area: Any) -> Joint:
@@ -223,173 +217,136 @@ def narrowed_by_links(joint: Joint, start: Joint, end: Joint, square: Any, area:
     The derivatives of the explicit formulas are enclosed far too widely where terms cancel; those
     of the two equations of length, |C − A|² = square and |C − B|² constant, are not.
     """
-    ranges = [part for part in joint if isinstance(part, Range)]
-    if len(ranges) < 2:
+    if not all(isinstance(part, Range) for part in joint):
         return joint
-    like = ranges[0]
-    c = tuple(ranges)
-    a, b = tuple(_as_range(p, like) for p in start), tuple(_as_range(p, like) for p in end)
-    grown = _as_range(square, like) * 0.5
-    cross = _as_range(area, like).value
+    c: Place = joint
+    a, b = ([_as_range(p, c[0]) for p in place] for place in (start, end))
+    grown = _as_range(square, c[0]) * 0.5
+    cross = _as_range(area, c[0]).value
     c = _first_guess(c, a, b, grown, cross)
     for _ in range(_ROUNDS):
-        u, v = (c[0] - a[0], c[1] - a[1]), (c[0] - b[0], c[1] - b[1])
-        inverse = _inverse_or_nothing(_intersection(cross, (u[0] * v[1] - u[1] * v[0]).value))
+        links = [[p - q for p, q in zip(c, far, strict=True)] for far in (a, b)]
+        (ux, uy), (vx, vy) = links
+        u, v = ([p.value for p in link] for link in links)
+        inverse = (cross & (ux * vy - uy * vx).value).inverse()
         slopes = _implicit_slopes(u, v, inverse, a, b, grown)
-        c = tuple(
-            replace(p, slope=_intersection(p.slope, slope))
-            for p, slope in zip(c, slopes, strict=True)
-        )
-        turned = [[_minus(p.slope, q.slope) for p, q in zip(c, far, strict=True)] for far in (a, b)]
-        bent = [_plus(_outer(x, x), _outer(y, y)) for x, y in turned]
-        first = _minus(_plus(_dot(u, (a[0].bend, a[1].bend)), grown.bend), bent[0])
-        second = _minus(_dot(v, (b[0].bend, b[1].bend)), bent[1])
+        c = [replace(p, slope=p.slope & slope) for p, slope in zip(c, slopes, strict=True)]
+        turned = [[p.slope - q.slope for p, q in zip(c, far, strict=True)] for far in (a, b)]
+        bent = [x[:, None] * x[None] + y[:, None] * y[None] for x, y in turned]
+        first = _dot(u, [p.bend for p in a]) + grown.bend - bent[0]
+        second = _dot(v, [p.bend for p in b]) - bent[1]
         bends = _solved(u, v, inverse, first, second)
-        c = tuple(
-            replace(p, bend=_intersection(p.bend, bend))._narrowed()
-            for p, bend in zip(c, bends, strict=True)
-        )
+        c = [replace(p, bend=p.bend & bend)._narrowed() for p, bend in zip(c, bends, strict=True)]
     return c[0], c[1]
 
 
-def _first_guess(
-    c: tuple[Range, ...], a: tuple[Range, ...], b: tuple[Range, ...], grown: Range, cross: Pair
-) -> tuple[Range, ...]:
+def _first_guess(c: Place, a: Place, b: Place, grown: Range, cross: Interval) -> Place:
     """Enclose the joint from its middle alone, where its formulas give next to nothing.
 
     A box around the middle is guessed. If the gradients over it carry the joint nowhere out of it,
     the joint cannot leave it: it moves continuously, and the links stay apart from being in line.
     """
-    swing = [np.maximum(*(np.abs(end) for end in _along(p.slope_at_middle, p.offsets))) for p in c]
+    swing = [p.slope_at_middle.along(p.offsets).magnitude for p in c]
     # A joint on a circle also moves across its tangent.
     widest = _BULGE * np.maximum(*swing)
     for factor in _GUESSES:
-        guess = [
-            (
-                p.at_middle[0] - factor * (w + widest) - 1e-12,
-                p.at_middle[1] + factor * (w + widest) + 1e-12,
-            )
-            for p, w in zip(c, swing, strict=True)
-        ]
-        u = [_minus(g, p.value) for g, p in zip(guess, a, strict=True)]
-        v = [_minus(g, p.value) for g, p in zip(guess, b, strict=True)]
-        across = _intersection(cross, _minus(_times(u[0], v[1]), _times(u[1], v[0])))
-        slopes = _implicit_slopes(u, v, _inverse_or_nothing(across), a, b, grown)
-        inside = np.ones(len(guess[0][0]), dtype=bool)
+        guess = []
+        for p, w in zip(c, swing, strict=True):
+            room = factor * (w + widest)
+            guess.append(Interval(p.at_middle.low - room - 1e-12, p.at_middle.high + room + 1e-12))
+        u, v = ([g - p.value for g, p in zip(guess, far, strict=True)] for far in (a, b))
+        across = cross & u[0] * v[1] - u[1] * v[0]
+        slopes = _implicit_slopes(u, v, across.inverse(), a, b, grown)
+        inside = np.ones(len(widest), dtype=bool)
         for part, slope, bound in zip(c, slopes, guess, strict=True):
-            reached = _plus(part.at_middle, _along(slope, part.offsets))
-            inside &= (reached[0] > bound[0]) & (reached[1] < bound[1])
-        found = (
-            (_where(inside, bound), _where(inside, slope))
-            for bound, slope in zip(guess, slopes, strict=True)
-        )
-        c = tuple(
+            reached = part.at_middle + slope.along(part.offsets)
+            inside &= (reached.low > bound.low) & (reached.high < bound.high)
+        # Adding it takes away what is not proved.
+        known = np.where(inside, 0.0, np.nan)
+        c = [
             replace(
-                part, value=_intersection(part.value, value), slope=_intersection(part.slope, slope)
+                part,
+                value=part.value & Interval(bound.low + known, bound.high + known),
+                slope=part.slope & Interval(slope.low + known, slope.high + known),
             )._narrowed()
-            for part, (value, slope) in zip(c, found, strict=True)
-        )
+            for part, bound, slope in zip(c, guess, slopes, strict=True)
+        ]
     return c
 
 
-def _where(known: Mask, bounds: Pair) -> Pair:
-    return np.where(known, bounds[0], np.nan), np.where(known, bounds[1], np.nan)
-
-
-def _inverse_or_nothing(x: Pair) -> Pair:
-    unknown = ~((x[0] > 0.0) | (x[1] < 0.0))
-    return _rounded_outward(
-        np.where(unknown, np.nan, 1.0 / x[1]), np.where(unknown, np.nan, 1.0 / x[0])
-    )
-
-
 def _implicit_slopes(
-    u: Sequence[Any],
-    v: Sequence[Any],
-    inverse: Pair,
-    a: tuple[Range, ...],
-    b: tuple[Range, ...],
-    grown: Range,
-) -> tuple[Pair, Pair]:
-    """Gradients of the joint from the equations of length; u and v are the links as bounds or
-    ranges.
-    """
-    first = _plus(_dot(u, (a[0].slope, a[1].slope)), grown.slope)
-    return _solved(u, v, inverse, first, _dot(v, (b[0].slope, b[1].slope)))
-
-
-def _bounds(part: Any) -> Pair:
-    return part.value if isinstance(part, Range) else part
+    u: Bounds, v: Bounds, inverse: Interval, a: Place, b: Place, grown: Range
+) -> Bounds:
+    """Gradients of the joint from the equations of length; u and v are the links."""
+    first = _dot(u, [p.slope for p in a]) + grown.slope
+    return _solved(u, v, inverse, first, _dot(v, [p.slope for p in b]))
 
 
 def _as_range(part: Any, like: Range) -> Range:
     if isinstance(part, Range):
         return part
-    flat, level = np.zeros_like(like.slope[0]), np.full_like(like.value[0], float(part))
-    bend = np.zeros_like(like.bend[0])
-    return Range(
-        (level, level), (flat, flat), (bend, bend), (level, level), (flat, flat), like.offsets
-    )
+    level = Interval.exactly(np.full_like(like.value.low, float(part)))
+    flat, bend = (Interval.exactly(np.zeros_like(x.low)) for x in (like.slope, like.bend))
+    return Range(level, flat, bend, level, flat, like.offsets)
 
 
-def _dot(u: Sequence[Any], slopes: tuple[Pair, Pair]) -> Pair:
-    return _plus(_times(_bounds(u[0]), slopes[0]), _times(_bounds(u[1]), slopes[1]))
+def _dot(u: Bounds, v: Bounds) -> Interval:
+    return u[0] * v[0] + u[1] * v[1]
 
 
-def _solved(
-    u: Sequence[Any], v: Sequence[Any], inverse: Pair, first: Pair, second: Pair
-) -> tuple[Pair, Pair]:
+def _solved(u: Bounds, v: Bounds, inverse: Interval, first: Interval, second: Interval) -> Bounds:
     """Solve u · x = first, v · x = second."""
-    x = _minus(_times(first, _bounds(v[1])), _times(second, _bounds(u[1])))
-    y = _minus(_times(second, _bounds(u[0])), _times(first, _bounds(v[0])))
-    return _times(x, inverse), _times(y, inverse)
+    x = (first * v[1] - second * u[1]) * inverse
+    return x, (second * u[0] - first * v[0]) * inverse
 
 
-def _squared(x: Pair) -> tuple[Pair, Pair, Pair]:
-    low, high = x
-    ends = low * low, high * high
-    least = np.where((low <= 0.0) & (high >= 0.0), 0.0, np.minimum(*ends))
-    bottom, top = _rounded_outward(least, np.maximum(*ends))
-    two = np.full_like(low, 2.0)
-    return (np.maximum(bottom, 0.0), top), (2.0 * low, 2.0 * high), (two, two)
+def _squared(x: Interval) -> tuple[Interval, ...]:
+    ends = x.low * x.low, x.high * x.high
+    least = np.where((x.low <= 0.0) & (x.high >= 0.0), 0.0, np.minimum(*ends))
+    square = Interval(least, np.maximum(*ends)).rounded()
+    two = np.full_like(x.low, 2.0)
+    return _not_negative(square), _doubled(x), Interval(two, two)
 
 
-def _inverse(x: Pair) -> tuple[Pair, Pair, Pair]:
-    inverse = _inverse_or_nothing(x)
-    square = _times(inverse, inverse)
-    square = np.maximum(square[0], 0.0), square[1]
-    cube = _times(square, inverse)
-    return inverse, _negated(square), (2.0 * cube[0], 2.0 * cube[1])
+def _doubled(x: Interval) -> Interval:
+    return Interval(2.0 * x.low, 2.0 * x.high)
 
 
-def _root(x: Pair) -> tuple[Pair, Pair, Pair]:
-    low, high = x
-    closes = low > 0.0
-    root = _rounded_outward(
-        np.sqrt(np.where(closes, low, np.nan)), np.sqrt(np.where(closes, high, np.nan))
-    )
-    rate = _rounded_outward(0.5 / root[1], 0.5 / root[0])
-    curvature = _times(_times(rate, rate), (1.0 / root[1], 1.0 / root[0]))
-    return root, rate, _negated(_rounded_outward(*curvature))
+def _not_negative(x: Interval) -> Interval:
+    return Interval(np.maximum(x.low, 0.0), x.high)
 
 
-def _cos(x: Pair) -> tuple[Pair, Pair, Pair]:
-    cosine, sine = cosine_range(*x), cosine_range(x[0] - np.pi / 2, x[1] - np.pi / 2)
-    return cosine, _negated(sine), _negated(cosine)
+def _inverse(x: Interval) -> tuple[Interval, ...]:
+    inverse = x.inverse()
+    square = _not_negative(inverse * inverse)
+    return inverse, -square, _doubled(square * inverse)
 
 
-def _sin(x: Pair) -> tuple[Pair, Pair, Pair]:
-    return _cos((x[0] - np.pi / 2, x[1] - np.pi / 2))
+def _root(x: Interval) -> tuple[Interval, ...]:
+    ends = (np.sqrt(np.where(x.low > 0.0, end, np.nan)) for end in (x.low, x.high))
+    root = Interval(*ends).rounded()
+    rate = Interval(0.5 / root.high, 0.5 / root.low).rounded()
+    curvature = rate * rate * Interval(1.0 / root.high, 1.0 / root.low)
+    return root, rate, -curvature.rounded()
 
 
-def cosine_range(low: Array, high: Array) -> Pair:
+def _quarter_before(x: Interval) -> Interval:
+    return Interval(x.low - np.pi / 2, x.high - np.pi / 2)
+
+
+def _cos(x: Interval) -> tuple[Interval, ...]:
+    cosine = cosine_range(x)
+    return cosine, -cosine_range(_quarter_before(x)), -cosine
+
+
+def cosine_range(angle: Interval) -> Interval:
     """Range of the cosine over ranges of angles. [rad, 1]"""
     # The margins cover the rounding of shifted angles and of the library's cosine.
-    slack = 1e-15 + 4.0 * np.spacing(np.maximum(np.abs(low), np.abs(high)))
-    low, high = low - slack, high + slack
+    slack = 1e-15 + 4.0 * np.spacing(angle.magnitude)
+    low, high = angle.low - slack, angle.high + slack
     ends = np.cos(low), np.cos(high)
     top = np.floor(high / (2 * np.pi)) > np.floor(low / (2 * np.pi))
     bottom = np.floor((high - np.pi) / (2 * np.pi)) > np.floor((low - np.pi) / (2 * np.pi))
     least = np.where(bottom, -1.0, np.minimum(*ends) - 1e-15)
     most = np.where(top, 1.0, np.maximum(*ends) + 1e-15)
-    return np.maximum(least, -1.0), np.minimum(most, 1.0)
+    return Interval(np.maximum(least, -1.0), np.minimum(most, 1.0))

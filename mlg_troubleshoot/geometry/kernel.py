@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -50,7 +50,11 @@ class Kernel:
         self.parameters = frozen(list(program.parameters.values()))
         self._output = _function(program, (program.output,))
         self._loop: Callable[..., None] | None = None
-        self._joints: Callable[..., tuple[Any, ...]] | None = None
+
+    @cached_property
+    def _places(self) -> Callable[..., tuple[Any, ...]]:
+        coordinates = tuple(name for pair in self._program.joints.values() for name in pair)
+        return _function(self._program, coordinates)
 
     def parameter_index(self, name: str) -> int:
         try:
@@ -91,16 +95,12 @@ class Kernel:
         """x and y of every point in its own plane, of one with a virtual link at its downstream
         link. [in]
         """
-        names = self._program.joints
-        wanted = tuple(dict.fromkeys(n for pair in names.values() for n in pair))
-        if self._joints is None:
-            self._joints = _function(self._program, wanted)
         with np.errstate(invalid="ignore", divide="ignore"):
             numbers = self.parameters.tolist() if parameters is None else parameters
-            values = dict(zip(wanted, self._joints(position, links, numbers), strict=True))
-        return {
-            joint: (np.asarray(values[x]), np.asarray(values[y])) for joint, (x, y) in names.items()
-        }
+            values = map(np.asarray, self._places(position, links, numbers))
+        # x and y of each point follow each other.
+        named = zip(self._program.joints, values, values, strict=True)
+        return {joint: (x, y) for joint, x, y in named}
 
     def no_clearance(self) -> list[float]:
         return [0.0] * (2 * len(self.mechanism.virtual_links))

@@ -2,7 +2,6 @@
 
 __all__ = [
     "amplification",
-    "displacement",
     "estimators",
     "given_data",
     "index_table",

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.random import Generator
 
 from mlg_troubleshoot.arrays import Array, Wholes
-from mlg_troubleshoot.indices.displacement import Response
-from mlg_troubleshoot.indices.estimators import Indices, failed_note, without_numbers
+from mlg_troubleshoot.indices.estimators import Indices, without_numbers
+from mlg_troubleshoot.indices.inputs import Response
 
 # Points held out inside the range and at its corners to judge an expansion by. [1]
 _HELD_OUT, _CORNERS = 48, 16
@@ -90,12 +90,7 @@ def chaos_indices(
             f"polynomial chaos, {len(values)} points for the fit and {len(checks)} for its check"
         )
         if failed:
-            return (
-                without_numbers(
-                    design, seed, n, used, failed, failed_note(failed, used), (np.nan, np.nan)
-                ),
-                None,
-            )
+            return without_numbers(design, seed, n, used, failed=failed), None
         before = np.inf if best is None else best.residual
         best = _best_fit(points, values, checks, check_values, best)
         if best is not None:
@@ -106,10 +101,8 @@ def chaos_indices(
         if not gains or used + len(values) > most:
             residual = "undefined" if best is None else f"{best.residual:.2g} of the variance"
             note = f"not smooth: a polynomial leaves {residual} unexplained"
-            return (
-                without_numbers(design, seed, n, used, 0, note, (float(values.mean()), np.nan)),
-                None,
-            )
+            mean = float(values.mean())
+            return without_numbers(design, seed, n, used, note, mean=mean), None
         more = _latin(rng, len(values), n)
         points, values = np.concatenate([points, more]), np.concatenate([values, response(more)])
 
@@ -187,23 +180,9 @@ def legendre_terms(unit: Array, exponents: Wholes) -> Array:
     [1]
     """
     degree = int(exponents.max(initial=0))
-    values = np.moveaxis(np.polynomial.legendre.legvander(2.0 * unit.T - 1.0, degree), -1, 0)
-    flat = (values * np.sqrt(2.0 * np.arange(degree + 1) + 1.0)[:, None, None]).reshape(
-        -1, len(unit)
-    )
-    places = _factors(exponents.tobytes(), exponents.shape)
-    matrix = flat[places[0]]
-    for factor in places[1:]:
-        matrix *= flat[factor]
-    return np.ascontiguousarray(matrix.T)
-
-
-@lru_cache(maxsize=64)
-def _factors(raw: bytes, shape: tuple[int, int]) -> list[Wholes]:
-    """Rows of the table of one-variable polynomials that each term multiplies; absent ones are
-    constant.
-    """
-    exponents = np.frombuffer(raw, dtype=np.int64).reshape(shape)
-    most = max(1, int((exponents > 0).sum(axis=1).max(initial=0)))
-    present = np.argsort(exponents == 0, axis=1, kind="stable")[:, :most]
-    return list((np.take_along_axis(exponents, present, axis=1) * shape[1] + present).T)
+    values = np.polynomial.legendre.legvander(2.0 * unit.T - 1.0, degree)
+    values *= np.sqrt(2.0 * np.arange(degree + 1) + 1.0)
+    matrix = np.ones((len(unit), len(exponents)))
+    for own, powers in zip(values, exponents.T, strict=True):
+        matrix *= own[:, powers]
+    return matrix

@@ -106,26 +106,16 @@ def without_numbers(
     seed: int,
     n: int,
     evaluations: int,
-    failed: int,
-    note: str,
-    moments: tuple[float, float],
+    note: str = "",
+    *,
+    failed: int = 0,
+    mean: float = np.nan,
+    variance: float = np.nan,
 ) -> Indices:
     """Return indices that are not defined, because samples failed or nothing varies."""
-    none, pairs = np.full(n, np.nan), np.full((n, 2), np.nan)
-    return Indices(
-        design,
-        seed,
-        none,
-        pairs,
-        none,
-        pairs,
-        moments[0],
-        moments[1],
-        evaluations,
-        failed,
-        note,
-        None,
-    )
+    none = np.full(n, np.nan), np.full(n, np.nan)
+    note = failed_note(failed, evaluations) if failed else note
+    return Indices.around(design, seed, none, none, mean, variance, evaluations, failed, note)
 
 
 def failed_note(failed: int, evaluations: int) -> str:

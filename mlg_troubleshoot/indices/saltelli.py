@@ -16,8 +16,8 @@ from numpy.random import Generator
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.indices.chaos import ChaosFit, chaos_indices
-from mlg_troubleshoot.indices.displacement import Response
-from mlg_troubleshoot.indices.estimators import Indices, failed_note, student_half, without_numbers
+from mlg_troubleshoot.indices.estimators import Indices, student_half, without_numbers
+from mlg_troubleshoot.indices.inputs import Response
 
 # Independent scrambles of the Sobol points: their spread gives the interval. [1]
 SCRAMBLES = 8
@@ -59,9 +59,7 @@ def saltelli_indices(  # noqa: PLR0913 - what is asked, where it stops, what a f
         failed = sum(total.failed for total in sums)
         design = f"Saltelli and Jansen on {SCRAMBLES} scrambles of 2^{power} Sobol points"
         if failed:
-            return without_numbers(
-                design, seed, len(sets), used, failed, failed_note(failed, used), (np.nan, np.nan)
-            )
+            return without_numbers(design, seed, len(sets), used, failed=failed)
         found = _pooled(sums, design, seed, used, note)
         if progress is not None:
             progress(used, found.half_width)
@@ -124,15 +122,9 @@ def _pooled(sums: list[_Sums], design: str, seed: int, used: int, note: str) -> 
     moments = np.array([each.moments() for each in sums])
     variance = moments[:, 1]
     if np.any(variance <= 0.0):
-        return without_numbers(
-            design,
-            seed,
-            len(sums[0].partial),
-            used,
-            0,
-            "the response does not vary",
-            (moments[0, 0], 0.0),
-        )
+        note = "the response does not vary"
+        n, mean = len(sums[0].partial), moments[0, 0]
+        return without_numbers(design, seed, n, used, note, mean=mean, variance=0.0)
     first = np.array(
         [each.partial / each.count / v for each, v in zip(sums, variance, strict=True)]
     )

@@ -12,7 +12,7 @@ import numpy as np
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.indices.displacement import Response
+from mlg_troubleshoot.indices.inputs import Response
 
 # Points of a tensor at most, and those evaluated at once. [1]
 _MOST_POINTS, _ROWS = 2_000_000, 1 << 16

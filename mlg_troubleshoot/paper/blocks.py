@@ -24,10 +24,9 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.errors import OutputError, UsageError
 from mlg_troubleshoot.geometry.kernel import numba_is_installed
-from mlg_troubleshoot.indices.displacement import HeldDirections
 from mlg_troubleshoot.indices.estimators import failed_note
-from mlg_troubleshoot.indices.inputs import Inputs
-from mlg_troubleshoot.paper.designs import middle_of_level, replicated_levels
+from mlg_troubleshoot.indices.inputs import HeldDirections, Inputs
+from mlg_troubleshoot.paper.replicated import middle_of_level, replicated_levels
 
 # Levels of one block: the work that is lost at an interruption. [1]
 LEVELS_PER_BLOCK = 50

@@ -1,5 +1,10 @@
 """First-order indices as the paper estimates them: replicated designs, averages of ten iterations.
 
+A modified Latin hypercube (section 2.2) has n1 replicates of n2 levels. Sorted by the level of one
+joint, the n1 samples of a level share that joint's clearance while the others vary (Fig. 5a);
+exchanging one joint's clearance among them lets that joint vary while the others are fixed (Fig.
+5b).
+
 A group mean over n1 samples still carries 1/n1 of the variance within the group, so that the
 variance of the group means is too large: the plain index exceeds the true one by (1 − S)/n1 on
 average. Both columns are given. The total-order study of Fig. 5b is in
@@ -10,13 +15,95 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
+from numpy.random import Generator
 
 from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.indices.displacement import Response
-from mlg_troubleshoot.paper.designs import central_composite, first_order_design
+from mlg_troubleshoot.indices.inputs import Response
+
+# Resolution V fractions of the two-level factorial: the columns whose product each further column
+# is. No word of their defining relations is shorter than five letters.
+_FRACTIONS: dict[int, tuple[int, tuple[tuple[int, ...], ...]]] = {
+    8: (6, ((0, 1, 2, 3), (0, 1, 4, 5))),
+    9: (7, ((0, 2, 3, 5, 6), (1, 2, 4, 5, 6))),
+    10: (7, ((0, 1, 2, 6), (1, 2, 3, 4), (0, 2, 3, 5))),
+}
+_FULL = 7
+
+
+@dataclass(frozen=True, slots=True)
+class Replicated:
+    """Levels and points of a replicated design.
+
+    points, shape (n1, n_rows, n): points of the unit cube, replicate by replicate. [1] places,
+    shape (n1, n_rows, n): group of each row for each variable: rows of one group share the
+    variable's value
+      (Fig. 5a). [1]
+    """
+
+    points: Array
+    places: Wholes
+
+
+def central_composite(n: int) -> Array:
+    """Corners and axial points of the range.
+
+    The paper has 138 points in ten joints and does not say how they are made up. 128 corners are
+    the resolution V fraction 2^(10−3) of the two-level factorial; the ten points that remain are
+    taken as one axial point per joint, all others in mid-range: the first joint at its limit, the
+    second at zero, and so on. (With all ten at their limits a joint in mid-range would go with high
+    values of the others, which adds 0.004 to every first-order index.)
+
+    Returns, shape (n_corners + n, n): points of the unit cube. [1]
+    Raises `UsageError` if there is no such design.
+    """
+    if not 2 <= n <= max(_FRACTIONS):
+        raise UsageError(
+            f"a central composite design in {n} variables", f"It has 2 to {max(_FRACTIONS)}."
+        )
+    base, words = (n, ()) if n <= _FULL else _FRACTIONS[n]
+    signs = np.array(list(product((-1, 1), repeat=base)))
+    columns = [signs, *(np.prod(signs[:, list(word)], axis=1)[:, None] for word in words)]
+    corners = (np.concatenate(columns, axis=1) + 1) / 2.0
+    return np.concatenate([corners, np.where(np.eye(n, dtype=bool), np.arange(1, n + 1) % 2, 0.5)])
+
+
+def replicated_levels(n: int, n1: int, n2: int, rng: Generator) -> Wholes:
+    """Levels of a modified Latin hypercube: every level once in every replicate.
+
+    Returns, shape (n1, n2, n): levels from 0. [1]
+    """
+    levels = np.tile(np.arange(n2, dtype=np.int64), (n1, n, 1))
+    return np.ascontiguousarray(rng.permuted(levels, axis=2).transpose(0, 2, 1))
+
+
+def middle_of_level(levels: Wholes, n2: int) -> Array:
+    """Point of the unit interval in the middle of a level. [1]"""
+    return np.asarray((levels + 0.5) / n2)
+
+
+def first_order_design(n: int, n1: int, n2: int, ccd: Array | None, rng: Generator) -> Replicated:
+    """Samples for the first-order index (Fig. 5a): Latin hypercube levels, composite points, or
+    both.
+
+    Every replicate holds all composite points. Points that share a joint's clearance are put in its
+    groups in an order of their own in every replicate, so that the others vary within a group.
+
+    ccd, shape (n_ccd, n): composite points added to every replicate. [1]
+    """
+    levels = replicated_levels(n, n1, n2, rng)
+    points, places = middle_of_level(levels, max(n2, 1)), levels
+    if ccd is not None:
+        tie = rng.random((n1, len(ccd), n))
+        order = np.lexsort((tie, np.broadcast_to(ccd, tie.shape)), axis=1)
+        groups = np.empty_like(order)
+        np.put_along_axis(groups, order, np.arange(len(ccd))[None, :, None], axis=1)
+        points = np.concatenate([points, np.broadcast_to(ccd, (n1, *ccd.shape))], axis=1)
+        places = np.concatenate([places, groups + n2], axis=1)
+    return Replicated(points, places)
 
 
 @dataclass(frozen=True, slots=True)

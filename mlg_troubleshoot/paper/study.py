@@ -17,12 +17,6 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.indices.amplification import Amplification, amplification
-from mlg_troubleshoot.indices.displacement import (
-    HeldDirections,
-    Response,
-    worst_directions,
-    worst_sense,
-)
 from mlg_troubleshoot.indices.estimators import GroupIndices, Indices, group_indices, student_half
 from mlg_troubleshoot.indices.index_table import (
     IndexTable,
@@ -32,10 +26,14 @@ from mlg_troubleshoot.indices.index_table import (
     ranks,
 )
 from mlg_troubleshoot.indices.inputs import (
+    HeldDirections,
     Inputs,
+    Response,
     beyond_margin,
     joint_groups,
     with_random_directions,
+    worst_directions,
+    worst_sense,
 )
 from mlg_troubleshoot.indices.saltelli import fast_indices, saltelli_indices
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
@@ -352,7 +350,7 @@ def _sized(paper: PaperDesign, n: int, options: StudyOptions) -> PaperDesign:
     """Return a paper design in the size asked for, with the composite points of this number of
     variables.
     """
-    from mlg_troubleshoot.paper.designs import central_composite
+    from mlg_troubleshoot.paper.replicated import central_composite
 
     return replace(
         paper,

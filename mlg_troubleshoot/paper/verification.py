@@ -14,7 +14,7 @@ from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.indices.amplification import STROKES, Amplification, amplification
-from mlg_troubleshoot.indices.displacement import HeldDirections, worst_directions
+from mlg_troubleshoot.indices.inputs import HeldDirections, worst_directions
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
 from mlg_troubleshoot.paper.targets import Computed, Target, load_targets, targets_file
 

@@ -18,7 +18,7 @@ from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile
 from openpyxl import Workbook, load_workbook
 from openpyxl.cell import Cell, MergedCell
 from openpyxl.comments import Comment
-from openpyxl.styles import Alignment, Font, PatternFill
+from openpyxl.styles import Alignment, PatternFill
 from openpyxl.worksheet._reader import FORMULA_TAG, VALUE_TAG
 from openpyxl.worksheet.pagebreak import Break
 from openpyxl.worksheet.worksheet import Worksheet
@@ -30,8 +30,8 @@ from mlg_troubleshoot.errors import OutputError, Problem, UsageError
 from mlg_troubleshoot.outputs import OutputKind, write_bytes
 from mlg_troubleshoot.records.cells import column_letters, writable
 from mlg_troubleshoot.records.model import ReadResult, SheetLayout
-from mlg_troubleshoot.records.refusals import FileRefusedError
-from mlg_troubleshoot.records.template import FONT, HEADER_FILL
+from mlg_troubleshoot.records.source import FileRefusedError
+from mlg_troubleshoot.records.template import BOLD, HEADER_FILL
 from mlg_troubleshoot.records.xlsx import XlsxFile, XlsxSheet
 from mlg_troubleshoot.units import LengthUnit
 
@@ -259,7 +259,7 @@ def _behind_table(sheet: Worksheet, layout: SheetLayout, free: int, own: Verdict
     for column, header in enumerate(headers, free):
         cell = sheet.cell(layout.header_row, column)
         _put(cell, header)
-        cell.font = Font(name=FONT, bold=True)
+        cell.font = BOLD
         _fill(cell, HEADER_FILL)
         cell.alignment = Alignment(wrap_text=True, vertical="center")
         found = {
@@ -314,7 +314,7 @@ def _beside_form(sheet: Worksheet, layout: SheetLayout, free: int, own: VerdictC
         for offset, (header, value) in enumerate(values.items()):
             label = sheet.cell(layout.header_row + offset, free)
             _put(label, header)
-            label.font = Font(name=FONT, bold=True)
+            label.font = BOLD
             _put(sheet.cell(layout.header_row + offset, free + 1), value)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
 from enum import StrEnum
@@ -37,7 +38,9 @@ class OddCell:
     number: float | None = None
 
 
-Cell = str | float | OddCell | None
+Filled = str | float | OddCell
+Cell = Filled | None
+Cells = Sequence[Cell]
 
 
 def column_letters(index: int) -> str:

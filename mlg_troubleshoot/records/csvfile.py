@@ -7,11 +7,10 @@ import csv
 import io
 import re
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 
-from mlg_troubleshoot.records.cells import MAX_COLUMNS, MAX_ROWS, Cell
-from mlg_troubleshoot.records.refusals import FileRefusedError
-from mlg_troubleshoot.records.source import NumberedRow, Sheet, Workbook
+from mlg_troubleshoot.records.cells import MAX_COLUMNS, MAX_ROWS, Cell, Cells
+from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet, Workbook
 
 # A quoted field may be as long as a line; the module's own limit would make it a fault.
 csv.field_size_limit(1_000_000)
@@ -37,14 +36,10 @@ def decode(data: bytes) -> tuple[str, list[str]]:
     elif len(data) >= 4:
         head = data[:4096]
         even, odd = head[0::2].count(0), head[1::2].count(0)
-        if odd > len(head) * 0.3 and even < len(head) * 0.05:
-            return _strictly(data, "utf-16-le"), [
-                "read as UTF-16 text (little-endian, without a byte order mark)"
-            ]
-        if even > len(head) * 0.3 and odd < len(head) * 0.05:
-            return _strictly(data, "utf-16-be"), [
-                "read as UTF-16 text (big-endian, without a byte order mark)"
-            ]
+        for order, own, other in (("little", odd, even), ("big", even, odd)):
+            if own > len(head) * 0.3 and other < len(head) * 0.05:
+                note = f"read as UTF-16 text ({order}-endian, without a byte order mark)"
+                return _strictly(data, f"utf-16-{order[0]}e"), [note]
     try:
         return data.decode("utf-8"), []
     except UnicodeDecodeError:
@@ -150,7 +145,7 @@ class _CsvSheet(Sheet):
         return parsed[0] if len(parsed) == 1 else None
 
 
-def csv_book(data: bytes, header_score: Callable[[Sequence[Cell]], int]) -> Workbook:
+def csv_book(data: bytes, header_score: Callable[[Cells], int]) -> Workbook:
     if len(data) > _MAX_BYTES:
         raise _too_large(f"a text of {len(data) / 1e6:.0f} MB")
     lines = data.count(b"\n") or data.count(b"\r")
@@ -172,7 +167,7 @@ def csv_book(data: bytes, header_score: Callable[[Sequence[Cell]], int]) -> Work
     return Workbook("csv", (_CsvSheet(text, delimiter),), notes, delimiter)
 
 
-def _find_delimiter(head: str, header_score: Callable[[Sequence[Cell]], int]) -> str:
+def _find_delimiter(head: str, header_score: Callable[[Cells], int]) -> str:
     """Take the separator under which one of the first rows makes most sense as a header."""
     lines = head.splitlines()[:20]
 

@@ -35,9 +35,7 @@ class Form:
 
     def is_untouched(self, options: ReadOptions) -> bool:
         filled = [label for _, label, value in self.lines if value is not None]
-        fields = (
-            recognise(label, options.joint_numbers, options.joint_names).field for label in filled
-        )
+        fields = (recognise(label, options.joints).field for label in filled)
         return all(field is not None and field.column in _DECLARATIONS for field in fields)
 
 
@@ -46,7 +44,7 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
     for _, cells in rows:
         for index, cell in enumerate(cells[:4]):
             text = cell if isinstance(cell, str) else ""
-            found = recognise(text, options.joint_numbers, options.joint_names).field
+            found = recognise(text, options.joints).field
             if found is not None:
                 kinds.setdefault(index, []).append(found.column)
                 break
@@ -78,7 +76,7 @@ def find_form(rows: Sequence[NumberedRow], options: ReadOptions) -> Form | None:
 
 def _is_line(label: str, options: ReadOptions) -> bool:
     """Leave out titles, hints and signature lines, but not a label that may be a reading."""
-    found = recognise(label, options.joint_numbers, options.joint_names)
+    found = recognise(label, options.joints)
     return found is not UNKNOWN or label in options.column_map or label.rstrip().endswith(":")
 
 

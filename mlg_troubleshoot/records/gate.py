@@ -29,7 +29,6 @@ from mlg_troubleshoot.decision.inspection import (
 )
 from mlg_troubleshoot.errors import Problem, UsageError
 from mlg_troubleshoot.records.cells import Cell, OddCell, OddKind, iso_date_cell
-from mlg_troubleshoot.records.headers import no_joint
 from mlg_troubleshoot.records.layout import ColumnReader
 from mlg_troubleshoot.records.model import ReadOptions, TableInHand
 from mlg_troubleshoot.records.rows import RowReader
@@ -45,7 +44,7 @@ def judge_row(
 ) -> tuple[Inspection | InvalidRow, list[Problem]]:
     """Judge values by column name as a table with these headers and one row would be."""
     if not any(name.startswith("clearance_") and name != CONVENTION.name for name in values):
-        values = {**values, CLEARANCE.header(options.joint_numbers[0]): None}
+        values = {**values, CLEARANCE.header(options.joints.numbers[0]): None}
     problems: list[Problem] = []
     table = TableInHand(
         options,
@@ -131,10 +130,9 @@ def judge_again(inspection: Inspection, options: ReadOptions) -> Inspection:
         by_joint = getattr(given, column.joint_fills) if column.joint_fills else {}
         for joint, value in by_joint.items():
             name = column.header(joint, unit)
-            if isinstance(joint, bool) or joint not in options.joint_numbers:
-                low, high = min(options.joint_numbers), max(options.joint_numbers)
-                said = no_joint(joint, options.joint_numbers)
-                raise UsageError(f"{name}: expected a joint from {low} to {high}", f"T{said[1:]}.")
+            if isinstance(joint, bool) or joint not in options.joints.numbers:
+                said = f"{name}: expected a joint from {options.joints.span}"
+                raise UsageError(said, f"T{options.joints.lack(joint)[1:]}.")
             values[name] = _times(value, scale)
         assumed = (
             column is GAUGE_U

@@ -5,9 +5,9 @@ from __future__ import annotations
 import difflib
 import re
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Set
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 from mlg_troubleshoot.decision.columns import (
     AXIAL_FLOAT,
@@ -21,6 +21,7 @@ from mlg_troubleshoot.decision.columns import (
     Column,
 )
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.units import UNIT_SPELLINGS, LengthUnit
 
 
@@ -60,6 +61,41 @@ class Field:
         duplicates.
         """
         return (self.column, self.number)
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Numbers and names of a gear's joints, by which headers are understood."""
+
+    numbers: tuple[int, ...] = tuple(range(1, 11))
+    names: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, gear: Gear) -> Joints:
+        return cls(gear.joint_numbers, tuple(joint.name for joint in gear.joints))
+
+    @property
+    def span(self) -> str:
+        """The first and the last number."""
+        return f"{min(self.numbers)} to {max(self.numbers)}"
+
+    def lack(self, number: object) -> str:
+        """Say that there is no such joint."""
+        return f"this gear has no joint {number}: its joints are {self.span}"
+
+    @cached_property
+    def _words(self) -> dict[int, set[str]]:
+        # Whatever it is called, a joint is a bearing and a joint.
+        words = ({*_TOKEN.findall(name.casefold()), "bearing", "joint"} for name in self.names)
+        return dict(zip(self.numbers, words, strict=False))
+
+    @cached_property
+    def vocabulary(self) -> frozenset[str]:
+        return frozenset().union(*self._words.values())
+
+    def called(self, words: Set[str]) -> list[int]:
+        """Joints in whose names all of these words stand."""
+        return [number for number, name in self._words.items() if words <= name]
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +203,7 @@ def tidy(header: str) -> str:
     return re.sub(r"\s+", " ", text).strip().rstrip(":*").strip().casefold()
 
 
-def parse_canonical(name: str, joint_numbers: tuple[int, ...]) -> Field | None:
+def parse_canonical(name: str, joints: Joints) -> Field | None:
     match = _CANONICAL.fullmatch(name)
     column = None if match is None else BY_NAME.get(match["name"])
     if match is None or column is None:
@@ -178,20 +214,18 @@ def parse_canonical(name: str, joint_numbers: tuple[int, ...]) -> Field | None:
         number is not None and not column.is_numbered
     ):
         return None
-    if column.copies == 1 and number is not None and number not in joint_numbers:
+    if column.copies == 1 and number is not None and number not in joints.numbers:
         return None
     return Field.of(column, number, unit)
 
 
 @lru_cache(maxsize=4096)
-def _recognise(
-    header: str, joint_numbers: tuple[int, ...], names: tuple[tuple[int, str], ...]
-) -> Recognition:
+def recognise(header: str, joints: Joints) -> Recognition:
     text = tidy(header)
     if not text or len(text) > 120:
         return UNKNOWN
     snake = re.sub(r"[\s\-]+", "_", text)
-    field = parse_canonical(snake, joint_numbers)
+    field = parse_canonical(snake, joints)
     if field is not None:
         return Recognition(field)
     bracketed = [part.strip() for part in _BRACKETS.findall(text)]
@@ -204,16 +238,12 @@ def _recognise(
     other = " ".join([plain, *(b.replace("°", "") for b in bracketed)]).strip()
     if other in _WITH_OTHER_UNIT:
         return Recognition(Field(_WITH_OTHER_UNIT[other]))
-    numbered = _numbered(words, joint_numbers, names)
+    numbered = _numbered(words, joints)
     if numbered is None:
         found = _by_alias(plain, units, foreign, odd)
         if found is UNKNOWN:
             found = _resembles_plunger(words, bool(units))
-        return (
-            _resembles_clearance(words, bool(units), joint_numbers, names)
-            if found is UNKNOWN
-            else found
-        )
+        return _resembles_clearance(words, bool(units), joints) if found is UNKNOWN else found
     return numbered if numbered.field is None else _with_unit(numbered.field, units, foreign, odd)
 
 
@@ -267,8 +297,7 @@ def _resembles_plunger(words: list[str], has_unit: bool) -> Recognition:
 def _resembles_clearance(
     words: list[str],
     has_unit: bool,
-    joint_numbers: tuple[int, ...],
-    names: tuple[tuple[int, str], ...],
+    joints: Joints,
 ) -> Recognition:
     """Doubt a header that may be a joint's clearance, although it does not say so plainly."""
     said = set(words) - _FILLERS
@@ -276,15 +305,15 @@ def _resembles_clearance(
         return UNKNOWN
     if len(words) == 1:
         number = re.fullmatch(r"(?:c|cl)?0?(\d{1,2})", words[0], re.ASCII)
-        if number is not None and int(number[1]) in joint_numbers:
+        if number is not None and int(number[1]) in joints.numbers:
             return _doubt(
                 "a number alone does not say what was measured", f"clearance_{int(number[1])}"
             )
     rest = said - _CLEARANCE_WORDS - _JOINT_WORDS
     speaks_of_joint = len(rest) < len(said)
-    named = len(rest) > 1 and rest <= _vocabulary(names)
+    named = len(rest) > 1 and rest <= joints.vocabulary
     if (speaks_of_joint and has_unit and rest) or (named and (speaks_of_joint or has_unit)):
-        fitting = [number for number, name in names if rest and rest <= _name_words(name)]
+        fitting = joints.called(rest)
         nearest = f"clearance_{fitting[0]}" if len(fitting) == 1 else None
         return _doubt(
             "it may be a joint's clearance, but does not give the joint's number", nearest
@@ -320,7 +349,7 @@ def _split_number(words: list[str]) -> tuple[list[str], int | None, list[str]]:
 
 
 def _numbered(  # noqa: PLR0911 - each return is one reason to doubt
-    words: list[str], joint_numbers: tuple[int, ...], names: tuple[tuple[int, str], ...]
+    words: list[str], joints: Joints
 ) -> Recognition | None:
     """Read the words of a joint's column; None if they do not speak of a joint by number."""
     before, number, after = _split_number(words)
@@ -339,11 +368,11 @@ def _numbered(  # noqa: PLR0911 - each return is one reason to doubt
         return UNKNOWN
     column = AXIAL_FLOAT if is_float else CLEARANCE
     nearest = column.header(number)
-    if number not in joint_numbers:
+    if number not in joints.numbers:
         close = difflib.get_close_matches(
-            nearest, [column.header(n) for n in joint_numbers], 2, 0.0
+            nearest, [column.header(n) for n in joints.numbers], 2, 0.0
         )
-        return _doubt(no_joint(number, joint_numbers), " or ".join(close), "joint_unknown")
+        return _doubt(joints.lack(number), " or ".join(close), "joint_unknown")
     if everything & _CONVENTION_WORDS:
         return _doubt("a convention in the header is not read; it has its own column", nearest)
     allowed = (
@@ -356,61 +385,23 @@ def _numbered(  # noqa: PLR0911 - each return is one reason to doubt
         )
     if after and not is_float and set(after) <= _CLEARANCE_WORDS:
         after = []
-    return _check_name(Field(column, number), after, names)
+    return _check_name(Field(column, number), after, joints)
 
 
-def no_joint(number: object, joint_numbers: tuple[int, ...]) -> str:
-    return (
-        f"this gear has no joint {number}: its joints are {min(joint_numbers)} to"
-        f" {max(joint_numbers)}"
-    )
-
-
-def _check_name(field: Field, after: list[str], names: tuple[tuple[int, str], ...]) -> Recognition:
+def _check_name(field: Field, after: list[str], joints: Joints) -> Recognition:
     """Accept a joint's name behind its number only if it is this joint's, not another's."""
     nearest, number = field.name, field.number
     said = set(after) - _FILLERS
-    if said - _vocabulary(names):
+    if said - joints.vocabulary:
         return _doubt(f"{' '.join(after)!r} may mean something other than the clearance", nearest)
-    own = next((_name_words(name) for n, name in names if n == number), frozenset())
-    if not said <= own:
-        others = [n for n, name in names if n != number and said <= _name_words(name)]
-        if others or own:
-            hint = f"; that is joint {others[0]}" if len(others) == 1 else ""
-            return _doubt(f"{' '.join(after)!r} is not the name of joint {number}{hint}", nearest)
+    called = joints.called(said)
+    if number not in called and (called or joints.names):
+        hint = f"; that is joint {called[0]}" if len(called) == 1 else ""
+        return _doubt(f"{' '.join(after)!r} is not the name of joint {number}{hint}", nearest)
     return Recognition(field)
 
 
-def _vocabulary(names: tuple[tuple[int, str], ...]) -> frozenset[str]:
-    return frozenset(word for _, name in names for word in _name_words(name))
-
-
-def _name_words(name: str) -> frozenset[str]:
-    return frozenset(_TOKEN.findall(name.casefold()))
-
-
-# The ten joints of the Hawker 800XP in the order of the mechanism (Fig. 7). The paper's text names
-# joints 2 to 5 (section 4.3); the other names follow from the order of the mechanism in section 3.2
-# and the reconstructed topology.
-_NAMES = (
-    "actuator rod end|locking pin|short link inner|locking lever pivot|short link outer|extension"
-    " lever end|bellcrank input|bellcrank pivot|bellcrank output|plunger pin"
-)
-_REFERENCE_NAMES = {
-    number: f"{name} bearing joint" for number, name in enumerate(_NAMES.split("|"), 1)
-}
-
-
-def recognise(
-    header: str, joint_numbers: tuple[int, ...], joint_names: Mapping[int, str]
-) -> Recognition:
-    names = dict(_REFERENCE_NAMES)
-    for number, name in joint_names.items():
-        names[number] = f"{name} {names.get(number, '')}" if number in joint_numbers else name
-    return _recognise(header, joint_numbers, tuple(sorted(names.items())))
-
-
-def near_miss(header: str, joint_numbers: tuple[int, ...]) -> Recognition:
+def near_miss(header: str, joints: Joints) -> Recognition:
     """Look for the canonical column that an unknown header is one entry error away from."""
     snake = _snake(header)
     bare = re.sub(r"_(in|thou|mm)$", "", snake)
@@ -418,12 +409,12 @@ def near_miss(header: str, joint_numbers: tuple[int, ...]) -> Recognition:
         column.header(number)
         for column in COLUMNS
         if column not in (UNIT, SIDE, JOINT)
-        for number in (joint_numbers if column.needs_joint else (None,))
+        for number in (joints.numbers if column.needs_joint else (None,))
     ]
     close = difflib.get_close_matches(bare, candidates, 1, 0.87)
     if not close:
         return UNKNOWN
-    field = parse_canonical(close[0], joint_numbers)
+    field = parse_canonical(close[0], joints)
     if field is not None and field.column.bears_verdict:
         unit = snake[len(bare) :]
         return _doubt(f"it looks like an entry error for {close[0]}{unit}", close[0] + unit)
@@ -434,11 +425,11 @@ def _snake(name: str) -> str:
     return re.sub(r"[\s\-]+", "_", tidy(name))
 
 
-def parse_target(name: str, joint_numbers: tuple[int, ...]) -> Field | None:
+def parse_target(name: str, joints: Joints) -> Field | None:
     text = _snake(name)
     if text == "carry":
         return None
-    field = parse_canonical(text, joint_numbers)
+    field = parse_canonical(text, joints)
     if field is None:
         raise UsageError(
             f"--map: {name!r} is not a column of the inspection table",

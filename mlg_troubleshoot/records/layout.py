@@ -17,7 +17,7 @@ from mlg_troubleshoot.decision.columns import (
     TAIL_NO,
     Column,
 )
-from mlg_troubleshoot.records.cells import Cell, column_letters, show, writable
+from mlg_troubleshoot.records.cells import Cell, Cells, column_letters, show, writable
 from mlg_troubleshoot.records.headers import (
     UNKNOWN,
     Recognition,
@@ -26,10 +26,9 @@ from mlg_troubleshoot.records.headers import (
     recognise,
     tidy,
 )
-from mlg_troubleshoot.records.model import ReadOptions, TableInHand
-from mlg_troubleshoot.records.refusals import HEADER_SEARCH_ROWS
+from mlg_troubleshoot.records.model import CellPlace, ReadOptions, TableInHand
 from mlg_troubleshoot.records.rows import PlacedField
-from mlg_troubleshoot.records.source import MergedRange, NumberedRow
+from mlg_troubleshoot.records.source import HEADER_SEARCH_ROWS, MergedRange, NumberedRow
 from mlg_troubleshoot.units import UNIT_SPELLINGS, LengthUnit
 
 
@@ -77,21 +76,18 @@ class Columns:
         return "; ".join(read), carried if self.carried else ""
 
 
-def _mapped(text: str, index: int, options: ReadOptions) -> bool:
-    return any(
-        tidy(key) == tidy(text) or key == column_letters(index) for key in options.column_map
-    )
+def _names(key: str, text: str, index: int) -> bool:
+    """Whether a key of a mapping is this header, or the letters of its column."""
+    return tidy(key) == tidy(text) or key == column_letters(index)
 
 
-def header_score(cells: Sequence[Cell], options: ReadOptions) -> int:
+def header_score(cells: Cells, options: ReadOptions) -> int:
     known: set[tuple[Column, int | None]] = set()
     doubtful = 0
     for index, cell in enumerate(cells):
         if isinstance(cell, str):
-            mapped = _mapped(cell, index, options)
-            found = (
-                UNKNOWN if mapped else recognise(cell, options.joint_numbers, options.joint_names)
-            )
+            mapped = any(_names(key, cell, index) for key in options.column_map)
+            found = UNKNOWN if mapped else recognise(cell, options.joints)
             known |= set() if found.field is None else {found.field.quantity}
             doubtful += mapped or bool(found.reason)
     columns = {column for column, _ in known}
@@ -137,7 +133,10 @@ def _two_row_header(
     pairs = [
         (upper, above, below)
         for (upper, above), (lower, below) in pairwise(near)
-        if lower == upper + 1 and _may_be_upper(above, below)
+        if lower == upper + 1
+        and any(c is not None for c in above)
+        and all(c is None or isinstance(c, str) for c in above)
+        and sum(c is not None for c in below) >= 2
     ]
     ranges = merged() if pairs else ()
     for upper, above, below in pairs:
@@ -148,18 +147,7 @@ def _two_row_header(
     return best
 
 
-def _may_be_upper(above: Sequence[Cell], below: Sequence[Cell]) -> bool:
-    texts = [c for c in above if c is not None]
-    return (
-        bool(texts)
-        and all(isinstance(c, str) for c in texts)
-        and sum(c is not None for c in below) >= 2
-    )
-
-
-def _joined(
-    upper: int, above: Sequence[Cell], below: Sequence[Cell], ranges: Sequence[MergedRange]
-) -> list[str]:
+def _joined(upper: int, above: Cells, below: Cells, ranges: Sequence[MergedRange]) -> list[str]:
     """Return each header of two rows; none if nothing is merged across columns."""
     across = [
         (first, last)
@@ -174,7 +162,7 @@ def _joined(
 
 
 def _unit_row(
-    header: Header, cells: Sequence[Cell], options: ReadOptions
+    header: Header, cells: Cells, options: ReadOptions
 ) -> tuple[LengthUnit | None, ...] | None:
     """Read a row of units below the header; None if it is something else."""
     words = [_text(c).strip("()[]").lower() for c in cells]
@@ -183,11 +171,7 @@ def _unit_row(
     ):
         return None
     for text, word in zip(header.texts, words, strict=False):
-        known = (
-            recognise(text, options.joint_numbers, options.joint_names).field
-            if word in UNIT_SPELLINGS
-            else None
-        )
+        known = recognise(text, options.joints).field if word in UNIT_SPELLINGS else None
         if known is not None and not known.column.is_length:
             return None
     units = [UNIT_SPELLINGS.get(word) for word in words[: len(header.texts)]]
@@ -203,7 +187,7 @@ def why_not_remembered(header: str, column: str, options: ReadOptions) -> str:
     if found.field is not None:
         return f"is read as {found.field.name}"
     if found.reason:
-        target = parse_target(column, options.joint_numbers)
+        target = parse_target(column, options.joints)
         if target is None or not (target.column.bears_verdict or target.column.needs_joint):
             return f"is doubtful: {found.reason}"
     return ""
@@ -211,8 +195,8 @@ def why_not_remembered(header: str, column: str, options: ReadOptions) -> str:
 
 def _understood(header: str, options: ReadOptions) -> Recognition:
     """Return what a header is understood as by itself, with no mapping."""
-    found = recognise(header, options.joint_numbers, options.joint_names)
-    return near_miss(header, options.joint_numbers) if found is UNKNOWN and header else found
+    found = recognise(header, options.joints)
+    return near_miss(header, options.joints) if found is UNKNOWN and header else found
 
 
 class ColumnReader:
@@ -227,9 +211,8 @@ class ColumnReader:
         options = self._options
         for key, target in (*options.column_map.items(), *options.remembered_map.items()):
             # Letters name a place in this table: nothing that was remembered from another knows it.
-            placed = key == column_letters(index) and key in options.column_map
-            if tidy(key) == tidy(text) or placed:
-                return Recognition(parse_target(target, options.joint_numbers)), True
+            if tidy(key) == tidy(text) or (key in options.column_map and _names(key, text, index)):
+                return Recognition(parse_target(target, options.joints)), True
         return _understood(text, options), False
 
     def place(
@@ -243,15 +226,15 @@ class ColumnReader:
         columns = Columns([])
         readings: list[tuple[Recognition, bool]] = []
         for index, text in enumerate(headers):
-            header_row, cell = (
-                places[index] if places is not None else (row, f"{column_letters(index)}{row}")
-            )
+            place = CellPlace.at(row, index, text)
+            if places is not None:
+                place = CellPlace(places[index][0], text, places[index][1])
             found, mapped = self._recognise(text, index)
             known = found.field
             if known is not None and index < len(units) and units[index] is not None:
                 known = replace(known, unit=known.unit or units[index])
             readings.append((found, mapped))
-            placed = PlacedField(index, text, known, bool(found.reason), cell, header_row, mapped)
+            placed = PlacedField(index, text, known, bool(found.reason), place, mapped)
             columns.placed.append(placed)
             if placed.refused:
                 self._doubt(placed, found)
@@ -286,21 +269,12 @@ class ColumnReader:
             columns.mapped.append(f'"{placed.header}" {placed.field.name}')
 
     def _tell(self, code: str, placed: PlacedField, expected: str, remedy: str) -> None:
-        self._table.tell(
-            code,
-            placed.header,
-            expected,
-            remedy,
-            placed.header_row,
-            placed.header,
-            placed.header_cell,
-        )
+        self._table.tell(code, placed.header, expected, remedy, placed.place)
 
     def _doubt(self, placed: PlacedField, found: Recognition) -> None:
         target = found.nearest or "clearance_3_in"
         if found.code == "joint_unknown":
-            joints = self._options.joint_numbers
-            expected = f"a joint from {min(joints)} to {max(joints)}"
+            expected = f"a joint from {self._options.joints.span}"
             remedy = f"{found.reason[:1].upper()}{found.reason[1:]}."
             if not self._by_hand:
                 remedy += f' The nearest names are {target}: pass --map "{placed.header}=COLUMN".'
@@ -373,7 +347,7 @@ class ColumnReader:
                 columns,
                 placed,
                 "header_duplicate",
-                f"one column for {placed.field.name}; {first.header_cell} {first.header!r} is one"
+                f"one column for {placed.field.name}; {first.place.cell} {first.header!r} is one"
                 " already",
                 f"Remove one of the two, or pass --map {column_letters(placed.index)}=carry to use"
                 " the other.",
@@ -411,15 +385,12 @@ class ColumnReader:
             )
             like = f' If "{hint}" is meant, pass --map "{hint}={name}".' if hint else ""
             remedy = f"Add the column, or name the one that is meant with --map.{like}"
-            self._table.tell("column_missing", None, expected, remedy, row, name)
+            self._table.tell("column_missing", None, expected, remedy, CellPlace(row, name))
 
     def _unused_map(self, columns: Columns, row: int) -> None:
         for key in self._options.column_map:
-            if not any(
-                tidy(key) == tidy(p.header) or key == column_letters(p.index)
-                for p in columns.placed
-            ):
+            if not any(_names(key, p.header, p.index) for p in columns.placed):
                 headers = ", ".join(p.header for p in columns.placed if p.header)
                 expected = f"one of the headers of the table: {headers[:200]}"
                 remedy = "Correct the header named in --map."
-                self._table.tell("map_header_unknown", key, expected, remedy, row, key)
+                self._table.tell("map_header_unknown", key, expected, remedy, CellPlace(row, key))

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 
 from mlg_troubleshoot.decision.columns import JOINT, RECORD_ID, Column
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
-from mlg_troubleshoot.records.cells import Cell, OddCell, column_letters, quote, show, stored
+from mlg_troubleshoot.records.cells import Cell, Cells, OddCell, column_letters, show, stored
 from mlg_troubleshoot.records.headers import tidy
-from mlg_troubleshoot.records.model import TableInHand
+from mlg_troubleshoot.records.model import CellPlace, TableInHand, to_correct
 from mlg_troubleshoot.records.rows import PlacedField, RowReader
-from mlg_troubleshoot.records.values import plain_text
+from mlg_troubleshoot.records.values import CellFaultError, plain_text
 
 _JOINT_TEXT = re.compile(r"(?:joint|jt|j)?\W*(?:no|nr|number|#)?\W*0?(\d{1,3})", re.ASCII)
 
@@ -45,12 +45,13 @@ class LongReader:
         # them.
         self._slots: dict[tuple[int, int], int] = {}
         for p in self._per_joint:
-            for joint in options.joint_numbers:
+            for joint in options.joints.numbers:
                 self._slots[p.index, joint] = len(wide)
                 own_field = None if p.field is None else replace(p.field, number=joint)
                 wide.append(replace(p, index=len(wide), field=own_field))
         self._width = len(wide)
-        self._names = {tidy(name): number for number, name in options.joint_names.items()}
+        joints = options.joints
+        self._names = dict(zip(map(tidy, joints.names), joints.numbers, strict=False))
         self._groups: dict[str | int, _Group] = {}
         self.reader = RowReader(wide, table)
 
@@ -64,7 +65,7 @@ class LongReader:
             None,
         )
 
-    def add(self, row: int, cells: Sequence[Cell]) -> None:
+    def add(self, row: int, cells: Cells) -> None:
         width = len(self._placed)
         filled = [*cells[:width], *[None] * (width - len(cells))]
         record = filled[self._record.index] if self._record is not None else None
@@ -81,7 +82,7 @@ class LongReader:
             self._same_elsewhere(group, row, filled)
         self._take_reading(group, row, filled)
 
-    def _same_elsewhere(self, group: _Group, row: int, filled: Sequence[Cell]) -> None:
+    def _same_elsewhere(self, group: _Group, row: int, filled: Cells) -> None:
         """Check that what belongs to the whole inspection is the same in each of its rows."""
         for p in self._placed:
             here, there = filled[p.index], group.cells[p.index]
@@ -95,7 +96,7 @@ class LongReader:
                 remedy = "All rows of one record must agree. Correct one of them, or the record id."
                 self._fault(group, (p, row, here), "record_contradicts", expected, remedy)
 
-    def _take_reading(self, group: _Group, row: int, filled: Sequence[Cell]) -> None:
+    def _take_reading(self, group: _Group, row: int, filled: Cells) -> None:
         if self._joint is None:
             return
         cell = filled[self._joint.index]
@@ -104,9 +105,8 @@ class LongReader:
             return
         joint = self._joint_number(cell)
         if joint is None:
-            joints = self._table.options.joint_numbers
             code = "joint_missing" if cell is None else "joint_unknown"
-            expected = f"a joint number from {min(joints)} to {max(joints)}"
+            expected = f"a joint number from {self._table.options.joints.span}"
             self._fault(
                 group, (self._joint, row, cell), code, expected, "Enter the joint's number."
             )
@@ -139,7 +139,7 @@ class LongReader:
             text = tidy(plain_text(cell))
             match = _JOINT_TEXT.fullmatch(text)
             number = int(match[1]) if match is not None else self._names.get(text)
-        return number if number in self._table.options.joint_numbers else None
+        return number if number in self._table.options.joints.numbers else None
 
     def _fault(
         self,
@@ -152,10 +152,8 @@ class LongReader:
         p, row, cell = place
         if p.header not in group.bad:
             group.bad.append(p.header)
-        found = None if cell is None else quote(cell)
-        self._table.tell(
-            code, found, expected, remedy, row, p.header, f"{column_letters(p.index)}{row}"
-        )
+        fault = CellFaultError(code, expected, remedy)
+        self._table.tell_fault(fault, cell, CellPlace.at(row, p.index, p.header))
 
     def finish(self) -> list[Inspection | InvalidRow]:
         done: list[Inspection | InvalidRow] = []
@@ -163,8 +161,6 @@ class LongReader:
             read = self.reader.read(group.row, group.cells, group.places)
             warnings = (*read.warnings, *group.warnings)
             if group.bad:
-                correct = (*group.bad, *(read.correct if isinstance(read, InvalidRow) else ()))
-                named, source = tuple(dict.fromkeys(correct)), self._table.source(group.row)
-                read = InvalidRow(read.record_id, read.tail_no, read.side, named, source=source)
+                read = to_correct(read, *group.bad)
             done.append(replace(read, warnings=warnings))
         return done

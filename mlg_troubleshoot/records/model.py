@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 from mlg_troubleshoot.decision.columns import CLEARANCE, PLUNGER_DISPLACEMENT, Column
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.records.cells import Cell, column_letters, quote
 from mlg_troubleshoot.records.dates import DateOrder
+from mlg_troubleshoot.records.headers import Joints
+from mlg_troubleshoot.records.values import CellFaultError
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 Progress = Callable[[int, int | None], None]
@@ -80,20 +83,18 @@ class TableResult:
 class ReadOptions(TableOptions):
     """What is declared about tables, and what the gear says of the values in them.
 
-    joint_names: names of the gear's joints, by which a header's number is checked; empty takes the
-    reference gear's. areas: names of the areas to open. clearance_hard_max_in,
-    clearance_confirm_above_in: a radial clearance above the one is refused, above the other
-        accepted with a warning. [in]
+    joints: numbers and names of the joints, by which headers are understood. areas: names of the
+    areas to open.
+    clearance_hard_max_in, clearance_confirm_above_in: a radial clearance above the one is refused,
+    above the other accepted with a warning. [in]
     plunger_hard_max_in: a measured plunger displacement beyond this, either way, is refused. [in]
     new_part_in, limit_in: radial clearance of a new part, and the largest one allowed, by joint;
-    empty where no gear
-        says them. [in]
+    empty where no gear says them. [in]
     margin_in: largest displacement that the gear allows; infinite where no gear says it. [in]
     asks: a person is there to confirm what is unusual.
     """
 
-    joint_numbers: tuple[int, ...] = tuple(range(1, 11))
-    joint_names: Mapping[int, str] = field(default_factory=dict)
+    joints: Joints = field(default_factory=Joints)
     areas: tuple[str, ...] = ("sidestay", "link assembly")
     clearance_hard_max_in: float = 0.050
     clearance_confirm_above_in: float = 0.015
@@ -121,8 +122,7 @@ class ReadOptions(TableOptions):
         return cls(
             **told,
             **declared,
-            joint_numbers=gear.joint_numbers,
-            joint_names={joint.number: joint.name for joint in gear.joints},
+            joints=Joints.of(gear),
             new_part_in={joint.number: joint.new_part.value for joint in gear.joints},
             areas=tuple(area.name for area in gear.areas),
             margin_in=gear.margin.value,
@@ -130,6 +130,21 @@ class ReadOptions(TableOptions):
             clearance_hard_max_in=gear.hard_limit.value,
             clearance_confirm_above_in=gear.confirm_above.value,
         )
+
+
+class CellPlace(NamedTuple):
+    """Where a problem stands, as far as it has a place."""
+
+    row: int | None = None
+    header: str | None = None
+    cell: str | None = None
+
+    @classmethod
+    def at(cls, row: int, index: int, header: str) -> CellPlace:
+        return cls(row, header, f"{column_letters(index)}{row}")
+
+
+NOWHERE = CellPlace()
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,18 +163,20 @@ class TableInHand:
         return RowSource(self.file, self.sheet, row)
 
     def tell(
-        self,
-        code: str,
-        value: str | None,
-        expected: str,
-        remedy: str,
-        row: int | None = None,
-        column: str | None = None,
-        cell: str | None = None,
+        self, code: str, value: str | None, expected: str, remedy: str, place: CellPlace
     ) -> None:
-        self.report(
-            Problem(code, self.file, self.sheet, row, column, cell, value, expected, remedy)
-        )
+        self.report(Problem(code, self.file, self.sheet, *place, value, expected, remedy))
+
+    def tell_fault(self, fault: CellFaultError, raw: Cell, place: CellPlace) -> None:
+        found = None if raw is None else quote(raw)
+        self.tell(fault.code, found, fault.expected, fault.remedy, place)
+
+
+def to_correct(row: Inspection | InvalidRow, *headers: str) -> InvalidRow:
+    """A row that cannot be judged before these columns of it are corrected."""
+    known = row.correct if isinstance(row, InvalidRow) else ()
+    named = tuple(dict.fromkeys((*headers, *known)))
+    return InvalidRow(row.record_id, row.tail_no, row.side, named, row.warnings, row.source)
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,14 +15,15 @@ from typing import BinaryIO
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import writable
 from mlg_troubleshoot.records.csvfile import csv_book
-from mlg_troubleshoot.records.duplicates import settle_duplicates
 from mlg_troubleshoot.records.forms import Form, find_form, read_form
 from mlg_troubleshoot.records.layout import Header, find_header, header_score
 from mlg_troubleshoot.records.model import FileRead, Progress, ReadOptions, ReadResult
-from mlg_troubleshoot.records.refusals import FileRefusedError
-from mlg_troubleshoot.records.row_consistency import history_warnings, order_warnings
-from mlg_troubleshoot.records.sniff import sniff
-from mlg_troubleshoot.records.source import NumberedRow, Sheet, Workbook
+from mlg_troubleshoot.records.row_consistency import (
+    history_warnings,
+    order_warnings,
+    settle_duplicates,
+)
+from mlg_troubleshoot.records.source import FileRefusedError, NumberedRow, Sheet, Workbook
 from mlg_troubleshoot.records.tables import Collected, read_table
 
 MAX_FILE_BYTES = 50_000_000
@@ -30,6 +31,22 @@ STDIN_NAME = "-"
 _PEEKED_ROWS = 120
 _INSTRUCTIONS = "instructions"
 _SUFFIXES = frozenset((".csv", ".tsv", ".txt", ".xlsx", ".xlsm", ".xls", ".ods"))
+
+_OLE_MAGIC = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
+_WORKBOOK_NAMES = frozenset((".xlsx", ".xlsm", ".xls", ".ods", ".xlsb", ".xltx", ".xltm"))
+_OTHERS: tuple[tuple[bytes, str], ...] = (
+    (b"%PDF", "a PDF document"),
+    (b"\x89PNG", "a picture (PNG)"),
+    (b"\xff\xd8\xff", "a picture (JPEG)"),
+    (b"GIF8", "a picture (GIF)"),
+    (b"\x1f\x8b", "a compressed file (gzip)"),
+    (b"7z\xbc\xaf", "a compressed file (7z)"),
+    (b"Rar!", "a compressed file (RAR)"),
+    (b"{\\rtf", "a text document (RTF)"),
+    (b"SQLite format 3", "a database"),
+    (b"\x7fELF", "a program"),
+    (b"MZ", "a program"),
+)
 
 Source = str | Path | BinaryIO
 _Found = tuple[FileRead, Collected]
@@ -47,24 +64,18 @@ class _Candidate:
     has_cells: bool
 
 
-def _ticker(progress: Progress | None) -> Callable[[int], None]:
-    done = 0
+def read_many(
+    sources: Iterable[Source], options: ReadOptions, *, progress: Progress | None = None
+) -> ReadResult:
+    """Read the inspections of several files, folders and patterns as one batch."""
+    given, done = list(sources), 0
 
-    def tick(rows: int) -> None:
+    def ticker(rows: int) -> None:
         nonlocal done
         done += rows
         if progress is not None:
             progress(done, None)
 
-    return tick
-
-
-def read_many(
-    sources: Iterable[Source], options: ReadOptions, *, progress: Progress | None = None
-) -> ReadResult:
-    """Read the inspections of several files, folders and patterns as one batch."""
-    ticker = _ticker(progress)
-    given = list(sources)
     read = _finish(
         [_read_file(item, options, ticker) for source in given for item in expand(source)]
     )
@@ -186,8 +197,39 @@ def _regular_file(source: str | Path) -> bytes:
         return file.read(MAX_FILE_BYTES + 1)
 
 
+def _sniffed(data: bytes, name: str) -> str:
+    """What kind of file it is, by its first bytes, not by its name."""
+    if not data.strip(b" \t\r\n\0\xef\xbb\xbf"):
+        raise FileRefusedError(
+            "file_empty", "the file holds nothing but blanks" if data else "the file is empty"
+        )
+    if data.startswith((b"PK\x03\x04", b"PK\x05\x06", b"PK\x07\x08")):
+        return "zip"
+    if data.startswith(_OLE_MAGIC):
+        return "ole"
+    head = data[:2048].lstrip(b"\xef\xbb\xbf \t\r\n")
+    for magic, what in _OTHERS:
+        if head.startswith(magic):
+            raise FileRefusedError("file_kind", what)
+    low = head.lower()
+    if low.startswith((b"<!doctype html", b"<html", b"<table", b"<head", b"<body")):
+        raise FileRefusedError("file_kind", "a web page (HTML), whatever its name")
+    if low.startswith(b"<?xml") or low.startswith(b"<workbook"):
+        raise FileRefusedError("file_kind", "an XML file, whatever its name")
+    suffix = Path(name).suffix.lower()
+    if suffix in _WORKBOOK_NAMES:
+        raise FileRefusedError(
+            "file_kind",
+            f"a text file under a workbook's name ({suffix})",
+            "a workbook",
+            "If it is a CSV file, rename it to .csv. Otherwise open it in a spreadsheet program and"
+            " save it as .xlsx.",
+        )
+    return "text"
+
+
 def open_book(data: bytes, label: str, options: ReadOptions) -> Workbook:
-    kind = sniff(data, label)
+    kind = _sniffed(data, label)
     if kind == "text":
         return csv_book(data, lambda cells: header_score(cells, options))
     if kind == "ole":
@@ -206,16 +248,12 @@ def open_book(data: bytes, label: str, options: ReadOptions) -> Workbook:
 def _candidate(sheet: Sheet, options: ReadOptions) -> _Candidate:
     rows = sheet.rows()
     peeked = list(islice(rows, _PEEKED_ROWS))
-    told = _is_instructions(peeked)
+    first = next((cell for _, cells in peeked[:1] for cell in cells if cell is not None), None)
+    told = isinstance(first, str) and first.strip().lower().startswith(_INSTRUCTIONS)
     header = None if told else find_header(peeked, options, sheet.merged)
     form = None if told or header is not None else find_form(peeked, options)
     has_rows = header is not None and any(number > header.row for number, _ in peeked)
     return _Candidate(sheet, chain(peeked, rows), header, form, has_rows, bool(peeked) and not told)
-
-
-def _is_instructions(rows: Sequence[NumberedRow]) -> bool:
-    first = next((cell for _, cells in rows[:1] for cell in cells if cell is not None), None)
-    return isinstance(first, str) and first.strip().lower().startswith(_INSTRUCTIONS)
 
 
 def _read_book(
@@ -362,11 +400,10 @@ def _finish(results: Sequence[_Found]) -> ReadResult:
         source: content for _, found in results for source, content in found.invalid_content.items()
     }
     problems += settle_duplicates(rows, layouts, contents)
-    for place, warnings in history_warnings(rows).items():
-        rows[place] = replace(rows[place], warnings=(*rows[place].warnings, *warnings))
-    backwards = order_warnings(rows, layouts)
-    for place, warning in backwards.items():
-        rows[place] = replace(rows[place], warnings=(*rows[place].warnings, warning))
+    slips, backwards = history_warnings(rows), order_warnings(rows, layouts)
+    for place in {*slips, *backwards}:
+        said = filter(None, (slips.get(place), backwards.get(place)))
+        rows[place] = replace(rows[place], warnings=(*rows[place].warnings, *said))
     problems.sort(key=_places(results))
     return ReadResult(
         tuple(rows),

@@ -37,9 +37,11 @@ from mlg_troubleshoot.decision.inspection import (
     InvalidRow,
     RowSource,
 )
+from mlg_troubleshoot.gear.gear import ROUNDING_IN
 from mlg_troubleshoot.records.cells import (
     Cell,
-    OddCell,
+    Cells,
+    Filled,
     column_letters,
     quote,
     show,
@@ -48,8 +50,8 @@ from mlg_troubleshoot.records.cells import (
 )
 from mlg_troubleshoot.records.dates import DateOrder, readings
 from mlg_troubleshoot.records.headers import Field
-from mlg_troubleshoot.records.model import TableInHand
-from mlg_troubleshoot.records.refusals import FileRefusedError
+from mlg_troubleshoot.records.model import NOWHERE, CellPlace, TableInHand
+from mlg_troubleshoot.records.source import FileRefusedError
 from mlg_troubleshoot.records.unit_fit import (
     UnitFit,
     judge_unit,
@@ -71,7 +73,6 @@ from mlg_troubleshoot.records.values import (
 )
 from mlg_troubleshoot.units import ClearanceConvention, Length, LengthUnit, Sentence
 
-_EPS_IN = 1e-9
 _REMEMBERED = 20_000
 _NO_FLOATS: Mapping[int, float] = MappingProxyType({})
 _MISSING_CONVENTION = (
@@ -94,14 +95,8 @@ def place_in_file(record_id: str) -> str:
     return "" if made is None else made[0]
 
 
-class _CellPlace(NamedTuple):
-    row: int
-    header: str
-    cell: str
-
-
 class _WaitingDate(NamedTuple):
-    place: _CellPlace
+    place: CellPlace
     raw: Cell
     fault: AmbiguousDateError
 
@@ -112,8 +107,7 @@ class PlacedField:
     header: str
     field: Field | None
     refused: bool = False
-    header_cell: str | None = None
-    header_row: int | None = None
+    place: CellPlace = NOWHERE
     is_mapped: bool = False
 
     @property
@@ -199,7 +193,7 @@ class RowReader:
         self._without_unit: set[str | None] = set()
         self._row = 0
         self._places: Sequence[tuple[int, str]] | None = None
-        self._cells: Sequence[Cell] = ()
+        self._cells: Cells = ()
         self._bad: set[int] = set()
         self._faults: list[tuple[int, CellFaultError]] = []
         # Somewhere it is tomorrow already.
@@ -223,7 +217,7 @@ class RowReader:
         return named
 
     def read(
-        self, row: int, cells: Sequence[Cell], places: Sequence[tuple[int, str]] | None = None
+        self, row: int, cells: Cells, places: Sequence[tuple[int, str]] | None = None
     ) -> Inspection | InvalidRow:
         """Read one row; every bad cell is reported once."""
         self._begin(row, cells, places)
@@ -232,7 +226,11 @@ class RowReader:
         found = self._read_cells(convention, unit, warnings)
         question = self._unit_question(found, convention, warnings)
         source = self._table.source(row)
-        self._report_faults(source)
+        for place, fault in sorted(self._faults, key=lambda fault: fault[0]):
+            if isinstance(fault, AmbiguousDateError):
+                self._waiting[source] = _WaitingDate(self._place(place), self._cells[place], fault)
+            else:
+                self._tell(place, fault)
         record_id, tail_no, side = (found.values.pop(column, None) for column in IDENTITY)
         if self._bad or record_id is None or tail_no is None or side is None or convention is None:
             return InvalidRow(record_id, tail_no, side, self._correct(), tuple(warnings), source)
@@ -316,7 +314,7 @@ class RowReader:
             found.lengths.setdefault(kind.column, {})[number] = length
             if kind.column is CLEARANCE:
                 found.entered[number] = entered
-                if length > self._options.clearance_confirm_above_in + _EPS_IN:
+                if length > self._options.clearance_confirm_above_in + ROUNDING_IN:
                     warnings.append(self._confirm_text(number, length, entered, scale))
             elif kind.column is PLUNGER_DISPLACEMENT:
                 found.plunger.append((length, entered.unit))
@@ -329,7 +327,7 @@ class RowReader:
             if column.holds is Holds.MOMENT:
                 return read_moment(cell, self._options.dates, self._latest)
             if column.holds is Holds.JOINTS:
-                return read_joints(cell, self._options.joint_numbers)
+                return read_joints(cell, self._options.joints.numbers)
             if column.holds is Holds.AREAS:
                 return read_areas(cell, self._options.areas)
             return read_value(
@@ -346,13 +344,6 @@ class RowReader:
             else f"Enter {column.asked}; there is no default."
         )
         raise CellFaultError(f"{column.name}_missing", column.asked, remedy)
-
-    def _report_faults(self, source: RowSource) -> None:
-        for place, fault in sorted(self._faults, key=lambda fault: fault[0]):
-            if isinstance(fault, AmbiguousDateError):
-                self._waiting[source] = _WaitingDate(self._place(place), self._cells[place], fault)
-            else:
-                self._tell(place, fault)
 
     def _warn(self, found: _Found, warnings: list[str]) -> None:
         """Say what of a good row is of no use, or unusual."""
@@ -379,7 +370,7 @@ class RowReader:
                 " joint has no reading"
             )
 
-    def ragged(self, row: int, cells: Sequence[Cell], expected: int) -> InvalidRow:
+    def ragged(self, row: int, cells: Cells, expected: int) -> InvalidRow:
         """Refuse a row that does not have as many fields as the header."""
         comma = len(cells) > expected and any(
             isinstance(c, str) and c.strip() == "0" for c in cells
@@ -392,35 +383,22 @@ class RowReader:
         )
         first = cells[0] if self._at.get(RECORD_ID) == 0 and cells else None
         record_id = plain_text(first) or None if isinstance(first, str) else None
-        told = (
+        why = FileRefusedError(
             "row_field_count",
             f"{len(cells)} fields",
             f"{expected} fields, as in the header",
             remedy,
         )
-        return self._refused_row(row, cells, record_id, *told)
+        return self.faulty(row, cells, why, record_id)
 
-    def faulty(self, row: int, cells: Sequence[Cell], why: FileRefusedError) -> InvalidRow:
-        told = why.problem
-        return self._refused_row(row, cells, None, told.code, str(why), told.expected, told.remedy)
-
-    def _refused_row(
-        self,
-        row: int,
-        cells: Sequence[Cell],
-        record_id: str | None,
-        code: str,
-        found: str,
-        expected: str,
-        remedy: str,
+    def faulty(
+        self, row: int, cells: Cells, why: FileRefusedError, record_id: str | None = None
     ) -> InvalidRow:
-        shown = quote(",".join(show(c) for c in cells), 80)
-        self._table.tell(code, f"{found}: {shown}", expected, remedy, row)
+        shown, told = quote(",".join(map(show, cells)), 80), why.problem
+        self._table.tell(told.code, f"{why}: {shown}", told.expected, told.remedy, CellPlace(row))
         return InvalidRow(record_id, None, None, ("row",), (), self._table.source(row))
 
-    def _begin(
-        self, row: int, cells: Sequence[Cell], places: Sequence[tuple[int, str]] | None
-    ) -> None:
+    def _begin(self, row: int, cells: Cells, places: Sequence[tuple[int, str]] | None) -> None:
         """Take up a row: fill it to the width of the header, and leave out what was not
         measured.
         """
@@ -465,7 +443,10 @@ class RowReader:
         elif declared is None:
             self._bad.add(-1)
             self._table.tell(
-                "convention_missing", None, *_MISSING_CONVENTION, self._row, CONVENTION.name
+                "convention_missing",
+                None,
+                *_MISSING_CONVENTION,
+                CellPlace(self._row, CONVENTION.name),
             )
         return declared
 
@@ -510,7 +491,7 @@ class RowReader:
         kind: _LengthKind,
         row_unit: LengthUnit | None,
         scale: ClearanceConvention,
-        cell: str | float | OddCell,
+        cell: Filled,
     ) -> tuple[float, EnteredClearance]:
         """Read a length that its column can hold; a clearance is radial. [in]"""
         column, unit, above_zero = kind
@@ -540,7 +521,7 @@ class RowReader:
             if is_clearance and fault.code == "length_negative":
                 fault.code = "clearance_negative"
             raise
-        beyond = not low - _EPS_IN <= value_in / factor <= high + _EPS_IN
+        beyond = not low - ROUNDING_IN <= value_in / factor <= high + ROUNDING_IN
         if beyond or (above_zero and value_in <= 0.0):
             if is_clearance:
                 usual = self._options.clearance_confirm_above_in
@@ -581,33 +562,21 @@ class RowReader:
 
     def _tell(self, index: int, fault: CellFaultError) -> None:
         placed = self._placed[index]
-        if fault.code == "unit_missing":
-            if placed.header_cell in self._without_unit:
-                return
-            self._without_unit.add(placed.header_cell)
-            where = placed.header_row, placed.header, placed.header_cell
-            self._table.tell(
-                fault.code, placed.header, "a unit: in, thou or mm", fault.remedy, *where
-            )
-            return
-        self._tell_cell(self._place(index), self._cells[index], fault)
+        if fault.code != "unit_missing":
+            self._table.tell_fault(fault, self._cells[index], self._place(index))
+        elif placed.place.cell not in self._without_unit:
+            self._without_unit.add(placed.place.cell)
+            expected = "a unit: in, thou or mm"
+            self._table.tell(fault.code, placed.header, expected, fault.remedy, placed.place)
 
-    def _place(self, index: int) -> _CellPlace:
-        placed = self._placed[index]
-        row, cell = (
-            (self._row, f"{column_letters(index)}{self._row}")
-            if self._places is None
-            else self._places[index]
-        )
-        return _CellPlace(row, placed.header, cell)
+    def _place(self, index: int) -> CellPlace:
+        header = self._placed[index].header
+        if self._places is None:
+            return CellPlace.at(self._row, index, header)
+        row, cell = self._places[index]
+        return CellPlace(row, header, cell)
 
-    def _tell_cell(self, place: _CellPlace, raw: Cell, fault: CellFaultError) -> None:
-        found = None if raw is None else quote(raw)
-        self._table.tell(
-            fault.code, found, fault.expected, fault.remedy, place.row, place.header, place.cell
-        )
-
-    def _read_date(self, cell: str | float | OddCell) -> date:
+    def _read_date(self, cell: Filled) -> date:
         if isinstance(cell, str):
             orders = set(readings(plain_text(cell)) or ())
             # A year first says nothing of the order of day and month in other cells.
@@ -626,7 +595,7 @@ class RowReader:
         order = next(iter(self._date_orders)) if len(self._date_orders) == 1 else None
         for waiting in self._waiting.values():
             if order is None:
-                self._tell_cell(waiting.place, waiting.raw, waiting.fault)
+                self._table.tell_fault(waiting.fault, waiting.raw, waiting.place)
         for place, row in enumerate(rows):
             if order is not None and row.source in self._waiting and isinstance(row, Inspection):
                 rows[place] = replace(

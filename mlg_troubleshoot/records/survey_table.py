@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,11 +20,10 @@ from openpyxl.worksheet.worksheet import Worksheet
 from mlg_troubleshoot.decision.columns import Column, Holds
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.outputs import write_csv
-from mlg_troubleshoot.records.cells import Cell, column_letters, quote, stored
-from mlg_troubleshoot.records.model import ReadOptions
+from mlg_troubleshoot.records.cells import Cells, Filled, column_letters, stored
+from mlg_troubleshoot.records.model import CellPlace, ReadOptions, TableInHand
 from mlg_troubleshoot.records.read import load_bytes, open_book
-from mlg_troubleshoot.records.refusals import FileRefusedError
-from mlg_troubleshoot.records.source import NumberedRow
+from mlg_troubleshoot.records.source import FileRefusedError
 from mlg_troubleshoot.records.template import write_book
 from mlg_troubleshoot.records.values import CellFaultError, read_number, read_text, read_value
 from mlg_troubleshoot.surveying.readings import (
@@ -49,7 +49,7 @@ _HEADER_WITHIN = 30
 _KINDS = {kind: kind for kind in ReadingKind if kind not in (ReadingKind.TRAVEL, ReadingKind.ORDER)}
 # No linkage of a landing gear is longer than this; angles are read within one turn.
 _LONGEST_IN, _WIDEST_DEG = 500.0, 360.0
-_DEGREES = ("°", "deg", "degrees")
+_DEGREES: tuple[str, ...] = ("°", "deg", "degrees")
 _HOW = {
     ReadingKind.DISTANCE: (
         "Pin centre to pin centre: over the outside of both pins, less half of each diameter."
@@ -175,11 +175,12 @@ def read_survey(
                 None,
             )
             if header is not None:
-                reader = _Rows(
-                    label, sheet.name, _names(rows[header][1]), linkage, comma=book.delimiter == ";"
-                )
-                found = [reader.read(row) for row in rows[header + 1 :]]
-                return tuple(r for r in found if r is not None), tuple(reader.problems), digest
+                problems: list[Problem] = []
+                comma = book.delimiter == ";"
+                table = TableInHand(ReadOptions(), label, sheet.name, problems.append, comma)
+                reader = _Rows(table, _names(rows[header][1]), linkage)
+                found = [reader.read(*row) for row in rows[header + 1 :]]
+                return tuple(r for r in found if r is not None), tuple(problems), digest
         raise FileRefusedError(
             "header_missing",
             "no header of a survey was found",
@@ -190,160 +191,108 @@ def read_survey(
         return (), (replace(refusal.problem, file=label),), ""
 
 
-def _names(cells: Sequence[Cell]) -> list[str]:
+def _names(cells: Cells) -> list[str]:
     return [cell.strip().lower() if isinstance(cell, str) else "" for cell in cells]
 
 
 class _Rows:
-    """Reads the rows of one sheet and gathers what is wrong with them."""
+    """Reads the rows of one sheet and tells what is wrong with them."""
 
-    def __init__(
-        self,
-        file: str,
-        sheet: str | None,
-        header: list[str],
-        linkage: SurveyedLinkage,
-        *,
-        comma: bool,
-    ) -> None:
-        self.file, self.sheet, self.header, self.linkage, self.comma = (
-            file,
-            sheet,
-            header,
-            linkage,
-            comma,
-        )
+    def __init__(self, table: TableInHand, header: list[str], linkage: SurveyedLinkage) -> None:
+        self.table, self.header, self.linkage = table, header, linkage
         self.points = [p.name for p in linkage.space.mechanism.points]
-        self.problems: list[Problem] = []
+        self.row: dict[str, Filled] = {}
+        self.column = ""
         for i, name in enumerate(header):
             if name and header.index(name) != i:
-                self._fault(
-                    1,
-                    name,
-                    None,
-                    "header_duplicate",
-                    "each column once",
-                    "Remove one of the columns.",
-                )
+                again = "each column once", "Remove one of the columns."
+                self._tell(1, name, CellFaultError("header_duplicate", *again))
 
-    def read(self, numbered: NumberedRow) -> SurveyReading | None:
+    def read(self, number: int, cells: Cells) -> SurveyReading | None:
         """Read one row; None if it has no value, or a cell that is wrong."""
-        number, cells = numbered
-        row = {
-            name: cell
-            for name, cell in zip(self.header, cells, strict=False)
-            if name and cell is not None
-        }
-        given = [f"value_{unit}" for unit in _UNITS if f"value_{unit}" in row]
+        named = zip(self.header, cells, strict=False)
+        self.row = {name: cell for name, cell in named if name and cell is not None}
+        given = [f"value_{unit}" for unit in _UNITS if f"value_{unit}" in self.row]
         if not given:
             return None
-        self.column = "kind"
         try:
-            kind: ReadingKind = read_value(_KIND, row.get("kind") or "")
-            turns = self.linkage.space.mechanism.output.kind == "angle"
-            is_angle = kind is ReadingKind.ANGLE or (kind is ReadingKind.PLUNGER and turns)
-            self._require(
-                kind in _KINDS,
-                "kind",
-                "one of " + ", ".join(_KINDS),
-                "Correct the word.",
-                "kind_unknown",
-            )
-            wanted = ("value_deg",) if is_angle else ("value_in", "value_mm")
-            one, expected = (
-                given[1:] == [] and given[0] in wanted,
-                f"one value, in {' or '.join(wanted)}",
-            )
-            self._require(
-                one, given[-1], expected, "Leave the other columns blank.", "value_columns"
-            )
-            value = self._quantity(
-                row, given[0], signed=kind in (ReadingKind.PLUNGER, ReadingKind.ANGLE)
-            )
-            u = default_u(kind, is_angle=is_angle)
-            for unit in _UNITS:
-                column, expected = f"u_{unit}", "an uncertainty in the unit of the value"
-                if column in row:
-                    self._require(
-                        (unit == "deg") == is_angle,
-                        column,
-                        expected,
-                        "Move the number.",
-                        "unit_of_u",
-                    )
-                    u = self._quantity(row, column, signed=False)
-            extension = self._extension(row)
-            start, end = self._ends(kind, row)
+            return self._reading(number, given)
         except CellFaultError as fault:
-            self._fault(
-                number, self.column, row.get(self.column), fault.code, fault.expected, fault.remedy
-            )
+            self._tell(number, self.column, fault)
             return None
-        return SurveyReading(
-            kind, start, end, value, u, extension, number, is_angle, self.linkage.driven_in
-        )
 
-    def _quantity(self, row: Mapping[str, Cell], column: str, *, signed: bool) -> float:
-        self.column, cell = column, row[column]
+    def _reading(self, number: int, given: list[str]) -> SurveyReading:
+        self.column = "kind"
+        kind: ReadingKind = read_value(_KIND, self.row.get("kind") or "")
+        turns = self.linkage.space.mechanism.output.kind == "angle"
+        is_angle = kind is ReadingKind.ANGLE or (kind is ReadingKind.PLUNGER and turns)
+        known = "one of " + ", ".join(_KINDS)
+        self._require(kind in _KINDS, "kind", known, "Correct the word.", "kind_unknown")
+        wanted = ("value_deg",) if is_angle else ("value_in", "value_mm")
+        self._require(
+            len(given) == 1 and given[0] in wanted,
+            given[-1],
+            f"one value, in {' or '.join(wanted)}",
+            "Leave the other columns blank.",
+            "value_columns",
+        )
+        value = self._quantity(given[0], kind in (ReadingKind.PLUNGER, ReadingKind.ANGLE))
+        u = default_u(kind, is_angle=is_angle)
+        for unit in _UNITS:
+            column, expected = f"u_{unit}", "an uncertainty in the unit of the value"
+            if column in self.row:
+                fits = (unit == "deg") == is_angle
+                self._require(fits, column, expected, "Move the number.", "unit_of_u")
+                u = self._quantity(column, False)
+        extension, ends = self._extension(), self._ends(kind)
+        driven_in = self.linkage.driven_in
+        return SurveyReading(kind, *ends, value, u, extension, number, is_angle, driven_in)
+
+    def _quantity(self, column: str, signed: bool) -> float:
         name, unit = column.split("_")
         if unit == "deg":
-            low, most = (-_WIDEST_DEG, _WIDEST_DEG) if signed else (0.0, _WIDEST_DEG)
-            expected = f"an angle from {low:g} to {most:g} degrees"
-            value = float(np.radians(self._number(cell, low, most, expected, _DEGREES)))
+            most, units = _WIDEST_DEG, _DEGREES
+            expected = f"an angle from {-most if signed else 0:g} to {most:g} degrees"
         else:
             length = LengthUnit.parse(unit)
-            most = length.from_inches(_LONGEST_IN)
-            value = length.to_inches(
-                self._number(
-                    cell,
-                    -most if signed else 0.0,
-                    most,
-                    f"a length up to {most:g} {unit}",
-                    length.spellings,
-                )
-            )
+            most, units = length.from_inches(_LONGEST_IN), length.spellings
+            expected = f"a length up to {most:g} {unit}"
+        low = -most if signed else 0.0
+        number = self._number(column, low, most, expected, units)
+        value = math.radians(number) if unit == "deg" else length.to_inches(number)
         remedy = "Read it again, or leave it blank."
         self._require(value > 0.0 or signed, column, f"a {name} above 0", remedy, "out_of_range")
         return value
 
-    def _extension(self, row: Mapping[str, Cell]) -> float | None:
+    def _extension(self) -> float | None:
         extension = None
         reach = 3.0 * abs(self.linkage.gear.reference.stroke[1] - self.linkage.low)
         for unit in (LengthUnit.INCH, LengthUnit.MILLIMETRE):
-            self.column, most = f"extension_{unit}", unit.from_inches(reach)
-            if self.column in row:
+            column, most = f"extension_{unit}", unit.from_inches(reach)
+            if column in self.row:
                 one = extension is None and (
                     unit is LengthUnit.INCH or self.linkage.driven_in == "in"
                 )
                 expected = "one extension, in the unit of the input"
-                self._require(one, self.column, expected, "Leave one.", "extension_columns")
-                read = self._number(
-                    row[self.column],
-                    0.0,
-                    most,
-                    f"an extension from 0 to {most:.4g}",
-                    unit.spellings,
+                self._require(one, column, expected, "Leave one.", "extension_columns")
+                expected = f"an extension from 0 to {most:.4g}"
+                extension = unit.to_inches(
+                    self._number(column, 0.0, most, expected, unit.spellings)
                 )
-                extension = unit.to_inches(read)
         return extension
 
     def _number(
-        self, cell: Cell, low: float, most: float, expected: str, units: tuple[str, ...]
+        self, column: str, low: float, most: float, expected: str, units: tuple[str, ...]
     ) -> float:
         """Read a number, which may be followed by the unit of its column."""
-        return read_number(
-            "" if cell is None else cell,
-            low,
-            most,
-            decimal_comma=self.comma,
-            expected=expected,
-            units=units,
-        )
+        self.column, comma = column, self.table.decimal_comma
+        cell = self.row[column]
+        return read_number(cell, low, most, decimal_comma=comma, expected=expected, units=units)
 
-    def _ends(self, kind: ReadingKind, row: Mapping[str, Cell]) -> tuple[str, str]:
+    def _ends(self, kind: ReadingKind) -> tuple[str, str]:
         texts = []
         for column in ("from", "to"):
-            cell = stored(row.get(column))
+            cell = stored(self.row.get(column))
             self.column = column
             # A spreadsheet takes the point 4 for a number.
             texts.append(
@@ -389,13 +338,8 @@ class _Rows:
             self.column = column
             raise CellFaultError(code, expected, remedy)
 
-    def _fault(
-        self, row: int, column: str, cell: Cell, code: str, expected: str, remedy: str
-    ) -> None:
-        place = (
-            f"{column_letters(self.header.index(column))}{row}" if column in self.header else None
-        )
-        shown = None if cell is None else quote(cell)
-        self.problems.append(
-            Problem(code, self.file, self.sheet, row, column, place, shown, expected, remedy)
-        )
+    def _tell(self, row: int, column: str, fault: CellFaultError) -> None:
+        place = CellPlace(row, column)
+        if column in self.header:
+            place = CellPlace.at(row, self.header.index(column), column)
+        self.table.tell_fault(fault, self.row.get(column), place)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from mlg_troubleshoot.decision.columns import CLEARANCE, SIDE, TAIL_NO
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
 from mlg_troubleshoot.errors import Problem
-from mlg_troubleshoot.records.cells import Cell, column_letters, quote
+from mlg_troubleshoot.records.cells import Cells, column_letters, quote
 from mlg_troubleshoot.records.layout import ColumnReader, Columns, Header
 from mlg_troubleshoot.records.longform import LongReader
 from mlg_troubleshoot.records.model import ColumnReading, ReadOptions, SheetLayout, TableInHand
@@ -108,7 +108,7 @@ class _Table:
             for column in (TAIL_NO, SIDE, CLEARANCE)
         ]
 
-    def take(self, number: int, cells: Sequence[Cell]) -> None:
+    def take(self, number: int, cells: Cells) -> None:
         # The header is printed again on a later page.
         if cells[0] == self._texts[0] and tuple(cells) == self._texts[: len(cells)] and any(cells):
             self._repeated += 1
@@ -128,7 +128,7 @@ class _Table:
             if read.__class__ is InvalidRow:
                 self._out.invalid_content[read.source] = hash(tuple(cells))
 
-    def _stands_aside(self, number: int, cells: Sequence[Cell]) -> bool:
+    def _stands_aside(self, number: int, cells: Cells) -> bool:
         """Tell a row of totals, signatures and the like: it says so first, and lacks what makes an
         inspection.
         """

@@ -33,9 +33,12 @@ from mlg_troubleshoot.records.headers import Field
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 _ROWS = 500
-# The font and the colour of headers of what this program writes into workbooks.
+# The fonts and the colour of headers of what this program writes into workbooks.
 FONT = "Calibri"
+BOLD = Font(name=FONT, bold=True)
 HEADER_FILL = "FFD9E2EC"
+_TITLE = Font(name=FONT, bold=True, size=14)
+_WRAPPED = Alignment(wrap_text=True, vertical="top")
 _LINE_PT = 15.0
 _LINE = Side(style="thin", color="FF9AA5B1")
 _REQUIRED_FILL = "FFFFE9A8"
@@ -140,9 +143,9 @@ def _instructions(book: Workbook, joints: Sequence[JointSpec]) -> None:
     for row, line in enumerate(lines, 1):
         cell = sheet.cell(row, 1, line)
         cell.data_type = "s"
-        cell.alignment = Alignment(wrap_text=True, vertical="top")
+        cell.alignment = _WRAPPED
         _as_high_as(sheet, row, line, 83)
-    sheet["A1"].font = Font(name=FONT, bold=True, size=14)
+    sheet["A1"].font = _TITLE
     sheet.row_dimensions[1].height = 24
     _fit_to_width(sheet)
 
@@ -165,7 +168,7 @@ def _table(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
     for index, field in enumerate(fields):
         letters = column_letters(index)
         cell = sheet.cell(1, index + 1, field.name)
-        cell.font = Font(name=FONT, bold=True)
+        cell.font = BOLD
         cell.fill = PatternFill(
             "solid", fgColor=_REQUIRED_FILL if _is_must(field.column) else HEADER_FILL
         )
@@ -220,7 +223,7 @@ def _validate(sheet: Worksheet, column: Column, cells: str) -> None:
 def _form(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
     sheet = book.create_sheet("Form")
     sheet["A1"] = FORM_TITLE
-    sheet["A1"].font = Font(name=FONT, bold=True, size=14)
+    sheet["A1"].font = _TITLE
     sheet["A2"] = (
         "One sheet is one inspection. Yellow lines must be filled in; blank means not measured."
     )
@@ -236,7 +239,7 @@ def _form(book: Workbook, gear: Gear, unit: LengthUnit) -> None:
         label.font = Font(name=FONT, bold=must)
         hint.value = _explain(field, gear, unit)
         hint.data_type = "s"
-        hint.alignment = Alignment(wrap_text=True, vertical="top")
+        hint.alignment = _WRAPPED
         hint.font = Font(name=FONT, size=9, color="FF52606D")
         _as_high_as(sheet, row, hint.value, 94)
         _validate(sheet, field.column, f"B{row}")

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from mlg_troubleshoot.decision.inspection import EnteredClearance
+from mlg_troubleshoot.gear.gear import ROUNDING_IN
 from mlg_troubleshoot.records.model import ReadOptions
 from mlg_troubleshoot.units import (
     MM_PER_IN,
@@ -31,7 +32,6 @@ _TOO_SMALL = 0.6
 _FEWEST = 3
 # A plunger reading of this size or less would be that of a failure in a larger unit. [in]
 _PLUNGER_NEAR_ZERO_IN = 0.0025
-_ROUNDING = 1e-9
 # No reading of a clearance is smaller. [in]
 _SMALLEST_IN = 0.0001
 CONFIRM_SMALL = (
@@ -86,7 +86,7 @@ def judge_unit(
         small = small if enough and mean < _TOO_SMALL else ()
     elif mean < _TOO_SMALL:
         scale = UnitFit.TOO_SMALL if enough else UnitFit.DOUBTFUL
-    elif enough and mean < 1.0 - _ROUNDING:
+    elif enough and mean < 1.0 - ROUNDING_IN:
         scale = UnitFit.DOUBTFUL
         small = tuple(joint for joint, ratio in ratios.items() if ratio < 1.0)
     if small:

@@ -14,7 +14,7 @@ from typing import Any
 from mlg_troubleshoot.decision.columns import OUTCOME, Column, Holds
 from mlg_troubleshoot.decision.inspection import Outcome
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.records.cells import UNWRITABLE, OddCell, OddKind, show, show_number
+from mlg_troubleshoot.records.cells import UNWRITABLE, Filled, OddCell, OddKind, show, show_number
 from mlg_troubleshoot.records.dates import DateOrder, readings, written_day
 from mlg_troubleshoot.units import MINUS, LengthUnit, parse_length
 
@@ -141,7 +141,7 @@ def plain_text(text: str) -> str:
 
 
 def read_length(
-    cell: str | float | OddCell,
+    cell: Filled,
     unit: LengthUnit | None,
     declared: LengthUnit | None = None,
     *,
@@ -223,7 +223,7 @@ def _length_fault(text: str, body: str, expected: str, unit: LengthUnit | None) 
 
 def read_value(
     column: Column,
-    cell: str | float | OddCell,
+    cell: Filled,
     header: str = "",
     *,
     decimal_comma: bool = False,
@@ -251,7 +251,7 @@ def read_value(
 
 
 def read_number(
-    cell: str | float | OddCell,
+    cell: Filled,
     low: float,
     high: float,
     *,
@@ -298,7 +298,7 @@ def _written_number(text: str, decimal_comma: bool, expected: str, units: tuple[
     return float(text)
 
 
-def read_text(cell: str | float | OddCell, expected: str, *, required: bool = False) -> str:
+def read_text(cell: Filled, expected: str, *, required: bool = False) -> str:
     """Read an identifier or another text; numbers keep the digits they show."""
     if isinstance(cell, str):
         if cell.isascii() and cell.isprintable():
@@ -318,7 +318,7 @@ def read_text(cell: str | float | OddCell, expected: str, *, required: bool = Fa
     raise odd_cell_fault(cell, expected)
 
 
-def _read_choice(column: Column, cell: str | float | OddCell) -> StrEnum:
+def _read_choice(column: Column, cell: Filled) -> StrEnum:
     """Read one of a few words, in upper or lower case."""
     choices = column.words_taken
     if isinstance(cell, str) and cell in choices:
@@ -341,13 +341,13 @@ _YES_NO = {
 }
 
 
-def _yes_no(cell: str | float | OddCell) -> bool | None:
+def _yes_no(cell: Filled) -> bool | None:
     if isinstance(cell, OddCell):
         return _YES_NO.get(cell.text.strip().casefold()) if cell.kind is OddKind.BOOLEAN else None
     return _YES_NO.get(show(cell).strip().casefold())
 
 
-def _read_yes_no(cell: str | float | OddCell) -> bool:
+def _read_yes_no(cell: Filled) -> bool:
     """Read the answer to a question: yes or no."""
     said = _yes_no(cell)
     if said is None:
@@ -388,7 +388,7 @@ def says_failed(text: str) -> bool:
     return _outcome_word(text) is Outcome.FAILED
 
 
-def _read_outcome(cell: str | float | OddCell, header: str) -> Outcome:
+def _read_outcome(cell: Filled, header: str) -> Outcome:
     """Read what the gear did; yes and no count only where the header asks a question (`Retracted?`,
     `Failed?`).
     """
@@ -416,9 +416,7 @@ class AmbiguousDateError(CellFaultError):
         self.days = days
 
 
-def read_date(
-    cell: str | float | OddCell, order: DateOrder | None = None, latest: date = date.max
-) -> date:
+def read_date(cell: Filled, order: DateOrder | None = None, latest: date = date.max) -> date:
     """Read a day: ISO 8601, a month as a word, numbers in one order, or a cell that is formatted as
     a date.
 
@@ -441,9 +439,7 @@ def read_date(
     return day
 
 
-def read_moment(
-    cell: str | float | OddCell, order: DateOrder | None = None, latest: date = date.max
-) -> date:
+def read_moment(cell: Filled, order: DateOrder | None = None, latest: date = date.max) -> date:
     """Read a day, with its time where the cell states one; an ambiguous day is a fault."""
     try:
         day = read_date(cell, order, latest)
@@ -460,7 +456,7 @@ def read_moment(
         raise CellFaultError("date_invalid", expected, remedy) from None
 
 
-def read_joints(cell: str | float | OddCell, numbers: Collection[int]) -> tuple[int, ...]:
+def read_joints(cell: Filled, numbers: Collection[int]) -> tuple[int, ...]:
     """Read joint numbers in any of the ways people list them: ``3 5``, ``#3, #5``, ``3;5``."""
     expected = f"numbers of joints from {min(numbers)} to {max(numbers)}, for example 3 5"
     words = re.split(r"[\s,;#]+|\band\b", plain_text(show(cell)))
@@ -474,7 +470,7 @@ def read_joints(cell: str | float | OddCell, numbers: Collection[int]) -> tuple[
     return tuple(sorted({int(word) for word in found}))
 
 
-def read_areas(cell: str | float | OddCell, areas: Collection[str]) -> tuple[str, ...]:
+def read_areas(cell: Filled, areas: Collection[str]) -> tuple[str, ...]:
     """Read names of areas, with commas or semicolons between."""
     expected = f"areas of this gear: {'; '.join(areas)}"
     by_name = {name.casefold(): name for name in areas}

@@ -22,8 +22,15 @@ from mlg_troubleshoot.records.cells import (
     OddKind,
     date_cell,
 )
-from mlg_troubleshoot.records.refusals import COPY_THE_TABLE, FileRefusedError
-from mlg_troubleshoot.records.source import MACROS, MergedRange, NumberedRow, Sheet, Workbook
+from mlg_troubleshoot.records.source import (
+    COPY_THE_TABLE,
+    MACROS,
+    FileRefusedError,
+    MergedRange,
+    NumberedRow,
+    Sheet,
+    Workbook,
+)
 from mlg_troubleshoot.records.zipguard import damage, damaged, outside_limits, password_protected
 
 MAX_BYTES = 20_000_000

@@ -43,8 +43,14 @@ from mlg_troubleshoot.records.cells import (
     OddKind,
     iso_date_cell,
 )
-from mlg_troubleshoot.records.refusals import FileRefusedError
-from mlg_troubleshoot.records.source import MACROS, MergedRange, NumberedRow, Sheet, Workbook
+from mlg_troubleshoot.records.source import (
+    MACROS,
+    FileRefusedError,
+    MergedRange,
+    NumberedRow,
+    Sheet,
+    Workbook,
+)
 from mlg_troubleshoot.records.zipguard import (
     MAX_ITEMS,
     GuardedZip,

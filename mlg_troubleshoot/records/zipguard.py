@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from xml.etree.ElementTree import ParseError
 
 from mlg_troubleshoot.records.cells import LETTERS, MAX_COLUMNS, MAX_ROWS, column_letters
-from mlg_troubleshoot.records.refusals import COPY_THE_TABLE, FileRefusedError
+from mlg_troubleshoot.records.source import COPY_THE_TABLE, FileRefusedError
 
 MAX_EXPANDED_BYTES = 200_000_000
 MAX_RATIO = 100

@@ -16,6 +16,7 @@ from mlg_troubleshoot.surveying.readings import (
     MINUTES,
     Quantity,
     ReadingKind,
+    Readings,
     SurveyedLinkage,
     SurveyReading,
 )
@@ -55,7 +56,7 @@ class _Design:
     def __init__(
         self,
         linkage: SurveyedLinkage,
-        taken: tuple[SurveyReading, ...] = (),
+        taken: Readings = (),
         quantity: Quantity | None = None,
     ) -> None:
         prior = Prior(linkage)
@@ -141,7 +142,7 @@ class _Design:
 
 
 def suggested_early(
-    linkage: SurveyedLinkage, taken: tuple[SurveyReading, ...], quantity: Quantity
+    linkage: SurveyedLinkage, taken: Readings, quantity: Quantity
 ) -> Suggested | None:
     """The reading that narrows the wanted quantities most per minute while little is known.
 
@@ -162,7 +163,7 @@ def suggested_early(
     return _worth_most(tuple(design.pool[j] for j in others), narrowing)
 
 
-def _worth_most(candidates: tuple[SurveyReading, ...], narrowing: Array) -> Suggested | None:
+def _worth_most(candidates: Readings, narrowing: Array) -> Suggested | None:
     """The reading that narrows most per minute, None if it hardly does."""
     best = int(np.argmax(narrowing / np.array([MINUTES[c.kind] for c in candidates])))
     return (
@@ -173,7 +174,7 @@ def _worth_most(candidates: tuple[SurveyReading, ...], narrowing: Array) -> Sugg
 
 
 def suggested(
-    linkage: SurveyedLinkage, draws: Array, wanted: Array, taken: tuple[SurveyReading, ...]
+    linkage: SurveyedLinkage, draws: Array, wanted: Array, taken: Readings
 ) -> Suggested | None:
     """The reading that narrows the wanted quantities most per minute, None if none of them matters.
 

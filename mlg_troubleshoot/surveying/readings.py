@@ -128,6 +128,9 @@ class SurveyReading:
         return Sentence.of("{}", Length(value))
 
 
+Readings = tuple[SurveyReading, ...]
+
+
 class SurveyedLinkage:
     """Design variables of a gear's linkage with its calibration, and what they predict, for batches
     of vectors.
@@ -189,7 +192,7 @@ class SurveyedLinkage:
         least = least + step * (slope + step * bend / 2.0)
         return direction * vectors[:, -1:] / (along[:, -1:] - least[:, None])
 
-    def predicted(self, readings: tuple[SurveyReading, ...], vectors: Array) -> Array:
+    def predicted(self, readings: Readings, vectors: Array) -> Array:
         """What each vector predicts for each reading, shape (n_vectors, n_readings); NaN where it
         does not close.
         """
@@ -256,7 +259,7 @@ class SurveyedLinkage:
                     found[:, i] = np.log(self.amplification(vectors)).mean(axis=1)
         return found
 
-    def slopes(self, readings: tuple[SurveyReading, ...], vectors: Array) -> tuple[Array, Array]:
+    def slopes(self, readings: Readings, vectors: Array) -> tuple[Array, Array]:
         """Predictions and their derivatives by central differences, shape (n_vectors, n_readings,
         n_variables).
         """
@@ -332,7 +335,7 @@ class SurveyedLinkage:
             np.isfinite(curve).all(axis=1) & np.isfinite(self.amplification(vectors)).all(axis=1)
         )
 
-    def candidates(self) -> tuple[SurveyReading, ...]:
+    def candidates(self) -> Readings:
         """Everything that can be read: the extension, the plunger over the stroke, every angle,
         every distance.
         """

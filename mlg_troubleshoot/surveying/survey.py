@@ -12,14 +12,14 @@ prior and of the readings' errors, fitted anew by a few steps (Oliver et al. 199
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import combinations
 from typing import Any
 
 import numpy as np
 from numpy.random import Generator
 
-from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.errors import InconclusiveDataError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Slider
@@ -27,6 +27,7 @@ from mlg_troubleshoot.surveying import tuned
 from mlg_troubleshoot.surveying.readings import (
     DEFAULT_U,
     ReadingKind,
+    Readings,
     SurveyedLinkage,
     SurveyReading,
 )
@@ -85,13 +86,13 @@ class Survey:
     """
 
     linkage: SurveyedLinkage
-    readings: tuple[SurveyReading, ...]
+    readings: Readings
     misfits: tuple[Misfit, ...]
     modes: tuple[Mode, ...]
     draws: Array
 
     @property
-    def read(self) -> tuple[SurveyReading, ...]:
+    def read(self) -> Readings:
         """The readings of the table."""
         return tuple(r for r in self.readings if r.row is not None)
 
@@ -156,7 +157,7 @@ class Prior:
         """Draws of it, whether they close or not."""
         return np.asarray(self.mean + rng.standard_normal((n, len(self.mean))) @ self.root.T)
 
-    def closing(self, n: int, rng: Generator, readings: tuple[SurveyReading, ...] = ()) -> Array:
+    def closing(self, n: int, rng: Generator, readings: Readings = ()) -> Array:
         """Draws of it that close, about so many, as the readings have it that speak of one variable
         each.
         """
@@ -180,12 +181,39 @@ class Prior:
         return found[likely & self.linkage.closes(found)][:n]
 
 
+@dataclass(frozen=True, slots=True)
+class Fits:
+    """Fits that are under way, one per row.
+
+    points, means, shape (n_fits, n_variables): where each is, and the middle of its prior. [in or
+    rad] kept, shape (n_fits, n_readings): the readings that each believes. noise, shape (n_fits,
+    n_readings): how far each takes a reading to be off, in the reading's uncertainty. [1] origin,
+    shape (n_fits,): from which of several hypotheses each began. loss, shape (n_fits,): as it was
+    judged last. [1]
+    """
+
+    points: Array
+    means: Array
+    kept: Mask
+    noise: Array
+    origin: Places
+    loss: Array
+
+    def __getitem__(self, rows: Any) -> Fits:
+        return Fits(*(getattr(self, part.name)[rows] for part in fields(self)))
+
+    def best(self, count: int) -> Fits:
+        return self[np.argsort(self.loss)[:count]]
+
+    @classmethod
+    def joined(cls, *fits: Fits) -> Fits:
+        return cls(*(np.concatenate([getattr(f, p.name) for f in fits]) for p in fields(cls)))
+
+
 class Fitting:
     """The readings of one survey against one prior."""
 
-    def __init__(
-        self, linkage: SurveyedLinkage, prior: Prior, readings: tuple[SurveyReading, ...]
-    ) -> None:
+    def __init__(self, linkage: SurveyedLinkage, prior: Prior, readings: Readings) -> None:
         self.linkage, self.prior, self.readings = linkage, prior, readings
         self.value = np.array([r.value for r in readings])
         self.u = np.array([r.u for r in readings])
@@ -198,76 +226,68 @@ class Fitting:
             i for i, r in enumerate(self.readings) if r.extension is None and r.kind not in moves
         ]
 
+    def begun(
+        self, points: Array, means: Any = None, kept: Any = True, noise: Any = 0.0, origin: Any = 0
+    ) -> Fits:
+        """Fits that begin at points, as a rule with all readings and the middle of the prior."""
+        count = len(points)
+        believed, off = (
+            np.broadcast_to(each, (count, len(self.readings))) for each in (kept, noise)
+        )
+        middle = np.broadcast_to(self.prior.mean if means is None else means, points.shape)
+        origin = np.broadcast_to(origin, count)
+        return Fits(points, middle, believed, off, origin, np.zeros(count))
+
     def residuals(self, points: Array) -> Array:
         with np.errstate(all="ignore"):
             return np.asarray((self.linkage.predicted(self.readings, points) - self.value) / self.u)
 
-    def loss(
-        self,
-        points: Array,
-        means: Array,
-        widened: float,
-        kept: Mask,
-        robust: bool,
-        noise: Any = 0.0,
-    ) -> Array:
-        r = np.where(kept, (self.residuals(points) - noise) / widened, 0.0)
+    def linear(self, points: Array, widened: float = 1.0) -> tuple[Array, Array]:
+        """Residuals in the uncertainties of the readings, and their slopes in widened ones."""
+        with np.errstate(all="ignore"):
+            found, slopes = self.linkage.slopes(self.readings, points)
+            return (found - self.value) / self.u, slopes / (self.u * widened)[:, None]
+
+    def loss(self, fits: Fits, widened: float, robust: bool) -> Array:
+        r = np.where(fits.kept, (self.residuals(fits.points) - fits.noise) / widened, 0.0)
         open_ = ~np.isfinite(r)
         r = np.where(open_, 0.0, r)
         data = np.where(open_, tuned.OPEN_LOSS, _robust(r)[0] if robust else r * r)
-        z = (points - means) @ self.prior.whiten.T
+        z = (fits.points - fits.means) @ self.prior.whiten.T
         return np.asarray(data.sum(axis=1) + (z * z).sum(axis=1))
 
-    def descend(
-        self,
-        points: Array,
-        kept: Mask,
-        widened: float,
-        steps: int,
-        robust: bool,
-        means: Any = None,
-        noise: Any = 0.0,
-    ) -> tuple[Array, Array]:
-        """Damped least squares of all starts at once, in variables in which the prior is the unit
+    def descend(self, fits: Fits, widened: float, steps: int, robust: bool) -> Fits:
+        """Damped least squares of all fits at once, in variables in which the prior is the unit
         sphere.
         """
-        points = points.copy()
-        means = np.broadcast_to(self.prior.mean if means is None else means, points.shape)
-        noise, kept = (
-            np.broadcast_to(each, (len(points), len(self.readings))) for each in (noise, kept)
-        )
-        loss = self.loss(points, means, widened, kept, robust, noise)
+        points, loss = fits.points.copy(), self.loss(fits, widened, robust)
         damping = np.full(len(points), 1e-2)
         moving, n = np.arange(len(points)), points.shape[1]
         for _ in range(steps):
-            x, before = points[moving], loss[moving]
-            with np.errstate(all="ignore"):
-                found, slopes = self.linkage.slopes(self.readings, x)
-            r = np.where(
-                kept[moving], ((found - self.value) / self.u - noise[moving]) / widened, 0.0
-            )
+            here, before = replace(fits, points=points)[moving], loss[moving]
+            r, g = self.linear(here.points, widened)
+            r = np.where(here.kept, (r - here.noise) / widened, 0.0)
             weight = _robust(r)[1] if robust else np.ones_like(r)
-            g = (
-                np.where(kept[moving][..., None], slopes / (self.u * widened)[:, None], 0.0)
-                @ self.prior.root
-            )
+            g = np.where(here.kept[..., None], g, 0.0) @ self.prior.root
             # A position that does not close pulls nowhere.
             bad = ~(np.isfinite(g).all(axis=2) & np.isfinite(r))
             r, g = np.where(bad, 0.0, r), np.where(bad[..., None], 0.0, g)
             gram = np.swapaxes(g, 1, 2) @ (weight[..., None] * g) + np.eye(n)
             down = (
-                np.einsum("smi,sm->si", g, weight * r) + (x - means[moving]) @ self.prior.whiten.T
+                np.einsum("smi,sm->si", g, weight * r)
+                + (here.points - here.means) @ self.prior.whiten.T
             )
             left = np.arange(len(moving))
             for _ in range(4 if robust else tuned.DAMPINGS):
-                at = moving[left]
+                at, trial = moving[left], here[left]
                 step = np.linalg.solve(
                     gram[left] + damping[at, None, None] * np.eye(n), down[left][..., None]
                 )[..., 0]
-                trial = x[left] - np.where(np.isfinite(step), step, 0.0) @ self.prior.root.T
-                new = self.loss(trial, means[at], widened, kept[at], robust, noise[at])
+                step = np.where(np.isfinite(step), step, 0.0) @ self.prior.root.T
+                trial = replace(trial, points=trial.points - step)
+                new = self.loss(trial, widened, robust)
                 better = new < loss[at]
-                points[at[better]], loss[at[better]] = trial[better], new[better]
+                points[at[better]], loss[at[better]] = trial.points[better], new[better]
                 damping[at] = np.where(better, damping[at] / 5.0, damping[at] * 8.0).clip(
                     1e-9, 1e12
                 )
@@ -277,7 +297,7 @@ class Fitting:
             moving = moving[loss[moving] < before - 1e-2]
             if not len(moving):
                 break
-        return points, loss
+        return replace(fits, points=points, loss=loss)
 
     def robust(self, points: Array) -> Array:
         """Fit from every start with uncertainties that shrink to their own; the best few remain.
@@ -286,146 +306,111 @@ class Fitting:
         start. What it does not tell stays as the start has it, so that starts which also move are
         among them.
         """
-        everything = np.ones(len(self.readings), dtype=bool)
-        still = self.still
-        starts = points
-        if len(still) > 2:
-            standing = Fitting(self.linkage, self.prior, tuple(self.readings[i] for i in still))
-            for widened in tuned.WIDENED:
-                points, _ = standing.descend(
-                    points, everything[: len(still)], widened, tuned.STEPS_EACH, True, starts
-                )
+        fits = self.begun(points, points)
+        shrinking: tuple[int, ...] = tuned.WIDENED
+        standing = self._standing()
+        if len(standing.readings) > 2:
+            still = standing.begun(points, points)
+            for widened in shrinking:
+                still = standing.descend(still, widened, tuned.STEPS_EACH, True)
             # Of the linkages that stand right, those that also move are the ones to go on with.
-            order = np.argsort(
-                self.loss(points, starts, tuned.WIDENED[2], everything, robust=True)
-            )[: 3 * tuned.MOST_MODES]
-            points, starts = points[order], starts[order]
-        for k, widened in enumerate(tuned.WIDENED[1:] if len(still) > 2 else tuned.WIDENED):
-            points, loss = self.descend(points, everything, widened, tuned.STEPS_EACH, True, starts)
+            fits = self.begun(still.points, points)
+            loss = self.loss(fits, shrinking[2], True)
+            fits = replace(fits, loss=loss).best(3 * tuned.MOST_MODES)
+            shrinking = shrinking[1:]
+        for k, widened in enumerate(shrinking):
+            fits = self.descend(fits, widened, tuned.STEPS_EACH, True)
             if k >= 1:
-                order = np.argsort(loss)[: max(tuned.MOST_MODES, len(points) // 2)]
-                points, starts = points[order], starts[order]
-        points, loss = self.descend(points, everything, 1.0, tuned.LAST_STEPS, robust=True)
-        return points[np.argsort(loss)][: tuned.MOST_MODES]
+                fits = fits.best(max(tuned.MOST_MODES, len(fits.points) // 2))
+        fits = self.descend(self.begun(fits.points), 1.0, tuned.LAST_STEPS, True)
+        return fits.best(tuned.MOST_MODES).points
 
-    def suspected(self, starts: Array) -> tuple[Array, Mask, Array]:
+    def _standing(self) -> Fitting:
+        """The same for what is read at the reference position."""
+        return Fitting(self.linkage, self.prior, tuple(self.readings[i] for i in self.still))
+
+    def suspected(self, starts: Array) -> Fits:
         """Fit what stands still without each reading in turn, and with each two distances
         exchanged.
 
         A slip leads a fit that begins with it into another valley, where readings that are right
         look wrong. All begin at every start, and the worse two thirds are given up whenever the
-        uncertainties shrink. Returns the points of the likeliest few, which readings each keeps,
-        and how far it takes each reading to be off in the reading's uncertainty.
+        uncertainties shrink. Returns the likeliest few, each with the readings that it keeps and
+        how far it takes them to be off.
         """
-        still = self.still
-        part = Fitting(self.linkage, self.prior, tuple(self.readings[i] for i in still))
-        pairs = list(
-            combinations(
-                [i for i, r in enumerate(part.readings) if r.kind is ReadingKind.DISTANCE], 2
-            )
-        )
+        still, part = self.still, self._standing()
+        lengths = [i for i, r in enumerate(part.readings) if r.kind is ReadingKind.DISTANCE]
+        pairs = list(combinations(lengths, 2))
         kept = np.concatenate(
             [~np.eye(len(still), dtype=bool), np.ones((len(pairs), len(still)), dtype=bool)]
         )
         noise, starts = np.zeros(kept.shape), starts[: max(1, tuned.MOST_RESIDUALS // kept.size)]
         for row, (i, j) in zip(noise[len(still) :], pairs, strict=True):
             row[[i, j]] = np.array([1.0, -1.0]) * (part.value[j] - part.value[i]) / part.u[[i, j]]
-        points = means = np.tile(starts, (len(kept), 1))
+        points = np.tile(starts, (len(kept), 1))
         which = np.repeat(np.arange(len(kept)), len(starts))
+        fits = part.begun(points, points, kept[which], noise[which], which)
         for widened in tuned.WIDENED:
-            points, loss = part.descend(
-                points, kept[which], widened, tuned.STEPS_LEFT_OUT, False, means, noise[which]
-            )
-            better = np.argsort(loss)[: max(tuned.FEWEST_STARTS, len(loss) // 3)]
-            points, means, which = points[better], means[better], which[better]
-        likely = np.isin(which, list(dict.fromkeys(which))[: tuned.MOST_MODES])
-        points, means, which = points[likely], means[likely], which[likely]
-        held, off = (
-            np.ones((len(points), len(self.readings)), dtype=bool),
-            np.zeros((len(points), len(self.readings))),
-        )
-        held[:, still], off[:, still] = kept[which], noise[which]
+            fits = part.descend(fits, widened, tuned.STEPS_LEFT_OUT, False)
+            fits = fits.best(max(tuned.FEWEST_STARTS, len(points) // 3))
+            points = fits.points
+        likely = list(dict.fromkeys(fits.origin))[: tuned.MOST_MODES]
+        fits = fits[np.isin(fits.origin, likely)]
+        held = np.ones((len(fits.points), len(self.readings)), dtype=bool)
+        off = np.zeros(held.shape)
+        held[:, still], off[:, still] = fits.kept, fits.noise
+        fits = self.begun(fits.points, fits.means, held, off, fits.origin)
         for widened in tuned.WIDENED[1:]:
-            points, loss = self.descend(
-                points, held, widened, tuned.STEPS_LEFT_OUT, False, means, off
-            )
-        each = [np.flatnonzero(which == k) for k in dict.fromkeys(which)]
-        best = np.concatenate([of[self._apart(points[of], loss[of], 2)] for of in each])
-        return points[best], held[best], off[best]
+            fits = self.descend(fits, widened, tuned.STEPS_LEFT_OUT, False)
+        each = [fits[fits.origin == k] for k in dict.fromkeys(fits.origin)]
+        return Fits.joined(*(of[self._apart(of, 2)] for of in each))
 
-    def reheated(
-        self, points: Array, rng: Generator, kept: Any = True, noise: Any = 0.0
-    ) -> tuple[Array, Array]:
+    def reheated(self, fits: Fits, rng: Generator) -> Fits:
         """Fit once more from around each point, as far as wider uncertainties would let it go; the
         best few remain.
 
         Next to a valley there often lies a better one, behind a low ridge or where more of the
-        readings close. kept, shape (n_points, n_readings): what each is fitted to at first; all of
-        the readings judge in the end. noise, shape (n_points, n_readings): how far each takes the
-        readings to be off where two are exchanged.
+        readings close. All of the readings judge in the end.
         """
-        kept, noise = (
-            np.broadcast_to(each, (len(points), len(self.readings))) for each in (kept, noise)
-        )
-        with np.errstate(all="ignore"):
-            found, slopes = self.linkage.slopes(self.readings, points)
-        weight = np.where(
-            kept, np.nan_to_num(_robust((found - self.value) / self.u - noise)[1]), 0.0
-        )
-        g = np.nan_to_num(slopes, posinf=0.0, neginf=0.0) / self.u[:, None] @ self.prior.root
+        r, slopes = self.linear(fits.points)
+        weight = np.where(fits.kept, np.nan_to_num(_robust(r - fits.noise)[1]), 0.0)
+        g = np.nan_to_num(slopes, posinf=0.0, neginf=0.0) @ self.prior.root
         values, turned = np.linalg.eigh(np.swapaxes(g, 1, 2) @ (weight[..., None] * g))
-        around, which, tried = (
-            [points],
-            np.arange(len(points)),
-            tuned.FITTED_AGAIN if (kept & (noise == 0.0)).all() else tuned.TRIED_AROUND,
-        )
-        held, off = (np.repeat(each, tried, axis=0) for each in (kept, noise))
+        is_plain = (fits.kept & (fits.noise == 0.0)).all()
+        tried = tuned.FITTED_AGAIN if is_plain else tuned.TRIED_AROUND
+        count, n = fits.points.shape
+        around, near = [fits], fits[np.repeat(np.arange(count), tried)]
         for widened in tuned.REHEATED:
-            z = rng.standard_normal((len(points), tried, points.shape[1]))
+            z = rng.standard_normal((count, tried, n))
             z /= np.sqrt(1.0 + np.maximum(values, 0.0) / widened**2)[:, None]
-            trial = points[:, None] + np.einsum("pij,pkj->pki", turned, z) @ self.prior.root.T
-            trial = trial.reshape(-1, points.shape[1])
+            trial = fits.points[:, None] + np.einsum("pij,pkj->pki", turned, z) @ self.prior.root.T
+            near = replace(near, points=trial.reshape(-1, n))
             # Of many around a fit of what stands still, those that also move are the ones to go on
             # with.
-            loss = self.loss(trial, self.prior.mean, widened, held, True, off).reshape(
-                len(points), -1
-            )
-            best = (
-                np.argsort(loss, axis=1)[:, : tuned.FITTED_AGAIN]
-                + tried * np.arange(len(points))[:, None]
-            ).ravel()
-            found, _ = self.descend(
-                trial[best], held[best], widened, tuned.REHEAT_STEPS, robust=True, noise=off[best]
-            )
-            around.append(found)
-        which = np.concatenate(
-            [which, *len(tuned.REHEATED) * [np.repeat(which, tuned.FITTED_AGAIN)]]
-        )
-        points, everything = np.concatenate(around), np.ones(len(self.readings), dtype=bool)
+            order = np.argsort(self.loss(near, widened, True).reshape(count, -1), axis=1)
+            best = order[:, : tuned.FITTED_AGAIN] + tried * np.arange(count)[:, None]
+            around.append(self.descend(near[best.ravel()], widened, tuned.REHEAT_STEPS, True))
+        fits = Fits.joined(*around)
+        fits = replace(fits, kept=np.ones_like(fits.kept))
         for steps, most in (
             (tuned.STEPS_EACH, 3 * tuned.MOST_MODES),
             (tuned.LAST_STEPS, 2 * tuned.MOST_MODES),
         ):
-            points, loss = self.descend(
-                points, everything, 1.0, steps, robust=True, noise=noise[which]
-            )
+            fits = self.descend(fits, 1.0, steps, True)
             # A few readings may be fitted by what does not move over its stroke.
-            loss = np.where(
-                self.linkage.closes(points), loss, np.inf
-            ) + tuned.EXCHANGE_LOSS * noise[which].any(axis=1)
-            apart = self._apart(points, loss, most)
-            points, loss, which = points[apart], loss[apart], which[apart]
-        return points, loss
+            loss = np.where(self.linkage.closes(fits.points), fits.loss, np.inf)
+            loss += tuned.EXCHANGE_LOSS * fits.noise.any(axis=1)
+            fits = replace(fits, loss=loss)
+            fits = fits[self._apart(fits, most)]
+        return fits
 
-    def _apart(self, points: Array, loss: Array, most: int) -> list[int]:
-        """The best points that are not near a better one."""
+    def _apart(self, fits: Fits, most: int) -> list[int]:
+        """The best fits that are not near a better one."""
         found: list[int] = []
-        whitened = points @ self.prior.whiten.T
-        for k in map(int, np.argsort(loss)):
-            if (
-                len(found) < most
-                and (np.abs(whitened[found] - whitened[k]).max(axis=1) > tuned.POINTS_APART).all()
-            ):
+        whitened = fits.points @ self.prior.whiten.T
+        for k in map(int, np.argsort(fits.loss)):
+            apart = np.abs(whitened[found] - whitened[k]).max(axis=1) > tuned.POINTS_APART
+            if len(found) < most and apart.all():
                 found.append(k)
         return found
 
@@ -433,9 +418,9 @@ class Fitting:
         """Least squares on the readings kept, from every point; each mode with its Laplace
         posterior and evidence.
         """
-        points, loss = self.descend(points, kept, 1.0, tuned.LAST_STEPS, robust=False, means=means)
-        with np.errstate(all="ignore"):
-            found, slopes = self.linkage.slopes(self.readings, points)
+        fits = self.descend(self.begun(points, means, kept), 1.0, tuned.LAST_STEPS, False)
+        points, loss = fits.points, fits.loss
+        residuals, slopes = self.linear(points)
         closes, index = self.linkage.closes(points), self.linkage.amplification(points)
         own: list[Array] = []
         modes: list[Mode] = []
@@ -443,7 +428,7 @@ class Fitting:
         for k in np.argsort(loss):
             if not (closes[k] and np.isfinite(slopes[k][kept]).all()):
                 continue
-            g = (slopes[k] / self.u[:, None])[kept] @ self.prior.root
+            g = slopes[k][kept] @ self.prior.root
             values, turned = np.linalg.eigh(g.T @ g)
             values = np.maximum(values, 0.0)
             root = self.prior.root @ (turned / np.sqrt(1.0 + values))
@@ -456,7 +441,7 @@ class Fitting:
             ):
                 continue
             own.append(index[k])
-            r = ((found[k] - self.value) / self.u)[kept]
+            r = residuals[k][kept]
             determined = float(np.sum(values / (1.0 + values)))
             modes.append(
                 Mode(points[k], means[k], root @ root.T, 0.0, float(r @ r), determined, sides)
@@ -577,7 +562,7 @@ class Fitting:
         """Readings one of which is wrong without anybody telling which: leaving out any of them
         fits alike.
         """
-        slopes = self.linkage.slopes(self.readings, mode.vector[None])[1][0] / self.u[:, None]
+        slopes = self.linear(mode.vector[None])[1][0]
         column = mode.covariance @ slopes[i]
         covariance = mode.covariance - np.outer(column, column) / (1.0 + slopes[i] @ column)
         rows = np.flatnonzero(kept | (np.arange(len(kept)) == i))
@@ -661,8 +646,7 @@ class Fitting:
             count = max(1, round(tuned.DRAWS * mode.weight))
             means = mode.mean + rng.standard_normal((count, n)) @ prior.root.T
             noise = rng.standard_normal((count, len(self.readings)))
-            g = self.linkage.slopes(self.readings, mode.vector[None])[1][0] / self.u[:, None]
-            g = np.where(kept[:, None], g, 0.0)
+            g = np.where(kept[:, None], self.linear(mode.vector[None])[1][0], 0.0)
             pulled = (means - mode.mean) @ prior.whiten.T @ prior.whiten + noise @ g
             # A valley is curved: each draw begins as far along its linear step as that helps.
             steps = [mode.vector + t * pulled @ mode.covariance for t in tuned.ALONG_PULL]
@@ -671,30 +655,26 @@ class Fitting:
                 # the prior.
                 means = steps[0] = np.concatenate([prior.closing(count, rng), means])[:count]
                 del steps[1:]
-            losses = [self.loss(x, means, 1.0, kept, False, noise) for x in steps]
-            begun.append((np.choose(np.argmin(losses, axis=0)[:, None], steps), means, noise))
-        points, means, noise = (np.concatenate(parts) for parts in zip(*begun, strict=True))
+            fits = self.begun(means, means, kept, noise)
+            losses = [self.loss(replace(fits, points=x), 1.0, False) for x in steps]
+            points = np.choose(np.argmin(losses, axis=0)[:, None], steps)
+            begun.append(replace(fits, points=points))
+        fits = Fits.joined(*begun)
         # The remaining loss of a draw that arrived is chi-squared, with as many degrees as
         # readings.
         enough = kept.sum() + tuned.FAR * np.sqrt(2.0 * kept.sum())
-        loss, late = np.full(len(points), np.inf), np.arange(len(points))
+        points, loss = fits.points, np.full(len(fits.points), np.inf)
+        late = np.arange(len(points))
         for _ in range(tuned.DRAW_ROUNDS):
-            points[late], loss[late] = self.descend(
-                points[late],
-                kept,
-                1.0,
-                tuned.DRAW_STEPS,
-                robust=False,
-                means=means[late],
-                noise=noise[late],
-            )
+            found = self.descend(fits[late], 1.0, tuned.DRAW_STEPS, False)
+            points[late], loss[late] = found.points, found.loss
             late = np.flatnonzero(loss > enough)
             if not len(late):
                 break
             # One that is held up in another valley begins again at the nearest that is in the right
             # one.
             sound = np.concatenate([[mode.vector for mode in modes], points[loss <= enough]])
-            apart = (((means[late][:, None] - sound) @ prior.whiten.T) ** 2).sum(axis=2)
+            apart = (((fits.means[late][:, None] - sound) @ prior.whiten.T) ** 2).sum(axis=2)
             points[late] = sound[np.argmin(apart, axis=1)]
         arrived = points[(loss <= enough) & self.linkage.closes(points)]
         if len(arrived) < 2:
@@ -716,7 +696,7 @@ def _robust(r: Array) -> tuple[Array, Array]:
 
 def fit(
     gear: Gear,
-    readings: tuple[SurveyReading, ...],
+    readings: Readings,
     rng: Generator,
     told: Callable[[int, int], None] = lambda *_: None,
 ) -> Survey:
@@ -738,19 +718,18 @@ def fit(
         readings = (*readings, prior.order)
     fitting = Fitting(linkage, prior, readings)
     starts = np.concatenate([prior.members, prior.closing(tuned.STARTS, rng, readings)])
-    points, loss = fitting.reheated(fitting.robust(starts), rng)
+    fits = fitting.reheated(fitting.begun(fitting.robust(starts)), rng)
     told(1, tuned.STAGES)
-    kept = np.abs(fitting.residuals(points[:1])[0]) < tuned.TRUSTED
+    kept = np.abs(fitting.residuals(fits.points[:1])[0]) < tuned.TRUSTED
     if not kept.all() and fitting.still:
         # What does not fit is a slip or another valley.
-        points, (without, held, off) = points[: tuned.MOST_MODES], fitting.suspected(starts)
-        nothing = np.zeros((len(points), len(readings)))
-        held, off = np.concatenate([nothing == 0.0, held]), np.concatenate([nothing, off])
-        points, loss = fitting.reheated(np.concatenate([points, without]), rng, held, off)
-        kept = np.abs(fitting.residuals(points[:1])[0]) < tuned.TRUSTED
+        found, others = fits.points[: tuned.MOST_MODES], fitting.suspected(starts)
+        others = replace(others, means=np.broadcast_to(prior.mean, others.points.shape))
+        fits = fitting.reheated(Fits.joined(fitting.begun(found), others), rng)
+        kept = np.abs(fitting.residuals(fits.points[:1])[0]) < tuned.TRUSTED
     # What is that much less likely, each slip counted, is not a mode: without what was exchanged it
     # might seem one.
-    points = points[loss <= loss[0] - 2.0 * np.log(tuned.LEAST_WEIGHT)]
+    points = fits.points[fits.loss <= fits.loss[0] - 2.0 * np.log(tuned.LEAST_WEIGHT)]
     told(2, tuned.STAGES)
     modes = fitting.modes(points, np.broadcast_to(prior.mean, points.shape), kept)
     if not modes:

@@ -28,13 +28,12 @@ from mlg_troubleshoot.decision.columns import (
     Holds,
 )
 from mlg_troubleshoot.decision.inspection import Inspection, Side
-from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
 from mlg_troubleshoot.records import ReadOptions
 from mlg_troubleshoot.records.values import CellFaultError, read_date, read_moment, read_text
 from mlg_troubleshoot.store import Record, RecordKind
 from mlg_troubleshoot.units import LengthUnit
 
-_EPS_IN = 1e-9
 # Made at run time from the joints of a gear: no checker of types reads them.
 _MANY: Any = tuple
 _BY: Any = dict
@@ -69,7 +68,7 @@ class KeptGate:
 
     def __init__(self, gear: Gear) -> None:
         options = ReadOptions.of(gear)
-        numbers = options.joint_numbers
+        numbers = options.joints.numbers
         self._joint: Any = Literal[tuple(numbers)]
         self._by_joint: Any = Literal[tuple(map(str, numbers))]
         columns = {name: kind for c in COLUMNS for name, kind in self._kinds(c, options)}
@@ -168,10 +167,10 @@ class KeptGate:
 
 def _number(low: float, high: float, *, above: bool = False) -> Any:
     """A number in the range of a column; what was converted to inches may be rounded."""
-    most = high + _EPS_IN if math.isfinite(high) else 1e12
+    most = high + ROUNDING_IN if math.isfinite(high) else 1e12
     if above:
         return Annotated[float, Meta(gt=low, le=most)]
-    return Annotated[float, Meta(ge=low - _EPS_IN * (low != 0.0), le=most)]
+    return Annotated[float, Meta(ge=low - ROUNDING_IN * (low != 0.0), le=most)]
 
 
 def _unread(values: Mapping[Column, Any]) -> str:

@@ -40,7 +40,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.search import ALIKE, beside
-from mlg_troubleshoot.records.headers import parse_canonical
+from mlg_troubleshoot.records.headers import Joints, parse_canonical
 from mlg_troubleshoot.units import LengthUnit
 
 # The planned fleet: two years of twenty aircraft (assumed), and what one row scatters, tail by tail
@@ -129,8 +129,9 @@ def _planned(columns: Sequence[str] | None, gear: Gear) -> tuple[set[str], set[i
         return set(FURTHER), set(gear.joint_numbers)
     recorded: set[str] = set()
     joints: set[int] = set()
+    known = Joints.of(gear)
     for name in columns:
-        field = parse_canonical(name, gear.joint_numbers)
+        field = parse_canonical(name, known)
         if field is None:
             raise UsageError(
                 f"{name} is not a column of an inspection table", "see docs/reference/columns.md"

@@ -31,8 +31,7 @@ from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.geometry.kernel import Kernel, numba_is_installed
 from mlg_troubleshoot.geometry.mechanism import Crank, Dyad, Mechanism, Output, Plane, Point, Slider
 from mlg_troubleshoot.indices.chaos import chaos_indices
-from mlg_troubleshoot.indices.displacement import HeldDirections, worst_directions
-from mlg_troubleshoot.indices.inputs import Inputs
+from mlg_troubleshoot.indices.inputs import HeldDirections, Inputs, worst_directions
 from mlg_troubleshoot.indices.tensor import tensor_indices
 
 Array = NDArray[np.float64]

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.paper.certified import CertifiedBound
-from mlg_troubleshoot.paper.worst_search import WorstSearch
+from mlg_troubleshoot.paper.worst_search import CertifiedBound, WorstSearch
 
 from .conftest import FAILURE, mlg
 

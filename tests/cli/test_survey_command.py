@@ -336,3 +336,13 @@ def test_a_template_in_millimetres_means_the_same_as_one_in_inches(tmp_path: Pat
         assert problems == ()
         readings.append([(r.value, r.u, r.extension or 0.0) for r in found])
     assert readings[1] == pytest.approx(np.array(readings[0]), rel=1e-4)
+
+
+def test_a_plunger_reading_of_zero_in_a_workbook_is_a_reading(tmp_path: Path) -> None:
+    book = openpyxl.Workbook()
+    for row in (("kind", "value_in", "extension_in"), ("PLUNGER", 0, 0.5)):
+        book.worksheets[0].append(row)
+    book.save(tmp_path / "s.xlsx")
+    found, problems, _ = read_survey(tmp_path / "s.xlsx", SurveyedLinkage(load_gear()))
+    assert problems == ()
+    assert [r.value for r in found] == [0.0]

@@ -13,7 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.geometry.intervals import Box, Range, cosine_range, narrowed_by_links
+from mlg_troubleshoot.geometry.intervals import (
+    Interval,
+    Range,
+    cosine_range,
+    narrowed_by_links,
+    variables,
+)
 
 FUNCTIONS: dict[str, Callable[[Any, Any], Any]] = {
     "square root": lambda x, y: np.sqrt(x + y),
@@ -33,23 +39,23 @@ def _inside(found: Range, function: Callable[[Any, Any], Any], points: np.ndarra
     x, y = points
     offsets = np.array([[step, 0.0], [0.0, step]])
     value = function(x, y)
-    assert np.all((found.value[0] <= value) & (value <= found.value[1]))
+    assert np.all((found.value.low <= value) & (value <= found.value.high))
     for i, (dx, dy) in enumerate(offsets):
         slope = (function(x + dx, y + dy) - function(x - dx, y - dy)) / (2 * step)
-        assert np.all((found.slope[0][i] - 1e-6 <= slope) & (slope <= found.slope[1][i] + 1e-6))
+        assert np.all((found.slope.low[i] - 1e-6 <= slope) & (slope <= found.slope.high[i] + 1e-6))
         for j, (ex, ey) in enumerate(offsets):
             ahead = function(x + dx + ex, y + dy + ey) - function(x + dx - ex, y + dy - ey)
             behind = function(x - dx + ex, y - dy + ey) - function(x - dx - ex, y - dy - ey)
             bend = (ahead - behind) / (4 * step**2)
             assert np.all(
-                (found.bend[0][i, j] - 1e-5 <= bend) & (bend <= found.bend[1][i, j] + 1e-5)
+                (found.bend.low[i, j] - 1e-5 <= bend) & (bend <= found.bend.high[i, j] + 1e-5)
             )
 
 
 @pytest.mark.parametrize("name", list(FUNCTIONS))
 def test_values_slopes_and_bends_of_a_formula_lie_inside(name: str) -> None:
     low, high = np.array([[1.0], [0.6]]), np.array([[1.9], [1.3]])
-    found = FUNCTIONS[name](*Box(low, high).variables())
+    found = FUNCTIONS[name](*variables(Interval(low, high)))
     grid = np.stack(np.meshgrid(np.linspace(1.0, 1.9, 31), np.linspace(0.6, 1.3, 31))).reshape(
         2, -1
     )
@@ -58,34 +64,34 @@ def test_values_slopes_and_bends_of_a_formula_lie_inside(name: str) -> None:
 
 def test_a_sum_that_no_number_of_the_machine_equals_lies_inside() -> None:
     low = np.array([[0.1], [0.2]])
-    found = operator.add(*Box(low, low).variables())
+    found = operator.add(*variables(Interval(low, low)))
     exact = Fraction(0.1) + Fraction(0.2)
-    assert Fraction(float(found.value[0][0])) < exact < Fraction(float(found.value[1][0]))
+    assert Fraction(float(found.value.low[0])) < exact < Fraction(float(found.value.high[0]))
 
 
 @pytest.mark.parametrize("name", list(FUNCTIONS))
 def test_a_point_is_enclosed_to_a_few_units_in_the_last_place(name: str) -> None:
     at = np.array([[1.3], [0.9]])
-    found = FUNCTIONS[name](*Box(at, at).variables())
-    assert float(found.value[1][0] - found.value[0][0]) < 1e-13
-    assert float(np.max(found.slope[1] - found.slope[0])) < 1e-12
+    found = FUNCTIONS[name](*variables(Interval(at, at)))
+    assert float(found.value.high[0] - found.value.low[0]) < 1e-13
+    assert float(np.max(found.slope.high - found.slope.low)) < 1e-12
 
 
 @pytest.mark.parametrize("function", [np.sqrt, lambda x: 1.0 / x])
 def test_where_a_formula_may_not_exist_its_range_is_not_a_number(
     function: Callable[[Any], Any],
 ) -> None:
-    (x,) = Box(np.array([[-0.1]]), np.array([[1.0]])).variables()
-    assert np.isnan(function(x).value[1][0])
+    (x,) = variables(Interval(np.array([[-0.1]]), np.array([[1.0]])))
+    assert np.isnan(function(x).value.high[0])
 
 
 @given(st.floats(-20.0, 20.0), st.floats(0.0, 8.0))
 def test_a_range_of_angles_has_the_range_of_its_cosines(low: float, width: float) -> None:
-    bottom, top = cosine_range(np.array([low]), np.array([low + width]))
+    found = cosine_range(Interval(np.array([low]), np.array([low + width])))
     cosines = np.cos(np.linspace(low, low + width, 400))
-    assert bottom[0] <= cosines.min()
-    assert cosines.max() <= top[0]
-    assert bottom[0] >= cosines.min() - 0.01 * width**2 - 1e-12
+    assert found.low[0] <= cosines.min()
+    assert cosines.max() <= found.high[0]
+    assert found.low[0] >= cosines.min() - 0.01 * width**2 - 1e-12
 
 
 def _tip(x: Any, y: Any) -> tuple[Any, Any, Any, Any]:
@@ -104,11 +110,11 @@ def test_a_joint_narrowed_by_its_links_still_holds_every_true_position_slope_and
     width: float,
 ) -> None:
     low, high = np.array([[-width], [-width]]), np.array([[width], [width]])
-    x, y = Box(low, high).variables()
+    x, y = variables(Interval(low, high))
     c = _tip(x, y)
-    before = [float(np.max(part.bend[1] - part.bend[0])) for part in c[:2]]
+    before = [float(np.max(part.bend.high - part.bend.low)) for part in c[:2]]
     narrowed = narrowed_by_links(c[:2], (x, y), (5.2, 0.0), 9.0, c[2])
-    after = [float(np.max(part.bend[1] - part.bend[0])) for part in narrowed]
+    after = [float(np.max(part.bend.high - part.bend.low)) for part in narrowed]
     assert after[1] < before[1] or not np.isfinite(before[1])
     grid = width * np.stack(np.meshgrid(np.linspace(-1, 1, 15), np.linspace(-1, 1, 15))).reshape(
         2, -1
@@ -126,12 +132,12 @@ def test_an_enclosure_of_the_linkage_holds_every_point_in_it(
     middle = rng.uniform(-0.004, 0.004, 20)
     low, high = middle - width * rng.random(20), middle + width * rng.random(20)
     stroke = part * gear.model.stroke[1]
-    found = kernel.enclose(stroke, Box(low[:, None], high[:, None]).variables())
-    if not np.isfinite(found.value[1][0]):
+    found = kernel.enclose(stroke, variables(Interval(low[:, None], high[:, None])))
+    if not np.isfinite(found.value.high[0]):
         return
     inside = low + (high - low) * rng.random((40, 20))
     values = kernel.output(stroke, list(inside.T))
-    assert np.all((found.value[0] <= values) & (values <= found.value[1]))
+    assert np.all((found.value.low <= values) & (values <= found.value.high))
     step = 1e-6
     for i in (0, 5, 11, 19):
         ahead, behind = inside.copy(), inside.copy()
@@ -140,4 +146,4 @@ def test_an_enclosure_of_the_linkage_holds_every_point_in_it(
         slope = (kernel.output(stroke, list(ahead.T)) - kernel.output(stroke, list(behind.T))) / (
             2 * step
         )
-        assert np.all((found.slope[0][i] - 1e-6 <= slope) & (slope <= found.slope[1][i] + 1e-6))
+        assert np.all((found.slope.low[i] - 1e-6 <= slope) & (slope <= found.slope.high[i] + 1e-6))

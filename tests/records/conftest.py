@@ -11,7 +11,9 @@ from typing import Any
 import openpyxl
 import pytest
 
+from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records import ReadOptions, ReadResult
+from mlg_troubleshoot.records.headers import Joints
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 from tests.records.reading import read_inspections
 
@@ -39,7 +41,8 @@ def read() -> Callable[..., ReadResult]:
             if isinstance(options.get(key), str):
                 options[key] = kind(options[key])
         raw = data.encode() if isinstance(data, str) else data
-        return read_inspections(io.BytesIO(raw), ReadOptions(**options), name=name)
+        known = {"joints": Joints.of(load_gear()), **options}
+        return read_inspections(io.BytesIO(raw), ReadOptions(**known), name=name)
 
     return run
 

@@ -9,7 +9,7 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome
 from mlg_troubleshoot.records import ReadOptions, read_many
-from mlg_troubleshoot.records.headers import recognise
+from mlg_troubleshoot.records.headers import Joints, recognise
 from tests.cli.conftest import mlg
 
 HEALTHY = {f"clearance_{n}_in": "0.001" for n in range(1, 11)}
@@ -40,7 +40,7 @@ def one(tmp_path, gear, **columns):
     ["outcome", "Result", "RESULT", "Outcome", "Retracted?", "Failed?", "Gear retracted (Y/N)"],
 )
 def test_usual_headers_of_an_outcome_are_understood(gear, header):
-    found = recognise(header, gear.joint_numbers, {})
+    found = recognise(header, Joints(gear.joint_numbers))
     assert found.field is not None
     assert found.field.name == "outcome"
 

@@ -6,6 +6,7 @@ import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.records.headers import Joints
 
 HEADER = ("record_id", "tail_no", "side", "clearance_convention")
 GOOD = ("R1", "N1", "LH", "RADIAL")
@@ -15,6 +16,7 @@ UNDERSTOOD = {
     "J3 [mm]": ("mm", 0.3302),
     "Clearance #3 – short link inner (in)": ("in", 0.013),
     "Clearance #3: short link inner bearing [in]": ("in", 0.013),
+    "Joint 3 short link inner bearing joint (in)": ("in", 0.013),
     "CLEARANCE 3 IN": ("in", 0.013),
     "Joint No. 3 (thou)": ("thou", 13),
     "Joint 3 in mm": ("mm", 0.3302),
@@ -161,7 +163,13 @@ def test_two_columns_of_remarks_of_one_name_are_both_kept(read, table):
 def test_the_names_of_another_gear_are_known_when_given(read, table):
     text = table((*HEADER, "Clearance #3 – drag strut knuckle (in)"), [(*GOOD, 0.013)])
     assert read(text).problems
-    assert not read(text, joint_names={3: "drag strut knuckle"}).problems
+    assert not read(text, joints=Joints(names=("", "", "drag strut knuckle"))).problems
+
+
+def test_the_names_of_the_shipped_gear_are_not_known_with_another(read, table):
+    text = table((*HEADER, "Clearance #2 – locking pin (in)"), [(*GOOD, 0.013)])
+    assert not read(text).problems
+    assert read(text, joints=Joints(names=("torque link", "drag strut knuckle"))).problems
 
 
 def test_a_header_cell_in_a_csv_file_is_named_by_its_letter(read, table):

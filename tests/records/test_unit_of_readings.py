@@ -196,7 +196,7 @@ def test_a_gear_file_without_the_play_of_new_parts_asks_nothing(gear):
         "clearance_convention": "RADIAL",
         **values,
     }
-    silent = ReadOptions(joint_numbers=options.joint_numbers, limit_in=options.limit_in)
+    silent = ReadOptions(joints=options.joints, limit_in=options.limit_in)
     assert not judge_row(named, silent)[1]
 
 

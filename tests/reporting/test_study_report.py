@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.paper.certified import CertifiedBound
 from mlg_troubleshoot.paper.statements import check_statements
 from mlg_troubleshoot.paper.study import (
     Directions,
@@ -18,7 +17,7 @@ from mlg_troubleshoot.paper.study import (
     compare_designs,
     run_study,
 )
-from mlg_troubleshoot.paper.worst_search import WorstSearch
+from mlg_troubleshoot.paper.worst_search import CertifiedBound, WorstSearch
 from mlg_troubleshoot.reporting.provenance import ReportProvenance
 from mlg_troubleshoot.reporting.publish import publish
 from mlg_troubleshoot.reporting.study_report import study_document

@@ -11,8 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.displacement import HeldDirections, Response, worst_directions
-from mlg_troubleshoot.indices.inputs import Inputs
+from mlg_troubleshoot.indices.inputs import HeldDirections, Inputs, Response, worst_directions
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
 
 Array = NDArray[np.float64]

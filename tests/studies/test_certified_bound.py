@@ -8,8 +8,7 @@ import pytest
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.model import LinkageModel, links_from
-from mlg_troubleshoot.paper.certified import CertifiedBound, certified_bound
-from mlg_troubleshoot.paper.worst_search import search_worst
+from mlg_troubleshoot.paper.worst_search import CertifiedBound, certified_bound, search_worst
 
 FAILURE = np.array([0.0, 0.0, 0.013, 0.0, 0.007, 0.0, 0.0, 0.0, 0.0, 0.0])
 

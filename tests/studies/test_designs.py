@@ -8,7 +8,11 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.paper.designs import central_composite, first_order_design, replicated_levels
+from mlg_troubleshoot.paper.replicated import (
+    central_composite,
+    first_order_design,
+    replicated_levels,
+)
 
 
 def test_the_papers_138_points_are_128_corners_and_one_axial_point_a_joint() -> None:

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.indices.chaos import chaos_indices, legendre_terms, total_degree
-from mlg_troubleshoot.indices.displacement import Response
-from mlg_troubleshoot.indices.inputs import beyond_margin
+from mlg_troubleshoot.indices.inputs import Response, beyond_margin
 from mlg_troubleshoot.indices.saltelli import fast_indices
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mlg_troubleshoot.indices.displacement import Response
+from mlg_troubleshoot.indices.inputs import Response
 from mlg_troubleshoot.indices.tensor import TensorIndices
 
 

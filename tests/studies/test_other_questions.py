@@ -8,10 +8,9 @@ import pytest
 from mlg_troubleshoot.errors import InconclusiveDataError, UsageError
 from mlg_troubleshoot.gear.directions import worst_case
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.displacement import HeldDirections
 from mlg_troubleshoot.indices.estimators import group_indices
 from mlg_troubleshoot.indices.given_data import given_data_indices
-from mlg_troubleshoot.indices.inputs import DISTRIBUTIONS, Inputs, beyond_margin
+from mlg_troubleshoot.indices.inputs import DISTRIBUTIONS, HeldDirections, Inputs, beyond_margin
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
 from mlg_troubleshoot.paper.statements import ClaimOutcome, Statement, check_statements
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.indices.displacement import Response
+from mlg_troubleshoot.indices.inputs import Response
 from mlg_troubleshoot.indices.tensor import TensorIndices, tensor_indices
 from mlg_troubleshoot.paper.replicated import (
     PAPER_DESIGNS,

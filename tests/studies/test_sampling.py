@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.displacement import Response
 from mlg_troubleshoot.indices.estimators import Indices, student_half
-from mlg_troubleshoot.indices.inputs import Inputs, joint_groups, with_random_directions
+from mlg_troubleshoot.indices.inputs import Inputs, Response, joint_groups, with_random_directions
 from mlg_troubleshoot.indices.saltelli import fast_indices, saltelli_indices
 from mlg_troubleshoot.indices.tensor import TensorIndices
 

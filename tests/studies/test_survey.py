@@ -278,11 +278,10 @@ def test_a_fit_that_is_held_up_is_freed_by_fitting_again_from_around_it(
     linkage = SurveyedLinkage(gear)
     prior = Prior(linkage)
     fitting = Fitting(linkage, prior, read)
-    everything = np.ones((1, len(read)), dtype=bool)
-    held_up, before = fitting.descend(prior.members[7:8], everything, 1.0, 25, robust=True)
-    _, after = fitting.reheated(held_up, np.random.default_rng(0))
-    assert before[0] > 100.0
-    assert after[0] < 30.0
+    held_up = fitting.descend(fitting.begun(prior.members[7:8]), 1.0, 25, robust=True)
+    freed = fitting.reheated(held_up, np.random.default_rng(0))
+    assert held_up.loss[0] > 100.0
+    assert freed.loss[0] < 30.0
 
 
 @pytest.fixture(scope="module")

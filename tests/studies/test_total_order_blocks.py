@@ -10,8 +10,7 @@ import pytest
 
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
-from mlg_troubleshoot.indices.displacement import HeldDirections
-from mlg_troubleshoot.indices.inputs import Inputs
+from mlg_troubleshoot.indices.inputs import HeldDirections, Inputs
 from mlg_troubleshoot.indices.tensor import TensorIndices
 from mlg_troubleshoot.paper.blocks import BlockStudy, compute_block, total_order_study
 
