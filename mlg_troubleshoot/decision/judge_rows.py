@@ -23,7 +23,7 @@ from mlg_troubleshoot.decision.causes import believed
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.decision.likely_worn import explain
 from mlg_troubleshoot.decision.monte_carlo import check_probability
-from mlg_troubleshoot.decision.next_joint import advise, in_one_voice
+from mlg_troubleshoot.decision.next_joint import advise
 from mlg_troubleshoot.decision.plan import Basis, Plan
 from mlg_troubleshoot.decision.planner import Judged, correct, plans
 from mlg_troubleshoot.decision.prediction import (
@@ -38,6 +38,7 @@ from mlg_troubleshoot.decision.ranking import rank_joints
 from mlg_troubleshoot.decision.repair import calibrated, repair_sets, rigging_alternative, search
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import verdict
+from mlg_troubleshoot.decision.wear_levels import Unread
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.units import Length, Sentence
@@ -154,9 +155,7 @@ def _assessment(
     worst = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
     budget = _budget(judged.batch, cases, i) if known else None
     beyond = bool(plunger.beyond[i])
-    detail = (
-        _detail(cases, i, found, plan, worst, budget, seed) if seed is not None and closes else {}
-    )
+    detail = _detail(cases, judged, i, plan, budget, seed) if seed is not None and closes else {}
     return Assessment(
         inspection=inspection,
         verdict=found,
@@ -229,21 +228,25 @@ def _budget(batch: BatchPrediction, cases: Cases, i: int) -> UncertaintyBudget:
 
 def _detail(
     cases: Cases,
+    judged: Judged,
     i: int,
-    found: Verdict,
     plan: Plan,
-    worst_in: tuple[float, float],
     budget: UncertaintyBudget | None,
     seed: int,
 ) -> dict[str, Any]:
     """What is worked out for a gear that is looked at alone."""
     one, rng = cases.take(np.array([i])), np.random.default_rng(seed)
-    detail: dict[str, Any] = {"measuring": in_one_voice(advise(one), plan)}
+    lower, found, causes = one.predict(one.filled(0.0)), judged.verdicts[i], believed(one)
+    unread = Unread(one, lower, causes.levels)
+    worst_in = float(lower.worst.over_in[0]), float(lower.worst.under_in[0])
+    detail: dict[str, Any] = {
+        "measuring": advise(one, unread, found, float(judged.p_within[i]), plan)
+    }
     if budget is not None:
         detail["confidence"] = check_probability(one, worst_in, budget, rng)
         if found in (Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE):
             detail["rigging"] = rigging_alternative(one, worst_in, budget)
-    detail["posterior"] = explain(one, rng, causes=believed(one))
+    detail["posterior"] = explain(one, rng, causes=causes)
     return detail
 
 

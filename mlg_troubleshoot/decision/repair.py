@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from statistics import NormalDist
 
 import numpy as np
 
@@ -17,14 +16,11 @@ from mlg_troubleshoot.decision.case import Cases, exact_chance
 from mlg_troubleshoot.decision.plan import minutes_to_measure, minutes_to_restore
 from mlg_troubleshoot.decision.prediction import Prediction, model_uncertainty
 from mlg_troubleshoot.decision.second_order import Response, responses
-from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
-from mlg_troubleshoot.decision.wear_levels import normal_cdf
+from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, SCORE, normal_cdf
 from mlg_troubleshoot.gear.gear import Gear
 
 # Repair sets that are shown, and gears searched at once. [1]
 _SHOWN, _ROWS = 5, 256
-# Standard score of the conformance probability. [1]
-SCORE = NormalDist().inv_cdf(CONFORMANCE)
 # Within this of the conformance limit a subset counts as about sufficient: how far the expansion
 # may be off. [in]
 _ABOUT_IN = 5e-4

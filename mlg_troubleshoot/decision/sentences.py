@@ -282,7 +282,8 @@ def measure(gear: Gear, joints: Sequence[int]) -> str:
 def measure_again(joints: Sequence[int], gauge_u_needed_in: float) -> Sentence:
     """Step MEASURE_AGAIN."""
     return Sentence.of(
-        "Measure {} again, with a standard uncertainty of {} radial or less.",
+        "Measure {} again with another gauge, to a standard uncertainty of {} radial or less, and"
+        " confirm which convention was read.",
         joint_list(joints),
         Length(gauge_u_needed_in, 5),
     )

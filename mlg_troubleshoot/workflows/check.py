@@ -11,10 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, MeasuringAdvice, Verdict
-from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, Side
 from mlg_troubleshoot.decision.judge_rows import assess
-from mlg_troubleshoot.decision.next_joint import advise
 from mlg_troubleshoot.decision.prediction import Extension
 from mlg_troubleshoot.errors import ExitCode, OutputError, UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
@@ -236,9 +234,11 @@ def predict(
     return worst_case(known.model, rows)
 
 
-def next_joint(gear: Gear, measured: Mapping[int, float]) -> MeasuringAdvice:
+def next_joint(gear: Gear, measured: Mapping[int, float]) -> MeasuringAdvice | None:
     """Say which joint's reading is most useful next, and whether one may stop measuring."""
-    return advise(Cases.of(gear, [replace(trial_inspection(gear), clearance_in=dict(measured))]))
+    row = replace(trial_inspection(gear), clearance_in=dict(measured))
+    (judged,) = assess([row], gear, load_index_table(gear), advice=True)
+    return judged.measuring if isinstance(judged, Assessment) else None
 
 
 def before_and_after(judgements: Sequence[Judgement]) -> tuple[Assessment, Assessment] | None:

@@ -164,9 +164,15 @@ class Hangar:
             found += [gear for gear, out in zip(new, beyond, strict=True) if out == wants]
         self.gears += found[:wanted]
 
-    def read(self, gear: Gear, joint: int, u_in: float = GAUGE_U_IN) -> None:
-        """Read one joint with a gauge that may be off."""
-        factor = self.world.gauge * self.world.slips.get(joint, 1.0)
+    def read(self, gear: Gear, joint: int, again_u_in: float | None = None) -> None:
+        """Read one joint with a gauge that may be off; again with another one, of which the scale
+        is right to 2 %, and the convention looked up.
+        """
+        if again_u_in is None:
+            u_in, factor = GAUGE_U_IN, self.world.gauge * self.world.slips.get(joint, 1.0)
+        else:
+            u_in, factor = again_u_in, self.rng.normal(1.0, 0.02)
+            gear.row[f"gauge_u_{joint}_in"] = u_in
         seen = factor * gear.true_in[joint - 1] + self.rng.normal(0.0, u_in)
         gear.row[f"clearance_{joint}_in"] = max(seen, 0.0)
 
@@ -222,9 +228,7 @@ class Hangar:
                 needed = step["gauge_u_needed_in"]
                 for j in joints:
                     gear.minutes += READ_MIN[j - 1]
-                    self.read(gear, j, needed or GAUGE_U_IN)
-                    if needed:
-                        row[f"gauge_u_{j}_in"] = needed
+                    self.read(gear, j, needed)
             case "READ_PLUNGER":
                 gear.minutes += PLUNGER_MIN
                 self.read_plunger(gear)

@@ -70,7 +70,7 @@ def test_a_displacement_beyond_what_the_joints_explain_is_not_explained(judge: J
 def test_a_joint_over_its_limit_is_restored_before_a_displacement_counts_as_unexplained(
     judge: Judge,
 ) -> None:
-    found = judge(every_joint(0.001, j7=0.008), readings_in=(0.060,))
+    found = judge(every_joint(0.001, j7=0.0148), readings_in=(0.060,))
     assert [(step.action, step.joints) for step in found.plan.steps] == [
         (Action.RESTORE, (7,)),
         (Action.CHECK_RIGGING, ()),
@@ -130,7 +130,7 @@ def test_an_area_counts_once_and_again_after_a_repair_closed_it(judge: Judge) ->
 
 
 def test_a_gear_that_retracts_has_only_the_joint_over_its_limit_restored(judge: Judge) -> None:
-    found = judge(every_joint(0.004, j7=0.008), outcome=Outcome.RETRACTED)
+    found = judge(every_joint(0.001, j7=0.0148), outcome=Outcome.RETRACTED)
     assert (found.next_action.action, found.next_action.joints) == (Action.RESTORE, (7,))
     assert found.end is End.DONE
 
@@ -158,7 +158,7 @@ def test_the_joints_explain_a_displacement_up_to_two_standard_uncertainties_beyo
 
 
 def test_a_failure_that_clearances_likely_caused_is_expected_to_be_repaired(judge: Judge) -> None:
-    found = judge(every_joint(0.001, j3=0.013, j5=0.007), outcome=Outcome.FAILED)
+    found = judge(every_joint(0.001, j3=0.0148), outcome=Outcome.FAILED)
     assert 0.05 < (found.probability_exceed_random_directions or 0.0) < 0.5
     assert [step.action for step in found.plan.steps] == [
         Action.READ_PLUNGER,

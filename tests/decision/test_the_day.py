@@ -38,7 +38,7 @@ def test_sound_joints_are_not_restored_for_one_that_cannot_be_reached(judge: Jud
 
 
 def test_a_joint_over_its_limit_is_restored_although_an_area_is_shut(judge: Judge) -> None:
-    found = judge(dict.fromkeys(SIDESTAY, 0.002) | {3: 0.013}, **FAILED, cannot_reach=LINKS)
+    found = judge(dict.fromkeys(SIDESTAY, 0.001) | {3: 0.0148}, **FAILED, cannot_reach=LINKS)
     assert (found.next_action.action, found.next_action.joints) == (Action.RESTORE, (3,))
     assert found.plan.steps[1].action is Action.READ_PLUNGER
 
