@@ -23,6 +23,7 @@ from mlg_troubleshoot.indices.index_table import load_index_table
 from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
 from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
+from mlg_troubleshoot.workflows.since_repairs import since_repairs
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.life.looking_back import PastInspection
@@ -262,13 +263,9 @@ def _judge(
 ) -> CheckResult:
     advice = len(rows) == 1 if options.advice is None else options.advice
     asked: dict[str, Any] = {"advice": advice, "seed": options.seed, "extension": options.extension}
-    as_they_count = rows
-    if store is not None:
-        from mlg_troubleshoot.workflows.since_repairs import since_kept_repairs
-
-        as_they_count = since_kept_repairs(rows, store, gear)
+    as_they_count = since_repairs(rows, gear, store)
     judgements = assess(as_they_count, gear, load_index_table(gear), **asked, progress=on_judged)
-    if store is not None:
+    if as_they_count is not rows:
         # What is shown and kept of an inspection is what was found, whatever counts no more.
         judgements = tuple(
             replace(judged, inspection=row)
