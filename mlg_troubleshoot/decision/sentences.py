@@ -302,7 +302,9 @@ def restore(
 ) -> str:
     """Step RESTORE; `expected`: what is measured before decides."""
     if expected:
-        return f"Restore what the readings call for: expected {joint_list(joints)}."
+        guessed = [joint for joint in joints if joint not in over]
+        found = f"what the readings find worn, perhaps {joint_list(guessed)}"
+        return f"Restore {f'{joint_list(over)} and ' if over else ''}{found}."
     said = (
         f"Restore, in this order: {joint_list(joints)}."
         if len(joints) > 1
