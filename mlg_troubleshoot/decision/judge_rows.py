@@ -35,7 +35,7 @@ from mlg_troubleshoot.decision.prediction import (
     Prediction,
 )
 from mlg_troubleshoot.decision.ranking import rank_joints
-from mlg_troubleshoot.decision.repair import calibrated, repair_sets, rigging_alternative, search
+from mlg_troubleshoot.decision.repair import repair_sets, rigging_alternative
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import verdict
 from mlg_troubleshoot.decision.wear_levels import Unread
@@ -99,11 +99,8 @@ def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Ass
         for beyond, low, high, missing in zip(plunger.beyond, p_lower, p_upper, absent, strict=True)
     ]
     closes = np.isfinite(batch.lower.displacement_in)
-    found = calibrated(
-        cases, search(cases, batch.upper.displacement_in, batch.upper.u_clearances_in)
-    )
     wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in verdicts]) & closes
-    sets = repair_sets(cases, found, wanted)
+    sets = repair_sets(cases, batch.upper, np.flatnonzero(wanted))
     findings = rank_joints(
         cases.gear,
         table,

@@ -562,30 +562,29 @@ def _measure_again(cases: Cases, judged: Judged) -> tuple[Mask, Array]:
     if not len(rows):
         return chosen, needed
     some = cases.take(rows)
-    part, margin = judged.batch.lower, cases.margin_in[rows]
+    part = judged.batch.lower
     slopes = responses(cases.gear)[0].slopes(some.filled(0.0))
     fixed = part.u_geometry_in[rows] ** 2 + part.u_model_in[rows] ** 2 + some.margin_u_in**2
     own = np.where(some.measured, (slopes * some.gauge_u_in) ** 2, 0.0)
-    done = np.zeros(len(rows), bool)
-    for better in BETTER_GAUGES_IN:
+    off = part.displacement_in[rows] - cases.margin_in[rows]
+    off, fixed = off[:, None], (fixed + own.sum(axis=1))[:, None]
+    for better in sorted(BETTER_GAUGES_IN):
         eligible = some.measured & ~some.own_gauge & (some.gauge_u_in > better)
-        worth = np.where(eligible, slopes**2 * (some.gauge_u_in**2 - better**2), 0.0)
+        then = (slopes * better) ** 2
+        worth = np.where(eligible, own - then, 0.0)
         order = np.argsort(-np.round(worth / cases.gear.access_minutes, 12), axis=1, kind="stable")
-        again = np.zeros_like(eligible)
-        for place in range(eligible.shape[1]):
-            joint = order[:, place]
-            again[np.arange(len(rows)), joint] = eligible[np.arange(len(rows)), joint]
-            left = np.sum(np.where(again, (slopes * better) ** 2, own), axis=1)
-            guard = SCORE * np.sqrt(fixed + left)
-            moves = np.sqrt(np.sum(np.where(again, own + (slopes * better) ** 2, 0.0), axis=1))
-            off = part.displacement_in[rows] - margin
-            moves = np.maximum(moves, 1e-12)
-            settles = tabled_normal_cdf((off - guard) / moves) + tabled_normal_cdf(
-                (-off - guard) / moves
-            )
-            now = ~done & again.any(axis=1) & (settles > 0.5)
-            chosen[rows[now]], needed[rows[now]] = again[now], better
-            done |= now
+        gained, moved = (
+            np.cumsum(np.take_along_axis(each, order, axis=1), axis=1)
+            for each in (worth, np.where(eligible, own + then, 0.0))
+        )
+        guard, moves = SCORE * np.sqrt(fixed - gained), np.sqrt(np.maximum(moved, 1e-24))
+        settles = tabled_normal_cdf((off - guard) / moves) + tabled_normal_cdf(
+            (-off - guard) / moves
+        )
+        enough = (settles > 0.5) & np.take_along_axis(eligible, order, axis=1)
+        upto = np.argsort(order, axis=1) <= np.argmax(enough, axis=1)[:, None]
+        now = enough.any(axis=1)
+        chosen[rows[now]], needed[rows[now]] = (eligible & upto)[now], better
     return chosen, needed
 
 
