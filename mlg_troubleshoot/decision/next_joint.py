@@ -11,7 +11,7 @@ from mlg_troubleshoot.decision.assessment import MeasuringAdvice, ReadingWorth, 
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.plan import Action, Plan, minutes_to_measure
 from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
-from mlg_troubleshoot.decision.wear_levels import Unread, level_chances
+from mlg_troubleshoot.decision.wear_levels import TOO_CLOSE, Unread, level_chances
 
 # At a conformance probability of 95 % one wrong WITHIN weighs as much as this many wrong OUTSIDE.
 COST_OF_WRONG_WITHIN = CONFORMANCE / (1.0 - CONFORMANCE)
@@ -20,9 +20,6 @@ _NO_VALUE = 1e-6
 # An expectation is enough where being wrong costs at most this share of what a just conforming
 # OUTSIDE does. [1]
 _ENOUGH_SHARE = 0.5
-# Chance from which a gear counts as too close to its margin for any reading of a joint to settle
-# it. [1]
-_TOO_CLOSE = 0.9
 
 
 def decision_risk(probability: Array | float) -> Array:
@@ -35,7 +32,7 @@ def enough(within: float, too_close: float = 0.0) -> Verdict | None:
     """Say which verdict an expectation is enough for, to go on troubleshooting."""
     if decision_risk(within) <= _ENOUGH_SHARE * (1.0 - CONFORMANCE) * (1.0 + 1e-9):
         return Verdict.WITHIN_MARGIN if within > 0.5 else Verdict.OUTSIDE_MARGIN
-    return Verdict.INCONCLUSIVE if too_close >= _TOO_CLOSE else None
+    return Verdict.INCONCLUSIVE if too_close >= TOO_CLOSE else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,7 @@ from mlg_troubleshoot.decision.prediction import BatchPrediction
 from mlg_troubleshoot.decision.repair import removable
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import SCORE, tabled_normal_cdf, verdict
-from mlg_troubleshoot.decision.wear_levels import Unread
+from mlg_troubleshoot.decision.wear_levels import TOO_CLOSE, Unread
 
 # Standard uncertainties that a better gauge can reach: those of bore gauges and micrometers. [in]
 BETTER_GAUGES_IN = (0.0004, 0.0003)
@@ -136,6 +136,7 @@ class _BatchContext:
         self.candidates = np.where(missing[:, None], critical, self.open)
         self.group = ahead.group(self.candidates, _SETTLED)
         self.rest = self.open & ~self.group
+        self.too_close = ~missing & (ahead.too_close() >= TOO_CLOSE)
         self.rest_needed = ahead.settled(self.group, self.rest) < 0.5
         # Restoring a joint that may be sound costs more than reading it with another gauge.
         doubt = (1.0 - causes.worn) * self.restore_min
@@ -366,6 +367,8 @@ class _PlanBuilder:
         """
         f, i = self.facts, self.row
         found = f.after_limits[i]
+        if found is Verdict.INCOMPLETE and f.too_close[i] and not self.over:
+            return self._end(End.TOO_CLOSE)
         if found is Verdict.INCOMPLETE and f.group[i].any():
             self._measure(self._joints(f.group[i]))
             if f.rest[i].any() and f.rest_needed[i]:

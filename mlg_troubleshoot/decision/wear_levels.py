@@ -25,9 +25,12 @@ _WORN_OUT = 0.02
 SHARES = (np.arange(50) + 0.5) / 25.0
 SHARE = 0.04
 
+# Chance from which a gear counts as too close to its margin for any reading of a joint to settle
+# it. [1]
+TOO_CLOSE = 0.8
 # What a reading may be wrong beside its stated uncertainty: standard deviation of the scale of a
 # gauge, and chance that it is the total play where the radial clearance is stated; assumed. [1]
-_SCALE, _SLIP = 0.1, 0.05
+_SCALE, _SLIP = 0.1, 0.1
 
 
 def _densities() -> Array:

@@ -237,8 +237,8 @@ def test_an_expectation_is_enough_where_being_wrong_costs_as_little_either_way()
 
 
 def test_measuring_on_is_not_worth_it_where_the_verdict_will_be_too_close_anyway() -> None:
-    assert enough(0.5, too_close=0.9) is Verdict.INCONCLUSIVE
-    assert enough(0.5, too_close=0.89) is None
+    assert enough(0.5, too_close=0.8) is Verdict.INCONCLUSIVE
+    assert enough(0.5, too_close=0.79) is None
 
 
 def test_an_expectation_of_either_side_goes_before_too_close() -> None:
