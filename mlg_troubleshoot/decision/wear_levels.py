@@ -74,7 +74,9 @@ def surely_worn(cases: Cases, levels: Array) -> Array:
         spread = np.hypot(u, np.where(again, 0.0, _SCALE * factor * SHARES))
         log = -0.5 * ((read - factor * SHARES) / spread) ** 2 - np.log(spread)
         logs.append(np.where(again & (factor > 1.0), -np.inf, log + np.log(share)))
-    weight = np.logaddexp(*logs) + np.log(levels[rows] @ DENSITIES)
+    # The level by the other readings: this one is in doubt.
+    others = levels[rows] / DENSITIES[:, np.minimum(read[:, 0] / SHARE, 49.0).astype(int)].T
+    weight = np.logaddexp(*logs) + np.log(others @ DENSITIES)
     weight = np.exp(weight - weight.max(axis=1, keepdims=True))
     chance[rows, joints] = (weight @ (SHARES > 1.0)) / weight.sum(axis=1)
     return chance

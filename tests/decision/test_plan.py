@@ -70,7 +70,7 @@ def test_a_displacement_beyond_what_the_joints_explain_is_not_explained(judge: J
 def test_a_joint_over_its_limit_is_restored_before_a_displacement_counts_as_unexplained(
     judge: Judge,
 ) -> None:
-    found = judge(every_joint(0.001, j7=0.0148), readings_in=(0.060,))
+    found = judge(every_joint(0.0003, j7=0.0148), readings_in=(0.060,))
     assert [(step.action, step.joints) for step in found.plan.steps] == [
         (Action.RESTORE, (7,)),
         (Action.CHECK_RIGGING, ()),
@@ -130,7 +130,7 @@ def test_an_area_counts_once_and_again_after_a_repair_closed_it(judge: Judge) ->
 
 
 def test_a_gear_that_retracts_has_only_the_joint_over_its_limit_restored(judge: Judge) -> None:
-    found = judge(every_joint(0.001, j7=0.0148), outcome=Outcome.RETRACTED)
+    found = judge(every_joint(0.0003, j7=0.0148), outcome=Outcome.RETRACTED)
     assert (found.next_action.action, found.next_action.joints) == (Action.RESTORE, (7,))
     assert found.end is End.DONE
 
