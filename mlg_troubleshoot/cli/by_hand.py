@@ -78,6 +78,7 @@ def _day(flags: Flags) -> dict[str, str | None]:
         "plunger_date": flags.plunger_date,
         "outcome_date": flags.outcome_date,
         "rigging_checked": flags.rigging_checked,
+        "measured_again": flags.measured_again,
         "cannot_reach": flags.cannot_reach,
         "no_spare": flags.no_spare,
         "open_areas": flags.open_areas,

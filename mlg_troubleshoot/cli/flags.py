@@ -67,6 +67,10 @@ class Flags:
             help="Rigging and lock roller: looked at, or set right.",
         ),
     ] = None
+    measured_again: Annotated[
+        str | None,
+        typer.Option("--measured-again", metavar="JOINTS", help="Read with another gauge too."),
+    ] = None
     cannot_reach: Annotated[
         str | None,
         typer.Option("--cannot-reach", metavar="JOINTS", help="Joints out of reach today, e.g. 4."),

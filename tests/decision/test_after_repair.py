@@ -137,6 +137,8 @@ def test_a_joint_that_reads_little_over_its_limit_is_read_with_another_gauge(jud
     clear = judge(every_joint(0.0003, j10=0.0148), gauge_u_in=0.0005)
     assert (edge.next_action.action, edge.next_action.joints) == (Action.MEASURE_AGAIN, (10,))
     assert "with another gauge" in edge.next_action.text
+    again = judge(every_joint(0.001, j10=0.0078), gauge_u_in=0.0005, measured_again=(10,))
+    assert again.next_action.action is Action.RESTORE
     assert clear.next_action.action is Action.RESTORE
 
 

@@ -236,3 +236,17 @@ def test_reading_in_an_area_that_the_repair_opens_anyway_costs_the_reading_alone
     # Joint 7 is over its limit: the link assembly, in which #8 is read, will be opened in any case.
     assert [(step.action, step.joints) for step in steps[:1]] == [(Action.MEASURE, (8,))]
     assert 7 in steps[1].joints
+
+
+def test_reading_ends_where_the_gear_will_be_too_close_anyway(judge: Judge) -> None:
+    close, open_still = (judge(dict.fromkeys(range(1, 8), c)) for c in (0.0022, 0.0019))
+    assert (close.verdict, close.end) == (Verdict.INCOMPLETE, End.TOO_CLOSE)
+    assert close.next_action.action is Action.CONTINUE
+    assert open_still.next_action.action is Action.MEASURE
+
+
+def test_the_expected_repair_says_which_joint_nobody_has_read(judge: Judge) -> None:
+    found = judge({3: 0.013, 5: 0.007}, outcome=Outcome.FAILED)
+    (repair,) = [step for step in found.plan.steps if step.action is Action.RESTORE]
+    assert repair.joints == (3, 2)
+    assert repair.text == "Restore #3 and what the readings find worn, perhaps #2."

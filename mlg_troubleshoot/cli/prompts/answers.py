@@ -42,6 +42,7 @@ SIGN_OFF = tuple(column.name for column in _SIGNED)
 DAY = {
     "n": "restored_joints",
     "g": "rigging_checked",
+    "a": "measured_again",
     "c": "cannot_reach",
     "w": "no_spare",
     "o": "open_areas",
@@ -247,7 +248,7 @@ _ITEM = re.compile(
 # What was repaired, and what the day allows, on the same line.
 _DAY_ITEM = re.compile(
     r"""\s*[,;]?\s*(?:
-        (?P<joints>n|new|c|cannot\s+reach|w|no\s+spare)\s*[=:]?\s*
+        (?P<joints>n|new|a|again|c|cannot\s+reach|w|no\s+spare)\s*[=:]?\s*
         (?P<numbers>\#?\d{1,3}(?![.\d])(?:(?:\s*[,;]\s*|\s+)\#?\d{1,3}(?![.\d]))*)
       | (?P<rigging>g|rigging)\s+(?P<looked>yes|no|corrected)
       | (?P<open>o|open)\s+(?P<areas>[a-z][a-z ;]*)
