@@ -57,8 +57,8 @@ def since_repairs(
     repair on the day of a row or later makes its outcome, its plunger reading and what it says of
     the restored joints older.
 
-    A row that states a repair itself stays as it is, and one without a date is no older than what
-    the store keeps.
+    A row that states a repair itself stays as it is; what the store keeps reaches only rows with a
+    date.
     """
     repairs: defaultdict[GearKey, list[Repair]] = defaultdict(list)
     for place, row in enumerate(rows):
