@@ -114,13 +114,13 @@ def advice_for(
 
     def advise(measured: Mapping[int, float], left: Sequence[int]) -> tuple[str, int | None] | None:
         advice = task.next_joint(gear, measured)
+        if advice is None:
+            return None
         if advice.stop and left:
             return f"{advice.text} Type done.", None
         joint = next((worth.joint for worth in advice.worth if worth.joint in left), None)
         if joint is None:
             return None
-        if advice.expected is not None and joint == advice.joint:
-            return f"{advice.text} Or type done.", joint
         return f"Most useful next reading: {gear.joint(joint).label}.", joint
 
     return advise

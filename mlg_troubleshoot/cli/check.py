@@ -46,6 +46,7 @@ _OF_ONE_GEAR: options.ColumnFlags = {
         "no|yes|corrected",
         "Rigging and lock roller: looked at, or set right.",
     ),
+    "measured_again": ("--measured-again", "JOINTS", "Read with another gauge too."),
     "cannot_reach": ("--cannot-reach", "JOINTS", "Joints out of reach today, e.g. 4."),
     "no_spare": ("--no-spare", "JOINTS", "Joints without a spare part, e.g. 3."),
     "open_areas": ("--open", "AREAS", "Areas that are open, e.g. sidestay."),

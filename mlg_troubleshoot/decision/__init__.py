@@ -2,11 +2,9 @@
 
 __all__ = [
     "assessment",
-    "case",
     "columns",
     "inspection",
     "judge_rows",
-    "next_joint",
     "plan",
     "prediction",
     "ranking",

@@ -64,7 +64,10 @@ class Cases:
             ),
             gauge_u_in=np.array([[i.gauge_u_of(number) for number in numbers] for i in rows]),
             own_gauge=np.array(
-                [[number in i.gauge_u_by_joint_in for number in numbers] for i in rows]
+                [
+                    [n in i.gauge_u_by_joint_in or n in i.measured_again for n in numbers]
+                    for i in rows
+                ]
             ),
             margin_in=np.array(
                 [gear.margin.value if i.margin_in is None else i.margin_in for i in rows]

@@ -7,9 +7,8 @@ products of characteristic functions: of a clearance c in uniformly random direc
 a joint that nobody read the same averaged over its wear. With a small chance the loads hold all
 pins in their worst directions: a reading near the bound then says so.
 
-Wear: the shares of one gear's joints are exponential about a level that they have in common, and a
-few joints are worn out for reasons of their own. No fleet of this gear is public: all of this is
-assumed, and stands in the tables below.
+Wear before the plunger is read is that of `wear_levels`. No fleet of this gear is public: all of
+this is assumed, and stands in the tables below.
 """
 
 from __future__ import annotations
@@ -25,14 +24,18 @@ from mlg_troubleshoot.decision.assessment import RepairSet
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import RiggingCheck
 from mlg_troubleshoot.decision.second_order import responses
-from mlg_troubleshoot.decision.wear_levels import tabled_normal_cdf
+from mlg_troubleshoot.decision.verdict_rule import tabled_normal_cdf
+from mlg_troubleshoot.decision.wear_levels import (
+    BEYOND,
+    DENSITIES,
+    LEVELS,
+    MEAN,
+    SHARES,
+    level_chances,
+    surely_worn,
+)
 from mlg_troubleshoot.gear.gear import Gear
 
-# Levels of wear of one gear, in units of the limit, each as likely. [1]
-_LEVELS = np.geomspace(0.06, 1.2, 7)
-# Chance that a joint is worn out for a reason of its own, at any level: between its limit and twice
-# its limit. [1]
-_WORN_OUT = 0.02
 # Of the gears that failed: how many did so through the joints for each that was mis-rigged, and for
 # each that failed through something that leaves the plunger within its margin.
 _JOINTS_FOR_ONE_MISRIGGED, _JOINTS_FOR_ONE_ELSEWHERE = 3.0, 3.0
@@ -53,7 +56,6 @@ _T = np.pi * np.arange(1, _TERMS + 1) / _HALF_IN
 _AT = np.linspace(-_HALF_IN, _HALF_IN, _PLACES)
 _STEP_IN = _AT[1] - _AT[0]
 _COSINES = np.cos(_T[:, None] * _AT)
-SHARES = (np.arange(50) + 0.5) / 25.0
 
 
 @lru_cache(maxsize=1)
@@ -68,25 +70,15 @@ def _bessel(z: Array) -> Array:
     return np.asarray(np.interp(z, np.arange(len(table)) * 0.05, table))
 
 
-def share_densities() -> Array:
-    """Chance of each share of a joint's wear at each level, (levels, shares). [1]"""
-    even = np.exp(-SHARES / _LEVELS[:, None])
-    even /= even.sum(axis=1, keepdims=True)
-    out = np.where(SHARES > 1.0, 1.0, 0.0)
-    return np.asarray((1.0 - _WORN_OUT) * even + _WORN_OUT * out / out.sum())
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Tables:
     """What a gear says of joints that nobody read: characteristic functions, and the same of worn
-    ones, (levels, joints, terms); mean and variance of the share; the bend of the mean, by joint.
+    ones, (levels, joints, terms); the bend of the mean, by joint.
     """
 
     amplification: Array
     unread: Array
     worn: Array
-    worn_chance: Array
-    share_mean: Array
     bend: Array
     exceeds: float
 
@@ -94,25 +86,15 @@ class _Tables:
 @lru_cache(maxsize=4)
 def _tables(gear: Gear) -> _Tables:
     response = responses(gear)[0]
-    chances = share_densities()
     reach = response.amplification * gear.limits_in
     waves = _bessel(_T[None, None, :] * reach[:, None, None] * SHARES[None, :, None])
-    unread = np.einsum("ls,jsk->ljk", chances, waves)
-    over = np.where(SHARES > 1.0, chances, 0.0)
-    worn = np.einsum("ls,jsk->ljk", over, waves)
+    unread = np.einsum("ls,jsk->ljk", DENSITIES, waves)
+    worn = np.einsum("ls,jsk->ljk", BEYOND, waves)
     diagonal = np.diag(response.curvature)
     bend = 0.25 * (diagonal[0::2] + diagonal[1::2])
     everything = np.prod(unread, axis=1).mean(axis=0) * _blur(_LINKAGE_U_IN)
     exceeds = float(1.0 - _inside(everything[None], np.array([gear.margin.value]))[0])
-    return _Tables(
-        response.amplification,
-        unread,
-        worn,
-        over.sum(axis=1),
-        chances @ SHARES,
-        bend,
-        exceeds,
-    )
+    return _Tables(response.amplification, unread, worn, bend, exceeds)
 
 
 def _blur(u_in: Array | float) -> Array:
@@ -131,7 +113,8 @@ class Causes:
 
     joints, rigging, elsewhere: chances that a failure is one of the joints, of the rigging or lock
     roller, or of something that leaves the plunger within its margin. [1]
-    worn: chance that each joint is beyond its limit, 0 or 1 where it was read. [1]
+    worn: chance that each joint is beyond its limit. [1]
+    levels: chances of the levels of wear, (n, levels). [1]
     exceeds: chance with random directions that the joints hold the plunger beyond its margin,
     unread ones by their wear, whatever the plunger reads. [1]
     waves: characteristic function of each joint, (n, joints, terms).
@@ -143,6 +126,7 @@ class Causes:
     rigging: Array
     elsewhere: Array
     worn: Array
+    levels: Array
     exceeds: Array
     waves: Array
     loaded: Array
@@ -231,28 +215,29 @@ def believed(cases: Cases) -> Causes:
     """Weigh what may be the matter with n gears, by everything that is known of each."""
     gear = cases.gear
     tables, read, limits = _tables(gear), cases.measured, gear.limits_in
-    levels = level_chances_of(cases)
+    levels = level_chances(cases)
     known = _bessel(_T * (tables.amplification * cases.filled(0.0))[:, :, None])
     known = known * _blur(np.sqrt(0.5) * tables.amplification * cases.gauge_u_in)
     x = np.abs(np.nan_to_num(cases.mean_in))
     u = np.hypot(cases.mean_u_in, 1e-4)
     seen = np.isfinite(cases.mean_in)
-    likely, worn = levels.copy(), levels @ tables.worn_chance
+    likely, worn = levels.copy(), levels @ BEYOND.sum(axis=1)
     worn = np.repeat(worn[:, None], len(limits), axis=1)
     rows = np.flatnonzero(seen)
     if len(rows):
         likely[rows], worn[rows] = _given_plunger(
             tables, read[rows], known[rows], levels[rows], x[rows], u[rows]
         )
-    flat = tables.unread.reshape(len(_LEVELS), -1)
+    flat = tables.unread.reshape(len(LEVELS), -1)
     before = np.where(read[:, :, None], known, (levels @ flat).reshape(known.shape))
     exceeds = 1.0 - _inside(np.prod(before, axis=1) * _blur(_LINKAGE_U_IN), cases.margin_in)
     waves = before.copy()
     if len(rows):
         after = (likely[rows] @ flat).reshape(known[rows].shape)
         waves[rows] = np.where(read[rows, :, None], known[rows], after)
-    mean_in = np.where(read, cases.filled(0.0), (likely @ tables.share_mean)[:, None] * limits)
-    return _weighed(cases, tables, waves, mean_in, np.clip(worn, 0.0, 1.0), u, exceeds)
+    mean_in = np.where(read, cases.filled(0.0), (likely @ MEAN)[:, None] * limits)
+    worn = np.where(read, surely_worn(cases, levels), np.clip(worn, 0.0, 1.0))
+    return _weighed(cases, tables, waves, mean_in, worn, likely, u, exceeds)
 
 
 def _given_plunger(
@@ -260,15 +245,15 @@ def _given_plunger(
 ) -> tuple[Array, Array]:
     """Chances of the levels, and of each unread joint being worn, given the plunger's reading."""
     at = _blur(np.hypot(u, _LINKAGE_U_IN)) * np.cos(_T * x[:, None])
-    count = read.shape[1]
-    density, worn = np.empty_like(levels), np.zeros((len(x), len(_LEVELS), count))
-    for k in range(len(_LEVELS)):
+    count, beyond = read.shape[1], BEYOND.sum(axis=1)
+    density, worn = np.empty_like(levels), np.zeros((len(x), len(LEVELS), count))
+    for k in range(len(LEVELS)):
         waves = np.where(read[:, :, None], known, tables.unread[k])
         ahead, behind = _products(waves)
         density[:, k] = 0.5 + np.sum(ahead[-1] * at, axis=1)
         for j in range(count):
             rest = ahead[j] * behind[j + 1] * at
-            worn[:, k, j] = 0.5 * tables.worn_chance[k] + rest @ tables.worn[k, j]
+            worn[:, k, j] = 0.5 * beyond[k] + rest @ tables.worn[k, j]
     density, worn = np.maximum(density, 1e-12), np.maximum(worn, 0.0)
     likely = levels * density
     likely /= likely.sum(axis=1, keepdims=True)
@@ -281,6 +266,7 @@ def _weighed(
     waves: Array,
     mean_in: Array,
     worn: Array,
+    levels: Array,
     u: Array,
     exceeds: Array,
 ) -> Causes:
@@ -296,15 +282,16 @@ def _weighed(
     by_joints = np.sum(density * fits * outside, axis=1)
     # Pins in their worst directions, either sense.
     centre = _COSINE * mean_in @ tables.amplification
-    scatter = np.sqrt(
-        np.sum((_COSINE_U * tables.amplification * mean_in) ** 2, axis=1)
-        + (0.1 * centre) ** 2
-        + _LINKAGE_U_IN**2
-        + u**2
+    variance = np.sum((_COSINE_U * tables.amplification * mean_in) ** 2, axis=1)
+    variance += (0.1 * centre) ** 2 + _LINKAGE_U_IN**2
+    scatter, off = np.sqrt(variance + u**2), np.abs(x) - centre
+    loaded = _LOADED * np.exp(-0.5 * (off / scatter) ** 2) / (2.0 * scatter)
+    # Where the plunger then stands, by its reading and by the clearances.
+    stood = centre + variance / scatter**2 * off
+    loaded_outside = loaded * tabled_normal_cdf(
+        (stood - margin) * scatter / (np.sqrt(variance) * u)
     )
-    loaded = _LOADED * np.exp(-0.5 * ((np.abs(x) - centre) / scatter) ** 2) / (2.0 * scatter)
-    loaded = np.where(np.abs(x) > margin - 2.0 * u, loaded, 0.0)
-    by_elsewhere = np.sum(density * fits * (1.0 - outside), axis=1)
+    by_elsewhere = np.sum(density * fits * (1.0 - outside), axis=1) + loaded - loaded_outside
     by_elsewhere *= tables.exceeds / _JOINTS_FOR_ONE_ELSEWHERE
     wide = _OFFSET * margin
     offset = np.exp(-0.5 * (_AT / wide[:, None]) ** 2) / wide[:, None] * _STEP_IN / 2.5066
@@ -313,7 +300,7 @@ def _weighed(
     by_rigging *= tables.exceeds / (_JOINTS_FOR_ONE_MISRIGGED * share)
     looked = np.array([i.rigging_checked not in (None, RiggingCheck.NO) for i in cases.inspections])
     by_rigging *= np.where(looked, _OVERLOOKED, 1.0)
-    all_joints = by_joints + loaded
+    all_joints = by_joints + loaded_outside
     total = np.maximum(all_joints + by_elsewhere + by_rigging, 1e-300)
     before = np.array([1.0, 1.0 / _JOINTS_FOR_ONE_MISRIGGED, 1.0 / _JOINTS_FOR_ONE_ELSEWHERE])
     before /= before.sum()
@@ -326,24 +313,14 @@ def _weighed(
         joints=parts[0],
         rigging=parts[1],
         elsewhere=parts[2],
-        worn=np.where(cases.measured, cases.over_limit, worn),
+        worn=worn,
+        levels=levels,
         exceeds=exceeds,
         waves=waves,
-        loaded=np.where(seen, loaded / np.maximum(all_joints, 1e-300), _LOADED),
+        loaded=np.where(seen, loaded_outside / np.maximum(all_joints, 1e-300), _LOADED),
         mean_in=mean_in,
         u_in=u,
     )
-
-
-def level_chances_of(cases: Cases) -> Array:
-    """Chances of the levels of wear of each gear, given what was read on it. [1]"""
-    share = np.clip(cases.filled(0.0) / cases.gear.limits_in, 0.0, 2.0)
-    # A reading blurs the density by its own uncertainty.
-    log = np.log(share_densities() / (SHARES[1] - SHARES[0]))
-    each = np.array([np.interp(share, SHARES, level) for level in log])
-    total = np.sum(np.where(cases.measured, each, 0.0), axis=2).T
-    chances = np.exp(total - total.max(axis=1, keepdims=True))
-    return np.asarray(chances / chances.sum(axis=1, keepdims=True))
 
 
 def _products(waves: Array) -> tuple[list[Array], list[Array]]:

@@ -514,6 +514,11 @@ OF_THE_DAY: tuple[Column, ...] = (
     ),
     RIGGING_CHECKED,
     Column(
+        name="measured_again",
+        holds=Holds.JOINTS,
+        meaning="Joints that were measured a second time, with another gauge, for example 3.",
+    ),
+    Column(
         name="cannot_reach",
         holds=Holds.JOINTS,
         meaning="Joints that cannot be reached today, for example 4.",

@@ -162,6 +162,8 @@ class Inspection:
         the time.
     rigging_checked : RiggingCheck or None
         Whether rigging and lock roller were looked at, or set right on `repair_date`.
+    measured_again : tuple of int
+        Joints that were measured a second time, with another gauge.
     cannot_reach, no_spare : tuple of int
         Joints that cannot be reached today, and those for which there is no spare part.
     open_areas : tuple of str
@@ -215,6 +217,7 @@ class Inspection:
     plunger_date: date | None = None
     outcome_date: date | None = None
     rigging_checked: RiggingCheck | None = None
+    measured_again: tuple[int, ...] = ()
     cannot_reach: tuple[int, ...] = ()
     no_spare: tuple[int, ...] = ()
     open_areas: tuple[str, ...] = ()

@@ -23,7 +23,7 @@ from mlg_troubleshoot.decision.causes import believed
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.decision.likely_worn import explain
 from mlg_troubleshoot.decision.monte_carlo import check_probability
-from mlg_troubleshoot.decision.next_joint import advise, in_one_voice
+from mlg_troubleshoot.decision.next_joint import advise
 from mlg_troubleshoot.decision.plan import Basis, Plan
 from mlg_troubleshoot.decision.planner import Judged, correct, plans
 from mlg_troubleshoot.decision.prediction import (
@@ -35,9 +35,10 @@ from mlg_troubleshoot.decision.prediction import (
     Prediction,
 )
 from mlg_troubleshoot.decision.ranking import rank_joints
-from mlg_troubleshoot.decision.repair import calibrated, repair_sets, rigging_alternative, search
+from mlg_troubleshoot.decision.repair import repair_sets, rigging_alternative
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.verdict_rule import verdict
+from mlg_troubleshoot.decision.wear_levels import Unread
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.units import Length, Sentence
@@ -98,11 +99,8 @@ def _assess_valid(cases: Cases, table: IndexTable, seed: int | None) -> list[Ass
         for beyond, low, high, missing in zip(plunger.beyond, p_lower, p_upper, absent, strict=True)
     ]
     closes = np.isfinite(batch.lower.displacement_in)
-    found = calibrated(
-        cases, search(cases, batch.upper.displacement_in, batch.upper.u_clearances_in)
-    )
     wanted = np.array([v is not Verdict.WITHIN_MARGIN for v in verdicts]) & closes
-    sets = repair_sets(cases, found, wanted)
+    sets = repair_sets(cases, batch.upper, np.flatnonzero(wanted))
     findings = rank_joints(
         cases.gear,
         table,
@@ -154,9 +152,7 @@ def _assessment(
     worst = float(lower.worst.over_in[i]), float(lower.worst.under_in[i])
     budget = _budget(judged.batch, cases, i) if known else None
     beyond = bool(plunger.beyond[i])
-    detail = (
-        _detail(cases, i, found, plan, worst, budget, seed) if seed is not None and closes else {}
-    )
+    detail = _detail(cases, judged, i, plan, budget, seed) if seed is not None and closes else {}
     return Assessment(
         inspection=inspection,
         verdict=found,
@@ -229,21 +225,25 @@ def _budget(batch: BatchPrediction, cases: Cases, i: int) -> UncertaintyBudget:
 
 def _detail(
     cases: Cases,
+    judged: Judged,
     i: int,
-    found: Verdict,
     plan: Plan,
-    worst_in: tuple[float, float],
     budget: UncertaintyBudget | None,
     seed: int,
 ) -> dict[str, Any]:
     """What is worked out for a gear that is looked at alone."""
     one, rng = cases.take(np.array([i])), np.random.default_rng(seed)
-    detail: dict[str, Any] = {"measuring": in_one_voice(advise(one), plan)}
+    lower, found, causes = one.predict(one.filled(0.0)), judged.verdicts[i], believed(one)
+    unread = Unread(one, lower, causes.levels)
+    worst_in = float(lower.worst.over_in[0]), float(lower.worst.under_in[0])
+    detail: dict[str, Any] = {
+        "measuring": advise(one, unread, found, float(judged.p_within[i]), plan)
+    }
     if budget is not None:
         detail["confidence"] = check_probability(one, worst_in, budget, rng)
         if found in (Verdict.OUTSIDE_MARGIN, Verdict.INCONCLUSIVE):
             detail["rigging"] = rigging_alternative(one, worst_in, budget)
-    detail["posterior"] = explain(one, rng, causes=believed(one))
+    detail["posterior"] = explain(one, rng, causes=causes)
     return detail
 
 

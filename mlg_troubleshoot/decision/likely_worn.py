@@ -15,16 +15,11 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.decision.assessment import ClearanceInterval, GroupChance, Posterior
 from mlg_troubleshoot.decision.case import Cases
-from mlg_troubleshoot.decision.causes import (
-    SHARES,
-    Causes,
-    believed,
-    level_chances_of,
-    share_densities,
-)
+from mlg_troubleshoot.decision.causes import Causes, believed
 from mlg_troubleshoot.decision.prediction import model_uncertainty
 from mlg_troubleshoot.decision.second_order import responses
 from mlg_troubleshoot.decision.sentences import percent
+from mlg_troubleshoot.decision.wear_levels import BEYOND, DENSITIES, SHARE, SHARES, level_chances
 from mlg_troubleshoot.gear.gear import Gear
 
 _QUANTILES = (0.05, 0.5, 0.95)
@@ -63,10 +58,8 @@ def _draw_clearances(one: Cases, rng: np.random.Generator, n: int) -> tuple[Arra
     occur. [in, 1]
     """
     found, limits = one.clearance_in[0], one.gear.limits_in
-    shares, densities = SHARES, share_densities()
-    level = rng.choice(len(densities), n, p=level_chances_of(one)[0])
-    beyond = np.where(shares > 1.0, densities, 0.0)
-    chance = beyond.sum(axis=1)[level]
+    level = rng.choice(len(DENSITIES), n, p=level_chances(one)[0])
+    chance = BEYOND.sum(axis=1)[level]
     often = np.maximum(chance, _DRAWN_WORN)
     drawn, log_weight = np.empty((n, len(found))), np.zeros(n)
     for j in range(len(found)):
@@ -75,12 +68,11 @@ def _draw_clearances(one: Cases, rng: np.random.Generator, n: int) -> tuple[Arra
             continue
         is_worn = rng.random(n) < often
         log_weight += np.where(is_worn, np.log(chance / often), np.log((1 - chance) / (1 - often)))
-        for k in range(len(densities)):
-            for part, rows in ((beyond[k], is_worn), (densities[k] - beyond[k], ~is_worn)):
+        for k in range(len(DENSITIES)):
+            for part, rows in ((BEYOND[k], is_worn), (DENSITIES[k] - BEYOND[k], ~is_worn)):
                 here = np.flatnonzero(rows & (level == k))
-                width = shares[1] - shares[0]
-                drawn[here, j] = rng.choice(shares, len(here), p=part / part.sum())
-                drawn[here, j] += width * (rng.random(len(here)) - 0.5)
+                drawn[here, j] = rng.choice(SHARES, len(here), p=part / part.sum())
+                drawn[here, j] += SHARE * (rng.random(len(here)) - 0.5)
         drawn[:, j] *= limits[j]
     return drawn, log_weight
 

@@ -15,7 +15,7 @@ import numpy as np
 from mlg_troubleshoot.decision.assessment import Confidence, UncertaintyBudget
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.second_order import responses
-from mlg_troubleshoot.decision.wear_levels import normal_cdf
+from mlg_troubleshoot.decision.verdict_rule import normal_cdf
 
 # Draws of the readings' errors. [1]
 _DRAWS = 4096

@@ -28,23 +28,21 @@ from mlg_troubleshoot.decision.plan import (
     minutes_to_restore,
 )
 from mlg_troubleshoot.decision.plunger_reading import Compared
-from mlg_troubleshoot.decision.prediction import BatchPrediction, model_uncertainty
-from mlg_troubleshoot.decision.repair import SCORE, removable
+from mlg_troubleshoot.decision.prediction import BatchPrediction
+from mlg_troubleshoot.decision.repair import removable
 from mlg_troubleshoot.decision.second_order import responses
-from mlg_troubleshoot.decision.verdict_rule import verdict
-from mlg_troubleshoot.decision.wear_levels import level_chances, moments, tabled_normal_cdf
+from mlg_troubleshoot.decision.verdict_rule import SCORE, tabled_normal_cdf, verdict
+from mlg_troubleshoot.decision.wear_levels import TOO_CLOSE, Unread
 
 # Standard uncertainties that a better gauge can reach: those of bore gauges and micrometers. [in]
 BETTER_GAUGES_IN = (0.0004, 0.0003)
 # Readings of one round are read together until the verdict is settled with this chance. [1]
-_SETTLED = 0.35
+_SETTLED = 0.2
 # A cause counts as excluded below this chance. [1]
 _EXCLUDED = 0.05
 # Joints read in one round of a gear that failed: until this share of what may be worn in the area
 # is read, two at least. [1]
 _TOGETHER = 0.6
-# Chance that a joint that reads over its limit by less than its uncertainty is within it. [1]
-_EDGE_IS_SOUND = 0.35
 # Joints beyond those over their limit that a repair to be tried may hold. [1]
 _MOST_EXTRA = 2
 # They are chosen among as many joints, those that move the plunger most.
@@ -122,7 +120,7 @@ class _BatchContext:
 
     def __init__(self, cases: Cases, judged: Judged, causes: Causes) -> None:
         gear = cases.gear
-        ahead = _UnreadJoints(cases, judged)
+        ahead = Unread(cases, judged.batch.lower, causes.levels)
         self.cases, self.judged, self.causes = cases, judged, causes
         self.numbers = gear.joint_numbers
         self.restore_min = np.array([joint.restore.value for joint in gear.joints])
@@ -136,11 +134,14 @@ class _BatchContext:
         critical = self.open & gear.critical
         missing = np.asarray(critical.any(axis=1))
         self.candidates = np.where(missing[:, None], critical, self.open)
-        self.group = ahead.group(self.candidates)
+        self.group = ahead.group(self.candidates, _SETTLED)
         self.rest = self.open & ~self.group
-        excess = cases.filled(0.0) - gear.limits_in
-        self.edge = (
-            cases.over_limit & cases.reachable & ~cases.own_gauge & (excess <= cases.gauge_u_in)
+        self.too_close = ~missing & (ahead.too_close() >= TOO_CLOSE)
+        self.rest_needed = ahead.settled(self.group, self.rest) < 0.5
+        # Restoring a joint that may be sound costs more than reading it with another gauge.
+        doubt = (1.0 - causes.worn) * self.restore_min
+        self.doubted = (
+            cases.over_limit & cases.reachable & ~cases.own_gauge & (doubt > gear.access_minutes)
         )
         self.after_limits = _verdicts_after_limits(cases, judged)
         self.again, self.again_u_in = _measure_again(cases, judged)
@@ -366,9 +367,11 @@ class _PlanBuilder:
         """
         f, i = self.facts, self.row
         found = f.after_limits[i]
+        if found is Verdict.INCOMPLETE and f.too_close[i] and not self.over:
+            return self._end(End.TOO_CLOSE)
         if found is Verdict.INCOMPLETE and f.group[i].any():
             self._measure(self._joints(f.group[i]))
-            if f.rest[i].any() and f.expected_end[i] is not Verdict.OUTSIDE_MARGIN:
+            if f.rest[i].any() and f.rest_needed[i]:
                 self._measure(self._joints(f.rest[i]))
             found = f.expected_end[i]
         elif found is Verdict.INCOMPLETE:
@@ -464,14 +467,10 @@ class _PlanBuilder:
     def _restore(
         self, joints: tuple[int, ...], best: RepairSet | None, *, expected: bool
     ) -> _PlanBuilder:
-        """Restore joints; those whose reading is over the limit by less than its uncertainty are
-        read again first, if that is expected to be quicker.
-        """
-        edge = tuple(n for n in joints if self.facts.edge[self.row, self._place(n)])
-        if edge and not expected:
-            saved = _EDGE_IS_SOUND * sum(self.gear.joint(n).restore.value for n in edge)
-            if minutes_to_measure(self.gear, edge, self.opened) < saved + 1e-9:
-                self._measure_again(edge, BETTER_GAUGES_IN[-1])
+        """Restore joints; where a reading over the limit is in doubt it is taken again first."""
+        doubted = tuple(n for n in joints if self.facts.doubted[self.row, self._place(n)])
+        if doubted and not expected:
+            self._measure_again(doubted, BETTER_GAUGES_IN[-1])
         minutes = minutes_to_restore(self.gear, joints, self.opened)
         unread = not self.cases.measured[self.row].all()
         text = sentences.restore(joints, self.over, best, unread=unread, expected=expected)
@@ -533,66 +532,6 @@ class _PlanBuilder:
         return frozenset(self.inspection.open_areas)
 
 
-class _UnreadJoints:
-    """What to expect of the joints that are not measured, gear by gear and level of wear by level
-    of wear.
-    """
-
-    def __init__(self, cases: Cases, judged: Judged) -> None:
-        self.gear, self.measured = cases.gear, cases.measured
-        limits, lower = self.gear.limits_in, judged.batch.lower
-        share = np.where(self.measured, np.minimum(cases.filled(0.0) / limits, 1.0), 0.0)
-        self.weight = level_chances(share.sum(axis=1), self.measured.sum(axis=1))
-        self.worst_in = np.nan_to_num(lower.displacement_in)
-        self.slopes = responses(self.gear)[0].slopes(cases.filled(0.5 * limits))
-        readings = np.sqrt(np.sum((self.slopes * cases.gauge_u_in) ** 2, axis=1))
-        model = model_uncertainty(cases.margin_in, cases.residual_u_in)
-        u = np.sqrt(
-            readings**2 + np.nan_to_num(lower.u_geometry_in) ** 2 + cases.margin_u_in**2 + model**2
-        )
-        self.within_in, self.outside_in = cases.margin_in - SCORE * u, cases.margin_in + SCORE * u
-
-    def total(self, joints: Mask) -> tuple[Array, Array]:
-        """Mean and standard deviation, at each level, of what some joints add to the worst case.
-        [in]
-        """
-        mean, variance = moments()
-        each = np.where(joints, self.slopes * self.gear.limits_in, 0.0)
-        return each.sum(axis=1)[:, None] * mean, np.sqrt((each**2).sum(axis=1)[:, None] * variance)
-
-    def settled(self, joints: Mask, rest: Mask) -> Array:
-        """Chance that the verdict is settled once some joints are read and the rest is not. [1]"""
-        mean, spread = self.total(joints)
-        open_in = np.sum(np.where(rest, self.slopes * self.gear.limits_in, 0.0), axis=1)
-
-        def below(bound_in: Array) -> Array:
-            scores = (bound_in[:, None] - self.worst_in[:, None] - mean) / np.maximum(spread, 1e-9)
-            return np.asarray(np.sum(self.weight * tabled_normal_cdf(scores), axis=1))
-
-        outside = 1.0 - below(self.outside_in)
-        within = below(self.within_in - open_in)
-        between = np.maximum(below(self.outside_in - open_in) - below(self.within_in), 0.0)
-        return outside + np.where((rest & self.gear.critical).any(axis=1), 0.0, within + between)
-
-    def group(self, candidates: Mask) -> Mask:
-        """The joints to read in one round: the fewest, most telling a minute first, that likely
-        settle the verdict.
-        """
-        reach = self.slopes * self.gear.limits_in / self.gear.access_minutes
-        # Rounded: both ends of one link are worth the same, and rounding noise must not order them.
-        order = np.argsort(np.where(candidates, -np.round(reach, 9), np.inf), axis=1, kind="stable")
-        chosen, done = np.zeros_like(candidates), ~candidates.any(axis=1)
-        rows = np.arange(len(candidates))
-        for place in range(candidates.shape[1]):
-            joint = order[:, place]
-            chosen[rows, joint] |= ~done & candidates[rows, joint]
-            if place > 0:
-                # Two at least: joints read one by one would not come to an end within twelve
-                # rounds.
-                done = done | (self.settled(chosen, ~self.measured & ~chosen) >= _SETTLED)
-        return chosen
-
-
 def _verdicts_after_limits(cases: Cases, judged: Judged) -> list[Verdict]:
     """The verdicts that stand once what is over its limit is restored."""
     verdicts = list(judged.verdicts)
@@ -626,51 +565,41 @@ def _measure_again(cases: Cases, judged: Judged) -> tuple[Mask, Array]:
     if not len(rows):
         return chosen, needed
     some = cases.take(rows)
-    part, margin = judged.batch.lower, cases.margin_in[rows]
+    part = judged.batch.lower
     slopes = responses(cases.gear)[0].slopes(some.filled(0.0))
     fixed = part.u_geometry_in[rows] ** 2 + part.u_model_in[rows] ** 2 + some.margin_u_in**2
     own = np.where(some.measured, (slopes * some.gauge_u_in) ** 2, 0.0)
-    done = np.zeros(len(rows), bool)
-    for better in BETTER_GAUGES_IN:
+    off = part.displacement_in[rows] - cases.margin_in[rows]
+    off, fixed = off[:, None], (fixed + own.sum(axis=1))[:, None]
+    for better in sorted(BETTER_GAUGES_IN):
         eligible = some.measured & ~some.own_gauge & (some.gauge_u_in > better)
-        worth = np.where(eligible, slopes**2 * (some.gauge_u_in**2 - better**2), 0.0)
+        then = (slopes * better) ** 2
+        worth = np.where(eligible, own - then, 0.0)
         order = np.argsort(-np.round(worth / cases.gear.access_minutes, 12), axis=1, kind="stable")
-        again = np.zeros_like(eligible)
-        for place in range(eligible.shape[1]):
-            joint = order[:, place]
-            again[np.arange(len(rows)), joint] = eligible[np.arange(len(rows)), joint]
-            left = np.sum(np.where(again, (slopes * better) ** 2, own), axis=1)
-            guard = SCORE * np.sqrt(fixed + left)
-            moves = np.sqrt(np.sum(np.where(again, own + (slopes * better) ** 2, 0.0), axis=1))
-            off = part.displacement_in[rows] - margin
-            moves = np.maximum(moves, 1e-12)
-            settles = tabled_normal_cdf((off - guard) / moves) + tabled_normal_cdf(
-                (-off - guard) / moves
-            )
-            now = ~done & again.any(axis=1) & (settles > 0.5)
-            chosen[rows[now]], needed[rows[now]] = again[now], better
-            done |= now
+        gained, moved = (
+            np.cumsum(np.take_along_axis(each, order, axis=1), axis=1)
+            for each in (worth, np.where(eligible, own + then, 0.0))
+        )
+        guard, moves = SCORE * np.sqrt(fixed - gained), np.sqrt(np.maximum(moved, 1e-24))
+        settles = tabled_normal_cdf((off - guard) / moves) + tabled_normal_cdf(
+            (-off - guard) / moves
+        )
+        enough = (settles > 0.5) & np.take_along_axis(eligible, order, axis=1)
+        upto = np.argsort(order, axis=1) <= np.argmax(enough, axis=1)[:, None]
+        now = enough.any(axis=1)
+        chosen[rows[now]], needed[rows[now]] = (eligible & upto)[now], better
     return chosen, needed
 
 
-def _expected(cases: Cases, judged: Judged, ahead: _UnreadJoints) -> list[Verdict]:
-    """The verdict if every unmeasured joint is as worn as expected."""
-    full = cases.filled((ahead.weight @ moments()[0])[:, None] * cases.gear.limits_in)
-    ends = list(judged.verdicts)
-    rows = np.flatnonzero(
-        ~cases.measured.all(axis=1) & np.isfinite(judged.batch.upper.displacement_in)
-    )
-    reference = responses(cases.gear)[0]
-    worst = (
-        judged.batch.lower.displacement_in[rows]
-        + reference.magnitude(full[rows])
-        - reference.magnitude(cases.filled(0.0)[rows])
-    )
-    for k, row in enumerate(rows):
-        if worst[k] <= ahead.within_in[row]:
-            ends[row] = Verdict.WITHIN_MARGIN
-        elif worst[k] < ahead.outside_in[row]:
-            ends[row] = Verdict.INCONCLUSIVE
-        else:
-            ends[row] = Verdict.OUTSIDE_MARGIN
-    return ends
+def _expected(cases: Cases, judged: Judged, ahead: Unread) -> list[Verdict]:
+    """The likeliest verdict once every joint is read."""
+    unread = ~cases.measured
+    within = ahead.below(ahead.within_in, unread)
+    close = ahead.too_close()
+    words = (Verdict.WITHIN_MARGIN, Verdict.INCONCLUSIVE, Verdict.OUTSIDE_MARGIN)
+    likeliest = np.argmax([within, close, 1.0 - within - close], axis=0)
+    known = cases.measured.all(axis=1) | ~np.isfinite(judged.batch.upper.displacement_in)
+    return [
+        now if done else words[place]
+        for now, done, place in zip(judged.verdicts, known, likeliest, strict=True)
+    ]

@@ -11,7 +11,7 @@ import numpy as np
 from mlg_troubleshoot.arrays import Array, Mask, Places
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.decision.second_order import responses
-from mlg_troubleshoot.decision.wear_levels import normal_cdf
+from mlg_troubleshoot.decision.verdict_rule import normal_cdf
 from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_slopes, adjusted_worst_case
 from mlg_troubleshoot.gear.directions import WorstCase
 from mlg_troubleshoot.gear.gear import Gear

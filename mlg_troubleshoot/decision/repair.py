@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from statistics import NormalDist
 
 import numpy as np
 
@@ -17,14 +16,11 @@ from mlg_troubleshoot.decision.case import Cases, exact_chance
 from mlg_troubleshoot.decision.plan import minutes_to_measure, minutes_to_restore
 from mlg_troubleshoot.decision.prediction import Prediction, model_uncertainty
 from mlg_troubleshoot.decision.second_order import Response, responses
-from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE
-from mlg_troubleshoot.decision.wear_levels import normal_cdf
+from mlg_troubleshoot.decision.verdict_rule import CONFORMANCE, SCORE, normal_cdf
 from mlg_troubleshoot.gear.gear import Gear
 
 # Repair sets that are shown, and gears searched at once. [1]
 _SHOWN, _ROWS = 5, 256
-# Standard score of the conformance probability. [1]
-SCORE = NormalDist().inv_cdf(CONFORMANCE)
 # Within this of the conformance limit a subset counts as about sufficient: how far the expansion
 # may be off. [in]
 _ABOUT_IN = 5e-4
@@ -36,9 +32,9 @@ _AS_NEW_IN = 1e-4
 class Subsets:
     """All subsets of a gear's joints, the quickest to restore first, then the smallest.
 
-    weights: the same as 0 and 1, for sums. [1]
+    weights: the same as 0 and 1, for sums; terms: with 1 where both joints of a pair are members,
+    the pairs as in an upper triangle. [1]
     alike: the same number for subsets of equally many joints in equal minutes.
-    pairs: 1 where both joints of a pair are members, the pairs as in an upper triangle. [1]
     joints: numbers of the joints of each.
     to_measure: minutes to read them.
     """
@@ -47,7 +43,7 @@ class Subsets:
     weights: Array
     minutes: Array
     alike: Places
-    pairs: Array
+    terms: Array
     joints: Sequence[tuple[int, ...]]
     to_measure: Sequence[float]
 
@@ -70,7 +66,7 @@ def subsets_of(gear: Gear) -> Subsets:
         members.astype(float),
         minutes,
         alike,
-        (members[:, first] & members[:, second]).astype(float),
+        np.hstack([members, members[:, first] & members[:, second]]).astype(float),
         joints,
         [minutes_to_measure(gear, each) for each in joints],
     )
@@ -135,16 +131,12 @@ def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
     for start in range(0, len(cases), _ROWS):
         part = slice(start, start + _ROWS)
         some, gone = now[part], less[part]
-        # Curvature of the other linkages: exact with everything restored, scaled to a subset by the
-        # square of its drop.
-        falls = [(gone * linkage.slopes(some)) @ table.weights.T for linkage in linkages]
-        after = worst_in[part, None] - falls[0] + _curvature_change(linkages[0], table, some, gone)
-        square = (falls[0] / np.maximum(falls[0][:, -1:], 1e-12)) ** 2
+        members = [_restored_worst(linkage, table, some, gone) for linkage in linkages]
+        falls = members[0][:, :1] - members[0]
+        after = worst_in[part, None] - falls
+        # What the expansion misses grows with the square of the drop.
+        square = (falls / np.maximum(falls[:, -1:], 1e-12)) ** 2
         after += _third_order(cases, some - gone, after[:, -1])[:, None] * square
-        members = []
-        for linkage, fall in zip(linkages, falls, strict=True):
-            whole, least = linkage.magnitude(some), linkage.magnitude(some - gone)
-            members.append(whole[:, None] - fall + (least - whole + fall[:, -1])[:, None] * square)
         geometry = _variance(members)
         model = model_uncertainty(after, cases.residual_u_in)
         gauges = u_clearances_in[part, None] ** 2 - _variance_drop(
@@ -157,15 +149,13 @@ def search(cases: Cases, worst_in: Array, u_clearances_in: Array) -> Search:
     return Search(table, np.where(barred | ~np.isfinite(slack), -np.inf, slack))
 
 
-def _curvature_change(
-    linkage: Response, table: Subsets, clearance_in: Array, less_in: Array
-) -> Array:
-    """What the curvature adds to the worst case with each subset restored. [in]"""
+def _restored_worst(linkage: Response, table: Subsets, now_in: Array, less_in: Array) -> Array:
+    """Worst case with each subset restored, by the expansion. [in]"""
     first, second = np.triu_indices(less_in.shape[1])
     curved = linkage.worst_curvature[first, second] * np.where(first == second, 0.5, 1.0)
-    return linkage.sense(clearance_in)[:, None] * (
-        (less_in[:, first] * less_in[:, second] * curved) @ table.pairs.T
-    )
+    curved = linkage.sense(now_in)[:, None] * curved * less_in[:, first] * less_in[:, second]
+    terms = np.hstack([-less_in * linkage.slopes(now_in), curved])
+    return np.asarray(linkage.magnitude(now_in)[:, None] + terms @ table.terms.T)
 
 
 def _third_order(cases: Cases, least_in: Array, expanded_in: Array) -> Array:
@@ -226,32 +216,32 @@ def _restored(cases: Cases, rows: Places, places: Places) -> tuple[Prediction, A
     return found, found.probability_within(some.margin_in, some.margin_u_in)
 
 
-def repair_sets(cases: Cases, found: Search, wanted: Mask) -> list[tuple[RepairSet, ...]]:
-    """Find the sets of joints which, restored, bring the worst case within the margin.
+def repair_sets(cases: Cases, upper: Prediction, wanted: Places) -> list[tuple[RepairSet, ...]]:
+    """Find the sets of joints which, restored, bring the worst case of the wanted gears within the
+    margin; `upper`: with unmeasured joints at their limit.
 
     Unmeasured joints count with their limit: what holds with them at 0 sends every fifth gear back.
     Only sets that contain no smaller sufficient set are returned, the quickest first, each checked
     by the exact worst case.
     """
-    table = subsets_of(cases.gear)
-    chosen = _quickest_sets(table, found.slack_in[wanted])
-    rows, sets = (
-        np.repeat(np.flatnonzero(wanted), [len(c) for c in chosen]),
-        np.concatenate([*chosen, [0]])[:-1],
-    )
-    result: list[list[RepairSet]] = [[] for _ in range(len(cases))]
+    result: list[tuple[RepairSet, ...]] = [()] * len(cases)
+    if not len(wanted):
+        return result
+    some, table = cases.take(wanted), subsets_of(cases.gear)
+    found = search(some, upper.displacement_in[wanted], upper.u_clearances_in[wanted])
+    chosen = _quickest_sets(table, calibrated(some, found).slack_in)
+    rows = np.repeat(np.arange(len(wanted)), [len(places) for places in chosen])
     if not len(rows):
-        return [tuple(sets) for sets in result]
-    sets = sets.astype(np.intp)
-    prediction, p = _restored(cases, rows, sets)
-    moved = prediction.displacement_in
+        return result
+    sets = np.concatenate(chosen)
+    prediction, p = _restored(some, rows, sets)
     for k in np.flatnonzero(p >= CONFORMANCE):
-        which = sets[k]
+        which, row = sets[k], int(wanted[rows[k]])
         minutes = table.to_measure[which], float(table.minutes[which])
-        result[rows[k]].append(
-            RepairSet(table.joints[which], float(moved[k]), float(p[k]), *minutes, RepairKind.SURE)
-        )
-    return [tuple(sets) for sets in result]
+        moved = float(prediction.displacement_in[k])
+        held = RepairSet(table.joints[which], moved, float(p[k]), *minutes, RepairKind.SURE)
+        result[row] = (*result[row], held)
+    return result
 
 
 def _quickest_sets(table: Subsets, slack_in: Array) -> Sequence[Places]:

@@ -282,7 +282,8 @@ def measure(gear: Gear, joints: Sequence[int]) -> str:
 def measure_again(joints: Sequence[int], gauge_u_needed_in: float) -> Sentence:
     """Step MEASURE_AGAIN."""
     return Sentence.of(
-        "Measure {} again, with a standard uncertainty of {} radial or less.",
+        "Measure {} again with another gauge, to a standard uncertainty of {} radial or less, and"
+        " confirm which convention was read.",
         joint_list(joints),
         Length(gauge_u_needed_in, 5),
     )
@@ -301,7 +302,9 @@ def restore(
 ) -> str:
     """Step RESTORE; `expected`: what is measured before decides."""
     if expected:
-        return f"Restore what the readings call for: expected {joint_list(joints)}."
+        guessed = [joint for joint in joints if joint not in over]
+        found = f"what the readings find worn, perhaps {joint_list(guessed)}"
+        return f"Restore {f'{joint_list(over)} and ' if over else ''}{found}."
     said = (
         f"Restore, in this order: {joint_list(joints)}."
         if len(joints) > 1

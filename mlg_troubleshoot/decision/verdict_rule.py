@@ -4,10 +4,34 @@ probability 95 %).
 
 from __future__ import annotations
 
+import math
+from statistics import NormalDist
+
+import numpy as np
+
+from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.assessment import Verdict
 
 # Conformance probability of a verdict (JCGM 106). [1]
 CONFORMANCE = 0.95
+# Standard score of the conformance probability. [1]
+SCORE = NormalDist().inv_cdf(CONFORMANCE)
+
+
+def normal_cdf(z: Array) -> Array:
+    """Standard normal distribution. [1]"""
+    # Not scipy's: a check of one gear would wait for its import longer than for the verdict.
+    flat = [0.5 * math.erfc(-value / math.sqrt(2.0)) for value in np.ravel(z).tolist()]
+    return np.reshape(np.array(flat), np.shape(z))
+
+
+_SCORES = np.linspace(-8.0, 8.0, 6401)
+_TABLE = normal_cdf(_SCORES)
+
+
+def tabled_normal_cdf(z: Array) -> Array:
+    """Standard normal distribution from a table, for many values at once. [1]"""
+    return np.interp(z, _SCORES, _TABLE)
 
 
 def zone(probability: float) -> Verdict:

@@ -1,85 +1,177 @@
-"""How worn the unmeasured joints may be, for ranking only: the verdict takes them at their bounds.
+"""How worn the joints may be that nobody read: the one prior of wear, for plan, chances and advice.
+A verdict takes unread joints at their bounds.
 
-No wear rate of this gear is public, so the distribution knows no fleet: a joint's wear, as a share
-of its limit, is exponential and cut off at the limit, and one gear's joints share a level of wear
-that is itself unknown. What was measured on a gear tells its level, and through it what to expect
-of the joints not yet measured.
+No wear rate of this gear is public, so the prior knows no fleet: the shares of one gear's joints
+are exponential about a level that they have in common, and a few joints are worn out for reasons
+of their own. What was read on a gear tells its level, and through it what to expect of the rest.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Places
-from mlg_troubleshoot.decision.second_order import Response
+from mlg_troubleshoot.arrays import Array, Mask
+from mlg_troubleshoot.decision.case import Cases
+from mlg_troubleshoot.decision.prediction import Prediction, model_uncertainty
+from mlg_troubleshoot.decision.second_order import responses
+from mlg_troubleshoot.decision.verdict_rule import SCORE, tabled_normal_cdf
 
-# Mean wear of a gear's joints as a share of their limit, before it is cut off at the limit. [1]
-_LEVELS = np.geomspace(0.05, 5.0, 24)
+# Levels of wear of one gear, in units of the limit, each as likely. [1]
+LEVELS = np.geomspace(0.06, 1.2, 7)
+# Chance that a joint is worn out for a reason of its own, at any level: between its limit and twice
+# its limit. [1]
+_WORN_OUT = 0.02
+# Shares of its limit that a joint may be worn to, and how wide each is. [1]
+SHARES = (np.arange(50) + 0.5) / 25.0
+SHARE = 0.04
+
+# Chance from which a gear counts as too close to its margin for any reading of a joint to settle
+# it. [1]
+TOO_CLOSE = 0.8
+# What a reading may be wrong beside its stated uncertainty: standard deviation of the scale of a
+# gauge, and chance that it is the total play where the radial clearance is stated; assumed. [1]
+_SCALE, _SLIP = 0.1, 0.1
 
 
-def level_weights(measured_share: Array) -> Array:
-    """Chances of the levels of wear of one gear, given what was measured on it. [1]"""
-    total = np.array([np.minimum(measured_share, 1.0).sum()])
-    return np.asarray(level_chances(total, np.array([len(measured_share)]))[0])
+def _densities() -> Array:
+    even = np.exp(-SHARES / LEVELS[:, None])
+    even /= even.sum(axis=1, keepdims=True)
+    out = np.where(SHARES > 1.0, 1.0, 0.0)
+    return np.asarray((1.0 - _WORN_OUT) * even + _WORN_OUT * out / out.sum())
 
 
-def level_chances(total_share: Array, count: Places) -> Array:
-    """The same for many gears, from the sum of the shares of each and their number: shape (n,
-    n_levels).
+# Chance of each share at each level, (levels, shares); of those beyond the limit; mean and variance
+# of the share, by level. [1]
+DENSITIES = _densities()
+BEYOND = np.where(SHARES > 1.0, DENSITIES, 0.0)
+MEAN = DENSITIES @ SHARES
+VARIANCE = DENSITIES @ SHARES**2 - MEAN**2
+
+
+def level_chances(cases: Cases) -> Array:
+    """Chances of the levels of wear of each gear, given what was read on it. [1]"""
+    share = np.clip(cases.filled(0.0) / cases.gear.limits_in, 0.0, 2.0)
+    each = np.array([np.interp(share, SHARES, level) for level in np.log(DENSITIES / SHARE)])
+    total = np.sum(np.where(cases.measured, each, 0.0), axis=2).T
+    chances = np.exp(total - total.max(axis=1, keepdims=True))
+    return np.asarray(chances / chances.sum(axis=1, keepdims=True))
+
+
+def surely_worn(cases: Cases, levels: Array) -> Array:
+    """Chance that each joint that was read is beyond its limit, (n, joints). [1]
+
+    A gauge may have an error of scale, and a reading may be the total play; neither is likely of a
+    joint that was measured again.
     """
-    log_norm = np.log(_LEVELS) + np.log1p(-np.exp(-1.0 / _LEVELS))
-    log_weight = -total_share[:, None] / _LEVELS - count[:, None] * log_norm
-    weight = np.exp(log_weight - log_weight.max(axis=1, keepdims=True))
-    return np.asarray(weight / weight.sum(axis=1, keepdims=True))
+    limits = cases.gear.limits_in
+    chance = np.zeros(cases.measured.shape)
+    rows, joints = np.nonzero(cases.over_limit)
+    read = (cases.clearance_in[rows, joints] / limits[joints])[:, None]
+    u = (cases.gauge_u_in[rows, joints] / limits[joints])[:, None]
+    again = cases.own_gauge[rows, joints][:, None]
+    logs = []
+    for factor, share in ((1.0, 1.0 - _SLIP), (2.0, _SLIP)):
+        spread = np.hypot(u, np.where(again, 0.0, _SCALE * factor * SHARES))
+        log = -0.5 * ((read - factor * SHARES) / spread) ** 2 - np.log(spread)
+        logs.append(np.where(again & (factor > 1.0), -np.inf, log + np.log(share)))
+    # The level by the other readings: this one is in doubt.
+    others = levels[rows] / DENSITIES[:, np.minimum(read[:, 0] / SHARE, 49.0).astype(int)].T
+    weight = np.logaddexp(*logs) + np.log(others @ DENSITIES)
+    weight = np.exp(weight - weight.max(axis=1, keepdims=True))
+    chance[rows, joints] = (weight @ (SHARES > 1.0)) / weight.sum(axis=1)
+    return chance
 
 
-def moments() -> tuple[Array, Array]:
-    """Mean and variance of a joint's wear at each level. [1]"""
-    cut = np.exp(-1.0 / _LEVELS)
-    mean = _LEVELS - cut / (1.0 - cut)
-    square = (2.0 * _LEVELS**2 - cut * (1.0 + 2.0 * _LEVELS + 2.0 * _LEVELS**2)) / (1.0 - cut)
-    return mean, square - mean**2
+class Unread:
+    """What the unread joints of n gears may add to the worst case, level of wear by level of wear.
 
+    At each level the worst case is normal, a sum over several joints where none dominates, and
+    linear about the clearances that are expected.
 
-def quantiles(n: int) -> Array:
-    """Wear at evenly spaced chances, for each level. [1]"""
-    chance = (np.arange(n) + 0.5) / n
-    level = _LEVELS[:, None]
-    return -level * np.log1p(chance * np.expm1(-1.0 / level))
-
-
-def level_likelihood(share: Array) -> Array:
-    """Density of a joint's wear at each level. [1]"""
-    return np.exp(-share[:, None] / _LEVELS) / (_LEVELS * -np.expm1(-1.0 / _LEVELS))
-
-
-def normal_cdf(z: Array) -> Array:
-    """Standard normal distribution. [1]"""
-    # Not scipy's: a check of one gear would wait for its import longer than for the verdict.
-    flat = [0.5 * math.erfc(-value / math.sqrt(2.0)) for value in np.ravel(z).tolist()]
-    return np.reshape(np.array(flat), np.shape(z))
-
-
-def tabled_normal_cdf(z: Array) -> Array:
-    """Standard normal distribution from a table, for many values at once. [1]"""
-    return np.interp(z, _SCORES, _TABLE)
-
-
-_SCORES = np.linspace(-8.0, 8.0, 6401)
-_TABLE = normal_cdf(_SCORES)
-
-
-def uncertainty_parts(
-    linkages: Sequence[Response], clearance_in: Array, gauge_u_in: Array | float, margin_u_in: float
-) -> tuple[Array, Array, Array]:
-    """Worst case by the second-order expansion, its slopes, and its uncertainty without that of the
-    model. [in]
+    levels: chances of the levels, (n, levels). [1] reach_in: what each unread joint adds at its
+    limit. [in]
     """
-    members = np.array([linkage.magnitude(clearance_in) for linkage in linkages])
-    u_geometry = members.std(axis=0, ddof=1) if len(members) > 1 else np.zeros(len(clearance_in))
-    slopes = linkages[0].slopes(clearance_in)
-    u_readings = np.sqrt(np.sum((gauge_u_in * slopes) ** 2, axis=1))
-    return members[0], slopes, np.sqrt(u_readings**2 + u_geometry**2 + margin_u_in**2)
+
+    def __init__(self, cases: Cases, lower: Prediction, levels: Array) -> None:
+        gear, linkages, self.levels = cases.gear, responses(cases.gear), levels
+        self.gear, self.read, self.margin_in = gear, cases.measured, cases.margin_in
+        self.base_in = np.nan_to_num(lower.displacement_in)
+        expected = cases.filled((levels @ MEAN)[:, None] * gear.limits_in)
+        each = np.array([linkage.magnitude(expected) for linkage in linkages])
+        slopes = linkages[0].slopes(expected)
+        self.reach_in = np.where(self.read, 0.0, slopes * gear.limits_in)
+        geometry = np.std(each, axis=0, ddof=1) if len(each) > 1 else np.zeros(len(cases))
+        parts = (
+            np.sqrt(np.sum((slopes * cases.gauge_u_in) ** 2, axis=1)),
+            geometry,
+            cases.margin_u_in,
+            model_uncertainty(each[0], cases.residual_u_in),
+        )
+        self.u_in = np.sqrt(sum(part**2 for part in parts))
+        guard = SCORE * self.u_in
+        self.within_in, self.outside_in = cases.margin_in - guard, cases.margin_in + guard
+
+    def adds(self, joints: Mask) -> tuple[Array, Array]:
+        """Mean and variance, at each level, of what some joints add to the worst case. [in, in²]"""
+        each = np.where(joints, self.reach_in, 0.0)
+        return each.sum(axis=1)[:, None] * MEAN, (each**2).sum(axis=1)[:, None] * VARIANCE
+
+    def below(self, bound_in: Array, joints: Mask, u_in: Array | float = 0.0) -> Array:
+        """Chance that the worst case, some joints added, is below a bound known to `u_in`. [1]"""
+        mean, variance = self.adds(joints)
+        spread = np.sqrt(np.maximum(variance + np.square(u_in), 1e-18))
+        scores = (bound_in[:, None] - self.base_in[:, None] - mean) / spread
+        return np.asarray(np.sum(self.levels * tabled_normal_cdf(scores), axis=1))
+
+    def within(self) -> Array:
+        """Chance that the worst case is within the margin. [1]"""
+        return self.below(self.margin_in, ~self.read, self.u_in[:, None])
+
+    def too_close(self) -> Array:
+        """Chance that neither verdict conforms once every joint is read. [1]"""
+        return self.below(self.outside_in, ~self.read) - self.below(self.within_in, ~self.read)
+
+    def settled(self, joints: Mask, rest: Mask) -> Array:
+        """Chance that the verdict is settled once some joints are read and the rest is not. [1]"""
+        open_in = np.sum(np.where(rest, self.reach_in, 0.0), axis=1)
+        outside = 1.0 - self.below(self.outside_in, joints)
+        within = self.below(self.within_in - open_in, joints)
+        between = self.below(self.outside_in - open_in, joints) - self.below(self.within_in, joints)
+        critical = (rest & self.gear.critical).any(axis=1)
+        return outside + np.where(critical, 0.0, within + np.maximum(between, 0.0))
+
+    def group(self, candidates: Mask, enough: float) -> Mask:
+        """The joints to read in one round: the fewest, most telling a minute first, that settle
+        the verdict with chance `enough`.
+        """
+        # Rounded: both ends of one link are worth the same, and rounding noise must not order them.
+        rate = np.round(self.reach_in / self.gear.access_minutes, 9)
+        order = np.argsort(np.where(candidates, -rate, np.inf), axis=1, kind="stable")
+        chosen, done = np.zeros_like(candidates), ~candidates.any(axis=1)
+        rows = np.arange(len(candidates))
+        for place in range(candidates.shape[1]):
+            joint = order[:, place]
+            chosen[rows, joint] |= ~done & candidates[rows, joint]
+            if place > 0:
+                # Two at least: joints read one by one would not come to an end within twelve
+                # rounds.
+                done = done | (self.settled(chosen, ~self.read & ~chosen) >= enough)
+        return chosen
+
+    def known(self, row: int, joint: int) -> tuple[Array, Array]:
+        """Chances of what a joint of one gear may read, and of the gear being within its margin
+        then. [1]
+        """
+        rest, reach = np.delete(self.reach_in[row], joint), self.reach_in[row, joint]
+        chances = self.levels[row][:, None] * DENSITIES
+        mean = self.base_in[row] + (rest.sum() * MEAN)[:, None] + reach * SHARES
+        spread = np.sqrt((rest @ rest) * VARIANCE + self.u_in[row] ** 2)[:, None]
+        within = tabled_normal_cdf((self.margin_in[row] - mean) / spread)
+        read = chances.sum(axis=0)
+        return read, np.sum(chances * within, axis=0) / read
+
+    def variance(self, row: int) -> Array:
+        """Variance of the worst case that a reading of each joint of one gear removes. [in²]"""
+        mean = self.levels[row] @ MEAN
+        variance = self.levels[row] @ (VARIANCE + MEAN**2) - mean**2
+        return np.asarray(self.reach_in[row] ** 2 * variance)

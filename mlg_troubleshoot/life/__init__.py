@@ -9,6 +9,7 @@ __all__ = [
     "forecast",
     "looking_back",
     "outlook",
+    "since_repairs",
     "unrecorded_work",
     "wear_paths",
 ]

@@ -11,10 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, MeasuringAdvice, Verdict
-from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, Side
 from mlg_troubleshoot.decision.judge_rows import assess
-from mlg_troubleshoot.decision.next_joint import advise
 from mlg_troubleshoot.decision.prediction import Extension
 from mlg_troubleshoot.errors import ExitCode, OutputError, UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
@@ -22,6 +20,7 @@ from mlg_troubleshoot.gear.directions import WorstCase, worst_case
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.indices.index_table import load_index_table
+from mlg_troubleshoot.life.since_repairs import since_repairs
 from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
 from mlg_troubleshoot.records.model import TableOptions, TableResult
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
@@ -236,9 +235,11 @@ def predict(
     return worst_case(known.model, rows)
 
 
-def next_joint(gear: Gear, measured: Mapping[int, float]) -> MeasuringAdvice:
+def next_joint(gear: Gear, measured: Mapping[int, float]) -> MeasuringAdvice | None:
     """Say which joint's reading is most useful next, and whether one may stop measuring."""
-    return advise(Cases.of(gear, [replace(trial_inspection(gear), clearance_in=dict(measured))]))
+    row = replace(trial_inspection(gear), clearance_in=dict(measured))
+    (judged,) = assess([row], gear, load_index_table(gear), advice=True)
+    return judged.measuring if isinstance(judged, Assessment) else None
 
 
 def before_and_after(judgements: Sequence[Judgement]) -> tuple[Assessment, Assessment] | None:
@@ -262,13 +263,9 @@ def _judge(
 ) -> CheckResult:
     advice = len(rows) == 1 if options.advice is None else options.advice
     asked: dict[str, Any] = {"advice": advice, "seed": options.seed, "extension": options.extension}
-    as_they_count = rows
-    if store is not None:
-        from mlg_troubleshoot.life.looking_back import since_kept_repairs
-
-        as_they_count = since_kept_repairs(rows, store, gear)
+    as_they_count = since_repairs(rows, gear, store)
     judgements = assess(as_they_count, gear, load_index_table(gear), **asked, progress=on_judged)
-    if store is not None:
+    if as_they_count is not rows:
         # What is shown and kept of an inspection is what was found, whatever counts no more.
         judgements = tuple(
             replace(judged, inspection=row)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from mlg_troubleshoot.decision.assessment import Assessment
 from mlg_troubleshoot.decision.inspection import Inspection
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import GearKey, find, warnings_of, without_dashes
+from mlg_troubleshoot.life.since_repairs import key_of, stated_repair
 from mlg_troubleshoot.records.rows import place_in_file
 from mlg_troubleshoot.store import (
     Added,
@@ -51,7 +53,9 @@ def keep(
     inspections = [inspection_record(each) for each in _under_first_ids(written, store)]
     known = store.known([record.identity_hash for record in inspections])
     records: list[Record] = []
-    for assessment, record in zip(judged, inspections, strict=True):
+    for assessment, row, record in zip(judged, written, inspections, strict=True):
+        # Before what was read after it.
+        records += _repairs_of(row, store)
         # Wherever an inspection was entered again, it is the first entry that was assessed.
         first = known.setdefault(record.identity_hash, record)
         records += [record, assessment_record(result.gear, options, assessment, record, first)]
@@ -61,6 +65,25 @@ def keep(
     )
     gears = {(record.tail_no, record.side) for record in records}
     return Kept(added.new, added.known, tuple(warnings_of(store, gears)))
+
+
+def _repairs_of(row: Inspection, store: Store) -> list[Record]:
+    """The repair that a row states, as records; none that the store keeps already."""
+    repair = stated_repair(row)
+    if repair is None:
+        return []
+    known = [
+        record for record in store.of_gear(*key_of(row)) if record.day == repair.day.isoformat()
+    ]
+    body: dict[str, Any] = {"landings": None, "work_order": None}
+    kinds = {RecordKind.REPAIR: sorted(repair.joints), RecordKind.RERIG: repair.rerigged}
+    return [
+        Record(kind, "", *key_of(row), repair.day.isoformat(), packed(body | more))
+        for kind, said in kinds.items()
+        if said
+        for more in ({"joints": said} if kind is RecordKind.REPAIR else {},)
+        if not any(r.kind is kind and r.body.get("joints") == more.get("joints") for r in known)
+    ]
 
 
 def correct(store: Store, record_id: str, result: CheckResult, options: CheckOptions) -> Record:

@@ -9,7 +9,7 @@ import argparse
 import tempfile
 from pathlib import Path
 
-from tests.decision.technician import WORLDS, counted, say
+from tests.decision.technician import WORLDS, counted, replayed, say
 
 
 def main() -> None:
@@ -18,8 +18,14 @@ def main() -> None:
     parser.add_argument("--gears", type=int, default=200)
     parser.add_argument("--seed", type=int, action="append", help="may repeat; default 7100")
     parser.add_argument("--world", help="the beginning of a world's name")
+    parser.add_argument("--replay", action="store_true", help="rows left as before their repair")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
+        if chosen.replay:
+            for seed in chosen.seed or [7100]:
+                n, away, unasked = replayed(chosen.gears, seed, Path(folder))
+                print(f"seed {seed}: {n} repaired, {away} sent elsewhere; {unasked} unasked")
+            return
         for seed in chosen.seed or [7100]:
             for place, world in enumerate(WORLDS):
                 if chosen.world is None or world.name.startswith(chosen.world):

@@ -56,6 +56,7 @@ class World:
     plunger_u_in: float = 0.002
     states_plunger_u: bool = False
     mix: tuple[float, float, float, float] = (3.0, 1.0, 4.0, 0.0)
+    shut: str = ""
 
 
 WORLDS = (
@@ -71,6 +72,8 @@ WORLDS = (
     World("H loaded, gauge x0.8", "H", "loaded", gauge=0.8),
     World("I gravity", "I", "gravity"),
     World("J uniform, gauge x0.8", "J", gauge=0.8),
+    World("A one joint shut", shut="joint"),
+    World("A one area shut", shut="area"),
 )
 
 
@@ -92,9 +95,16 @@ class Gear:
     end: str = ""
     promised: float = 0.0
     stale: bool = False
+    shut: set[int] = field(default_factory=set)
+    repaired_rows: list[dict[str, Any]] = field(default_factory=list)
     chances: list[tuple[float, bool]] = field(default_factory=list)
     first: dict[str, Any] = field(default_factory=dict)
     last: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def asked(self) -> set[int]:
+        """The joints that the program asked for."""
+        return {j for _action, joints in self.done for j in joints}
 
     @property
     def clock(self) -> str:
@@ -113,8 +123,18 @@ class Hangar:
             self._draw(kind, round(n * share[kind]))
         for place, gear in enumerate(self.gears):
             gear.row["outcome"] = "RETRACTED" if gear.kind == NONE else "FAILED"
+            gear.shut = self._shut()
+            gear.row["cannot_reach"] = " ".join(map(str, sorted(gear.shut)))
             for j in self.rng.permutation(10)[: (0, 2, 5, 10)[place % 4]]:
-                self.read(gear, int(j) + 1)
+                if j + 1 not in gear.shut:
+                    self.read(gear, int(j) + 1)
+
+    def _shut(self) -> set[int]:
+        """Joints that nobody can reach today."""
+        joint = int(self.rng.integers(10)) + 1 if self.world.shut else 0
+        if self.world.shut == "area":
+            return {j for j in range(1, 11) if AREA[j - 1] == AREA[joint - 1]}
+        return {joint} - {0}
 
     def directions(self, n: int) -> Array:
         """Where the pins of n gears rest. [rad]"""
@@ -164,9 +184,15 @@ class Hangar:
             found += [gear for gear, out in zip(new, beyond, strict=True) if out == wants]
         self.gears += found[:wanted]
 
-    def read(self, gear: Gear, joint: int, u_in: float = GAUGE_U_IN) -> None:
-        """Read one joint with a gauge that may be off."""
-        factor = self.world.gauge * self.world.slips.get(joint, 1.0)
+    def read(self, gear: Gear, joint: int, again_u_in: float | None = None) -> None:
+        """Read one joint with a gauge that may be off; again with another one, of which the scale
+        is right to 2 %, and the convention looked up.
+        """
+        if again_u_in is None:
+            u_in, factor = GAUGE_U_IN, self.world.gauge * self.world.slips.get(joint, 1.0)
+        else:
+            u_in, factor = again_u_in, self.rng.normal(1.0, 0.02)
+            gear.row[f"gauge_u_{joint}_in"] = u_in
         seen = factor * gear.true_in[joint - 1] + self.rng.normal(0.0, u_in)
         gear.row[f"clearance_{joint}_in"] = max(seen, 0.0)
 
@@ -195,6 +221,7 @@ class Hangar:
         before = {int(word) for word in gear.row.get("restored_joints", "").split()}
         gear.row["restored_joints"] = " ".join(map(str, sorted({*before, *joints})))
         gear.row["repair_date"] = gear.clock
+        gear.repaired_rows.append(dict(gear.row))
         gear.stale = True
 
     def read_plunger(self, gear: Gear) -> None:
@@ -222,9 +249,7 @@ class Hangar:
                 needed = step["gauge_u_needed_in"]
                 for j in joints:
                     gear.minutes += READ_MIN[j - 1]
-                    self.read(gear, j, needed or GAUGE_U_IN)
-                    if needed:
-                        row[f"gauge_u_{j}_in"] = needed
+                    self.read(gear, j, needed)
             case "READ_PLUNGER":
                 gear.minutes += PLUNGER_MIN
                 self.read_plunger(gear)
@@ -293,13 +318,15 @@ class Hangar:
     def measure_all(self, folder: Path) -> Hangar:
         """Measure all ten joints, then the best repair and a trial retraction."""
         for gear in self.gears:
-            unread = [j for j in range(1, 11) if f"clearance_{j}_in" not in gear.row]
+            reach = set(range(1, 11)) - gear.shut
+            unread = [j for j in sorted(reach) if f"clearance_{j}_in" not in gear.row]
             self.open(gear, unread)
             for j in unread:
                 gear.minutes += READ_MIN[j - 1]
                 self.read(gear, j)
         for gear, said in zip(self.gears, self.judged(self.gears, folder), strict=True):
             over = [j["joint"] for j in said["joints"] if j["over_limit"]]
+            over = [j for j in over if j not in gear.shut]
             sure = [s for s in said["repair_sets"] or () if s["kind"] == "sure"]
             failed = gear.row["outcome"] == "FAILED" and said["verdict"] != "WITHIN_MARGIN"
             joints = sure[0]["joints"] if failed and sure else over
@@ -323,6 +350,7 @@ class Counted:
 def counted(world: World, n: int, seed: int, folder: Path) -> tuple[Counted, Hangar]:
     """Work on the gears of a world, and on the same ones by measuring everything."""
     hangar = Hangar(world, n, seed)
+    best = oracle(hangar) if world.mix[CLEARANCE] else Oracle(float("nan"), float("nan"))
     base = deepcopy(hangar).measure_all(folder)
     hangar.work(folder)
     by = [[g for g in hangar.gears if g.kind == kind] for kind in range(4)]
@@ -342,11 +370,14 @@ def counted(world: World, n: int, seed: int, folder: Path) -> tuple[Counted, Han
         "second repairs": mean([g.repairs > 1 for g in repaired]),
         "cured": mean([stands[id(g)] <= MARGIN_IN for g in by[CLEARANCE]]),
         "sent away": len(away) / max(len(by[CLEARANCE]), 1),
+        "oracle, minutes": best.minutes,
+        "oracle, sound of restored": best.sound,
         "sound of restored": sum(g.sound for g in hangar.gears)
         / max(sum(g.restored for g in hangar.gears), 1),
         "other, sound restored": mean([g.sound > 0 for g in by[OTHER]]),
         "not failed, sound restored": mean([g.sound > 0 for g in by[NONE]]),
         "mis-rigged, restored": mean([g.restored > 0 for g in by[MISRIGGED]]),
+        "asked for what is shut": mean([bool(g.asked & g.shut) for g in hangar.gears]),
         "wrong WITHIN": mean(
             [g.end == "WITHIN" and bound[id(g)] > 1.05 * MARGIN_IN for g in hangar.gears]
         ),
@@ -360,6 +391,62 @@ def counted(world: World, n: int, seed: int, folder: Path) -> tuple[Counted, Han
         ),
         hangar,
     )
+
+
+def replayed(n: int, seed: int, folder: Path) -> tuple[int, int, int]:
+    """Failures by clearance whose row, right after their repair, still says what was before it:
+    their number; how many are sent elsewhere; the same without a word of the repair in the row
+    and without being asked for one.
+    """
+    hangar = Hangar(WORLDS[0], n, seed).work(folder)
+    repaired = [g for g in hangar.gears if g.kind == CLEARANCE and g.repaired_rows]
+    for gear in repaired:
+        gear.row = gear.repaired_rows[0]
+    away = sum(said["end"] == "NOT_EXPLAINED" for said in hangar.judged(repaired, folder))
+    for gear in repaired:
+        for column in ("restored_joints", "repair_date"):
+            del gear.row[column]
+    unasked = sum(
+        said["end"] == "NOT_EXPLAINED" and "restored_joints" not in said["plan"][0]["text"]
+        for said in hangar.judged(repaired, folder)
+    )
+    return len(repaired), away, unasked
+
+
+@dataclass(frozen=True)
+class Oracle:
+    """What the quickest repair of failures by clearance takes, all clearances and directions being
+    known, and how many of the joints that it restores are within their limits.
+    """
+
+    minutes: float
+    sound: float
+
+
+def oracle(hangar: Hangar) -> Oracle:
+    """Restore what is over its limit and the quickest more that hold, read the plunger, retract."""
+    sets = ((np.arange(1024)[:, None] >> np.arange(10)) & 1).astype(bool)
+    inside = np.array([[area == name for area in AREA] for name in AREA_MIN])
+    areas = (sets[:, None, :] & inside).any(axis=2) @ np.array(list(AREA_MIN.values()))
+    minutes = sets @ np.array(RESTORE_MIN) + areas + PLUNGER_MIN + RETRACT_MIN
+    spent, restored, sound = [], 0, 0
+    for gear in hangar.gears:
+        if gear.kind != CLEARANCE:
+            continue
+        over = gear.true_in > LIMIT_IN
+        able = np.flatnonzero(~(over & ~sets).any(axis=1))
+        able = able[np.argsort(minutes[able], kind="stable")]
+        for some in np.array_split(able, max(len(able) // 32, 1)):
+            true = np.where(sets[some], 0.0005, gear.true_in)
+            turned = np.repeat(gear.angles[None], len(some), axis=0)
+            holds = np.abs(displacement(true, turned, hangar.world.linkage)) <= MARGIN_IN
+            if holds.any():
+                best = some[int(np.argmax(holds))]
+                spent.append(float(minutes[best]))
+                restored += int(sets[best].sum())
+                sound += int((sets[best] & ~over).sum())
+                break
+    return Oracle(float(np.mean(spent)), sound / max(restored, 1))
 
 
 def say(name: str, found: Counted) -> str:

@@ -91,7 +91,7 @@ def test_joints_that_read_like_new_on_a_gear_that_failed_are_asked_about(judge: 
 
 
 def test_a_blank_outcome_is_no_complaint(judge: Judge) -> None:
-    found = judge(every_joint(0.002, j10=0.0085))
+    found = judge(every_joint(0.0003, j10=0.0148))
     assert [(s.action, s.joints) for s in found.plan.steps] == [
         (Action.RESTORE, (10,)),
         (Action.DONE, ()),
@@ -132,10 +132,13 @@ def test_a_plunger_at_the_edge_of_its_margin_is_read_again_once(judge: Judge) ->
     assert twice.next_action.action is Action.MEASURE
 
 
-def test_a_joint_over_its_limit_by_less_than_its_uncertainty_is_read_again(judge: Judge) -> None:
+def test_a_joint_that_reads_little_over_its_limit_is_read_with_another_gauge(judge: Judge) -> None:
     edge = judge(every_joint(0.001, j10=0.0078), gauge_u_in=0.0005)
-    clear = judge(every_joint(0.001, j10=0.0081), gauge_u_in=0.0005)
+    clear = judge(every_joint(0.0003, j10=0.0148), gauge_u_in=0.0005)
     assert (edge.next_action.action, edge.next_action.joints) == (Action.MEASURE_AGAIN, (10,))
+    assert "with another gauge" in edge.next_action.text
+    again = judge(every_joint(0.001, j10=0.0078), gauge_u_in=0.0005, measured_again=(10,))
+    assert again.next_action.action is Action.RESTORE
     assert clear.next_action.action is Action.RESTORE
 
 

@@ -156,4 +156,4 @@ def test_with_advice_the_posterior_names_groups_and_intervals(gear: Gear, judge:
     (row,) = check_as_json(gear, [judged], [], [])["inspections"]
     assert row["posterior"]["groups"][0]["joints"] == [3, 5]
     assert [interval["joint"] for interval in row["posterior"]["intervals"]] == list(range(1, 11))
-    assert row["measuring"]["stop"] is True
+    assert row["measuring"]["text"] == "Next: measure again #3."

@@ -70,7 +70,7 @@ def test_a_displacement_beyond_what_the_joints_explain_is_not_explained(judge: J
 def test_a_joint_over_its_limit_is_restored_before_a_displacement_counts_as_unexplained(
     judge: Judge,
 ) -> None:
-    found = judge(every_joint(0.001, j7=0.008), readings_in=(0.060,))
+    found = judge(every_joint(0.0003, j7=0.0148), readings_in=(0.060,))
     assert [(step.action, step.joints) for step in found.plan.steps] == [
         (Action.RESTORE, (7,)),
         (Action.CHECK_RIGGING, ()),
@@ -130,7 +130,7 @@ def test_an_area_counts_once_and_again_after_a_repair_closed_it(judge: Judge) ->
 
 
 def test_a_gear_that_retracts_has_only_the_joint_over_its_limit_restored(judge: Judge) -> None:
-    found = judge(every_joint(0.004, j7=0.008), outcome=Outcome.RETRACTED)
+    found = judge(every_joint(0.0003, j7=0.0148), outcome=Outcome.RETRACTED)
     assert (found.next_action.action, found.next_action.joints) == (Action.RESTORE, (7,))
     assert found.end is End.DONE
 
@@ -158,7 +158,7 @@ def test_the_joints_explain_a_displacement_up_to_two_standard_uncertainties_beyo
 
 
 def test_a_failure_that_clearances_likely_caused_is_expected_to_be_repaired(judge: Judge) -> None:
-    found = judge(every_joint(0.001, j3=0.013, j5=0.007), outcome=Outcome.FAILED)
+    found = judge(every_joint(0.001, j3=0.0148), outcome=Outcome.FAILED)
     assert 0.05 < (found.probability_exceed_random_directions or 0.0) < 0.5
     assert [step.action for step in found.plan.steps] == [
         Action.READ_PLUNGER,
@@ -236,3 +236,17 @@ def test_reading_in_an_area_that_the_repair_opens_anyway_costs_the_reading_alone
     # Joint 7 is over its limit: the link assembly, in which #8 is read, will be opened in any case.
     assert [(step.action, step.joints) for step in steps[:1]] == [(Action.MEASURE, (8,))]
     assert 7 in steps[1].joints
+
+
+def test_reading_ends_where_the_gear_will_be_too_close_anyway(judge: Judge) -> None:
+    close, open_still = (judge(dict.fromkeys(range(1, 8), c)) for c in (0.0022, 0.0019))
+    assert (close.verdict, close.end) == (Verdict.INCOMPLETE, End.TOO_CLOSE)
+    assert close.next_action.action is Action.CONTINUE
+    assert open_still.next_action.action is Action.MEASURE
+
+
+def test_the_expected_repair_says_which_joint_nobody_has_read(judge: Judge) -> None:
+    found = judge({3: 0.013, 5: 0.007}, outcome=Outcome.FAILED)
+    (repair,) = [step for step in found.plan.steps if step.action is Action.RESTORE]
+    assert repair.joints == (3, 2)
+    assert repair.text == "Restore #3 and what the readings find worn, perhaps #2."

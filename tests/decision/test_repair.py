@@ -30,10 +30,7 @@ def repair_sets(
     """Repair sets of one gear."""
     cases = Cases.of(gear, [replace(inspection, margin_in=margin_in)])
     upper = predict_batch(cases).upper
-    found = repair.calibrated(
-        cases, repair.search(cases, upper.displacement_in, upper.u_clearances_in)
-    )
-    return repair.repair_sets(cases, found, np.array([True]))[0]
+    return repair.repair_sets(cases, upper, np.array([0]))[0]
 
 
 def allowance(gear: Gear, inspection: Inspection) -> dict[int, float]:

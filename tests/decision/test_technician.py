@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.decision.technician import CLEARANCE, NONE, OTHER, WORLDS, Hangar, counted
+from tests.decision.technician import CLEARANCE, NONE, OTHER, WORLDS, Hangar, counted, replayed
 
 _BY_NAME = {world.name: world for world in WORLDS}
 
@@ -57,3 +57,24 @@ def test_one_gear_is_told_alone_what_it_is_told_in_a_batch(worked: tuple, tmp_pa
         (alone,) = fresh.judged([gear], tmp_path)
         assert alone["plan"] == among_others["plan"]
         assert (alone["end"], alone["verdict"]) == (among_others["end"], among_others["verdict"])
+
+
+@pytest.mark.parametrize("name", ["A one joint shut", "A one area shut"])
+def test_a_plan_ends_without_asking_for_what_cannot_be_reached(name: str, tmp_path: Path) -> None:
+    hangar = Hangar(_BY_NAME[name], 24, 1902).work(tmp_path)
+    assert all(gear.shut and gear.end for gear in hangar.gears)
+    assert [gear.asked & gear.shut for gear in hangar.gears] == [set()] * len(hangar.gears)
+
+
+def test_no_repaired_failure_is_sent_elsewhere_by_what_its_row_says_from_before(
+    tmp_path: Path,
+) -> None:
+    repaired, sent_elsewhere, _unasked = replayed(24, 1903, tmp_path)
+    assert repaired > 5
+    assert sent_elsewhere == 0
+
+
+def test_another_gauge_spares_the_joints_that_one_reads_too_high(tmp_path: Path) -> None:
+    found, _hangar = counted(_BY_NAME["D gravity, gauge x1.2"], 48, 1905, tmp_path)
+    assert found.figures["sound of restored"] <= 0.08
+    assert found.figures["not failed, sound restored"] <= 0.05

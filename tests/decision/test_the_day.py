@@ -38,7 +38,7 @@ def test_sound_joints_are_not_restored_for_one_that_cannot_be_reached(judge: Jud
 
 
 def test_a_joint_over_its_limit_is_restored_although_an_area_is_shut(judge: Judge) -> None:
-    found = judge(dict.fromkeys(SIDESTAY, 0.002) | {3: 0.013}, **FAILED, cannot_reach=LINKS)
+    found = judge(dict.fromkeys(SIDESTAY, 0.0003) | {3: 0.0148}, **FAILED, cannot_reach=LINKS)
     assert (found.next_action.action, found.next_action.joints) == (Action.RESTORE, (3,))
     assert found.plan.steps[1].action is Action.READ_PLUNGER
 
@@ -64,6 +64,6 @@ def test_no_more_joints_are_read_than_the_minutes_allow(judge: Judge) -> None:
 
 
 def test_what_does_not_fit_the_minutes_is_said(judge: Judge) -> None:
-    found = judge(every_joint(0.001, j3=0.013), **FAILED, minutes_available=60.0)
+    found = judge(every_joint(0.0003, j3=0.0148), **FAILED, minutes_available=60.0)
     assert found.next_action.action is Action.CONTINUE
     assert "restore #3 takes 135 min; 60 min are left today" in (found.plan.open_question or "")

@@ -905,10 +905,11 @@ def test_joints_restored_at_the_prompt_make_what_was_typed_before_older(flow: Fl
 
 
 def test_the_day_is_taken_on_one_line(flow: Flow) -> None:
-    typed = "c 4, w 3 o sidestay; link assembly"
+    typed = "c 4, w 3 a 5 o sidestay; link assembly"
     answers = play(flow, [*TEN, typed, "t 180 g yes"]).state.answers
     read = answers.inspection(flow.gear, "R1")
     assert (read.cannot_reach, read.no_spare, read.minutes_available) == ((4,), (3,), 180.0)
+    assert read.measured_again == (5,)
     assert read.open_areas == ("sidestay", "link assembly")
     assert read.rigging_checked is RiggingCheck.YES
 

@@ -42,6 +42,7 @@ SIGN_OFF = tuple(column.name for column in _SIGNED)
 DAY = {
     "n": "restored_joints",
     "g": "rigging_checked",
+    "a": "measured_again",
     "c": "cannot_reach",
     "w": "no_spare",
     "o": "open_areas",
@@ -236,6 +237,7 @@ _JOINTS = r"\#?\d{1,3}(?![.\d])(?:(?:\s*[,;]\s*|\s+)\#?\d{1,3}(?![.\d]))*"
 _ITEM = re.compile(
     rf"""\s*[,;]?\s*(?:
         (?:n|new)\s*[=:]?\s*(?P<restored_joints>{_JOINTS})
+      | (?:a|again)\s*[=:]?\s*(?P<measured_again>{_JOINTS})
       | (?:c|cannot\s+reach)\s*[=:]?\s*(?P<cannot_reach>{_JOINTS})
       | (?:w|no\s+spare)\s*[=:]?\s*(?P<no_spare>{_JOINTS})
       | (?:g|rigging)\s+(?P<rigging_checked>yes|no|corrected)

@@ -300,6 +300,7 @@ def more_page(answers: Answers, gear: Gear, width: int) -> Page:
             for key, example, meaning in (
                 ("n", "3 5", "I have restored these joints since"),
                 ("g", "yes", "rigging and roller looked at (or: g corrected)"),
+                ("a", "3", "measured again with another gauge"),
                 ("c", "4", "these joints cannot be reached today"),
                 ("w", "3", "without a spare part for these joints"),
                 ("o", "", f"these areas are open: {'; '.join(a.name for a in gear.areas)}"),
@@ -307,7 +308,7 @@ def more_page(answers: Answers, gear: Gear, width: int) -> Page:
             )
         ),
     )
-    return Page(shown, " f, r, p, m, n, g, c, w, o, t, or Enter to go on > ")
+    return Page(shown, " f, r, p, m, n, g, a, c, w, o, t, or Enter to go on > ")
 
 
 def confirm_more_page(most_in: float, unit: LengthUnit | None) -> Page:

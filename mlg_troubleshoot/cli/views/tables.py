@@ -8,7 +8,7 @@ from rich.text import Text
 
 from mlg_troubleshoot.cli.output import word
 from mlg_troubleshoot.decision.assessment import Assessment, Judgement, Verdict
-from mlg_troubleshoot.decision.plan import Action, Basis, End
+from mlg_troubleshoot.decision.plan import Action, Basis, End, Step
 from mlg_troubleshoot.units import Sentence
 
 STYLES = {
@@ -63,10 +63,14 @@ def what_follows(a: Assessment) -> str | None:
     """
     if len(a.plan.steps) < 2:
         return None
-    rest = [
-        step.words + f" ({step.minutes:.0f} min)" * bool(step.minutes)
-        for step in a.plan.steps[1:-1]
-    ]
+    unread = {finding.joint for finding in a.joints if finding.clearance_in is None}
+
+    def words(step: Step) -> str:
+        guessed = step.action is Action.RESTORE and unread & set(step.joints)
+        said = step.text[0].lower() + step.text[1:].rstrip(".") if guessed else step.words
+        return said + f" ({step.minutes:.0f} min)" * bool(step.minutes)
+
+    rest = [words(step) for step in a.plan.steps[1:-1]]
     return Sentence.of(
         "Then, as expected: {}{}{}", ", ".join(rest), ". " if rest else "", a.plan.steps[-1].text
     )

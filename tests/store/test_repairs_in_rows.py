@@ -1,0 +1,80 @@
+"""A repair that a row states: what it does to the rows below it, and what is kept of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mlg_troubleshoot.store import RecordKind, Store
+from tests.cli.conftest import mlg, row
+
+from .places import table
+
+FAILED = {"outcome": "FAILED", "plunger_displacement_in": "0.035"}
+RESTORED = {"restored_joints": "3", "repair_date": "2026-03-02"}
+
+
+def visit(name: str, day: str, worn_in: str, **more: str) -> dict[str, str]:
+    return row(record_id=name, inspection_date=day, clearance_3_in=worn_in, **more)
+
+
+@pytest.fixture
+def history(tmp_path: Path) -> Path:
+    """A failure, its repair, and a row below them that still says what was before."""
+    return table(
+        tmp_path,
+        visit("before", "2026-03-01", "0.0148", **FAILED),
+        visit("repair", "2026-03-02", "0.0005", **RESTORED),
+        visit("below", "2026-03-02", "0.0005", **FAILED),
+        visit("later", "2026-03-09", "0.0005", **FAILED),
+    )
+
+
+def next_of(history: Path) -> dict[str, str]:
+    found = mlg("check", history, "--json").json["inspections"]
+    return {each["record_id"]: each["next_action"]["action"] for each in found}
+
+
+def test_a_row_below_the_repair_of_its_gear_is_not_judged_by_what_is_older(history: Path) -> None:
+    assert next_of(history)["below"] == "READ_PLUNGER"
+
+
+def test_a_row_above_the_repair_is_judged_as_it_was_then(history: Path) -> None:
+    assert next_of(history)["before"] in ("RESTORE", "MEASURE", "MEASURE_AGAIN", "CHECK_RIGGING")
+
+
+def test_a_failure_after_the_repair_is_a_new_one(history: Path) -> None:
+    assert next_of(history)["later"] != "READ_PLUNGER"
+
+
+def test_keeping_a_row_that_states_a_repair_keeps_the_repair_once(
+    history: Path, tmp_path: Path
+) -> None:
+    place = str(tmp_path / "store.sqlite")
+    for _ in range(2):
+        mlg("check", history, "--keep", "--store", place)
+    kept = [record for record in Store(place).all() if record.kind is RecordKind.REPAIR]
+    assert [(record.day, record.body["joints"]) for record in kept] == [("2026-03-02", [3])]
+
+
+def test_a_repair_that_was_recorded_by_hand_is_not_kept_twice(
+    history: Path, tmp_path: Path
+) -> None:
+    place = str(tmp_path / "store.sqlite")
+    first = table(tmp_path, visit("first", "2026-02-01", "0.0100"), name="first.csv")
+    mlg("check", first, "--keep", "--store", place)
+    gear = row()["tail_no"], row()["side"]
+    mlg("history", "repair", *gear, "--joint", "3", "--date", "2026-03-02", "--store", place)
+    mlg("check", history, "--keep", "--store", place)
+    kinds = [record.kind for record in Store(place).all()]
+    assert kinds.count(RecordKind.REPAIR) == 1
+
+
+def test_a_rigging_that_a_row_says_was_corrected_is_kept_as_a_re_rigging(tmp_path: Path) -> None:
+    place = str(tmp_path / "store.sqlite")
+    rerigged = {"rigging_checked": "corrected", "repair_date": "2026-03-02"}
+    file = table(tmp_path, visit("rigged", "2026-03-02", "0.0010", **rerigged))
+    mlg("check", file, "--keep", "--store", place)
+    kinds = [record.kind for record in Store(place).all()]
+    assert kinds.count(RecordKind.RERIG) == 1
