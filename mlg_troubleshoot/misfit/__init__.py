@@ -11,7 +11,7 @@ __all__ = [
     "fitting",
     "held_out",
     "posterior",
-    "search",
+    "simulation",
     "simulation_result",
     "verdict",
 ]
