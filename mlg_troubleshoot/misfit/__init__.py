@@ -6,7 +6,9 @@ Its modules are its doors: a check needs the beliefs of a diagnosis, and not sci
 
 __all__ = [
     "beliefs",
+    "conclusion",
     "covariance",
+    "design",
     "explanation",
     "fitting",
     "held_out",

@@ -17,7 +17,7 @@ TESTABLE, ALIKE = 0.03, 1e-3
 
 @dataclass(frozen=True)
 class Design:
-    """Testable suspects in classes that these rows cannot tell apart, by their places."""
+    """Testable suspects in classes that these rows cannot distinguish, by their places."""
 
     classes: tuple[tuple[int, ...], ...]
 

@@ -36,7 +36,7 @@ def key_of(name: str) -> Key:
 
 
 @dataclass(frozen=True)
-class Point:
+class FittedPoint:
     """The simulation where some suspects fit best, the others nominal.
 
     values: of all parameters. rest, shape (N,): reading less prediction. columns, shape (N, p):
@@ -51,13 +51,13 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedPoint:
     """A point with what is believed there.
 
     noise: of the readings in the unit of each, shape (N,). [unit]
     """
 
-    point: Point
+    point: FittedPoint
     noise: NoiseModel
     unit: Array
     follows: Conclusion
@@ -116,7 +116,9 @@ class Study:
             scale[index] = max(float(np.sqrt(np.mean(columns[index] ** 2))), 1e-300)
         seen = columns / scale[:, None]
         self.design = design_of(seen[:, :count], seen[:, count:])
-        self.nominal = Point(runner.nominal, runner.reading - base, columns, runner.reading - base)
+        self.nominal = FittedPoint(
+            runner.nominal, runner.reading - base, columns, runner.reading - base
+        )
         wide = np.zeros((*runner.shape, count))
         wide[runner.row, runner.output] = seen[:, :count]
         self.contexts = self._contexts(predicted, wide.reshape(len(wide), -1))
@@ -137,22 +139,24 @@ class Study:
             contexts += [Context(name, log, size * placed, listed=False) for size in sizes]
         return contexts
 
-    def at(self, values: Array, base: Array) -> Point:
+    def at(self, values: Array, base: Array) -> FittedPoint:
         """Linearise the simulation at some values."""
         run = self.runner
         columns = run.sensitivities(values, base, range(len(values)))
         change = (values - run.nominal)[: self.count] / run.trial[: self.count]
         rest = run.reading - base
-        return Point(values, rest, columns, rest + columns[:, : self.count] @ change)
+        return FittedPoint(values, rest, columns, rest + columns[:, : self.count] @ change)
 
-    def fitted(self, at: Judged, chosen: Sequence[int], context: int) -> Point:
+    def fitted(self, at: JudgedPoint, chosen: Sequence[int], context: int) -> FittedPoint:
         """Fit some suspects and all nuisance parameters, the other suspects nominal."""
         values = at.point.values.copy()
         others = [k for k in range(self.count) if k not in chosen]
         values[others] = self.runner.nominal[others]
         return self._fit(values, chosen, at.settled(chosen, context), at.unit)
 
-    def _fit(self, values: Array, chosen: Sequence[int], noise: NoiseModel, unit: Array) -> Point:
+    def _fit(
+        self, values: Array, chosen: Sequence[int], noise: NoiseModel, unit: Array
+    ) -> FittedPoint:
         noise = replace(noise, loadings=noise.loadings[:, noise.absorbed :], absorbed=0)
 
         def weigh(columns: Array) -> Array:
@@ -161,7 +165,7 @@ class Study:
 
         return self.at(*self.runner.fit(values, [*chosen, *self.nuisance], weigh))
 
-    def start(self) -> Point:
+    def start(self) -> FittedPoint:
         """The nuisance parameters fitted; what they absorb shows only there."""
         point = self.nominal
         if self.nuisance:
@@ -180,7 +184,7 @@ class Study:
         listed = self.beliefs.expected * (1.0 - self.beliefs.unlisted)
         return listed / max(len(self.design.classes), 1)
 
-    def effects(self, point: Point, noise: NoiseModel, unit: Array) -> Effects:
+    def effects(self, point: FittedPoint, noise: NoiseModel, unit: Array) -> Effects:
         """One effect of each class of suspects, and entry errors of readings far out."""
         run, beliefs = self.runner, self.beliefs
         first = [members[0] for members in self.design.classes]
@@ -217,7 +221,7 @@ class Study:
             usual[index] = np.maximum(usual[index], middle)
         return np.asarray(np.abs(rest) > _SLIP * usual)
 
-    def judged(self, start: Point) -> Judged:
+    def judged(self, start: FittedPoint) -> JudgedPoint:
         """Search from nothing; where that ends with a discrepancy, also from what explains most
         without one, which may be the bend of a large change.
         """
@@ -230,7 +234,7 @@ class Study:
         again = self._searched(self.fitted(at, chosen, 0))
         return at if again.likeliest.context else again
 
-    def _searched(self, start: Point) -> Judged:
+    def _searched(self, start: FittedPoint) -> JudgedPoint:
         """Search, fit what is likeliest and linearise there, until the same is likeliest again."""
         point, tried = start, set[tuple[int, ...]]()
         free = start.columns[:, self.nuisance]
@@ -241,7 +245,7 @@ class Study:
             effects = self.effects(point, noise, unit)
             data = point.whole / unit
             found = posterior(noise, data, effects, self.contexts, beliefs, (), _MOST)
-            at = Judged(point, noise, unit, Conclusion(found, beliefs), self.contexts)
+            at = JudgedPoint(point, noise, unit, Conclusion(found, beliefs), self.contexts)
             chosen, context = self.chosen(found.names_of(at.likeliest)), at.likeliest.context
             state = (context, *sorted(chosen))
             if state in tried or len(tried) == _ROUNDS:

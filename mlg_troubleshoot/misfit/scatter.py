@@ -1,7 +1,7 @@
 """What readings do when nothing is wrong: each its own scatter, scatter between groups; and the
 smooth shapes in which they may differ from a simulation that no suspect makes wrong.
 
-Such a discrepancy is no noise, but a cause must explain the data better than it does (Kennedy and
+Such a discrepancy is not noise, but a cause must explain the data better than it does (Kennedy and
 O'Hagan 2001).
 """
 
@@ -70,8 +70,8 @@ class Readings:
         return noise, unit
 
     def scale_of(self, left: Array, spare: float) -> Array:
-        """Standard deviation of each reading by itself, from what is left of them when a share of
-        them is spare; far ones count less.
+        """Standard deviation of each reading by itself, from residuals of which a share is spare;
+        far ones count less.
         """
         relative = np.ones(len(left)) if self.declared is None else self.declared
         size = np.abs(left) / relative

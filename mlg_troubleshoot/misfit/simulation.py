@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.held_out import folds_of
-from mlg_troubleshoot.misfit.linearised import Judged, Point, Study, key_of
+from mlg_troubleshoot.misfit.linearised import JudgedPoint, FittedPoint, Study, key_of
 from mlg_troubleshoot.misfit.runner import Runner, held_out, least_squares
 from mlg_troubleshoot.misfit.simulation_inputs import checked
 from mlg_troubleshoot.misfit.simulation_result import (
@@ -87,7 +87,7 @@ def diagnose_simulation(
 
 
 def _diagnosed(study: Study) -> SimulationDiagnosis:
-    """Say what is wrong, what may be, what that gains, and what is left."""
+    """Say what is wrong, what may be, what that gains, and the residual."""
     runner, names = study.runner, study.runner.names
     start = study.start()
     at = study.judged(start)
@@ -123,10 +123,10 @@ def _diagnosed(study: Study) -> SimulationDiagnosis:
     )
 
 
-def _causes(study: Study, at: Judged) -> list[int]:
+def _causes(study: Study, at: JudgedPoint) -> list[int]:
     """Suspects that are sure, and beside a discrepancy also those that take away most of the misfit
-    where they act; without those that make held-out rows worse, and those whose value cannot be
-    told from nominal.
+    where they act; without those that make held-out rows worse, and those whose interval
+    contains the nominal value.
     """
     causes = study.chosen(at.follows.sure)
     first = [members[0] for members in study.design.classes]
@@ -147,7 +147,7 @@ def _causes(study: Study, at: Judged) -> list[int]:
     return causes
 
 
-def _reach(study: Study, at: Judged, k: int, others: Sequence[int]) -> float:
+def _reach(study: Study, at: JudgedPoint, k: int, others: Sequence[int]) -> float:
     """Half the 95 % interval of a suspect's change, what looks like a discrepancy being one.
     [trials]
     """
@@ -156,7 +156,7 @@ def _reach(study: Study, at: Judged, k: int, others: Sequence[int]) -> float:
     return float(student.ppf(0.975, degrees) * at.linear([k, *others], context).errors[0])
 
 
-def _share(at: Judged, others: Sequence[int], k: int) -> float:
+def _share(at: JudgedPoint, others: Sequence[int], k: int) -> float:
     """Share of the squared misfit where a suspect acts that it takes away from what others leave.
     [1]
     """
@@ -170,7 +170,7 @@ def _share(at: Judged, others: Sequence[int], k: int) -> float:
 
 
 def _held_out(
-    study: Study, at: Judged, point: Point, fitted: Sequence[int], acting: Sequence[int]
+    study: Study, at: JudgedPoint, point: FittedPoint, fitted: Sequence[int], acting: Sequence[int]
 ) -> tuple[Array, str]:
     """Misfit of rows held out over their scatter, some causes fitted to the others; rows are held
     out by group as long as the others teach what acts.
@@ -185,8 +185,8 @@ class _Report:
     """What is said of a diagnosis: final is where the causes alone fit best."""
 
     study: Study
-    at: Judged
-    final: Point
+    at: JudgedPoint
+    final: FittedPoint
     causes: tuple[int, ...]
 
     def describe(self, k: int) -> SuspectFound:
@@ -213,7 +213,7 @@ class _Report:
             aliases=tuple(names[j] for j in self.study.design.class_of(k) if j != k),
         )
 
-    def gain(self, start: Point) -> HeldOutGain:
+    def gain(self, start: FittedPoint) -> HeldOutGain:
         """Misfit of rows held out, before and after, in the unit of the readings."""
         before, by = _held_out(self.study, self.at, start, (), self.causes)
         after, by = _held_out(self.study, self.at, self.final, self.causes, self.causes)
