@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.misfit.beliefs import Beliefs
 from mlg_troubleshoot.misfit.held_out import folds_of
-from mlg_troubleshoot.misfit.linearised import JudgedPoint, FittedPoint, Study, key_of
+from mlg_troubleshoot.misfit.linearised import FittedPoint, JudgedPoint, Study, key_of
 from mlg_troubleshoot.misfit.runner import Runner, held_out, least_squares
 from mlg_troubleshoot.misfit.simulation_inputs import checked
 from mlg_troubleshoot.misfit.simulation_result import (
