@@ -48,6 +48,14 @@ def diagnose(
             help="Probability from which a cause is named: of ten named at 0.9 nine are right.",
         ),
     ] = 0.9,
+    beliefs: Annotated[
+        Path | None,
+        typer.Option(
+            "--beliefs",
+            metavar="FILE.toml",
+            help="How often and how large things are expected to be wrong in your fleet.",
+        ),
+    ] = None,
     tables: options.Tables,
     force: options.Force = False,
     show: options.Show = None,
@@ -71,13 +79,20 @@ def diagnose(
     from mlg_troubleshoot.workflows import diagnose as task
 
     written = OutputFile("--write-extension", write_extension, EXTENSION)
-    claim(tables.gear, [*files, *(causes or ())], [written], report, force=force)
+    claim(
+        tables.gear,
+        [*files, *(causes or ()), *([beliefs] if beliefs else [])],
+        [written],
+        report,
+        force=force,
+    )
     shown = settings(tables.gear, show, page, tables.columns, keep=remember)
     asked = task.DiagnoseOptions(
         **tables.declared(shown.headers),
         remembered=shown.note or None,
         cause_files=tuple(causes or ()),
         sure=sure,
+        beliefs_file=beliefs,
     )
     try:
         with stages(quiet=quiet) as bar:
