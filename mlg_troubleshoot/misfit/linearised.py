@@ -25,6 +25,8 @@ from mlg_troubleshoot.misfit.scatter import Readings, smooth_shapes
 _SIZES = (1.0 / 3.0, 1.0, 3.0, 10.0, 30.0, 100.0)
 # Residual over the scatter of a reading from which it may be an entry error.
 _SLIP = 3.0
+# Share of the largest reading or effect that a number of it does not hold.
+_DIGITS = 1e-12
 # Computing only: suspects that act together at most, and rounds until the same is likeliest again.
 _MOST, _ROUNDS = 12, 8
 _SUSPECT = "suspect"
@@ -105,13 +107,14 @@ class Study:
         self.nuisance = list(range(count, len(runner.names)))
         self.outputs = [np.flatnonzero(runner.output == k) for k in np.unique(runner.output)]
         own = None if declared is None else declared[runner.row, runner.output]
-        self.readings = Readings(runner.row, self.outputs, group, own)
         # Rows are dealt to folds in an order that no pattern of the rows has.
         self.fold = np.random.default_rng(0).permutation(runner.shape[0])
         predicted = runner.nominal_prediction()
         base = predicted[runner.row, runner.output]
         columns = runner.sensitivities(runner.nominal, base, range(len(runner.names)))
-        scale = np.ones(len(base)) if own is None else own
+        floor = _DIGITS * float(max(np.max(np.abs(runner.reading)), np.max(np.abs(columns))))
+        self.readings = Readings(runner.row, self.outputs, group, own, max(floor, 1e-300))
+        scale = np.ones(len(base)) if own is None else own.copy()
         for index in self.outputs if own is None else ():
             scale[index] = max(float(np.sqrt(np.mean(columns[index] ** 2))), 1e-300)
         seen = columns / scale[:, None]

@@ -135,8 +135,10 @@ class Runner:
             cost = float(rest @ weigh(rest[:, None])[:, 0])
             slopes = self.sensitivities(values, base, active)
             step, fall = _newton_step(slopes, rest, weigh)
+            if fall < _STANDS + 1e-6 * cost:
+                break
             there = self._shorter(values, active, step, weigh, cost)
-            if fall < _STANDS + 1e-6 * cost or there is None:
+            if there is None:
                 break
             values, base = there
         return values, base

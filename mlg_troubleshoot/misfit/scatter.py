@@ -37,12 +37,16 @@ _SPARE = 0.25
 
 @dataclass(frozen=True)
 class Readings:
-    """Where readings stand: their outputs, groups, and declared standard uncertainty."""
+    """Where readings stand: their outputs, groups, and declared standard uncertainty.
+
+    floor: scatter that each has at least, as a number of limited digits. [unit of the readings]
+    """
 
     row: Wholes
     outputs: Sequence[Wholes]
     group: Wholes | None
     declared: Array | None
+    floor: float = 1e-300
 
     def noise(self, scale: Array, free: Array) -> tuple[NoiseModel, Array]:
         """Noise in the unit of each output's scatter, free columns absorbed, and these units."""
@@ -81,7 +85,7 @@ class Readings:
             spread = 1.4826 * float(np.median(own)) / np.sqrt(spare)
             near = np.minimum(own, _FAR * spread) if spread > 0.0 else own
             level[index] = max(
-                float(np.sqrt(np.mean(near**2) / spare)), 1e-12 * float(np.max(size)), 1e-300
+                float(np.sqrt(np.mean(near**2) / spare)), self.floor / float(np.max(relative))
             )
         return np.asarray(relative * level * np.maximum(1.0, size / level / _FAR))
 

@@ -130,7 +130,7 @@ def _causes(study: Study, at: JudgedPoint) -> list[int]:
     """
     causes = study.chosen(at.follows.sure)
     first = [members[0] for members in study.design.classes]
-    while at.likeliest.context:
+    while at.follows.verdict is Verdict.UNLISTED:
         shares = {k: _share(at, causes, k) for k in first if k not in causes}
         most = max(shares, key=shares.__getitem__, default=-1)
         if shares.get(most, 0.0) <= _MOST_OF_IT:
@@ -202,7 +202,7 @@ class _Report:
         held = self.final.columns[:, self.study.nuisance] / at.weight[:, None]
         seen = whole / at.weight
         seen = (seen - held @ least_squares(held, seen)) * at.weight
-        reach = _reach(self.study, at, k, others) * abs(run.trial[k])
+        reach = _reach(self.study, at, k, others) * float(abs(run.trial[k]))
         value = float(run.nominal[k] + change)
         return SuspectFound(
             suspect=run.suspects[k],

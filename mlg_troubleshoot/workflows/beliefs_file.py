@@ -36,7 +36,7 @@ class BeliefsFile(Table):
 
 def load_beliefs(path: Path, sure: float, causes: Collection[str]) -> Beliefs:
     """Read what is believed; a name among the rarer ones that is not a cause is refused."""
-    remedy = "Give a TOML file with schema = 1. Its keys stand in docs/explanation/diagnosis.md, under What is believed beforehand."
+    remedy = "Give a TOML file with schema = 1. Its keys stand in docs/explanation/diagnosis.md."
     file = read_toml(path, BeliefsFile, remedy)
     for name in file.content.rarer:
         if name not in causes:
