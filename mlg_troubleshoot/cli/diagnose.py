@@ -43,6 +43,14 @@ def diagnose(
             help="Probability from which a cause is named: of ten named at 0.9 nine are right.",
         ),
     ] = 0.9,
+    beliefs: Annotated[
+        Path | None,
+        typer.Option(
+            "--beliefs",
+            metavar="FILE.toml",
+            help="How often and how large things are expected to be wrong in your fleet.",
+        ),
+    ] = None,
     tables: options.Tables,
     shown: options.OutputOptions,
     remember: options.Remember = False,
@@ -62,13 +70,14 @@ def diagnose(
     from mlg_troubleshoot.workflows import diagnose as task
 
     outputs = [OutputFile("--write-extension", write_extension, EXTENSION)]
-    inputs = [*files, *(causes or ())]
+    inputs = [*files, *(causes or ()), *([beliefs] if beliefs else [])]
     settings = shown.begin(tables.gear, inputs, outputs, tables=tables, keep=remember)
     asked = task.DiagnoseOptions(
         **tables.declared(settings.headers),
         remembered=settings.note or None,
         cause_files=tuple(causes or ()),
         sure=sure,
+        beliefs_file=beliefs,
     )
     try:
         with stages(quiet=shown.quiet) as bar:

@@ -12,7 +12,7 @@ from mlg_troubleshoot.diagnosis.extension import (
     write_extension,
 )
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable, table_from_inspections
-from mlg_troubleshoot.misfit.search import diagnose_simulation
+from mlg_troubleshoot.misfit.simulation import diagnose_simulation
 from mlg_troubleshoot.misfit.simulation_result import (
     HeldOutGain,
     SimulationDiagnosis,

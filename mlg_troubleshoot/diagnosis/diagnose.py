@@ -590,14 +590,14 @@ def _report(
         beside=open_ if causes else (),
         unlisted_variables=finding.variables,
         unlisted_rms_in=finding.unlisted_rms_in,
-        probabilities=finding.probabilities,
+        probabilities=finding.follows.listed,
         p_nothing=chances.nothing,
         p_unlisted=chances.unlisted,
         p_left=finding.left,
         remainder_p=p_value_of(
             case.problem, left - case.problem.misfit + case.problem.expected, finding.noise
         ),
-        ten_times=finding.ten_times,
+        ten_times=finding.follows.ten_times,
         not_testable=not_testable,
         unsaid=_unsaid(table),
         ruled_out=finding.ruled_out,

@@ -22,8 +22,9 @@ from mlg_troubleshoot.diagnosis.causes.together import Block
 from mlg_troubleshoot.diagnosis.noise import EXPECTED_SLOPE, Rows, build_noise
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.misfit.beliefs import Beliefs
+from mlg_troubleshoot.misfit.conclusion import Conclusion
 from mlg_troubleshoot.misfit.covariance import NoiseModel
-from mlg_troubleshoot.misfit.explanation import Context, Effects, Explanation, Key
+from mlg_troubleshoot.misfit.explanation import UNLISTED, Context, Effects, Explanation, Key
 from mlg_troubleshoot.misfit.fitting import fit
 from mlg_troubleshoot.misfit.posterior import MisfitPosterior, posterior
 from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
@@ -31,8 +32,6 @@ from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
 # The noise is estimated again from what is left as long as that changes the likeliest explanation,
 # so often at most.
 _ROUNDS = 3
-# What moves with a variable that no list has goes by this name.
-UNLISTED = "unlisted"
 _BY = " × "
 
 
@@ -143,18 +142,18 @@ class MisfitProblem:
 class Finding:
     """What the posterior says.
 
-    verdict: NONE, NAMED, AMBIGUOUS or UNLISTED. said: names that are sure. open: names of which
-    something acts, or something more than what is sure. aliases: what these data cannot tell
-    from a sure all-joint effect. best: the explanation that is reported. variables: what an
-    unlisted effect moves with. unlisted_rms_in: its root mean square. [in] ruled_out: names
+    follows: the verdict, with the posterior that it follows from. said: names that are sure.
+    open: names of which something acts, or something more than what is sure. aliases: what these
+    data cannot tell from a sure all-joint effect. best: the explanation that is reported.
+    variables: what an unlisted effect moves with. unlisted_rms_in: its root mean square. [in]
+    ruled_out: names
     that would explain something alone, but hardly act, likeliest first. noise: the noise under
     which all are compared. smallest_rms_in: root mean square of the smallest effect that is
     detected with 80 % power. [in] left: probability that something else acts beside what is
     sure. classes: names that these rows cannot tell from a name.
     """
 
-    verdict: Verdict
-    posterior: MisfitPosterior
+    follows: Conclusion
     noise: NoiseModel
     best: Explanation
     said: tuple[Key, ...]
@@ -169,33 +168,24 @@ class Finding:
 
     def class_probability(self, key: Key) -> float:
         """Probability that something of this name acts, or what these rows cannot tell from it."""
-        return max(self.probability(key), _any(self.posterior, {key, *self.classes.get(key, ())}))
+        alike = self.follows.any_of({key, *self.classes.get(key, ())})
+        return max(self.probability(key), alike)
 
     def probability(self, key: Key) -> float:
         """Probability that something of this name acts, its look-alikes counted with it."""
         blocks = {context.name for context in self.posterior.contexts}
         aliases = self.aliases if key in self.said and key in blocks else ()
-        return min(_any(self.posterior, {key, *aliases}), 1.0)
+        return min(self.follows.any_of({key, *aliases}), 1.0)
 
     @property
-    def probabilities(self) -> dict[Key, float]:
-        """Probability of every listed cause, the likeliest first."""
-        listed = ((n, p) for n, p in self.posterior.names.items() if n[0] != UNLISTED)
-        return dict(sorted(listed, key=lambda item: (-item[1], str(item[0]))))
+    def verdict(self) -> Verdict:
+        """NONE, NAMED, AMBIGUOUS or UNLISTED."""
+        return self.follows.verdict
 
     @property
-    def ten_times(self) -> dict[Key, float]:
-        """Probability of the likeliest cause if its likeliest rival were ten times likelier."""
-        order = list(self.probabilities)[:2]
-        if len(order) < 2:
-            return {}
-        first, rival = order
-        whole = with_first = 0.0
-        for names, p in self.posterior.together.items():
-            weighed = p * (10.0 if rival in names else 1.0)
-            whole += weighed
-            with_first += weighed if first in names else 0.0
-        return {rival: with_first / whole}
+    def posterior(self) -> MisfitPosterior:
+        """How likely each explanation is."""
+        return self.follows.posterior
 
 
 def explain(problem: MisfitProblem) -> Finding:
@@ -233,83 +223,33 @@ def _noise_beside(problem: MisfitProblem, explained: Array) -> NoiseModel:
 
 def _said(problem: MisfitProblem, found: MisfitPosterior, noise: NoiseModel) -> Finding:
     """What is sure, what is open, and what is ruled out."""
-    beliefs, chance = problem.beliefs, found.names
-    rivals_only = {c.key for c in problem.candidates if c.stands_in}
-    blocks = {(b.cause.name, None) for b in problem.blocks}
-    listed = {n: p for n, p in chance.items() if n[0] != UNLISTED}
-    order = sorted(listed, key=lambda name: (-listed[name], str(name)))
-    said = [n for n in order if listed[n] >= beliefs.sure and n not in rivals_only]
-    aliases: tuple[Key, ...] = ()
-    either = [n for n in order if n in blocks]
-    if len(either) > 1 and not set(said) & blocks and _any(found, set(either)) >= beliefs.sure:
-        said, aliases = [*said, either[0]], tuple(either[1:])
-    alike = _alike(problem, found, said)
-    said = [n for n in said if n not in alike]
-    verdict = Verdict.NAMED if said else Verdict.AMBIGUOUS
-    if found.nothing >= 0.5:
-        verdict = Verdict.NONE
-    elif found.unlisted >= 0.5 or not listed:
-        verdict = Verdict.UNLISTED
-    if verdict in {Verdict.NONE, Verdict.UNLISTED}:
-        said, aliases, alike = [], (), set()
+    blocks = frozenset((b.cause.name, None) for b in problem.blocks)
+    rivals_only = frozenset(c.key for c in problem.candidates if c.stands_in)
+    follows = Conclusion(found, problem.beliefs, blocks, rivals_only)
+    said, aliases = follows.sure, follows.aliases
+    if follows.verdict in {Verdict.NONE, Verdict.UNLISTED}:
+        said, aliases = (), ()
+    open_ = follows.open_beside(said)
+    variables, size = _unlisted(found, follows.verdict)
     counted = {*said, *aliases}
-    rest = [n for n in order if n not in counted]
-    further, open_ = _any(found, set(rest)), list[Key]()
-    if verdict is Verdict.AMBIGUOUS or (verdict is Verdict.NAMED and further >= 0.5):
-        # At least one of the set acts, as sure as anything that is said.
-        for name in rest:
-            unsure = _any(found, set(open_)) < beliefs.sure * further
-            if listed[name] > 1.0 - beliefs.sure or unsure:
-                open_.append(name)
-    open_ += [n for n in rest if n in alike and n not in open_]
-    best = _reported(found, set(said), verdict)
-    variables, size = _unlisted(found, verdict)
     alone: dict[Key, float] = {}
     for k, candidate in enumerate(problem.candidates):
         alone[candidate.key] = max(alone.get(candidate.key, -np.inf), found.over_nothing[k])
     hardly = [n for n in alone if alone[n] > 0.0 and n not in {*counted, *open_}]
     return Finding(
-        verdict,
-        found,
+        follows,
         noise,
-        best,
-        tuple(said),
-        tuple(open_),
+        follows.reported(said),
+        said,
+        open_,
         aliases,
         tuple(sorted(hardly, key=lambda n: -alone[n])),
         variables,
         size,
         _smallest(problem, found, noise),
-        _any(found, set(chance) - counted),
+        follows.any_of(set(found.names) - counted),
         _classes(problem, found, [*said, *open_]),
     )
-
-
-def _any(found: MisfitPosterior, names: set[Key]) -> float:
-    """Probability that something of these names acts."""
-    return float(sum(p for own, p in found.together.items() if own & names))
-
-
-def _alike(problem: MisfitProblem, found: MisfitPosterior, said: Sequence[Key]) -> set[Key]:
-    """Names that these rows cannot tell from each other, one of which is sure: what is believed of
-    them beforehand must not decide.
-    """
-    names = [c.key for c in problem.candidates]
-    within, size = problem.beliefs.odds, problem.columns
-    prior, chance = found.effects.log_prior, np.maximum(found.of_effect, 1e-300)
-    unit = size / np.linalg.norm(size, axis=0)
-    alike: set[Key] = set()
-    for name in said:
-        own = [k for k, other in enumerate(names) if other == name]
-        if not own:
-            continue
-        best = max(own, key=lambda k: chance[k])
-        near = np.abs(unit.T @ unit[:, best]) > problem.beliefs.alike
-        evidence = np.log(chance[: len(names)]) - prior[: len(names)]
-        near &= evidence > evidence[best] - within
-        others = {names[k] for k in np.flatnonzero(near)} - {name}
-        alike |= others | ({name} if others else set())
-    return alike
 
 
 def _classes(
@@ -342,16 +282,6 @@ def p_value_of(problem: MisfitProblem, left: Array, noise: NoiseModel) -> float:
     spread = fitted.scale * np.sqrt(np.sum(shapes * product, axis=0))
     largest = float(np.max(np.abs(left @ product) / spread))
     return float(min(1.0, shapes.shape[1] * erfc(largest / sqrt(2.0))))
-
-
-def _reported(found: MisfitPosterior, said: set[Key], verdict: Verdict) -> Explanation:
-    """The likeliest explanation with all that is sure, or with something."""
-    for explanation in found.likeliest:
-        names = found.names_of(explanation)
-        some = bool(names) or verdict is Verdict.NONE
-        if some and said <= names:
-            return explanation
-    return found.likeliest[0]
 
 
 def _unlisted(found: MisfitPosterior, verdict: Verdict) -> tuple[tuple[str, ...], float]:

@@ -6,12 +6,14 @@ Its modules are its doors: a check needs the beliefs of a diagnosis, and not sci
 
 __all__ = [
     "beliefs",
+    "conclusion",
     "covariance",
+    "design",
     "explanation",
     "fitting",
     "held_out",
     "posterior",
-    "search",
+    "simulation",
     "simulation_result",
     "verdict",
 ]

@@ -31,6 +31,8 @@ class NoiseModel:
     gear_ratio: float
     tail_ratios: tuple[float, ...]
     scale_in: float
+    absorbed: int = 0
+    tail_chances: tuple[float, ...] = ()
     _roots: dict[float, tuple[Array, float]] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
@@ -40,6 +42,16 @@ class NoiseModel:
         """Noise of rows that are whitened already: equal, independent and of unit size."""
         none = np.zeros(n, np.int64)
         return cls(np.ones(n), none, none, np.empty((n, 0)), 0.0, 0.0, (0.0,), 1.0)
+
+    @property
+    def tail_levels(self) -> list[tuple[float, float]]:
+        """Each ratio of the scatter between tails, and the logarithm of its chance beforehand."""
+        chances = self.tail_chances or (1.0,) * len(self.tail_ratios)
+        return list(zip(self.tail_ratios, np.log(chances).tolist(), strict=True))
+
+    def with_tails(self, ratio: float) -> NoiseModel:
+        """The same with one ratio of the scatter between tails."""
+        return replace(self, tail_ratios=(ratio,), tail_chances=())
 
     def floored(self, square: Array) -> Array:
         """Add what no row can be better than to a residual sum of squares."""
@@ -65,6 +77,14 @@ class NoiseModel:
         """
         product, _log = self.precision_times(data[:, None], self.tail_ratios[-1])
         return np.asarray(effects_in @ (effects_in.T @ product[:, 0]) / self.scale_in**2)
+
+    def own_part(self, data: Array) -> tuple[Array, float]:
+        """What each row scatters by itself, all that rows have in common taken out, and the share
+        of the rows that is left to tell it. [in, 1]
+        """
+        root, _log = self._root(self.tail_ratios[-1])
+        own = data - self.relative**2 * (root.T @ (root @ data))
+        return own, float(1.0 - np.mean(self.relative**2 * np.sum(root**2, axis=0)))
 
     def factors(self, tail_ratio: float) -> Array:
         """Low-rank part of the covariance, shape (n, k). [1]"""

@@ -11,6 +11,8 @@ from mlg_troubleshoot.arrays import Array, Wholes
 
 # What is wrong, and in what: a cause with its target.
 Key = tuple[str, str | None]
+# What moves with a variable that no list has goes by this name.
+UNLISTED = "unlisted"
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,8 @@ class Context:
     expected. shared_in, shape (n, k): independent effects of one standard deviation each. columns:
     the effects of an `Effects` where it acts, if they differ there; asked for only where it is
     likely. correction: what its true prior adds to the log-likelihood of the normal one, given what
-    rows say of its own columns, aᵀx − xᵀQx / 2; raw_in, shape (n, j): those columns.
+    rows say of its own columns, aᵀx − xᵀQx / 2; raw_in, shape (n, j): those columns. listed: True
+    if it stands on the list of causes.
     """
 
     name: Key | None
@@ -90,6 +93,7 @@ class Context:
     columns: Callable[[], Array] | None = None
     correction: Callable[[Array, Array], float] | None = None
     raw_in: Array | None = None
+    listed: bool = True
 
     @staticmethod
     def none(n: int) -> Context:

@@ -44,15 +44,15 @@ def shrunk(
 
 def fit(noise: NoiseModel, columns: Array, data: Array) -> Fit:
     """Fit columns to one data set, scale and tail scatter included."""
-    n, k = columns.shape
+    n, k = len(data) - noise.absorbed, columns.shape[1]
     best: Fit | None = None
-    for ratio in noise.tail_ratios:
+    for ratio, chance in noise.tail_levels:
         product, log_determinant = noise.precision_times(np.column_stack([columns, data]), ratio)
         inner = columns.T @ product[:, :k]
         inverse = np.linalg.pinv(inner)
         values = inverse @ (columns.T @ product[:, k])
         rest = float(noise.floored(data @ product[:, k] - values @ inner @ values))
-        likelihood = -0.5 * n * np.log(rest / n) - 0.5 * log_determinant
+        likelihood = chance - 0.5 * n * np.log(rest / n) - 0.5 * log_determinant
         if best is None or likelihood > best.log_likelihood:
             scale = np.sqrt(rest / max(n - k, 1))
             errors = scale * np.sqrt(np.maximum(np.diag(inverse), 0.0))

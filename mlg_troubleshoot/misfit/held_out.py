@@ -29,13 +29,9 @@ def folds_of(
     return shuffled[row] % min(_FOLDS, len(shuffled)), "row"
 
 
-def likelier(
-    noise: NoiseModel, before: Array, after: Array, fold: Wholes, allowed: float = 1.0
-) -> bool:
+def likelier(noise: NoiseModel, before: Array, after: Array, fold: Wholes) -> bool:
     """Tell whether the residual of held-out rows is likelier after than before, what a fold has in
     common being noise.
-
-    allowed: squared residual after over that before, from which it is not. [1]
 
     Far readings decide no more than others: where noise is estimated they scatter more.
     """
@@ -43,7 +39,7 @@ def likelier(
     square = np.sum(
         [noise.take(fold == k).square(left[fold == k], ratio) for k in np.unique(fold)], axis=0
     )
-    return bool(square[1] < allowed * square[0])
+    return bool(square[1] < square[0])
 
 
 def held_out_part(

@@ -26,12 +26,16 @@ class Products:
     """Inner products of effects and data, which stand last, under one noise without its tails."""
 
     def __init__(self, noise: NoiseModel, columns: Array, data: Array) -> None:
-        self.noise, self.n = noise, len(data)
+        self.noise, self.n = noise, len(data) - noise.absorbed
         self.columns = np.column_stack([columns, data])
         self.weighted = noise.precision_times(self.columns, 0.0)[0]
         self.square = np.einsum("ij,ij->j", self.columns, self.weighted)
         self.along = self.columns.T @ self.weighted[:, -1]
-        self.tails = [noise.tail_root(ratio) for ratio in noise.tail_ratios]
+        self.tails = [
+            (root, determinant - 2.0 * chance)
+            for ratio, chance in noise.tail_levels
+            for root, determinant in [noise.tail_root(ratio)]
+        ]
         self.common = [root @ self.columns for root, _log in self.tails]
         self._cross: dict[int, Array] = {}
 

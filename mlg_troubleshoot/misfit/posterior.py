@@ -59,11 +59,12 @@ def posterior(
     contexts: Sequence[Context],
     beliefs: Beliefs,
     start: Sequence[Explanation] = (),
+    most: int = MOST,
 ) -> MisfitPosterior:
     """Search the likeliest sets of effects in all contexts, and sum the probability of all near
     them.
     """
-    search = _Search(noise, data, effects, contexts, beliefs)
+    search = _Search(noise, data, effects, contexts, beliefs, most)
     search.run(start)
     return search.summed()
 
@@ -85,6 +86,7 @@ class _Search:
     effects: Effects
     contexts: Sequence[Context]
     beliefs: Beliefs
+    most: int
     extended: dict[tuple[int, frozenset[int]], _Extended] = field(default_factory=dict)
     _marginals: dict[int, Marginal] = field(default_factory=dict)
     _alone: dict[tuple[int, frozenset[int]], Explanation] = field(default_factory=dict)
@@ -118,7 +120,7 @@ class _Search:
         taken = {int(self.number[k]) for k in members} - {0}
         further[np.isin(self.number, list(taken))] = -np.inf
         further[list(members)] = -np.inf
-        if len(members) >= MOST:
+        if len(members) >= self.most:
             further[:] = -np.inf
         leading = tuple(np.argsort(-further)[: BEAM + 1].tolist())
         self.extended[key] = _Extended(self.alone(context, members), further, values, leading)
@@ -138,7 +140,7 @@ class _Search:
         for found in start:
             self.extend(found.context, frozenset(found.members))
         self._own_columns()
-        for _ in range(MOST):
+        for _ in range(self.most):
             self._beams()
             if not self._neighbours():
                 break
@@ -260,9 +262,9 @@ class _Search:
                 expected += total * wide.share_of(about.shared_in, left)
         acting = np.array([name is not None for name in self.effects.names], bool)
         expected += self.effects.columns[:, acting] @ size[acting]
-        context_names = {context.name for context in self.contexts}
+        listed |= {context.name for context in self.contexts if context.listed}
         nothing = together.get(frozenset(), 0.0)
-        unlisted = sum(p for own, p in together.items() if own - listed - context_names)
+        unlisted = sum(p for own, p in together.items() if own - listed)
         order = sorted((at.own for *_k, at in parts), key=lambda e: -e.log_posterior)
         return MisfitPosterior(
             self.effects,

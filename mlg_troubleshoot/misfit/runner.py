@@ -45,6 +45,7 @@ class Runner:
         self.trial = np.array([s.trial for s in suspects], float)
         self.nominal = np.array([s.nominal for s in suspects], float)
         self.calls = 0
+        self._asked: dict[bytes, Array] = {}
 
     def everything(self, values: Array) -> Array:
         """Predict all rows and outputs, shape (n, m)."""
@@ -63,8 +64,13 @@ class Runner:
         return predicted
 
     def at(self, values: Array) -> Array:
-        """Predict the readings, shape (N,); NaN where the simulation has no answer."""
-        return self.everything(values)[self.row, self.output]
+        """Predict the readings, shape (N,); NaN where the simulation has no answer. The same values
+        are asked once.
+        """
+        key = values.tobytes()
+        if key not in self._asked:
+            self._asked[key] = self.everything(values)[self.row, self.output]
+        return self._asked[key]
 
     def nominal_prediction(self) -> Array:
         """Predict all rows at the nominal values, and refuse what is not a number where a reading
@@ -116,58 +122,56 @@ class Runner:
         return self.at(moved)
 
     def fit(
-        self,
-        values: Array,
-        active: Sequence[int],
-        white: Callable[[Array], Array],
-        columns: Array | None = None,
-    ) -> tuple[Array, Array, float]:
-        """Fit some parameters by least squares of the whitened misfit (Gauss–Newton), from the
-        values given.
+        self, values: Array, active: Sequence[int], weigh: Callable[[Array], Array]
+    ) -> tuple[Array, Array]:
+        """Fit some parameters to the readings (Gauss-Newton), from the values given.
 
-        The sensitivities are computed again only where the sum of squares does not fall as they
-        say. Returned are all values, the prediction, and the sum of squares.
+        weigh: multiplies columns by the inverse covariance of the readings. Returned are all
+        values, and the prediction.
         """
         base = self.at(values)
-        rest = white(self.reading - base)
-        cost = float(rest @ rest)
-        if not active:
-            return values, base, cost
-        exact = columns is None
-        slopes = white(self.sensitivities(values, base, active) if columns is None else columns)
-        for _ in range(_ITERATIONS):
-            step = least_squares(slopes, rest)
-            expected = cost - float(np.sum((rest - slopes @ step) ** 2))
-            if expected < _STANDS + 1e-6 * cost:
+        for _ in range(_ITERATIONS if active else 0):
+            rest = self.reading - base
+            cost = float(rest @ weigh(rest[:, None])[:, 0])
+            slopes = self.sensitivities(values, base, active)
+            step, fall = _newton_step(slopes, rest, weigh)
+            if fall < _STANDS + 1e-6 * cost:
                 break
-            there = self._shorter(values, active, step, white, cost)
-            slow = there is None or cost - there[3] < 0.7 * expected
-            if there is None and exact:
+            there = self._shorter(values, active, step, weigh, cost)
+            if there is None:
                 break
-            if there is not None:
-                values, base, rest, cost = there
-            exact = slow
-            if slow:
-                slopes = white(self.sensitivities(values, base, active))
-        return values, base, cost
+            values, base = there
+        return values, base
 
     def _shorter(
         self,
         values: Array,
         active: Sequence[int],
         step: Array,
-        white: Callable[[Array], Array],
+        weigh: Callable[[Array], Array],
         cost: float,
-    ) -> tuple[Array, Array, Array, float] | None:
+    ) -> tuple[Array, Array] | None:
         """Go along a step, or a part of it, if that makes the sum of squares smaller."""
         for share in (1.0, 0.5, 0.25, 0.1, 0.02):
             moved = values.copy()
             moved[list(active)] += share * step * self.trial[list(active)]
             base = self.at(moved)
-            rest = white(self.reading - base)
-            if float(rest @ rest) < cost:
-                return moved, base, rest, float(rest @ rest)
+            rest = self.reading - base
+            if float(rest @ weigh(rest[:, None])[:, 0]) < cost:
+                return moved, base
         return None
+
+
+def _newton_step(
+    slopes: Array, rest: Array, weigh: Callable[[Array], Array]
+) -> tuple[Array, float]:
+    """Step to the least weighted sum of squares, and by how much that falls."""
+    size = np.linalg.norm(slopes, axis=0)
+    unit = slopes / np.where(size > 0.0, size, 1.0)
+    held = weigh(unit)
+    along = held.T @ rest
+    step = np.linalg.pinv(unit.T @ held, rcond=_KNOWN**2, hermitian=True) @ along
+    return step / np.where(size > 0.0, size, 1.0), float(step @ along)
 
 
 def least_squares(columns: Array, data: Array) -> Array:

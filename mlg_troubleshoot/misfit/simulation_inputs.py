@@ -12,8 +12,6 @@ from mlg_troubleshoot.arrays import Array, Wholes
 from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.misfit.simulation_result import Suspect
 
-_LEAST_PERMUTATIONS = 19
-
 
 def checked(
     measured: ArrayLike,
@@ -21,7 +19,6 @@ def checked(
     nuisance: Sequence[Suspect],
     groups: ArrayLike | None,
     reading_u: ArrayLike | None,
-    permutations: int,
 ) -> tuple[Array, Array | None, Wholes | None]:
     """Readings as (n, m), declared uncertainty likewise, groups as numbers."""
     data = _numbers(measured, "measured")
@@ -41,10 +38,6 @@ def checked(
         raise UsageError(
             f"{readings} readings are too few for {len(nuisance)} nuisance parameters",
             f"measure {len(nuisance) + 3 - readings} more at least",
-        )
-    if permutations < _LEAST_PERMUTATIONS:
-        raise UsageError(
-            f"permutations is {permutations}", f"at least {_LEAST_PERMUTATIONS} are needed"
         )
     return data, _declared(reading_u, data), _groups(groups, len(data))
 

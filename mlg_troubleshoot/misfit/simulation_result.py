@@ -28,6 +28,10 @@ class Suspect:
         What to inspect if it is named.
     separates : str, optional
         The reading that would distinguish it from what looks like it.
+    prior_sd : float, optional
+        Standard deviation of how wrong it may be, known beforehand; without it any effect from a
+        third of the scatter of a reading to a hundred times as much is taken for equally likely.
+        [unit]
     """
 
     name: str
@@ -37,6 +41,7 @@ class Suspect:
     sentence: str = ""
     inspect: str = ""
     separates: str = ""
+    prior_sd: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +59,8 @@ class SuspectFound:
     effect_rms : float
         Root mean square over the readings of what the change does to the prediction, less what the
         nuisance parameters absorb of it. [unit of the readings]
-    p_value : float
-        Chance of as much for any suspect if nothing more is wrong. [1]
+    probability : float
+        Probability that it is wrong, or one of its aliases. [1]
     aliases : tuple of str
         Suspects that these rows cannot tell from it, whatever is measured: the class is named, not
         this member.
@@ -65,7 +70,7 @@ class SuspectFound:
     value: float
     interval: tuple[float, float]
     effect_rms: float
-    p_value: float
+    probability: float
     aliases: tuple[str, ...]
 
     @property
@@ -109,7 +114,7 @@ class SimulationDiagnosis:
         NONE, NAMED, AMBIGUOUS (the data leave rivals) or UNLISTED (more is left than the suspects
         explain).
     causes : tuple of SuspectFound
-        All that earned their place, whatever the verdict, by effect.
+        All that are sure and make held-out rows smaller, whatever the verdict, by effect.
     also_possible : tuple of SuspectFound
         The whole set that the data leave possible, where there are rivals that no alias class says;
         else empty.
@@ -118,6 +123,10 @@ class SimulationDiagnosis:
         looked at.
     untestable : tuple of str
         Suspects that do nothing in these rows which the nuisance parameters do not absorb.
+    p_nothing : float
+        Probability that nothing is wrong. [1]
+    p_unlisted : float
+        Probability that something is wrong that no suspect explains. [1]
     gain : HeldOutGain
         Gain on held-out rows.
     parameters : mapping of str to float
@@ -132,10 +141,6 @@ class SimulationDiagnosis:
         [unit of the readings]
     calls : int
         Times that the simulation was called.
-    permutations : int
-        Number of null simulations.
-    seed : int
-        Seed.
     """
 
     verdict: Verdict
@@ -143,11 +148,16 @@ class SimulationDiagnosis:
     also_possible: tuple[SuspectFound, ...]
     aliases: tuple[tuple[str, ...], ...]
     untestable: tuple[str, ...]
+    p_nothing: float
+    p_unlisted: float
     gain: HeldOutGain
     parameters: Mapping[str, float]
     remainder_p: float
     smallest_detectable_rms: float
     noise: tuple[float, ...]
     calls: int
-    permutations: int
-    seed: int
+
+    @property
+    def named(self) -> tuple[SuspectFound, ...]:
+        """The causes that the verdict stands for."""
+        return self.causes if self.verdict is Verdict.NAMED else ()

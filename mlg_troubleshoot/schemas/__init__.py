@@ -23,7 +23,7 @@ NAMES = (
     "reconstruct",
     "doctor",
 )
-FILES = ("gear-file", "ensemble", "targets", "indices", "extension", "settings")
+FILES = ("gear-file", "ensemble", "targets", "indices", "extension", "settings", "beliefs")
 
 
 def schema(name: str) -> dict[str, Any]:
@@ -34,7 +34,7 @@ def schema(name: str) -> dict[str, Any]:
     name : str
         ``check``, ``diagnose``, ``study``, ``fleet``, ``history``, ``life``, ``gear``, ``verify``,
         ``survey``, ``separable``, ``reconstruct`` or ``doctor``; of files ``gear-file``,
-        ``ensemble``, ``targets``, ``indices``, ``extension`` or ``settings``.
+        ``ensemble``, ``targets``, ``indices``, ``extension``, ``settings`` or ``beliefs``.
 
     Returns
     -------
@@ -77,8 +77,17 @@ def _kinds(name: str) -> list[Any]:
         from mlg_troubleshoot.gear.gear_file import EnsembleFile, GearFile
         from mlg_troubleshoot.indices.index_table import IndexTable
         from mlg_troubleshoot.paper.targets import TargetsFile
+        from mlg_troubleshoot.workflows.beliefs_file import BeliefsFile
 
-        files = (GearFile, EnsembleFile, TargetsFile, IndexTable, ExtensionFile, SettingsFile)
+        files = (
+            GearFile,
+            EnsembleFile,
+            TargetsFile,
+            IndexTable,
+            ExtensionFile,
+            SettingsFile,
+            BeliefsFile,
+        )
         return [dict(zip(FILES, files, strict=True))[name]]
     kinds: dict[str, list[Any]] = {
         "diagnose": [outputs.DiagnoseOutput, outputs.NotConcluded],

@@ -1,6 +1,7 @@
 """One file for each task of a user: options in, result out. No terminal here."""
 
 __all__ = [
+    "beliefs_file",
     "check",
     "diagnose",
     "doctor",

@@ -37,12 +37,15 @@ class DiagnoseOptions(TableOptions):
         Python files with the user's own causes.
     sure : float
         Probability from which a cause is named. [1]
+    beliefs_file : Path or None
+        TOML file of what is believed beforehand; None for what the program believes.
     """
 
     gear: str = DEFAULT_GEAR
     remembered: str | None = None
     cause_files: tuple[Path, ...] = ()
     sure: float = 0.9
+    beliefs_file: Path | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,6 +96,7 @@ def diagnose_files(
         If the tables cannot answer the question.
     """
     from mlg_troubleshoot.diagnosis import (
+        CATALOGUE,
         ModelExtension,
         diagnose,
         load_causes,
@@ -100,9 +104,14 @@ def diagnose_files(
     )
     from mlg_troubleshoot.misfit.beliefs import Beliefs
     from mlg_troubleshoot.records import ReadOptions, read_many
+    from mlg_troubleshoot.workflows.beliefs_file import load_beliefs
 
     gear = load_gear(options.gear)
     own = tuple(cause for file in options.cause_files for cause in load_causes(file))
+    beliefs = Beliefs(sure=options.sure)
+    if options.beliefs_file is not None:
+        names = {cause.name for cause in (*CATALOGUE, *own)}
+        beliefs = load_beliefs(options.beliefs_file, options.sure, names)
     reading = replace(
         ReadOptions.of(gear, options),
         clearance_hard_max_in=_ANY_LENGTH_IN,
@@ -130,7 +139,7 @@ def diagnose_files(
         gear.discrepancies,
         own_causes=own,
         ensemble=gear.ensemble_models[1:],
-        beliefs=Beliefs(sure=options.sure),
+        beliefs=beliefs,
         progress=progress,
     )
     by_record = {inspection.record_id: inspection for inspection in once}

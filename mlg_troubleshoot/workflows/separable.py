@@ -39,7 +39,7 @@ from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.misfit.beliefs import Beliefs
-from mlg_troubleshoot.misfit.search import ALIKE, beside
+from mlg_troubleshoot.misfit.design import ALIKE, beside
 from mlg_troubleshoot.records.headers import Joints, parse_canonical
 from mlg_troubleshoot.units import LengthUnit
 

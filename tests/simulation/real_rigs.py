@@ -36,7 +36,8 @@ class Gear:
     suspects = (
         Suspect("sleeve_size", 0.1, 0.01, "mm", separates="the dial against a gauge block"),
         Suspect("dial_scale", 1.0, 0.05, separates="the dial against a gauge block"),
-        Suspect("dial_zero", 0.0, 0.005, "mm"),
+        # A dial is set to within one of its divisions.
+        Suspect("dial_zero", 0.0, 0.005, "mm", prior_sd=0.01),
     )
 
 

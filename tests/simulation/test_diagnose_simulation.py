@@ -11,8 +11,6 @@ from mlg_troubleshoot.diagnosis import Suspect, Verdict, diagnose_simulation
 from mlg_troubleshoot.errors import TroubleshootError
 from tests.simulation.rigs import RIGS, Rig, readings, slider_crank, thermal, two_link
 
-FEW = 199
-
 
 def line(n: int = 60) -> tuple[np.ndarray, Rig]:
     """A straight line, its rate known twice, its level unknown."""
@@ -31,7 +29,7 @@ def line(n: int = 60) -> tuple[np.ndarray, Rig]:
 def test_suspects_that_multiply_each_other_are_one_class_and_named_as_one() -> None:
     _x, rig = line()
     read = readings(rig, {"rate": 1.3}, 0.02, np.random.default_rng(1))
-    found = diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown, permutations=FEW)
+    found = diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown)
     assert found.verdict is Verdict.NAMED
     assert [{cause.name, *cause.aliases} for cause in found.causes] == [{"rate", "scale"}]
 
@@ -40,7 +38,7 @@ def test_classes_and_what_cannot_be_tested_do_not_depend_on_what_was_read() -> N
     _x, rig = line()
     for value in (1.0, 1.4):
         read = readings(rig, {"rate": value}, 0.02, np.random.default_rng(2))
-        found = diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown, permutations=FEW)
+        found = diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown)
         assert found.aliases == (("rate", "scale"),)
         assert found.untestable == ("shift",)
 
@@ -53,7 +51,7 @@ def test_a_large_change_is_fitted_until_it_stands(rig_name: str, cause: str, cha
     rig = RIGS[rig_name](80, rng)
     true = rig.suspects[cause][0] + change
     read = readings(rig, {cause: true}, 0.05 * rig.seen(cause, change), rng)
-    found = diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown, permutations=FEW)
+    found = diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown)
     assert [c.name for c in found.causes] == [cause]
     low, high = found.causes[0].interval
     assert low - (high - low) < true < high + (high - low)
@@ -65,7 +63,7 @@ def test_three_causes_at_once_are_all_named() -> None:
     rig = two_link(120, rng)
     wrong = {"length_1": 303.0, "scale_2": 1.02, "sag": 0.01}
     read = readings(rig, wrong, 0.3, rng, outliers=0.02, missing=0.02)
-    found = diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown, permutations=FEW)
+    found = diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown)
     assert {c.name for c in found.causes} == set(wrong)
     assert found.gain.rms_after < 0.5 * found.gain.rms_before
 
@@ -75,9 +73,7 @@ def test_nothing_is_named_where_nothing_is_wrong_but_groups_scatter() -> None:
     rig = slider_crank(90, rng)
     groups = np.arange(90) % 9
     read = readings(rig, {}, 0.05, rng, groups, group_scatter=1.0, outliers=0.03, heavy=True)
-    found = diagnose_simulation(
-        rig.predict, read, rig.suspected, rig.unknown, groups, permutations=FEW
-    )
+    found = diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown, groups)
     assert found.verdict is Verdict.NONE
     assert found.causes == ()
 
@@ -94,8 +90,8 @@ def test_an_offset_is_not_named_from_scatter_between_many_groups() -> None:
         return (p["offset"] + p["rate"] * x)[:, None]
 
     suspects = [Suspect("offset", 0.0, 0.1), Suspect("rate", 1.0, 0.1)]
-    grouped = diagnose_simulation(predict, read, suspects, groups=groups, permutations=FEW)
-    blind = diagnose_simulation(predict, read, suspects, permutations=FEW)
+    grouped = diagnose_simulation(predict, read, suspects, groups=groups)
+    blind = diagnose_simulation(predict, read, suspects)
     assert grouped.causes == ()
     assert [c.name for c in blind.causes] == ["offset"]
 
@@ -126,9 +122,7 @@ def test_a_cause_that_alternates_is_named_beside_an_unlisted_curve() -> None:
         return (p["level"] + p["rate"] * x + p["play"] * way)[:, None]
 
     level = [Suspect("level", 0.0, 0.1), Suspect("rate", 1.0, 0.1)]
-    found = diagnose_simulation(
-        predict, read, [Suspect("play", 0.0, 0.01)], level, permutations=FEW
-    )
+    found = diagnose_simulation(predict, read, [Suspect("play", 0.0, 0.01)], level)
     assert found.verdict is Verdict.UNLISTED
     assert [c.name for c in found.causes] == ["play"]
     assert found.causes[0].value == pytest.approx(0.05, abs=0.015)
@@ -144,9 +138,7 @@ def test_the_place_of_a_group_that_is_held_out_is_fitted_there() -> None:
 
     read = places[groups] + 1.5 * x + 0.05 * rng.standard_normal(60)
     own = [Suspect(f"place_{g}", 0.0, 1.0) for g in range(6)]
-    found = diagnose_simulation(
-        predict, read, [Suspect("rate", 1.0, 0.1)], own, groups, permutations=FEW
-    )
+    found = diagnose_simulation(predict, read, [Suspect("rate", 1.0, 0.1)], own, groups)
     assert found.gain.held_out_by == "group"
     assert found.gain.rms_before == pytest.approx(0.5 / np.sqrt(3.0), rel=0.3)
     assert found.gain.rms_after == pytest.approx(0.05, rel=0.3)
@@ -157,19 +149,16 @@ def test_what_a_declared_uncertainty_says_decides_which_readings_count() -> None
     rng = np.random.default_rng(10)
     u = np.where(x > 0.0, 0.01, 1.0)[:, None]
     read = rig.predict({**rig.nominal, "rate": 1.05}) + u * rng.standard_normal((60, 1))
-    told = diagnose_simulation(
-        rig.predict, read, rig.suspected, rig.unknown, reading_u=u, permutations=FEW
-    )
+    told = diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown, reading_u=u)
     assert {"rate", "scale"} in [{c.name, *c.aliases} for c in told.causes + told.also_possible]
 
 
-def test_the_same_seed_gives_the_same_answer() -> None:
+def test_the_same_data_give_the_same_answer() -> None:
     rng = np.random.default_rng(11)
     rig = thermal(40, rng)
     read = readings(rig, {"zero_1": 0.0}, 0.3, rng)
     first, again = (
-        diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown, permutations=99, seed=5)
-        for _ in range(2)
+        diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown) for _ in range(2)
     )
     assert first == again
 
@@ -184,7 +173,7 @@ def test_two_that_look_nearly_alike_are_both_reported_until_the_data_tell_them_a
     suspects = [Suspect("square", 0.0, 0.1), Suspect("power", 0.0, 0.1)]
     for noise, names in ((0.3, {"square", "power"}), (0.01, set())):
         read = 0.5 * x**2.2 + noise * rng.standard_normal(80)
-        found = diagnose_simulation(predict, read, suspects, permutations=FEW)
+        found = diagnose_simulation(predict, read, suspects)
         assert found.verdict is (Verdict.AMBIGUOUS if names else Verdict.NAMED)
         assert {c.name for c in found.also_possible} == names
 
@@ -194,7 +183,7 @@ def test_a_few_readings_far_out_do_not_move_the_value() -> None:
     rng = np.random.default_rng(13)
     read = readings(rig, {"bend": 0.3}, 0.02, rng)
     read[[5, 30, 55]] += 5.0
-    found = diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown, permutations=FEW)
+    found = diagnose_simulation(rig.predict, read, rig.suspected, rig.unknown)
     assert [c.name for c in found.causes] == ["bend"]
     assert found.causes[0].value == pytest.approx(0.3, abs=0.05)
 
@@ -216,9 +205,7 @@ def test_what_is_true_in_one_group_only_helps_no_other_and_is_not_named() -> Non
     groups, x = np.arange(100) % 5, rng.uniform(-1.0, 1.0, 100)
     read = x + np.where(groups == 0, 0.3 * x, 0.0) + 0.05 * rng.standard_normal(100)
     suspects = [Suspect("rate", 1.0, 0.1)]
-    found = diagnose_simulation(
-        lambda p: (p["rate"] * x)[:, None], read, suspects, groups=groups, permutations=FEW
-    )
+    found = diagnose_simulation(lambda p: (p["rate"] * x)[:, None], read, suspects, groups=groups)
     assert found.causes == ()
 
 
@@ -237,7 +224,7 @@ def test_a_curve_that_no_suspect_has_is_not_lent_to_the_one_most_like_it() -> No
     assert found.causes == ()
 
 
-def test_what_is_small_beside_an_unlisted_curve_is_not_named() -> None:
+def test_what_makes_no_held_out_row_better_beside_an_unlisted_curve_is_not_named() -> None:
     rng = np.random.default_rng(17)
     x, way = np.repeat(np.linspace(-1.0, 1.0, 40), 2), np.tile([-1.0, 1.0], 40)
     read = x + 0.5 * np.sin(5.0 * x) + 0.02 * way + 0.01 * rng.standard_normal(80)
@@ -263,7 +250,7 @@ def test_what_helps_no_other_group_is_not_named_however_clearly_it_stands_out() 
         assert found.causes == ()
 
 
-def test_what_helps_but_is_small_beside_an_unlisted_curve_is_not_named() -> None:
+def test_what_is_small_beside_an_unlisted_curve_is_found_where_it_alternates_often_enough() -> None:
     rng = np.random.default_rng(20)
     x, way = np.repeat(np.linspace(-1.0, 1.0, 150), 2), np.tile([-1.0, 1.0], 150)
     read = x + 0.5 * np.sin(5.0 * x) + 0.06 * way + 0.01 * rng.standard_normal(300)
@@ -272,9 +259,9 @@ def test_what_helps_but_is_small_beside_an_unlisted_curve_is_not_named() -> None
         read,
         [Suspect("play", 0.0, 0.01)],
         [Suspect("level", 0.0, 0.1)],
-        permutations=FEW,
     )
-    assert (found.verdict, found.causes) == (Verdict.UNLISTED, ())
+    assert (found.verdict, found.named) == (Verdict.UNLISTED, ())
+    assert found.causes[0].value == pytest.approx(0.06, abs=0.005)
 
 
 def test_a_cause_that_two_others_explain_together_is_left_out_again() -> None:
@@ -285,7 +272,6 @@ def test_a_cause_that_two_others_explain_together_is_left_out_again() -> None:
         lambda p: (p["u"] * u + p["v"] * v + p["both"] * (u + v + 0.5 * w))[:, None],
         read,
         [Suspect(name, 0.0, 0.1) for name in ("u", "v", "both")],
-        permutations=FEW,
     )
     assert {c.name for c in found.causes} == {"u", "v"}
 
@@ -302,7 +288,6 @@ def test_groups_scatter_in_the_unit_of_the_readings_however_exact_some_of_these_
         offset,
         groups=groups,
         reading_u=u,
-        permutations=FEW,
     )
     low, high = found.causes[0].interval
     assert high - low > 2.0 / np.sqrt(12.0)
@@ -321,9 +306,7 @@ def test_readings_far_out_are_no_pattern_although_rows_share_a_nuisance_paramete
 
         read = groups + x + rng.standard_t(2, 120)
         own = [Suspect(name, 0.0, 1.0) for name in "abc"]
-        found = diagnose_simulation(
-            predict, read, [Suspect("rate", 1.0, 0.1)], own, groups, permutations=FEW
-        )
+        found = diagnose_simulation(predict, read, [Suspect("rate", 1.0, 0.1)], own, groups)
         alarms += found.verdict is not Verdict.NONE
     assert alarms <= 1
 
@@ -347,7 +330,6 @@ A = Suspect("rate", 1.0, 0.1)
         ({"groups": ["a"]}, "one label for each row"),
         ({"reading_u": [1.0, 2.0]}, "reading_u has shape"),
         ({"reading_u": [0.0]}, "not above 0"),
-        ({"permutations": 5}, "permutations is 5"),
         ({"predict": lambda _p: np.full((8, 1), np.nan)}, "no number for 8 of 8"),
         (
             {"predict": lambda p: np.zeros((8, 1)) * (1.0 if p["rate"] == 1.0 else np.nan)},
@@ -363,7 +345,6 @@ def test_what_a_caller_gets_wrong_is_refused_with_words(
         "predict": lambda p: (p["rate"] * x)[:, None],
         "measured": x[:, None],
         "suspects": [A],
-        "permutations": 99,
     }
     with pytest.raises(TroubleshootError) as caught:
         diagnose_simulation(**{**given, **changed})  # type: ignore[arg-type]

@@ -59,11 +59,8 @@ def test_what_is_bent_in_the_plotter_is_unlisted() -> None:
 
 @cache
 def arm(session: int) -> SimulationDiagnosis:
-    # What these tests ask is decided long before 999 draws.
     rig = Panda(session)
-    return diagnose_simulation(
-        rig.predict, rig.measured, rig.offsets, rig.nuisance, rig.place, permutations=199
-    )
+    return diagnose_simulation(rig.predict, rig.measured, rig.offsets, rig.nuisance, rig.place)
 
 
 @pytest.mark.parametrize("session", [1, pytest.param(2, marks=pytest.mark.slow)])
@@ -106,9 +103,7 @@ def test_with_all_denavit_hartenberg_parameters_no_session_names_what_the_other_
     for session in (1, 2):
         rig = Panda(session)
         found.append(
-            diagnose_simulation(
-                rig.predict, rig.measured, rig.every, rig.nuisance, rig.place, permutations=199
-            )
+            diagnose_simulation(rig.predict, rig.measured, rig.every, rig.nuisance, rig.place)
         )
     for one, other in (found, found[::-1]):
         known = {cause.name: cause for cause in (*other.causes, *other.also_possible)}

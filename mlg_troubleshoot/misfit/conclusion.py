@@ -1,0 +1,134 @@
+"""What follows from a posterior: what is sure, what stays open, and the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mlg_troubleshoot.misfit.beliefs import Beliefs
+from mlg_troubleshoot.misfit.explanation import UNLISTED, Explanation, Key
+from mlg_troubleshoot.misfit.posterior import MisfitPosterior
+from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What a posterior says.
+
+    sure: names that act, the likeliest first, whatever else does. either: names of which one acts
+    for certain, but any may stand for it. never: names that only stand for what the data cannot
+    test.
+    """
+
+    posterior: MisfitPosterior
+    beliefs: Beliefs
+    either: frozenset[Key] = frozenset()
+    never: frozenset[Key] = frozenset()
+
+    @cached_property
+    def listed(self) -> dict[Key, float]:
+        """Probability of each listed name, the likeliest first."""
+        names = self.posterior.names
+        listed = ((n, p) for n, p in names.items() if n[0] != UNLISTED)
+        return dict(sorted(listed, key=lambda item: (-item[1], str(item[0]))))
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """NONE, NAMED, AMBIGUOUS or UNLISTED."""
+        if self.posterior.nothing >= 0.5:
+            return Verdict.NONE
+        if self.posterior.unlisted >= 0.5 or not self.listed:
+            return Verdict.UNLISTED
+        return Verdict.NAMED if self.sure else Verdict.AMBIGUOUS
+
+    @cached_property
+    def _one_of(self) -> tuple[Key, ...]:
+        """Names of which one is sure, and none of them alone."""
+        names = tuple(n for n in self.listed if n in self.either)
+        alone = any(self.listed[n] >= self.beliefs.sure for n in names)
+        told = len(names) > 1 and not alone and self.any_of(names) >= self.beliefs.sure
+        return names if told else ()
+
+    @cached_property
+    def _standing_out(self) -> tuple[Key, ...]:
+        sure = [n for n, p in self.listed.items() if p >= self.beliefs.sure and n not in self.never]
+        return (*sure, *self._one_of[:1])
+
+    @cached_property
+    def _alike(self) -> set[Key]:
+        """Names that these rows cannot tell from each other, one of which is sure: what is believed
+        of them beforehand must not decide.
+        """
+        found, effects = self.posterior, self.posterior.effects
+        places = np.flatnonzero(effects.listed).tolist()
+        names = [effects.names[k] for k in places]
+        columns, prior = effects.columns[:, places], effects.log_prior[places]
+        unit = columns / np.linalg.norm(columns, axis=0)
+        evidence = np.log(np.maximum(found.of_effect[places], 1e-300)) - prior
+        alike: set[Key] = set()
+        for name in self._standing_out:
+            own = [k for k, other in enumerate(names) if other == name]
+            if not own:
+                continue
+            best = max(own, key=lambda k: found.of_effect[places[k]])
+            near = np.abs(unit.T @ unit[:, best]) > self.beliefs.alike
+            near &= evidence > evidence[best] - self.beliefs.odds
+            others = {key for k in np.flatnonzero(near) if (key := names[k]) and key != name}
+            alike |= others | ({name} if others else set())
+        return alike
+
+    @cached_property
+    def sure(self) -> tuple[Key, ...]:
+        """Names that act, the likeliest first."""
+        return tuple(n for n in self._standing_out if n not in self._alike)
+
+    @cached_property
+    def aliases(self) -> tuple[Key, ...]:
+        """Names that may stand in the place of the last one that is sure."""
+        return self._one_of[1:]
+
+    def open_beside(self, said: Sequence[Key]) -> tuple[Key, ...]:
+        """Names of which something more acts than what is said; look-alikes with them."""
+        counted = {*said, *(self.aliases if said else ())}
+        rest = [n for n in self.listed if n not in counted]
+        further, names = self.any_of(rest), list[Key]()
+        if self.verdict is Verdict.AMBIGUOUS or (self.verdict is Verdict.NAMED and further >= 0.5):
+            # At least one of the set acts, as sure as anything that is said.
+            for name in rest:
+                unsure = self.any_of(names) < self.beliefs.sure * further
+                if self.listed[name] > 1.0 - self.beliefs.sure or unsure:
+                    names.append(name)
+        if self.verdict in {Verdict.NAMED, Verdict.AMBIGUOUS}:
+            names += [n for n in rest if n in self._alike and n not in names]
+        return tuple(names)
+
+    def any_of(self, names: Collection[Key]) -> float:
+        """Probability that something of these names acts."""
+        wanted = set(names)
+        return float(sum(p for own, p in self.posterior.together.items() if own & wanted))
+
+    def reported(self, said: Collection[Key]) -> Explanation:
+        """The likeliest explanation with all that is said, or with something."""
+        for explanation in self.posterior.likeliest:
+            names = self.posterior.names_of(explanation)
+            some = bool(names) or self.verdict is Verdict.NONE
+            if some and set(said) <= names:
+                return explanation
+        return self.posterior.likeliest[0]
+
+    @property
+    def ten_times(self) -> dict[Key, float]:
+        """Probability of the likeliest cause if its likeliest rival were ten times likelier."""
+        order = list(self.listed)[:2]
+        if len(order) < 2:
+            return {}
+        first, rival = order
+        whole = with_first = 0.0
+        for names, p in self.posterior.together.items():
+            weighed = p * (10.0 if rival in names else 1.0)
+            whole += weighed
+            with_first += weighed if first in names else 0.0
+        return {rival: with_first / whole}

@@ -1,0 +1,265 @@
+"""A simulation linearised where the likeliest of its suspects fit best, and how likely each
+explanation is there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mlg_troubleshoot.arrays import Array, Mask, Wholes
+from mlg_troubleshoot.misfit.beliefs import Beliefs
+from mlg_troubleshoot.misfit.conclusion import Conclusion
+from mlg_troubleshoot.misfit.covariance import NoiseModel
+from mlg_troubleshoot.misfit.design import beside, design_of
+from mlg_troubleshoot.misfit.explanation import UNLISTED, Context, Effects, Explanation, Key
+from mlg_troubleshoot.misfit.fitting import Fit, fit
+from mlg_troubleshoot.misfit.posterior import posterior
+from mlg_troubleshoot.misfit.runner import Runner
+from mlg_troubleshoot.misfit.scatter import Readings, smooth_shapes
+
+# Sizes of a suspect that does not state its own, over the usual one: equally likely, as nobody
+# knows them.
+_SIZES = (1.0 / 3.0, 1.0, 3.0, 10.0, 30.0, 100.0)
+# Residual over the scatter of a reading from which it may be an entry error.
+_SLIP = 3.0
+# Share of the largest reading or effect that a number of it does not hold.
+_DIGITS = 1e-12
+# Computing only: suspects that act together at most, and rounds until the same is likeliest again.
+_MOST, _ROUNDS = 12, 8
+_SUSPECT = "suspect"
+
+
+def key_of(name: str) -> Key:
+    """What the posterior calls a suspect."""
+    return _SUSPECT, name
+
+
+@dataclass(frozen=True)
+class FittedPoint:
+    """The simulation where some suspects fit best, the others nominal.
+
+    values: of all parameters. rest, shape (N,): reading less prediction. columns, shape (N, p):
+    change of each reading for one trial of each parameter. whole, shape (N,): misfit with all
+    suspects at nominal, as far as the columns say.
+    """
+
+    values: Array
+    rest: Array
+    columns: Array
+    whole: Array
+
+
+@dataclass(frozen=True)
+class JudgedPoint:
+    """A point with what is believed there.
+
+    noise: of the readings in the unit of each, shape (N,). [unit]
+    """
+
+    point: FittedPoint
+    noise: NoiseModel
+    unit: Array
+    follows: Conclusion
+    contexts: Sequence[Context]
+
+    @property
+    def likeliest(self) -> Explanation:
+        """The likeliest explanation."""
+        return self.follows.posterior.likeliest[0]
+
+    @property
+    def weight(self) -> Array:
+        """Scatter of each reading. [unit of the readings]"""
+        return self.unit * self.noise.relative
+
+    @property
+    def columns(self) -> Array:
+        """Effects of all parameters per trial, in the unit of each reading."""
+        return self.point.columns / self.unit[:, None]
+
+    def linear(self, chosen: Sequence[int], context: int) -> Fit:
+        """Fit changes of some suspects in their trials, as far as the columns say."""
+        noise = self.noise.beside(self.contexts[context].shared_in)
+        return fit(noise, self.columns[:, list(chosen)], self.point.whole / self.unit)
+
+    def settled(self, chosen: Sequence[int], context: int) -> NoiseModel:
+        """Noise with the likeliest scatter between groups, and the discrepancy of a context."""
+        noise = self.noise.beside(self.contexts[context].shared_in)
+        return noise.with_tails(self.linear(chosen, context).tail_ratio)
+
+
+class Study:
+    """What does not change while suspects are judged: suspects come first, then nuisance."""
+
+    def __init__(
+        self,
+        runner: Runner,
+        count: int,
+        declared: Array | None,
+        group: Wholes | None,
+        beliefs: Beliefs,
+    ) -> None:
+        self.runner, self.count, self.group = runner, count, group
+        self.beliefs = beliefs
+        self.nuisance = list(range(count, len(runner.names)))
+        self.outputs = [np.flatnonzero(runner.output == k) for k in np.unique(runner.output)]
+        own = None if declared is None else declared[runner.row, runner.output]
+        # Rows are dealt to folds in an order that no pattern of the rows has.
+        self.fold = np.random.default_rng(0).permutation(runner.shape[0])
+        predicted = runner.nominal_prediction()
+        base = predicted[runner.row, runner.output]
+        columns = runner.sensitivities(runner.nominal, base, range(len(runner.names)))
+        floor = _DIGITS * float(max(np.max(np.abs(runner.reading)), np.max(np.abs(columns))))
+        self.readings = Readings(runner.row, self.outputs, group, own, max(floor, 1e-300))
+        scale = np.ones(len(base)) if own is None else own.copy()
+        for index in self.outputs if own is None else ():
+            scale[index] = max(float(np.sqrt(np.mean(columns[index] ** 2))), 1e-300)
+        seen = columns / scale[:, None]
+        self.design = design_of(seen[:, :count], seen[:, count:])
+        self.nominal = FittedPoint(
+            runner.nominal, runner.reading - base, columns, runner.reading - base
+        )
+        wide = np.zeros((*runner.shape, count))
+        wide[runner.row, runner.output] = seen[:, :count]
+        self.contexts = self._contexts(predicted, wide.reshape(len(wide), -1))
+
+    def _contexts(self, predicted: Array, sensitivities: Array) -> list[Context]:
+        """Nothing, or a smooth discrepancy of some size, each output by itself."""
+        shapes = smooth_shapes(predicted, sensitivities, self.group)
+        beliefs, row = self.beliefs, self.runner.row
+        sizes = [beliefs.shape_size * size for size in beliefs.sizes]
+        contexts = [Context.none(len(row))]
+        for shape in shapes:
+            width = shape.factor.shape[1]
+            placed = np.zeros((len(row), width * len(self.outputs)))
+            for place, index in enumerate(self.outputs):
+                placed[index, place * width : (place + 1) * width] = shape.factor[row[index]]
+            share = beliefs.expected * beliefs.unlisted / (len(shapes) * len(sizes))
+            name, log = (UNLISTED, shape.moves_with), float(np.log(share))
+            contexts += [Context(name, log, size * placed, listed=False) for size in sizes]
+        return contexts
+
+    def at(self, values: Array, base: Array) -> FittedPoint:
+        """Linearise the simulation at some values."""
+        run = self.runner
+        columns = run.sensitivities(values, base, range(len(values)))
+        change = (values - run.nominal)[: self.count] / run.trial[: self.count]
+        rest = run.reading - base
+        return FittedPoint(values, rest, columns, rest + columns[:, : self.count] @ change)
+
+    def fitted(self, at: JudgedPoint, chosen: Sequence[int], context: int) -> FittedPoint:
+        """Fit some suspects and all nuisance parameters, the other suspects nominal."""
+        values = at.point.values.copy()
+        others = [k for k in range(self.count) if k not in chosen]
+        values[others] = self.runner.nominal[others]
+        return self._fit(values, chosen, at.settled(chosen, context), at.unit)
+
+    def _fit(
+        self, values: Array, chosen: Sequence[int], noise: NoiseModel, unit: Array
+    ) -> FittedPoint:
+        noise = replace(noise, loadings=noise.loadings[:, noise.absorbed :], absorbed=0)
+
+        def weigh(columns: Array) -> Array:
+            weighed, _log = noise.precision_times(columns / unit[:, None], noise.tail_ratios[-1])
+            return weighed / unit[:, None]
+
+        return self.at(*self.runner.fit(values, [*chosen, *self.nuisance], weigh))
+
+    def start(self) -> FittedPoint:
+        """The nuisance parameters fitted; what they absorb shows only there."""
+        point = self.nominal
+        if self.nuisance:
+            free = point.columns[:, self.nuisance]
+            scale = self.readings.first_scale(point.columns, free, point.rest)
+            noise, unit = self.readings.noise(scale, free)
+            point = self._fit(point.values, (), noise.with_tails(0.0), unit)
+            columns = point.columns / unit[:, None]
+            _left, seen = beside(columns[:, : self.count], columns[:, self.count :])
+            self.design = self.design.within(seen)
+        return point
+
+    @property
+    def often(self) -> float:
+        """How often each class of suspects is expected to be wrong in a set of data. [1]"""
+        listed = self.beliefs.expected * (1.0 - self.beliefs.unlisted)
+        return listed / max(len(self.design.classes), 1)
+
+    def effects(self, point: FittedPoint, noise: NoiseModel, unit: Array) -> Effects:
+        """One effect of each class of suspects, and entry errors of readings far out."""
+        run, beliefs = self.runner, self.beliefs
+        first = [members[0] for members in self.design.classes]
+        columns = point.columns[:, first] / unit[:, None]
+        acting = np.sqrt(np.sum(columns**2, axis=0) / np.sum(columns != 0.0, axis=0))
+        stated = [run.suspects[k].prior_sd for k in first]
+        size = [
+            beliefs.shape_size / own if sd is None else sd / abs(run.trial[k])
+            for k, sd, own in zip(first, stated, acting, strict=True)
+        ]
+        none = np.zeros(len(first))
+        suspects = Effects(
+            columns=columns,
+            names=[key_of(run.names[k]) for k in first],
+            listed=np.ones(len(first), bool),
+            log_prior=np.full(len(first), np.log(self.often)),
+            size=np.array(size),
+            scales=np.array([sd is None for sd in stated], bool),
+            least=none,
+            sign=none,
+            mean=none,
+        )
+        far = self._far(point.rest / unit, noise.relative)
+        slip = float(np.log(beliefs.slips / len(unit)))
+        slips = np.eye(len(unit))[:, far]
+        errors = Effects.free(slips, [None] * slips.shape[1], slip, beliefs.slip_size)
+        return Effects.joined([suspects, errors])
+
+    def _far(self, rest: Array, relative: Array) -> Mask:
+        """Readings that stand out among those of their output."""
+        usual = relative.copy()
+        for index in self.outputs:
+            middle = 1.4826 * float(np.median(np.abs(rest[index])))
+            usual[index] = np.maximum(usual[index], middle)
+        return np.asarray(np.abs(rest) > _SLIP * usual)
+
+    def judged(self, start: FittedPoint) -> JudgedPoint:
+        """Search from nothing; where that ends with a discrepancy, also from what explains most
+        without one, which may be the bend of a large change.
+        """
+        at = self._searched(start)
+        if not at.likeliest.context:
+            return at
+        found = at.follows.posterior
+        plain = (e for e in found.likeliest if e.members and not e.context)
+        chosen = self.chosen(found.names_of(next(plain, at.likeliest)))
+        again = self._searched(self.fitted(at, chosen, 0))
+        return at if again.likeliest.context else again
+
+    def _searched(self, start: FittedPoint) -> JudgedPoint:
+        """Search, fit what is likeliest and linearise there, until the same is likeliest again."""
+        point, tried = start, set[tuple[int, ...]]()
+        free = start.columns[:, self.nuisance]
+        scale = self.readings.first_scale(start.columns, free, start.rest)
+        beliefs = replace(self.beliefs, sizes=_SIZES)
+        while True:
+            noise, unit = self.readings.noise(scale, point.columns[:, self.nuisance])
+            effects = self.effects(point, noise, unit)
+            data = point.whole / unit
+            found = posterior(noise, data, effects, self.contexts, beliefs, (), _MOST)
+            at = JudgedPoint(point, noise, unit, Conclusion(found, beliefs), self.contexts)
+            chosen, context = self.chosen(found.names_of(at.likeliest)), at.likeliest.context
+            state = (context, *sorted(chosen))
+            if state in tried or len(tried) == _ROUNDS:
+                return at
+            tried.add(state)
+            point = self.fitted(at, chosen, context)
+            left, spare = at.settled(chosen, context).own_part(point.rest / unit)
+            spare = max(spare - len(chosen) / len(left), 1.0 / len(left))
+            scale = self.readings.scale_of(left * unit, spare)
+
+    def chosen(self, names: Iterable[Key]) -> list[int]:
+        """Places of the suspects among some names."""
+        known = self.runner.names
+        return [known.index(str(name)) for what, name in names if what == _SUSPECT]

@@ -1,0 +1,238 @@
+"""Which parameters of a simulation its measured data show to be wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import chi2
+from scipy.stats import t as student
+from threadpoolctl import threadpool_limits
+
+from mlg_troubleshoot.arrays import Array
+from mlg_troubleshoot.misfit.beliefs import Beliefs
+from mlg_troubleshoot.misfit.held_out import folds_of
+from mlg_troubleshoot.misfit.linearised import FittedPoint, JudgedPoint, Study, key_of
+from mlg_troubleshoot.misfit.runner import Runner, held_out, least_squares
+from mlg_troubleshoot.misfit.simulation_inputs import checked
+from mlg_troubleshoot.misfit.simulation_result import (
+    HeldOutGain,
+    SimulationDiagnosis,
+    Suspect,
+    SuspectFound,
+)
+from mlg_troubleshoot.misfit.verdict import MisfitVerdict as Verdict
+
+# Share of the squared misfit that a cause takes away beside a discrepancy: most of it.
+_MOST_OF_IT = 0.5
+
+
+def diagnose_simulation(
+    predict: Callable[[Mapping[str, float]], Any],
+    measured: ArrayLike,
+    suspects: Sequence[Suspect],
+    nuisance: Sequence[Suspect] = (),
+    groups: ArrayLike | None = None,
+    reading_u: ArrayLike | None = None,
+    beliefs: Beliefs | None = None,
+) -> SimulationDiagnosis:
+    """Find which parameters of a simulation its measured data show to be wrong.
+
+    What no data of these rows could tell is stated first, from the sensitivities alone: classes of
+    suspects that are one to these rows, and suspects that the nuisance parameters absorb. Then the
+    probability of every set of suspects follows from Bayes' rule, each as a change of unknown size,
+    against nothing at all and against smooth discrepancies that no suspect makes. The simulation is
+    linearised where the likeliest set fits best. What is named is sure, and makes the misfit of
+    held-out rows smaller. Linear algebra runs on one thread meanwhile, in the simulation as well.
+
+    Parameters
+    ----------
+    predict : callable
+        Takes the parameters by name, returns the prediction of all rows and outputs, shape (n, m).
+    measured : array_like, shape (n, m) or (n,)
+        Readings, NaN where not read.
+    suspects : sequence of Suspect
+        Parameters that may be wrong.
+    nuisance : sequence of Suspect, optional
+        Parameters that are unknown anyway: always fitted, never named.
+    groups : array_like, shape (n,), optional
+        Labels of rows that share a session, a tail or a place. Scatter between groups is noise;
+        whole groups are held out for the gain.
+    reading_u : array_like, shape (m,) or (n, m), optional
+        Standard uncertainty of a reading by which readings are weighed; without it each output's is
+        estimated. [unit of the readings]
+    beliefs : Beliefs, optional
+        What is believed before a measured value is looked at, and from which probability a cause is
+        named.
+
+    Returns
+    -------
+    SimulationDiagnosis
+        The verdict, the causes, the gain, and the parameters to predict with.
+
+    Raises
+    ------
+    UsageError
+        If the arrays do not fit together, a name stands twice, a trial is 0, or the simulation
+        gives no number.
+    """
+    data, declared, group = checked(measured, suspects, nuisance, groups, reading_u)
+    runner = Runner(predict, data, [*suspects, *nuisance])
+    # The matrices are small: threads that wait for each other cost several times what they save.
+    with threadpool_limits(1, "blas"):
+        return _diagnosed(Study(runner, len(suspects), declared, group, beliefs or Beliefs()))
+
+
+def _diagnosed(study: Study) -> SimulationDiagnosis:
+    """Say what is wrong, what may be, what that gains, and the residual."""
+    runner, names = study.runner, study.runner.names
+    start = study.start()
+    at = study.judged(start)
+    causes = _causes(study, at)
+    report = _Report(study, at, study.fitted(at, causes, 0), tuple(causes))
+    open_ = study.chosen(at.follows.open_beside([key_of(names[k]) for k in causes]))
+    verdict, found = at.follows.verdict, at.follows.posterior
+    if verdict is Verdict.NAMED and not causes:
+        # Something is wrong, and no suspect explains unseen rows.
+        verdict = Verdict.UNLISTED
+    often, n = study.often, len(at.unit)
+    smallest = study.beliefs.seen_from(often, n) * float(np.sqrt(np.mean(at.unit**2) / n))
+    described = [report.describe(k) for k in causes]
+    return SimulationDiagnosis(
+        verdict=verdict,
+        causes=tuple(sorted(described, key=lambda c: -c.effect_rms)),
+        also_possible=tuple(report.describe(k) for k in open_ if k not in causes),
+        aliases=tuple(
+            tuple(names[k] for k in members) for members in study.design.classes if len(members) > 1
+        ),
+        untestable=tuple(names[k] for k in range(study.count) if k not in study.design.testable),
+        p_nothing=found.nothing,
+        p_unlisted=min(found.unlisted, 1.0),
+        gain=report.gain(start),
+        parameters=dict(zip(names, report.final.values.tolist(), strict=True)),
+        remainder_p=report.remainder_p(),
+        smallest_detectable_rms=smallest,
+        noise=tuple(
+            float(np.median(at.weight[own])) if np.any(own := runner.output == k) else float("nan")
+            for k in range(runner.shape[1])
+        ),
+        calls=runner.calls,
+    )
+
+
+def _causes(study: Study, at: JudgedPoint) -> list[int]:
+    """Suspects that are sure, and beside a discrepancy also those that take away most of the misfit
+    where they act; without those that make held-out rows worse, and those whose interval
+    contains the nominal value.
+    """
+    causes = study.chosen(at.follows.sure)
+    first = [members[0] for members in study.design.classes]
+    while at.follows.verdict is Verdict.UNLISTED:
+        shares = {k: _share(at, causes, k) for k in first if k not in causes}
+        most = max(shares, key=shares.__getitem__, default=-1)
+        if shares.get(most, 0.0) <= _MOST_OF_IT:
+            break
+        causes.append(most)
+    for k in causes[::-1]:
+        others = [j for j in causes if j != k]
+        before, after = (
+            _held_out(study, at, at.point, fitted, causes)[0] for fitted in (others, causes)
+        )
+        change = abs(float(at.linear([k, *others], 0).values[0]))
+        if after @ after >= before @ before or change < _reach(study, at, k, others):
+            causes = others
+    return causes
+
+
+def _reach(study: Study, at: JudgedPoint, k: int, others: Sequence[int]) -> float:
+    """Half the 95 % interval of a suspect's change, what looks like a discrepancy being one.
+    [trials]
+    """
+    context = at.follows.reported([key_of(study.runner.names[k])]).context
+    degrees = max(len(at.unit) - at.noise.absorbed - len(others) - 1, 1)
+    return float(student.ppf(0.975, degrees) * at.linear([k, *others], context).errors[0])
+
+
+def _share(at: JudgedPoint, others: Sequence[int], k: int) -> float:
+    """Share of the squared misfit where a suspect acts that it takes away from what others leave.
+    [1]
+    """
+    noise, acts = at.settled([*others, k], 0), at.point.columns[:, k] != 0.0
+    square = []
+    for chosen in ([*others], [*others, k]):
+        left = at.point.whole / at.unit - at.columns[:, chosen] @ at.linear(chosen, 0).values
+        own, _spare = noise.own_part(left)
+        square.append(float(np.sum((own[acts] / noise.relative[acts]) ** 2)))
+    return 1.0 - square[1] / max(square[0], 1e-300)
+
+
+def _held_out(
+    study: Study, at: JudgedPoint, point: FittedPoint, fitted: Sequence[int], acting: Sequence[int]
+) -> tuple[Array, str]:
+    """Misfit of rows held out over their scatter, some causes fitted to the others; rows are held
+    out by group as long as the others teach what acts.
+    """
+    columns = point.columns / at.weight[:, None]
+    part, by = folds_of(study.runner.row, study.group, columns[:, list(acting)], study.fold)
+    return held_out(columns, point.whole / at.weight, fitted, study.nuisance, part), by
+
+
+@dataclass(frozen=True)
+class _Report:
+    """What is said of a diagnosis: final is where the causes alone fit best."""
+
+    study: Study
+    at: JudgedPoint
+    final: FittedPoint
+    causes: tuple[int, ...]
+
+    def describe(self, k: int) -> SuspectFound:
+        """Describe a cause, or what may be one in addition to the causes."""
+        at, run, names = self.at, self.study.runner, self.study.runner.names
+        others = [j for j in self.causes if j != k]
+        told = float(at.linear([k, *others], at.likeliest.context).values[0])
+        change, whole = told * run.trial[k], at.point.columns[:, k] * told
+        if k in self.causes:
+            change = self.final.values[k] - run.nominal[k]
+            without = np.where(np.arange(len(names)) == k, run.nominal, self.final.values)
+            whole = run.reading - self.final.rest - run.at(without)
+        held = self.final.columns[:, self.study.nuisance] / at.weight[:, None]
+        seen = whole / at.weight
+        seen = (seen - held @ least_squares(held, seen)) * at.weight
+        reach = _reach(self.study, at, k, others) * float(abs(run.trial[k]))
+        value = float(run.nominal[k] + change)
+        return SuspectFound(
+            suspect=run.suspects[k],
+            value=value,
+            interval=(value - reach, value + reach),
+            effect_rms=float(np.sqrt(np.mean(seen**2))),
+            probability=min(at.follows.listed.get(key_of(names[k]), 0.0), 1.0),
+            aliases=tuple(names[j] for j in self.study.design.class_of(k) if j != k),
+        )
+
+    def gain(self, start: FittedPoint) -> HeldOutGain:
+        """Misfit of rows held out, before and after, in the unit of the readings."""
+        before, by = _held_out(self.study, self.at, start, (), self.causes)
+        after, by = _held_out(self.study, self.at, self.final, self.causes, self.causes)
+        rms = [float(np.sqrt(np.mean((left * self.at.weight) ** 2))) for left in (before, after)]
+        return HeldOutGain(rms[0], rms[1], by)
+
+    def remainder_p(self) -> float:
+        """p-value of the smooth shape that stands out most in the residual, as one of all of them
+        (Bonferroni); each sum of squares as a multiple of chi-squared (Satterthwaite 1946).
+        """
+        noise = self.at.settled(self.causes, 0)
+        ratio, left = noise.tail_ratios[-1], self.final.rest / self.at.unit
+        weighed = noise.precision_times(left[:, None], ratio)[0][:, 0]
+        variance = float(left @ weighed) / max(len(left) - noise.absorbed - len(self.causes), 1)
+        patterns, chances = self.study.contexts[1 :: len(self.study.beliefs.sizes)], [1.0]
+        for pattern in patterns:
+            shape = pattern.shared_in
+            spread = shape.T @ noise.precision_times(shape, ratio)[0]
+            mean, square = float(np.trace(spread)), float(np.sum(spread**2))
+            size = float(np.sum((shape.T @ weighed) ** 2)) / variance
+            chances.append(len(patterns) * float(chi2.sf(size * mean / square, mean**2 / square)))
+        return min(chances)

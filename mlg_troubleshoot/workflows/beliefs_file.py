@@ -1,0 +1,46 @@
+"""A file of what is believed before a measured value is looked at, where that differs from the
+program's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from mlg_troubleshoot.datafile import AboveZero, Name, Table, read_toml
+from mlg_troubleshoot.misfit.beliefs import Beliefs
+
+_OWN = Beliefs()
+_Share = Annotated[float, Meta(gt=0, lt=1)]
+
+
+class BeliefsFile(Table):
+    """What a fleet is known to be like; a key that is not there is as in :class:`Beliefs`."""
+
+    schema: Literal[1]
+    expected: AboveZero = _OWN.expected
+    unlisted: _Share = _OWN.unlisted
+    slips: AboveZero = _OWN.slips
+    slip_size: AboveZero = _OWN.slip_size
+    shape_size: AboveZero = _OWN.shape_size
+    sizes: Annotated[tuple[AboveZero, ...], Meta(min_length=1, max_length=9)] = _OWN.sizes
+    form: AboveZero = _OWN.form
+    exact: AboveZero = _OWN.exact
+    alike: _Share = _OWN.alike
+    rarer: dict[Name, AboveZero] = msgspec.field(default_factory=dict)
+
+
+def load_beliefs(path: Path, sure: float, causes: Collection[str]) -> Beliefs:
+    """Read what is believed; a name among the rarer ones that is not a cause is refused."""
+    remedy = "Give a TOML file with schema = 1. Its keys stand in docs/explanation/diagnosis.md."
+    file = read_toml(path, BeliefsFile, remedy)
+    for name in file.content.rarer:
+        if name not in causes:
+            raise file.fail(("rarer", name), f"one of {', '.join(sorted(causes))}")
+    values = msgspec.structs.asdict(file.content)
+    del values["schema"]
+    return Beliefs(**values, sure=sure)
