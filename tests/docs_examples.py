@@ -15,6 +15,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tests.warm_mlg import folder_of_mlg
+
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
 PAGES = (README, *sorted((ROOT / "docs").rglob("*.md")), ROOT / "inspection_data" / "README.md")
@@ -55,7 +58,7 @@ def run(commands: tuple[str, ...], folder: Path) -> Session:
     for name in ("inspection_data", "mlg_troubleshoot", "tests", "docs"):
         if not (folder / name).exists():
             (folder / name).symlink_to(ROOT / name)
-    here = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
+    here = os.pathsep.join((folder_of_mlg(), str(Path(sys.executable).parent), os.environ["PATH"]))
     mark = "-- end of a command --"
     # Each command sees the exit code of the one before it, as at a prompt.
     script = "\n".join(

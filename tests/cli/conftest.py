@@ -9,10 +9,12 @@ import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.main import get_command
 
 from mlg_troubleshoot.cli.app import app
 
@@ -43,6 +45,12 @@ class Run:
         return found
 
 
+@cache
+def command() -> Callable[..., Any]:
+    """The command as typer builds it; that takes as long as many a run of it."""
+    return get_command(app)
+
+
 def mlg(*arguments: object, stdin: bytes = b"") -> Run:
     """Run the command in this process, without a terminal."""
     streams = [
@@ -54,7 +62,7 @@ def mlg(*arguments: object, stdin: bytes = b"") -> Run:
     try:
         with contextlib.redirect_stdout(streams[0]), contextlib.redirect_stderr(streams[1]):
             try:
-                app([str(a) for a in arguments], prog_name="mlg")
+                command()([str(a) for a in arguments], prog_name="mlg")
             except SystemExit as stop:
                 code = stop.code if isinstance(stop.code, int) else int(stop.code is not None)
     finally:

@@ -253,3 +253,11 @@ def test_a_set_that_only_just_suffices_is_found(gear: Gear) -> None:
     assert [found.joints for found in repair_sets(gear, inspected(read), margin_in)] == [
         tuple(read)
     ]
+
+
+def test_a_set_that_the_exact_prediction_does_not_confirm_is_not_offered(gear: Gear) -> None:
+    cases, table = Cases.of(gear, [inspected(FULL_FAILURE)]), repair.subsets_of(gear)
+    # A search that holds joint 3 alone to suffice, which leaves less than 95 %.
+    alone = (table.members.sum(axis=1) == 1) & table.members[:, 2]
+    held = repair.Search(table, np.where(alone, 0.01, -np.inf)[None])
+    assert repair.repair_sets(cases, held, np.array([True])) == [()]

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
+from mlg_troubleshoot.records.cells import NumberFormat, OddCell
 
 HEADER = (
     "record_id",
@@ -200,3 +201,11 @@ def test_a_comma_and_rounding_in_what_a_document_shows_do_not_matter(read, sampl
             changed.writestr(name, content)
     good = read(data.getvalue(), "t.ods").rows[1]
     assert good.clearance_in[7] == pytest.approx(0.25 / 25.4)
+
+
+def test_a_format_of_two_sections_shows_a_number_below_zero_by_the_second() -> None:
+    shown = NumberFormat.of('0.0 "in";0.0 "mm"')
+    assert shown is not None
+    cell = shown.cell(-1.5, epoch_1904=False)
+    assert isinstance(cell, OddCell)
+    assert cell.text == "1.5 mm"

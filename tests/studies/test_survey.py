@@ -164,6 +164,16 @@ def test_swapped_readings_are_named_as_swapped_and_do_not_bend_the_linkage(four_
     assert best[1:3] == pytest.approx(index_of((CRANK, COUPLER, ROCKER, GROUND, TURN)), rel=1e-3)
 
 
+def test_a_distance_in_another_unit_is_named_alone_with_the_unit_that_would_fit(
+    four_bar: Gear,
+) -> None:
+    readings = list(readings_of((*BRACED, ("O2", "B", LATER)), 2e-3))
+    readings[4] = replace(readings[4], value=readings[4].value * 25.4)
+    (misfit,) = fit(four_bar, tuple(readings), np.random.default_rng(0)).misfits
+    assert misfit.reading.row == 6
+    assert "25.4 times too large" in misfit.suggestion
+
+
 def test_distances_that_no_triangle_has_are_named_together(four_bar: Gear) -> None:
     readings = list(readings_of(LENGTHS, 0.01))
     # Ground less crank is 3.95 in: no two of the three readings say which is a tenth too long or
@@ -298,6 +308,7 @@ def slipped(
     return fit(gear, (*read[:place], slip, *read[place + 1 :]), np.random.default_rng(1)), row
 
 
+@pytest.mark.slow
 def test_a_full_survey_with_a_slip_in_it_still_finds_the_amplification_indices(
     slipped: tuple[Survey, int], truth: np.ndarray
 ) -> None:
@@ -308,6 +319,7 @@ def test_a_full_survey_with_a_slip_in_it_still_finds_the_amplification_indices(
     assert error.max() < 0.12
 
 
+@pytest.mark.slow
 def test_the_slip_alone_is_named_with_the_unit_that_would_fit(slipped: tuple[Survey, int]) -> None:
     found, row = slipped
     (misfit,) = found.misfits
@@ -324,6 +336,7 @@ def named(
     return {m.reading.row: m.suggestion for m in fit(gear, rows, np.random.default_rng(1)).misfits}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("one", "other"), [(29, 33), (24, 30)])
 def test_a_swapped_pair_in_a_full_survey_is_named_and_nothing_else(
     gear: Gear, read: tuple[SurveyReading, ...], one: int, other: int
@@ -336,6 +349,7 @@ def test_a_swapped_pair_in_a_full_survey_is_named_and_nothing_else(
     }
 
 
+@pytest.mark.slow
 def test_the_intervals_hold_the_true_indices_and_are_narrow(
     slipped: tuple[Survey, int], truth: np.ndarray
 ) -> None:
@@ -346,6 +360,7 @@ def test_the_intervals_hold_the_true_indices_and_are_narrow(
     assert np.median(high / low) < 1.25
 
 
+@pytest.mark.slow
 def test_every_draw_moves_over_the_whole_stroke(slipped: tuple[Survey, int]) -> None:
     found, _ = slipped
     assert len(found.draws) > 100

@@ -1,0 +1,78 @@
+"""What is believed of a gear that failed: its joints, its rigging, or everything else."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mlg_troubleshoot.decision.assessment import RepairKind, RepairSet
+from mlg_troubleshoot.decision.case import Cases
+from mlg_troubleshoot.decision.causes import Causes, believed
+from mlg_troubleshoot.decision.inspection import Outcome, RiggingCheck
+from mlg_troubleshoot.gear.gear import Gear
+from tests.decision.conftest import every_joint, inspected
+
+WORN = every_joint(0.004)
+
+
+def causes_of(gear: Gear, clearance_in: dict[int, float], **more: Any) -> Causes:
+    return believed(Cases.of(gear, [inspected(clearance_in, **more)]))
+
+
+def test_a_rigging_that_was_looked_at_is_rarely_the_cause(gear: Gear) -> None:
+    odds = []
+    for looked in (None, RiggingCheck.YES):
+        found = causes_of(gear, WORN, readings_in=(0.036,), rigging_checked=looked)
+        odds.append(float(found.rigging[0] / found.joints[0]))
+    assert odds[1] == pytest.approx(0.03 * odds[0])
+
+
+def test_the_joints_explain_a_reading_at_their_worst_directions_though_no_random_ones_would(
+    gear: Gear,
+) -> None:
+    worst_in = float(0.94 * gear.model.plunger_amplification() @ np.full(10, 0.004))
+    found = causes_of(gear, WORN, readings_in=(worst_in,), rigging_checked=RiggingCheck.YES)
+    assert found.loaded[0] > 0.9
+    assert found.joints[0] > 0.9
+
+
+def test_a_joint_that_was_read_is_known_to_be_worn_or_not(gear: Gear) -> None:
+    found = causes_of(gear, {3: 0.013, 5: 0.001}, readings_in=(0.036,))
+    assert found.worn[0, [2, 4]].tolist() == [1.0, 0.0]
+    assert ((found.worn[0, [0, 6]] > 0.0) & (found.worn[0, [0, 6]] < 1.0)).all()
+
+
+def test_a_large_displacement_says_that_unread_joints_are_worn_more(gear: Gear) -> None:
+    little, much = (
+        float(causes_of(gear, {9: 0.001}, readings_in=(x,)).mean_in[0, 2]) for x in (0.002, 0.05)
+    )
+    assert much > 1.3 * little
+
+
+def test_a_second_repair_is_no_surer_than_sure_where_nothing_is_restored(gear: Gear) -> None:
+    worst_in = float(0.94 * gear.model.plunger_amplification() @ np.full(10, 0.006))
+    found = causes_of(gear, every_joint(0.006), readings_in=(worst_in,))
+    assert found.second_repair(0, np.zeros((1, 10), bool))[0] == pytest.approx(1.0, abs=0.01)
+
+
+def test_joints_are_the_likelier_cause_from_a_third_of_the_usual_chance_of_leaving_the_margin(
+    gear: Gear,
+) -> None:
+    fresh = inspected({})
+    found = believed(Cases.of(gear, [fresh]))
+    # The chance of a gear of which nothing was read is about the usual one.
+    assert 0.2 < found.expected_elsewhere / float(found.exceeds[0]) < 0.5
+
+
+def test_a_gear_that_failed_before_its_repair_has_the_chance_of_a_second_one(gear: Gear) -> None:
+    asked = RepairSet((3,), 0.02, 0.97, 10.0, 10.0, RepairKind.SURE)
+    repaired = {"restored_joints": (7,), "repair_date": datetime(2026, 3, 4, 8, 0)}
+    chances = []
+    for outcome in (Outcome.FAILED, None):
+        found = causes_of(gear, WORN, outcome=outcome, **repaired)
+        ((said,),) = found.with_chances([(asked,)])
+        chances.append(said.second_repair_probability is not None)
+    assert chances == [True, False]

@@ -1,0 +1,87 @@
+"""Rows of a table that are older than a repair which the store keeps of the same gear."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import date, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mlg_troubleshoot.decision.inspection import Inspection, RiggingCheck
+from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.life.since_repairs import since_repairs
+from mlg_troubleshoot.store import Store, inspection_record
+from tests.cli.conftest import mlg
+from tests.decision.conftest import inspected
+
+Counted = Callable[..., Inspection]
+WORN, SOUND = 0.012, 0.001
+THE_DAY = date(2026, 2, 1)
+
+
+@pytest.fixture(scope="module")
+def counted(tmp_path_factory: pytest.TempPathFactory, gear: Gear) -> Counted:
+    """A row as it counts where the store keeps a repair of joint 3 on 1 February, of one gear with
+    a re-rigging on that day as well.
+    """
+    place = tmp_path_factory.mktemp("store") / "store.sqlite"
+    repair = ("--date", THE_DAY.isoformat(), "--store", place)
+    for tail in ("N1", "N2"):
+        kept = inspected({3: WORN}, tail_no=tail, inspection_date=date(2026, 1, 1))
+        Store(place).add([inspection_record(kept)])
+        assert mlg("history", "repair", tail, "LH", "--joint", "3", *repair).code == 0
+    assert mlg("history", "rerig", "N2", "LH", *repair).code == 0
+
+    def count(day: date | None, worn_in: float = WORN, **more: Any) -> Inspection:
+        of_row = {"tail_no": "N1", "inspection_date": day, **more}
+        row = inspected({3: worn_in, 5: SOUND}, **of_row)
+        (found,) = since_repairs([row], gear, Store(Path(place)))
+        assert isinstance(found, Inspection)
+        return found
+
+    return count
+
+
+def test_a_row_of_the_day_before_loses_what_was_restored(counted: Counted) -> None:
+    found = counted(date(2026, 1, 31), SOUND)
+    assert (set(found.clearance_in), found.restored_joints) == ({5}, (3,))
+
+
+def test_a_row_of_the_day_after_stays_as_it_is(counted: Counted) -> None:
+    found = counted(date(2026, 2, 2))
+    assert (set(found.clearance_in), found.restored_joints) == ({3, 5}, ())
+
+
+def test_a_row_of_the_same_day_counts_as_older(counted: Counted) -> None:
+    assert counted(THE_DAY, SOUND).repair_date == THE_DAY
+
+
+@pytest.mark.parametrize(("worn_in", "left"), [(WORN, {5}), (SOUND, {3, 5})])
+def test_on_the_day_of_the_repair_only_a_reading_over_its_limit_is_of_the_old_part(
+    counted: Counted, worn_in: float, left: set[int]
+) -> None:
+    assert set(counted(THE_DAY, worn_in).clearance_in) == left
+
+
+def test_a_row_that_states_a_repair_itself_stays_as_it_is(counted: Counted) -> None:
+    own = {"restored_joints": (5,), "repair_date": datetime(2026, 1, 20, 8, 0)}
+    assert counted(date(2026, 1, 21), **own).restored_joints == (5,)
+
+
+def test_a_row_without_a_date_stays_as_it_is(counted: Counted) -> None:
+    assert counted(None).restored_joints == ()
+
+
+@pytest.mark.parametrize(("tail", "rigging"), [("N1", None), ("N2", RiggingCheck.CORRECTED)])
+def test_the_rigging_counts_as_corrected_where_a_re_rigging_is_kept(
+    counted: Counted, tail: str, rigging: RiggingCheck | None
+) -> None:
+    assert counted(date(2026, 1, 31), tail_no=tail).rigging_checked is rigging
+
+
+def test_what_a_row_was_warned_of_stands_before_what_the_store_keeps(counted: Counted) -> None:
+    told = counted(date(2026, 1, 31), warnings=("as read",)).warnings
+    assert told[0] == "as read"
+    assert "the store keeps a repair of #3 on 2026-02-01" in told[1]
