@@ -194,7 +194,8 @@ def test_an_unmeasured_joint_is_called_so_and_not_zero(failure: Run) -> None:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"clearance_3_in": "0.013"}, "restore #3"),
+        ({"clearance_3_in": "0.013"}, "measure again #3"),
+        ({"clearance_3_in": "0.013", "measured_again": "3"}, "restore #3"),
         ({"clearance_4_in": ""}, "measure #4"),
         ({"side": ""}, "correct: side"),
         ({"outcome": "FAILED"}, "read the plunger"),

@@ -255,9 +255,13 @@ def test_a_set_that_only_just_suffices_is_found(gear: Gear) -> None:
     ]
 
 
-def test_a_set_that_the_exact_prediction_does_not_confirm_is_not_offered(gear: Gear) -> None:
+def test_a_set_that_the_exact_prediction_does_not_confirm_is_not_offered(
+    gear: Gear, monkeypatch: pytest.MonkeyPatch
+) -> None:
     cases, table = Cases.of(gear, [inspected(FULL_FAILURE)]), repair.subsets_of(gear)
     # A search that holds joint 3 alone to suffice, which leaves less than 95 %.
     alone = (table.members.sum(axis=1) == 1) & table.members[:, 2]
     held = repair.Search(table, np.where(alone, 0.01, -np.inf)[None])
-    assert repair.repair_sets(cases, held, np.array([True])) == [()]
+    monkeypatch.setattr(repair, "search", lambda *_given: held)
+    upper = cases.predict(cases.filled(gear.limits_in))
+    assert repair.repair_sets(cases, upper, np.array([0])) == [()]

@@ -135,7 +135,7 @@ def test_the_gate_of_kept_records_takes_a_new_column(journey):
 
 
 def test_the_gate_of_kept_records_knows_the_range_of_a_new_column(journey):
-    assert "400 is not air humidity percent from 0 to 100" in journey["gate of a damaged record"]
+    assert "400 is not a number from 0 to 100" in journey["gate of a damaged record"]
 
 
 def test_a_new_column_is_judged_from_python(journey):
