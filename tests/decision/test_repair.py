@@ -263,5 +263,6 @@ def test_a_set_that_the_exact_prediction_does_not_confirm_is_not_offered(
     alone = (table.members.sum(axis=1) == 1) & table.members[:, 2]
     held = repair.Search(table, np.where(alone, 0.01, -np.inf)[None])
     monkeypatch.setattr(repair, "search", lambda *_given: held)
+    monkeypatch.setattr(repair, "calibrated", lambda _cases, found: found)
     upper = cases.predict(cases.filled(gear.limits_in))
     assert repair.repair_sets(cases, upper, np.array([0])) == [()]
