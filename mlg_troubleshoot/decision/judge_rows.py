@@ -361,7 +361,9 @@ def _warnings(
             "Standard uncertainty of the plunger reading not stated:"
             f" {DEFAULT_PLUNGER_U_IN:.4f} in taken as the default."
         )
-    warnings += sentences.older_than_the_repair(inspection)
+    warnings += sentences.older_than_the_repair(
+        inspection, [f.joint for f in findings if f.over_limit]
+    )
     return tuple(warnings)
 
 

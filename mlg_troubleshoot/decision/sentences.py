@@ -4,7 +4,7 @@ paper.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import date
 
@@ -374,11 +374,16 @@ def no_repair_set(a: Assessment) -> str:
     return f"No {_SET_THAT_HOLDS}"
 
 
-def older_than_the_repair(inspection: Inspection) -> list[str]:
-    """Ask about what stands in a row and may be older than the repair."""
+def older_than_the_repair(inspection: Inspection, over_limit: Collection[int]) -> list[str]:
+    """Ask about what stands in a row and may be older than the repair; joints over their limit."""
     if not inspection.is_repaired:
         return []
-    said = []
+    said = [
+        f"Joint #{joint} was restored, and its reading, which counts as taken after that, is above"
+        " its limit. Was it taken before? Then leave it blank, and read the joint once more."
+        for joint in inspection.restored_joints
+        if joint in over_limit
+    ]
     if inspection.outcome is not None and inspection.standing_outcome is None:
         said.append(
             f"The outcome {inspection.outcome} counts as older than the repair. Is it newer? Then"

@@ -364,6 +364,7 @@ def counted(world: World, n: int, seed: int, folder: Path) -> tuple[Counted, Han
     bound = dict(zip(map(id, hangar.gears), worst(true, world.linkage), strict=True))
     repaired = [g for g in hangar.gears if g.repairs]
     away = [g for g in by[CLEARANCE] if stands[id(g)] > MARGIN_IN]
+    left = int((true > LIMIT_IN).sum())
     figures = {
         "ended": mean([bool(g.end) for g in hangar.gears]),
         "steps, most": float(max(len(g.done) for g in hangar.gears)),
@@ -374,6 +375,8 @@ def counted(world: World, n: int, seed: int, folder: Path) -> tuple[Counted, Han
         "oracle, sound of restored": best.sound,
         "sound of restored": sum(g.sound for g in hangar.gears)
         / max(sum(g.restored for g in hangar.gears), 1),
+        "over their limit, overlooked": left
+        / max(left + sum(g.restored - g.sound for g in hangar.gears), 1),
         "other, sound restored": mean([g.sound > 0 for g in by[OTHER]]),
         "not failed, sound restored": mean([g.sound > 0 for g in by[NONE]]),
         "mis-rigged, restored": mean([g.restored > 0 for g in by[MISRIGGED]]),

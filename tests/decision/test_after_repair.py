@@ -59,6 +59,11 @@ def test_a_failure_that_may_be_older_than_the_repair_is_asked_about(judge: Judge
     assert any("FAILED counts as older than the repair. Is it newer?" in w for w in warnings)
 
 
+def test_a_restored_joint_that_still_reads_over_its_limit_is_asked_about(judge: Judge) -> None:
+    warnings = judge(RESTORED | {3: 0.013}, **REPAIRED).warnings
+    assert any(w.startswith("Joint #3 was restored, and its reading") for w in warnings)
+
+
 @pytest.mark.parametrize(
     ("one", "other", "later"),
     [
