@@ -59,6 +59,8 @@ T = TypeVar("T")
 Place = tuple[str | int, ...]
 
 
+# No float holds a number so large, and no file half of a character.
+_REFUSED = (msgspec.ValidationError, OverflowError, UnicodeEncodeError)
 # By name, since a checker of types would otherwise ask for ``frozen`` at every kind of table.
 _STRICT: dict[str, Any] = {"frozen": True, "forbid_unknown_fields": True}
 
@@ -104,7 +106,7 @@ def decode(path: Path, values: dict[str, Any], kind: type[T]) -> T:
     """Return the values of a file as a kind of table; `GearFileError` if they do not fit it."""
     try:
         return msgspec.convert(values, kind, str_keys=True)
-    except (msgspec.ValidationError, OverflowError):
+    except _REFUSED:
         raise _error(path, values, *_refusal(values, kind)) from None
 
 
@@ -242,7 +244,7 @@ def _why(value: Any, kind: Any) -> Exception | None:
     """Return why a value is not of a kind; None if it is."""
     try:
         msgspec.convert(value, kind, str_keys=True)
-    except (msgspec.ValidationError, OverflowError) as error:
+    except _REFUSED as error:
         return error.__cause__ if isinstance(error.__cause__, RefusedValueError) else error
     return None
 

@@ -53,6 +53,7 @@ WRONG_INSPECTIONS = {
     "a whole number of 400 digits": with_field(gear_landings=10**400),
     "another side than its record": with_field(side="RH"),
     "a side that is none": with_field(side="XX"),
+    "a side that is half a character": with_field(side="\ud800"),
     "a convention that is none": with_field(convention="GUESSED"),
     "a day that is none": with_field(inspection_date="9999-99-99"),
     "a margin of zero": with_field(margin_in=0.0),
