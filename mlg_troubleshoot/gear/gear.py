@@ -213,6 +213,8 @@ class Gear:
         it.
     numbers : tuple of Sourced
         Every number behind a prediction, with its source.
+    linkage_known : bool
+        True if every number of the linkage was measured or is from a technical order.
     geometry_sha256, ensemble_sha256 : str
         Hash of the reference geometry with its calibration, and of the ensemble.
     path : Path
@@ -245,6 +247,7 @@ class Gear:
     discrepancies: Discrepancies
     cycle: RetractionCycle | None
     numbers: tuple[Sourced, ...]
+    linkage_known: bool
     geometry_sha256: str
     ensemble_sha256: str
     path: Path

@@ -401,6 +401,8 @@ def _read(path: Path) -> Gear:
     found = file.content
     numbers = _Numbers(found.sources)
     _add_numbers(found, numbers)
+    surely = {SourceKind.MEASURED, SourceKind.TECHNICAL_ORDER}
+    linkage_known = {number.kind for number in numbers.found} <= surely
     reference = _linkage(found, "A")
     members: dict[str, dict[str, Any]] = {}
     ensemble_path = path
@@ -437,6 +439,7 @@ def _read(path: Path) -> Gear:
         discrepancies=_discrepancies(file, reference.mechanism),
         cycle=found.cycle,
         numbers=tuple(numbers.found),
+        linkage_known=linkage_known,
         geometry_sha256=_sha256({k: file.values.get(k) for k in _GEOMETRY_KEYS}),
         ensemble_sha256=_sha256(members),
         path=path,

@@ -51,15 +51,15 @@ class Effects:
         )
 
     @staticmethod
-    def free(columns: Array, names: Sequence[Key | None], log_prior: float, size: float) -> Effects:
-        """Effects that are on no list and may have any sign, each equally likely."""
+    def free(columns: Array, names: Sequence[Key | None], log_prior: Array, size: float) -> Effects:
+        """Effects that are on no list and may have any sign."""
         p = columns.shape[1]
         none = np.zeros(p)
         return Effects(
             columns,
             names,
             none.astype(bool),
-            np.full(p, log_prior),
+            log_prior,
             np.full(p, size),
             np.array([name is not None for name in names], bool),
             none,

@@ -102,6 +102,7 @@ def diagnose_files(
         load_causes,
         table_from_inspections,
     )
+    from mlg_troubleshoot.diagnosis.causes.together import OtherGeometry
     from mlg_troubleshoot.misfit.beliefs import Beliefs
     from mlg_troubleshoot.records import ReadOptions, read_many
     from mlg_troubleshoot.workflows.beliefs_file import load_beliefs
@@ -112,6 +113,9 @@ def diagnose_files(
     if options.beliefs_file is not None:
         names = {cause.name for cause in (*CATALOGUE, *own)}
         beliefs = load_beliefs(options.beliefs_file, options.sure, names)
+    if gear.linkage_known:
+        rarer = {OtherGeometry.name: beliefs.surveyed, **beliefs.rarer}
+        beliefs = replace(beliefs, rarer=rarer)
     reading = replace(
         ReadOptions.of(gear, options),
         clearance_hard_max_in=_ANY_LENGTH_IN,

@@ -9,6 +9,7 @@ and following, were used for no constant of the program.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,26 @@ OF_DEPARTURES = {
     "convention": 10,
     "one group": 18,
 }
+# Other fleets than those that are drawn: how much oftener each occurs, by what is wrong in it.
+_EVERY_SECOND = tuple(simulator.CATALOGUE)[::2]
+MIXTURES: dict[str, Callable[[list[str]], float]] = {
+    "as drawn": lambda _wrong: 1.0,
+    "nothing wrong three times as often": lambda wrong: 1.0 if wrong else 3.0,
+    "nothing wrong a third as often": lambda wrong: 1.0 if wrong else 1.0 / 3.0,
+    "unlisted three times as often": lambda wrong: (
+        3.0 if set(wrong) - {*simulator.CATALOGUE, "load_directions", "convention_slip"} else 1.0
+    ),
+    "every second cause three times as often, the others a third": lambda wrong: float(
+        np.prod(
+            [3.0 if c in _EVERY_SECOND else 1.0 / 3.0 for c in wrong if c in simulator.CATALOGUE]
+        )
+    ),
+    "every second cause a third as often, the others three times": lambda wrong: float(
+        np.prod(
+            [1.0 / 3.0 if c in _EVERY_SECOND else 3.0 for c in wrong if c in simulator.CATALOGUE]
+        )
+    ),
+}
 EDGES = (0.05, 0.2, 0.4, 0.6, 0.8, 0.95, 0.99, 1.0)
 
 
@@ -59,22 +80,35 @@ def run(task: Any) -> dict[str, Any]:
     return study.run(task) if isinstance(task, dict) else departures.run(task)
 
 
-def bins(records: list[dict[str, Any]]) -> list[tuple[float, float, int, float, int]]:
-    """Of each bin: its edges, how many causes were stated in it, their mean, and how many act.
+def bins(
+    records: list[dict[str, Any]], oftener: Callable[[list[str]], float] = MIXTURES["as drawn"]
+) -> list[tuple[float, float, int, float, float]]:
+    """Of each bin: its edges, how many causes were stated in it, their mean, and the share of them
+    that acts, as if fleets with something wrong were so much oftener.
 
-    Fleets of another linkage are left out: whether it shows in their rows is not known.
+    Fleets of another linkage are left out, and that as a cause: whether it shows in their rows is
+    not known.
     """
-    said = [
-        (float(p), any(study._same((cause, target), tuple(t)) for t in r["truth"]))
-        for r in records
-        if r.get("linkage", "A") == "A"
-        for cause, target, p in r.get("probabilities", ())
-    ]
+    said = np.array(
+        [
+            (
+                float(p),
+                any(study._same((cause, target), tuple(t)) for t in r["truth"]),
+                oftener([str(name) for name, _target in r["truth"]]),
+            )
+            for r in records
+            if r.get("linkage", "A") == "A"
+            for cause, target, p in r.get("probabilities", ())
+            if cause != "geometry"
+        ]
+    ).reshape(-1, 3)
     found = []
     for low, high in pairwise(EDGES):
-        own = [(p, acts) for p, acts in said if low <= p < high or (high == 1.0 and p >= high)]
-        mean = float(np.mean([p for p, _acts in own])) if own else float("nan")
-        found.append((low, high, len(own), mean, sum(acts for _p, acts in own)))
+        own = said[(said[:, 0] >= low) & ((said[:, 0] < high) | (high == 1.0))]
+        stated, acts = (
+            np.average(own[:, :2], axis=0, weights=own[:, 2]) if len(own) else np.full(2, np.nan)
+        )
+        found.append((low, high, len(own), float(stated), float(acts)))
     return found
 
 
@@ -90,9 +124,13 @@ def main() -> None:
     records = study.mapped(run, listed, given.workers, given.keep)
     print("| stated | causes | mean stated | act |\n|---|---|---|---|")
     for low, high, count, mean, acting in bins(records):
-        rate = study._rate(acting, count)
+        rate = study._rate(round(acting * count) if count else 0, count)
         band = f"{rate['low']:.2f}–{rate['high']:.2f}"
         print(f"| {low:.2f}–{high:.2f} | {count} | {mean:.3f} | {rate['rate']:.3f} ({band}) |")
+    print("\nact less stated, in points, in each of these bins, were the fleets others:")
+    for name, oftener in MIXTURES.items():
+        off = [100.0 * (acting - mean) for *_bin, mean, acting in bins(records, oftener)]
+        print(f"| {name} | {' | '.join(f'{points:+.0f}' for points in off)} |")
 
 
 if __name__ == "__main__":
