@@ -105,7 +105,7 @@ class MisfitProblem:
         alike = Counter(named)
         share = np.log([shares[UNLISTED] / (len(alike) * alike[name]) for name in named])
         free = Effects.free(shapes, named, share, beliefs.shape_size * scale)
-        slip = np.log(np.full(n, beliefs.slips / n))
+        slip = float(np.log(beliefs.slips / n))
         slips = Effects.free(np.eye(n), [None] * n, slip, beliefs.slip_size * scale)
         return Effects.joined([listed, free, slips])
 

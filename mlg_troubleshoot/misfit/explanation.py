@@ -51,7 +51,9 @@ class Effects:
         )
 
     @staticmethod
-    def free(columns: Array, names: Sequence[Key | None], log_prior: Array, size: float) -> Effects:
+    def free(
+        columns: Array, names: Sequence[Key | None], log_prior: Array | float, size: float
+    ) -> Effects:
         """Effects that are on no list and may have any sign."""
         p = columns.shape[1]
         none = np.zeros(p)
@@ -59,7 +61,7 @@ class Effects:
             columns,
             names,
             none.astype(bool),
-            log_prior,
+            np.full(p, log_prior),
             np.full(p, size),
             np.array([name is not None for name in names], bool),
             none,

@@ -212,7 +212,7 @@ class Study:
         )
         far = self._far(point.rest / unit, noise.relative)
         slips = np.eye(len(unit))[:, far]
-        slip = np.full(slips.shape[1], np.log(beliefs.slips / len(unit)))
+        slip = float(np.log(beliefs.slips / len(unit)))
         errors = Effects.free(slips, [None] * slips.shape[1], slip, beliefs.slip_size)
         return Effects.joined([suspects, errors])
 

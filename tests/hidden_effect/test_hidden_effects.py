@@ -223,3 +223,22 @@ def test_two_causes_of_single_joints_are_not_taken_for_another_linkage_or_direct
     assert {(c.candidate.cause.name, c.candidate.target) for c in found.causes} == set(
         fleet.label.causes
     )
+
+
+@pytest.mark.parametrize(
+    ("unlisted", "part"),
+    [
+        ("lost_motion_under_load", "elastic_compliance"),
+        ("approach_of_one_technician", "technician_bias"),
+        ("pressure_of_one_gauge", "gauge_bias"),
+    ],
+)
+def test_what_an_unlisted_effect_has_of_a_listed_cause_is_not_put_down_to_that(
+    unlisted: str, part: str
+) -> None:
+    seed = 40_100
+    spec = replace(draw_spec(seed, "null", null="iid"), effects=(EffectSpec(unlisted, None, 15.0),))
+    gear = load_gear()
+    found = diagnose(gear.model, as_table(simulate_fleet(spec, seed).table), gear.discrepancies)
+    assert found.p_unlisted > 0.9
+    assert sum(p for (cause, _target), p in found.probabilities.items() if cause == part) < 0.5
