@@ -614,10 +614,10 @@ def _report(
         repeatability_source=source,
         smallest_rms_in=finding.smallest_rms_in,
         gain=gain,
-        # What makes aircraft that it was not fitted to no likelier is not written.
+        # What predicts aircraft that it was not fitted to no better is not written.
         terms=(
             tuple(cause for cause in causes if cause.predicts)
-            if gain is not None and gain.likelier
+            if gain is not None and gain.better
             else ()
         ),
         residual_u_in=float(np.std(left)),

@@ -122,6 +122,11 @@ def main() -> None:
     given = parser.parse_args()
     listed = tasks(given.first_seed)[: given.fleets]
     records = study.mapped(run, listed, given.workers, given.keep)
+    of_study = study.summarise([r for r in records if "strengths" in r])["targets"]
+    of_departures = departures.summarise([r for r in records if "strengths" not in r])["lines"]
+    rates = [(name, aim, of_study[name]) for name, aim in study.AIMS.items() if name in of_study]
+    rates += [(name, aim, of_departures[name]) for name, (*_f, aim) in departures.LINES.items()]
+    print(*study.HEAD, *(study.rate_line(*rate) for rate in rates if rate[2]["n"]), "", sep="\n")
     print("| stated | causes | mean stated | act |\n|---|---|---|---|")
     for low, high, count, mean, acting in bins(records):
         rate = study._rate(round(acting * count) if count else 0, count)

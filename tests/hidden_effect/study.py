@@ -180,7 +180,8 @@ def _compare(fleet: simulator.Fleet, found: Diagnosis | None) -> Record:
     ) <= set(_own_names(label.variables))
     if found.gain is not None:
         before, after = found.gain.rms_before_in**2, found.gain.rms_after_in**2
-        record["worse"] = after > before
+        if found.terms:
+            record["worse"] = after > before
         place = {name: k for k, name in enumerate(fleet.table["record_id"])}
         truth_in = label.truth_term[[place[name] for name in found.used.record_id]]
         best = before - float(np.mean((found.misfit_in - truth_in) ** 2))

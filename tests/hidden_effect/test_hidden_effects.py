@@ -242,3 +242,17 @@ def test_what_an_unlisted_effect_has_of_a_listed_cause_is_not_put_down_to_that(
     found = diagnose(gear.model, as_table(simulate_fleet(spec, seed).table), gear.discrepancies)
     assert found.p_unlisted > 0.9
     assert sum(p for (cause, _target), p in found.probabilities.items() if cause == part) < 0.5
+
+
+def test_one_of_two_causes_that_undo_each_other_does_not_extend_the_model() -> None:
+    seed = 69_700_368
+    gear = load_gear()
+    found = diagnose(
+        gear.model,
+        as_table(draw_fleet(seed, "double").table),
+        gear.discrepancies,
+        ensemble=gear.ensemble_models[1:],
+    )
+    assert found.gain is not None
+    assert found.gain.rms_after_in > found.gain.rms_before_in
+    assert not found.terms
