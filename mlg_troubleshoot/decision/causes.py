@@ -269,11 +269,9 @@ def _weighed(
     )
     by_elsewhere = np.sum(density * fits * (1.0 - outside), axis=1) + loaded - loaded_outside
     by_elsewhere *= tables.exceeds / PRIORS.joints_for_one_elsewhere
-    wide = PRIORS.offset * margin
-    offset = np.exp(-0.5 * (AT_IN / wide[:, None]) ** 2) / wide[:, None] * STEP_IN / 2.5066
-    share = 2.0 * (1.0 - tabled_normal_cdf(np.full(1, 1.0 / PRIORS.offset)))[0]
-    by_rigging = np.sum(offset * fits * outside, axis=1)
-    by_rigging *= tables.exceeds / (PRIORS.joints_for_one_misrigged * share)
+    offset = 1.0 / (1.0 + (AT_IN / (PRIORS.offset * margin[:, None])) ** 8)
+    by_rigging = np.sum(offset * fits * outside, axis=1) / np.sum(offset * outside, axis=1)
+    by_rigging *= tables.exceeds / PRIORS.joints_for_one_misrigged
     looked = np.array([i.rigging_checked not in (None, RiggingCheck.NO) for i in cases.inspections])
     by_rigging *= np.where(looked, PRIORS.overlooked, 1.0)
     all_joints = by_joints + loaded_outside

@@ -37,7 +37,8 @@ def explain(one: Cases, causes: Causes | None = None) -> Posterior | None:
     random, (mean, spread) = bessel(turns), PRIORS.cosine
     aligned = np.exp(1j * mean * turns - 0.5 * (spread * turns) ** 2)
     u = np.hypot(found.u_in[0], PRIORS.linkage_u_in)
-    wide = np.hypot(u, PRIORS.offset * one.margin_in[0])
+    # As wide as what a wrong rigging adds, which is about even.
+    wide = np.hypot(u, PRIORS.offset * one.margin_in[0] / np.sqrt(3.0))
     given = [
         (chance, _Given(clearance, waves, reading, scatter))
         for chance, waves, scatter in (
@@ -109,7 +110,7 @@ class _Given:
         joints = range(len(waves))
         rest = np.stack([np.delete(self.whole, j, axis=1).prod(axis=1) for j in joints], axis=1)
         of_each = 0.5 + np.einsum("kjt,jst->kjs", rest * self.seen, waves).real
-        density = np.einsum("k,kjs->js", self.levels, before.chances * np.maximum(of_each, 0.0))
+        density = np.einsum("k,kjs->js", self.levels, before.chances * np.maximum(of_each, 1e-12))
         self.density = density / density.sum(axis=1, keepdims=True)
 
     def _fits(self, waves: Array, mass: Array | float = 1.0) -> Array:

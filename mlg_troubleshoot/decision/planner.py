@@ -329,7 +329,8 @@ class _PlanBuilder:
         """The joints to read next; none where a repair is quicker than what reading may save."""
         f, i = self.facts, self.row
         # A worn joint that hardly moves the plunger is hardly the cause.
-        worn = f.causes.worn[i] * f.causes.leverage
+        # Rounded: both ends of one link are worth the same, and noise must not order them.
+        worn = np.round(f.causes.worn[i] * f.causes.leverage, 9)
         chosen: tuple[int, ...] = ()
         most = -1.0
         for area in self.gear.areas:
@@ -523,9 +524,8 @@ class _PlanBuilder:
                 )
                 return replace(found, steps=(step, *found.steps[1:]))
         question = sentences.does_not_fit(first, left, found.open_question)
-        self.steps = []
-        ended = self._end(End.CANNOT_CLEAR)
-        return replace(ended, open_question=question)
+        stop = Step(Action.CONTINUE, (), 0.0, None, sentences.STOP_FOR_TODAY)
+        return Plan((stop,), End.CANNOT_CLEAR, question)
 
     @property
     def _at_first(self) -> frozenset[str]:

@@ -18,7 +18,7 @@ class Priors:
     joints_for_one_misrigged, joints_for_one_elsewhere: of the gears that failed, how many did so
     through the joints for each that was mis-rigged, and for each that failed through something that
     leaves the plunger within its margin.
-    offset: how far a wrong rigging moves the plunger: standard deviation in margins. [1]
+    offset: how far a wrong rigging moves the plunger: evenly, up to about so many margins. [1]
     overlooked: chance that a rigging that was looked at is wrong nevertheless. [1]
     loaded, scatter_deg: chance that loads hold all pins near their worst directions, and the
     standard deviation of their angles then. [1, deg]
@@ -34,7 +34,7 @@ class Priors:
 
     joints_for_one_misrigged: float = 3.0
     joints_for_one_elsewhere: float = 3.0
-    offset: float = 1.5
+    offset: float = 2.0
     overlooked: float = 0.03
     loaded: float = 0.02
     scatter_deg: float = 20.0

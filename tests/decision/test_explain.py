@@ -10,7 +10,10 @@ import pytest
 from mlg_troubleshoot.decision.assessment import Posterior
 from mlg_troubleshoot.decision.case import Cases
 from mlg_troubleshoot.decision.causes import believed
+from mlg_troubleshoot.decision.inspection import RiggingCheck
 from mlg_troubleshoot.decision.likely_worn import explain
+from mlg_troubleshoot.decision.priors import PRIORS
+from mlg_troubleshoot.decision.wear_levels import DENSITIES, SHARES, level_chances
 from mlg_troubleshoot.gear.gear import Gear
 from tests.benchmarks import worn_gears
 from tests.decision.conftest import Judge, every_joint, inspected
@@ -142,3 +145,25 @@ def test_a_coarse_reading_of_one_joint_leaves_its_clearance_open(gear: Gear) -> 
     assert found is not None
     width = {each.joint: each.high_in - each.low_in for each in found.intervals}
     assert width[5] > 2.0 * width[3]
+
+
+def test_every_interval_is_a_number_where_nothing_explains_the_reading(gear: Gear) -> None:
+    found = explained(gear, every_joint(0.0005), 0.12)
+    assert all(0.0 <= each.low_in <= each.median_in <= each.high_in for each in found.intervals)
+
+
+def test_the_chance_of_wear_is_that_of_sampling_the_same_model(gear: Gear) -> None:
+    sound = {j: 0.0005 for j in range(1, 11) if j != 2}
+    read = inspected(sound, readings_in=(0.02,), rigging_checked=RiggingCheck.YES)
+    one, rng = Cases.of(gear, [read]), np.random.default_rng(3)
+    found, n = explain(one), 200_000
+    assert found is not None
+    level = rng.choice(len(DENSITIES), n, p=level_chances(one)[0])
+    drawn = np.array([rng.choice(SHARES, n, p=each) for each in DENSITIES])[level, np.arange(n)]
+    clearance = np.full((n, 10), 0.0005)
+    clearance[:, 1] = drawn * gear.limits_in[1]
+    reach = clearance * gear.model.plunger_amplification()
+    moved = np.sum(reach * np.cos(rng.uniform(0.0, 2.0 * np.pi, (n, 10))), axis=1)
+    weight = np.exp(-0.5 * ((0.02 - moved) / np.hypot(0.0015, PRIORS.linkage_u_in)) ** 2)
+    sampled = float(weight @ (drawn > 1.0) / weight.sum())
+    assert chance(found, 2) == pytest.approx(sampled, abs=0.03)
