@@ -246,6 +246,7 @@ class _PlanBuilder:
                 self._check_rigging()
                 if rigging > 0.5:
                     return self._restore_over_limit()._end(End.NOT_EXPLAINED)
+                joints /= 1.0 - (1.0 - PRIORS.overlooked) * rigging
         if following:
             return self._read_and_restore(following)
         if best is not None and (joints >= PRIORS.usual or set(best.joints) <= set(self.over)):

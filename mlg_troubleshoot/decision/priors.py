@@ -53,7 +53,7 @@ class Priors:
 
     @property
     def usual(self) -> float:
-        """Chance that a failure is one of the joints, where it is no matter of rigging. [1]"""
+        """Chance that the joints are the cause of a failure that rigging did not cause. [1]"""
         return self.joints_for_one_elsewhere / (1.0 + self.joints_for_one_elsewhere)
 
 
