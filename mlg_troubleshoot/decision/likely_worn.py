@@ -52,7 +52,8 @@ def explain(one: Cases, causes: Causes | None = None) -> Posterior | None:
     def chance_of_none(joints: Sequence[int]) -> float:
         places = [gear.joint_numbers.index(number) for number in joints]
         sound = sum(chance * each.none_worn(places) for chance, each in given)
-        return float(np.clip(sound, 0.0, 1.0))
+        # Readings are followed to four standard uncertainties: nothing is surer than that.
+        return float(np.clip(sound, 1e-4, 1.0 - 1e-4))
 
     chances = [GroupChance(group, 1.0 - chance_of_none(group)) for group in gear.link_groups]
     chances.sort(key=lambda chance: -chance.probability)

@@ -25,6 +25,7 @@ from tests.decision.technician import (
     MARGIN_IN,
     MISRIGGED,
     NONE,
+    OTHER,
     Hangar,
     World,
 )
@@ -43,11 +44,8 @@ def _said(hangar: Hangar, folder: Path, rng: np.random.Generator) -> dict[str, l
     for gear in gears:
         hangar.read_plunger(gear)
     hangar.judged(gears, folder)
-    judgements = check_files([folder / "row.csv"], CheckOptions(advice=False)).judgements
-    cases = Cases.of(
-        check_files([folder / "row.csv"], CheckOptions(advice=False)).gear,
-        [judgement.inspection for judgement in judgements],
-    )
+    result = check_files([folder / "row.csv"], CheckOptions(advice=False))
+    cases = Cases.of(result.gear, [judgement.inspection for judgement in result.judgements])
     causes = believed(cases)
     for i, (gear, said) in enumerate(zip(gears, unread, strict=True)):
         read = cases.measured[i]
@@ -57,10 +55,8 @@ def _said(hangar: Hangar, folder: Path, rng: np.random.Generator) -> dict[str, l
             )
             z = (bound[i] - said["predicted_displacement_in"]) / said["standard_uncertainty_in"]
             pairs["z"].append((z, abs(z) <= 1.645))
-        # Any gear of the fleet, whatever happened to it: its own directions are turned away.
+        # Whatever happened to the gear: its pins rest anew in random directions.
         turned = rng.uniform(0.0, 2.0 * np.pi, (_TURNS, 10))
-        if gear.kind == NONE and i % 4 == 0 and not read.all():
-            pass
         moved = displacement(np.repeat(true[i : i + 1], _TURNS, axis=0), turned, world.linkage)
         name = "random directions, ten read" if read.all() else "random directions, some unread"
         chance = float(np.mean(np.abs(moved) > MARGIN_IN))
@@ -68,6 +64,7 @@ def _said(hangar: Hangar, folder: Path, rng: np.random.Generator) -> dict[str, l
         if gear.kind != NONE:
             pairs["the joints"].append((causes.joints[i], gear.kind == CLEARANCE))
             pairs["rigging"].append((causes.rigging[i], gear.kind == MISRIGGED))
+            pairs["something else"].append((causes.elsewhere[i], gear.kind == OTHER))
         if gear.kind in (CLEARANCE, MISRIGGED):
             found = explain(cases.take(np.array([i])))
             assert found is not None
