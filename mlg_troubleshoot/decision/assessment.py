@@ -222,7 +222,6 @@ class Posterior:
     no_joint_worn: chance that no joint is worn beyond its limit. [1]
     not_clearance: chance that something other than clearance displaced the plunger. [1]
     called_worn: groups that are more likely worn than not.
-    effective_draws: independent draws that the result is worth. [1]
     """
 
     groups: tuple[GroupChance, ...]
@@ -230,7 +229,6 @@ class Posterior:
     not_clearance: float
     intervals: tuple[ClearanceInterval, ...]
     called_worn: tuple[tuple[int, ...], ...]
-    effective_draws: float
     text: str
 
 
