@@ -269,6 +269,8 @@ class Inspection:
 class InvalidRow:
     """A data row that cannot be judged, with the columns to correct; its problems stand in the list
     of problems.
+
+    understood: what could be read of it, None if nothing; what it lacks is None there.
     """
 
     record_id: str | None
@@ -277,3 +279,4 @@ class InvalidRow:
     correct: tuple[str, ...]
     warnings: tuple[str, ...] = ()
     source: RowSource = RowSource()
+    understood: Inspection | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
@@ -175,8 +175,10 @@ class TableInHand:
 def to_correct(row: Inspection | InvalidRow, *headers: str) -> InvalidRow:
     """A row that cannot be judged before these columns of it are corrected."""
     known = row.correct if isinstance(row, InvalidRow) else ()
+    understood = row.understood if isinstance(row, InvalidRow) else row
     named = tuple(dict.fromkeys((*headers, *known)))
-    return InvalidRow(row.record_id, row.tail_no, row.side, named, row.warnings, row.source)
+    identity = row.record_id, row.tail_no, row.side
+    return InvalidRow(*identity, named, row.warnings, row.source, understood)
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,10 +219,13 @@ class SheetLayout:
 
 @dataclass(frozen=True, slots=True)
 class FileRead:
+    """One file as read; a DataFrame has the labels of its rows, whatever they are."""
+
     name: str
     kind: str
     sha256: str | None
     rows: int
+    labels: Sequence[object] = ()
 
 
 @dataclass(frozen=True, slots=True)
