@@ -12,6 +12,7 @@ from enum import StrEnum
 from typing import Any
 
 from mlg_troubleshoot.errors import UsageError
+from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 # Standard uncertainty of a clearance reading that states none. [in]
@@ -106,8 +107,8 @@ class RowSource:
     row: int | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Inspection:
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class Inspection(Result):
     """One valid inspection of one gear.
 
     Parameters

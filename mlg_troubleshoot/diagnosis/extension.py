@@ -41,6 +41,7 @@ from mlg_troubleshoot.gear.adjustment import Adjustment, adjusted_worst_case
 from mlg_troubleshoot.gear.gear import Discrepancies, Gear
 from mlg_troubleshoot.gear.model import LinkageModel
 from mlg_troubleshoot.outputs import OutputKind, write_text
+from mlg_troubleshoot.results import Result
 
 _HEADING = "# Extension of the model by a diagnosis of measured displacements.\n"
 EXTENSION = OutputKind.marked("is not an extension of the model", _HEADING)
@@ -79,8 +80,8 @@ class ExtensionFile(Table):
     unread_joints: tuple[Whole, ...] = ()
 
 
-@dataclass(frozen=True)
-class Term:
+@dataclass(frozen=True, repr=False, eq=False)
+class Term(Result):
     """One named cause with its fitted parameter.
 
     Parameters
@@ -102,8 +103,8 @@ class Term:
         return self.candidate.cause.words(self.candidate.target)
 
 
-@dataclass(frozen=True)
-class ModelExtension:
+@dataclass(frozen=True, repr=False, eq=False)
+class ModelExtension(Result):
     """Terms that are added to the model of one geometry.
 
     Parameters

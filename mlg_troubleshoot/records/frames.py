@@ -11,13 +11,14 @@ from mlg_troubleshoot.decision.columns import (
     CONVENTION,
     IDENTITY,
     STROKE,
+    UNIT,
     Holds,
 )
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.errors import Problem
 from mlg_troubleshoot.records.cells import Cell, typed
 from mlg_troubleshoot.records.gate import cells_of
-from mlg_troubleshoot.records.headers import Joints, parse_canonical
+from mlg_troubleshoot.records.headers import Joints, parse_canonical, recognise
 from mlg_troubleshoot.records.layout import Header
 from mlg_troubleshoot.records.source import NumberedRow, Sheet
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
@@ -63,6 +64,7 @@ class FrameSheet(Sheet):
         self._columns = [_cells(frame.iloc[:, place]) for place in range(frame.shape[1])]
 
     def _read(self) -> Iterator[NumberedRow]:
+        yield self.header.row, self.header.texts
         for number, cells in enumerate(zip(*self._columns, strict=True), _FIRST_ROW):
             if any(cell is not None for cell in cells):
                 yield number, cells
@@ -74,6 +76,26 @@ def _cells(column: pd.Series[Any]) -> list[Cell]:
         # A column of days has no times.
         known = [day.date() if day is not None and day == day.normalize() else day for day in known]
     return [value if value.__class__ is float else typed(value) for value in known]
+
+
+def clearances_alone(source: Frame, joints: Joints) -> pd.DataFrame:
+    """The clearances of a frame, and what says how to read them, each row as of a gear of its
+    own.
+    """
+    frame = as_frame(source)
+    found = [recognise(str(name), joints) for name in frame.columns]
+    kept = [
+        place
+        for place, each in enumerate(found)
+        if each.reason or (each.field and each.field.column in (CLEARANCE, CONVENTION, UNIT))
+    ]
+    rows = list(map(str, range(len(frame))))
+    return frame.iloc[:, kept].assign(record_id=rows, tail_no=rows, side="LH")
+
+
+def source_label(source: object) -> str:
+    """What a table is called: its path, or that it is a frame."""
+    return FRAME if is_frame(source) else str(source)
 
 
 def label_of(labels: Sequence[object], row: int | None) -> object:

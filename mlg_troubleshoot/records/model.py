@@ -18,6 +18,11 @@ from mlg_troubleshoot.records.values import CellFaultError
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 Progress = Callable[[int, int | None], None]
+_WORDS: Mapping[str, Callable[[str], object]] = {
+    "unit": LengthUnit.parse,
+    "convention": ClearanceConvention.parse,
+    "dates": DateOrder,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,6 +60,13 @@ class TableOptions:
     decimal_comma: bool = False
     small_readings_true: bool = False
     dates: DateOrder | None = None
+
+    def __post_init__(self) -> None:
+        """Take a unit, a convention and an order of dates as people write them."""
+        for name, read in _WORDS.items():
+            said = getattr(self, name)
+            if isinstance(said, str):
+                object.__setattr__(self, name, read(said))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
