@@ -10,8 +10,6 @@ from dataclasses import fields, is_dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -75,8 +73,9 @@ def _parts(value: Any) -> dict[str, Any]:
 
 def _short(value: object) -> str:
     kind = type(value).__name__
-    if isinstance(value, np.ndarray):
-        return f"array{value.shape}"
+    shape = getattr(value, "shape", None)
+    if shape is not None:
+        return f"array{shape}"
     if isinstance(value, str | int | float | None):
         return textwrap.shorten(repr(value), _VALUE, placeholder="…")
     text = "" if isinstance(value, Result) or is_dataclass(value) else repr(value)
@@ -87,6 +86,8 @@ def _short(value: object) -> str:
 
 def same(one: Any, other: Any) -> bool:
     """Whether two values hold the same, arrays and missing numbers included."""
+    import numpy as np
+
     if one is other:
         return True
     if type(one) is not type(other):

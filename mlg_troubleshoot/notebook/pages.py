@@ -13,6 +13,7 @@ from mlg_troubleshoot.reporting.diagnosis_report import diagnosis_document
 from mlg_troubleshoot.reporting.html import Document, render
 from mlg_troubleshoot.reporting.inspection_report import batch_document, inspection_document
 from mlg_troubleshoot.reporting.provenance import provenance_of
+from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows.check import CheckResult
 from mlg_troubleshoot.workflows.diagnose import DiagnoseResult
 
@@ -40,14 +41,9 @@ def page(result: Any) -> str:
 def _document(result: Any) -> Document | None:
     if isinstance(result, DiagnoseResult):
         made = provenance_of(result.gear, result.inputs_sha256)
-        extended = result.extension
+        said = result.problems, result.notes
         return diagnosis_document(
-            result.diagnosis,
-            result.gear,
-            made,
-            extended,
-            problems=result.problems,
-            notes=result.notes,
+            result.diagnosis, result.gear, made, result.extension, LengthUnit.INCH, *said
         )
     if not isinstance(result, CheckResult) or len(result.judgements) > _MOST_GEARS:
         return None

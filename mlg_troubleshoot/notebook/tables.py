@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from functools import singledispatch
 from typing import Any
 
@@ -16,6 +15,7 @@ from mlg_troubleshoot.gear.directions import WorstCase
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.indices.index_table import IndexTable
 from mlg_troubleshoot.life.folding import lives
+from mlg_troubleshoot.output_types import GearIdentity
 from mlg_troubleshoot.paper.study import StudyFindings
 from mlg_troubleshoot.records.frames import frame_of, label_of
 from mlg_troubleshoot.records.headers import Joints
@@ -24,6 +24,7 @@ from mlg_troubleshoot.reporting.json_form import (
     check_as_json,
     diagnosis_as_json,
     plain,
+    written,
 )
 from mlg_troubleshoot.reporting.life_json import fleet_as_json, life_as_json
 from mlg_troubleshoot.reporting.model_json import study_as_json, survey_as_json
@@ -77,7 +78,7 @@ def _(result: StudyFindings) -> dict[str, Any]:
 
 @to_dict.register
 def _(result: IndexTable) -> dict[str, Any]:
-    values: dict[str, Any] = msgspec.to_builtins(result)
+    values: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(result))
     return values
 
 
@@ -89,12 +90,7 @@ def _(result: WorstCase) -> dict[str, Any]:
 
 @to_dict.register
 def _(result: Gear) -> dict[str, Any]:
-    kept = {field.name: getattr(result, field.name) for field in fields(result)}
-    return {name: plain(value) for name, value in kept.items() if name not in _FILES}
-
-
-# Of this machine, not of the gear.
-_FILES = ("path", "indices_file", "files")
+    return {**written(GearIdentity, result), "joints": plain(result.joints)}
 
 
 @to_dict.register

@@ -15,6 +15,7 @@ from mlg_troubleshoot.records.cells import Cell, column_letters, quote
 from mlg_troubleshoot.records.dates import DateOrder
 from mlg_troubleshoot.records.headers import Joints
 from mlg_troubleshoot.records.values import CellFaultError
+from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 Progress = Callable[[int, int | None], None]
@@ -69,8 +70,8 @@ class TableOptions:
                 object.__setattr__(self, name, read(said))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TableResult:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
+class TableResult(Result):
     """What a task tells of the tables that it read.
 
     Parameters

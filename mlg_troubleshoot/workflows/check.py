@@ -23,7 +23,6 @@ from mlg_troubleshoot.indices.index_table import load_index_table
 from mlg_troubleshoot.life.since_repairs import since_repairs
 from mlg_troubleshoot.outputs import OutputKind, csv_text, write_csv
 from mlg_troubleshoot.records.model import TableOptions, TableResult
-from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:
@@ -66,7 +65,7 @@ class CheckOptions(TableOptions):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
-class CheckResult(TableResult, Result):
+class CheckResult(TableResult):
     """What a check found, in addition to what :class:`TableResult` tells of its tables.
 
     Parameters

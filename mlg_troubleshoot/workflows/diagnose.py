@@ -14,7 +14,6 @@ from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.records.model import TableOptions, TableResult
-from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.units import ClearanceConvention, LengthUnit
 
 if TYPE_CHECKING:
@@ -51,7 +50,7 @@ class DiagnoseOptions(TableOptions):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
-class DiagnoseResult(TableResult, Result):
+class DiagnoseResult(TableResult):
     """What a diagnosis found, in addition to what :class:`TableResult` tells of its tables.
 
     Parameters
