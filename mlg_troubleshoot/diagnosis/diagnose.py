@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 from mlg_troubleshoot.arrays import Array, Mask
 from mlg_troubleshoot.diagnosis.along import predicted
 from mlg_troubleshoot.diagnosis.bank import build_bank
-from mlg_troubleshoot.diagnosis.causes import CATALOGUE
+from mlg_troubleshoot.diagnosis.causes import with_own
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene
 from mlg_troubleshoot.diagnosis.causes.convention import ConventionSlip, as_meant
 from mlg_troubleshoot.diagnosis.causes.together import Block, JointFactors
@@ -280,7 +280,7 @@ def diagnose(
         read = len(table)
         table = _answerable(table)
         (scene, rows), faults = _without_faults(model, table, where, None)
-        catalogue = (*CATALOGUE, *own_causes)
+        catalogue = with_own(own_causes)
         # What never varies cannot be distinguished from a linkage of other dimensions.
         same = {
             name

@@ -27,7 +27,7 @@ from mlg_troubleshoot.datafile import (
     read_toml,
 )
 from mlg_troubleshoot.decision.inspection import Inspection
-from mlg_troubleshoot.diagnosis.causes import CATALOGUE
+from mlg_troubleshoot.diagnosis.causes import in_own_cause, with_own
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause
 from mlg_troubleshoot.diagnosis.scene import scene_at
 from mlg_troubleshoot.diagnosis.table import (
@@ -180,7 +180,9 @@ def adjustment_of(
         cause = term.candidate.cause
         if not set(cause.needs) <= set(table.columns):
             continue
-        own = cause.adjust(scene_at(model, table, where, clearance), term.candidate, term.value)
+        scene = scene_at(model, table, where, clearance)
+        with in_own_cause([cause], table.columns):
+            own = cause.adjust(scene, term.candidate, term.value)
         clearance = own.clearance_in
         for name, values in own.changed.items():
             changed[name] = changed.get(name, np.zeros(len(clearance))) + values
@@ -261,7 +263,7 @@ def load_extension(files: Sequence[Path], gear: Gear, own: Sequence[Cause] = ())
     terms: list[Term] = []
     hashes: list[str] = []
     rows, residual, unread = 0, float("nan"), set[int]()
-    known = {cause.name: cause for cause in (*CATALOGUE, *own)}
+    known = {cause.name: cause for cause in with_own(own)}
     for file in files:
         read = read_toml(file, ExtensionFile, "Give a file that mlg diagnose wrote.")
         found = read.content

@@ -212,7 +212,8 @@ def diagnosis_as_json(
 
 
 def _named(candidate: Any) -> dict[str, Any]:
-    return {"cause": candidate.cause.name, "target": candidate.target}
+    name = {"cause": candidate.cause.name, "target": candidate.target}
+    return {**name, "sentence": candidate.cause.words(candidate.target)}
 
 
 def _possible(candidate: Any) -> dict[str, Any]:

@@ -94,7 +94,8 @@ class Picture:
         page = (
             f'<!doctype html><html lang="en"><title>{escape(self.title)}</title><style>'
             f"{font_faces()} @page {{ size: {self.width:g}px {self.height:g}px; margin: 0 }} "
-            f"body {{ margin: 0; font-family: {_FONT} }} svg {{ display: block }}</style>"
+            f"body {{ margin: 0; font-family: {_FONT} }}"
+            "body > svg { display: block; width: 100%; height: auto }</style>"
             f"<body>{self.svg}</body></html>"
         )
         try:

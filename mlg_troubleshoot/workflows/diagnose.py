@@ -97,12 +97,12 @@ def diagnose_files(
         If the tables cannot answer the question.
     """
     from mlg_troubleshoot.diagnosis import (
-        CATALOGUE,
         ModelExtension,
         load_causes,
         table_from_inspections,
     )
     from mlg_troubleshoot.diagnosis import diagnose as diagnosed
+    from mlg_troubleshoot.diagnosis.causes import in_own_cause, with_own
     from mlg_troubleshoot.misfit.beliefs import Beliefs
     from mlg_troubleshoot.records import ReadOptions, read_many
     from mlg_troubleshoot.workflows.beliefs_file import load_beliefs
@@ -112,7 +112,7 @@ def diagnose_files(
     own = tuple(cause for file in options.cause_files for cause in load_causes(file))
     beliefs = Beliefs(sure=options.sure)
     if options.beliefs_file is not None:
-        names = {cause.name for cause in (*CATALOGUE, *own)}
+        names = {cause.name for cause in with_own(own)}
         beliefs = load_beliefs(options.beliefs_file, options.sure, names)
     reading = replace(
         ReadOptions.of(gear, options),
@@ -135,15 +135,17 @@ def diagnose_files(
     # refused.
     once = list({(i.source.file, i.record_id): i for i in reversed(valid)}.values())[::-1]
     notes = (*read.notes, *_evidence_notes(once, len(valid) - len(once), gear))
-    diagnosis = diagnosed(
-        gear.model,
-        table_from_inspections(once, gear, along=True),
-        gear.discrepancies,
-        own_causes=own,
-        ensemble=gear.ensemble_models[1:],
-        beliefs=beliefs,
-        progress=progress,
-    )
+    table = table_from_inspections(once, gear, along=True)
+    with in_own_cause(own, table.columns):
+        diagnosis = diagnosed(
+            gear.model,
+            table,
+            gear.discrepancies,
+            own_causes=own,
+            ensemble=gear.ensemble_models[1:],
+            beliefs=beliefs,
+            progress=progress,
+        )
     by_record = {inspection.record_id: inspection for inspection in once}
     faults = tuple(_as_written(fault, by_record[fault.record_id]) for fault in diagnosis.faults)
     diagnosis = replace(diagnosis, rows_read=len(read.rows), faults=faults)
