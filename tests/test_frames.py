@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import joblib
+import jsonschema
 import numpy as np
 import pandas as pd
 import pytest
@@ -175,82 +176,80 @@ def test_read_inspections_has_nullable_numbers_dates_and_categories() -> None:
     assert {name: str(read[name].dtype) for name in kinds} == kinds
 
 
-@cache
-def results() -> dict[str, Any]:
-    """One of every result that a public function gives."""
-    gear = mlg.load_gear()
-    checked = mlg.check_files([DATA / "fleet_batch.csv"])
-    diagnosed = mlg.diagnose(DATA / "measured_pressure.csv")
+def simulated() -> Any:
     force = np.linspace(1.0, 20.0, 40)
+    measured = force / 8.0 + np.random.default_rng(1).normal(0.0, 0.02, 40)
     suspects = [mlg.Suspect("stiffness", 10.0, 0.5)]
-    return {
-        "gear": gear,
-        "worst": mlg.predict({3: 0.013}),
-        "check": checked,
-        "assessment": checked.judgements[0],
-        "inspection": checked.judgements[0].row,
-        "indices": mlg.load_index_table(gear),
-        "study": mlg.run_study(gear, mlg.StudyOptions()),
-        "diagnose": diagnosed,
-        "diagnosis": diagnosed.diagnosis,
-        "extension": diagnosed.extension,
-        "simulation": mlg.diagnose_simulation(
-            lambda p: force / p["stiffness"], force / 8.0, suspects
-        ),
-        "survey": mlg.survey(pd.DataFrame(SURVEY)),
-        "lives": mlg.forecast(DATA / "fleet_batch.csv"),
-    }
+    return mlg.diagnose_simulation(lambda p: force / p["stiffness"], measured, suspects)
+
+
+# One of every result that a public function gives.
+RESULTS: dict[str, Callable[[], Any]] = {
+    "gear": mlg.load_gear,
+    "worst": lambda: mlg.predict({3: 0.013}),
+    "check": lambda: mlg.check_files([DATA / "fleet_batch.csv"]),
+    "assessment": lambda: result("check").judgements[0],
+    "inspection": lambda: result("assessment").inspection,
+    "indices": lambda: mlg.load_index_table(mlg.load_gear()),
+    "study": lambda: mlg.run_study(mlg.load_gear(), mlg.StudyOptions()),
+    "diagnose": lambda: mlg.diagnose(DATA / "measured_pressure.csv"),
+    "diagnosis": lambda: result("diagnose").diagnosis,
+    "extension": lambda: result("diagnose").extension,
+    "simulation": simulated,
+    "survey": lambda: mlg.survey(pd.DataFrame(SURVEY)),
+    "lives": lambda: mlg.forecast(DATA / "fleet_batch.csv"),
+}
+
+
+@cache
+def result(name: str) -> Any:
+    return RESULTS[name]()
 
 
 SURVEY = {"kind": ["PLUNGER"], "from": [None], "to": [None], "value_in": ["x"]}
-NAMES = (
-    *("gear", "worst", "check", "assessment", "inspection", "indices", "study", "diagnose"),
-    *("diagnosis", "extension", "simulation", "survey", "lives"),
-)
 COPIES: dict[str, Callable[[Any], Any]] = {
-    "pickle": lambda result: pickle.loads(pickle.dumps(result)),
+    "pickle": lambda given: pickle.loads(pickle.dumps(given)),
     "deepcopy": copy.deepcopy,
     "copy": copy.copy,
 }
 
 
 @pytest.mark.parametrize("how", COPIES)
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", RESULTS)
 def test_a_copy_of_a_result_is_equal_to_it(name: str, how: str) -> None:
-    result = results()[name]
-    assert COPIES[how](result) == result
+    given = result(name)
+    assert COPIES[how](given) == given
 
 
-def same_again(result: Any) -> Any:
-    return result
+def same_again(given: Any) -> Any:
+    return given
 
 
 @pytest.mark.slow
 def test_results_travel_to_two_processes_and_back() -> None:
-    given = list(results().values())
-    assert joblib.Parallel(2)(joblib.delayed(same_again)(result) for result in given) == given
+    given = [result(name) for name in RESULTS]
+    assert joblib.Parallel(2)(joblib.delayed(same_again)(each) for each in given) == given
 
 
 def test_results_of_other_inspections_differ() -> None:
     assert mlg.predict({3: 0.013}) != mlg.predict({3: 0.012})
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", RESULTS)
 def test_a_result_says_itself_in_twenty_lines(name: str) -> None:
-    text = repr(results()[name])
+    text = repr(result(name))
     assert len(text.splitlines()) <= 20
     assert len(text) <= 4000
 
 
-@pytest.mark.parametrize("name", [n for n in NAMES if n not in ("inspection", "extension")])
+@pytest.mark.parametrize("name", [n for n in RESULTS if n not in ("inspection", "extension")])
 def test_a_result_is_a_table(name: str) -> None:
-    assert not results()[name].to_frame().empty
+    assert not result(name).to_frame().empty
 
 
 @pytest.mark.parametrize("name", ["check", "diagnose", "study", "survey"])
 def test_the_dict_of_a_result_is_the_documented_json(name: str) -> None:
-    known = set(schema(name)["properties"])
-    assert set(results()[name].to_dict()) <= known
+    jsonschema.validate(result(name).to_dict(), schema(name))
 
 
 def test_a_table_has_a_row_per_gear_with_the_labels_of_the_frame() -> None:
@@ -264,12 +263,12 @@ def test_a_table_has_a_row_per_gear_with_the_labels_of_the_frame() -> None:
 
 def test_a_table_that_is_not_there_names_those_that_are() -> None:
     with pytest.raises(mlg.TroubleshootError) as caught:
-        results()["check"].to_frame("joint")
+        result("check").to_frame("joint")
     assert "joints" in caught.value.remedy
 
 
 def test_a_small_check_shows_its_report() -> None:
-    page = results()["check"]._repr_html_()
+    page = result("check")._repr_html_()
     assert page.startswith("<iframe")
     assert "Batch summary" in page
 
@@ -290,7 +289,7 @@ PICTURES = [
 
 @pytest.mark.parametrize(("name", "picture", "how"), PICTURES)
 def test_a_result_draws_itself(name: str, picture: str, how: dict[str, Any]) -> None:
-    drawn = results()[name].plot(picture, **how)
+    drawn = result(name).plot(picture, **how)
     assert drawn._repr_svg_().startswith('<svg xmlns="http://www.w3.org/2000/svg"')
 
 
@@ -298,13 +297,13 @@ def test_a_result_draws_itself(name: str, picture: str, how: dict[str, Any]) -> 
     ("ending", "start"), [(".svg", b"<svg"), (".png", b"\x89PNG"), (".pdf", b"%PDF")]
 )
 def test_a_picture_is_saved_as_its_name_ends(tmp_path: Path, ending: str, start: bytes) -> None:
-    file = results()["gear"].plot().save(tmp_path / f"gear{ending}")
+    file = result("gear").plot().save(tmp_path / f"gear{ending}")
     assert file.read_bytes().startswith(start)
 
 
 def test_residuals_against_an_unknown_column_name_the_columns() -> None:
     with pytest.raises(mlg.TroubleshootError) as caught:
-        results()["diagnose"].plot("residuals", against="colour")
+        result("diagnose").plot("residuals", against="colour")
     assert "hydraulic_pressure_psi" in caught.value.remedy
 
 
@@ -322,7 +321,7 @@ def test_a_store_gives_what_it_keeps_as_tables(tmp_path: Path) -> None:
 
 
 def test_a_survey_of_a_frame_names_its_wrong_cell() -> None:
-    (problem,) = results()["survey"].problems
+    (problem,) = result("survey").problems
     assert problem.place() == "DataFrame, cell loc[0, 'value_in'], column 'value_in'"
 
 
@@ -362,8 +361,8 @@ def test_a_cause_with_a_shipped_name_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_sentence_of_a_cause_stands_in_the_json() -> None:
-    (cause,) = results()["diagnose"].to_dict()["causes"]
-    (named,) = results()["diagnose"].diagnosis.causes
+    (cause,) = result("diagnose").to_dict()["causes"]
+    (named,) = result("diagnose").diagnosis.causes
     assert cause["sentence"] == named.candidate.cause.sentence
 
 
@@ -371,9 +370,9 @@ def test_a_gauge_that_reads_too_much_in_all_rows_is_an_alias_of_the_calibration_
     frame = mlg.read_inspections(DATA / "measured_nothing_wrong.csv")
     readings = [name for name in frame.columns if name.startswith("plunger_displacement")]
     frame[readings] *= 1.15
-    (cause,) = mlg.diagnose(frame).to_dict()["causes"]
-    assert cause["cause"] == "calibration_rate"
-    assert "the gauge of all rows reads too much" in cause["sentence"]
+    found = mlg.diagnose(frame).to_dict()
+    said = {each["cause"]: each["sentence"] for each in found["causes"] + found["also_possible"]}
+    assert "the gauge of all rows reads too much" in said["calibration_rate"]
 
 
 def test_a_name_that_a_simulation_does_not_get_is_noted_with_those_that_it_gets() -> None:
