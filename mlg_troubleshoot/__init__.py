@@ -26,7 +26,7 @@ write_reports            printable reports of a checked table
 diagnose, diagnose_files measured against predicted: cause, extension, gain
 diagnose_simulation      the same question for a simulation of yours
 survey                   a geometry from readings of a real gear
-forecast, Store          landings that gears have left; what is kept of them
+forecast, Store          landings that gears have left; the records that are kept
 write_extension          the extension of a diagnosis, for `load_model_extension`
 load_index_table         precomputed sensitivity and amplification indices of a gear
 run_study                the same computed again, by the design and for the clearances you choose

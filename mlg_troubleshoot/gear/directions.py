@@ -33,10 +33,13 @@ IN_CACHE = 4096
 class WorstCase(Result):
     """Worst displacement of each gear in both senses, with the directions that give it.
 
-    over_in, under_in, shape (n,): signed displacement in the worst directions for over-travel and
-    under-travel; NaN
-      where the linkage does not close. [in]
-    over_directions, under_directions, shape (n, n_joints): directions of the virtual links. [rad]
+    Parameters
+    ----------
+    over_in, under_in : ndarray, shape (n,)
+        Signed displacement in the worst directions for over-travel and under-travel; NaN where the
+        linkage does not close. [in]
+    over_directions, under_directions : ndarray, shape (n, n_joints)
+        Directions of the virtual links. [rad]
     """
 
     over_in: Array

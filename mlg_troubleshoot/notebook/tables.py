@@ -138,7 +138,7 @@ def _is_table(value: Any) -> bool:
 
 
 def _frame(rows: list[Any]) -> pd.DataFrame:
-    """One line for each row; what is a table itself has its own."""
+    """One line per row; what is a table itself has its own."""
     if not all(isinstance(row, dict) for row in rows):
         return pd.DataFrame({"value": rows})
     bare = [{k: each for k, each in row.items() if not (each and _is_table(each))} for row in rows]
@@ -146,7 +146,7 @@ def _frame(rows: list[Any]) -> pd.DataFrame:
 
 
 def _columns(lists: dict[str, Any]) -> dict[str, Any]:
-    """Lists of numbers, one for each row of an array."""
+    """Lists of numbers, one per row of an array."""
     return {
         name: values
         for name, values in lists.items()
@@ -164,7 +164,7 @@ def _index(result: CheckResult) -> pd.Index[Any]:
 
 
 def store_frame(store: Store, of: str) -> pd.DataFrame:
-    """The inspections of a store that stand, or one line for each gear in it."""
+    """The inspections of a store that stand, or one line per gear in it."""
     found = lives(store).values()
     if of == "lives":
         return _frame(fleet_as_json([*found], {})["gears"])

@@ -247,7 +247,14 @@ def files_of(place: str | Path | None = None) -> tuple[Path, ...]:
 class Store:
     """The store at a path (SQLite) or a URL (``postgresql+psycopg://…``).
 
-    ``judge`` says what is wrong with the content of a record whenever it is read.
+    Parameters
+    ----------
+    place : str or Path, optional
+        Where it is; else ``MLG_STORE``, or the user's own file.
+    patience_s : int
+        How long a writer waits for others. [s]
+    judge : callable, optional
+        Says what is wrong with the content of a record whenever it is read.
     """
 
     def __init__(
@@ -287,7 +294,7 @@ class Store:
         return frame
 
     def lives(self) -> pd.DataFrame:
-        """Return one line for each gear, the worst first."""
+        """Return one line per gear, the worst first."""
         frame: pd.DataFrame = notebook().store_frame(self, "lives")
         return frame
 

@@ -46,7 +46,18 @@ _ANY_ROW = {"record_id": "-", "tail_no": "-", "side": "LH", "clearance_conventio
 class Lives(Result):
     """Lives of gears, and what the wear of the whole fleet says of each.
 
-    problems: cells of the table that they were read from, if it was one.
+    Parameters
+    ----------
+    gear : Gear
+        The gear type.
+    lives : tuple of GearLife
+        What is known of each gear.
+    forecasts : mapping of tail and side to Forecast
+        Landings that each has left. [landings]
+    model : WearModel or None
+        How joints wear; None if nothing can be learnt.
+    problems : tuple of Problem
+        Wrong cells of the table that they were read from, if it was one.
     """
 
     gear: Gear
