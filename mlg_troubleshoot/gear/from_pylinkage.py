@@ -19,6 +19,8 @@ from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import SourceKind
 from mlg_troubleshoot.units import LengthUnit
 
+# An arc often ends where the linkage is flat: so much of it is left out at each end. [1]
+_INSET = 0.01
 _NO_COUNTERPART = "Replace it by a crank, links between pins, or a guide that stands still."
 
 
@@ -117,7 +119,9 @@ def _travel(driver: TheirLink) -> tuple[float, float]:
     if driver.type != "arc_driver":
         return -10.0, 0.0
     now = driver.arc_start if driver.initial_angle is None else driver.initial_angle
-    return math.degrees(driver.arc_start - now), math.degrees(driver.arc_end - now)
+    inset = _INSET * (driver.arc_end - driver.arc_start)
+    start, end = driver.arc_start + inset - now, driver.arc_end - inset - now
+    return math.degrees(start), math.degrees(end)
 
 
 class _Theirs:
