@@ -236,8 +236,8 @@ def _of_components(linkage: Any) -> dict[str, Any]:
                         "initial_angle": part.arc_start + now,
                     }
             case "RRRDyad":
-                for end in _names([part.anchor1, part.anchor2]):
-                    links.append({"id": f"{end}-{part.name}", "joints": [end, part.name]})
+                ends = _names([part.anchor1, part.anchor2])
+                links += [{"id": f"{p}-{part.name}", "joints": [p, part.name]} for p in ends]
             case "RRPDyad" if _stand_still(part.line_anchor1, part.line_anchor2):
                 (end,) = _names([part.revolute_anchor])
                 a, b = part.line_anchor1, part.line_anchor2

@@ -401,7 +401,7 @@ def _read(path: Path) -> Gear:
     found = file.content
     numbers = _Numbers(found.sources)
     _add_numbers(found, numbers)
-    reference = _linkage(found, "A")
+    reference = linkage_of(found, "A")
     members: dict[str, dict[str, Any]] = {}
     ensemble_path = path
     if found.ensemble is not None:
@@ -418,7 +418,7 @@ def _read(path: Path) -> Gear:
         ensemble=(
             reference,
             *(
-                _linkage(decode(ensemble_path, member, GeometryTable), name)
+                linkage_of(decode(ensemble_path, member, GeometryTable), name)
                 for name, member in members.items()
             ),
         ),
@@ -513,7 +513,8 @@ def _add_numbers(table: GeometryTable, numbers: _Numbers) -> None:
             numbers.add(step.axis_deg, "deg", step.source)
 
 
-def _linkage(table: GeometryTable, name: str) -> Linkage:
+def linkage_of(table: GeometryTable, name: str) -> Linkage:
+    """The linkage that the tables of a gear file describe."""
     drive = table.input
     points = (Point(p.name, p.plane, *p.at, p.fixed, p.virtual_link) for p in table.points)
     read = table.output

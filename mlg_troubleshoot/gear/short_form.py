@@ -18,7 +18,8 @@ from msgspec import Meta
 from mlg_troubleshoot.datafile import DataFile, Name, RefusedValueError, Table, decode, read_toml
 from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Source, SourceKind
-from mlg_troubleshoot.gear.gear_file import Angle, Coordinate, Length
+from mlg_troubleshoot.gear.gear_file import Angle, Coordinate, GearFile, Length, linkage_of
+from mlg_troubleshoot.gear.model import Calibration, LinkageModel
 
 Place = tuple[Coordinate, Coordinate]
 Ends = Annotated[tuple[Name, ...], Meta(min_length=2)]
@@ -96,6 +97,12 @@ class NewGear:
     steps: tuple[str, ...]
     assumed: tuple[str, ...]
 
+    def closes(self) -> None:
+        """Raise `MechanismError` if the linkage does not close over its travel."""
+        table = decode(Path("gear file"), self.values, GearFile)
+        linkage = linkage_of(table, "A")
+        LinkageModel(linkage.mechanism, linkage.stroke, Calibration())
+
 
 def read_short_form(file: Path) -> NewGear:
     """Read a short form; `GearFileError` with file, key and value if something is wrong or
@@ -145,7 +152,11 @@ class _Builder:
         form = self.form
         points = {*form.ground, *form.moving}
         named = [
-            *((("links", link, i), p) for link, ends in form.links.items() for i, p in enumerate(ends)),
+            *(
+                (("links", link, i), p)
+                for link, ends in form.links.items()
+                for i, p in enumerate(ends)
+            ),
             *((("slots", link), pin) for link, pin in form.slots.items()),
             *((("joints", point), point) for point in form.joints),
         ]
@@ -190,7 +201,9 @@ class _Builder:
     def _locate(self, point: str) -> bool:
         """Locate a point by the links that it is on, if enough of their points are located."""
         form = self.form
-        reach = {link: ends for link in self._links_of(point) if (ends := self._located(link, point))}
+        reach = {
+            link: ends for link in self._links_of(point) if (ends := self._located(link, point))
+        }
         rigid = [x for x in reach if len(reach[x]) > 1 and x != form.input.actuator]
         slotted = [x for x in reach if x in form.slots and self._is_known(form.slots[x])]
         if form.input.crank in reach:
@@ -303,7 +316,12 @@ class _Builder:
             "points": points,
             "steps": list(self.steps.values()),
             "areas": [
-                {"name": "all", "description": "the linkage", "access_min": 0.0, "source": "assumed"}
+                {
+                    "name": "all",
+                    "description": "the linkage",
+                    "access_min": 0.0,
+                    "source": "assumed",
+                }
             ],
             "joints": list(self._joints()),
         }

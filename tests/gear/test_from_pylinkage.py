@@ -35,9 +35,7 @@ def server_four_bar() -> Any:
     return (
         MechanismBuilder("Four-Bar Linkage")
         .add_ground_link("ground", ports={"O1": (0, 0), "O2": (100, 0)})
-        .add_driver_link(
-            "crank", length=25, motor_port="O1", omega=0.1, initial_angle=math.pi / 4
-        )
+        .add_driver_link("crank", length=25, motor_port="O1", omega=0.1, initial_angle=math.pi / 4)
         .add_link("coupler", length=70)
         .add_link("rocker", length=60)
         .connect("crank.tip", "coupler.0")
@@ -241,7 +239,7 @@ def test_a_flat_position_is_refused_because_it_fits_two_assemblies() -> None:
     a, d = Ground(0.0, 0.0, name="A"), Ground(3.0, 0.0, name="D")
     crank = Crank(anchor=a, radius=1.0, name="B")
     pin = RRRDyad(crank.output, d, 3.0, 1.0, name="C")
-    with pytest.raises(GearFileError, match="moving.C.*off the line from B to D"):
+    with pytest.raises(GearFileError, match=r"moving\.C.*off the line from B to D"):
         short_form(short_form_of(Linkage([a, d, crank, pin], name="flat"), **LIMITS))
 
 
@@ -253,7 +251,9 @@ def test_a_part_without_counterpart_is_named() -> None:
 
 
 def test_lines_that_stand_still_meet_in_a_point_on_the_ground() -> None:
-    corners = [Ground(x, y, name=n) for x, y, n in ((0, 0, "a"), (2, 2, "b"), (0, 2, "c"), (2, 0, "e"))]
+    corners = [
+        Ground(x, y, name=n) for x, y, n in ((0, 0, "a"), (2, 2, "b"), (0, 2, "c"), (2, 0, "e"))
+    ]
     meeting = PPDyad(*corners, name="P")
     crank = Crank(corners[0], 1.0, name="K")
     found = short_form_of(Linkage([*corners, meeting, crank], name="lines"), **LIMITS)
@@ -265,7 +265,10 @@ def test_lines_that_stand_still_meet_in_a_point_on_the_ground() -> None:
     [
         ({"links": [{"id": "x", "joints": ["nobody", "A"]}]}, r"links\[1\].joints.*nobody"),
         ({"joints": [{"id": "A", "position": [None, None]}]}, r"joints\[1\].position.*None"),
-        ({"joints": [{"id": "A", "position": [0, 0], "type": "Static"}]}, "ground, prismatic, revolute or tracker, found 'Static'"),
+        (
+            {"joints": [{"id": "A", "position": [0, 0], "type": "Static"}]},
+            "ground, prismatic, revolute or tracker, found 'Static'",
+        ),
         ({"links": []}, "links: expected one driver instead of 0"),
         ({"jonts": []}, "did you mean 'joints'"),
     ],
