@@ -149,8 +149,10 @@ class _Course:
         try:
             short_form(self.values, self.file.name).closes()
         except TroubleshootError as error:
-            asked = [key for key, *_ in _QUESTIONS]
-            place = error.message.partition(": ")[2].split(".")[0].split(":")[0]
-            state = asked.index(place) if place in asked else asked.index("links")
+            # "file: key.name: what": a point that nothing locates lacks a link.
+            key = error.message.partition(": ")[2].split(":")[0].split(".")[0]
+            asked = [question[0] for question in _QUESTIONS]
+            lacks_link = key not in asked or "nothing locates" in error.message
+            state = asked.index("links" if lacks_link else key)
             return again(state, f"{error.message}. {error.remedy}")
         return Turn(0, effect=Effect.COMPUTE)

@@ -135,8 +135,8 @@ class _Theirs:
         self.slots: dict[str, str] = {}
         self.links: dict[str, list[str]] = {}
         for i, link in enumerate(m.links):
-            for k, joint in enumerate(link.joints):
-                if joint not in self.places:
+            for k, end in enumerate(link.joints):
+                if end not in self.places:
                     place = ("links", i, "joints", k)
                     raise file.fail(place, f"one of the joints {', '.join(self.places)}")
         fixed = [j.id for j in m.joints if j.type == "ground"]
@@ -145,11 +145,11 @@ class _Theirs:
         self.ground = list(dict.fromkeys(fixed))
         for link in m.links:
             self._add_link(link)
-        for i, joint in enumerate(m.joints):
+        for index, joint in enumerate(m.joints):
             if joint.type == "prismatic":
                 self.guides[joint.id] = math.degrees(math.atan2(joint.axis[1], joint.axis[0]))
             if joint.type == "tracker":
-                self._add_tracker(joint, i)
+                self._add_tracker(joint, index)
 
     def _add_link(self, link: TheirLink) -> None:
         ends = list(dict.fromkeys(link.joints))

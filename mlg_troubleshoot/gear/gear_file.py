@@ -349,9 +349,12 @@ _STEPS: dict[type[StepTable], type[Step]] = {
 
 
 def shipped_gears() -> tuple[str, ...]:
-    """Return the names of the gears that ship with the program, for :func:`load_gear`."""
+    """Return the names of the gears that ship with the program, the default one first, for
+    :func:`load_gear`.
+    """
     names = {p.stem for p in _DATA.glob("*.toml")}
-    return tuple(sorted(n for n in names if not n.endswith(("-ensemble", "-targets"))))
+    gears = (n for n in names if not n.endswith(("-ensemble", "-targets")))
+    return tuple(sorted(gears, key=lambda name: (name != DEFAULT_GEAR, name)))
 
 
 def load_gear(name_or_path: str | Path | Gear = DEFAULT_GEAR) -> Gear:

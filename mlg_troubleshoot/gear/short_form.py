@@ -150,7 +150,7 @@ class _Builder:
 
     def _check_names(self) -> None:
         form = self.form
-        points = {*form.ground, *form.moving}
+        points = form.ground | form.moving
         named = [
             *(
                 (("links", link, i), p)
@@ -293,7 +293,7 @@ class _Builder:
             "schema": 1,
             "id": form.name,
             "name": form.name,
-            "provenance": form.source.text,
+            "provenance": form.source.text.strip().partition("\n")[0],
             "sources": {
                 "given": msgspec.to_builtins(form.source),
                 "assumed": {"kind": str(SourceKind.ASSUMED), "text": _ASSUMED},
