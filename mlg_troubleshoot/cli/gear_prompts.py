@@ -37,7 +37,7 @@ def _numbers(words: list[str]) -> list[float]:
 
 def _driven(words: list[str]) -> dict[str, Any]:
     kind, link, *travel = words
-    return {kind: link, "travel_deg" if kind == "crank" else "travel_in": _numbers(travel)}
+    return {kind: link, "travel": _numbers(travel)}
 
 
 def _sourced(words: list[str]) -> dict[str, str]:

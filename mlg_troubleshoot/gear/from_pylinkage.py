@@ -19,48 +19,35 @@ from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import SourceKind
 from mlg_troubleshoot.units import LengthUnit
 
-# An arc often ends where the linkage is flat: so much of it is left out at each end. [1]
-_INSET = 0.01
 _NO_COUNTERPART = "Replace it by a crank, links between pins, or a guide that stands still."
 
 
-class TheirJoint(Table):
-    """A joint of their file; reading ignores names and state."""
+class TheirJoint(Table, forbid_unknown_fields=False):
+    """A joint of their file; what is not needed is not read."""
 
     id: Name
     position: Pair
     type: Literal["ground", "revolute", "prismatic", "tracker"] = "revolute"
-    name: str | None = None
     axis: Pair = (1.0, 0.0)
-    line_point: Pair | None = None
-    slide_distance: float = 0.0
     ref_joint1_id: str = ""
     ref_joint2_id: str = ""
-    distance: float = 0.0
-    angle: float = 0.0
 
 
-class TheirLink(Table):
+class TheirLink(Table, forbid_unknown_fields=False):
     """A link of their file; a driver turns about its motor joint."""
 
     id: Name
     joints: tuple[str, ...]
     type: Literal["ground", "driver", "arc_driver", "link"] = "link"
-    name: str | None = None
-    angular_velocity: float = 0.0
-    initial_angle: float | None = None
     motor_joint: str | None = None
-    arc_start: float = 0.0
-    arc_end: float = 0.0
 
 
-class TheirMechanism(Table):
+class TheirMechanism(Table, forbid_unknown_fields=False):
     """A mechanism as `pylinkage.mechanism.mechanism_to_json` writes it."""
 
     joints: tuple[TheirJoint, ...]
     links: tuple[TheirLink, ...]
     name: str = ""
-    ground: str | None = None
 
 
 def short_form_of(
@@ -68,14 +55,14 @@ def short_form_of(
     *,
     limit: float,
     margin: float,
-    travel_deg: tuple[float, float] | None = None,
+    travel_deg: tuple[float, float] = (-10.0, 0.0),
     output: Mapping[str, str] | None = None,
     unit: LengthUnit = LengthUnit.INCH,
 ) -> dict[str, Any]:
     """Return the short form of a linkage of pylinkage, of the values of its file, or of the file.
 
     limit, margin: of all joints, and of the output. [in, in or rad]
-    travel_deg: the crank from the position drawn; else its arc, or the last 10 degrees. [deg]
+    travel_deg: the crank, from its present position. [deg]
     output: as in a short form; else the last guide, or the last link on the ground.
     unit: of their coordinates, which have none.
     """
@@ -93,7 +80,7 @@ def short_form_of(
         "links": theirs.links,
         "guides_deg": theirs.guides,
         "slots": theirs.slots,
-        "input": {"crank": driver.id, "travel_deg": list(travel_deg or _travel(driver))},
+        "input": {"crank": driver.id, "travel": list(travel_deg)},
         "output": dict(output or theirs.output()),
         "joints": dict.fromkeys(theirs.pins(), limit),
         "margin": margin,
@@ -113,15 +100,6 @@ def _read(linkage: Any) -> DataFile[TheirMechanism]:
     path = Path(str(values.get("name")) or "linkage")
     values = msgspec.to_builtins(values)
     return DataFile(path, values, decode(path, values, TheirMechanism))
-
-
-def _travel(driver: TheirLink) -> tuple[float, float]:
-    if driver.type != "arc_driver":
-        return -10.0, 0.0
-    now = driver.arc_start if driver.initial_angle is None else driver.initial_angle
-    inset = _INSET * (driver.arc_end - driver.arc_start)
-    start, end = driver.arc_start + inset - now, driver.arc_end - inset - now
-    return math.degrees(start), math.degrees(end)
 
 
 class _Theirs:
@@ -214,27 +192,13 @@ def _of_components(linkage: Any) -> dict[str, Any]:
     for part, place in zip(linkage.components, places, strict=True):
         joint: dict[str, Any] = {"id": part.name, "position": list(place)}
         joints.append(joint)
-        kind = type(part).__name__
-        match kind:
+        match type(part).__name__:
             case "Ground":
                 joint["type"] = "ground"
             case "Crank" | "ArcCrank":
                 (pivot,) = _names([part.anchor])
-                arc = kind == "ArcCrank"
                 link = {"id": f"{part.name} crank", "joints": [pivot, part.name]}
-                links.append(link | {"type": "arc_driver" if arc else "driver"})
-                links[-1]["motor_joint"] = pivot
-                if arc:
-                    now = math.remainder(
-                        math.atan2(place[1] - part.anchor.y, place[0] - part.anchor.x)
-                        - part.arc_start,
-                        math.tau,
-                    )
-                    links[-1] |= {
-                        "arc_start": part.arc_start,
-                        "arc_end": part.arc_end,
-                        "initial_angle": part.arc_start + now,
-                    }
+                links.append(link | {"type": "driver", "motor_joint": pivot})
             case "RRRDyad":
                 ends = _names([part.anchor1, part.anchor2])
                 links += [{"id": f"{p}-{part.name}", "joints": [p, part.name]} for p in ends]
@@ -248,7 +212,7 @@ def _of_components(linkage: Any) -> dict[str, Any]:
             case "FixedDyad" | "PointTracker":
                 first, second = _names([part.anchor1, part.anchor2])
                 joint |= {"type": "tracker", "ref_joint1_id": first, "ref_joint2_id": second}
-            case _:
+            case kind:
                 raise GearFileError(
                     f"{linkage.name}: {part.name}: a {kind} has no counterpart in a gear"
                     " (of dyads RRP and PP: with a line that moves)",

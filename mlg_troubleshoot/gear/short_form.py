@@ -31,29 +31,24 @@ _CONFIRM_ABOVE, _HARD_LIMIT = 2.0, 5.0
 
 
 class DriveTable(Table):
-    """What moves the linkage, and how far from the position that is drawn: a crank by an angle, or
-    an actuator by a length.
+    """What moves the linkage, and how far from the position that is drawn: a crank by an angle in
+    degrees, or an actuator by a length in inches.
     """
 
+    travel: Place
     crank: Name | None = None
     actuator: Name | None = None
-    travel_deg: tuple[Angle, Angle] | None = None
-    travel_in: Place | None = None
 
     def __post_init__(self) -> None:
         if (self.crank is None) == (self.actuator is None):
             raise RefusedValueError("crank", "the name of a link here or in actuator, not in both")
-        key, other = ("travel_in", "travel_deg") if self.actuator else ("travel_deg", "travel_in")
-        travel = getattr(self, key)
-        if travel is None or travel[0] == travel[1]:
-            raise RefusedValueError(key, "two different numbers")
-        if getattr(self, other) is not None:
-            raise RefusedValueError(other, f"{key} in its place")
+        if self.travel[0] == self.travel[1]:
+            raise RefusedValueError("travel", "two different numbers")
 
     @property
     def stroke(self) -> list[float]:
         """The input from start to end. [in or rad]"""
-        return list(self.travel_in or np.radians(self.travel_deg or ()).tolist())
+        return [float(np.radians(end)) if self.crank else end for end in self.travel]
 
 
 class ReadTable(Table):
