@@ -9,7 +9,6 @@ import typer
 
 from mlg_troubleshoot.cli import options, output
 from mlg_troubleshoot.errors import UsageError
-from mlg_troubleshoot.gear import DEFAULT_GEAR
 
 if TYPE_CHECKING:
     from mlg_troubleshoot.gear.gear import Gear
@@ -82,18 +81,16 @@ def _asked(answers: Path) -> Path:
 
 
 def _say(gear: Gear, file: Path) -> None:
-    picture = _drawn(gear, file.with_suffix(".svg"))
+    picture = gear.plot().save(file.with_suffix(".svg"))
     output.write(f"Gear: {file}, {len(gear.joints)} joints. Table: {gear.indices_file}")
     output.write(f"Drawn as understood: {picture}. Use it: mlg check FILE --gear {file}")
 
 
 def draw(
     context: typer.Context,
-    file: Annotated[Path, typer.Argument(metavar="FILE.svg", help="The picture to write.")],
-    gear: Annotated[
-        str | None,
-        typer.Option("--gear", metavar="NAME|TOML", help="Shipped gear or a gear file."),
-    ] = None,
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE.svg|FILE.png|FILE.pdf", help="The picture to write.")
+    ],
     force: options.Force = False,
     _version: options.Version = False,
 ) -> None:
@@ -102,17 +99,6 @@ def draw(
     from mlg_troubleshoot.gear.gear_file import load_gear
     from mlg_troubleshoot.outputs import OutputFile, OutputKind
 
-    if file.suffix.lower() != ".svg":
-        raise UsageError(f"{file.name!r} is not the name of a picture", "End the name in .svg.")
-    name = gear or context.obj or DEFAULT_GEAR
     own = OutputKind.marked("is not a drawing", '<svg xmlns="http://www.w3.org/2000/svg" viewBox')
-    claim(name, (), [OutputFile("the drawing", file, own)], force=force)
-    output.write(f"Drawn: {_drawn(load_gear(name), file)}")
-
-
-def _drawn(gear: Gear, file: Path) -> Path:
-    from mlg_troubleshoot.outputs import write_text
-    from mlg_troubleshoot.reporting.schematic import linkage_svg
-
-    write_text(file, linkage_svg(gear))
-    return file
+    claim(context.obj, (), [OutputFile("the drawing", file, own)], force=force)
+    output.write(f"Drawn: {load_gear(context.obj).plot().save(file)}")

@@ -9,6 +9,7 @@ from enum import StrEnum
 
 from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow
 from mlg_troubleshoot.decision.plan import Basis, End, Plan, Step
+from mlg_troubleshoot.results import Result
 
 
 class Verdict(StrEnum):
@@ -251,8 +252,8 @@ class _Planned:
         return self.plan.end
 
 
-@dataclass(frozen=True, slots=True)
-class Assessment(_Planned):
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class Assessment(_Planned, Result):
     """The decision about one gear.
 
     Parameters
@@ -382,8 +383,8 @@ class Assessment(_Planned):
         return tuple(sorted(self.joints, key=lambda finding: finding.rank))
 
 
-@dataclass(frozen=True, slots=True)
-class Rejected(_Planned):
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class Rejected(_Planned, Result):
     """A row that cannot be judged: verdict INVALID, its numbers absent."""
 
     row: InvalidRow

@@ -26,6 +26,7 @@ from mlg_troubleshoot.errors import GearFileError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear, shipped_gears
 from mlg_troubleshoot.outputs import SCHEMA_VERSION, OutputKind, write_text
+from mlg_troubleshoot.results import Result
 
 # A sampled index may lie a little outside 0 to 1, its interval further.
 Index = Annotated[float, Meta(ge=-2, le=3)]
@@ -86,7 +87,7 @@ class TableGear(Table):
     provenance: str
 
 
-class IndexTable(Table):
+class IndexTable(Result, Table):
     """Precomputed indices of a gear, as the file holds them."""
 
     schema_version: Literal[1]

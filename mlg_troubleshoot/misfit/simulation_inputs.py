@@ -63,6 +63,7 @@ def _suspects(suspects: Sequence[Suspect], nuisance: Sequence[Suspect]) -> None:
             "name each once",
         )
     for s in [*suspects, *nuisance]:
+        _numbers([s.nominal, s.trial], f"{s.name}: nominal {s.nominal!r} or trial {s.trial!r}")
         if not (np.isfinite(s.nominal) and np.isfinite(s.trial)) or s.trial == 0.0:
             raise UsageError(
                 f"{s.name}: nominal {s.nominal:g}, trial {s.trial:g} {s.unit}".rstrip(),

@@ -12,7 +12,7 @@ from itertools import combinations
 from typing import Any, Literal, Unpack
 
 import numpy as np
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.decision.assessment import Assessment, JointFinding
@@ -557,20 +557,3 @@ def _covered(tried: Array, segments: list[Segment]) -> Array:
     leave = np.minimum(np.maximum(first, last).min(axis=2), 1.0)
     length = np.clip(leave - enter, 0.0, None) * np.hypot(run[:, 0], run[:, 1])
     return np.asarray(6.0 * length.sum(axis=1))
-
-
-def linkage_svg(gear: Gear) -> str:
-    """Return the linkage of a gear as one SVG document, its planes next to each other."""
-    panels = blank_schematic(gear).panels
-    placed = []
-    left = 0.0
-    height = 0.0
-    for _name, drawing, width in panels:
-        placed.append(drawing.replace("<svg ", Markup(f'<svg x="{left:g}" '), 1))
-        left += width
-        height = max(height, float(drawing.split('height="')[1].split('"')[0]))
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {left:g} {height:g}"'
-        f' font-family="DejaVu Sans, sans-serif"><title>{escape(gear.name)}</title>'
-        f"{Markup().join(placed)}</svg>\n"
-    )

@@ -8,6 +8,7 @@ from pathlib import Path
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.errors import ExitCode, Problem
 from mlg_troubleshoot.gear.gear import Gear
+from mlg_troubleshoot.results import Result
 from mlg_troubleshoot.surveying.plan import Suggested
 from mlg_troubleshoot.surveying.survey import Survey
 from mlg_troubleshoot.units import Length, Sentence
@@ -38,8 +39,8 @@ class InspectedGear:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class SurveyResult:
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class SurveyResult(Result):
     """What a survey gave.
 
     gear: the gear as it was before. survey: the fit; None if nothing was read. problems: cells that
