@@ -25,7 +25,7 @@ Place = tuple[Coordinate, Coordinate]
 Ends = Annotated[tuple[Name, ...], Meta(min_length=2)]
 # What a gear file must state and a short form does not: changed there by who knows better.
 _ASSUMED = "Not stated in the short form: assumed by the authors of this tool."
-_PLANE = "plane"
+_PLANE = "base"
 # A reading above twice the largest limit is asked again, one above five times is refused. [1]
 _CONFIRM_ABOVE, _HARD_LIMIT = 2.0, 5.0
 
@@ -203,7 +203,12 @@ class _Builder:
         slotted = [x for x in reach if x in form.slots and self._is_known(form.slots[x])]
         if form.input.crank in reach:
             (pivot,) = reach[form.input.crank]
-            self._add(point, "crank", f"crank {form.input.crank} about {pivot}", pivot=pivot)
+            self._add(
+                point,
+                "crank",
+                f"{form.input.crank} about {pivot}, turned by the input",
+                pivot=pivot,
+            )
         elif point in form.guides_deg and reach:
             link, (end, *_) = next(iter(reach.items()))
             self._slide(point, link, end)
