@@ -134,7 +134,10 @@ def test_a_linkage_that_does_not_close_leaves_no_file(tmp_path: Path) -> None:
 def test_the_answers_at_the_prompt_become_a_short_form(tmp_path: Path) -> None:
     assert ask_gear(tmp_path / "short.toml", Typed(*ANSWERS))
     steps = read_short_form(tmp_path / "short.toml").steps
-    assert steps == ("A: crank about O, turned by the input", "B: dyad RRR: coupler from A, rocker from D")
+    assert steps == (
+        "A: crank about O, turned by the input",
+        "B: dyad RRR: coupler from A, rocker from D",
+    )
 
 
 def test_the_prompt_says_what_is_missing_and_asks_for_it(tmp_path: Path) -> None:
