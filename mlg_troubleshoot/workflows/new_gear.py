@@ -13,6 +13,7 @@ from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.gear.short_form import NewGear, read_short_form, short_form
 from mlg_troubleshoot.outputs import OutputKind, write_text
+from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows.index_tables import renew_index_table
 
 _HEADING = "# Written by mlg gear new.\n"
@@ -54,7 +55,16 @@ def new_gear(form: Mapping[str, Any] | str | Path, file: str | Path) -> WrittenG
     return _write(found, Path(file))
 
 
-def from_pylinkage(linkage: Any, file: str | Path, **how: Any) -> Gear:
+def from_pylinkage(
+    linkage: Any,
+    file: str | Path,
+    *,
+    limit: float,
+    margin: float,
+    travel_deg: tuple[float, float] = (-10.0, 0.0),
+    output: Mapping[str, str] | None = None,
+    unit: LengthUnit = LengthUnit.INCH,
+) -> Gear:
     """Write the gear of a linkage of pylinkage, and its table of indices.
 
     Parameters
@@ -64,10 +74,14 @@ def from_pylinkage(linkage: Any, file: str | Path, **how: Any) -> Gear:
         It is read in its present position, which must not be flat.
     file : str or Path
         The gear file to write.
-    **how
-        limit: limit of every joint. [in] margin: allowed displacement of the output. [in or rad]
-        Optional are travel_deg, from the position read [deg]; output, as in a short form; unit, a
-        `LengthUnit`, of coordinates that are not inches.
+    limit, margin : float
+        Limit of every joint, and allowed displacement of the output. [in, in or rad]
+    travel_deg : tuple of float
+        Travel of the crank from its present position; clearances act at its end. [deg]
+    output : mapping, optional
+        As in a short form; else the last point on a guide, or the last link on the ground.
+    unit : LengthUnit
+        Unit of the coordinates, which a linkage does not state.
 
     Returns
     -------
@@ -81,7 +95,9 @@ def from_pylinkage(linkage: Any, file: str | Path, **how: Any) -> Gear:
     """
     from mlg_troubleshoot.gear.from_pylinkage import short_form_of
 
-    return _write(short_form(short_form_of(linkage, **how)), Path(file)).gear
+    how: dict[str, Any] = {"travel_deg": travel_deg, "output": output, "unit": unit}
+    form = short_form_of(linkage, limit=limit, margin=margin, **how)
+    return _write(short_form(form), Path(file)).gear
 
 
 def _write(found: NewGear, file: Path) -> WrittenGear:
