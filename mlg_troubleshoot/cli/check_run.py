@@ -20,6 +20,7 @@ from mlg_troubleshoot.outputs import OutputFile
 from mlg_troubleshoot.units import LengthUnit
 from mlg_troubleshoot.workflows import check as task
 from mlg_troubleshoot.workflows.diagnose import load_model_extension
+from mlg_troubleshoot.workflows.index_tables import renew_index_table
 
 # Where the prompts write a report that was not asked for by a flag.
 _ASKED_FOR = Path("report")
@@ -62,6 +63,9 @@ class Run:
 
     def run(self) -> int:
         """Judge, show and keep; the exit code is returned."""
+        renewed = renew_index_table(load_gear(self._asked.gear))
+        if renewed is not None:
+            output.say(f"Note: {renewed}")
         if self._asks:
             result = self._ask()
         else:

@@ -36,6 +36,10 @@ Rank = Annotated[int, Meta(ge=1, le=MOST_ENTRIES)]
 _SAME_RANK = 1e-4
 
 
+class StaleTableError(GearFileError):
+    """A table of indices that is missing, or was computed for another geometry or other limits."""
+
+
 class JointIndices(Table):
     """Indices of one joint, as fractions of the variance and not normalised to 1.
 
@@ -145,7 +149,7 @@ def load_index_table(gear: Gear) -> IndexTable:
     """
     path = gear.indices_file
     if not path.exists():
-        raise GearFileError(f"{path.name}: the table of indices is missing", _remedy(gear))
+        raise StaleTableError(f"{path.name}: the table of indices is missing", _remedy(gear))
     try:
         state = path.stat()
         table = _read_once(path, state.st_mtime_ns, state.st_size)
@@ -157,7 +161,7 @@ def load_index_table(gear: Gear) -> IndexTable:
         ("ensemble", table.gear.ensemble_sha256, gear.ensemble_sha256),
     ):
         if found != wanted:
-            raise GearFileError(
+            raise StaleTableError(
                 f"{path.name}: was computed for another {what}: {found[:16]}, not {wanted[:16]}",
                 _remedy(gear),
             )
@@ -166,7 +170,7 @@ def load_index_table(gear: Gear) -> IndexTable:
     if limits != wanted_limits:
         gone = sorted(set(limits) ^ set(wanted_limits))
         named = ", ".join(f"joint {number} at {limit:g} in" for number, limit in gone)
-        raise GearFileError(
+        raise StaleTableError(
             f"{path.name}: was computed for other joints or limits: {named}", _remedy(gear)
         )
     return table
